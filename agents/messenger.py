@@ -3,7 +3,7 @@
     plain MAVLink frames to one node or all          -> one packet, unchanged
     bytes to a port, a set of nodes, or confirmed    -> pieces and receipts (`fanet_mw.delivery`)
 
-`statuses.py` reports to the applications what becomes of their messages.
+`message_statuses.py` reports to the applications what becomes of their messages.
 """
 
 from collections import Counter
@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from agents.listeners import Listeners
-from agents.statuses import Statuses
+from agents.message_statuses import Statuses
 from agents.submission import Submission
 from fanet_mw import wire
 from fanet_mw.application import Application, Fate, Received, Status

@@ -22,7 +22,7 @@ from fanet_mw.routing.aodv.messages import RREP, RouteReply, RouteRequest
 from fanet_mw.routing.aodv.table import AodvRoute, AodvTable
 from fanet_mw.routing.olsr import Olsr
 from fanet_mw.routing.olsr import parameters as olsr
-from fanet_mw.serial import later
+from fanet_mw.serial_number import later
 from fanet_mw.units import BROADCAST, MS, NodeId
 from scripts.rivals import COLUMNS, row
 

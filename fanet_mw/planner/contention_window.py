@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from fanet_mw.graph.topology import Adjacency, two_hop
-from fanet_mw.planner.flood import contended_ns
+from fanet_mw.planner.flood_cost import contended_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, seconds_to_ns
 

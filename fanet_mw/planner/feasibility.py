@@ -21,7 +21,7 @@ from fanet_mw.planner import contention_window, reachability, verdict
 from fanet_mw.planner.access import Ways, access_outcome, ways
 from fanet_mw.planner.claimed_turns import Claimants, ClaimedPlan
 from fanet_mw.planner.demand import ClassPlan, TrafficClass
-from fanet_mw.planner.flood import FloodCost, flood_cost
+from fanet_mw.planner.flood_cost import FloodCost, flood_cost
 from fanet_mw.planner.goodput_bound import Goodput, any_protocol
 from fanet_mw.planner.head_slot import ClassLoad, ClusterPlan, slot_delays, work_ns
 from fanet_mw.planner.timetable_plan import Candidate, TimetablePlan, judge, table_for

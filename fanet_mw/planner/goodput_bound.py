@@ -29,7 +29,7 @@ from typing import NamedTuple
 
 from fanet_mw.airtime import Timing
 from fanet_mw.graph.topology import Adjacency, components
-from fanet_mw.planner.flood import frame_ns
+from fanet_mw.planner.flood_cost import frame_ns
 from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.routing.clustered.timetable.turn_plan import most_together
 from fanet_mw.scenario import Scenario

@@ -12,7 +12,7 @@ from fanet_mw.planner.head_slot import ClusterPlan
 from fanet_mw.planner.loss import Loss
 from fanet_mw.planner.lossy_plan import Drawn, LossyPlan
 from fanet_mw.planner.optimum import Optimum
-from fanet_mw.planner.search import ScenarioChange
+from fanet_mw.planner.scenario_change import ScenarioChange
 from fanet_mw.planner.timetable_plan import TimetablePlan
 from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE
 from fanet_mw.units import MS, S

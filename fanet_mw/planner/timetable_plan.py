@@ -19,7 +19,7 @@ from fanet_mw.bounds import (
     delay_any_order,
     delay_fifo,
 )
-from fanet_mw.planner.flood import FloodCost
+from fanet_mw.planner.flood_cost import FloodCost
 from fanet_mw.planner.head_slot import ClassLoad, ClusterPlan
 from fanet_mw.planner.variant import vary
 from fanet_mw.routing.clustered.tdma.own_bound import RootTurns

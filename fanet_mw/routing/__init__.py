@@ -18,8 +18,8 @@ MAKERS: Final[Mapping[str, str]] = {
     "aodv": "fanet_mw.routing.aodv:Aodv",
     "olsr": "fanet_mw.routing.olsr:Olsr",
     "dsdv": "fanet_mw.routing.dsdv:Dsdv",
-    "gossip": "fanet_mw.routing.storm:Gossip",
-    "counter": "fanet_mw.routing.storm:CounterBased",
+    "gossip": "fanet_mw.routing.gossip:Gossip",
+    "counter": "fanet_mw.routing.counter:CounterBased",
     "geographic": "fanet_mw.routing.geographic:Geographic",
 }
 """The class or function that makes each protocol of this package (`scenario.routing.PROTOCOLS`), as MODULE:NAME."""

@@ -32,7 +32,7 @@ class Family(IntEnum):
     DSDV = 3
     GEOGRAPHIC = 4
     ADDRESS = 5
-    """Address resolution, which is no routing protocol but runs beside any of them (`fanet_mw.routing.resolution`)."""
+    """Address resolution, which is no routing protocol but runs beside any of them (`address_resolution.py`)."""
 
 
 def type_of(family: Family, number: int) -> int:

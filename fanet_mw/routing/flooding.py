@@ -1,7 +1,7 @@
 """Plain flooding: every node re-broadcasts each new packet once, after a random jitter (paper, Figure 9).
 
 `FloodingProtocol` is the common base of the protocols that flood everything, even packets for one node: `flooding`
-here, `gossip` and `counter` in `storm.py`.
+here, `gossip` and `counter` in the files of these names.
 """
 
 from abc import abstractmethod

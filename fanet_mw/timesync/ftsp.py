@@ -20,7 +20,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
-from fanet_mw.serial import following, newer
+from fanet_mw.serial_number import following, newer
 from fanet_mw.timesync.clock_fit import EXACT, ClockFit, Line, Oscillator, Pair
 from fanet_mw.timesync.first_belief import FirstBelief
 from fanet_mw.units import MS, NodeId, S

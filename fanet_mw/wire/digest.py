@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import Final, NamedTuple, Self
 
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.serial import newer
+from fanet_mw.serial_number import newer
 from fanet_mw.wire import DIGEST, OVERHEAD, VERSION, Packed, decode_every, encode_inner
 
 WINDOW: Final = 33

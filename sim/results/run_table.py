@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from fanet_mw.errors import ConfigError
 from sim.results.file_names import SCENARIO_FILE, SUMMARY_FILE
-from sim.results.rows import flat
+from sim.results.flat_summary import flat
 
 if TYPE_CHECKING:
     from pyarrow import Table

@@ -1,6 +1,6 @@
 """The constants of AODV, OLSR and address resolution as RFCs list them; where they leave a choice, ns-3's."""
 
-from fanet_mw.routing import resolution
+from fanet_mw.routing import address_resolution
 from fanet_mw.routing.aodv import parameters as aodv
 from fanet_mw.routing.olsr import parameters as olsr
 from fanet_mw.units import MS, S
@@ -28,6 +28,6 @@ def test_olsr_has_the_values_of_rfc_3626_section_18() -> None:
 
 
 def test_address_resolution_has_the_values_of_ns_3_s_arp() -> None:
-    assert (resolution.REQUEST_JITTER_NS, resolution.WAIT_REPLY_NS) == (10 * MS, 1 * S)
-    assert (resolution.MAX_RETRIES, resolution.PENDING) == (3, 3)
-    assert (resolution.ALIVE_NS, resolution.DEAD_NS) == (120 * S, 100 * S)
+    assert (address_resolution.REQUEST_JITTER_NS, address_resolution.WAIT_REPLY_NS) == (10 * MS, 1 * S)
+    assert (address_resolution.MAX_RETRIES, address_resolution.PENDING) == (3, 3)
+    assert (address_resolution.ALIVE_NS, address_resolution.DEAD_NS) == (120 * S, 100 * S)

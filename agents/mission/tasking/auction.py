@@ -11,7 +11,7 @@ forgotten after a while, and its task is open again.
 from collections.abc import Iterable
 from typing import Final, NamedTuple
 
-from fanet_mw.serial import following, newer
+from fanet_mw.serial_number import following, newer
 from fanet_mw.units import NodeId, S
 from fanet_mw.wire.search import MOST_BIDS, WITHDRAWN, Bid
 

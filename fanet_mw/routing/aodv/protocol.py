@@ -34,13 +34,13 @@ from fanet_mw.routing.aodv.messages import (
 from fanet_mw.routing.aodv.neighbors import HelloNeighbors
 from fanet_mw.routing.aodv.table import AodvRoute, AodvTable
 from fanet_mw.routing.control import Family
-from fanet_mw.routing.routed import Routed
-from fanet_mw.routing.waiting import WaitingRoom
-from fanet_mw.serial import following, later, newer
+from fanet_mw.routing.hop_by_hop import HopByHop
+from fanet_mw.routing.waiting_room import WaitingRoom
+from fanet_mw.serial_number import following, later, newer
 from fanet_mw.units import BROADCAST, MS, NodeId, earliest, seconds_to_ns
 
 
-class Aodv(Routed):
+class Aodv(HopByHop):
     """Ad hoc on-demand distance vector routing."""
 
     family: ClassVar[Family] = Family.AODV

@@ -8,7 +8,7 @@ Entries expire when they are looked at; nothing here has a timer.
 from dataclasses import dataclass, field
 
 from fanet_mw.routing.aodv.parameters import DELETE_PERIOD_NS
-from fanet_mw.serial import following, later, newer
+from fanet_mw.serial_number import following, later, newer
 from fanet_mw.units import NodeId
 
 

@@ -22,15 +22,15 @@ from fanet_mw.routing import control
 from fanet_mw.routing.control import Family
 from fanet_mw.routing.dsdv.messages import FULL, INCREMENTAL, PER_ENTRY, Advertised, Update
 from fanet_mw.routing.dsdv.table import PERIODIC_UPDATE_NS, DsdvTable
-from fanet_mw.routing.routed import Routed
-from fanet_mw.routing.waiting import WaitingRoom
+from fanet_mw.routing.hop_by_hop import HopByHop
+from fanet_mw.routing.waiting_room import WaitingRoom
 from fanet_mw.units import NodeId, S, earliest, seconds_to_ns
 
 _GATHER_NS: Final = 1 * S
 """A change is advertised after U(0, this time), with all changes that have come by then (ns-3's triggered updates)."""
 
 
-class Dsdv(Routed):
+class Dsdv(HopByHop):
     """Destination-sequenced distance vector routing."""
 
     family: ClassVar[Family] = Family.DSDV

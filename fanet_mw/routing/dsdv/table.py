@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from fanet_mw.routing.dsdv.messages import INFINITE, Advertised
-from fanet_mw.serial import following, newer
+from fanet_mw.serial_number import following, newer
 from fanet_mw.units import NodeId, S
 
 PERIODIC_UPDATE_NS: Final = 15 * S

@@ -20,12 +20,12 @@ from fanet_mw.bus.messages import Reception, TxOutcome
 from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
+from fanet_mw.routing.address_resolution import Outgoing
 from fanet_mw.routing.control import Family
 from fanet_mw.routing.geographic.locations import HELLO_INTERVAL_NS, LocationTable
 from fanet_mw.routing.geographic.messages import BEACON, LOCATION, QUERY, Fix, Location, PositionBeacon, Query
-from fanet_mw.routing.resolution import Outgoing
-from fanet_mw.routing.routed import Routed
-from fanet_mw.routing.waiting import WaitingRoom
+from fanet_mw.routing.hop_by_hop import HopByHop
+from fanet_mw.routing.waiting_room import WaitingRoom
 from fanet_mw.units import BROADCAST, MS, US, NodeId, S, earliest, seconds_to_ns
 
 LOCATION_INTERVAL_NS: Final = 5 * S
@@ -36,7 +36,7 @@ QUERY_INTERVAL_NS: Final = 5 * S
 LOOK_INTERVAL_NS: Final = 500 * MS
 
 
-class Geographic(Routed):
+class Geographic(HopByHop):
     """Greedy forwarding by position; a packet is carried while no neighbor is nearer to its destination."""
 
     family: ClassVar[Family] = Family.GEOGRAPHIC

@@ -21,6 +21,7 @@ from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing import control
 from fanet_mw.routing.control import Family
+from fanet_mw.routing.hop_by_hop import HopByHop
 from fanet_mw.routing.olsr import parameters as p
 from fanet_mw.routing.olsr.messages import (
     HELLO,
@@ -37,8 +38,7 @@ from fanet_mw.routing.olsr.messages import (
 )
 from fanet_mw.routing.olsr.routes import OlsrRoute, routing_table
 from fanet_mw.routing.olsr.state import Repositories
-from fanet_mw.routing.routed import Routed
-from fanet_mw.serial import following
+from fanet_mw.serial_number import following
 from fanet_mw.units import BROADCAST, NodeId, earliest
 
 _HELLO_VTIME: Final = encode_time(p.NEIGHB_HOLD_TIME_NS)
@@ -46,7 +46,7 @@ _HELLO_HTIME: Final = encode_time(p.HELLO_INTERVAL_NS)
 _TC_VTIME: Final = encode_time(p.TOP_HOLD_TIME_NS)
 
 
-class Olsr(Routed):
+class Olsr(HopByHop):
     """Optimized link state routing."""
 
     family: ClassVar[Family] = Family.OLSR

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from fanet_mw.routing.olsr.messages import Hello, LinkType, NeighborType, TopologyControl, decode_time
 from fanet_mw.routing.olsr.parameters import NEIGHB_HOLD_TIME_NS, WILL_DEFAULT
-from fanet_mw.serial import newer
+from fanet_mw.serial_number import newer
 from fanet_mw.units import NodeId
 
 _NEVER_NS = 1 << 62

@@ -52,7 +52,7 @@ async def serve(
         names, expected = Topics(swarm), expected_names(scenario)
         collection = None
         if out is not None:
-            from sim.run.collecting.collection import (
+            from sim.run.collecting.router_collection import (
                 Collection,  # only imported here, because the figures of a result need numpy and a router does not
             )
 

@@ -8,7 +8,7 @@ to its own head, takes a neighbor's route to another head, so that its packets r
 from typing import Final, NamedTuple
 
 from fanet_mw.node.neighbors import Neighbor, Neighbors
-from fanet_mw.serial import following, newer
+from fanet_mw.serial_number import following, newer
 from fanet_mw.units import NodeId
 
 UNREACHABLE: Final = 255

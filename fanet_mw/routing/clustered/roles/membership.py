@@ -7,7 +7,7 @@ that is in no part of a complete schedule belongs to no cluster.
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from fanet_mw import serial
+from fanet_mw import serial_number
 from fanet_mw.routing.clustered.roles.lease import Authority
 from fanet_mw.routing.clustered.roles.states import Event
 from fanet_mw.routing.clustered.tdma.slots import Superframe
@@ -174,4 +174,4 @@ class Membership:
 
 def newer(version: Version, than: Version) -> bool:
     """True if `version` is later than another one of the same leader (16-bit serial numbers, RFC 1982)."""
-    return serial.newer(version.epoch, than.epoch, bits=16)
+    return serial_number.newer(version.epoch, than.epoch, bits=16)

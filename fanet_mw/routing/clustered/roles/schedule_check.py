@@ -7,7 +7,7 @@ from fanet_mw.node.contract import Port
 from fanet_mw.routing.clustered.roles.leader import SETTLE_NS
 from fanet_mw.routing.clustered.roles.lease import Authority
 from fanet_mw.routing.clustered.roles.membership import Membership
-from fanet_mw.serial import newer
+from fanet_mw.serial_number import newer
 from fanet_mw.units import US, S
 from fanet_mw.wire.inner import Schedule
 

@@ -12,7 +12,7 @@ from fanet_mw.node.duplicates import key_of_packet
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.forwarding.repair import AGAIN_NS, ASSESS_NS, FLOOD_OVER_NS
 from fanet_mw.routing.clustered.roles.lease import Authority
-from fanet_mw.serial import newer
+from fanet_mw.serial_number import newer
 from fanet_mw.wire.inner import Beacon
 
 

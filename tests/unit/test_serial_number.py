@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fanet_mw.serial import following, later, newer
+from fanet_mw.serial_number import following, later, newer
 
 widths = st.sampled_from([8, 16, 32])
 

@@ -1,11 +1,9 @@
-"""Two answers to the broadcast storm: flooding in which not every node relays. Everything is flooded, even packets for
-one node.
+"""Counter-based flooding: a node relays a packet unless it receives enough copies of it in time, another answer to the
+broadcast storm (Ni et al., MobiCom 1999, 3.2).
 
-    gossip   GOSSIP1(p, k): relay with probability p, always within the first k hops (Haas, Halpern, Li, ToN, 2006)
-    counter  wait U(0, assess); do not relay if C copies are received in that time    (Ni et al., MobiCom 1999, 3.2)
-
-The parameters are `routing.gossip_p`, `gossip_k`, `counter` and `assess_ms`. Not modeled: GOSSIP2 to GOSSIP4 of the
-first paper (neighbor counts, second chances, zones), and the distance- and location-based schemes of the second.
+A node waits U(0, `routing.assess_ms`), and relays the packet if it has received fewer than `routing.counter` copies by
+then. Everything is flooded, even packets for one node. Not modeled: the distance- and location-based schemes of the
+paper.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,24 +14,6 @@ from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.assessment import Assessment
 from fanet_mw.routing.flooding import FloodingProtocol
 from fanet_mw.units import MS
-
-
-class Gossip(FloodingProtocol):
-    """Flooding in which each node relays with a certain probability."""
-
-    stream_name: ClassVar[str] = "storm"
-
-    def __init__(self, port: Port) -> None:
-        super().__init__(port)
-        routing = port.scenario.routing
-        self._p, self._k, self._jitter_ns = routing.gossip_p, routing.gossip_k, routing.jitter_ns
-
-    def _consider(self, packet: Packet, *, now_ns: int) -> Sequence[Relay]:
-        """Relay within k hops, or with probability p; `hops` counts the transmissions before the one received."""
-        draw, jitter = self._random(), self._random()
-        if packet.header.hops + 1 <= self._k or draw < self._p:
-            return ((packet, now_ns + self._lead_ns + int(jitter * self._jitter_ns)),)
-        return ()
 
 
 class CounterBased(FloodingProtocol):

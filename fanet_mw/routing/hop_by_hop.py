@@ -18,8 +18,8 @@ from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing import control
+from fanet_mw.routing.address_resolution import Knowledge, Outgoing, Resolver
 from fanet_mw.routing.control import BodyReader, Family, check_node, type_of
-from fanet_mw.routing.resolution import Knowledge, Outgoing, Resolver
 from fanet_mw.units import BROADCAST, NodeId, earliest
 from fanet_mw.wire import Kind
 
@@ -38,7 +38,7 @@ _TARGET: Final = struct.Struct("<H")
 """RFC 826's target protocol address. The sender's is the origin in the header; hardware addresses are the MAC's."""
 
 
-class Routed(RoutingProtocol):
+class HopByHop(RoutingProtocol):
     """The base of the rival protocols that keep routes."""
 
     family: ClassVar[Family]

@@ -25,6 +25,7 @@ as assumed neither shift nor widen their estimates.
 import math
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
+from operator import mul, sub
 from typing import Final
 
 from agents.mission.finding.phone_filter import (
@@ -68,22 +69,32 @@ def likelihood(place: Estimate, readings: Iterable[tuple[Enu, float]], model: Ph
     """The likelihood of each common offset, given the powers of one phone at a known place; the maximum is about 1."""
     nearest = sorted(readings, key=lambda reading: (_slant_m(place, reading[0]), reading))[:_MOST_READINGS]
     sigma_db = max(model.shadowing_db, 1.0)
-    spread_db = sigma_db * math.sqrt(2)
     logs = [0.0] * len(_SINGLE)
-    threshold_dbm = model.threshold_dbm
     for position, rssi_dbm in nearest:
         expected_dbm = model.power_dbm - REFERENCE_LOSS_DB - 10 * model.exponent * math.log10(_slant_m(place, position))
-        for at, offset_db in enumerate(_SINGLE):
-            mean_dbm = expected_dbm + offset_db
-            heard = 0.5 * math.erfc((threshold_dbm - mean_dbm) / spread_db)
-            off = (rssi_dbm - mean_dbm) / sigma_db
-            logs[at] -= (0.5 * off * off + math.log(max(heard, _RARELY_HEARD))) / CORRELATION_FACTOR
+        logs = list(map(sub, logs, _improbabilities(expected_dbm, rssi_dbm, model.threshold_dbm, sigma_db)))
     most = max(logs)
     single = [math.exp(log - most) for log in logs]
     spread = _spread(max(model.offset_db, _GRAIN_DB))
-    common = [math.fsum(weight * value for weight, value in zip(row, single, strict=True)) for row in spread]
+    common = [math.fsum(map(mul, row, single)) for row in spread]
     greatest = max(common)
     return tuple(value / greatest + _LIKELIHOOD_FLOOR for value in common)
+
+
+@lru_cache(maxsize=1024)
+def _improbabilities(expected_dbm: float, rssi_dbm: float, threshold_dbm: float, sigma_db: float) -> tuple[float, ...]:
+    """For each offset of one phone, the negative logarithm of the likelihood of a received power.
+
+    A phone's powers are used again whenever further ones have come, by all UAVs of one process.
+    """
+    spread_db = sigma_db * math.sqrt(2)
+    found = []
+    for offset_db in _SINGLE:
+        mean_dbm = expected_dbm + offset_db
+        heard = 0.5 * math.erfc((threshold_dbm - mean_dbm) / spread_db)
+        off = (rssi_dbm - mean_dbm) / sigma_db
+        found.append((0.5 * off * off + math.log(max(heard, _RARELY_HEARD))) / CORRELATION_FACTOR)
+    return tuple(found)
 
 
 def common_offset(phones: Iterable[Sequence[float]]) -> PhoneOffset:

@@ -103,6 +103,8 @@ class Finds:
         if find is None:
             find = self._new_find(report.survivor, now_ns)
         before = find.latest.get(report.reporter)
+        if before == report:
+            return find  # several neighbors pass the same report on
         if before is None or report.t_us > before.t_us:
             find.latest[report.reporter] = report
         find.reporters.add(report.reporter)
@@ -139,7 +141,7 @@ class Finds:
 
     def unconfirmed(self) -> list[int]:
         """The survivors without a confirmation that holds, in order of id."""
-        return sorted(survivor for survivor, find in self.known.items() if find.confirmed is None)
+        return sorted([survivor for survivor, find in self.known.items() if find.confirmed is None])
 
     def is_confirmed(self, survivor: int) -> bool:
         """True if the survivor has a confirmation that holds."""

@@ -18,10 +18,10 @@ b. Once a person has been recognized as the phone's owner, the position of that 
 """
 
 import math
-from collections.abc import Sequence
-from functools import lru_cache
+from collections.abc import Iterable, Sequence
+from functools import lru_cache, reduce
 from itertools import compress
-from operator import add, mul
+from operator import add, and_, mul
 from typing import Final, NamedTuple
 
 from fanet_mw.units import Enu
@@ -34,6 +34,9 @@ _HALF_CELLS: Final = 16
 the strongest received power."""
 _WIDTH: Final = 2 * _HALF_CELLS + 1
 _EVERY_CELL: Final = (True,) * (_WIDTH * _WIDTH)
+_COLUMNS: Final = tuple(float(cell % _WIDTH) for cell in range(_WIDTH * _WIDTH))
+_ROWS: Final = tuple(float(cell // _WIDTH) for cell in range(_WIDTH * _WIDTH))
+"""The column and the row of each cell."""
 _OFF_CENTER_M: Final = 120.0
 """A new grid is made when the strongest power was received farther than this from the middle of the present one."""
 CORRELATION_FACTOR: Final = 1.5
@@ -124,6 +127,8 @@ class PhoneFilter:
         """The samples that the cells include: each place with the power received there, or None for no reception."""
         self._pending: list[tuple[Enu, float | None]] = []
         """The samples that the cells do not include yet; they are added when an estimate is asked for."""
+        self.pending_powers = 0
+        """The number of received powers among these."""
         self._sums: list[float] = []
         """For each cell, the sum of the residuals of the received powers."""
         self._squares: list[float] = []
@@ -142,12 +147,13 @@ class PhoneFilter:
         near that place before.
         """
         taken = self._taken.setdefault(reporter, [])
-        if any(_ground_m(p, position) < _SAME_PLACE_M for p in taken):
+        if _is_sampled(position, taken):
             return False
         taken.append(position)
         if self._middle is None:
             self._middle = position
         self._pending.append((position, rssi_dbm))
+        self.pending_powers += 1
         return True
 
     def on_silence(self, position: Enu) -> None:
@@ -156,7 +162,7 @@ class PhoneFilter:
         """
         if self._middle is None or not self.near(position, within_m=_SILENCE_M):
             return
-        if any(_ground_m(p, position) < _SAME_PLACE_M for p in self._silent_at):
+        if _is_sampled(position, self._silent_at):
             return
         self._silent_at.append(position)
         self._pending.append((position, None))
@@ -174,11 +180,6 @@ class PhoneFilter:
     @property
     def is_seen(self) -> bool:
         return self._seen is not None
-
-    @property
-    def pending_powers(self) -> int:
-        """The number of received powers that the cells do not include yet."""
-        return sum(1 for _, rssi_dbm in self._pending if rssi_dbm is not None)
 
     @property
     def included_powers(self) -> int:
@@ -211,7 +212,7 @@ class PhoneFilter:
             return
         assert self._middle is not None, "a place without reception is a sample only after the first reception"
         self._samples += self._pending
-        fresh, self._pending = self._pending, []
+        fresh, self._pending, self.pending_powers = self._pending, [], 0
         strongest = max((s for s in self._samples if s[1] is not None), key=lambda s: s[1] or 0.0)[0]
         if not self._sums or _ground_m(self._middle, strongest) > _OFF_CENTER_M:
             self._middle, fresh, self._count = strongest, self._samples, 0
@@ -288,20 +289,17 @@ class PhoneFilter:
         self._totals = scores
         possible = self._inside()
         self._best = best = max(compress(scores, possible))
-        total = mean_i = mean_j = ii = ij = jj = 0.0
         exp, least = math.exp, best - 40.0
-        for at in [at for at, score in enumerate(scores) if score >= least]:
-            if not possible[at]:
-                continue
-            weight = exp(0.5 * (scores[at] - best))
-            j, i = divmod(at, _WIDTH)
-            total += weight
-            mean_i += weight * i
-            mean_j += weight * j
-            ii += weight * i * i
-            ij += weight * i * j
-            jj += weight * j * j
-        mean_i, mean_j = mean_i / total, mean_j / total
+        likely = [score >= least for score in scores]
+        if possible is not _EVERY_CELL:
+            likely = list(map(and_, likely, possible))
+        weights = [exp(0.5 * (score - best)) for score in compress(scores, likely)]
+        columns, rows = list(compress(_COLUMNS, likely)), list(compress(_ROWS, likely))
+        by_column, by_row = list(map(mul, weights, columns)), list(map(mul, weights, rows))
+        total = _sum(weights)
+        mean_i, mean_j = _sum(by_column) / total, _sum(by_row) / total
+        ii, ij = _sum(map(mul, by_column, columns)), _sum(map(mul, by_column, rows))
+        jj = _sum(map(mul, by_row, rows))
         cell2 = _CELL_M * _CELL_M
         quantized = 1 / 12
         return Estimate(
@@ -315,6 +313,17 @@ class PhoneFilter:
 
 def _ground_m(a: Enu, b: Enu) -> float:
     return math.hypot(a.east - b.east, a.north - b.north)
+
+
+def _sum(values: Iterable[float]) -> float:
+    """The sum, added from the first to the last; `sum` adds in another manner from Python 3.12 on."""
+    return reduce(add, values, 0.0)
+
+
+def _is_sampled(position: Enu, sampled: Iterable[Enu]) -> bool:
+    """True if one of the places of earlier samples is so near to a position that both share their shadowing."""
+    east, north, hypot = position.east, position.north, math.hypot
+    return any(hypot(east_m - east, north_m - north) < _SAME_PLACE_M for east_m, north_m, _ in sampled)
 
 
 def _squared_distances_m2(middle: Enu, position: Enu, up2: float) -> list[float]:

@@ -253,13 +253,11 @@ class Guidance:
         wish = feed + _GAIN * (places - at)
         speed = np.linalg.norm(wish, axis=1)
         wish *= np.minimum(1.0, limit / np.maximum(speed, 1e-9))[:, None]
-        landings: dict[int, float] = {}
-        for row, command in self._commands.items():
-            if isinstance(command, _FlyAt):
-                wish[row] = command.velocity
-                self._fence(wish[row], at[row])
-            elif isinstance(command, _Land):
-                landings[row] = command.speed_m_s
+        flown = {row: command.velocity for row, command in self._commands.items() if isinstance(command, _FlyAt)}
+        if flown:
+            rows = [*flown]
+            wish[rows] = self._within_fence(np.array([*flown.values()]), at[rows])
+        landings = {row: command.speed_m_s for row, command in self._commands.items() if isinstance(command, _Land)}
         if landings or self._grounded:
             self._near_the_ground(wish, at, landings)
         return _keep_clear(wish, at, self._see_m) if len(at) > 1 and self._see_m else wish
@@ -271,14 +269,15 @@ class Guidance:
             self._hold(row, Enu(*at[row].tolist()))
             self._enter(row, FlightMode.FAILSAFE)
 
-    def _fence(self, wish: Values, at: Values) -> None:
-        """Limit a velocity [3] so that the UAV can brake before the geofence; a UAV beyond it is brought back."""
+    def _within_fence(self, wish: Rows, at: Rows) -> Rows:
+        """Velocities limited so that each UAV can brake before the geofence; a UAV beyond it is brought back."""
+        limited = wish.copy()
         for axis, half in ((0, self._half_east), (1, self._half_north)):
-            outwards = math.copysign(1.0, at[axis])
-            left_m = half + FENCE_M - abs(float(at[axis]))
-            most = math.sqrt(2 * _BRAKE_M_S2 * left_m) if left_m > 0 else -_HOLD_M_S
-            if wish[axis] * outwards > most:
-                wish[axis] = most * outwards
+            outwards = np.copysign(1.0, at[:, axis])
+            left_m = half + FENCE_M - np.abs(at[:, axis])
+            most = np.where(left_m > 0, np.sqrt(2 * _BRAKE_M_S2 * np.maximum(left_m, 0.0)), -_HOLD_M_S)
+            limited[:, axis] = np.where(wish[:, axis] * outwards > most, most * outwards, wish[:, axis])
+        return limited
 
     def _near_the_ground(self, wish: Rows, at: Rows, landings: Mapping[int, float]) -> None:
         """Set the velocities of UAVs that land or stand on the ground.

@@ -17,3 +17,13 @@ class Motion(NamedTuple):
         seconds = (t_ns - self.at_ns) / S
         here, v = self.position, self.velocity
         return Enu(here.east + v.east * seconds, here.north + v.north * seconds, here.up + v.up * seconds)
+
+    def offset_from(self, place: Enu, t_ns: int) -> Enu:
+        """The vector from a place to the position at another instant."""
+        seconds = (t_ns - self.at_ns) / S
+        here, v = self.position, self.velocity
+        return Enu(
+            here.east + v.east * seconds - place.east,
+            here.north + v.north * seconds - place.north,
+            here.up + v.up * seconds - place.up,
+        )

@@ -155,7 +155,7 @@ class ConflictMonitor:
 
     def _approach(self, node: NodeId, own: Motion) -> ClosestApproach:
         other = self._others[node]
-        apart = other.position_at(own.at_ns).minus(own.position)
+        apart = other.offset_from(own.position, own.at_ns)
         return closest(apart, other.velocity.minus(own.velocity), within_s=self._horizon_s)
 
     def _courses(self, own: Motion) -> list[Motion]:
@@ -182,7 +182,7 @@ class ConflictMonitor:
         other = self._others.get(node)
         if other is None:
             return own.at_ns > self._threats[node].until_ns + _PAST_NS
-        sideways = _level(other.position_at(own.at_ns).minus(own.position))
+        sideways = _level(other.offset_from(own.position, own.at_ns))
         approach = closest(sideways, _level(other.velocity.minus(own.velocity)), within_s=_EVER_S)
         return approach.distance_m > self._clear_m
 

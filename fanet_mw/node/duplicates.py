@@ -45,6 +45,11 @@ def key_of(origin: int, seq: int) -> int:
     return origin * _SPREAD + seq
 
 
+def origin_and_seq(key: int) -> tuple[int, int]:
+    """The pair of which a number is the key."""
+    return divmod(key, _SPREAD)
+
+
 def key_of_packet(packet: Packet) -> int:
     """The key of a packet."""
     return key_of(packet.header.origin, packet.header.seq)

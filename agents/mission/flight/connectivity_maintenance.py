@@ -39,7 +39,7 @@ class ConnectivityMaintenance:
             if motion is None:
                 continue
             plane = tether_plane(
-                motion.position_at(now_ns).minus(self._navigation.position),
+                motion.offset_from(self._navigation.position, now_ns),
                 (motion.velocity.east, motion.velocity.north),
                 tether_m=self._tether_m,
                 within_s=_TETHER_S,
@@ -53,7 +53,7 @@ class ConnectivityMaintenance:
         plan = self._formation.plan
         assert plan is not None, "who has a place has a plan"
         near = [
-            (motion.position_at(now_ns).minus(self._navigation.position).norm(), other)
+            (motion.offset_from(self._navigation.position, now_ns).norm(), other)
             for other in places
             if (motion := self._neighbors.motion(plan.nodes[other], now_ns=now_ns)) is not None
         ]

@@ -43,7 +43,7 @@ class ReciprocalAvoidance:
         planes: list[tuple[float, HalfPlane]] = []
         seen = [Motion(*mover) for mover in self._obstacles.movers(now_ns)]
         for motion in (*self._neighbors.all(now_ns=now_ns), *seen):
-            offset = motion.position_at(now_ns).minus(here)
+            offset = motion.offset_from(here, now_ns)
             distance = math.hypot(offset.east, offset.north)
             climb = flown.up - motion.velocity.up
             apart_soon = abs(offset.up - climb * 3.0)

@@ -72,7 +72,7 @@ class Station:
         if own is not None:
             return own
         heard = [
-            (motion.position_at(now_ns).minus(place).norm(), head)
+            (motion.offset_from(place, now_ns).norm(), head)
             for head in clusters
             if (motion := self._motions.motion(head, now_ns=now_ns)) is not None
         ]

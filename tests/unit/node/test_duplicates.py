@@ -65,3 +65,8 @@ def test_no_two_packets_have_the_same_key(one: tuple[int, int], other: tuple[int
 def test_packets_of_all_origins_at_about_the_same_time_spread_over_a_dict() -> None:
     slots = {duplicates.key_of(origin, seq) % 4096 for origin in range(1, 46) for seq in range(1000, 1010)}
     assert len(slots) > 400, "450 keys; a dict looks for a number by its low bits"
+
+
+@given(packets)
+def test_the_key_of_a_packet_names_it(packet: tuple[int, int]) -> None:
+    assert duplicates.origin_and_seq(duplicates.key_of(*packet)) == packet

@@ -16,7 +16,7 @@ from itertools import compress
 from operator import ne
 from typing import Final, NamedTuple
 
-from fanet_mw.node.duplicates import key_of
+from fanet_mw.node.duplicates import key_of, origin_and_seq
 from fanet_mw.node.packet import Packet
 from fanet_mw.units import MS, US
 from fanet_mw.wire.digest import CAPACITY, Digest, Holding
@@ -54,13 +54,11 @@ class Repair:
         self._capacity = capacity
         self._random = random
         self._holdings: dict[int, Holding] = {}
-        self._store: dict[int, _Kept] = {}
-        """The stored packets by key."""
+        self._store: dict[int, dict[int, _Kept]] = {}
+        """The stored packets by sequence number, for each origin of which there is any."""
         self._order: deque[tuple[int, int, int]] = deque()
-        """The keys in the order in which their packets came, each with the instant of the packet's generation [swarm
-        us] and its origin, so that a packet need not be looked at when it is dropped."""
-        self._stored: dict[int, int] = {}
-        """The number of stored packets by origin."""
+        """Origin, sequence number and instant of generation [swarm us] of each stored packet, in the order in which the
+        packets came, so that a packet need not be looked at when it is dropped."""
         self.pending: dict[int, int] = {}
         """The instant at which each packet is to be repaired, by key."""
         self._due: list[tuple[int, int]] = []
@@ -71,42 +69,43 @@ class Repair:
 
     def hold(self, packet: Packet, *, flooded: bool, expect_ns: int, now_ns: int) -> None:
         """Store a data packet, received or own. One that has not been flooded yet should have been by `expect_ns`."""
-        header, store, order = packet.header, self._store, self._order
+        header = packet.header
         origin, seq = header.origin, header.seq
-        key = key_of(origin, seq)
         holding = self._holdings.get(origin)
         self._holdings[origin] = Holding(origin, seq, 0) if holding is None else holding.with_(seq)
         ripe_ns = now_ns + FLOOD_OVER_NS if flooded else expect_ns
-        known = store.get(key)
+        of_origin = self._store.get(origin)
+        if of_origin is None:
+            of_origin = self._store[origin] = {}
+        known = of_origin.get(seq)
         if known is not None:
-            store[key] = _Kept(packet, min(ripe_ns, known.ripe_ns))
+            of_origin[seq] = _Kept(packet, min(ripe_ns, known.ripe_ns))
             return
-        store[key] = _new(_Kept, (packet, ripe_ns))
-        order.append((key, header.origin_us, origin))
-        self._stored[origin] = self._stored.get(origin, 0) + 1
-        if len(store) > self._capacity or order[0][1] < (now_ns - self._window_ns) // US:
+        of_origin[seq] = _new(_Kept, (packet, ripe_ns))
+        order = self._order
+        order.append((origin, seq, header.origin_us))
+        if len(order) > self._capacity or order[0][2] < (now_ns - self._window_ns) // US:
             self._forget(now_ns)
 
     def _forget(self, now_ns: int) -> None:
         """Drop packets that are too old to be repaired, and the oldest ones beyond the capacity."""
         horizon_us = (now_ns - self._window_ns) // US
-        order, store, stored = self._order, self._store, self._stored
+        order, store = self._order, self._store
         while order:
-            key, born_us, origin = order[0]
-            if len(store) <= self._capacity and born_us >= horizon_us:
+            origin, seq, born_us = order[0]
+            if len(order) <= self._capacity and born_us >= horizon_us:
                 return
             order.popleft()
-            del store[key]
-            if stored[origin] > 1:
-                stored[origin] -= 1
-            else:
-                del stored[origin]
+            of_origin = store[origin]
+            del of_origin[seq]
+            if not of_origin:
+                del store[origin]
 
     def digest(self, *, now_ns: int, most: int = _MOST_ORIGINS) -> Digest:
         """The digest for this node's hello: of all origins, or of the next `most` of them."""
         most = min(most, _MOST_ORIGINS)
         self._forget(now_ns)
-        origins = sorted(self._stored)
+        origins = sorted(self._store)
         if len(origins) <= most:
             return Digest(tuple(self._holdings[origin] for origin in origins), complete=True)
         at = self._turn % len(origins)
@@ -118,16 +117,19 @@ class Repair:
 
     def on_digest(self, digest: Digest, *, now_ns: int) -> None:
         """A neighbor's hello was received: plan to send what it lacks."""
-        told, held, origins = digest.by_origin, self._holdings, self._stored
+        told, held, origins = digest.by_origin, self._holdings, self._store
         planned = 0
         for origin in compress(origins, map(ne, map(told.get, origins), map(held.__getitem__, origins))):
             theirs = told.get(origin)
             if theirs is None and not digest.complete:
                 continue
+            of_origin = origins[origin]
             for seq in held[origin].beyond(theirs):
+                kept = of_origin.get(seq)
+                if kept is None or kept.ripe_ns > now_ns:
+                    continue
                 key = key_of(origin, seq)
-                kept = self._store.get(key)
-                if kept is not None and kept.ripe_ns <= now_ns and key not in self.pending:
+                if key not in self.pending:
                     self._plan(key, now_ns)
                     planned += 1
                     if planned == _PER_HELLO:
@@ -144,9 +146,11 @@ class Repair:
             self._put_off(key, now_ns)
 
     def _put_off(self, key: int, now_ns: int) -> None:
-        kept = self._store.get(key)
+        origin, seq = origin_and_seq(key)
+        of_origin = self._store.get(origin, {})
+        kept = of_origin.get(seq)
         if kept is not None:
-            self._store[key] = kept._replace(ripe_ns=now_ns + AGAIN_NS)
+            of_origin[seq] = kept._replace(ripe_ns=now_ns + AGAIN_NS)
 
     def next_wake_ns(self) -> int | None:
         due = self._due
@@ -162,7 +166,8 @@ class Repair:
         while (due_ns := self.next_wake_ns()) is not None and due_ns <= now_ns:
             _, key = heapq.heappop(self._due)
             del self.pending[key]
-            kept = self._store.get(key)
+            origin, seq = origin_and_seq(key)
+            kept = self._store.get(origin, {}).get(seq)
             if kept is not None:
                 packets.append((due_ns, kept.packet))
                 self._put_off(key, now_ns)

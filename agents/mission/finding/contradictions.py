@@ -43,7 +43,7 @@ class Contradictions:
         if find.confirmed is None:
             self._judged.pop(survivor, None)
             return False
-        received = find.filter.included_powers + find.filter.pending_powers
+        received = find.filter.received_powers
         if received - self._judged.setdefault(survivor, received) < _FRESH:
             return False
         self._judged[survivor] = received

@@ -127,8 +127,6 @@ class PhoneFilter:
         """The samples that the cells include: each place with the power received there, or None for no reception."""
         self._pending: list[tuple[Enu, float | None]] = []
         """The samples that the cells do not include yet; they are added when an estimate is asked for."""
-        self.pending_powers = 0
-        """The number of received powers among these."""
         self._sums: list[float] = []
         """For each cell, the sum of the residuals of the received powers."""
         self._squares: list[float] = []
@@ -153,7 +151,6 @@ class PhoneFilter:
         if self._middle is None:
             self._middle = position
         self._pending.append((position, rssi_dbm))
-        self.pending_powers += 1
         return True
 
     def on_silence(self, position: Enu) -> None:
@@ -180,6 +177,11 @@ class PhoneFilter:
     @property
     def is_seen(self) -> bool:
         return self._seen is not None
+
+    @property
+    def received_powers(self) -> int:
+        """The number of received powers, those included that the cells do not include yet."""
+        return sum(map(len, self._taken.values()))
 
     @property
     def included_powers(self) -> int:
@@ -212,7 +214,7 @@ class PhoneFilter:
             return
         assert self._middle is not None, "a place without reception is a sample only after the first reception"
         self._samples += self._pending
-        fresh, self._pending, self.pending_powers = self._pending, [], 0
+        fresh, self._pending = self._pending, []
         strongest = max((s for s in self._samples if s[1] is not None), key=lambda s: s[1] or 0.0)[0]
         if not self._sums or _ground_m(self._middle, strongest) > _OFF_CENTER_M:
             self._middle, fresh, self._count = strongest, self._samples, 0

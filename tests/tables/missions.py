@@ -157,6 +157,7 @@ PLACES_HEAD: Final = [
 ]  # fmt: skip
 CLEAR_HEAD: Final = [
     "others are known by", "seeds", "contacts with UAVs / solids", "nearer than 4 m", "least distance [m]",
+    "nearest UAV: 1 % / median [m]",
     *(f"UAV-seconds within {limit:.0f} m [%]" for limit in _NEAR_M),
 ]  # fmt: skip
 
@@ -170,6 +171,8 @@ def clear_row(name: str, runs: Sequence[Run]) -> list[str]:
         f"{sum(found['collisions'] - found['solid'] for found in runs)} / {sum(found['solid'] for found in runs)}",
         f"{sum(found['losses'] for found in runs)}",
         f"{min(found['least_m'] for found in runs):.1f}",
+        f"{statistics.fmean(found['nearest_m']['p1'] for found in runs):.0f} / "
+        f"{statistics.fmean(found['nearest_m']['p50'] for found in runs):.0f}",
         *(f"{100 * share:.2f}" for share in near),
     ]
 

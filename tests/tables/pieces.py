@@ -10,10 +10,11 @@ from typing import Final
 from tests.tables.kept import KEPT, Kept, OutOfTime
 from tests.tables.mission import SMALL, WHOLE
 from tests.tables.missions import CLEAR, COUNTRY, PLACES, SHAPES, Case, fly
+from tests.tables.paper_rescue import PAPER
 
 TABLES: Final[Mapping[str, Mapping[str, Case]]] = {
     "places": PLACES, "country": COUNTRY, "shapes": SHAPES, "keeping-clear": CLEAR, "mission-network": SMALL,
-    "mission-network-whole": WHOLE,
+    "mission-network-whole": WHOLE, "rescue-paper": PAPER,
 }  # fmt: skip
 
 

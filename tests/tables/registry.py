@@ -7,7 +7,17 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from tests.tables import attacks, emulator, flight, formation_flight, installations, mission, missions, protocol
+from tests.tables import (
+    attacks,
+    emulator,
+    flight,
+    formation_flight,
+    installations,
+    mission,
+    missions,
+    paper_rescue,
+    protocol,
+)
 from tests.tables.markdown import Rows, Tolerance
 
 DOCUMENTS: Final = Path(__file__).parents[2] / "docs"
@@ -58,6 +68,9 @@ TABLES: Final[Mapping[str, Table]] = {
     "country": Table("results/missions.md", missions.country, Tolerance(absolute=0.05, relative=0.02)),
     "shapes": Table("results/missions.md", missions.shapes, Tolerance(absolute=1, relative=0.05)),
     "keeping-clear": Table("results/missions.md", missions.keeping_clear, Tolerance(absolute=0.05, relative=0.02)),
+    "rescue-paper": Table(
+        "results/rescue-paper.md", paper_rescue.paper_rescues, Tolerance(absolute=0.05, relative=0.02)
+    ),
     "installations": Table(
         "results/installations.md", installations.installations, Tolerance(relative=0.1), installations.MACHINE
     ),

@@ -21,6 +21,7 @@ _PROTOCOLS: Final = {
         "clusters.repair_s=0",
     ),
 }  # fmt: skip
+_FIRST_SEEDS: Final = tuple(range(1, 6))
 
 
 def _cases(keys: tuple[str, ...], seeds: tuple[int, ...], losses: tuple[float, ...]) -> Mapping[str, Case]:
@@ -32,8 +33,10 @@ def _cases(keys: tuple[str, ...], seeds: tuple[int, ...], losses: tuple[float, .
 
 
 SMALL: Final = {
-    **_cases(_FEW_UAVS, (1, 2), (0.0, 0.5, 0.8)),
-    "ours, and hellos are not used to avoid others | 0%": Case("rescue", (*_FEW_UAVS, "mission.avoid_by=[]"), (1, 2)),
+    **_cases(_FEW_UAVS, _FIRST_SEEDS, (0.0, 0.5, 0.8)),
+    "ours, and hellos are not used to avoid others | 0%": Case(
+        "rescue", (*_FEW_UAVS, "mission.avoid_by=[]"), _FIRST_SEEDS
+    ),
 }
 WHOLE: Final = _cases(("duration_s=240",), (1,), (0.0, 0.8))
 

@@ -234,6 +234,8 @@ class Uav(Actor):
             setpoint = setpoint._replace(kind=SetpointKind.VELOCITY, velocity=course.velocity)
         elif course.land:
             setpoint = setpoint._replace(kind=SetpointKind.LAND)
+        elif course.take_off:
+            setpoint = setpoint._replace(kind=SetpointKind.TAKEOFF)
         self.outbox.append((self._topics.setpoint, setpoint))
 
     def _tap(self, frames: bytes, now_ns: int) -> None:

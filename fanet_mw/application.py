@@ -43,6 +43,8 @@ class Course(NamedTuple):
     land: bool = False
     """True: the UAV sinks straight down from where it is, at the speed of the course, and stops its motors on the
     ground."""
+    take_off: bool = False
+    """True: the UAV climbs straight up to the height of `position`, at the speed of the course, and stays there."""
 
 
 class Received(NamedTuple):

@@ -1,5 +1,6 @@
 """Records what a searching UAV is doing, in one word, whenever it changes."""
 
+from agents.mission.flight.flight import Flight
 from agents.mission.flight.return_home import ReturnHome
 from agents.mission.formation.formation_place import FormationPlace
 from agents.mission.outbox import Outbox
@@ -8,11 +9,14 @@ from fanet_mw.units import NodeId
 
 
 class ModeRecord:
-    """The mode of one UAV: wait, deploy, search, respond, return or land."""
+    """The mode of one UAV: takeoff, wait, deploy, search, respond, return or land."""
 
-    def __init__(self, node: NodeId, place: FormationPlace, return_home: ReturnHome, outbox: Outbox) -> None:
+    def __init__(
+        self, node: NodeId, place: FormationPlace, flight: Flight, return_home: ReturnHome, outbox: Outbox
+    ) -> None:
         self._node = node
-        self._place, self._return_home, self._outbox = place, return_home, outbox
+        self._place, self._flight = place, flight
+        self._return_home, self._outbox = return_home, outbox
         self._last: tuple[str, int] | None = None
         """The mode that was recorded last, and the survivor to whom the UAV flew then."""
 
@@ -28,6 +32,8 @@ class ModeRecord:
             return "land"
         if self._return_home.leaves:
             return "return"
+        if self._flight.takes_off:
+            return "takeoff"
         if survivor:
             return "respond"
         if self._place.is_taken_up(now_ns):

@@ -27,6 +27,7 @@ from agents.mission.flight.flight import Flight
 from agents.mission.flight.goal import Goal
 from agents.mission.flight.reciprocal_avoidance import ReciprocalAvoidance
 from agents.mission.flight.return_home import ReturnHome
+from agents.mission.flight.take_off import TakeOff, take_off_ns
 from agents.mission.flight.velocity_choice import VelocityChoice
 from agents.mission.formation.formation_place import FormationPlace
 from agents.mission.formation.formation_planner import FormationPlanner
@@ -73,10 +74,14 @@ class Searcher:
         self._radar = RadarWatch(navigation, obstacles, neighbors, mission.avoid_by)
         self._place = place = FormationPlace(node, navigation, reach_m=reach_m)
         least_m_s, _ = mission.approach_speeds_m_s
-        planner = FormationPlanner(node, expected=scenario.nodes.count, deploy_speed_m_s=_DEPLOY * least_m_s)
+        nodes = scenario.nodes
+        planner = FormationPlanner(
+            node, expected=nodes.count, deploy_speed_m_s=_DEPLOY * least_m_s,
+            take_off_ns=take_off_ns(nodes.altitude_m) if nodes.on_ground else 0,
+        )  # fmt: skip
         self._plans = PlanExchange(
             node, planner, place, navigation, outbox,
-            pattern=formation(scenario, scenario.nodes.count), random=self._random,
+            pattern=formation(scenario, nodes.count), random=self._random,
         )  # fmt: skip
         coverage = coverage_map(scenario)
         self._reception = PhoneReception(scenario, node, finds, navigation, outbox, coverage)
@@ -100,8 +105,14 @@ class Searcher:
         )
         gaps = None if coverage is None else Gaps(coverage, place)
         goal = Goal(finds, navigation, place, approach, gaps)
-        self._flight = Flight(navigation, goal, velocity_choice, self._return_home)
-        self._mode = ModeRecord(node, place, self._return_home, outbox)
+        take_off = TakeOff(
+            node, position,
+            navigation=navigation, neighbors=neighbors, outbox=outbox, height_m=nodes.altitude_m,
+        ) if nodes.on_ground else None  # fmt: skip
+        self._flight = Flight(
+            navigation, place, goal, velocity_choice, take_off=take_off, return_home=self._return_home
+        )
+        self._mode = ModeRecord(node, place, self._flight, self._return_home, outbox)
         self._node = node
         self._next_review_ns: int | None = None
 

@@ -36,8 +36,9 @@ class Nodes(Section):
     altitude_m: Length = 50.0
     """Height at which the nodes start and fly, with every layout but `explicit`."""
     on_ground: bool = False
-    """Whether UAVs stand on the ground at the start, and take off when told to; otherwise they
-    start at `altitude_m`."""
+    """Whether UAVs stand on the ground at the start; otherwise they start at `altitude_m`. UAVs of a planned search
+    (`mission.search`) take off by themselves, straight up to `altitude_m` above their pads; others when an application
+    commands it."""
     telemetry_hz: Rate = 1.0
     """Rate of each node's MAVLink telemetry on its tap; 0 sends none."""
     positions_m: tuple[tuple[Coordinate, Coordinate, Coordinate], ...] = ()

@@ -55,6 +55,7 @@ COUNTRY: Final[Mapping[str, Case]] = {
     "`rescue`": Case("rescue", (), _TWENTY),
     "`hills`": Case("hills", (), _TWENTY),
     "`night`": Case("night", (), _TWENTY),
+    "`rescue-base`": Case("rescue-base", (), (1, 2, 3)),
 }
 _SMALL: Final = (
     "nodes.count=20", "nodes.spacing_m=100", "nodes.telemetry_hz=0", "clusters.count=4", "traffic.interval_s=4",

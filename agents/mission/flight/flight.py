@@ -2,7 +2,9 @@
 
 from agents.mission.flight.goal import Goal
 from agents.mission.flight.return_home import ReturnHome
+from agents.mission.flight.take_off import TakeOff
 from agents.mission.flight.velocity_choice import VelocityChoice
+from agents.mission.formation.formation_place import FormationPlace
 from agents.mission.navigation.navigation import Navigation
 from fanet_mw.units import STILL, Enu
 
@@ -11,10 +13,19 @@ class Flight:
     """Chooses the velocity of one UAV."""
 
     def __init__(
-        self, navigation: Navigation, goal: Goal, velocity_choice: VelocityChoice, return_home: ReturnHome
+        self,
+        navigation: Navigation,
+        place: FormationPlace,
+        goal: Goal,
+        velocity_choice: VelocityChoice,
+        *,
+        take_off: TakeOff | None,
+        return_home: ReturnHome,
     ) -> None:
-        self._navigation, self._goal = navigation, goal
-        self._velocity_choice, self._return_home = velocity_choice, return_home
+        """`take_off`: None for a UAV that is in the air from the start."""
+        self._navigation, self._place, self._goal = navigation, place, goal
+        self._velocity_choice = velocity_choice
+        self._take_off, self._return_home = take_off, return_home
         self.velocity: Enu | None = None
         """A new velocity to fly, until the application takes it; None if there is no new one."""
 
@@ -25,10 +36,25 @@ class Flight:
     def fix(self, position: Enu, velocity: Enu, survivor: int | None, *, now_ns: int) -> None:
         """A position fix: choose a velocity. `survivor` is the one to whom this UAV flies, if any."""
         self._navigation.fix(position, velocity, now_ns=now_ns)
-        if not self._return_home.leaves:
+        if self.takes_off and self._climbs(now_ns):
+            self.velocity = None
+        elif not self._return_home.leaves:
             goal, feed = self._goal.at(survivor, now_ns)
             self.velocity = self._velocity_choice.velocity(goal, feed, now_ns)
         elif self._return_home.land_if_there():
             self.velocity = None
         else:
             self.velocity = self._velocity_choice.velocity(self._return_home.goal, STILL, now_ns)
+
+    @property
+    def takes_off(self) -> bool:
+        """True from the start of a UAV that stands on the ground until it has taken off, or leaves its mission."""
+        return self._take_off is not None and self._take_off.lasts and not self._return_home.leaves
+
+    def _climbs(self, now_ns: int) -> bool:
+        """Go on with the take-off; returns False once it is over, and the UAV departs for its place."""
+        assert self._take_off is not None, "who takes off stood on the ground"
+        self._take_off.fix(now_ns)
+        if not self._take_off.lasts:
+            self._place.depart(now_ns)
+        return self._take_off.lasts

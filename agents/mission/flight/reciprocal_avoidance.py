@@ -18,7 +18,7 @@ from fanet_mw.units import Enu, S
 _LEVEL_M: Final = 4.0
 """UAVs whose heights differ by more than twice this are on different levels, and not in each other's way once both keep
 their heights."""
-_CLEARANCE_M: Final = 10.0
+CLEARANCE_M: Final = 10.0
 """The distance that is kept from other UAVs, in addition to the error of their positions."""
 _HORIZON_S: Final = 6.0
 """A collision is avoided if it would happen within this time."""
@@ -53,7 +53,7 @@ class ReciprocalAvoidance:
                 offset,
                 (flown.east, flown.north),
                 (motion.velocity.east, motion.velocity.north),
-                clearance_m=_CLEARANCE_M + position_error_m((now_ns - motion.at_ns) / S),
+                clearance_m=CLEARANCE_M + position_error_m((now_ns - motion.at_ns) / S),
                 horizon_s=_HORIZON_S,
                 share=0.5,
             )

@@ -38,7 +38,8 @@ class FormationPlace:
         self.pattern: Pattern | None = None
         self.place: int | None = None
         self._left_from: Enu | None = None
-        """The position at which this UAV was when it received its first plan, and from which it flies to its place."""
+        """The position at which this UAV was when it received its first plan, or had taken off after that; it flies to
+        its place from there."""
         self._left_ns = 0
         """The instant at which it leaves that position."""
 
@@ -48,7 +49,12 @@ class FormationPlace:
         self.plan, self.pattern = plan, pattern_of(plan)
         self.place = plan.nodes.index(self._node) if self._node in plan.nodes else None
         if first:
-            self._left_from, self._left_ns = self._navigation.over_ground(now_ns), max(now_ns, plan.start_us * US)
+            self.depart(now_ns)
+
+    def depart(self, now_ns: int) -> None:
+        """Fly to the place from here, and not before the plan begins."""
+        begins_ns = now_ns if self.plan is None else self.plan.start_us * US
+        self._left_from, self._left_ns = self._navigation.over_ground(now_ns), max(now_ns, begins_ns)
 
     def leave(self) -> None:
         """Give up the place, even if the plan still has it."""

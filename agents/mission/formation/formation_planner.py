@@ -5,6 +5,7 @@
                 _PATIENCE_NS
     lost nodes: a UAV that was not received for _LOST_NS loses its place; a follower takes over a place of a team or of
                 a relay, because those places keep the swarm connected and sweep the area
+    take-off:   the first plan of UAVs on the ground begins when they have had time to climb
     leavers:    a node whose status says that its battery is only enough for the way home is replaced at once
 
 The first assignment minimizes the sum of the squared distances flown. If all UAVs leave and arrive at the same
@@ -47,8 +48,10 @@ class _HeardUav(NamedTuple):
 class FormationPlanner:
     """The planning at one node. Any node can be the planner; all others only listen."""
 
-    def __init__(self, node: NodeId, *, expected: int, deploy_speed_m_s: float) -> None:
+    def __init__(self, node: NodeId, *, expected: int, deploy_speed_m_s: float, take_off_ns: int = 0) -> None:
+        """`take_off_ns`: the time that UAVs need for their take-off, before which the first plan does not begin."""
         self._node = node
+        self._take_off_ns = take_off_ns
         self._expected = expected
         self._deploy_speed = deploy_speed_m_s
         self._members: dict[int, _HeardUav] = {}
@@ -143,12 +146,14 @@ class FormationPlanner:
         for node, place in zip(nodes, chosen, strict=True):
             holders[place] = node
         holders = _filled(holders, pattern)
+        assert self._began_ns is not None, "a plan is made in a review"
+        start_ns = max(now_ns + _NOTICE_NS, self._began_ns + self._take_off_ns)
         farthest_m = max(costs[row][place] for row, place in enumerate(chosen)) ** 0.5
         return plan_of(
             pattern,
             tuple(holders),
             planner=self._node,
-            start_us=(now_ns + _NOTICE_NS) // US,
+            start_us=start_ns // US,
             deploy_ds=round(10 * max(1.0, farthest_m / self._deploy_speed)),
         )
 

@@ -88,6 +88,19 @@ def test_a_plan_gives_everyone_a_place_and_the_swarm_stays_in_one_piece_on_the_w
         assert is_one(places), share
 
 
+def test_the_first_plan_begins_when_all_have_had_time_to_take_off() -> None:
+    begins_s = []
+    for take_off_s in (0, 5, 30):
+        planner = FormationPlanner(NodeId(1), expected=45, deploy_speed_m_s=9, take_off_ns=take_off_s * S)
+        planner.review(None, now_ns=S)
+        for other in range(1, 46):
+            planner.status(SearchStatus(0, Enu(15.0 * other, 0.0, 0.1), other, 0, 100), now_ns=0)
+        assert planner.review(formation(), now_ns=3 * S)
+        assert planner.plan is not None
+        begins_s.append(planner.plan.start_us * US / S)
+    assert begins_s == [10, 10, 31], "from the notice of 7 s, or from the first review"
+
+
 def test_the_place_of_a_lost_uav_in_a_line_goes_to_a_follower() -> None:
     planner, pattern = planner_with(45), formation()
     planner.review(pattern, now_ns=S)

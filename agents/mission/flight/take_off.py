@@ -1,0 +1,92 @@
+"""The take-off of a UAV that stands on its pad: straight up to the height of the lanes, clear of those beside it."""
+
+import math
+from typing import Final
+
+from agents.mission.flight.reciprocal_avoidance import CLEARANCE_M
+from agents.mission.navigation.navigation import Navigation
+from agents.mission.navigation.neighbor_motions import NeighborMotions
+from agents.mission.outbox import Outbox
+from fanet_mw.application import Course
+from fanet_mw.units import Enu, NodeId, S, seconds_to_ns
+
+_CLIMB_M_S: Final = 2.5
+"""The speed of the climb."""
+_LISTEN_NS: Final = 3 * S
+"""How long a UAV listens before it takes off, to learn from hellos who stands beside it."""
+_PATIENCE_NS: Final = 40 * S
+"""A UAV takes off this long after its start even if another one still stands beside it: that one may be broken."""
+_LEAD_M: Final = 15.0
+"""Of two UAVs whose pads are nearer to each other than the clearance, the second one takes off when the first one is
+this far above it."""
+_UP: Final = 0.9
+"""A UAV has taken off once it has climbed this share of the height; it climbs the rest on its way."""
+_STOPPED_M_S: Final = 0.3
+"""A UAV that climbs more slowly than this has not received its setpoint, or has reached the height."""
+_REPEAT_NS: Final = 2 * S
+"""The interval at which the setpoint is sent again while the UAV does not climb."""
+
+
+def take_off_ns(height_m: float) -> int:
+    """The time from the start to the end of a take-off that waits for nobody; a second is for getting up to speed."""
+    return _LISTEN_NS + seconds_to_ns(_UP * height_m / _CLIMB_M_S + 1.0)
+
+
+class TakeOff:
+    """The take-off of one UAV."""
+
+    def __init__(
+        self,
+        node: NodeId,
+        pad: Enu,
+        *,
+        navigation: Navigation,
+        neighbors: NeighborMotions,
+        outbox: Outbox,
+        height_m: float,
+    ) -> None:
+        """`pad`: the place on which the UAV stands. `height_m`: the height of the lanes above ground."""
+        self._node, self._pad = node, pad
+        self._navigation, self._neighbors, self._outbox = navigation, neighbors, outbox
+        self._height_m = height_m
+        self._began_ns: int | None = None
+        self._told_ns: int | None = None
+        """The instant at which the take-off was last commanded; None while the UAV waits on its pad."""
+        self.lasts = True
+        """True until the UAV has taken off."""
+
+    def fix(self, now_ns: int) -> None:
+        """A position fix: wait, command the take-off, or find that it is over."""
+        if self._began_ns is None:
+            self._began_ns = now_ns
+        climb_m_s = self._navigation.velocity.up
+        if self._told_ns is None:
+            if not self._is_clear(now_ns - self._began_ns, now_ns):
+                return
+        elif self._is_up(climb_m_s):
+            self.lasts = False
+            return
+        elif climb_m_s > _STOPPED_M_S or now_ns - self._told_ns < _REPEAT_NS:
+            return
+        self._told_ns = now_ns
+        above = self._pad._replace(up=self._pad.up + self._height_m)
+        self._outbox.course = Course(above, _CLIMB_M_S, take_off=True)
+
+    def _is_clear(self, waited_ns: int, now_ns: int) -> bool:
+        """True once no neighbor with a lower id stands or climbs right beside this UAV."""
+        return waited_ns >= _PATIENCE_NS or (
+            waited_ns >= _LISTEN_NS
+            and not any(
+                node < self._node and self._is_beside(motion.position_at(now_ns))
+                for node, motion in self._neighbors.by_node(now_ns=now_ns)
+            )
+        )
+
+    def _is_beside(self, other: Enu) -> bool:
+        off = other.minus(self._pad)
+        return math.hypot(off.east, off.north) < CLEARANCE_M and off.up < min(_LEAD_M, _UP * self._height_m)
+
+    def _is_up(self, climb_m_s: float) -> bool:
+        """True once the UAV has climbed far enough, or no farther than its altitude is measured wrongly."""
+        climbed = (self._navigation.position.up - self._pad.up) / self._height_m
+        return climbed >= _UP or (climbed >= 0.5 * _UP and climb_m_s < _STOPPED_M_S)

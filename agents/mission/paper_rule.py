@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from agents.mission.finding.localization import Sighting, estimate
+from agents.mission.finding.least_squares import Sighting, estimate
 from agents.mission.finding.phone_reception import MISSED_SCANS
 from agents.mission.flight.approach_speed import approach_speed_m_s
 from agents.mission.outbox import Outbox, ReportFormat

@@ -18,7 +18,7 @@ from typing import Final, assert_never
 from agents.mission.finding.announcing import Announcing
 from agents.mission.finding.coverage_map import CoverageMap
 from agents.mission.finding.finds import Finds
-from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, PhoneModel
+from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, PhoneModel
 from agents.mission.finding.phone_reception import PhoneReception
 from agents.mission.finding.sightings import Sightings
 from agents.mission.flight.approach_speed import approach_speed_m_s

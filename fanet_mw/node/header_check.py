@@ -6,8 +6,8 @@ any effect.
     instant of generation               not in the future
     sequence number                     not above those for which there was time since swarm instant 0
 
-Frames that cannot be decoded are counted as `malformed` by the node (`node.py`). A packet that was recorded and is sent
-again is a copy (`duplicates.py`), or has outlived its lifetime (`expired`, `node.py`).
+Frames that cannot be decoded (`reader.py`) are counted as `malformed` by the node (`node.py`). A packet that was
+recorded and is sent again is a copy (`duplicates.py`), or has outlived its lifetime (`expired`, `node.py`).
 
 Origins are not proved: a relay may still invent a packet in the name of another node. But it cannot keep out that
 node's own packets, because duplicates are found by a hash of the whole packet, and not by origin and sequence number

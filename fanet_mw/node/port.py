@@ -1,5 +1,8 @@
 """The port of a node, through which its protocol sends frames, makes control packets, and drops packets.
 
+It also aggregates (`routing.aggregate`): packets that are sent together share one frame, a bundle. Which packets go
+together is chosen by the protocol's access (`tdma/slot_access.py`, `tdma/root_release.py`) and by the queue's order.
+
 The port calls neither the node nor the protocol. Transmissions wait in `requests` until the actor takes them.
 """
 

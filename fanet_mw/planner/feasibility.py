@@ -15,16 +15,16 @@ from typing import Final, NamedTuple
 
 from fanet_mw import wire
 from fanet_mw.bounds import Bounded, DelayBound, Refused, paper
-from fanet_mw.bounds.guard import PLANNED_ERROR_NS, slot_guard_ns
+from fanet_mw.bounds.slot_guard import PLANNED_ERROR_NS, slot_guard_ns
 from fanet_mw.graph.topology import Adjacency, within_range
 from fanet_mw.planner import contention_window, reachability, verdict
-from fanet_mw.planner.access import Ways, access_outcome, ways
 from fanet_mw.planner.claimed_turns import Claimants, ClaimedPlan
 from fanet_mw.planner.demand import ClassPlan, TrafficClass
 from fanet_mw.planner.flood_cost import FloodCost, flood_cost
 from fanet_mw.planner.goodput_bound import Goodput, any_protocol
 from fanet_mw.planner.head_slot import ClassLoad, ClusterPlan, slot_delays, work_ns
 from fanet_mw.planner.timetable_plan import Candidate, TimetablePlan, judge, table_for
+from fanet_mw.planner.uplink_delay import Ways, access_outcome, ways
 from fanet_mw.routing.clustered.claimed.claiming import geometry, turn_bytes
 from fanet_mw.routing.clustered.clustering import Cluster, balanced
 from fanet_mw.routing.clustered.tdma.turns import receipt_ns

@@ -17,9 +17,9 @@ from fanet_mw.bus.messages import Reception, TxOutcome, TxStatus
 from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.packet import Packet
-from fanet_mw.routing import control
+from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.routing.address_resolution import Knowledge, Outgoing, Resolver
-from fanet_mw.routing.control import BodyReader, Family, check_node, type_of
+from fanet_mw.routing.rival_control_messages import BodyReader, Family, check_node, type_of
 from fanet_mw.units import BROADCAST, NodeId, earliest
 from fanet_mw.wire import Kind
 

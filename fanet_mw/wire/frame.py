@@ -65,7 +65,7 @@ class Kind(IntEnum):
     LINKS = 5
     """The leader's links of an assignment."""
     ROUTING = 8
-    """A control message of a rival protocol (`fanet_mw.routing.control`)."""
+    """A control message of a rival protocol (`fanet_mw.routing.rival_control_messages`)."""
 
 
 _KINDS: Final = frozenset(int(kind) for kind in Kind)

@@ -15,8 +15,8 @@ from typing import Any, Final, NamedTuple
 from agents.applications.traffic import Load, sources_of
 from agents.clock.clocked_uav import make_uav
 from agents.mission.finding.calibration import common_offset, likelihood
-from agents.mission.finding.localization import Sighting, estimate
-from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, Estimate, PhoneFilter, PhoneModel, PhoneOffset
+from agents.mission.finding.least_squares import Sighting, estimate
+from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, Estimate, PhoneFilter, PhoneModel, PhoneOffset
 from fanet_mw.scenario import Traffic
 from fanet_mw.trace import BoundStated
 from fanet_mw.units import MS, Enu, NodeId

@@ -6,7 +6,7 @@ from rival_bench import Bench
 
 from fanet_mw.routing.aodv.messages import RERR, RREP, RREQ, UNKNOWN_SEQUENCE, RouteError, RouteReply, RouteRequest
 from fanet_mw.routing.aodv.table import AodvRoute
-from fanet_mw.routing.control import Family, type_of
+from fanet_mw.routing.rival_control_messages import Family, type_of
 from fanet_mw.scenario import Scenario
 
 ASK, ANSWER, ERROR = (type_of(Family.AODV, number) for number in (RREQ, RREP, RERR))

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 from rival_bench import Bench
 
-from fanet_mw.routing.control import Family, type_of
 from fanet_mw.routing.olsr.messages import HELLO, TC, Hello, HelloNeighbor, LinkType, NeighborType, encode_time
+from fanet_mw.routing.rival_control_messages import Family, type_of
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, S
 

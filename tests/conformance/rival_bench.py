@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 from fanet_mw import wire
 from fanet_mw.bus.messages import Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.node.node import Node
-from fanet_mw.routing import control, make_protocol
+from fanet_mw.routing import make_protocol
+from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId
 

@@ -11,7 +11,7 @@ import pytest
 from rival_bench import Bench
 
 from fanet_mw.errors import ConfigError
-from fanet_mw.routing import control
+from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.routing.address_resolution import (
     ALIVE_NS,
     DEAD_NS,
@@ -21,8 +21,8 @@ from fanet_mw.routing.address_resolution import (
     WAIT_REPLY_NS,
 )
 from fanet_mw.routing.aodv.messages import RREP, RREQ, UNKNOWN_SEQUENCE, RouteReply, RouteRequest
-from fanet_mw.routing.control import Family, type_of
 from fanet_mw.routing.hop_by_hop import ADDRESS_REPLY, ADDRESS_REQUEST
+from fanet_mw.routing.rival_control_messages import Family, type_of
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, S
 from fanet_mw.wire import Kind

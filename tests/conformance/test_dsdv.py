@@ -5,9 +5,9 @@ from collections.abc import Callable
 import pytest
 from rival_bench import Bench
 
-from fanet_mw.routing.control import Family, type_of
 from fanet_mw.routing.dsdv.messages import FULL, INCREMENTAL, INFINITE, Advertised, Update
 from fanet_mw.routing.dsdv.table import HOLD_NS, MAX_SETTLING_NS, PERIODIC_UPDATE_NS
+from fanet_mw.routing.rival_control_messages import Family, type_of
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, NodeId, S
 

@@ -6,9 +6,9 @@ import pytest
 from rival_bench import Bench
 
 from fanet_mw import wire
-from fanet_mw.routing.control import Family, type_of
 from fanet_mw.routing.geographic import messages as m
 from fanet_mw.routing.geographic.messages import Fix, Location, PositionBeacon, Query
+from fanet_mw.routing.rival_control_messages import Family, type_of
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, US, Enu, S
 

@@ -15,7 +15,7 @@ from fastcrc.crc16 import mcrf4xx
 
 from fanet_mw import mavlink, wire
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.routing import control
+from fanet_mw.routing import rival_control_messages as control
 
 _FLOATS: Final = (
     0.0, -0.0, 1.0, -1.0, 1e-30, 1e10, -1e10, 3e38, -3e38, math.inf, -math.inf, math.nan, 300.0, -300.0, 1e5, 1e6,

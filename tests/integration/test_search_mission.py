@@ -10,6 +10,7 @@ from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import Message, Obstructions, Poses
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.virtual import VirtualHost
+from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Confirmed, Planned, Record
 from fanet_mw.units import S
 from sim.results.mission import mission
@@ -67,7 +68,11 @@ class Around(Actor):
 
 def flown(wrap: Callable[[Actor, Topics], Actor], *, seconds: int, keys: Sequence[str] = ()) -> Outcome:
     """The mission in which each UAV is wrapped."""
-    scenario = find("rescue", [*KEYS, *keys, f"duration_s={seconds}"])
+    return run_with(find("rescue", [*KEYS, *keys, f"duration_s={seconds}"]), wrap)
+
+
+def run_with(scenario: Scenario, wrap: Callable[[Actor, Topics], Actor]) -> Outcome:
+    """The scenario in which each UAV is wrapped."""
     world, medium, *uavs = actors_of(scenario, scenario.name)
     records: list[Record] = []
     names = Topics(scenario.name)
@@ -105,6 +110,26 @@ def test_a_whole_mission_goes_as_it_does_when_the_worlds_truth_is_poisoned_for_e
         for lie in (False, True)
     )
     assert sum(isinstance(record, Confirmed) for record in poisoned.records) >= 2
+    assert list(poisoned.records) == list(clean.records)
+    refused = [report["bus_malformed"] for name, report in poisoned.reports.items() if name.startswith("agent-")]
+    assert min(refused) > 100, "every UAV was told, and took in nothing"  # type: ignore[type-var]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize(
+    ("name", "keys"),
+    [
+        ("town", ["duration_s=40"]),  # buildings, a no-fly area, a map and radar
+        ("night", ["duration_s=40", "sensors.gps_outages=[[0,0,600,10,35]]"]),
+        ("convoy", ["duration_s=60"]),  # formation flight
+    ],
+)
+def test_a_shipped_flight_goes_as_it_does_when_the_worlds_truth_is_poisoned(name: str, keys: Sequence[str]) -> None:
+    clean, poisoned = (
+        run_with(find(name, keys), lambda uav, names, lie=lie: Told(uav, names, poisoned=lie))  # type: ignore[misc]
+        for lie in (False, True)
+    )
     assert list(poisoned.records) == list(clean.records)
     refused = [report["bus_malformed"] for name, report in poisoned.reports.items() if name.startswith("agent-")]
     assert min(refused) > 100, "every UAV was told, and took in nothing"  # type: ignore[type-var]

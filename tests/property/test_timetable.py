@@ -6,9 +6,9 @@ from itertools import pairwise
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, timetable
-from fanet_mw.routing.clustered.timetable.turn_filling import Geometry
 from fanet_mw.units import Enu, NodeId
 
 Places = tuple[tuple[NodeId, Enu], ...]

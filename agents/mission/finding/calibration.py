@@ -28,7 +28,7 @@ from functools import lru_cache
 from operator import mul, sub
 from typing import Final
 
-from agents.mission.finding.phone_filter import (
+from agents.mission.finding.phone_localization import (
     AS_ASSUMED,
     CORRELATION_FACTOR,
     REFERENCE_LOSS_DB,

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple, assert_never
 
 from agents.mission.finding.calibration import common_offset, likelihood
-from agents.mission.finding.phone_filter import AS_ASSUMED, Estimate, PhoneFilter, PhoneModel, PhoneOffset
+from agents.mission.finding.phone_localization import AS_ASSUMED, Estimate, PhoneFilter, PhoneModel, PhoneOffset
 from fanet_mw.units import US, Enu, S
 from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Found, Standing

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from agents.mission.finding.finds import SAME_PLACE_M, Finds, estimate_of
-from agents.mission.finding.phone_filter import Estimate
+from agents.mission.finding.phone_localization import Estimate
 from agents.mission.hungarian import assign
 from fanet_mw.units import Enu, S
 from fanet_mw.wire.search import Found

@@ -1,4 +1,6 @@
-"""The return of a UAV whose battery runs low: it flies home above all UAVs that search, then lands straight down."""
+"""The return of a UAV whose battery runs low: it flies home above all UAVs that search, then lands straight down. Its
+task and its place in the formation are handed on before (`Searcher.on_battery`, `FormationPlanner`).
+"""
 
 import math
 from typing import Final

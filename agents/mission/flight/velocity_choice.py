@@ -5,12 +5,13 @@ Constraints are half-planes of velocities. Hard ones keep a UAV clear of obstacl
 UAVs (`reciprocal_avoidance.py`). Soft ones keep it within radio reach of those UAVs with which it keeps the swarm
 connected (`connectivity_maintenance.py`). If no velocity satisfies all of them, soft constraints are dropped, the least
 important first. If the hard ones alone contradict each other, the velocity with the least violation is flown
-(`half_planes.py`).
+(`half_planes.py`). The vertical part follows the terrain (`terrain_following.py`).
 """
 
 import math
 from typing import Final, Protocol
 
+from agents.mission.flight.terrain_following import TerrainFollowing
 from agents.mission.navigation.half_planes import HalfPlane, Velocity, nearest
 from agents.mission.navigation.known_obstacles import KnownObstacles
 from agents.mission.navigation.navigation import Navigation
@@ -18,8 +19,6 @@ from fanet_mw.units import Enu
 
 _LANE_GAIN: Final = 0.4
 """The rate at which a deviation from the wanted place is corrected [1/s]."""
-_CLIMB_M_S: Final = 2.5
-"""The greatest speed of climbing and sinking."""
 _LEAST_M_S: Final = 1.0
 """The least speed at which a UAV flies around a corner."""
 
@@ -45,6 +44,7 @@ class VelocityChoice:
         soft: list[Constraint],
     ) -> None:
         self._navigation, self._obstacles = navigation, obstacles
+        self._terrain = TerrainFollowing(navigation, obstacles)
         self._most_m_s = most_m_s
         self._hard, self._soft = hard, soft
 
@@ -64,10 +64,8 @@ class VelocityChoice:
         hard = len(planes)
         planes += [plane for constraint in self._soft for plane in constraint.planes(now_ns)]
         east, north = nearest(wanted, planes, limit=self._most_m_s, hard=hard) if planes else wanted
-        velocity = Enu(east, north, 0.0)
-        climb_m = goal.up + obstacles.climb_m(here, velocity) - self._navigation.height_m(now_ns)
-        climb_m = max(climb_m, obstacles.least_up_m(here, velocity) - here.up)
-        return velocity._replace(up=max(-_CLIMB_M_S, min(_CLIMB_M_S, 0.5 * climb_m)))
+        flat = Enu(east, north, 0.0)
+        return flat._replace(up=self._terrain.climb_m_s(goal.up, flat, now_ns))
 
     def _towards(self, corner: Enu, *, speed_m_s: float) -> Velocity:
         """The velocity to a corner on the way around an obstacle; near the corner it is as slow as the goal itself

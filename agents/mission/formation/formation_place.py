@@ -6,7 +6,7 @@ near its team. A UAV that has no place yet waits where it is. (`shape.py` explai
 
 from typing import Final
 
-from agents.mission.finding.phone_filter import Estimate
+from agents.mission.finding.phone_localization import Estimate
 from agents.mission.formation.formation_planner import pattern_of
 from agents.mission.formation.pattern import Pattern
 from agents.mission.navigation.navigation import Navigation

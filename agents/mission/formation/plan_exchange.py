@@ -1,4 +1,6 @@
-"""How all UAVs come to the same plan: each sends its status, one of them plans, and all follow the newest plan."""
+"""How all UAVs come to the same plan: each sends its status, one of them plans (`formation_planner.py`), and all
+follow the newest plan.
+"""
 
 from collections.abc import Callable
 from typing import Final

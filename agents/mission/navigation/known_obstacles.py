@@ -150,7 +150,7 @@ class KnownObstacles:
         ]
         return max((roof for roof in ahead if roof + OVER_M <= at.up), default=-math.inf) + OVER_M
 
-    def climb_m(self, at: Enu, velocity: Enu) -> float:
+    def rise_m(self, at: Enu, velocity: Enu) -> float:
         """By how much the ground rises within the next seconds of the flight; 0 if it does not."""
         if not self._map.heights_m:
             return 0.0

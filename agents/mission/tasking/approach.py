@@ -8,7 +8,7 @@ import math
 from typing import Final
 
 from agents.mission.finding.finds import Finds
-from agents.mission.finding.phone_filter import Estimate
+from agents.mission.finding.phone_localization import Estimate
 from agents.mission.navigation.navigation import Navigation
 from agents.mission.outbox import Outbox
 from fanet_mw.trace import Arrived

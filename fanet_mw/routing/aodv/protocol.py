@@ -15,7 +15,7 @@ from fanet_mw.bus.messages import Reception, TxOutcome
 from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
-from fanet_mw.routing import control
+from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.routing.aodv import parameters as p
 from fanet_mw.routing.aodv.discovery import Discovery, RateLimit, RouteSearch, SeenRequests
 from fanet_mw.routing.aodv.messages import (
@@ -33,8 +33,8 @@ from fanet_mw.routing.aodv.messages import (
 )
 from fanet_mw.routing.aodv.neighbors import HelloNeighbors
 from fanet_mw.routing.aodv.table import AodvRoute, AodvTable
-from fanet_mw.routing.control import Family
 from fanet_mw.routing.hop_by_hop import HopByHop
+from fanet_mw.routing.rival_control_messages import Family
 from fanet_mw.routing.waiting_room import WaitingRoom
 from fanet_mw.serial_number import following, later, newer
 from fanet_mw.units import BROADCAST, MS, NodeId, earliest, seconds_to_ns

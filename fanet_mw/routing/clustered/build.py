@@ -36,7 +36,6 @@ from fanet_mw.routing.clustered.relaying.neighbor_knowledge import (
 from fanet_mw.routing.clustered.relaying.neighborhood import Neighborhood
 from fanet_mw.routing.clustered.relaying.rules import CounterRule, GossipRule, RelayAll, Rule
 from fanet_mw.routing.clustered.relaying.scheduled import ScheduledRelaying
-from fanet_mw.routing.clustered.roles.absent import NoRoles
 from fanet_mw.routing.clustered.roles.assigned import AssignedRoles, RoleParts
 from fanet_mw.routing.clustered.roles.failover import Failover
 from fanet_mw.routing.clustered.roles.failure_detector import FailureDetector
@@ -45,23 +44,24 @@ from fanet_mw.routing.clustered.roles.leader import Leader
 from fanet_mw.routing.clustered.roles.lease import Lease
 from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import Membership
+from fanet_mw.routing.clustered.roles.no_roles import NoRoles
 from fanet_mw.routing.clustered.roles.position_updates import PositionUpdates
 from fanet_mw.routing.clustered.roles.schedule_check import ScheduleCheck
 from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
 from fanet_mw.routing.clustered.tdma.admission import Admission
 from fanet_mw.routing.clustered.tdma.call_release import CallRelease
 from fanet_mw.routing.clustered.tdma.contention import Contention
+from fanet_mw.routing.clustered.tdma.reserved_room import reserved
 from fanet_mw.routing.clustered.tdma.root_release import RootRelease
 from fanet_mw.routing.clustered.tdma.slot_access import SlotAccess
 from fanet_mw.routing.clustered.tdma.slot_release import SlotRelease
-from fanet_mw.routing.clustered.tdma.urgent import reserved
 from fanet_mw.routing.clustered.timetable.heard_load import HeardLoads
 from fanet_mw.routing.clustered.timetable.link_quality import LinkQuality
 from fanet_mw.routing.clustered.timetable.promises import Promises
+from fanet_mw.routing.clustered.timetable.timetables_in_force import TurnPlans
 from fanet_mw.routing.clustered.timetable.timetabling import FromPlaces, NoTimetable, Timetabling
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.routing.clustered.timetable.turn_plan import leader_load
-from fanet_mw.routing.clustered.timetable.turn_plans import TurnPlans
 from fanet_mw.units import MS, seconds_to_ns
 
 _STORE_PACKETS: Final = 4096

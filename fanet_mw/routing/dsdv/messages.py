@@ -9,7 +9,7 @@ import struct
 from typing import Final, NamedTuple, Self
 
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.routing.control import BodyReader, check_node
+from fanet_mw.routing.rival_control_messages import BodyReader, check_node
 
 FULL: Final = 1
 INCREMENTAL: Final = 2

@@ -18,11 +18,11 @@ from fanet_mw.bus.messages import Reception, TxOutcome
 from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
-from fanet_mw.routing import control
-from fanet_mw.routing.control import Family
+from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.routing.dsdv.messages import FULL, INCREMENTAL, PER_ENTRY, Advertised, Update
 from fanet_mw.routing.dsdv.table import PERIODIC_UPDATE_NS, DsdvTable
 from fanet_mw.routing.hop_by_hop import HopByHop
+from fanet_mw.routing.rival_control_messages import Family
 from fanet_mw.routing.waiting_room import WaitingRoom
 from fanet_mw.units import NodeId, S, earliest, seconds_to_ns
 

@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple, Self
 
 from fanet_mw import wire
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.routing.control import BodyReader, check_node
+from fanet_mw.routing.rival_control_messages import BodyReader, check_node
 from fanet_mw.units import Enu
 
 BEACON: Final = 1

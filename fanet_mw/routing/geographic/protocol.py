@@ -21,10 +21,10 @@ from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.address_resolution import Outgoing
-from fanet_mw.routing.control import Family
 from fanet_mw.routing.geographic.locations import HELLO_INTERVAL_NS, LocationTable
 from fanet_mw.routing.geographic.messages import BEACON, LOCATION, QUERY, Fix, Location, PositionBeacon, Query
 from fanet_mw.routing.hop_by_hop import HopByHop
+from fanet_mw.routing.rival_control_messages import Family
 from fanet_mw.routing.waiting_room import WaitingRoom
 from fanet_mw.units import BROADCAST, MS, US, NodeId, S, earliest, seconds_to_ns
 

@@ -11,8 +11,8 @@ from enum import IntEnum
 from typing import Final, NamedTuple, Self
 
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.routing.control import BodyReader, check_node
 from fanet_mw.routing.olsr.parameters import WILL_ALWAYS
+from fanet_mw.routing.rival_control_messages import BodyReader, check_node
 from fanet_mw.units import S
 
 HELLO: Final = 1

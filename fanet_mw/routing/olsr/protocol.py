@@ -19,8 +19,7 @@ from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.graph.multipoint_relays import multipoint_relays
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
-from fanet_mw.routing import control
-from fanet_mw.routing.control import Family
+from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.routing.hop_by_hop import HopByHop
 from fanet_mw.routing.olsr import parameters as p
 from fanet_mw.routing.olsr.messages import (
@@ -38,6 +37,7 @@ from fanet_mw.routing.olsr.messages import (
 )
 from fanet_mw.routing.olsr.routes import OlsrRoute, routing_table
 from fanet_mw.routing.olsr.state import Repositories
+from fanet_mw.routing.rival_control_messages import Family
 from fanet_mw.serial_number import following
 from fanet_mw.units import BROADCAST, NodeId, earliest
 

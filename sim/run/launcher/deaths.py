@@ -1,4 +1,6 @@
-"""The processes of a swarm that ended too early, and which of them may be started again."""
+"""The processes of a swarm that ended too early, and which of them may be started again (`swarm.py` does that, by
+`Processes.restart`).
+"""
 
 from collections import Counter
 from typing import Final

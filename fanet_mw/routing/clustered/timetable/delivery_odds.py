@@ -16,8 +16,8 @@ from math import exp, fsum
 from typing import Final, NamedTuple
 
 from fanet_mw.rng import stream
+from fanet_mw.routing.clustered.timetable.flood_geometry import rows
 from fanet_mw.routing.clustered.timetable.redundant_scheduling import Network
-from fanet_mw.routing.clustered.timetable.turn_filling import rows
 from fanet_mw.units import NodeId
 from fanet_mw.wire.links import NEPERS
 

@@ -19,7 +19,7 @@ from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
 from fanet_mw.rng import stream
-from fanet_mw.routing.clustered.timetable.turn_filling import (
+from fanet_mw.routing.clustered.timetable.flood_geometry import (
     ONLY,
     RECEIVER,
     WINDOW,

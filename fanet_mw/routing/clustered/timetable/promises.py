@@ -22,8 +22,8 @@ from fanet_mw.routing.clustered.tdma.own_bound import RootTurns
 from fanet_mw.routing.clustered.tdma.root_release import RootRelease
 from fanet_mw.routing.clustered.tdma.turns import clocks_fit, receipt_ns
 from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE, likely_delay_ns
+from fanet_mw.routing.clustered.timetable.timetables_in_force import TurnPlans
 from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan
-from fanet_mw.routing.clustered.timetable.turn_plans import TurnPlans
 from fanet_mw.trace import BoundStated, LikelyStated
 from fanet_mw.units import MS, US, NodeId, seconds_to_ns
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY

@@ -19,7 +19,7 @@ import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from fanet_mw.routing.clustered.timetable.turn_filling import (
+from fanet_mw.routing.clustered.timetable.flood_geometry import (
     ONLY,
     RECEIVER,
     WINDOW,

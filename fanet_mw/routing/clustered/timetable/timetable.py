@@ -22,9 +22,9 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from fanet_mw.routing.clustered.timetable.delivery_odds import Odds, odds
+from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry, NodeRows
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort, Flood, FloodNetwork, Packing
 from fanet_mw.routing.clustered.timetable.redundant_scheduling import Network, RedundantPacking, Wave, enough_for
-from fanet_mw.routing.clustered.timetable.turn_filling import Geometry, NodeRows
 from fanet_mw.units import Enu, NodeId
 from fanet_mw.wire.links import Link
 

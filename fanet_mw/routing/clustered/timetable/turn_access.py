@@ -19,8 +19,8 @@ from fanet_mw.routing.clustered.tdma.contention import Contention
 from fanet_mw.routing.clustered.tdma.root_release import RootRelease, TurnsInForce
 from fanet_mw.routing.clustered.tdma.slot_access import SlotAccess
 from fanet_mw.routing.clustered.timetable.promises import Promises
+from fanet_mw.routing.clustered.timetable.timetables_in_force import TurnPlans
 from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan
-from fanet_mw.routing.clustered.timetable.turn_plans import TurnPlans
 from fanet_mw.units import US, earliest, seconds_to_ns
 from fanet_mw.wire import Kind
 

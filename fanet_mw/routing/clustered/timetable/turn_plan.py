@@ -18,13 +18,13 @@ from itertools import islice
 from types import MappingProxyType
 from typing import Final, NamedTuple, Self, TypeVar
 
+from fanet_mw.routing.clustered.tdma.reserved_room import reserved
 from fanet_mw.routing.clustered.tdma.turns import Turns, turn_ns
-from fanet_mw.routing.clustered.tdma.urgent import reserved
 from fanet_mw.routing.clustered.timetable.delivery_odds import Odds
+from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
 from fanet_mw.routing.clustered.timetable.heard_load import packets
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, redundant_timetable, timetable
-from fanet_mw.routing.clustered.timetable.turn_filling import Geometry
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire import DIGEST, HEADER_BYTES, LINKS, LOADS, OVERHEAD, PLACES, SCHEDULE

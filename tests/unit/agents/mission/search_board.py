@@ -4,7 +4,7 @@ import math
 
 from agents.mission.finding.announcing import Announcing
 from agents.mission.finding.finds import Finds
-from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, PhoneModel
+from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, PhoneModel
 from agents.mission.flight.goal import Goal
 from agents.mission.formation.formation_place import FormationPlace
 from agents.mission.formation.formation_planner import plan_of

@@ -4,7 +4,7 @@ import math
 
 from search_board import FOLLOWER, MODEL, UP_M, Board
 
-from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, Estimate
+from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, Estimate
 from fanet_mw.trace import Confirmed, Refuted
 from fanet_mw.units import Enu, S
 from fanet_mw.wire.inner import Survivor

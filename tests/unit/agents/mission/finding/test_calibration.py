@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from agents.mission.finding.calibration import common_offset, likelihood
 from agents.mission.finding.finds import Finds
-from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, Estimate, PhoneModel
+from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, Estimate, PhoneModel
 from fanet_mw.units import Enu
 from fanet_mw.wire.inner import MOST_DBM, Survivor
 from fanet_mw.wire.search import Found, Standing

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from agents.mission.finding.contradictions import Contradictions
 from agents.mission.finding.finds import Finds
 from agents.mission.finding.identities import Identities
-from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, PhoneModel
+from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, PhoneModel
 from fanet_mw.units import US, Enu, S
 from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Found, Standing

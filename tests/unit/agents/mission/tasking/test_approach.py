@@ -5,7 +5,7 @@ from itertools import pairwise
 
 from search_board import FOLLOWER, UP_M, Board
 
-from agents.mission.finding.phone_filter import Estimate
+from agents.mission.finding.phone_localization import Estimate
 from fanet_mw.units import Enu, S
 
 

@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.routing.clustered.timetable.delivery_odds import odds
+from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
 from fanet_mw.routing.clustered.timetable.link_quality import FAST, FIRST, WINDOW, LinkQuality
 from fanet_mw.routing.clustered.timetable.link_state import LinkState, adjacency, worth_a_change
 from fanet_mw.routing.clustered.timetable.redundant_scheduling import Network, Wave, enough_for
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, redundant_timetable
-from fanet_mw.routing.clustered.timetable.turn_filling import Geometry
 from fanet_mw.units import Enu, NodeId, S
 from fanet_mw.wire import HEADER_BYTES
 from fanet_mw.wire.links import CAPACITY, MESSAGES, Link, Links, frames_of, grade_of, power_of

@@ -5,8 +5,8 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.mission.finding.localization import Sighting, estimate
-from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB
+from agents.mission.finding.least_squares import Sighting, estimate
+from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB
 from fanet_mw.units import Enu
 
 POWER_DBM, EXPONENT = 15.0, 3.0

@@ -5,7 +5,7 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, PhoneFilter, PhoneModel
+from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, PhoneFilter, PhoneModel
 from agents.mission.finding.sightings import ground_place
 from fanet_mw.units import Enu
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from fanet_mw import wire
 from fanet_mw.dialect import fanet
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.routing import control
+from fanet_mw.routing import rival_control_messages as control
 
 HEADER = wire.Header(12, 1, 3, 0xFFFF, 3, wire.Kind.ROUTING, 1, 0, 0, 0).encode()
 BODY = bytes(range(256)) + bytes(44)

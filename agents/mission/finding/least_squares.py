@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB
+from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB
 from fanet_mw.units import Enu
 
 _STEPS: Final = 12

@@ -24,6 +24,7 @@ from sim.results.clocks import true_delays
 from sim.results.links import LinkTotals
 from sim.run.collecting.taps import TapLog
 from sim.run.collecting.trace_log import TraceLog
+from sim.run.huge_pages import HugePages
 from sim.run.outcome import Outcome
 from sim.world.environment.map_on_board import map_on_board
 from sim.world.mobility.layout import positions
@@ -41,7 +42,8 @@ def no_applications(_: int) -> Sequence[Application]:
 
 
 _STEP_NS: Final = 100 * MS
-"""The time between two checks for signals. The result of a run does not depend on it."""
+"""The time between two checks for signals, and for memory to be kept in huge pages. The result of a run does not depend
+on it."""
 
 
 def actors_of(
@@ -153,8 +155,10 @@ def _run(host: VirtualHost, scenario: Scenario, on_progress: Callable[[float], N
     if signals:
         raise KeyboardInterrupt(signals[0])
     host.start()
+    pages = HugePages()
     for until_ns in range(_STEP_NS, scenario.duration_ns + _STEP_NS, _STEP_NS):
         host.run(min(until_ns, scenario.duration_ns))
+        pages.keep_up()
         on_progress(host.now_ns / S)
         if signals:
             break

@@ -180,7 +180,7 @@ class PhoneFilter:
 
     @property
     def received_powers(self) -> int:
-        """The number of received powers, those included that the cells do not include yet."""
+        """The number of received powers, also of those that the cells do not include yet."""
         return sum(map(len, self._taken.values()))
 
     @property

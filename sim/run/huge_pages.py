@@ -1,0 +1,67 @@
+"""Asks Linux to keep the memory of a long run in huge pages.
+
+A run in virtual time goes through the state of all nodes again and again, which is hundreds of megabytes in pages of
+4 kB: far more pages than the processor keeps the addresses of. In pages of 2 MB the same run takes a tenth less CPU
+time. The kernel moves memory into such pages on request (`MADV_COLLAPSE`, Linux 6.1). Where it cannot, because it is
+older or another system, nothing changes but the speed. The results of a run do not depend on it.
+"""
+
+import ctypes
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Final
+
+_HUGE_BYTES: Final = 2 << 20
+_COLLAPSE: Final = 25  # MADV_COLLAPSE, include/uapi/asm-generic/mman-common.h
+_MAPS: Final = Path("/proc/self/maps")
+_EVERY_S: Final = 2.0
+"""The least time between two requests. A shorter run makes none."""
+Request = Callable[[int], bool]
+"""Asks for the huge page that begins at an address; False if the kernel refuses."""
+
+
+class HugePages:
+    """The huge pages of this process, for which a run asks while its memory grows."""
+
+    def __init__(self, request: Request | None = None) -> None:
+        """`request`: how to ask for a page; None for the request to the kernel of this system, if it has one."""
+        self._request = request or _to_kernel()
+        self._asked: set[int] = set()
+        """The addresses for which a page was asked for already."""
+        self._next_s = time.perf_counter() + _EVERY_S
+
+    def keep_up(self) -> None:
+        """Ask for huge pages for the memory that has been added, unless that was done a moment ago."""
+        if self._request is not None and time.perf_counter() >= self._next_s:
+            self.ask(self._request)
+            self._next_s = time.perf_counter() + _EVERY_S
+
+    def ask(self, request: Request) -> int:
+        """Ask for every page once; returns for how many the kernel does as it is asked."""
+        new = [address for address in huge_pages(_MAPS.read_text()) if address not in self._asked]
+        self._asked.update(new)
+        return sum(map(request, new))
+
+
+def huge_pages(maps: str) -> Iterator[int]:
+    """The addresses of all whole huge pages in writable memory that belongs to no file, as the kernel lists it."""
+    for line in maps.splitlines():
+        span, rights, _, _, inode, *name = line.split(maxsplit=5)
+        if rights == "rw-p" and inode == "0" and (not name or name[0] == "[heap]"):
+            begin, end = (int(address, 16) for address in span.split("-"))
+            yield from range(-(-begin // _HUGE_BYTES) * _HUGE_BYTES, end - _HUGE_BYTES + 1, _HUGE_BYTES)
+
+
+def _to_kernel() -> Request | None:
+    """The request to the kernel; None on a system without it."""
+    if sys.platform != "linux":
+        return None
+    madvise = ctypes.CDLL(None).madvise
+    madvise.argtypes = (ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int)
+
+    def request(address: int) -> bool:
+        return bool(madvise(address, _HUGE_BYTES, _COLLAPSE) == 0)
+
+    return request

@@ -1,0 +1,42 @@
+"""Huge pages for the memory of a long run."""
+
+import mmap
+import sys
+
+import pytest
+
+from sim.run.huge_pages import HugePages, huge_pages
+
+_HUGE = 2 << 20
+_MAPS = f"""\
+400000-{0x400000 + 9 * _HUGE:x} rw-p 00000000 00:00 0                  [heap]
+{0x7F0000100000:x}-{0x7F0000100000 + 2 * _HUGE:x} rw-p 00000000 00:00 0
+{0x7F1000000000:x}-{0x7F1000000000 + 4 * _HUGE:x} r--p 00000000 08:01 1234       /usr/lib/libpython3.11.so
+{0x7F2000000000:x}-{0x7F2000000000 + 4 * _HUGE:x} rw-p 00000000 08:01 1234       /usr/lib/libpython3.11.so
+{0x7F3000000000:x}-{0x7F3000000000 + 4 * _HUGE:x} rw-s 00000000 00:01 77
+{0x7FFC00000000:x}-{0x7FFC00000000 + 4 * _HUGE:x} rw-p 00000000 00:00 0          [stack]
+"""
+
+
+def test_whole_huge_pages_in_memory_of_this_process_alone_are_asked_for() -> None:
+    """Not in files, in memory that is shared with other processes, or on the stack; and no page that begins or ends
+    outside of a piece of memory.
+    """
+    assert list(huge_pages(_MAPS)) == [*range(0x400000, 0x400000 + 9 * _HUGE, _HUGE), 0x7F0000200000]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the list of a process's memory is Linux's")
+def test_a_page_is_asked_for_once_however_often_a_run_asks() -> None:
+    asked: list[int] = []
+
+    def request(address: int) -> bool:
+        asked.append(address)
+        return True
+
+    pages = HugePages()
+    before = pages.ask(request)
+    with mmap.mmap(-1, 4 * _HUGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS):
+        added = pages.ask(request)
+    assert before > 0
+    assert added > 0
+    assert len(asked) == len(set(asked)) == before + added

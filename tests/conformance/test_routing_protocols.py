@@ -13,7 +13,8 @@ from fanet_mw import wire
 from fanet_mw.bus.messages import TxRequest
 from fanet_mw.bus.topics import Topics, node_of
 from fanet_mw.hosts.virtual import VirtualHost
-from fanet_mw.routing import MAKERS, control
+from fanet_mw.routing import MAKERS
+from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.scenario.routing import PROTOCOLS
 from fanet_mw.trace import Delivered, Dropped, Generated, Record

@@ -6,7 +6,7 @@ from typing import Final
 PAGES: Final = ("report.html", "report.md")
 PICTURES: Final = "pictures"
 """The folder of a run's pictures, beside the page."""
-KINDS: Final = ("delays", "delivery", "links", "slots", "mission")
+KINDS: Final = ("delays", "delivery", "links", "slots", "mission", "tracks")
 """What the pictures of a run show; each is a file `SCENARIO-SEED-KIND` in both formats."""
 FORMATS: Final = (".png", ".svg")
 

@@ -14,7 +14,7 @@ Positions are the true ones, once a second (`Posed`).
 
 import math
 import statistics
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -35,7 +35,7 @@ from fanet_mw.trace import (
     Record,
     Refuted,
 )
-from fanet_mw.units import S
+from fanet_mw.units import Enu, S
 from sim.run.collecting.record_kinds import records_of
 from sim.world.environment.survivors import place
 from sim.world.sensors.phone import REFERENCE_LOSS_DB
@@ -45,7 +45,7 @@ _HOMEWARD: Final = frozenset({"return", "land"})
 _WRECKED: Final = "fallen"
 _CELL_M: Final = 25.0
 _NEARLY_ALL: Final = 0.95
-_MISTAKEN_M: Final = 25.0
+MISTAKEN_M: Final = 25.0
 """A UAV that announces a survivor farther than this from the true place has mistaken another person
 for that survivor."""
 
@@ -59,42 +59,70 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
     truth = place(scenario)
     first: dict[int, int] = {}
     errors: list[float] = []
-    announced: dict[int, list[Confirmed]] = {}
-    """For each survivor, the confirmations that hold, in the order of their announcement."""
-    reopened = 0
+    found = Confirmations(truth)
     for record in records_of(records, Approaching, Confirmed, Refuted):
         if type(record) is Approaching:
             first.setdefault(record.node, record.t_ns)
             if 1 <= record.survivor <= len(truth):  # a survivor with another number exists only in a forged message
                 at = truth[record.survivor - 1]
                 errors.append(math.hypot(at.east - record.east_m, at.north - record.north_m))
-        elif type(record) is Confirmed and 1 <= record.survivor <= len(truth):
-            announced.setdefault(record.survivor, []).append(record)
-        elif type(record) is Refuted and record.survivor in announced:
-            held = announced[record.survivor]
-            announced[record.survivor] = [one for one in held if not _takes_back(record, one)]
-            reopened += len(announced[record.survivor]) < len(held)
-    confirmed = {survivor: held[0] for survivor, held in announced.items() if held}
-    error_m = {
-        s: math.hypot(truth[s - 1].east - r.east_m, truth[s - 1].north - r.north_m) for s, r in confirmed.items()
-    }
-    right = [s for s in confirmed if error_m[s] <= _MISTAKEN_M]
+        else:
+            found.add(record)
+    right, mistaken = found.right(), found.mistaken()
+    confirmed = [*right, *mistaken]
     return {
         "survivors": scenario.mission.survivors,
         "detected": len({r.survivor for r in records_of(records, Detected)}),
         "approached": len({r.survivor for r in records_of(records, Approaching)}),
         "reached": len({r.survivor for r in records_of(records, Arrived)}),
         "confirmed": len(right),
-        "mistaken": len(confirmed) - len(right),
-        "reopened": reopened,
-        "time_to_confirm_s": sorted(round(confirmed[s].t_ns / S, 3) for s in right),
+        "mistaken": len(mistaken),
+        "reopened": found.reopened,
+        "time_to_confirm_s": sorted(round(one.t_ns / S, 3) for one in right),
         "uavs_approaching": len(first),
         "time_to_approach_s": sorted(round(t_ns / S, 3) for t_ns in first.values()),
         "localization_error_m": _median(errors),
-        "confirmed_error_m": _median(list(error_m.values())),
+        "confirmed_error_m": _median([found.error_m(one) for one in confirmed]),
         "collisions": sum(1 for _ in records_of(records, Collided)),
         **_flown(scenario, records),
     }
+
+
+class Confirmations:
+    """The survivors whom UAVs have announced, up to the records seen so far."""
+
+    def __init__(self, truth: Sequence[Enu]) -> None:
+        """`truth`: the true places of the survivors, in the order of their ids."""
+        self._truth = truth
+        self._held: dict[int, list[Confirmed]] = {}
+        """For each survivor, the confirmations that hold, in the order of their announcement."""
+        self.reopened = 0
+        """The number of times that a confirmation was taken back."""
+
+    def add(self, record: Record) -> None:
+        """Take in a record; others than confirmations and refutations change nothing."""
+        if type(record) is Confirmed and 1 <= record.survivor <= len(self._truth):
+            self._held.setdefault(record.survivor, []).append(record)
+        elif type(record) is Refuted and record.survivor in self._held:
+            held = self._held[record.survivor]
+            self._held[record.survivor] = [one for one in held if not _takes_back(record, one)]
+            self.reopened += len(self._held[record.survivor]) < len(held)
+
+    def error_m(self, confirmed: Confirmed) -> float:
+        """The distance between the announced place and the true one."""
+        at = self._truth[confirmed.survivor - 1]
+        return math.hypot(at.east - confirmed.east_m, at.north - confirmed.north_m)
+
+    def right(self) -> list[Confirmed]:
+        """The first confirmation of each survivor who was announced near the true place."""
+        return [one for one in self._first() if self.error_m(one) <= MISTAKEN_M]
+
+    def mistaken(self) -> list[Confirmed]:
+        """The same for those who were announced far from it."""
+        return [one for one in self._first() if self.error_m(one) > MISTAKEN_M]
+
+    def _first(self) -> list[Confirmed]:
+        return [held[0] for held in self._held.values() if held]
 
 
 def _takes_back(refuted: Refuted, confirmed: Confirmed) -> bool:

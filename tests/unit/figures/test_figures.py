@@ -230,7 +230,13 @@ def test_a_run_has_a_page_with_its_delays_links_and_mission(scenario: str, tmp_p
     finish(simulate(catalog.find(scenario, keys)), out=tmp_path)
     html, markdown = (path.read_text() for path in write([tmp_path], tmp_path))
     pictures = {path.stem.removeprefix(f"{scenario}-1-") for path in (tmp_path / "pictures").glob("*.png")}
-    assert pictures == {"delays", "delivery", "links", "slots"} | ({"mission"} if scenario == "quick" else set())
+    of_mission = {"mission", "tracks"} if scenario == "quick" else set()
+    assert pictures == {"delays", "delivery", "links", "slots"} | of_mission
+    for words in ("Mission", "survivors confirmed", "area covered"):
+        assert (words in markdown) == (scenario == "quick"), "a run without a mission has no section about one"
+    kept = re.search(r"Of (\d+) packets of (heads|nodes with turns), (\d+) were let out", markdown)
+    assert kept is not None, "the protocol has slots, or turns"
+    assert kept[1] == kept[3] != "0"
     assert html.count("data:image/png;base64,") == len(pictures)
     assert ("within the bound stated" in markdown) == (scenario == "clusters")
 

@@ -313,4 +313,5 @@ class AssignedRoles:
             "cluster": membership.cluster,
             "head": membership.head,
             "epoch": membership.epoch,
+            "slots": None if membership.superframe is None else membership.superframe.report(),
         }

@@ -5,9 +5,11 @@ start      start+period
 |<-usable->g|          each slot ends with a silent guard time
 """
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from fanet_mw.errors import LocalProtocolError
+from fanet_mw.units import MS
 
 
 class Slot(NamedTuple):
@@ -50,3 +52,12 @@ class Superframe(NamedTuple):
         """The slot in whose usable part an instant lies; None in a guard time, or in the rest of the superframe."""
         slot, rest = divmod((t_ns - self.origin_ns) % self.period_ns, self.slot_ns)
         return slot if slot < self.slots and rest < self.slot_ns - self.guard_ns else None
+
+    def report(self) -> Mapping[str, object]:
+        """The geometry as JSON values; cluster k has slot k."""
+        return {
+            "start_ms": self.origin_ns / MS,
+            "period_ms": self.period_ns / MS,
+            "slot_ms": self.slot_ns / MS,
+            "guard_ms": self.guard_ns / MS,
+        }

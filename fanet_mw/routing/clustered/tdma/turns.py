@@ -14,7 +14,7 @@ The *root* of a flood is the node at which it begins, in a turn of its own. The 
 of turns from that turn until all nodes have the packet, the first and the last one included.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from fanet_mw.airtime import OVERHEAD_BYTES, Timing, airtime_ns
@@ -118,6 +118,15 @@ class Turns(NamedTuple):
         """The duration of a flood of `span` turns from turn `offset` on, including contention windows in between."""
         last_ns = self.start_ns(offset + span - 1, superframe_start_ns=0)
         return last_ns + self.turn_ns - self.start_ns(offset, superframe_start_ns=0)
+
+    def report(self) -> Mapping[str, object]:
+        """The geometry as JSON values."""
+        return {
+            "start_ms": self.origin_ns / MS,
+            "period_ms": self.period_ns / MS,
+            "contention_ms": self.contention_ns / MS,
+            "turn_ms": self.turn_ns / MS,
+        }
 
 
 def turn_slack_ns(scenario: Scenario) -> int:

@@ -233,4 +233,9 @@ class TurnAccess:
         return self._slots.waiting() + len(self._roots)
 
     def report(self) -> Mapping[str, object]:
-        return {**self._promises.report(), "planned": bool(self._plans.in_order)}
+        newest = self._plans.newest
+        return {
+            **self._promises.report(),
+            "planned": newest is not None,
+            "turns": None if newest is None else newest.report(),
+        }

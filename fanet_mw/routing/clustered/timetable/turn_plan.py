@@ -142,6 +142,10 @@ class TurnPlan(NamedTuple):
         """True if this node transmits its packets itself."""
         return node in self.table.spans
 
+    def report(self) -> Mapping[str, object]:
+        """The geometry, and the turns in which this node transmits new packets, as JSON values."""
+        return {**self.turns.report(), "own": list(self.roots)}
+
 
 class _Wish(NamedTuple):
     """One way to try: the number of packets of each root, and how many of them share a turn."""

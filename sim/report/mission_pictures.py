@@ -1,0 +1,135 @@
+"""The pictures of one run's mission: what was achieved over time, and where the UAVs flew."""
+
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+from typing import Final
+
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import MaxNLocator, PercentFormatter
+
+from fanet_mw.trace import Approaching, Arrived, Detected
+from fanet_mw.units import S
+from sim.figures.style import SERIES, canvas, legend_above
+from sim.report.run_pictures import RunPicture, map_canvas
+from sim.report.run_records import RunRecords
+from sim.results.mission import Confirmations, OverflownCells
+
+_BLUE, _RED, _GREEN, _PINK, _ORANGE = (look.color for look in SERIES)
+_DARK: Final = "#222222"
+_STEPS: Final = ((Detected, "detected", _ORANGE, "o", "-"), (Approaching, "approached", _BLUE, "s", "--"),
+                 (Arrived, "reached", _PINK, "^", "-."))  # fmt: skip
+
+Step = tuple[float, float]
+"""An instant [s], and the value from then on."""
+
+
+def progress(run: RunRecords) -> RunPicture | None:
+    """Survivors detected, approached, reached and confirmed, and the area covered, over time."""
+    people = run.scenario.mission.survivors
+    lines = [line for line in _lines(run) if line[1]] if people else []
+    covered = list(_coverage(run))
+    if not lines and not covered:
+        return None
+    panels = [bool(lines), bool(covered)].count(True)
+    figure, axes = canvas(1, panels, width=6.5, height=2.6)
+    if lines:
+        _draw_counts(axes[0], lines, end_s=run.end_s)
+        axes[0].axhline(people, color=_DARK, linewidth=0.9, linestyle=(0, (1, 2)), label=f"all {people} survivors")
+        axes[0].set_ylabel("survivors")
+        axes[0].set_ylim(0, people * 1.06)
+        axes[0].yaxis.set_major_locator(MaxNLocator(integer=True))
+        legend_above(figure, axes[0])
+    if covered:
+        axes[-1].plot(*zip(*covered, strict=True), color=_GREEN)
+        axes[-1].set_ylabel("area covered")
+        axes[-1].set_ylim(0, 1.05)
+        axes[-1].yaxis.set_major_formatter(PercentFormatter(1.0))
+    for panel in axes:
+        panel.set_xlim(0, run.end_s)
+    axes[-1].set_xlabel("time [s]")
+    return RunPicture(figure, _progress_said(run, [label for label, _, _, _, _ in lines], covered=bool(covered)))
+
+
+def _progress_said(run: RunRecords, drawn: Sequence[str], *, covered: bool) -> str:
+    said = [f"Number of different survivors {', '.join(drawn)} so far."] if drawn else []
+    possible = ["detected", "approached", "reached"] + ["confirmed"] * (run.scenario.mission.search != "none")
+    missing = [label for label in possible if label not in drawn]
+    if run.scenario.mission.survivors and missing:
+        said.append(f"No survivor was {' or '.join(missing)}.")
+    if "confirmed" in drawn:
+        said.append("A confirmation far from the true place, or one that was taken back, does not count.")
+    if covered:
+        said.append("Covered is what came within the nominal range of a UAV's phone receiver.")
+    return " ".join(said)
+
+
+def _lines(run: RunRecords) -> Iterator[tuple[str, list[Step], str, str, str]]:
+    """Each line: its name, its steps, color, marker and dashes; the steps are empty if it never happened."""
+    for kind, label, color, marker, dash in _STEPS:
+        first: dict[int, int] = {}
+        for record in run.mission:
+            if isinstance(record, kind):
+                first.setdefault(record.survivor, record.t_ns)
+        steps = [(t_ns / S, float(count)) for count, t_ns in enumerate(sorted(first.values()), 1)]
+        yield label, steps, color, marker, dash
+    held, confirmed = Confirmations(run.survivors), []
+    for record in run.mission:
+        before = len(held.right())
+        held.add(record)
+        if len(held.right()) != before:
+            confirmed.append((record.t_ns / S, float(len(held.right()))))
+    yield "confirmed", confirmed, _GREEN, "D", "-"
+
+
+def _draw_counts(axes: Axes, lines: Sequence[tuple[str, list[Step], str, str, str]], *, end_s: float) -> None:
+    for label, steps, color, marker, dash in lines:
+        whole = [(0.0, 0.0), *steps, (end_s, steps[-1][1])]
+        axes.plot(*zip(*whole, strict=True), color=color, marker=marker, markersize=3.5, label=label, linestyle=dash,
+                  drawstyle="steps-post", markevery=range(1, len(steps) + 1))  # fmt: skip
+
+
+def _coverage(run: RunRecords) -> Iterator[Step]:
+    """The share of the area covered at each instant with positions."""
+    cells = OverflownCells(run.scenario)
+    posed = sorted((one for track in run.tracks.values() for one in track), key=lambda one: one.t_ns)
+    for t_ns, together in groupby(posed, key=lambda one: one.t_ns):
+        cells.add([(one.east_m, one.north_m, one.up_m) for one in together])
+        yield t_ns / S, cells.share
+
+
+def tracks(run: RunRecords) -> RunPicture | None:
+    """The tracks of all UAVs over the area, with survivors and the places at which they were confirmed."""
+    if not run.tracks:
+        return None
+    half = run.scenario.world.area_m / 2
+    flown = [[(one.east_m, one.north_m) for one in track] for track in run.tracks.values()]
+    figure, axes = map_canvas([(-half, -half), (half, half), *(at for track in flown for at in track)])
+    axes.add_patch(Rectangle((-half, -half), 2 * half, 2 * half, fill=False, edgecolor=_DARK, linestyle="--",
+                             linewidth=0.9, label="area to be searched"))  # fmt: skip
+    axes.add_collection(LineCollection(flown, colors=_BLUE, linewidths=0.8, alpha=0.6, label="tracks"))
+    ends = [track[-1] for track in flown]
+    axes.scatter([at[0] for at in ends], [at[1] for at in ends], s=14, color=_BLUE, zorder=3, label="UAVs at the end")
+    confirms = run.scenario.mission.search != "none"
+    held = Confirmations(run.survivors)
+    for record in run.mission:
+        held.add(record)
+    right, mistaken = held.right(), held.mistaken()
+    found = {one.survivor for one in right}
+    missed = [at for survivor, at in enumerate(run.survivors, 1) if survivor not in found]
+    had = [at for survivor, at in enumerate(run.survivors, 1) if survivor in found]
+    for places, label, color, marker in (
+        ([(at.east, at.north) for at in had], "survivor, confirmed", _DARK, "o"),
+        ([(at.east, at.north) for at in missed], "survivor, not confirmed" if confirms else "survivor", _RED, "x"),
+        ([(one.east_m, one.north_m) for one in right], "place confirmed", _GREEN, "+"),
+        ([(one.east_m, one.north_m) for one in mistaken], "place confirmed by mistake", _PINK, "v"),
+    ):
+        if places:
+            axes.scatter([at[0] for at in places], [at[1] for at in places], s=55, marker=marker, linewidths=1.5,
+                         zorder=4, label=label, color=color, facecolors="none" if marker == "o" else color)  # fmt: skip
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=3)
+    end = f"The true positions of all {len(flown)} UAVs from 0 to {run.end_s:g} s, once a second."
+    lost = f" The survivors' places are not known any more ({run.unplaced})." if run.unplaced else ""
+    return RunPicture(figure, end + lost)

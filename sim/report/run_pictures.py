@@ -1,0 +1,291 @@
+"""The pictures of one run's network: delays, delivery, links over the area, and the slots of the protocol."""
+
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator, PercentFormatter
+
+from fanet_mw.trace import LetOut
+from fanet_mw.units import MS, S
+from sim.figures.style import SERIES, canvas, legend_above
+from sim.report.run_records import RunRecords
+
+_WINDOWS: Final = 40
+"""The number of steps of the delivery ratio over time."""
+_SHARES: Final = ListedColormap([colormaps["viridis"](step / 255) for step in range(200)])
+"""Colors from dark violet, for links that lose everything, to green; the yellow end of the color map is invisible on
+white."""
+_LONG_NS: Final = 10 * S
+"""Delays are drawn in seconds if the longest is at least this long."""
+_NARROWEST: Final = 0.35
+"""The least ratio of a map's sides."""
+_MOST_NAMED: Final = 12
+"""The greatest number of slots whose owners are named above them."""
+_BLUE, _RED, _GREEN, _PINK, _ORANGE = (look.color for look in SERIES)
+_DARK: Final = "#222222"
+_SHADE: Final = "#f3cf86"
+
+
+class RunPicture(NamedTuple):
+    """A figure with its caption."""
+
+    figure: Figure
+    caption: str
+
+
+def delays(run: RunRecords) -> RunPicture | None:
+    """The distribution of the delays, beside that of the stated bounds."""
+    if not run.delivered:
+        return None
+    figure, (axes,) = canvas(1, width=6.5)
+    whole = sum(len(run.targets(origin)) for origin, _ in run.sent)
+    bounds = [bound for name, bound in run.bounds.items() if name in run.sent]
+    late_ns = [one.delay_ns for one in run.delivered]
+    unit, unit_ns = ("s", S) if max(late_ns + bounds) >= _LONG_NS else ("ms", MS)
+    _steps(axes, [delay / unit_ns for delay in late_ns], whole, "delay", _BLUE, "-")
+    if bounds:
+        _steps(axes, [bound / unit_ns for bound in bounds], len(run.sent), "bound stated by the origin", _RED, "--")
+        legend_above(figure, axes)
+    axes.set_xlabel(f"end-to-end delay [{unit}]")
+    axes.set_ylabel("share of packets x targets")
+    axes.set_xlim(left=0)
+    axes.set_ylim(0, 1.05)
+    said = (
+        "dashed, the share of packets for which the origin stated at most this bound."
+        if bounds
+        else "no origin stated a bound."
+    )
+    return RunPicture(figure, f"The share of packets x targets that were delivered within a delay; {said}")
+
+
+def _steps(axes: Axes, values: Sequence[float], whole: int, label: str, color: str, dash: object) -> None:
+    ordered = sorted(values)
+    axes.plot(ordered, [(rank + 1) / whole for rank in range(len(ordered))], color=color, label=label, linestyle=dash,
+              drawstyle="steps-post")  # fmt: skip
+
+
+def delivery(run: RunRecords) -> RunPicture | None:
+    """The delivery ratio over time, and per receiver."""
+    if not run.sent:
+        return None
+    figure, (over_time, per_node) = canvas(2, width=4.6)
+    start_ns, end_ns = run.scenario.traffic_window_ns
+    step_ns = max(1, (end_ns - start_ns) // _WINDOWS)
+    wanted: Counter[int] = Counter()
+    had: Counter[int] = Counter()
+    of_node: dict[int, list[int]] = defaultdict(lambda: [0, 0])
+    for (origin, _), t_ns in run.sent.items():
+        for node in run.targets(origin):
+            wanted[(t_ns - start_ns) // step_ns] += 1
+            of_node[node][1] += 1
+    for one in run.delivered:
+        had[(run.sent[one.origin, one.seq] - start_ns) // step_ns] += 1
+        of_node[one.node][0] += 1
+    steps = sorted(wanted)
+    times = [(start_ns + (step + 0.5) * step_ns) / S for step in steps]
+    over_time.plot(times, [had[step] / wanted[step] for step in steps], color=_BLUE)
+    over_time.set_xlabel("instant at which packets were generated [s]")
+    nodes = sorted(of_node)
+    per_node.bar(nodes, [of_node[node][0] / of_node[node][1] for node in nodes], color=_BLUE)
+    per_node.set_xlabel("receiver (node id)")
+    per_node.xaxis.set_major_locator(MaxNLocator(integer=True))
+    for axes in (over_time, per_node):
+        axes.set_ylabel("packet delivery ratio")
+        axes.set_ylim(0, 1.05)
+    return RunPicture(
+        figure,
+        f"Left: the delivery ratio of the packets generated in each {step_ns / S:.3g} s. Right: that of each receiver "
+        "over the whole run.",
+    )
+
+
+def links(run: RunRecords, counted: Sequence[Mapping[str, Any]]) -> RunPicture | None:
+    """The links over the area."""
+    places = run.places()
+    known = [link for link in counted if link["copies"] and {link["src"], link["dst"]} <= places.at.keys()]
+    if not known:
+        return None
+    reach_m = run.scenario.radio.range_m
+    ends = [(places.at[link["src"]], places.at[link["dst"]]) for link in known]
+    shown = [
+        index
+        for index, ((east, north), (east2, north2)) in enumerate(ends)
+        if not places.moved or (east - east2) ** 2 + (north - north2) ** 2 <= reach_m**2
+    ]
+    figure, axes = map_canvas(list(places.at.values()))
+    lines = LineCollection([ends[index] for index in shown], cmap=_SHARES, linewidths=1.3)
+    lines.set_array([known[index]["received"] / known[index]["copies"] for index in shown])
+    lines.set_clim(0, 1)
+    axes.add_collection(lines)
+    heads = {head for head in run.heads.values() if head}
+    for wanted, label, marker in ((True, "cluster head", "s"), (False, "node", "o")):
+        chosen = [at for node, at in places.at.items() if (node in heads) == wanted]
+        if chosen:
+            axes.scatter([at[0] for at in chosen], [at[1] for at in chosen], marker=marker, s=26, zorder=3,
+                         color=_DARK if wanted else "#ffffff", edgecolors=_DARK, label=label)  # fmt: skip
+    legend_above(figure, axes)
+    figure.colorbar(
+        lines, ax=axes, fraction=0.05, label="copies received / copies in range", format=PercentFormatter(1.0)
+    )
+    caption = f"Links by the share of copies received in the whole run; nodes {places.said}."
+    if places.moved:
+        caption += (
+            f" Drawn are the {len(shown):,} directed links between nodes that were within radio.range_m = {reach_m:g} "
+            f"m of each other there; {len(known) - len(shown):,} other pairs were in range at other times."
+        )
+    return RunPicture(figure, caption)
+
+
+def map_canvas(places: Sequence[tuple[float, float]]) -> tuple[Figure, Axes]:
+    """A figure in which a metre to the east is as long as one to the north, in the shape of what it shows."""
+    spans = [(min(at[axis] for at in places), max(at[axis] for at in places)) for axis in (0, 1)]
+    longest_m = max(high - low for low, high in spans) or 1.0
+    reaches_m = [max((high - low) / 2 + 0.05 * longest_m, _NARROWEST * longest_m / 2) for low, high in spans]
+    figure, (axes,) = canvas(1, width=6.5, height=1.4 + 4.4 * min(1.0, reaches_m[1] / reaches_m[0]))
+    axes.set_aspect("equal")
+    (west, east), (south, north) = (
+        ((low + high) / 2 - reach_m, (low + high) / 2 + reach_m)
+        for (low, high), reach_m in zip(spans, reaches_m, strict=True)
+    )
+    axes.set_xlim(west, east)
+    axes.set_ylim(south, north)
+    axes.set_xlabel("east [m]")
+    axes.set_ylabel("north [m]")
+    return figure, axes
+
+
+class _Own(NamedTuple):
+    """A span of the superframe that belongs to one node."""
+
+    node: int
+    start_ns: int
+    length_ns: int
+
+
+class _Frame(NamedTuple):
+    """The superframe in force at the end of a run."""
+
+    start_ns: int
+    period_ns: int
+    contention_ns: int
+    own: Sequence[_Own]
+    called: str
+    """What a span is called: `slot` or `turn`."""
+
+    def place_ns(self, one: LetOut) -> int:
+        """The place of an instant in the superframe."""
+        return (one.t_ns - self.start_ns) % self.period_ns
+
+
+def slots(run: RunRecords, reports: Mapping[int, Mapping[str, Any]]) -> RunPicture | None:
+    """The instants at which packets were let out, over the slots or turns of their owners."""
+    frame = _frame(reports)
+    if run.scenario.routing.protocol != "clustered" or not run.let_out:
+        return None
+    heads = {head for head in run.heads.values() if head}
+    if frame is None:
+        frame = _Frame(0, run.scenario.clusters.period_ns, 0, (), "slot")
+    shown = [one for one in run.let_out if one.t_ns >= frame.start_ns]
+    figure, (axes,) = canvas(1, width=7.5, height=4.4)
+    _draw_owners(axes, frame)
+    owners = {own.node for own in frame.own}
+    words = ("nodes with turns", "other nodes") if frame.called == "turn" else ("heads", "members")
+    for wanted, label, color, marker in ((True, words[0], _BLUE, "|"), (False, words[1], _DARK, ".")):
+        chosen = [one for one in shown if (one.node in (owners or heads)) == wanted]
+        if chosen:
+            places = [frame.place_ns(one) / MS for one in chosen]
+            size = 16 if not wanted or frame.called == "turn" else 50
+            axes.scatter(places, [one.node for one in chosen], color=color, s=size, marker=marker, zorder=3,
+                         linewidths=1.2 if wanted else 0, label=f"packets of {label}")  # fmt: skip
+    axes.set_xlabel(f"place in the superframe of {frame.period_ns / MS:g} ms [ms]")
+    axes.set_ylabel("origin (node id)")
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlim(0, frame.period_ns / MS)
+    axes.set_ylim(0.2, run.scenario.nodes.count + 0.8)
+    if axes.get_legend_handles_labels()[0]:
+        legend_above(figure, axes)
+    return RunPicture(figure, _slots_said(frame, shown))
+
+
+def _draw_owners(axes: Axes, frame: _Frame) -> None:
+    """Shade the spans of the superframe, each on the line of its owner, and slots over the whole height as well."""
+    if frame.contention_ns:
+        axes.axvspan(0, frame.contention_ns / MS, color="#eeeeee", zorder=0, label="contention window")
+    for index, own in enumerate(frame.own):
+        start_ms, length_ms = own.start_ns / MS, own.length_ns / MS
+        axes.barh(
+            own.node, length_ms, left=start_ms, height=0.8, color=_SHADE, edgecolor=_SHADE, zorder=1,
+            label=None if index else f"the owner's {frame.called}",
+        )  # fmt: skip
+        if frame.called == "slot":
+            axes.axvline(start_ms, color="#999999", linewidth=0.7, zorder=0)
+            if len(frame.own) <= _MOST_NAMED:
+                middle_ms = start_ms + length_ms / 2
+                axes.text(middle_ms, 1.0, f"head {own.node}", transform=axes.get_xaxis_transform(), ha="center",
+                          va="bottom", fontsize=8)  # fmt: skip
+
+
+def _slots_said(frame: _Frame, shown: Sequence[LetOut]) -> str:
+    """The caption: what is shaded, and how many packets of owners were let out in what belongs to them."""
+    if not frame.own:
+        return "When packets were let out first, by place in the flooding period."
+    spans: dict[int, list[_Own]] = defaultdict(list)
+    for own in frame.own:
+        spans[own.node].append(own)
+    owned = [one for one in shown if one.node in spans]
+    kept = sum(
+        any((frame.place_ns(one) - own.start_ns) % frame.period_ns < own.length_ns for own in spans[one.node])
+        for one in owned
+    )
+    if frame.called == "slot":
+        owner = "heads"
+        shaded = "each head's slot without its guard time; members send their packets to a head by contention"
+    else:
+        owner = "nodes with turns"
+        shaded = "the turns in which a node transmits packets of its own, on the line of that node"
+    return (
+        f"When packets were let out first, under the last schedule, which began at {frame.start_ns / S:.3g} s. "
+        f"Shaded: {shaded}. Of {len(owned):,} packets of {owner}, {kept:,} were let out in a {frame.called} of the "
+        "origin."
+    )
+
+
+def _frame(reports: Mapping[int, Mapping[str, Any]]) -> _Frame | None:
+    """The superframe of the last schedule, from the reports of its owners; None if nobody owns a slot or a turn."""
+    turns = {node: report["turns"] for node, report in reports.items() if report.get("turns")}
+    slots = {
+        node: report["slots"]
+        for node, report in reports.items()
+        if report.get("slots") and report.get("role") == "head"
+    }
+    told = turns or slots
+    if not told:
+        return None
+    newest = max(told.values(), key=lambda frame: float(frame["start_ms"]))
+    own = (
+        [one for node, frame in turns.items() for one in _turns_of(node, frame)]
+        if turns
+        else [
+            _Own(node, reports[node]["cluster"] * _ns(frame["slot_ms"]), _ns(frame["slot_ms"] - frame["guard_ms"]))
+            for node, frame in slots.items()
+        ]
+    )
+    own.sort(key=lambda one: one.start_ns)
+    contention_ns = _ns(newest.get("contention_ms", 0.0))
+    return _Frame(_ns(newest["start_ms"]), _ns(newest["period_ms"]), contention_ns, own, "turn" if turns else "slot")
+
+
+def _turns_of(node: int, frame: Mapping[str, Any]) -> Iterator[_Own]:
+    for offset in frame["own"]:
+        turn_ns = _ns(frame["turn_ms"])
+        yield _Own(node, (_ns(frame["contention_ms"]) + offset * turn_ns) % _ns(frame["period_ms"]), turn_ns)
+
+
+def _ns(value_ms: float) -> int:
+    return round(value_ms * MS)

@@ -1,0 +1,143 @@
+"""The page of one run: its rows and its pictures, from records written by hand."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from fanet_mw.trace import Confirmed, Detected, Generated, LetOut, Posed, Record, Refuted, RoleChanged
+from fanet_mw.units import MS, S
+from sim.report import mission_pictures, run_pictures, run_rows
+from sim.report.run_records import RunRecords
+from sim.results.mission import mission
+from tests.conftest import MakeScenario
+
+SEARCH = {
+    "nodes.count": 2, "world.area_m": 400, "mission.survivors": 2, "mission.survivor_positions_m": [[0, 100], [50, 0]],
+    "mission.search": "lines",
+}  # fmt: skip
+FOUND: tuple[Record, ...] = (
+    *(Posed(second * S, node, -100.0 + 10 * second, 40.0 * node, 30.0) for second in range(11) for node in (1, 2)),
+    Detected(2 * S, 1, 1, -60.0),
+    Detected(3 * S, 2, 2, -60.0),
+    Confirmed(4 * S, 1, 1, 0.0, 98.0),
+    Confirmed(5 * S, 2, 2, -150.0, 0.0),
+    Refuted(6 * S, 2, 2, -150.0, 0.0),
+    Confirmed(7 * S, 2, 2, 50.0, 3.0),
+)
+
+
+def in_order(records: Iterable[Record]) -> list[Record]:
+    return sorted(records, key=lambda record: record.t_ns)
+
+
+def run_of(scenario: Any, *records: Record) -> RunRecords:
+    run = RunRecords(scenario)
+    run.read(in_order(records))
+    return run
+
+
+def drawn(figure: Figure) -> dict[str, list[tuple[float, float]]]:
+    """The lines of a figure with labels, as points."""
+    return {
+        str(line.get_label()): [(float(x), float(y)) for x, y in np.asarray(line.get_data()).T.tolist()]
+        for axes in figure.axes
+        for line in axes.lines
+    }
+
+
+def legend(figure: Figure) -> list[str]:
+    return [text.get_text() for box in figure.legends for text in box.get_texts()]
+
+
+def test_a_confirmation_counts_from_its_instant_if_it_is_right_and_nothing_has_an_empty_legend_entry(
+    make_scenario: MakeScenario,
+) -> None:
+    drawing = mission_pictures.progress(run_of(make_scenario(**SEARCH), *FOUND))
+    assert drawing is not None
+    assert drawn(drawing.figure)["confirmed"] == [(0, 0), (4, 1), (7, 2), (10, 2)], "one at 5 s was far from the person"
+    assert drawn(drawing.figure)["detected"] == [(0, 0), (2, 1), (3, 2), (10, 2)]
+    assert legend(drawing.figure) == ["detected", "confirmed", "all 2 survivors"]
+    assert "No survivor was approached or reached." in drawing.caption
+
+
+def test_coverage_over_time_ends_at_that_of_the_summary(make_scenario: MakeScenario) -> None:
+    scenario = make_scenario(**SEARCH)
+    drawing = mission_pictures.progress(run_of(scenario, *FOUND))
+    assert drawing is not None
+    times, shares = np.asarray(drawing.figure.axes[1].lines[0].get_data()).tolist()
+    assert times == list(range(11))
+    assert shares[-1] == pytest.approx(mission(scenario, in_order(FOUND))["coverage"], abs=1e-6)
+    assert shares[0] < shares[-1], "the UAVs fly on"
+
+
+def test_the_map_shows_tracks_and_where_each_survivor_was_confirmed(make_scenario: MakeScenario) -> None:
+    drawing = mission_pictures.tracks(run_of(make_scenario(**SEARCH), *FOUND))
+    assert drawing is not None
+    at = {str(one.get_label()): np.asarray(one.get_offsets()).tolist() for one in drawing.figure.axes[0].collections}
+    assert at["place confirmed"] == [[0, 98], [50, 3]]
+    assert at["survivor, confirmed"] == [[0, 100], [50, 0]]
+    assert at["UAVs at the end"] == [[0, 40], [0, 80]]
+    assert not [label for label in at if "mistake" in label or "not confirmed" in label]
+
+
+def test_the_rows_of_a_search_name_what_it_achieved_in_readable_numbers(make_scenario: MakeScenario) -> None:
+    found = run_rows.mission({"mission": mission(make_scenario(**SEARCH), in_order(FOUND))}, confirms=True)
+    rows = {row[0]: row[1] for row in found.rows}
+    assert rows["survivors confirmed, within 25 m of the true place"] == "2 of 2"
+    assert rows["time to confirm: first, median, last"] == "4 s, 5.5 s, 7 s"
+    assert rows["confirmations taken back"] == "1"
+    assert {"area covered", "time in which all searching UAVs were connected"} <= rows.keys()
+    assert rows["distance to the nearest other UAV: least, 1st percentile, median"] == "40 m, 40 m, 40 m"
+
+
+def test_numbers_have_units_and_no_exponents() -> None:
+    assert [run_rows.milliseconds(value) for value in (None, 0.0412, 304.4, 9_999.4, 12_413.0)] == [
+        "-", "0.0412 ms", "304 ms", "9,999 ms", "12.4 s",
+    ]  # fmt: skip
+    assert [run_rows.percent(share) for share in (None, 0.0, 0.66251, 0.99999, 1.0)] == [
+        "-", "0 %", "66.25 %", "more than 99.99 %", "100 %",
+    ]  # fmt: skip
+
+
+def test_links_are_drawn_between_the_places_of_a_stated_window(make_scenario: MakeScenario) -> None:
+    """Both UAVs fly 100 m to the east within 10 s, of which the last 4 s belong to the drain."""
+    scenario = make_scenario(**SEARCH, **{"drain_s": 4, "radio.range_m": 50})
+    links = [{"src": 1, "dst": 2, "copies": 4, "received": 3}]
+    drawing = run_pictures.links(run_of(scenario, *FOUND), links)
+    assert drawing is not None
+    (nodes,) = (one for one in drawing.figure.axes[0].collections if one.get_label() == "node")
+    assert np.asarray(nodes.get_offsets()).tolist() == [[-70, 40], [-70, 80]]
+    assert "at their mean places from 0 to 6 s" in drawing.caption
+    assert "1 directed links between nodes that were within radio.range_m = 50 m" in drawing.caption
+
+
+def test_packets_are_held_against_the_slots_of_their_heads(make_scenario: MakeScenario) -> None:
+    """Two slots of 500 ms in a superframe that began at 1.2 s. Head 3 keeps to its slot, head 2 once does not."""
+    run = run_of(
+        make_scenario(**{"nodes.count": 4, "clusters.count": 2, "clusters.flooding_period_s": 1}),
+        *(RoleChanged(S, node, "head", cluster, node) for cluster, node in enumerate((2, 3))),
+        *(Generated(S, node, seq, "traffic", 9) for node in (2, 3) for seq in (1, 2)),
+        LetOut(1100 * MS, 2, 0),
+        LetOut(2300 * MS, 2, 1),
+        LetOut(2800 * MS, 2, 2),
+        LetOut(2700 * MS, 3, 1),
+        LetOut(4100 * MS, 3, 2),
+        LetOut(2900 * MS, 4, 1),
+    )
+    slots = {"start_ms": 1200.0, "period_ms": 1000.0, "slot_ms": 500.0, "guard_ms": 2.0}
+    reports = {node: {"slots": slots, "role": "head", "cluster": node - 2} for node in (2, 3)}
+    drawing = run_pictures.slots(run, {**reports, 4: {"slots": slots, "role": "member", "cluster": 0}})
+    assert drawing is not None
+    assert "Of 4 packets of heads, 3 were let out in a slot of the origin." in drawing.caption
+    bars = [
+        (bar.get_x(), bar.get_width(), bar.get_y() + bar.get_height() / 2)
+        for bar in drawing.figure.axes[0].patches
+        if isinstance(bar, Rectangle)
+    ]
+    assert bars == [(0, 498, 2), (500, 498, 3)]
+    assert [text.get_text() for text in drawing.figure.axes[0].texts] == ["head 2", "head 3"]
+    assert legend(drawing.figure) == ["packets of heads", "packets of members", "the owner's slot"]

@@ -168,5 +168,5 @@ def test_a_hill_ahead_is_climbed_before_it_is_reached() -> None:
     obstacles = KnownObstacles(OnboardMap((), rows, 50.0))
     at = Enu(-25.0, 0.0, 60.0)
     assert obstacles.ground_m(Enu(25.0, 0.0, 0.0)) == pytest.approx(15.0)
-    assert obstacles.climb_m(at, Enu(10.0, 0.0, 0.0)) == pytest.approx(21.0)
-    assert obstacles.climb_m(at, Enu(-10.0, 0.0, 0.0)) == 0.0
+    assert obstacles.rise_m(at, Enu(10.0, 0.0, 0.0)) == pytest.approx(21.0)
+    assert obstacles.rise_m(at, Enu(-10.0, 0.0, 0.0)) == 0.0

@@ -45,6 +45,27 @@ def test_with_shadowing_nothing_below_the_threshold_is_told(make_scenario: MakeS
     assert min(heard) < -90, "and what is just above it is"
 
 
+def test_shadowing_is_gaussian_of_its_standard_deviation_over_places_and_phones(make_scenario: MakeScenario) -> None:
+    """800 values: mean, deviation and quartiles are no more than four standard errors off."""
+    scenario, phones = sensor(make_scenario, shadowing_db=6.0, detection_dbm=-300.0)
+    mission, survivors = scenario.mission, np.array(place(scenario))
+    shadowing = []
+    for cell in range(100):
+        here = np.array([25.0 * cell + 5.0, 5.0, 50.0])
+        for survivor, dbm in phones.scan(here):
+            distance_m = float(np.linalg.norm(survivors[survivor - 1] - here))
+            shadowing.append(
+                dbm - (mission.phone_power_dbm - 40.05 - 10 * mission.phone_exponent * np.log10(distance_m))
+            )
+    values = np.array(shadowing)
+    count = len(values)
+    assert count == 800, "every phone is heard at every place"
+    assert abs(values.mean()) <= 4 * 6.0 / np.sqrt(count)
+    assert abs(values.std() / 6.0 - 1) <= 4 / np.sqrt(2 * count)
+    within_quartiles = np.mean(np.abs(values) < 0.6745 * 6.0)
+    assert abs(within_quartiles - 0.5) <= 4 * 0.5 / np.sqrt(count)
+
+
 def test_what_a_place_hides_it_hides_every_time(make_scenario: MakeScenario) -> None:
     scenario, phones = sensor(make_scenario, shadowing_db=8.0, detection_dbm=-200.0)
     here, near, elsewhere = (np.array([east, 5.0, 50.0]) for east in (5.0, 5.001, 405.0))

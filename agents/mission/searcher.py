@@ -5,6 +5,7 @@ others.
     phones in reach     -> reports: flooded, and passed from neighbor to neighbor in hellos     finding.phone_reception
     enough reporters    -> an auction; winners leave their lanes as far as the formation allows tasking
     too few reporters   -> the auction sends a UAV that has not reported, for another bearing   tasking
+    nobody seen, ears   -> a UAV with microphones goes down to listen                           tasking.listening
     seen at close range -> confirmed, announced; responders return to their lanes               finding.announcing
     contradicted later  -> refuted, announced; reported and bid for as before the confirmation  finding.contradictions
 
@@ -44,6 +45,7 @@ from agents.mission.navigation.radar_watch import RadarWatch
 from agents.mission.outbox import Outbox
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import Bidding
+from agents.mission.tasking.listening import Listening
 from fanet_mw.bus.messages import Echo
 from fanet_mw.motion import Motion
 from fanet_mw.rng import stream
@@ -104,7 +106,9 @@ class Searcher:
             soft=[ConnectivityMaintenance(navigation, neighbors, place, reach_m=reach_m)],
         )
         gaps = None if coverage is None else Gaps(coverage, place)
-        goal = Goal(finds, navigation, place, approach, gaps)
+        heard = scenario.sensors.voice_hz > 0
+        listening = Listening(scenario, node, navigation, neighbors, speed_m_s=speed_m_s) if heard else None
+        goal = Goal(finds, navigation, place, approach, gaps, listening)
         take_off = TakeOff(
             node, position,
             navigation=navigation, neighbors=neighbors, outbox=outbox, height_m=nodes.altitude_m,

@@ -11,7 +11,7 @@ from fanet_mw.bus.messages import Message, Obstructions, Poses
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Confirmed, Planned, Record
+from fanet_mw.trace import Confirmed, Planned, Posed, Record, Sighted
 from fanet_mw.units import S
 from sim.results.mission import mission
 from sim.run.outcome import Outcome
@@ -141,6 +141,20 @@ def test_three_uavs_confirm_by_a_spiral_what_lines_would_need_twelve_for() -> No
     assert found["coverage"] == found["connected"] == 1.0
     assert found["confirmed"] == found["survivors"]
     assert not found["mistaken"] + found["collisions"]
+
+
+def test_a_survivor_in_the_open_is_confirmed_by_voice_alone_from_a_uav_that_goes_down_to_listen() -> None:
+    few = ["nodes.count=3", "clusters.count=1", "traffic.sources=2", "world.area_m=300", "mission.search=spiral"]
+    by_ear = ["sensors.camera_hz=0", "sensors.voice_hz=2", "duration_s=140"]
+    outcome = simulate(find("rescue", [*KEYS, *few, *by_ear]))
+    found = mission_of(outcome)
+    assert found["confirmed"] >= 1
+    assert not found["mistaken"] + found["collisions"]
+    confirmed = next(record for record in outcome.records if isinstance(record, Confirmed))
+    assert {record.sensor for record in outcome.records if isinstance(record, Sighted)} == {"voice"}
+    poses = [record for record in outcome.records if isinstance(record, Posed) and record.node == confirmed.node]
+    assert min(pose.up_m for pose in poses if pose.t_ns <= confirmed.t_ns) < 14.1
+    assert max(pose.up_m for pose in poses if pose.t_ns > confirmed.t_ns) > 30
 
 
 class Lost(Around):

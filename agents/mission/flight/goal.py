@@ -8,6 +8,7 @@ from agents.mission.formation.gaps import Gaps
 from agents.mission.navigation.navigation import Navigation
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import FAR_M, VAGUE_M
+from agents.mission.tasking.listening import Listening
 from fanet_mw.units import STILL, Enu
 
 _SHARED_M: Final = 35.0
@@ -24,13 +25,14 @@ class Goal:
         formation: FormationPlace,
         approach: Approach,
         gaps: Gaps | None,
+        listening: Listening | None,
     ) -> None:
         """`gaps`: the cells that the formation has left unsearched; None if UAVs do not share what
-        they have searched.
+        they have searched. `listening`: takes a UAV with microphones down; None for a UAV without.
         """
         self._finds, self._navigation = finds, navigation
         self._formation, self._approach = formation, approach
-        self._gaps = gaps
+        self._gaps, self._listening = gaps, listening
 
     def at(self, task: int | None, now_ns: int) -> tuple[Enu, Enu]:
         """The place to fly to, and how it moves; `task` is the survivor that this UAV has won, if any."""
@@ -46,7 +48,12 @@ class Goal:
             gap = self._gap(now_ns)
             return (lane, moves) if gap is None else (Enu(*gap, lane.up), STILL)
         east, north = self._approach.next_point(survivor, place, now_ns, responding=survivor == task)
-        return formation.bounded(east, north, lane, moves)
+        if self._listening is None:
+            return formation.bounded(east, north, lane, moves)
+        seen = self._finds.known[survivor].filter.is_seen
+        look = self._listening.goal(survivor, place, Enu(east, north, lane.up), seen=seen, now_ns=now_ns)
+        goal, feed = formation.bounded(look.east, look.north, lane, moves)
+        return goal._replace(up=look.up), feed
 
     def _gap(self, now_ns: int) -> tuple[float, float] | None:
         """The nearest unsearched gap, if this UAV is a follower; None for all other UAVs, or if there is no gap."""

@@ -15,6 +15,7 @@ from agents.mission.navigation.navigation import Navigation
 from agents.mission.outbox import Outbox
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.auction import Auction
+from agents.mission.tasking.listening import descent_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Approaching
 from fanet_mw.units import NodeId, S
@@ -27,7 +28,7 @@ FAR_M: Final = 450.0
 _SCOUT_AFTER_NS: Final = 4 * S
 """How long a survivor may have too few reporters before another UAV is sent to report it."""
 _RETURN_AFTER_NS: Final = 45 * S
-"""How long a responder searches for a survivor in vain before it withdraws its bid."""
+"""How long a responder searches for a survivor in vain before it withdraws its bid, without the time of a descent."""
 _AGAIN_NS: Final = 20 * S
 """How long a UAV that has withdrawn its bid does not bid again."""
 _LONG_AGO_NS: Final = -(10**18)
@@ -57,6 +58,7 @@ class Bidding:
         self._approach = approach
         self._outbox = outbox
         self._speed_m_s = speed_m_s
+        self._patience_ns = _RETURN_AFTER_NS + descent_ns(scenario)
         self._auction = Auction(node)
         self._taken_back_ns: dict[int, int] = {}
         """The instant at which this UAV last withdrew its bid for each survivor by its own decision."""
@@ -135,7 +137,7 @@ class Bidding:
         find = self._finds.known[survivor]
         lost = not self._wins(survivor, find, now_ns)
         arrived_ns = self._approach.arrived_ns.get(survivor)
-        late = arrived_ns is not None and now_ns - arrived_ns > _RETURN_AFTER_NS
+        late = arrived_ns is not None and now_ns - arrived_ns > self._patience_ns
         if not late and self._formation.is_free:
             late = not self._formation.holds_together(find.place(), now_ns, within_s=-5.0)
         if late:

@@ -58,7 +58,7 @@ class Board:
             SCENARIO, node, finds=self.finds, navigation=self.navigation, formation=self.place,
             approach=self.approach, outbox=self.out, speed_m_s=10.0,
         )  # fmt: skip
-        self.goal = Goal(self.finds, self.navigation, self.place, self.approach, None)
+        self.goal = Goal(self.finds, self.navigation, self.place, self.approach, None, None)
         self.announcing = Announcing(node, self.finds, self.out)
 
     def hear(self, survivor: int, truth: Enu, reporters: range, *, now_ns: int) -> None:

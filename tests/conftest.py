@@ -1,6 +1,7 @@
 """Fixtures shared by all tests."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -28,6 +29,17 @@ _REALTIME = (
 )  # fmt: skip
 """Modules whose tests live in real time. They wait more than they work, so four of them go side by side; none of them
 asks how late this machine is: frames are announced long ahead, and what ends soon by itself is waited for."""
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leave out modules of which `-m` chooses no test, where it ends as in `scripts/test`: each of the processes there
+    would take some seconds to read them all.
+    """
+    chosen = str(config.getoption("markexpr"))
+    if collection_path.suffix != ".py" or not chosen.endswith("realtime"):
+        return None
+    in_real_time = collection_path.stem.startswith(_REALTIME)
+    return True if in_real_time == chosen.endswith("not realtime") else None
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

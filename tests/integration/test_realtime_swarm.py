@@ -121,7 +121,7 @@ def test_a_swarm_of_processes_delivers_and_accounts_for_every_frame(tmp_path: Pa
 
 
 def test_a_killed_agent_is_named_and_the_others_carry_on() -> None:
-    outcome, events = run(scenario(), at_s=2.5, act=kill("agent-4"))
+    outcome, events = run(scenario("duration_s=4"), at_s=2, act=kill("agent-4"))
     assert outcome.aborted is None
     assert outcome.ended == [("agent-4", -signal.SIGKILL)]
     assert any("agent-4 ended with signal SIGKILL" in event for event in events)
@@ -132,7 +132,7 @@ def test_a_killed_agent_is_named_and_the_others_carry_on() -> None:
 
 
 def test_a_killed_agent_is_started_again_with_respawn_and_takes_part() -> None:
-    outcome, events = run(scenario("duration_s=8"), at_s=2.5, act=kill("agent-4"), respawn=True)
+    outcome, events = run(scenario("duration_s=6.5"), at_s=2, act=kill("agent-4"), respawn=True)
     assert outcome.aborted is None
     assert any("agent-4" in event and "started again" in event for event in events)
     report = outcome.reports["agent-4"]
@@ -196,8 +196,10 @@ def at_start(number: int, *, after_s: float) -> tuple[int, str]:
 
 def test_ctrl_c_while_a_swarm_starts_ends_it_without_a_traceback() -> None:
     """Wherever it comes: in the imports, when the server of children starts, between children, before the clock."""
-    for after_s in (0.0, 0.5, 1.2, 2.2):
-        code, said = at_start(signal.SIGINT, after_s=after_s)
+    moments_s = (0.0, 0.5, 1.2, 2.2)
+    with ThreadPoolExecutor() as pool:  # the four launches have nothing in common
+        ended = list(pool.map(lambda after_s: at_start(signal.SIGINT, after_s=after_s), moments_s))
+    for after_s, (code, said) in zip(moments_s, ended, strict=True):
         assert code == 130, (after_s, said)
         assert "Traceback" not in said, (after_s, said)
         assert len(said.splitlines()) <= 3, (after_s, said)
@@ -217,7 +219,7 @@ def late_agent(*, node: int, **arguments: Any) -> int:
         there.touch()
         raise BusError("no Zenoh router")
     if node == 3:
-        time.sleep(3)
+        time.sleep(2)
     return run_agent(node=NodeId(node), **arguments)
 
 
@@ -228,7 +230,7 @@ def test_an_agent_that_is_late_to_start_is_waited_for_and_one_that_found_no_rout
     monkeypatch.setattr("sim.run.launcher.swarm.WORD_EVERY_S", 1.0)
     name = f"late-{uuid.uuid4().hex}"
     try:
-        outcome, events = run(scenario(), swarm=name)
+        outcome, events = run(scenario("duration_s=1", "warmup_s=0.2", "drain_s=0.2"), swarm=name)
     finally:
         (Path(tempfile.gettempdir()) / f"{name}-agent-2").unlink(missing_ok=True)
     assert outcome.aborted is None
@@ -266,13 +268,17 @@ def test_a_launched_swarm_is_found_by_other_commands(tmp_path: Path, monkeypatch
     words = [process.stderr.readline()]
     while "processes up" not in words[-1]:
         words.append(process.stderr.readline())
+    links = subprocess.Popen(
+        command("links", "--reports", "1"), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )  # it waits for a report while the other commands are tried
     listed = subprocess.run(command("swarms", "--json"), capture_output=True, text=True, check=True)
     (entry,) = json.loads(listed.stdout)
     assert (entry["swarm"], entry["pid"]) == ("test", process.pid)
     assert f"swarm test on {entry['endpoint']}\n" in words
-    for arguments in (("links", "--reports", "1"), ("air", "cut", "3"), ("air", "restore", "--swarm", "test")):
+    for arguments in (("air", "cut", "3"), ("air", "restore", "--swarm", "test")):
         done = subprocess.run(command(*arguments), capture_output=True, text=True, check=False, timeout=60)
         assert (done.returncode, done.stderr) == (0, ""), arguments
+    assert (links.communicate(timeout=PATIENCE_S)[1], links.returncode) == ("", 0)
     process.send_signal(signal.SIGTERM)
     process.communicate(timeout=PATIENCE_S)
     assert list((tmp_path / "fanet-mw").iterdir()) == []
@@ -319,7 +325,7 @@ def test_services_started_one_by_one_make_a_swarm() -> None:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-    small = ["--set", "nodes.count=3", "--set", "clusters.count=1", "--duration", "4", "--set", "warmup_s=0",
+    small = ["--set", "nodes.count=3", "--set", "clusters.count=1", "--duration", "2", "--set", "warmup_s=0",
              "--set", "drain_s=0"]  # fmt: skip
     router = subprocess.Popen(command("router", "quick", "--listen", endpoint, *small), stderr=subprocess.PIPE)
     assert router.stderr is not None

@@ -75,7 +75,7 @@ def test_a_run_whose_agents_were_all_killed_is_not_valid() -> None:
 
 
 def test_a_run_whose_emulator_was_killed_and_started_again_is_not_valid_and_says_what_is_missing() -> None:
-    outcome, summary = run(scenario("duration_s=8"), (1.5, send(signal.SIGKILL, "emulator")), respawn=True)
+    outcome, summary = run(scenario("duration_s=6"), (1.5, send(signal.SIGKILL, "emulator")), respawn=True)
     assert about(summary, "emulator ended")
     missing = summary["frames"]["unaccounted"]
     assert missing > 20
@@ -124,11 +124,11 @@ class Watch:
 
 def test_a_world_that_is_started_again_goes_on_where_it_was_and_the_run_is_not_valid() -> None:
     watch = Watch()
-    fast = scenario("duration_s=8", "mobility.model=formation", "mobility.speed_m_s=15")
-    _, summary = run(fast, (0.5, watch), (4.0, send(signal.SIGKILL, "world")), respawn=True)
+    fast = scenario("duration_s=6", "mobility.model=formation", "mobility.speed_m_s=15")
+    _, summary = run(fast, (0.5, watch), (2.5, send(signal.SIGKILL, "world")), respawn=True)
     watch.bus.close()
     assert about(summary, "world ended") == "world ended before the end, with signal SIGKILL: 1, limit 0"
-    assert watch.poses[-1].t_ns > 6.5 * S, "there are poses again"
+    assert watch.poses[-1].t_ns > 5 * S, "there are poses again"
     far_m = np.linalg.norm(np.array(watch.poses[-1].states)[:3] - np.array(watch.poses[0].states)[:3])
     assert far_m > 40, "far from where they started"
     assert watch.jump_m() < 10
@@ -160,7 +160,7 @@ def test_an_agent_that_is_started_again_after_a_step_of_the_clock_takes_part(
 ) -> None:
     """Its process reads a unix clock that is off by the step; the swarm's time is handed to it."""
     monkeypatch.setattr("sim.run.launcher.services.run_agent", partial(agent_after_a_step, step_s))
-    outcome, summary = run(scenario("duration_s=6"), (2.0, send(signal.SIGKILL, "agent-4")), respawn=True)
+    outcome, summary = run(scenario("duration_s=5"), (1.5, send(signal.SIGKILL, "agent-4")), respawn=True)
     assert [name for name, _ in outcome.ended] == ["agent-4"], "once, because it was killed"
     assert about(summary, "agent-4 ended")
     assert outcome.reports["agent-4"]["final"]

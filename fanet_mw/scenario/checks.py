@@ -26,6 +26,8 @@ _SCHEDULE_PLACES: Final = 2
 """The number of FANET_PLACES messages that go with one full FANET_SCHEDULE."""
 _TAKEN: Final = frozenset(("report", "warning", "telemetry", "receipt", "joined", "formation"))
 """The names that other applications have in a trace, which traffic classes may not use."""
+_FARTHEST_BASE: Final = 2.0
+"""The greatest distance of the base from the middle of the area, along each axis, in widths of the area."""
 _RIVALS: Final = ("aodv", "olsr", "dsdv", "geographic")
 _MOST_CLUSTERS_ABREAST: Final = 7
 """The greatest number of clusters side by side: a circle around one head has room for six more heads."""
@@ -198,8 +200,14 @@ def _blind_warnings(scenario: Scenario) -> Iterator[str]:
 
 
 def _impossible_places(scenario: Scenario) -> Iterator[str]:
-    """Survivors outside the area, or in buildings that do not exist."""
+    """A base far from the area, survivors outside of it, or in buildings that do not exist."""
     mission, world = scenario.mission, scenario.world
+    farthest_m = _FARTHEST_BASE * world.area_m
+    if max(map(abs, world.base_m)) > farthest_m:
+        east, north = world.base_m
+        yield (
+            f"world.base_m = [{east:g}, {north:g}] must be within +-{_FARTHEST_BASE:g} x world.area_m = {farthest_m:g}"
+        )
     for index, (east, north) in enumerate(mission.survivor_positions_m):
         if max(abs(east), abs(north)) > world.area_m / 2:
             yield (

@@ -37,7 +37,8 @@ class World(Section):
     tick_ms: Annotated[float, Field(ge=1, le=10_000)] = 100.0
     """The interval at which poses are published."""
     base_m: tuple[Coordinate, Coordinate] = (0.0, 0.0)
-    """East and north of the base, which is the middle of the layout in which the swarm starts."""
+    """East and north of the base, which is the middle of the layout in which the swarm starts; each at most twice
+    `area_m`."""
     crash: Literal["none", "falls"] = "none"
     """The effect of a contact on a vehicle: `none`, it is only counted; `falls`, the vehicle falls to the ground and
     stays there."""

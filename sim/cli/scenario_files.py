@@ -131,7 +131,10 @@ def check(file: ScenarioName, *, choice: ScenarioFlags = ScenarioFlags()) -> int
         A .toml file, or a shipped scenario's name.
 
     """
+    from sim.world.possible_world import require_possible
+
     chosen = choice.scenario(file)
+    require_possible(chosen)
     Console().print(f"{file}: {_sentence(chosen)}", highlight=False, soft_wrap=True, markup=False)
     return 0
 

@@ -12,6 +12,7 @@ from fanet_mw.scenario.model import Scenario
 from sim.scenarios import catalog
 from sim.sweep import measures
 from sim.sweep.spec import MOST_RUNS, Setting, Sweep
+from sim.world.possible_world import PossibleWorlds
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +46,7 @@ def tasks_of(sweep: Sweep) -> list[Task]:
     measures.check(sweep.measure)
     tasks: list[Task] = []
     mistakes: dict[str, list[str]] = {}
+    worlds = PossibleWorlds()
     for setting in sweep.settings():
         overrides = setting.overrides()
         for seed in sweep.seed_list():
@@ -52,6 +54,7 @@ def tasks_of(sweep: Sweep) -> list[Task]:
                 scenario = catalog.find(sweep.base, [*overrides, f"seed={seed}"])
                 if setting.realtime and not scenario.radio.lead_ms:
                     raise ConfigError("radio.lead_ms = 0 is for virtual time: must be > 0 in real time, for example 20")
+                worlds.require(scenario)
             except ConfigError as error:
                 mistakes.setdefault(str(error), []).append(f"case {setting.case}, {', '.join(overrides)}")
                 break

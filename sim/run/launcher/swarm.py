@@ -35,6 +35,7 @@ from sim.run.launcher.processes import Processes, describe
 from sim.run.launcher.services import Services
 from sim.run.outcome import Outcome
 from sim.world.flight_recorder import FlightRecorder
+from sim.world.possible_world import require_possible
 
 READY_TIMEOUT_S: Final = 300.0
 """How long the launcher waits until all processes are present: on a busy machine 47 processes take a minute, and a
@@ -268,9 +269,11 @@ async def launch(
     `zenoh_config` is Zenoh's own configuration: a file for all processes, or a folder with one file for each. What is
     collected waits in temporary files in `spool_folder`, by default where the system keeps such files.
 
-    Raises BusError when the bus cannot be used or the swarm does not come up, ConfigError when a limit of the machine
-    is too low, and KeyboardInterrupt with its number when a signal comes before there is anything to report.
+    Raises BusError when the bus cannot be used or the swarm does not come up, ConfigError when the world is impossible
+    or a limit of the machine is too low, and KeyboardInterrupt with its number when a signal comes before there is
+    anything to report.
     """
+    require_possible(scenario)
     limits.prepare(processes=len(expected_names(scenario)))
     if must_compile():
         on_event(COMPILING_NOTICE)

@@ -46,7 +46,8 @@ def read(path: Path, *, origin_deg: tuple[float, float] | None, height_m: float)
     try:
         rings = [(_ring(points), _height(properties, height_m)) for points, properties in _polygons(tree)]
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
-        raise ConfigError(f"world.buildings_geojson: {path} is no GeoJSON of buildings: {error!r}") from error
+        reason = str(error) if isinstance(error, ValueError) else repr(error)
+        raise ConfigError(f"world.buildings_geojson: {path} is no GeoJSON of buildings: {reason}") from error
     if not rings:
         raise ConfigError(f"world.buildings_geojson: {path} holds no Polygon")
     if origin_deg is None:

@@ -267,17 +267,6 @@ class PhoneFilter:
             steps = [min(most, step) for step in steps]
         self._scores = list(map(add, self._scores, map(table.__getitem__, steps)))
 
-    def _inside(self) -> Sequence[bool]:
-        """For each cell, True if it lies in the area; all cells are taken if none does."""
-        assert self._middle is not None, "the grid has a middle before its cells are used"
-        half = self._model.half_m + _CELL_M / 2
-        if max(abs(self._middle.east), abs(self._middle.north)) + _HALF_CELLS * _CELL_M <= half:
-            return _EVERY_CELL
-        east = [abs(self._middle.east + (i - _HALF_CELLS) * _CELL_M) <= half for i in range(_WIDTH)]
-        north = [abs(self._middle.north + (j - _HALF_CELLS) * _CELL_M) <= half for j in range(_WIDTH)]
-        found = [row and column for row in north for column in east]
-        return found if any(found) else _EVERY_CELL
-
     def _moments(self) -> Estimate:
         """Compute the posterior of all cells; returns its mean and covariance within the area."""
         assert self._middle is not None, "the grid has a middle before its cells are used"
@@ -289,7 +278,7 @@ class PhoneFilter:
             for s, q, silence in zip(self._sums, self._squares, self._scores, strict=True)
         ]
         self._totals = scores
-        possible = self._inside()
+        possible = _inside(self._middle, model.half_m + _CELL_M / 2)
         self._best = best = max(compress(scores, possible))
         exp, least = math.exp, best - 40.0
         likely = [score >= least for score in scores]
@@ -311,6 +300,19 @@ class PhoneFilter:
             (ij / total - mean_i * mean_j) * cell2,
             (max(0.0, jj / total - mean_j * mean_j) + quantized) * cell2,
         )
+
+
+@lru_cache(maxsize=64)
+def _inside(middle: Enu, half_m: float) -> Sequence[bool]:
+    """For each cell of the grid around `middle`, True if it lies no farther than `half_m` to the east, west, north and
+    south of the origin; all cells are taken if none does.
+    """
+    if max(abs(middle.east), abs(middle.north)) + _HALF_CELLS * _CELL_M <= half_m:
+        return _EVERY_CELL
+    east = [abs(middle.east + (i - _HALF_CELLS) * _CELL_M) <= half_m for i in range(_WIDTH)]
+    north = [abs(middle.north + (j - _HALF_CELLS) * _CELL_M) <= half_m for j in range(_WIDTH)]
+    found = tuple(row and column for row in north for column in east)
+    return found if any(found) else _EVERY_CELL
 
 
 def _ground_m(a: Enu, b: Enu) -> float:

@@ -70,7 +70,7 @@ SHAPES: Final[Mapping[str, Case]] = {
     ), (1, 2)),
 }  # fmt: skip
 CLEAR: Final[Mapping[str, Case]] = {
-    "hellos of neighbors and radar": Case("town", (), (1, 2, 3)),
+    "hellos of neighbors and radar": Case("town", (), _TWENTY),
     "radar alone": Case("town", ('mission.avoid_by=["radar"]',), (1, 2, 3)),
     "neither": Case("town", ("mission.avoid_by=[]",), (1, 2, 3)),
 }

@@ -15,7 +15,7 @@ from tests.tables.missions import Case, flown, fly
 _UAVS: Final = 45
 _HALF: Final = _UAVS // 2
 PAPER: Final[Mapping[str, Case]] = {
-    interval_s: Case("rescue-paper", (f"mission.report_interval_s={interval_s}",), tuple(range(1, 11)))
+    interval_s: Case("rescue-paper", (f"mission.report_interval_s={interval_s}",), tuple(range(1, 21)))
     for interval_s in ("1.0", "0.5", "0.1")
 }
 """By the interval of app_2 [s]."""

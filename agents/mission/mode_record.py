@@ -9,7 +9,7 @@ from fanet_mw.units import NodeId
 
 
 class ModeRecord:
-    """The mode of one UAV: takeoff, wait, deploy, search, respond, return or land."""
+    """The mode of one UAV: takeoff, wait, deploy, search, respond, return, lost_link or land."""
 
     def __init__(
         self, node: NodeId, place: FormationPlace, flight: Flight, return_home: ReturnHome, outbox: Outbox
@@ -30,8 +30,8 @@ class ModeRecord:
     def _mode(self, survivor: int | None, now_ns: int) -> str:
         if self._return_home.lands:
             return "land"
-        if self._return_home.leaves:
-            return "return"
+        if self._return_home.reason is not None:
+            return self._return_home.reason.value
         if self._flight.takes_off:
             return "takeoff"
         if survivor:

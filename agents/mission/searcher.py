@@ -50,7 +50,7 @@ from fanet_mw.bus.messages import Echo
 from fanet_mw.motion import Motion
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import Enu, NodeId, S
+from fanet_mw.units import Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import MOST_PLACES, Bids, Covered, Found, Search, SearchStatus, Standing, Told, encode_bids
 
@@ -97,6 +97,7 @@ class Searcher:
         self._return_home = ReturnHome(
             position, navigation, outbox,
             speed_m_s=speed_m_s, height_m=scenario.nodes.altitude_m, reserve=mission.reserve_charge,
+            lost_link_ns=seconds_to_ns(mission.lost_link_s),
         )  # fmt: skip
         velocity_choice = VelocityChoice(
             navigation,
@@ -133,6 +134,8 @@ class Searcher:
         if self._next_review_ns is None or now_ns < self._next_review_ns:
             return
         self._next_review_ns = now_ns + _REVIEW_NS
+        if self._return_home.loses_link(now_ns):
+            self._leave(now_ns)
         self._reception.review(now_ns)
         for survivor in self._sightings.contradicted():
             self._announcing.refute(survivor, now_ns)
@@ -164,10 +167,14 @@ class Searcher:
     def on_battery(self, charge: float, *, now_ns: int) -> None:
         """A reading of the battery; a UAV that must leave gives up its place and its task at once."""
         if self._return_home.on_battery(charge, now_ns=now_ns):
-            self._bidding.hand_on(now_ns)
-            self._plans.leave()
-            self._plans.say_status(self._return_home.percent, now_ns)
-            self._mode.review(self._bidding.survivor, now_ns)
+            self._leave(now_ns)
+
+    def _leave(self, now_ns: int) -> None:
+        """Give up the place and the task, tell all, and fly home."""
+        self._bidding.hand_on(now_ns)
+        self._plans.leave()
+        self._plans.say_status(self._return_home.percent, now_ns)
+        self._mode.review(self._bidding.survivor, now_ns)
 
     def scan(self, heard: Sequence[tuple[int, float]], *, now_ns: int) -> None:
         """The receiver detects these phones with these powers [dBm], and no others."""
@@ -203,11 +210,19 @@ class Searcher:
 
     def hello(self, origin: int, motion: Motion, *, now_ns: int) -> None:
         """A neighbor's hello states how it flies."""
+        self._on_heard(now_ns)
         self._neighbors.on_hello(origin, motion)
         self._plans.on_hello(origin, motion.position, now_ns=now_ns)
 
+    def _on_heard(self, now_ns: int) -> None:
+        """Another UAV was heard; a UAV that flew home because it heard nobody takes part again."""
+        if self._return_home.on_heard(now_ns):
+            self._plans.come_back(self._return_home.percent, now_ns)
+            self._mode.review(self._bidding.survivor, now_ns)
+
     def on_message(self, message: Told, *, now_ns: int) -> None:
         """A message of another node was received, sent to its neighbors or to all nodes."""
+        self._on_heard(now_ns)
         match message:
             case Survivor():
                 if message.reporter != self._node:

@@ -63,6 +63,7 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
     found += _too_small_frames(scenario)
     found += _unkept_deadline(scenario)
     found += _blind_warnings(scenario)
+    found += _deaf_search(scenario)
     found += _impossible_formation(scenario)
     found += _impossible_faults(scenario)
     found += [
@@ -137,6 +138,16 @@ def _too_small_frames(scenario: Scenario) -> Iterator[str]:
         whole = size["FANET_ROUTE"] + inner
         if whole > most:
             yield f"radio.max_frame_bytes = {most} must be >= {whole} for {what}"
+
+
+def _deaf_search(scenario: Scenario) -> Iterator[str]:
+    """A limit on silence that is no longer than the silence between two hellos."""
+    mission, hello_s = scenario.mission, scenario.routing.hello_interval_s
+    if mission.lost_link_s and (not hello_s or mission.lost_link_s <= hello_s):
+        yield (
+            f"mission.lost_link_s = {mission.lost_link_s:g} needs hellos in shorter intervals, 0 < "
+            f"routing.hello_interval_s = {hello_s:g} < {mission.lost_link_s:g}"
+        )
 
 
 def _impossible_formation(scenario: Scenario) -> Iterator[str]:

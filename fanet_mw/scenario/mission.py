@@ -58,6 +58,10 @@ class Mission(Section):
     reserve_charge: Annotated[float, Field(ge=0, le=1)] = 0.15
     """`search`: the share of its battery with which a UAV must come home. If it would come home with less, it flies
     home and lands, and others take over its place and task; needs `sensors.battery_hz`."""
+    lost_link_s: Duration = 0.0
+    """`search`: a UAV that has received no hello and no message of the search for this long flies home and lands; if it
+    hears somebody again before it lands, it takes part again. 0: it searches on, however long it hears nobody. Needs
+    hellos."""
     responders: Annotated[int, Field(ge=1, le=1000)] = 3
     """`search`: the number of UAVs that fly to each survivor, chosen by auction; the others go on searching."""
     report_interval_s: Interval = 5.0

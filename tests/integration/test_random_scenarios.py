@@ -98,6 +98,8 @@ def test_a_swarm_whose_largest_messages_just_fit_a_frame_works(keys: Sequence[st
 
 @pytest.mark.parametrize(("keys", "said"), [
     (("routing.hello_interval_s=0",), "needs hellos: routing.hello_interval_s > 0"),
+    (("mission.lost_link_s=1",), "mission.lost_link_s = 1 needs hellos in shorter intervals, 0 < "
+     "routing.hello_interval_s = 1 < 1"),
     (("routing.hello_interval_s=1e-10",), "routing.hello_interval_s = 1e-10 must be 0 or >= 0.01"),
     (("clusters.relay=scheduled", "radio.max_frame_bytes=679"), "radio.max_frame_bytes = 679 must be >= 680"),
     (("clusters.relay=scheduled", "clusters.links=measured", "nodes.count=30", "radio.max_frame_bytes=995"),

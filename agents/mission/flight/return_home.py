@@ -1,8 +1,10 @@
-"""The return of a UAV whose battery runs low: it flies home above all UAVs that search, then lands straight down. Its
-task and its place in the formation are handed on before (`Searcher.on_battery`, `FormationPlanner`).
+"""The return of a UAV whose battery runs low, or that hears nobody any more: it flies home above all UAVs that search,
+then lands straight down. Its task and its place in the formation are handed on before (`searcher.py`,
+`FormationPlanner`).
 """
 
 import math
+from enum import StrEnum
 from typing import Final
 
 from agents.mission.flight.endurance import Endurance
@@ -19,30 +21,71 @@ _LAND_M_S: Final = 1.5
 """The speed of the landing."""
 
 
+class ReturnReason(StrEnum):
+    """Why a UAV flies home; the values are modes of the mission in the trace."""
+
+    BATTERY = "return"
+    """Its battery is only enough for the way home."""
+    LOST_LINK = "lost_link"
+    """It has received nothing from anybody for too long."""
+
+
 class ReturnHome:
     """The return of one UAV: when it leaves its mission, and how it flies home."""
 
     def __init__(
-        self, home: Enu, navigation: Navigation, outbox: Outbox, *, speed_m_s: float, height_m: float, reserve: float
+        self,
+        home: Enu,
+        navigation: Navigation,
+        outbox: Outbox,
+        *,
+        speed_m_s: float,
+        height_m: float,
+        reserve: float,
+        lost_link_ns: int,
     ) -> None:
         """`height_m`: the height of the lanes above ground. `reserve`: the share of the charge with which it is to
-        land.
+        land. `lost_link_ns`: how long it may hear nobody; 0 for as long as it likes.
         """
         self._home = home._replace(up=height_m + _HIGHER_M)
         self._navigation, self._outbox = navigation, outbox
         self._endurance = Endurance(home, speed_m_s=speed_m_s, reserve=reserve)
-        self.leaves = False
-        """True from the moment at which it flies home."""
+        self._lost_link_ns = lost_link_ns
+        self._heard_ns: int | None = None
+        """The instant at which another UAV was last heard; None before the first time: there is no link to lose."""
+        self.reason: ReturnReason | None = None
+        """Why it flies home; None while it takes part in the mission."""
         self.lands = False
         """True from the moment at which it has reached its base and lands."""
 
     def on_battery(self, charge: float, *, now_ns: int) -> bool:
         """A reading of the battery; returns True if the UAV must leave now."""
         self._endurance.read(charge, now_ns=now_ns)
-        if self.leaves or self._endurance.margin(self._navigation.position) > 0.0:
+        if self.reason is ReturnReason.BATTERY or self._endurance.margin(self._navigation.position) > 0.0:
             return False
-        self.leaves = True
+        self.reason = ReturnReason.BATTERY
         return True
+
+    def on_heard(self, now_ns: int) -> bool:
+        """Another UAV was heard; returns True if this one therefore takes part in the mission again."""
+        self._heard_ns = now_ns
+        if self.reason is not ReturnReason.LOST_LINK or self.lands:
+            return False
+        self.reason = None
+        return True
+
+    def loses_link(self, now_ns: int) -> bool:
+        """True if the UAV must leave now, because it has not heard anybody for too long."""
+        heard_ns = self._heard_ns
+        if not self._lost_link_ns or heard_ns is None or self.leaves or now_ns - heard_ns < self._lost_link_ns:
+            return False
+        self.reason = ReturnReason.LOST_LINK
+        return True
+
+    @property
+    def leaves(self) -> bool:
+        """True while the UAV flies home, and once it has landed there."""
+        return self.reason is not None
 
     @property
     def percent(self) -> int:

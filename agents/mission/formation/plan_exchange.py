@@ -66,9 +66,16 @@ class PlanExchange:
         self._next_status_ns = now_ns + round((0.8 + 0.4 * self._random()) * STATUS_S * S)
 
     def leave(self) -> None:
-        """Give up the place in the formation for good."""
+        """Give up the place in the formation, and take none until this UAV comes back."""
         self._flies_home = True
         self._place.leave()
+
+    def come_back(self, percent: int, now_ns: int) -> None:
+        """Take part again: follow the plan, and tell all; whoever has lost the place gets a vacant one."""
+        self._flies_home = False
+        if self._planner.plan is not None:
+            self._adopt(now_ns)
+        self.say_status(percent, now_ns)
 
     # --- received messages ----------------------------------------------------------------------------------------
 

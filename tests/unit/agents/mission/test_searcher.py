@@ -34,11 +34,13 @@ class Flight:
         planned: bool = True,
         home: Enu = HOME,
         avoid_by: Sequence[str] = ("hellos", "radar"),
+        lost_link_s: float = 0.0,
     ) -> None:
         keys = {
             "nodes.count": 20, "nodes.altitude_m": 65, "mission.survivors": 3, "mission.search": "lines",
             "mobility.model": "onboard", "world.area_m": 1000, "radio.range_m": 250, "sensors.battery_hz": 1,
             "sensors.camera_hz": 2, "mission.avoid_by": avoid_by,
+            "mission.lost_link_s": lost_link_s,
         }  # fmt: skip
         scenario = make_scenario(**keys)
         self.outbox = Outbox()
@@ -51,8 +53,10 @@ class Flight:
         if planned:
             self.searcher.on_message(self.plan, now_ns=0)
 
-    def fly(self, seconds: float, *, charge: Callable[[float], float] | None = None) -> None:
-        """Fly as it wants to; `charge` is what its battery says, by the second."""
+    def fly(self, seconds: float, *, charge: Callable[[float], float] | None = None, heard: bool = False) -> None:
+        """Fly as it wants to; `charge` is what its battery says, by the second. With `heard` it receives the hello of a
+        UAV far away once a second.
+        """
         until_ns = self.now_ns + round(seconds * S)
         while self.now_ns < until_ns:
             self.now_ns += 200 * MS
@@ -63,11 +67,18 @@ class Flight:
             self.searcher.fix(self.at, velocity, now_ns=self.now_ns)
             if charge is not None and self.now_ns % S == 0:
                 self.searcher.on_battery(charge(self.now_ns / S), now_ns=self.now_ns)
+            if heard and self.now_ns % S == 0:
+                self.searcher.hello(3, Motion(Enu(0.0, 400.0, 90.0), STILL, self.now_ns), now_ns=self.now_ns)
             self.searcher.wake(self.now_ns)
 
     @property
     def told(self) -> list[Told]:
         return [message for packet in self.outbox.packets for message in told_in(bytes(HEADER_BYTES) + packet.frames)]
+
+    @property
+    def away_m(self) -> float:
+        """Its horizontal distance from home."""
+        return math.hypot(self.at.east - HOME.east, self.at.north - HOME.north)
 
     @property
     def modes(self) -> list[str]:
@@ -92,6 +103,66 @@ def test_who_has_just_enough_left_says_so_flies_home_and_lands(make_scenario: Ca
     charges = [message.charge for message in flight.told if isinstance(message, SearchStatus)]
     assert min(charges[:3]) > 50
     assert charges[-1] == 0
+
+
+def test_who_hears_nobody_any_more_flies_home_and_lands(make_scenario: Callable[..., Scenario]) -> None:
+    flight = Flight(make_scenario, lost_link_s=15)
+    flight.fly(40, heard=True)
+    assert flight.modes == ["deploy", "search"]
+    assert flight.away_m > 100
+    flight.fly(13)
+    assert flight.modes == ["deploy", "search"], "it is silent for 13 s only"
+    flight.fly(4)
+    assert flight.modes == ["deploy", "search", "lost_link"]
+    charges = [message.charge for message in flight.told if isinstance(message, SearchStatus)]
+    assert charges[-1] == 0, "others may still hear that its place is free"
+    flight.fly(60)
+    assert flight.modes == ["deploy", "search", "lost_link", "land"]
+    assert flight.away_m < 5
+    assert flight.outbox.course is not None
+    assert flight.outbox.course.land
+    flight.fly(10, heard=True)
+    assert flight.modes[-1] == "land"
+    assert flight.away_m < 5, "whoever has landed stays there"
+
+
+def test_who_hears_somebody_again_on_its_way_home_takes_up_its_place_again(
+    make_scenario: Callable[..., Scenario],
+) -> None:
+    flight = Flight(make_scenario, lost_link_s=15)
+    flight.fly(40, heard=True)
+    flight.fly(22)
+    assert flight.modes[-1] == "lost_link"
+    before_m = flight.away_m
+    flight.fly(1, heard=True)
+    assert flight.modes[-1] == "search"
+    charges = [message.charge for message in flight.told if isinstance(message, SearchStatus)]
+    assert charges[-1] > 0, "and it says so at once"
+    flight.fly(20, heard=True)
+    assert flight.away_m > before_m
+    flight.fly(17)
+    assert flight.modes[-2:] == ["search", "lost_link"], "and the second time as the first"
+
+
+def test_a_low_battery_takes_a_uav_home_for_good_even_if_it_hears_somebody_again(
+    make_scenario: Callable[..., Scenario],
+) -> None:
+    flight = Flight(make_scenario, lost_link_s=15)
+    flight.fly(60, heard=True)
+    flight.fly(17)
+    flight.fly(2, charge=lambda _: 0.1)
+    flight.fly(2, heard=True)
+    assert flight.modes[-2:] == ["lost_link", "return"]
+
+
+def test_who_has_never_heard_anybody_or_is_not_asked_to_mind_searches_on(
+    make_scenario: Callable[..., Scenario],
+) -> None:
+    alone, unasked = Flight(make_scenario, lost_link_s=5, planned=False), Flight(make_scenario)
+    unasked.fly(2, heard=True)
+    for flight in (alone, unasked):
+        flight.fly(40)
+        assert flight.modes[-1] != "lost_link"
 
 
 def test_who_flies_home_takes_its_bids_back_so_that_another_goes(make_scenario: Callable[..., Scenario]) -> None:

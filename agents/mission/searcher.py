@@ -269,11 +269,12 @@ class Searcher:
 def phone_model(scenario: Scenario) -> PhoneModel:
     """The model of phones and receivers by which this scenario's survivors are located."""
     mission = scenario.mission
+    half_db = mission.rubble_db / 2
     return PhoneModel(
-        mission.phone_power_dbm,
+        mission.phone_power_dbm - half_db,
         mission.phone_exponent,
         mission.shadowing_db,
-        _OFFSET_DB,
+        math.hypot(_OFFSET_DB, half_db),
         mission.detection_dbm,
         scenario.world.area_m / 2,
     )
@@ -283,7 +284,7 @@ def formation(scenario: Scenario, count: int) -> Pattern | None:
     """The formation in which this number of UAVs searches the area of a scenario; None if they are too few."""
     demands = Demands(
         area_m=scenario.world.area_m,
-        seen_m=_ground_range_m(phone_model(scenario), scenario.nodes.altitude_m),
+        seen_m=_ground_range_m(scenario),
         reach_m=scenario.radio.range_m,
         height_m=scenario.nodes.altitude_m,
         speed_m_s=scenario.mobility.speed_m_s,
@@ -295,7 +296,7 @@ def formation(scenario: Scenario, count: int) -> Pattern | None:
 
 def coverage_map(scenario: Scenario) -> CoverageMap | None:
     """An empty map of searched cells; None if the UAVs of this scenario share none."""
-    seen_m = _ground_range_m(phone_model(scenario), scenario.nodes.altitude_m)
+    seen_m = _ground_range_m(scenario)
     return CoverageMap(area_m=scenario.world.area_m, seen_m=seen_m) if scenario.mission.coverage_map else None
 
 
@@ -304,7 +305,11 @@ def least_nodes(scenario: Scenario) -> int | None:
     return next((count for count in range(1, MOST_PLACES + 1) if formation(scenario, count) is not None), None)
 
 
-def _ground_range_m(model: PhoneModel, height_m: float) -> float:
-    """The greatest horizontal distance at which a phone on the ground is received, without shadowing."""
-    slant = 10 ** ((model.power_dbm - REFERENCE_LOSS_DB - model.threshold_dbm) / (10 * model.exponent))
+def _ground_range_m(scenario: Scenario) -> float:
+    """The greatest horizontal distance at which a phone on the ground is received from the height of the search,
+    through the rubble that the plan allows for, without shadowing.
+    """
+    mission, height_m = scenario.mission, scenario.nodes.altitude_m
+    budget_db = mission.phone_power_dbm - mission.rubble_db - REFERENCE_LOSS_DB - mission.detection_dbm
+    slant = 10 ** (budget_db / (10 * mission.phone_exponent))
     return math.sqrt(max(1.0, slant * slant - height_m * height_m))

@@ -32,6 +32,10 @@ class Mission(Section):
     """Where the random places are: anywhere in the open area, or inside buildings."""
     buried: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Share of the survivors who lie under rubble (`sensors.burial_phone_db`, `sensors.burial_voice_db`)."""
+    rubble_db: Annotated[float, Field(ge=0, le=100)] = 0.0
+    """`search`: the loss through rubble that the plan allows for. Lanes lie so near to each other that a phone which is
+    weaker by this is received between them, and its power is taken to be anywhere in between. Needs a low
+    `nodes.altitude_m`: with 20 dB, a phone is received within 31 m."""
     reports_to_approach: Count = 3
     """A UAV approaches a survivor when this many different nodes have reported that survivor (paper, 4.1)."""
     search: Literal["none", "lines", "spiral", "sectors"] = "none"

@@ -211,7 +211,7 @@ class OverflownCells:
 
     def __init__(self, scenario: Scenario) -> None:
         mission, half = scenario.mission, scenario.world.area_m / 2
-        budget_db = mission.phone_power_dbm - REFERENCE_LOSS_DB - mission.detection_dbm
+        budget_db = mission.phone_power_dbm - mission.rubble_db - REFERENCE_LOSS_DB - mission.detection_dbm
         self._range_m = 10 ** (budget_db / (10 * mission.phone_exponent))
         count = max(1, round(2 * half / _CELL_M))
         self._axis = (np.arange(count) + 0.5) * (2 * half / count) - half

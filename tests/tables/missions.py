@@ -14,13 +14,14 @@ import numpy as np
 
 from agents.mission.searcher import formation, least_nodes
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Collided, FlightModeChanged, Posed, Record
+from fanet_mw.trace import Approaching, Collided, Confirmed, Detected, FlightModeChanged, Posed, Record
 from fanet_mw.units import S
 from sim.results.files import finish
 from sim.results.mission import OverflownCells
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 from sim.sweep.measures import enough_heard_s
+from sim.world.environment.survivors import Survivors
 from tests.tables.kept import KEPT, Kept, Run
 from tests.tables.markdown import Rows
 
@@ -85,11 +86,13 @@ def fly(scenario: Scenario) -> Run:
     nearest = np.concatenate(list(_nearest_m(records)))
     return {
         **summary["mission"],
+        **_under_rubble(scenario, records),
         "pdr": summary["pdr"],
         "reports": summary.get("reports", {}).get("pdr"),
         "solid": sum(1 for record in records if type(record) is Collided and not record.other),
         "no_fly": world["no_fly_entries"],
         "least_m": world["separation"].get("least_m"),
+        "least_charge": world.get("least_charge"),
         "losses": world["separation"].get("losses"),
         "near": [float((nearest <= limit).mean()) for limit in _NEAR_M],
         "landed": len({r.node for r in records if type(r) is FlightModeChanged and r.mode == "land"}),
@@ -104,6 +107,22 @@ def fly(scenario: Scenario) -> Run:
 def flown(case: Case, kept: Kept) -> list[Run]:
     """What the missions of a case came to, seed by seed."""
     return [kept.of(case.with_seed(seed)) for seed in case.seeds]
+
+
+def _under_rubble(scenario: Scenario, records: Collection[Record]) -> Run:
+    """How many survivors are buried, how many of them were found, and how far off the last known estimates are."""
+    survivors = Survivors(scenario)
+    buried = {int(row) + 1 for row in np.flatnonzero(survivors.buried)}
+    last = {record.survivor: record for record in records if type(record) is Approaching and record.survivor in buried}
+    return {
+        "buried": len(buried),
+        "buried_detected": len({r.survivor for r in records if type(r) is Detected} & buried),
+        "buried_confirmed": len({r.survivor for r in records if type(r) is Confirmed} & buried),
+        "buried_off_m": [
+            float(np.hypot(*(survivors.places[survivor - 1][:2] - (record.east_m, record.north_m))))
+            for survivor, record in sorted(last.items())
+        ],
+    }
 
 
 def _half_covered_s(scenario: Scenario, records: Collection[Record]) -> float | None:

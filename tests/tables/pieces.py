@@ -11,10 +11,11 @@ from tests.tables.kept import KEPT, Kept, OutOfTime
 from tests.tables.mission import SMALL, WHOLE
 from tests.tables.missions import CLEAR, COUNTRY, PLACES, SHAPES, Case, fly
 from tests.tables.paper_rescue import PAPER
+from tests.tables.small_rescues import ENGINES, SENSES
 
 TABLES: Final[Mapping[str, Mapping[str, Case]]] = {
     "places": PLACES, "country": COUNTRY, "shapes": SHAPES, "keeping-clear": CLEAR, "mission-network": SMALL,
-    "mission-network-whole": WHOLE, "rescue-paper": PAPER,
+    "mission-network-whole": WHOLE, "rescue-paper": PAPER, "engines": ENGINES, "senses": SENSES,
 }  # fmt: skip
 
 

@@ -17,6 +17,7 @@ from tests.tables import (
     missions,
     paper_rescue,
     protocol,
+    small_rescues,
 )
 from tests.tables.markdown import Rows, Tolerance
 
@@ -67,6 +68,10 @@ TABLES: Final[Mapping[str, Table]] = {
     "places": Table("results/missions.md", missions.places, Tolerance(absolute=0.05, relative=0.02)),
     "country": Table("results/missions.md", missions.country, Tolerance(absolute=0.05, relative=0.02)),
     "shapes": Table("results/missions.md", missions.shapes, Tolerance(absolute=1, relative=0.05)),
+    "engines": Table(
+        "results/small-rescues.md", small_rescues.engines, Tolerance(absolute=0.05, relative=0.05), ("times real time",)
+    ),
+    "senses": Table("results/small-rescues.md", small_rescues.senses, Tolerance(absolute=0.05, relative=0.05)),
     "keeping-clear": Table("results/missions.md", missions.keeping_clear, Tolerance(absolute=0.05, relative=0.02)),
     "rescue-paper": Table(
         "results/rescue-paper.md", paper_rescue.paper_rescues, Tolerance(absolute=0.05, relative=0.02)

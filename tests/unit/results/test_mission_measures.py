@@ -17,8 +17,8 @@ KEYS: dict[str, Any] = {
 }  # fmt: skip
 
 
-def measured(records: Sequence[Record]) -> dict[str, Any]:
-    return mission(Scenario(**KEYS), records)
+def measured(records: Sequence[Record], **mission_keys: float) -> dict[str, Any]:
+    return mission(Scenario(**{**KEYS, "mission": {**KEYS["mission"], **mission_keys}}), records)
 
 
 def at(t_s: int, *easts: float) -> list[Record]:
@@ -51,6 +51,7 @@ def test_who_has_left_the_search_or_has_fallen_need_not_be_in_reach(
 def test_coverage_is_the_share_of_the_area_within_range_of_a_receiver() -> None:
     circle = math.pi * 137**2 / 500**2
     assert abs(measured(at(1, 0, 0, 0))["coverage"] - circle) < 0.02, "cells of 25 m"
+    assert measured(at(1, 0, 0, 0), rubble_db=20)["coverage"] == 0.0, "a phone under rubble is not received from 50 m"
     everywhere = [Posed(S * k, 1, -250 + 100 * (k % 6), -250 + 100 * (k // 6), 50.0) for k in range(36)]
     found = measured(everywhere)
     assert found["coverage"] == 1.0

@@ -8,7 +8,7 @@ import pytest
 from agents.mission.formation.formation_planner import plan_of
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.mission.outbox import Outbox
-from agents.mission.searcher import Searcher, formation
+from agents.mission.searcher import Searcher, formation, phone_model
 from fanet_mw.bus.messages import Echo
 from fanet_mw.motion import Motion
 from fanet_mw.scenario import Scenario
@@ -296,3 +296,21 @@ def test_a_survivor_whose_confirmation_is_taken_back_is_searched_for_again(
     flight.fly(3)
     assert flight.modes[-1] == "respond"
     assert told_in(bytes(HEADER_BYTES) + flight.searcher.hello_frames(flight.now_ns))[-1] == refuted, "it passes it on"
+
+
+def test_a_plan_that_allows_for_rubble_has_lanes_between_which_a_phone_under_it_is_received(
+    make_scenario: Callable[..., Scenario],
+) -> None:
+    keys = {
+        "nodes.count": 12, "nodes.altitude_m": 20, "mission.survivors": 3, "mission.search": "spiral",
+        "mobility.model": "onboard", "world.area_m": 500, "radio.range_m": 250, "sensors.camera_hz": 2,
+    }  # fmt: skip
+    open_air, rubble = (make_scenario(**keys, **{"mission.rubble_db": loss_db}) for loss_db in (0, 20))
+    heard_m = math.sqrt((10 ** ((15 - 20 - 40.05 + 90) / 30)) ** 2 - 20**2)
+    patterns = formation(open_air, 12), formation(rubble, 12)
+    lanes_m = [pattern.shape.lane_m for pattern in patterns if pattern is not None]
+    assert lanes_m[0] > 120
+    assert heard_m < lanes_m[1] <= 1.35 * heard_m
+    assert phone_model(open_air)[:4] == (15.0, 3.0, 4.0, 1.0)
+    assert phone_model(rubble).power_dbm == 5.0, "in the middle between a phone in the open and one under rubble"
+    assert phone_model(rubble).offset_db == pytest.approx(10.0, abs=0.1), "both are within a standard deviation"

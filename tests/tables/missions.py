@@ -72,8 +72,8 @@ SHAPES: Final[Mapping[str, Case]] = {
 }  # fmt: skip
 CLEAR: Final[Mapping[str, Case]] = {
     "hellos of neighbors and radar": Case("town", (), _TWENTY),
-    "radar alone": Case("town", ('mission.avoid_by=["radar"]',), (1, 2, 3)),
-    "neither": Case("town", ("mission.avoid_by=[]",), (1, 2, 3)),
+    "radar alone": Case("town", ('mission.avoid_by=["radar"]',), _TWENTY[:10]),
+    "neither": Case("town", ("mission.avoid_by=[]",), _TWENTY[:10]),
 }
 
 

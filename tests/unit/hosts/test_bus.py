@@ -12,12 +12,19 @@ from fanet_mw.hosts.bus import Bus
 from sim.run.launcher.swarm import free_endpoint
 
 CLIENT = """
-import sys
+import sys, time
 from pathlib import Path
 from fanet_mw.hosts.bus import Bus
-with Bus.join(sys.argv[1], patience_s=20) as bus:
+def runtimes():
     names = {(task / "comm").read_text().strip().rpartition("-")[0] for task in Path("/proc/self/task").iterdir()}
-print(*sorted(names & {"app", "rx", "tx", "net", "acc"}))
+    return " ".join(sorted(names & {"app", "rx", "tx", "net", "acc"}))
+with Bus.join(sys.argv[1], patience_s=20) as bus:
+    bus.ask("a/topic", lambda topic, payload: None)
+    time.sleep(0.3)  # a thread that there is has its name by then
+    ends_s = time.monotonic() + 20
+    while runtimes() != sys.argv[2] and time.monotonic() < ends_s:
+        time.sleep(0.05)
+    print(runtimes())
 """
 pytestmark = pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="only Linux tells the names of threads")
 
@@ -33,7 +40,7 @@ def test_a_client_does_not_switch_between_threads_unless_the_user_asks_for_it(
     others = {key: value for key, value in os.environ.items() if key != "ZENOH_RUNTIME"}
     with Bus.serve(endpoint):
         client = subprocess.run(
-            [sys.executable, "-c", CLIENT, endpoint],
+            [sys.executable, "-c", CLIENT, endpoint, runtimes],
             env=others | environment, capture_output=True, text=True, timeout=60, check=True,
         )  # fmt: skip
     assert client.stdout.strip() == runtimes

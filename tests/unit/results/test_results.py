@@ -89,7 +89,13 @@ main()
 
 def test_a_limit_of_the_size_of_files_costs_the_long_ones_only(tmp_path: Path) -> None:
     """The operating system refuses the writes here, as it does on a full disk, and no disk of one's own is needed."""
-    command = [sys.executable, "-c", _LIMITED, str(tmp_path / "out")]
+    command = [
+        sys.executable,
+        "-B",
+        "-c",
+        _LIMITED,
+        str(tmp_path / "out"),
+    ]  # no bytecode: it would be cut, for all others
     done = subprocess.run(command, capture_output=True, text=True, timeout=110, check=False)
     assert "Traceback" not in done.stderr
     assert "trace.jsonl" in done.stderr

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Final, Literal
 
-from sim.figures.statistics import Interval, interval
+from sim.figures.statistics import ANY, Interval, Possible, interval
 
 BEYOND: Final = "(Beyond the paper) "
 """The text before a claim that is not the paper's."""
@@ -47,10 +47,12 @@ class Statement:
     side: Literal["above", "below"]
     threshold: float
     unit: str = ""
+    possible: Possible = ANY
+    """What the quantity can be; its interval holds nothing else."""
 
     @property
     def interval(self) -> Interval:
-        return interval(self.values)
+        return interval(self.values, self.possible)
 
     @property
     def finding(self) -> Finding:
@@ -82,14 +84,14 @@ class Statement:
         }
 
 
-def above(what: str, values: Values, threshold: float, unit: str = "") -> Statement:
+def above(what: str, values: Values, threshold: float, unit: str = "", *, possible: Possible = ANY) -> Statement:
     """The statement that a quantity is above a threshold."""
-    return Statement(what, _listed(values), "above", threshold, unit)
+    return Statement(what, _listed(values), "above", threshold, unit, possible)
 
 
-def below(what: str, values: Values, threshold: float, unit: str = "") -> Statement:
+def below(what: str, values: Values, threshold: float, unit: str = "", *, possible: Possible = ANY) -> Statement:
     """The statement that a quantity is below a threshold."""
-    return Statement(what, _listed(values), "below", threshold, unit)
+    return Statement(what, _listed(values), "below", threshold, unit, possible)
 
 
 def _listed(values: Values) -> Sequence[float]:

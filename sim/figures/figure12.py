@@ -2,23 +2,29 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from matplotlib.axes import Axes
 
 from sim.figures.claims import Claim, Reason, above, below
 from sim.figures.recipe import Drawing, Recipe, point
 from sim.figures.runs import Quantity, Row, Runs, differences
-from sim.figures.statistics import interval
-from sim.figures.style import LOOKS, Look, band, canvas, legend_above, plain_log
+from sim.figures.statistics import DISTANCE, SHARE, Interval, Possible, interval
+from sim.figures.style import Look, beside, canvas, legend_above, line, look_of, plain_log, ticks_at
 
 _CASES: Final = ("flooding", "paper", "ours")
+_VARIANTS: Final = {
+    "ours": "fanet-mw: 44 heads, 0.5 s, counter, repair",
+    "paper": "the paper's method, 4 clusters, 5 s",
+}
 _FLOWN: Final = "paper, physics engine"
 _INTERVAL: Final = "mission.report_interval_s"
 _AT: Final = "mission__report_interval_s"
 _SLOW_S, _FAST_S = 1.0, 0.1
 _EARLY_S: Final = 55.0
 _MANY: Final = 30
+_SWARM: Final = Possible(0, 45)
+"""The possible numbers of UAVs."""
 _NEARLY_ALL: Final = 43
 _FEW: Final = 5
 _WINDOW_S: Final = (50.0, 70.0)
@@ -33,6 +39,15 @@ _SINCE_S: Final = tuple(math.pow(10.0, step / 10) for step in range(-30, 19))
 """The edges of the classes of time, from a millisecond to more than a minute."""
 _STEP_S: Final = 0.5
 """The distance of the instants at which turned UAVs are counted for the mean."""
+_BARS_S: Final = (30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0)
+_BARS_SINCE_S: Final = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
+"""The instants at which the interval of a mean is drawn."""
+_APART_S: Final = 1.3
+_APART: Final = 0.18
+_NEAR: Final = 0.05
+"""The distance of the bars of two methods: a time, or a share of what a logarithmic axis shows; of intervals less, as
+there are few.
+"""
 
 
 def _times(row: Row) -> list[float]:
@@ -86,50 +101,100 @@ def _after(limit_s: float) -> Callable[[Row], float]:
     return lambda row: _by((row["enough_heard_s"] or 0.0) + limit_s)(row)
 
 
-def _draw_since_start(axes: Axes, look: Look, rows: Sequence[Row]) -> list[Mapping[str, Any]]:
-    """The number of UAVs that have turned by each instant: the mean as a line, and each seed as a thin line."""
-    longest_s = max(row["duration_s"] for row in rows)
-    for row in rows:
-        times = sorted(_times(row))
-        axes.step(
-            [0.0, *times, longest_s], [0, *range(1, len(times) + 1), len(times)], where="post",
-            color=look.color, linestyle=look.dash, linewidth=0.7, alpha=0.45,
-        )  # fmt: skip
-    instants = [step * _STEP_S for step in range(round(longest_s / _STEP_S) + 1)]
-    counts = [interval([_by(at)(row) for row in rows]) for at in instants]
-    axes.plot(instants, [one.mean for one in counts], color=look.color, linestyle=look.dash, linewidth=1.8)
-    return [point(one, since_start_s=at) for one, at in zip(counts, instants, strict=True)]
+class _Clock(NamedTuple):
+    """A time over which UAVs that have turned are counted: where it begins, and at which instants a bar is drawn."""
+
+    column: str
+    label: str
+    instants_s: Sequence[float]
+    bars_s: Sequence[float]
+    log: bool
+    quantity: Callable[[float], Callable[[Row], float]]
+    """The number of UAVs at an instant."""
 
 
-def _draw_since_heard(axes: Axes, look: Look, rows: Sequence[Row]) -> list[Mapping[str, Any]]:
-    """The same over the time since enough UAVs received the same phone, with the interval of the mean as a band."""
-    counts = [interval([_after(at)(row) for row in rows]) for at in _SINCE_S]
-    axes.plot(_SINCE_S, [one.mean for one in counts], color=look.color, linestyle=look.dash, label=look.label)
-    band(axes, look, _SINCE_S, counts, most=rows[0]["nodes"])
-    return [point(one, since_heard_s=at) for one, at in zip(counts, _SINCE_S, strict=True)]
+def _draw_shares(axes: Axes, look: Look, rows: Sequence[Row], clock: _Clock, place: int) -> list[Mapping[str, Any]]:
+    """The mean share of UAVs that have turned by each instant; bars show its interval at some of them, beside those of
+    other methods.
+    """
+
+    def shares(instants_s: Sequence[float]) -> list[Interval]:
+        return [interval([clock.quantity(at)(row) / row["nodes"] for row in rows], SHARE) for at in instants_s]
+
+    every, barred = shares(clock.instants_s), shares(clock.bars_s)
+    axes.plot(clock.instants_s, [one.mean for one in every], color=look.color, linestyle=look.dash)
+    apart = _APART if clock.log else _APART_S
+    at_s = [beside(at, place, len(_CASES), log=clock.log, apart=apart) for at in clock.bars_s]
+    line(axes, look._replace(dash="none"), at_s, barred, most=1.0)
+    return [point(one, **{clock.column: at}) for one, at in zip(every, clock.instants_s, strict=True)]
+
+
+def _draw_delivery(axes: Axes, runs: Runs, quantity: str) -> list[Mapping[str, Any]]:
+    """What arrives of an application, over how often app_2 is sent."""
+    data: list[Mapping[str, Any]] = []
+    intervals = runs.levels(_INTERVAL)
+    for place, case in enumerate(_CASES):
+        found = [runs.of(quantity, case=case, **{_AT: interval_s}) for interval_s in intervals]
+        kept = [(at, one) for at, one in zip(intervals, found, strict=True) if one.runs]
+        at_s = [beside(at, place, len(_CASES), log=True, apart=_NEAR) for at, _ in kept]
+        line(axes, look_of(case, _VARIANTS), at_s, [one for _, one in kept], most=1.0)
+        data += [point(one, app_2_interval_s=at, series=case, delivered=quantity) for at, one in kept]
+    axes.set_xscale("log")
+    ticks_at(axes.xaxis, {at: f"{at:g}" for at in intervals})
+    axes.set_xlabel("app_2 every [s]")
+    return data
 
 
 def draw(runs: Runs) -> Drawing:
     intervals = list(reversed(runs.levels(_INTERVAL)))
-    figure, panels = canvas(len(intervals), 2, share_y=True, width=3.6, height=2.9)
-    since_start, since_heard = panels[: len(intervals)], panels[len(intervals) :]
-    data = []
-    for upper, lower, letter, interval_s in zip(since_start, since_heard, "abc", intervals, strict=False):
-        for case in _CASES:
-            rows = runs.where(case=case, **{_AT: interval_s})
-            if rows:
-                drawn = [*_draw_since_start(upper, LOOKS[case], rows), *_draw_since_heard(lower, LOOKS[case], rows)]
-                data += [{"app_2_interval_s": interval_s, "series": case, **row} for row in drawn]
-        upper.set_title(f"({letter}) app_2 every {interval_s:g} s")
-        upper.set_xlabel("time since the start [s]")
-        lower.set_xlabel("time since three had heard a phone [s]")
-        lower.set_xscale("log")
-        plain_log(lower.xaxis)
-        for axes in (upper, lower):
-            axes.set_ylim(0, 47)
-    for first in (since_start[0], since_heard[0]):
-        first.set_ylabel("UAVs that have turned (of 45)")
-    legend_above(figure, since_heard[0])
+    columns = len(intervals) + 1
+    figure, panels = canvas(columns, 2, share_y=True, width=3.4, height=2.9)
+    end_s = max(row["duration_s"] for row in runs.rows)
+    clocks = (
+        _Clock(
+            "since_start_s",
+            "time since the start [s]",
+            [step * _STEP_S for step in range(round(end_s / _STEP_S) + 1)],
+            [at for at in _BARS_S if at < end_s],
+            log=False,
+            quantity=_by,
+        ),
+        _Clock(
+            "since_heard_s",
+            "time since three had heard a phone [s]",
+            _SINCE_S,
+            _BARS_SINCE_S,
+            log=True,
+            quantity=_after,
+        ),
+    )
+    data: list[Mapping[str, Any]] = []
+    for row_of_panels, clock in enumerate(clocks):
+        for column, interval_s in enumerate(intervals):
+            axes = panels[row_of_panels * columns + column]
+            for place, case in enumerate(_CASES):
+                rows = runs.where(case=case, **{_AT: interval_s})
+                if rows:
+                    drawn = _draw_shares(axes, look_of(case, _VARIANTS), rows, clock, place)
+                    data += [{"app_2_interval_s": interval_s, "series": case, **one} for one in drawn]
+            axes.set_xlabel(clock.label)
+            if clock.log:
+                axes.set_xscale("log")
+                axes.set_xlim(_SINCE_S[0], _SINCE_S[-1])
+                plain_log(axes.xaxis)
+            else:
+                axes.set_title(f"({'abc'[column]}) app_2 every {interval_s:g} s")
+        panels[row_of_panels * columns].set_ylabel("share of UAVs that have turned")
+    for axes, quantity, title in (
+        (panels[columns - 1], "pdr", "(d) app_1 (1024 B every 1 s)"),
+        (panels[-1], "reports.pdr", "(e) app_2 (512 B)"),
+    ):
+        axes.set_title(title)
+        data += _draw_delivery(axes, runs, quantity)
+        axes.set_ylabel("share delivered")
+        axes.tick_params(labelleft=True)
+    panels[0].set_ylim(0, 1.05)
+    legend_above(figure, panels[-1])
     return Drawing(figure, data)
 
 
@@ -159,8 +224,10 @@ def _flooding_is_first(runs: Runs) -> Claim:
         "method fewer than 5.",
         [
             above("half of the swarm has turned: the paper's method minus flooding", ahead, 0.0, "s"),
-            above("flooding: UAVs by 55 s", _seen(runs, _by(_EARLY_S), "flooding", _SLOW_S), _MANY),
-            below("the paper's method: UAVs by 55 s", _seen(runs, _by(_EARLY_S), "paper", _SLOW_S), _FEW),
+            above("flooding: UAVs by 55 s", _seen(runs, _by(_EARLY_S), "flooding", _SLOW_S), _MANY, possible=_SWARM),
+            below(
+                "the paper's method: UAVs by 55 s", _seen(runs, _by(_EARLY_S), "paper", _SLOW_S), _FEW, possible=_SWARM
+            ),
         ],
         [_geometry(runs)],
     )
@@ -173,8 +240,8 @@ def _the_method_is_ahead_later(runs: Runs) -> Claim:
         "Under both the news reaches everyone in the end: whoever has not turned yet is told again by the next "
         "report, and nobody is left by whom the other could be ahead.",
         [
-            above("flooding: UAVs at the end, if anybody turns", flooded, _NEARLY_ALL),
-            above("the paper's method: UAVs at the end, if anybody turns", told, _NEARLY_ALL),
+            above("flooding: UAVs at the end, if anybody turns", flooded, _NEARLY_ALL, possible=_SWARM),
+            above("the paper's method: UAVs at the end, if anybody turns", told, _NEARLY_ALL, possible=_SWARM),
         ],
         "that a seed in which nobody turns (one of ten) does not count. With it the reason is open.",
     )
@@ -197,8 +264,10 @@ def _flooding_chokes(runs: Runs) -> Claim:
         "Only UAVs that hear a phone send app_2, and few do: the load stays far from what chokes a flood, and the "
         "news is there as soon as it can be.",
         [
-            below("UAVs that have heard a phone", _seen(runs, _heard, "flooding", _FAST_S), _MANY),
-            below("flooding: busy share of the air", _seen(runs, "air.busy", "flooding", _FAST_S), _FREE),
+            below("UAVs that have heard a phone", _seen(runs, _heard, "flooding", _FAST_S), _MANY, possible=_SWARM),
+            below(
+                "flooding: busy share of the air", _seen(runs, "air.busy", "flooding", _FAST_S), _FREE, possible=SHARE
+            ),
             below("flooding: half turns so much later", _seen(runs, _wait_s, "flooding", _FAST_S), _AT_ONCE_S, "s"),
         ],
         _LIMIT_SET_AFTERWARDS,
@@ -206,7 +275,7 @@ def _flooding_chokes(runs: Runs) -> Claim:
     return Claim(
         12,
         "At a packet every 0.1 s nobody ever approaches under flooding.",
-        [below("flooding: UAVs at the end", _seen(runs, _at_end, "flooding", _FAST_S), 1.0)],
+        [below("flooding: UAVs at the end", _seen(runs, _at_end, "flooding", _FAST_S), 1.0, possible=_SWARM)],
         [few_send],
     )
 
@@ -216,7 +285,15 @@ def _the_method_hardly_changes(runs: Runs) -> Claim:
     return Claim(
         12,
         "The proposed method hardly changes at 0.1 s.",
-        [below("change of the time when half have turned", [abs(value) for value in change], _HARDLY_S, "s")],
+        [
+            below(
+                "change of the time when half have turned",
+                [abs(value) for value in change],
+                _HARDLY_S,
+                "s",
+                possible=DISTANCE,
+            )
+        ],
     )
 
 
@@ -229,6 +306,7 @@ def _most_turn_in_the_window(runs: Runs) -> Claim:
                 f"app_2 every {interval_s:g} s: share of those that turn that do so within 50-70 s",
                 _seen(runs, _in_window, "paper", interval_s),
                 _MOST,
+                possible=SHARE,
             )
             for interval_s in reversed(runs.levels(_INTERVAL))
         ],
@@ -242,7 +320,15 @@ def _point_masses_do(flown: Mapping[int, float], simple: Mapping[int, float]) ->
     return Claim(
         0,
         "UAVs as point masses turn when those of the physics engine do.",
-        [below("the paper's method, every 1 s: change of the time when half have turned", change, _HARDLY_S, "s")],
+        [
+            below(
+                "the paper's method, every 1 s: change of the time when half have turned",
+                change,
+                _HARDLY_S,
+                "s",
+                possible=DISTANCE,
+            )
+        ],
     )
 
 
@@ -264,9 +350,11 @@ FIGURE: Final = Recipe(
     "When UAVs turn towards survivors",
     "fig12",
     "45 UAVs fly in from a base over 16 survivors; everyone sends app_1 (1024 B every 1 s) to everyone, and whoever "
-    "hears a phone reports it as app_2 (512 B every 1, 0.5 or 0.1 s); the paper's method floods every 5 s. Above: "
-    "UAVs that have turned by then, the mean, and thin each seed. Below: the same since three UAVs had heard the same "
-    "phone, before which nobody can turn; bands: 95 % of the mean.",
+    "hears a phone reports it as app_2 (512 B every 1, 0.5 or 0.1 s). The paper's method: 4 clusters, flooding period "
+    "5 s. fanet-mw: every node a head, flooding period 0.5 s, relays that count copies, repair. Above: mean share of "
+    "the UAVs that have turned by then. Below: the same since three UAVs had heard the same phone, before which nobody "
+    "can turn. Right: what arrives of app_1, and of app_2. Bars: 95 % of the mean over seeds, beside each other so "
+    "that they can be told apart.",
     draw,
     claims,
 )

@@ -7,6 +7,7 @@ from typing import Final
 from sim.figures.claims import Claim, Statement
 from sim.figures.recipe import Drawing, Recipe, point
 from sim.figures.runs import Row, Runs, differences
+from sim.figures.statistics import SHARE
 from sim.figures.style import SERIES, canvas, legend_above, line, spaced, ticks_at
 
 _FALLS: Final = 0.02
@@ -68,6 +69,7 @@ def claims(runs: Runs) -> list[Claim]:
                 list(shares.values()),
                 "above",
                 _MOSTLY,
+                possible=SHARE,
             )
         )
     return [

@@ -30,6 +30,8 @@ class Look(NamedTuple):
     dash: str | tuple[int, tuple[int, ...]]
 
 
+CONTROL: Final = "flooding, cw_min 1"
+"""The case that floods with the contention window of the timetable's runs: it tells what the window makes of them."""
 LOOKS: Final[Mapping[str, Look]] = {
     "ours": Look("fanet-mw", "#0072B2", "o", "-"),
     "paper": Look("the paper's method", "#D55E00", "s", "--"),
@@ -38,6 +40,7 @@ LOOKS: Final[Mapping[str, Look]] = {
     "olsr": Look("OLSR", "#E69F00", "v", (0, (3, 1, 1, 1))),
     "gossip": Look("gossip", "#CC79A7", "D", (0, (5, 1))),
     "counter": Look("counter-based", "#E69F00", "v", (0, (3, 1, 1, 1))),
+    CONTROL: Look("plain flooding, cw_min 1", "#777777", "x", (0, (2, 1))),
     "limit": Look("a path exists", "#000000", "", (0, (1, 2))),
 }
 """The look of each case of a sweep."""
@@ -72,6 +75,14 @@ _PARAMETERS: Final[Mapping[str, Any]] = {
     "svg.hashsalt": "fanet-mw",
     "svg.fonttype": "none",
 }
+
+
+def look_of(case: str, variants: Mapping[str, str], number: int = 0) -> Look:
+    """The look of a case: that of a protocol is the same in all figures, which name the variant that they show; other
+    cases get theirs by their order.
+    """
+    look = LOOKS[case] if case in LOOKS else SERIES[number % len(SERIES)]._replace(label=case)
+    return look._replace(label=variants.get(case, look.label))
 
 
 def applied() -> AbstractContextManager[None]:
@@ -152,9 +163,13 @@ def plain_log(axis: Axis) -> None:
 
 
 def legend_above(figure: Figure, axes: Axes) -> None:
-    """One legend for all panels, above them, where it covers nothing."""
+    """One legend for all panels, above them, where it covers nothing; in as many rows as it needs to be seen whole."""
     handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    for rows in range(1, len(labels) + 1):
+        legend = figure.legend(handles, labels, loc="outside upper center", ncols=math.ceil(len(labels) / rows))
+        if legend.get_window_extent().width <= figure.bbox.width:
+            break
+        legend.remove()
 
 
 def band(

@@ -115,7 +115,7 @@ def measured() -> TableRows:
         ["90 % of a velocity step [s]"], ["overshoot of it [%]"], ["90 % of a climb of 2 m/s [s]"],
         ["off its place in gusts, RMS [m]"], ["off its place in gusts, worst [m]"],
         ["off the figure of eight, RMS [m]"],
-        ["the fast model beside it, RMS [m]"], ["hover [W]"], ["endurance to 20 % / to empty [min]"],
+        ["rotors minus the fast model, RMS [m]"], ["hover [W]"], ["endurance to 20 % / to empty [min]"],
         ["endurance, published [min]"], ["energy at 5 / 10 m/s [kJ/km]"], ["least energy [kJ/km], at [m/s]"],
     ]  # fmt: skip
     for trial in TRIALS:

@@ -8,6 +8,7 @@ import statistics
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fanet_mw.errors import ConfigError
@@ -16,8 +17,8 @@ from sim.figures.claims import Claim, Finding, Reason, Statement, Verdict, above
 from sim.figures.render import render
 from sim.figures.rescue import confirmed_s, loss_share
 from sim.figures.runs import Runs, differences, max_per_seed, mean_per_seed
-from sim.figures.statistics import interval, quantile_975
-from sim.figures.style import beside, reaches, spaced
+from sim.figures.statistics import DISTANCE, SHARE, interval, quantile_975
+from sim.figures.style import beside, canvas, legend_above, reaches, spaced
 from sim.report.page import write
 from sim.results.files import finish
 from sim.run.virtual import simulate
@@ -43,6 +44,47 @@ def test_an_interval_is_that_of_student() -> None:
     assert math.isnan(interval([]).mean)
     assert interval([1280.4, 1280.4]).text("ms") == "1280 ms [1280, 1280]"
     assert interval([0.01234]).text() == "0.0123 [one run]"
+
+
+def test_an_interval_of_few_seeds_ends_where_the_quantity_does() -> None:
+    found = interval([1.0, 1.0, 0.7], SHARE)
+    assert found.high == 1.0
+    assert found.low == interval([1.0, 1.0, 0.7]).low, "the other end keeps its place"
+    assert interval([0.1, 0.1, 2.0], DISTANCE).low == 0.0
+    assert interval([0.4], SHARE)[1:3] == SHARE
+
+
+def test_an_interval_of_ten_seeds_holds_nothing_beyond_what_was_seen_and_is_as_skew_as_that() -> None:
+    """Nine seeds in which all 45 turn, and one in which nobody does: the mean is at most 45."""
+    found = interval([45.0] * 9 + [0.0])
+    assert 0.0 <= found.low < 36.0
+    assert found.high == 45.0
+    assert found == interval([45.0] * 9 + [0.0]), "it is the same each time"
+
+
+def test_an_interval_of_many_normal_values_is_that_of_student() -> None:
+    values = list(np.random.default_rng(3).normal(5.0, 2.0, 12))
+    half = quantile_975(11) * statistics.stdev(values) / math.sqrt(12)
+    found = interval(values)
+    assert (found.high - found.low) / 2 == pytest.approx(half, rel=0.1)
+
+
+def test_a_rival_that_was_not_flown_leaves_a_claim_open() -> None:
+    claim = Claim(
+        0, "ours is best", [above("ours minus flooding", [1.0, 1.1], 0.0), above("ours minus paper", [], 0.0)]
+    )
+    assert claim.verdict is not Verdict.AGREES
+    assert "no run" in claim.statements[1].text()
+
+
+def test_a_legend_that_is_wider_than_its_figure_takes_more_rows() -> None:
+    figure, (axes, _) = canvas(2)
+    for number in range(7):
+        axes.plot([0, 1], label=f"a protocol with a long name, number {number}")
+    legend_above(figure, axes)
+    (legend,) = figure.legends
+    assert len(legend.get_texts()) == 7
+    assert legend.get_window_extent().width <= figure.bbox.width
 
 
 def test_quantiles_fall_towards_the_normal_one() -> None:

@@ -101,7 +101,7 @@ def _after(limit_s: float) -> Callable[[Row], float]:
     return lambda row: _by((row["enough_heard_s"] or 0.0) + limit_s)(row)
 
 
-class _Clock(NamedTuple):
+class _TimeAxis(NamedTuple):
     """A time over which UAVs that have turned are counted: where it begins, and at which instants a bar is drawn."""
 
     column: str
@@ -113,7 +113,7 @@ class _Clock(NamedTuple):
     """The number of UAVs at an instant."""
 
 
-def _draw_shares(axes: Axes, look: Look, rows: Sequence[Row], clock: _Clock, place: int) -> list[Mapping[str, Any]]:
+def _draw_shares(axes: Axes, look: Look, rows: Sequence[Row], clock: _TimeAxis, place: int) -> list[Mapping[str, Any]]:
     """The mean share of UAVs that have turned by each instant; bars show its interval at some of them, beside those of
     other methods.
     """
@@ -151,7 +151,7 @@ def draw(runs: Runs) -> Drawing:
     figure, panels = canvas(columns, 2, share_y=True, width=3.4, height=2.9)
     end_s = max(row["duration_s"] for row in runs.rows)
     clocks = (
-        _Clock(
+        _TimeAxis(
             "since_start_s",
             "time since the start [s]",
             [step * _STEP_S for step in range(round(end_s / _STEP_S) + 1)],
@@ -159,7 +159,7 @@ def draw(runs: Runs) -> Drawing:
             log=False,
             quantity=_by,
         ),
-        _Clock(
+        _TimeAxis(
             "since_heard_s",
             "time since three had heard a phone [s]",
             _SINCE_S,

@@ -11,7 +11,6 @@ order of the runs: the same sweep with the same code gives the same table.
 import contextlib
 import fcntl
 import os
-import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -115,8 +114,8 @@ class Store:
 
 def write_whole(path: Path, table: pa.Table) -> None:
     """Write a table so that the file is either complete or missing, even if the process or the machine dies."""
-    with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".tmp", delete=False) as file:
-        fresh = Path(file.name)
+    fresh = path.with_name(f"{path.stem}-{os.getpid()}.tmp")
+    with fresh.open("wb") as file:  # with the mode that the umask gives, so that colleagues may read it
         pq.write_table(table, file, compression="zstd")
         file.flush()
         os.fsync(file.fileno())

@@ -1,9 +1,11 @@
 """Sweeps that are cut short and taken up again: the table is that of an uninterrupted one, and nothing runs twice."""
 
 import json
+import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+import pyarrow as pa
 import pytest
 
 from fanet_mw.errors import ConfigError
@@ -13,7 +15,7 @@ from sim.sweep import spec
 from sim.sweep.one_run import Finished, carry_out
 from sim.sweep.remaining_runs import RemainingRuns
 from sim.sweep.run import Progress, run
-from sim.sweep.store import TABLE, Store
+from sim.sweep.store import TABLE, Store, write_whole
 from sim.sweep.tasks import Task, tasks_of
 
 FILE = """
@@ -185,3 +187,13 @@ def test_files_of_single_runs_are_made_one_before_they_are_many(sweep, tmp_path,
 def test_a_folder_without_results_is_an_error(tmp_path) -> None:
     with pytest.raises(ConfigError, match=r"holds neither runs\.parquet"):
         read(tmp_path)
+
+
+def test_who_may_read_a_table_is_what_the_umask_says(tmp_path: Path) -> None:
+    before = os.umask(0o022)
+    try:
+        write_whole(tmp_path / "runs.parquet", pa.table({"seed": [1]}))
+    finally:
+        os.umask(before)
+    (table,) = tmp_path.iterdir()
+    assert table.stat().st_mode & 0o777 == 0o644

@@ -131,10 +131,12 @@ def check(file: ScenarioName, *, choice: ScenarioFlags = ScenarioFlags()) -> int
         A .toml file, or a shipped scenario's name.
 
     """
-    from sim.world.possible_world import require_possible
-
     chosen = choice.scenario(file)
-    require_possible(chosen)
+    if chosen.world.has_obstacles or chosen.world.no_fly_m:
+        # imported here, because it brings numpy, which other scenarios do not need
+        from sim.world.possible_world import require_possible
+
+        require_possible(chosen)
     Console().print(f"{file}: {_sentence(chosen)}", highlight=False, soft_wrap=True, markup=False)
     return 0
 

@@ -131,12 +131,10 @@ def check(file: ScenarioName, *, choice: ScenarioFlags = ScenarioFlags()) -> int
         A .toml file, or a shipped scenario's name.
 
     """
-    chosen = choice.scenario(file)
-    if chosen.world.has_obstacles or chosen.world.no_fly_m:
-        # imported here, because it brings numpy, which other scenarios do not need
-        from sim.world.possible_world import require_possible
+    from sim.world.possible_world import require_possible
 
-        require_possible(chosen)
+    chosen = choice.scenario(file)
+    require_possible(chosen)
     Console().print(f"{file}: {_sentence(chosen)}", highlight=False, soft_wrap=True, markup=False)
     return 0
 

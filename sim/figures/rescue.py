@@ -30,8 +30,13 @@ def confirmed_s(row: Row, share: float) -> float:
     never happened [s].
     """
     times = sorted(row["mission.time_to_confirm_s"] or ())
-    wanted = max(1, round(share * row["mission.survivors"]))
+    wanted = _people(row, share)
     return float(times[wanted - 1] if len(times) >= wanted else row["duration_s"])
+
+
+def _people(row: Row, share: float) -> int:
+    """The number of survivors in a share of them, at least one."""
+    return max(1, round(share * int(row["mission.survivors"])))
 
 
 def _half_s(row: Row) -> float:
@@ -46,8 +51,7 @@ def _misses(share: float) -> Callable[[Row], bool]:
     """Whether a run ended before this share of the survivors was confirmed."""
 
     def misses(row: Row) -> bool:
-        wanted = max(1, round(share * row["mission.survivors"]))
-        return bool(len(row["mission.time_to_confirm_s"] or ()) < wanted)
+        return len(row["mission.time_to_confirm_s"] or ()) < _people(row, share)
 
     return misses
 

@@ -167,7 +167,7 @@ def legend_above(figure: Figure, axes: Axes) -> None:
     handles, labels = axes.get_legend_handles_labels()
     for rows in range(1, len(labels) + 1):
         legend = figure.legend(handles, labels, loc="outside upper center", ncols=math.ceil(len(labels) / rows))
-        if legend.get_window_extent().width <= figure.bbox.width:
+        if legend.get_window_extent().width <= figure.bbox.width or rows == len(labels):
             break
         legend.remove()
 

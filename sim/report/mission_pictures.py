@@ -75,11 +75,13 @@ def _lines(run: RunRecords) -> Iterator[tuple[str, list[Step], str, str, str]]:
         steps = [(t_ns / S, float(count)) for count, t_ns in enumerate(sorted(first.values()), 1)]
         yield label, steps, color, marker, dash
     held, confirmed = Confirmations(run.survivors), []
+    before = 0
     for record in run.mission:
-        before = len(held.right())
         held.add(record)
-        if len(held.right()) != before:
-            confirmed.append((record.t_ns / S, float(len(held.right()))))
+        count = len(held.right())
+        if count != before:
+            confirmed.append((record.t_ns / S, float(count)))
+        before = count
     yield "confirmed", confirmed, _GREEN, "D", "-"
 
 

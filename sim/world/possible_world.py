@@ -4,12 +4,7 @@ other.
 
 import json
 
-import numpy as np
-
 from fanet_mw.scenario import Scenario
-from sim.world.environment.obstacles import obstacles
-from sim.world.incidents.no_fly import NoFly
-from sim.world.mobility.layout import positions
 
 
 def require_possible(scenario: Scenario) -> None:
@@ -17,6 +12,13 @@ def require_possible(scenario: Scenario) -> None:
     world = scenario.world
     if not (world.has_obstacles or world.no_fly_m):
         return
+    # imported here, because they bring numpy, which scenarios without any of this do not need
+    import numpy as np
+
+    from sim.world.environment.obstacles import obstacles
+    from sim.world.incidents.no_fly import NoFly
+    from sim.world.mobility.layout import positions
+
     starts = np.array(positions(scenario), dtype=np.float64)
     if world.has_obstacles:
         obstacles(scenario, starts)

@@ -87,6 +87,13 @@ def test_a_legend_that_is_wider_than_its_figure_takes_more_rows() -> None:
     assert legend.get_window_extent().width <= figure.bbox.width
 
 
+def test_a_legend_that_does_not_fit_in_any_way_is_drawn_all_the_same() -> None:
+    figure, (axes,) = canvas(1)
+    axes.plot([0, 1], label="a name that is wider than the whole figure " * 10)
+    legend_above(figure, axes)
+    assert len(figure.legends) == 1
+
+
 def test_quantiles_fall_towards_the_normal_one() -> None:
     found = [quantile_975(freedom) for freedom in range(1, 200)]
     assert found == sorted(found, reverse=True)

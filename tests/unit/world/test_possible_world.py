@@ -13,7 +13,7 @@ from sim.run.launcher.swarm import launch
 from sim.scenarios import catalog
 from sim.sweep import spec
 from sim.sweep.tasks import tasks_of
-from sim.world import possible_world
+from sim.world.environment import obstacles
 
 IMPOSSIBLE = [
     ('world.heightmap="nope.asc"', r"world.heightmap: .*nope.asc cannot be read"),
@@ -70,8 +70,8 @@ def test_a_sweep_names_each_impossible_world_once_with_the_case_that_has_it() ->
 )
 def test_each_world_of_a_sweep_is_built_once(monkeypatch: pytest.MonkeyPatch, world: str, worlds: int) -> None:
     built = []
-    whole = possible_world.obstacles
-    monkeypatch.setattr(possible_world, "obstacles", lambda *given: built.append(given) or whole(*given))
+    whole = obstacles.obstacles
+    monkeypatch.setattr(obstacles, "obstacles", lambda *given: built.append(given) or whole(*given))
     text = f'base = "quick"\nseeds = 5\n[set]\n{world}\n[grid]\n"nodes.count" = [3, 4]\n"traffic.interval_s" = [1, 2]\n'
     assert len(tasks_of(spec.parse(text, source="test"))) == 20
     assert len(built) == worlds

@@ -25,6 +25,7 @@ from fanet_mw.routing.clustered.clustering import Cluster, Swarm, succession
 from fanet_mw.routing.clustered.clustering.division import Division, drift
 from fanet_mw.routing.clustered.roles.lease import Authority
 from fanet_mw.routing.clustered.roles.liveness import Liveness
+from fanet_mw.routing.clustered.roles.membership import EPOCH_BITS
 from fanet_mw.routing.clustered.roles.position_updates import lost_ns
 from fanet_mw.routing.clustered.roles.roster import Roster, sure_m
 from fanet_mw.routing.clustered.timetable.heard_load import HeardLoads
@@ -154,7 +155,7 @@ class Leader:
 
     def on_outbid(self, epoch: int, *, now_ns: int) -> None:
         """A schedule was received in this leader's name that it has not made: announce a later epoch soon."""
-        if newer(epoch, self._epoch, bits=16) and self._assigned.parts:
+        if newer(epoch, self._epoch, bits=EPOCH_BITS) and self._assigned.parts:
             self._epoch, self._outbid = epoch, True
             self._due_ns = min(self._due_ns, now_ns + SETTLE_NS)
 
@@ -221,7 +222,7 @@ class Leader:
             return
         self._roster.forget_reports()
         ordered = [Cluster(cluster.head, succession(cluster, swarm)) for cluster in clusters]
-        self._epoch, self._outbid = following(self._epoch, bits=16) or 1, False
+        self._epoch, self._outbid = following(self._epoch, bits=EPOCH_BITS) or 1, False
         self._assigned = _Assigned(ordered, places, links, start_ns, self._parts(ordered, start_ns), measured, loads)
 
     def _loads(self, now_ns: int) -> Mapping[NodeId, int]:

@@ -5,7 +5,7 @@ that is in no part of a complete schedule belongs to no cluster.
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from fanet_mw import serial_number
 from fanet_mw.routing.clustered.roles.lease import Authority
@@ -34,6 +34,8 @@ class Version(NamedTuple):
     epoch: int
 
 
+EPOCH_BITS: Final = 16
+"""The bits of a schedule's epoch, which wraps."""
 _NOWHERE = ClusterPlace()
 
 
@@ -174,4 +176,4 @@ class Membership:
 
 def newer(version: Version, than: Version) -> bool:
     """True if `version` is later than another one of the same leader (16-bit serial numbers, RFC 1982)."""
-    return serial_number.newer(version.epoch, than.epoch, bits=16)
+    return serial_number.newer(version.epoch, than.epoch, bits=EPOCH_BITS)

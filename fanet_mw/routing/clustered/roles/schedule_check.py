@@ -6,7 +6,7 @@ from fanet_mw.errors import MalformedFrameError
 from fanet_mw.node.contract import Port
 from fanet_mw.routing.clustered.roles.leader import SETTLE_NS
 from fanet_mw.routing.clustered.roles.lease import Authority
-from fanet_mw.routing.clustered.roles.membership import Membership
+from fanet_mw.routing.clustered.roles.membership import EPOCH_BITS, Membership
 from fanet_mw.serial_number import newer
 from fanet_mw.units import US, S
 from fanet_mw.wire.inner import Schedule
@@ -48,5 +48,5 @@ class ScheduleCheck:
             return
         most = _EPOCHS + (now_ns - self._renewed_ns) // min(period_ns, SETTLE_NS)
         ahead = (epoch - known.epoch) & 0xFFFF
-        if epoch and newer(epoch, known.epoch, bits=16) and ahead > most:
+        if epoch and newer(epoch, known.epoch, bits=EPOCH_BITS) and ahead > most:
             raise MalformedFrameError(f"epoch {epoch} after {known.epoch}: at most {most} can have been missed")

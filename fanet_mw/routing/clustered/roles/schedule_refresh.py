@@ -12,6 +12,7 @@ from fanet_mw.node.duplicates import key_of_packet
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.forwarding.repair import AGAIN_NS, ASSESS_NS, FLOOD_OVER_NS
 from fanet_mw.routing.clustered.roles.lease import Authority
+from fanet_mw.routing.clustered.roles.membership import EPOCH_BITS
 from fanet_mw.serial_number import newer
 from fanet_mw.wire.inner import Beacon
 
@@ -46,7 +47,7 @@ class ScheduleRefresh:
         authority, epoch = self._version
         theirs = Authority(beacon.term, beacon.leader)
         behind = not beacon.leader or theirs > authority
-        if behind or (theirs == authority and newer(epoch, beacon.epoch, bits=16)):
+        if behind or (theirs == authority and newer(epoch, beacon.epoch, bits=EPOCH_BITS)):
             self._plan(now_ns + int(self._random() * ASSESS_NS))
 
     def _plan(self, due_ns: int | None) -> None:

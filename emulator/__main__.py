@@ -3,9 +3,9 @@
 import sys
 from pathlib import Path
 
-from emulator.capture_file import CaptureFile, unused
 from emulator.kernel.compile import COMPILING_NOTICE, must_compile, warm_up
 from emulator.medium import Medium
+from emulator.pcap_file import PcapFile, unused
 from fanet_mw.hosts import interrupts, service
 from fanet_mw.hosts.realtime import SwarmAddress
 from fanet_mw.scenario import Scenario
@@ -20,7 +20,7 @@ def run(scenario: Scenario, address: SwarmAddress, *, pcap: Path | None = None, 
     if pcap is None:
         service.live(Medium(scenario, address.swarm), scenario, address)
         return 0
-    with CaptureFile(unused(pcap), scenario.radio, receptions=receptions) as file:
+    with PcapFile(unused(pcap), scenario.radio, receptions=receptions) as file:
 
         def on_epoch(epoch_unix_ns: int) -> None:
             file.pcap.epoch_unix_ns = epoch_unix_ns

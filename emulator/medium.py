@@ -1,8 +1,7 @@
 """The link emulator as an actor: transmit requests and poses in, receptions and transmit statuses out.
 
 It never looks into a frame, and a station is a node id minus one. Requests are announced ahead of time, and wait in the
-kernel for their instant. A request that comes after its instant is counted as late, and dropped if it is more than
-`TOO_LATE_NS` late.
+kernel for their instant. What becomes of a request that comes after its instant is in `late_requests.py`.
 """
 
 from collections.abc import Mapping
@@ -10,11 +9,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from emulator.accounts import Accounts
-from emulator.air import Air, Rows
 from emulator.faults import Faults
 from emulator.kernel import state as s
+from emulator.kernel_interface import KernelInterface, Rows
 from emulator.measurement import Measurement, Sample
+from emulator.medium_counters import MediumCounters
 from emulator.pcap import Capture
 from emulator.requests import NUMBER_MASK, FrameSlots, RequestNumbers
 from fanet_mw.actor import Actor
@@ -25,8 +24,6 @@ from fanet_mw.errors import DropReason
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, FARTHEST_M, MS, NodeId, earliest
 
-TOO_LATE_NS: Final = 50 * MS
-"""A request that is later than this is dropped, because its slot belongs to another node by then."""
 ANNOUNCED: Final = 1024
 """The greatest number of a node's requests that may wait for their instant, in addition to those in its MAC queue."""
 _new: Final = tuple.__new__
@@ -62,11 +59,11 @@ class Medium(Actor):
         self._station_of = {topics.radio_tx(node): node - 1 for node in nodes}
         faults = Faults(radio, stations=self._count, planned=scenario.planned_faults)
         self._capture = capture
-        self._air = Air(scenario, stations=self._count, faults=faults, capture=capture is not None)
-        self._accounts = Accounts()
+        self._kernel = KernelInterface(scenario, stations=self._count, faults=faults, capture=capture is not None)
+        self._counters = MediumCounters()
         self._measurement = Measurement(scenario.traffic_window_ns)
         self._numbers = RequestNumbers(self._count)
-        self._slots = FrameSlots(self._air.slots(), nodes, most_held=radio.queue_frames + ANNOUNCED)
+        self._slots = FrameSlots(self._kernel.slots(), nodes, most_held=radio.queue_frames + ANNOUNCED)
         self._due_ns = self._next_due_ns()
         self._now_ns = 0
 
@@ -74,13 +71,13 @@ class Medium(Actor):
 
     def start(self, now_ns: int) -> None:
         self.wake(now_ns)
-        self._air.book.begin(now_ns)
+        self._kernel.book.begin(now_ns)
 
     def receive(self, topic: str, message: Message, now_ns: int) -> None:
         if type(message) is TxRequest:
             station = self._station_of.get(topic)
             if station is None:
-                self._accounts.refused["unknown_station"] += 1
+                self._counters.refused["unknown_station"] += 1
             else:
                 self._request(station, message, now_ns)
         elif isinstance(message, Poses):
@@ -90,24 +87,24 @@ class Medium(Actor):
             self._obstruct(message)
         elif topic == self._topics.radio_control and isinstance(message, Degrade | Jam | Cut | Restore):
             self.wake(now_ns)
-            why = self._air.faults.obey(message, self._now_ns)
-            self._accounts.controls += why is None
+            why = self._kernel.faults.obey(message, self._now_ns)
+            self._counters.controls += why is None
             self._take_in_faults(why)
         else:
-            self._accounts.refused["message_type"] += 1
+            self._counters.refused["message_type"] += 1
 
     def wake(self, now_ns: int) -> None:
         """Advance the air to `now_ns`, and send receptions and statuses."""
         while self._due_ns is not None and self._due_ns <= now_ns:
             self._pass_due(self._due_ns)
-        rows = self._air.advance(now_ns)
+        rows = self._kernel.advance(now_ns)
         if rows:
             self._hand_out(rows)
         if now_ns > self._now_ns:
             self._now_ns = now_ns
 
     def next_wake_ns(self) -> int | None:
-        wake_ns, due_ns = self._air.next_output_ns, self._due_ns
+        wake_ns, due_ns = self._kernel.next_output_ns, self._due_ns
         if wake_ns == _NEVER:
             return due_ns
         if self._handover_ns:
@@ -119,22 +116,22 @@ class Medium(Actor):
         self._report_links(self._now_ns)
 
     def report(self) -> Mapping[str, Any]:
-        accounts, arrays = self._accounts, self._air.arrays
+        counters, arrays = self._counters, self._kernel.arrays
         return {
             "kind": "emulator",
             "frames": {
                 "sent": self._numbers.total,
-                "delivered": accounts.delivered,
+                "delivered": counters.delivered,
                 "in_flight": self._slots.in_flight,
-                "dropped": {reason: accounts.dropped[reason] for reason in sorted(accounts.dropped)},
+                "dropped": {reason: counters.dropped[reason] for reason in sorted(counters.dropped)},
             },
             "requests": self._numbers.report(),
-            "copies": accounts.copies(arrays.g, in_flight=self._air.copies_under_way()),
+            "copies": counters.copies(arrays.g, in_flight=self._kernel.copies_under_way()),
             "air": self._measurement.report(self._sample(), stations=self._count),
-            "late": accounts.lateness(self._numbers.total),
-            "poses": accounts.poses,
-            "controls": accounts.controls,
-            "refused": dict(sorted(accounts.refused.items())),
+            "late": counters.late.report(self._numbers.total),
+            "poses": counters.poses,
+            "controls": counters.controls,
+            "refused": dict(sorted(counters.refused.items())),
             "handed": {i + 1: count for i, count in enumerate(arrays.st[s.HANDED].tolist()) if count},
         }
 
@@ -145,7 +142,7 @@ class Medium(Actor):
         seq, start_ns, frame, dst, wants_status = request
         numbers, slots = self._numbers, self._slots
         if seq != numbers.expected[station] and (lost := numbers.lost_before(station, seq)):
-            self._accounts.dropped[DropReason.BUS] += lost
+            self._counters.dropped[DropReason.BUS] += lost
         numbers.expected[station] = (seq + 1) & NUMBER_MASK
         numbers.made[station] += 1
         size = len(frame)
@@ -160,16 +157,16 @@ class Medium(Actor):
             self._refuse(station, request, DropReason.BACKLOG, now_ns)
             return
         if not slots.free:
-            self._air.grow()
-            slots.add(self._air.slots() - len(slots.requests))
+            self._kernel.grow()
+            slots.add(self._kernel.slots() - len(slots.requests))
         slot = slots.free.pop()
         slots.requests[slot], slots.sources[slot] = request, slots.nodes[station]
         slots.held[station] += 1
         if start_ns < self._now_ns:
             start_ns = self._now_ns
-        self._air.submit(slot, station, s.EVERYONE if dst == BROADCAST else dst - 1, size, start_ns, wants_status)
-        if self._air.book.next_ns is None:
-            self._air.book.plan(self._now_ns)
+        self._kernel.submit(slot, station, s.EVERYONE if dst == BROADCAST else dst - 1, size, start_ns, wants_status)
+        if self._kernel.book.next_ns is None:
+            self._kernel.book.plan(self._now_ns)
             self._due_ns = self._next_due_ns()
 
     def _refuse_shape(self, station: int, request: TxRequest, now_ns: int) -> None:
@@ -189,13 +186,13 @@ class Medium(Actor):
         if not -_HORIZON_NS < late_ns < _HORIZON_NS:
             self._refuse(station, request, DropReason.MALFORMED, now_ns)
             return True
-        self._accounts.late(late_ns)
-        if late_ns > TOO_LATE_NS:
+        too_late = self._counters.late.is_too_late(late_ns)
+        if too_late:
             self._refuse(station, request, DropReason.LATE, now_ns)
-        return late_ns > TOO_LATE_NS
+        return too_late
 
     def _refuse(self, station: int, request: TxRequest, reason: DropReason, now_ns: int) -> None:
-        self._accounts.drop(reason)
+        self._counters.drop(reason)
         if request.wants_status:
             status = TxStatus(request.seq, _OUTCOME_OF[reason], now_ns, 0)
             self.outbox.append((self._rx_topics[station], status))
@@ -204,15 +201,15 @@ class Medium(Actor):
 
     def _pass_due(self, due_ns: int) -> None:
         """Process what is due at this instant: the measurement begins or ends, faults change, links are reported."""
-        self._hand_out(self._air.advance(max(due_ns, self._now_ns)))
+        self._hand_out(self._kernel.advance(max(due_ns, self._now_ns)))
         self._now_ns = max(self._now_ns, due_ns)
         sample_ns = self._measurement.next_ns()
         if sample_ns is not None and sample_ns <= due_ns:
             self._measurement.pass_time(due_ns, self._sample())
-        fault_ns = self._air.faults.next_ns()
+        fault_ns = self._kernel.faults.next_ns()
         if fault_ns is not None and fault_ns <= due_ns:
-            self._take_in_faults(*self._air.faults.pass_time(due_ns))
-        book = self._air.book
+            self._take_in_faults(*self._kernel.faults.pass_time(due_ns))
+        book = self._kernel.book
         if book.next_ns is not None and book.next_ns <= due_ns:
             if self._report_links(due_ns) or self._slots.in_flight:
                 book.plan(due_ns)
@@ -221,15 +218,15 @@ class Medium(Actor):
         self._due_ns = self._next_due_ns()
 
     def _next_due_ns(self) -> int | None:
-        return earliest(self._measurement.next_ns(), self._air.faults.next_ns(), self._air.book.next_ns)
+        return earliest(self._measurement.next_ns(), self._kernel.faults.next_ns(), self._kernel.book.next_ns)
 
     def _sample(self) -> Sample:
-        arrays, now_ns = self._air.arrays, self._now_ns
-        return Sample(arrays.g.copy(), arrays.busy_ns(now_ns), self._accounts.delivered_bytes, now_ns)
+        arrays, now_ns = self._kernel.arrays, self._now_ns
+        return Sample(arrays.g.copy(), arrays.busy_ns(now_ns), self._counters.delivered_bytes, now_ns)
 
     def _report_links(self, now_ns: int) -> bool:
         """Publish the statistics of links; returns False if there was no traffic."""
-        stats = self._air.links(now_ns)
+        stats = self._kernel.links(now_ns)
         if stats is not None:
             self.outbox.append((self._topics.radio_links, stats))
         return stats is not None
@@ -240,17 +237,17 @@ class Medium(Actor):
         """
         for why in refused:
             if why is not None:
-                self._accounts.refused[why] += 1
-        if self._air.faults.records:
-            self.records += self._air.faults.records
-            self._air.faults.records.clear()
-            self._air.relink()
+                self._counters.refused[why] += 1
+        if self._kernel.faults.records:
+            self.records += self._kernel.faults.records
+            self._kernel.faults.records.clear()
+            self._kernel.relink()
             self._due_ns = self._next_due_ns()
 
     def _hand_out(self, rows: Rows) -> None:
         if self._capture is not None:
             rows = self._record(rows, self._capture)
-        accounts, reception = self._accounts, _NO_RECEPTION
+        counters, reception = self._counters, _NO_RECEPTION
         slots, append, rx_topics = self._slots, self.outbox.append, self._rx_topics
         requests, sources, held, free = slots.requests, slots.sources, slots.held, slots.free
         for kind, slot, station, t_ns, value, attempts in rows:
@@ -262,10 +259,10 @@ class Medium(Actor):
                 append((rx_topics[station], reception))
             elif kind == _FREE:
                 if value == _DELIVERED:
-                    accounts.delivered += 1
-                    accounts.delivered_bytes += len(request.frame)
+                    counters.delivered += 1
+                    counters.delivered_bytes += len(request.frame)
                 else:
-                    accounts.lost(value)
+                    counters.lost(value)
                 requests[slot] = None
                 held[station] -= 1
                 free.append(slot)
@@ -291,21 +288,21 @@ class Medium(Actor):
         """Obstructions have changed; they take effect with the next poses, which are of the same instant."""
         pairs = np.frombuffer(obstructions.pairs, np.uint16).astype(np.int64)
         if len(pairs) % 2 or (len(pairs) and not 1 <= pairs.min() <= pairs.max() <= self._count):
-            self._accounts.refused["obstructions"] += 1
+            self._counters.refused["obstructions"] += 1
             return
-        self._air.obstruct(pairs.reshape(-1, 2) - 1)
+        self._kernel.obstruct(pairs.reshape(-1, 2) - 1)
 
     def _place(self, poses: Poses) -> None:
         ids = np.frombuffer(poses.ids, np.uint16).astype(np.int64)
         if len(poses.states) != 6 * len(ids):
-            self._accounts.refused["poses"] += 1
+            self._counters.refused["poses"] += 1
             return
         states = np.frombuffer(poses.states, np.float64).reshape(-1, 6)
         known = (ids >= 1) & (ids <= self._count)
         if not known.all() or not (np.abs(states[:, :3]) <= FARTHEST_M).all():  # also false for NaN
-            self._accounts.refused["poses"] += 1
+            self._counters.refused["poses"] += 1
             return
-        self._accounts.poses += 1
+        self._counters.poses += 1
         at = np.full((self._count, 3), np.inf)
         at[ids - 1] = states[:, :3]
-        self._air.place(at)
+        self._kernel.place(at)

@@ -10,9 +10,9 @@ received without error. In ns-3.44 the extension beyond DIFS begins at the end o
 medium is busy.
 """
 
-from emulator.chance import MODULUS, uniform
 from emulator.kernel.heap import push
 from emulator.kernel.jit import jit
+from emulator.kernel.random_numbers import MODULUS, uniform
 from emulator.kernel.state import (
     ACCESS,
     ACK_TO,

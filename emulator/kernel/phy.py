@@ -11,12 +11,12 @@ their frames meet at a receiver that hears both.
 
 import math
 
-from emulator.chance import MODULUS, uniform
 from emulator.kernel.channel_access import on_busy, on_idle
 from emulator.kernel.ending import lost, put, release
 from emulator.kernel.frame_exchange import acknowledged
 from emulator.kernel.heap import push
 from emulator.kernel.jit import jit
+from emulator.kernel.random_numbers import MODULUS, uniform
 from emulator.kernel.state import (
     ACK,
     ACK_NS,

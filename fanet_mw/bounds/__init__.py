@@ -8,10 +8,10 @@ slot.
 
 from fanet_mw.bounds.arrivals import Arrivals, Periodic, Total
 from fanet_mw.bounds.bounded_or_refused import Bounded, DelayBound, Refused
+from fanet_mw.bounds.guard_time import guard_ns
 from fanet_mw.bounds.mac import Dcf
 from fanet_mw.bounds.network_calculus import backlog, delay_any_order, delay_fifo
 from fanet_mw.bounds.slot import Server, SlotServer
-from fanet_mw.bounds.slot_guard import guard_ns
 from fanet_mw.bounds.turn_gaps import TurnServer
 
 __all__ = [

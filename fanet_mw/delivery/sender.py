@@ -14,7 +14,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
-from fanet_mw.delivery.round_trips import RoundTrips
+from fanet_mw.delivery.retransmission_timeout import RetransmissionTimeout
 from fanet_mw.units import BROADCAST, MS, US, NodeId
 from fanet_mw.wire import message as wire_message
 from fanet_mw.wire.message import MAVLINK_PORT, MOST_PIECES, Head, Receipt
@@ -104,7 +104,7 @@ class Sender:
         self._node = node
         self._everyone = tuple(NodeId(other) for other in everyone if other != node)
         self._most_bytes = most_bytes
-        self._round_trips = RoundTrips(wait_ns)
+        self._round_trips = RetransmissionTimeout(wait_ns)
         self._messages: dict[int, _OutgoingMessage] = {}
         self._flows: dict[tuple[tuple[NodeId, ...], int, int], _Flow] = {}
         self._next_flow = 0

@@ -20,7 +20,7 @@ from fanet_mw.hosts.bus import Bus, HostBus
 from fanet_mw.hosts.presence import Presence
 from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
 from fanet_mw.scenario import Scenario
-from fanet_mw.scenario.identity import as_json, fingerprint
+from fanet_mw.scenario.fingerprint import as_json, fingerprint
 from fanet_mw.units import MS, S
 
 _START_DELAY_NS: Final = 300 * MS

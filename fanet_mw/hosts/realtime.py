@@ -30,7 +30,7 @@ from fanet_mw.hosts.inbox import Inbox
 from fanet_mw.hosts.presence import few
 from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
 from fanet_mw.scenario import Scenario
-from fanet_mw.scenario.identity import as_json, differences, fingerprint
+from fanet_mw.scenario.fingerprint import as_json, differences, fingerprint
 from fanet_mw.trace import Record
 from fanet_mw.units import S
 

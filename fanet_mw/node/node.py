@@ -17,8 +17,8 @@ from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.node import duplicates
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.header_check import HeaderCheck
-from fanet_mw.node.own_packets import OwnPackets
 from fanet_mw.node.packet import Packet, Relay
+from fanet_mw.node.packet_numbering import PacketNumbering
 from fanet_mw.node.port import NodePort
 from fanet_mw.node.reader import BUNDLE, Reader
 from fanet_mw.scenario import Scenario
@@ -76,7 +76,7 @@ class Node:
         self._reader = reader or Reader()
         self._duplicates = duplicates.DuplicateSet()
         self._header_check = HeaderCheck(node, scenario)
-        self._own = OwnPackets(node, self._duplicates, most_bytes=scenario.radio.max_frame_bytes)
+        self._own = PacketNumbering(node, self._duplicates, most_bytes=scenario.radio.max_frame_bytes)
         self.port = NodePort(node, scenario, self._duplicates, self._own, position=position)
         self.requests = self.port.requests
         """The transmissions that the actor is to take to the radio."""

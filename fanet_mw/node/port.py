@@ -15,8 +15,8 @@ from fanet_mw import wire
 from fanet_mw.bus.messages import TxRequest
 from fanet_mw.errors import DropReason
 from fanet_mw.node.duplicates import PHASES, DuplicateSet, hash_of
-from fanet_mw.node.own_packets import OwnPackets
 from fanet_mw.node.packet import Packet, Relay
+from fanet_mw.node.packet_numbering import PacketNumbering
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Dropped, LetOut, Record
@@ -30,7 +30,7 @@ class NodePort:
     """The port of one node (`contract.Port`)."""
 
     def __init__(
-        self, node: NodeId, scenario: Scenario, duplicate_set: DuplicateSet, own: OwnPackets, *, position: Enu
+        self, node: NodeId, scenario: Scenario, duplicate_set: DuplicateSet, own: PacketNumbering, *, position: Enu
     ) -> None:
         self.node = node
         self.scenario = scenario

@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 from fanet_mw import wire
 from fanet_mw.bounds import Bounded, DelayBound, Refused, paper
-from fanet_mw.bounds.slot_guard import PLANNED_ERROR_NS, slot_guard_ns
+from fanet_mw.bounds.guard_time import PLANNED_ERROR_NS, slot_guard_ns
 from fanet_mw.graph.topology import Adjacency, within_range
 from fanet_mw.planner import contention_window, reachability, verdict
 from fanet_mw.planner.claimed_turns import Claimants, ClaimedPlan

@@ -6,7 +6,7 @@ Each table is in the file of its name: `[radio]` in `radio.py`. The model is re-
     checks.py                    what the tables allow together
     config.py, quantities.py     reading from files and settings; units that a value may be written with
     commented.py, reference.py   a file with every key explained; what can be said of each key
-    identity.py                  whether two processes run the same scenario
+    fingerprint.py                  whether two processes run the same scenario
 """
 
 from fanet_mw.scenario.clock import Clock

@@ -22,7 +22,7 @@ from typing import Final, NamedTuple
 
 from fanet_mw.serial_number import following, newer
 from fanet_mw.timesync.clock_fit import EXACT, ClockFit, Line, Oscillator, Pair
-from fanet_mw.timesync.first_belief import FirstBelief
+from fanet_mw.timesync.initial_sync import InitialSync
 from fanet_mw.units import MS, NodeId, S
 from fanet_mw.wire.inner import TimeBeacon
 
@@ -103,7 +103,7 @@ class TimeSync:
         """Another reference that may be followed: its id, its pairs so far, and since when it is considered."""
         self._neighbors: dict[NodeId, _LastBeacon] = {}
         self._doubt_ns = int(_DOUBT_HELLOS * own.hello_ns)
-        self._first = FirstBelief(
+        self._first = InitialSync(
             own.oscillator,
             leader=own.leader,
             wait_ns=self._doubt_ns,
@@ -283,7 +283,7 @@ class TimeSync:
         """Use a pair from a neighbor that follows the same reference."""
         steps = self._fit.steps
         if self._fit.line is None:
-            self._fit.add(pair)  # `FirstBelief` has accepted it
+            self._fit.add(pair)  # `InitialSync` has accepted it
             return
         agrees = self._fit.agrees(pair)
         if not agrees:

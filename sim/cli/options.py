@@ -110,7 +110,7 @@ class OutputFlags:
 
     def capture_path(self) -> Path | None:
         """The path of the capture, if one is wanted."""
-        from emulator.capture_file import NAME
+        from emulator.pcap_file import NAME
 
         wanted = self.pcap or self.pcap_receptions
         return self.out / NAME if wanted and self.out is not None else None

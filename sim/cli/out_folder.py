@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from emulator.capture_file import NAME as CAPTURE
-from emulator.capture_file import captures
+from emulator.pcap_file import NAME as CAPTURE
+from emulator.pcap_file import captures
 from fanet_mw.errors import ConfigError
 from sim.report import names
 from sim.results.file_names import RUN_FILES

@@ -41,8 +41,8 @@ def simulate(
         A shipped scenario's name (see `fanet scenarios`) or a .toml file.
 
     """
-    from emulator.capture_file import CaptureFile
     from emulator.kernel.compile import COMPILING_NOTICE, must_compile, warm_up
+    from emulator.pcap_file import PcapFile
     from fanet_mw.hosts import interrupts
     from sim.run.virtual import EPOCH_UNIX_NS
     from sim.run.virtual import simulate as run
@@ -54,7 +54,7 @@ def simulate(
         warm_up()
     signals: list[int] = []
     path = output.capture_path()
-    capture = CaptureFile(path, chosen.radio, receptions=output.pcap_receptions) if path else nullcontext()
+    capture = PcapFile(path, chosen.radio, receptions=output.pcap_receptions) if path else nullcontext()
     with _progress(chosen, quiet=output.json) as tell, capture as file, interrupts.handed_to(signals.append):
         if file is not None:
             file.pcap.epoch_unix_ns = EPOCH_UNIX_NS

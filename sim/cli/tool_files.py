@@ -44,7 +44,7 @@ def keys(
         How long the certificates are valid [days].
 
     """
-    from sim.run.bus.keys import make
+    from sim.run.bus.certificates import make
 
     chosen = choice.scenario(scenario)
     made = make(chosen, out, swarm=swarm or chosen.name, hosts=host, days=days)

@@ -16,13 +16,13 @@ def require_possible(scenario: Scenario) -> None:
     import numpy as np
 
     from sim.world.environment.obstacles import obstacles
-    from sim.world.incidents.no_fly import NoFly
+    from sim.world.incidents.no_fly_entries import NoFlyEntries
     from sim.world.mobility.layout import positions
 
     starts = np.array(positions(scenario), dtype=np.float64)
     if world.has_obstacles:
         obstacles(scenario, starts)
-    NoFly(world.no_fly_m, starts)
+    NoFlyEntries(world.no_fly_m, starts)
 
 
 class PossibleWorlds:

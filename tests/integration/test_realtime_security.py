@@ -33,7 +33,7 @@ from fanet_mw.hosts.bus import Bus, exposure
 from fanet_mw.hosts.clock import ClockKeeper, ClockListener
 from fanet_mw.units import BROADCAST, Enu, NodeId, S
 from sim.results.files import finish
-from sim.run.bus.keys import make
+from sim.run.bus.certificates import make
 from sim.run.launcher.swarm import free_endpoint, launch
 from sim.scenarios import catalog
 

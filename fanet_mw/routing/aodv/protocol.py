@@ -35,7 +35,7 @@ from fanet_mw.routing.aodv.neighbors import HelloNeighbors
 from fanet_mw.routing.aodv.table import AodvRoute, AodvTable
 from fanet_mw.routing.hop_by_hop import HopByHop
 from fanet_mw.routing.rival_control_messages import Family
-from fanet_mw.routing.waiting_room import WaitingRoom
+from fanet_mw.routing.send_buffer import SendBuffer
 from fanet_mw.serial_number import following, later, newer
 from fanet_mw.units import BROADCAST, MS, NodeId, earliest, seconds_to_ns
 
@@ -52,7 +52,7 @@ class Aodv(HopByHop):
         self._discovery = Discovery()
         self._requests = SeenRequests()
         self._hellos = HelloNeighbors()
-        self._room = WaitingRoom(capacity=routing.queue_frames, hold_ns=seconds_to_ns(routing.lifetime_s))
+        self._room = SendBuffer(capacity=routing.queue_frames, hold_ns=seconds_to_ns(routing.lifetime_s))
         self._rreq_limit = RateLimit(p.RREQ_RATELIMIT)
         self._rerr_limit = RateLimit(p.RERR_RATELIMIT)
         self._blacklist: dict[NodeId, int] = {}

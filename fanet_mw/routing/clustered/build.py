@@ -38,12 +38,12 @@ from fanet_mw.routing.clustered.relaying.rules import CounterRule, GossipRule, R
 from fanet_mw.routing.clustered.relaying.scheduled import ScheduledRelaying
 from fanet_mw.routing.clustered.roles.assigned import AssignedRoles, RoleParts
 from fanet_mw.routing.clustered.roles.failover import Failover
-from fanet_mw.routing.clustered.roles.failure_detector import FailureDetector
 from fanet_mw.routing.clustered.roles.joining import Joining
 from fanet_mw.routing.clustered.roles.leader import Leader
 from fanet_mw.routing.clustered.roles.lease import Lease
 from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import Membership
+from fanet_mw.routing.clustered.roles.neighbor_failure_detector import NeighborFailureDetector
 from fanet_mw.routing.clustered.roles.no_roles import NoRoles
 from fanet_mw.routing.clustered.roles.position_updates import PositionUpdates
 from fanet_mw.routing.clustered.roles.schedule_check import ScheduleCheck
@@ -266,7 +266,7 @@ def _role_parts(ground: _Ground, membership: Membership, *, takes_slot: bool) ->
         joining=Joining(port, updates, links, ground.random),
         refresh=ScheduleRefresh(port.stream("refresh").random),
         check=ScheduleCheck(port, membership),
-        detector=None if takes_slot else FailureDetector(liveness, hello_ns=ground.hello_ns),
+        detector=None if takes_slot else NeighborFailureDetector(liveness, hello_ns=ground.hello_ns),
         links=links,
         liveness=liveness,
     )  # fmt: skip

@@ -23,7 +23,7 @@ from fanet_mw.routing.dsdv.messages import FULL, INCREMENTAL, PER_ENTRY, Adverti
 from fanet_mw.routing.dsdv.table import PERIODIC_UPDATE_NS, DsdvTable
 from fanet_mw.routing.hop_by_hop import HopByHop
 from fanet_mw.routing.rival_control_messages import Family
-from fanet_mw.routing.waiting_room import WaitingRoom
+from fanet_mw.routing.send_buffer import SendBuffer
 from fanet_mw.units import NodeId, S, earliest, seconds_to_ns
 
 _GATHER_NS: Final = 1 * S
@@ -39,7 +39,7 @@ class Dsdv(HopByHop):
         super().__init__(port)
         routing = port.scenario.routing
         self._table = DsdvTable(port.node)
-        self._room = WaitingRoom(capacity=routing.queue_frames, hold_ns=seconds_to_ns(routing.lifetime_s))
+        self._room = SendBuffer(capacity=routing.queue_frames, hold_ns=seconds_to_ns(routing.lifetime_s))
         self._most = control.capacity(port.scenario.radio.max_frame_bytes) // PER_ENTRY
         self._full_ns: int | None = None
         self._news_ns: int | None = None

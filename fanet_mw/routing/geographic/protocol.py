@@ -25,7 +25,7 @@ from fanet_mw.routing.geographic.locations import HELLO_INTERVAL_NS, LocationTab
 from fanet_mw.routing.geographic.messages import BEACON, LOCATION, QUERY, Fix, Location, PositionBeacon, Query
 from fanet_mw.routing.hop_by_hop import HopByHop
 from fanet_mw.routing.rival_control_messages import Family
-from fanet_mw.routing.waiting_room import WaitingRoom
+from fanet_mw.routing.send_buffer import SendBuffer
 from fanet_mw.units import BROADCAST, MS, US, NodeId, S, earliest, seconds_to_ns
 
 LOCATION_INTERVAL_NS: Final = 5 * S
@@ -45,7 +45,7 @@ class Geographic(HopByHop):
         super().__init__(port)
         routing = port.scenario.routing
         self._locations = LocationTable()
-        self._room = WaitingRoom(capacity=routing.queue_frames, hold_ns=seconds_to_ns(routing.lifetime_s))
+        self._room = SendBuffer(capacity=routing.queue_frames, hold_ns=seconds_to_ns(routing.lifetime_s))
         self._hops = routing.hop_limit
         self._beacon_ns: int | None = None
         self._retry_ns: int | None = None

@@ -2,7 +2,7 @@
 
 from fanet_mw.scenario import Scenario
 from sim.world.engines.contract import Rows
-from sim.world.incidents.no_fly import NoFly
+from sim.world.incidents.no_fly_entries import NoFlyEntries
 from sim.world.incidents.separation import Separation
 
 
@@ -12,5 +12,5 @@ class Incidents:
     def __init__(self, scenario: Scenario, starts: Rows) -> None:
         """Raises ConfigError if a UAV would start in a no-fly area."""
         self.collisions = 0
-        self.no_fly = NoFly(scenario.world.no_fly_m, starts)
+        self.no_fly = NoFlyEntries(scenario.world.no_fly_m, starts)
         self.separation = Separation(scenario.mission.collision_distance_m)

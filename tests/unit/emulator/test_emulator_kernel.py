@@ -123,7 +123,7 @@ def test_all_books_close_and_the_air_falls_silent(load: tuple[int, int, str, str
     assert copies["on_air"] == copies["received"] + sum(copies["lost"].values())
     assert sum(report["handed"].values()) == sum(isinstance(message, Reception) for _, message in outputs)
     assert sum(isinstance(message, TxStatus) for _, message in outputs) == 150
-    rows = air._air.arrays.st
+    rows = air._kernel.arrays.st
     for row in (state.CS, state.NSIG, state.QLEN, state.TX_KIND):
         assert not rows[row].any(), "the air is silent"
     for row in (state.LOCK, state.WAITING, state.HEAD, state.ACK_TO, state.BUSY_SINCE):

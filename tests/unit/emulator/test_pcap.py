@@ -17,9 +17,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from test_medium_timelines import ACK_NS, DIFS_NS, FRAME_NS, PAYLOAD, SIFS_NS, Air
 
-from emulator.capture_file import CaptureFile, unused
 from emulator.medium import Medium
 from emulator.pcap import Pcap, checksum
+from emulator.pcap_file import PcapFile, unused
 from fanet_mw import mavlink, wire
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import ConfigError
@@ -273,8 +273,8 @@ def test_a_capture_that_cannot_be_opened_is_one_sentence_and_a_full_disk_ends_it
 ) -> None:
     radio = make_scenario().radio
     with pytest.raises(ConfigError, match=r"--pcap: .* cannot be written"):
-        CaptureFile(tmp_path, radio)
-    with CaptureFile(Path("/dev/full"), radio) as file:
+        PcapFile(tmp_path, radio)
+    with PcapFile(Path("/dev/full"), radio) as file:
         for i in range(1000):
             file.pcap.transmitted(i, 1, BROADCAST, i, PAYLOAD, 1)
     assert capsys.readouterr().err.count("the capture ends here: No space left on device") == 1
@@ -284,7 +284,7 @@ def test_what_was_captured_a_second_ago_can_be_read_while_the_run_goes_on(
     tmp_path: Path, make_scenario: MakeScenario
 ) -> None:
     path = tmp_path / "air.pcap"
-    with CaptureFile(path, make_scenario().radio) as file:
+    with PcapFile(path, make_scenario().radio) as file:
         for t_ns in (0, 400 * MS, 999 * MS):
             file.pcap.transmitted(t_ns, 1, BROADCAST, 0, PAYLOAD, 1)
         assert not path.read_bytes(), "gathered"
@@ -305,7 +305,7 @@ def test_an_emulator_that_starts_again_keeps_the_capture_of_the_last_one(tmp_pat
 def test_tshark_reads_it_without_complaint(tmp_path: Path) -> None:
     path = tmp_path / "air.pcap"
     scenario = catalog.find("contention_unicast", ["duration_s=0.5", "drain_s=0", "nodes.count=3"])
-    with CaptureFile(path, scenario.radio, receptions=True) as file:
+    with PcapFile(path, scenario.radio, receptions=True) as file:
         simulate(scenario, capture=file.pcap)
     fields = ["frame.time_epoch", "wlan.fcs.status", "ip.checksum.status", "udp.checksum.status"]
     options = ["-o", "wlan.check_checksum:TRUE", "-o", "ip.check_checksum:TRUE", "-o", "udp.check_checksum:TRUE"]

@@ -2,7 +2,7 @@
 
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.presence import Presence
-from fanet_mw.scenario.identity import differences, fingerprint
+from fanet_mw.scenario.fingerprint import differences, fingerprint
 from sim.scenarios import catalog
 
 NAMES = Topics("s")

@@ -9,7 +9,7 @@ the access what the schedule makes of this node.
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
-from fanet_mw.bounds.slot_guard import slot_guard_ns
+from fanet_mw.bounds.guard_time import slot_guard_ns
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.node.contract import Port
 from fanet_mw.node.neighbors import Neighbor
@@ -18,12 +18,12 @@ from fanet_mw.node.reader import decoded
 from fanet_mw.routing.clustered.contract import ScheduledAccess
 from fanet_mw.routing.clustered.forwarding.gradient import UNREACHABLE, Gradient, RouteToHead
 from fanet_mw.routing.clustered.roles.failover import Failover
-from fanet_mw.routing.clustered.roles.failure_detector import FailureDetector
 from fanet_mw.routing.clustered.roles.joining import Joining
 from fanet_mw.routing.clustered.roles.leader import Leader
 from fanet_mw.routing.clustered.roles.lease import Authority, Lease
 from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import Membership
+from fanet_mw.routing.clustered.roles.neighbor_failure_detector import NeighborFailureDetector
 from fanet_mw.routing.clustered.roles.schedule_check import ScheduleCheck
 from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
 from fanet_mw.routing.clustered.roles.states import Action
@@ -50,7 +50,7 @@ class RoleParts(NamedTuple):
     joining: Joining
     refresh: ScheduleRefresh
     check: ScheduleCheck
-    detector: FailureDetector | None
+    detector: NeighborFailureDetector | None
     """The failure detector for all neighbors; None if only heads are watched."""
     links: LinkQuality | None
     """The measured quality of the node's links; None if links are not measured."""
@@ -243,7 +243,7 @@ class AssignedRoles:
         if parts.detector is not None and parts.joining.may_update(now_ns):
             self._report_silent_neighbor(parts.detector, now_ns)
 
-    def _report_silent_neighbor(self, detector: FailureDetector, now_ns: int) -> None:
+    def _report_silent_neighbor(self, detector: NeighborFailureDetector, now_ns: int) -> None:
         """Flood a report that a neighbor has fallen silent; the leader receives it, and so does a neighbor that
         lives.
         """

@@ -10,7 +10,7 @@ have been near it.
 
 A stand-in floods a join that names the silent node. Without a timetable it also uses the slot of the head from then on.
 With a timetable there is no slot to take over: the stand-in only informs the leader, and any silent neighbor is
-reported in the same way (`failure_detector.py`).
+reported in the same way (`neighbor_failure_detector.py`).
 """
 
 from typing import Final

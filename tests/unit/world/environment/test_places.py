@@ -24,7 +24,7 @@ from sim.world.environment import footprints, heightmap
 from sim.world.environment.obstacles import Box, Hills, Obstacles, obstacles
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors, place
-from sim.world.incidents.no_fly import NoFly
+from sim.world.incidents.no_fly_entries import NoFlyEntries
 from sim.world.mobility.layout import positions
 
 MakeScenario = Callable[..., Scenario]
@@ -86,7 +86,7 @@ def test_places_that_cannot_be_are_refused_by_name(
 
 
 def test_entries_into_a_no_fly_area_are_counted_once_each() -> None:
-    area = NoFly([(100, 0, 30)], np.array([[0.0, 0, 50], [50, 0, 50]]))
+    area = NoFlyEntries([(100, 0, 30)], np.array([[0.0, 0, 50], [50, 0, 50]]))
     for east in (60, 80, 100, 120, 140, 100):
         area.watch(np.array([[0.0, 0, 50], [east, 0, 50]]))
     assert area.entries == 2
@@ -94,7 +94,7 @@ def test_entries_into_a_no_fly_area_are_counted_once_each() -> None:
 
 def test_a_start_within_a_no_fly_area_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"world.no_fly_m.1: node 2 starts within it"):
-        NoFly([(900, 0, 30), (50, 0, 30)], np.array([[0.0, 0, 50], [50, 0, 50]]))
+        NoFlyEntries([(900, 0, 30), (50, 0, 30)], np.array([[0.0, 0, 50], [50, 0, 50]]))
 
 
 # --- heights from files -----------------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from fanet_mw.errors import ConfigError
 from sim.world.engines.contract import Rows
 
 
-class NoFly:
+class NoFlyEntries:
     """Upright cylinders without a top."""
 
     def __init__(self, areas: Sequence[tuple[float, float, float]], starts: Rows) -> None:

@@ -1,11 +1,11 @@
-"""The counters of the medium: requests, copies of frames, late frames. Each thing is counted only once, here."""
+"""The counters of the medium: requests, copies of frames, late requests. Each thing is counted only once, here."""
 
 from collections import Counter
 from typing import Any, Final
 
 from emulator.kernel import state as s
+from emulator.late_requests import LateRequests
 from fanet_mw.errors import DropReason
-from fanet_mw.units import MS
 
 _REASON_OF: Final = {
     s.NO_RECEIVER: DropReason.NO_RECEIVER,
@@ -19,11 +19,9 @@ _REASON_OF: Final = {
     s.JAMMED: DropReason.JAMMED,
     s.CUT_OFF: DropReason.STATION_DOWN,
 }
-_LATENESS_STEPS: Final = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
-"""The upper edges of the bins of the lateness histogram [ms]; a percentile is stated as the upper edge of its bin."""
 
 
-class Accounts:
+class MediumCounters:
     """The counters of requests by the medium, and those of copies by the kernel."""
 
     def __init__(self) -> None:
@@ -36,20 +34,10 @@ class Accounts:
         """The number of sets of positions that were accepted."""
         self.controls = 0
         """The number of changes of the air that were made."""
-        self.late_frames = 0
-        self._max_late_ns = 0
-        self._lateness = [0] * (len(_LATENESS_STEPS) + 1)
+        self.late = LateRequests()
 
     def drop(self, reason: DropReason) -> None:
         self.dropped[reason] += 1
-
-    def late(self, by_ns: int) -> None:
-        """A request came `by_ns` after the instant at which its frame was to start."""
-        self.late_frames += 1
-        self._max_late_ns = max(self._max_late_ns, by_ns)
-        late_ms = by_ns / MS
-        index = next((i for i, edge in enumerate(_LATENESS_STEPS) if late_ms <= edge), len(_LATENESS_STEPS))
-        self._lateness[index] += 1
 
     def lost(self, verdict: int) -> None:
         """Count a frame that no node has received, when nothing refers to it any more."""
@@ -73,24 +61,3 @@ class Accounts:
             "lost": {reason.value: count for reason, count in lost.items() if count},
             "in_flight": in_flight,
         }
-
-    def lateness(self, requests: int) -> dict[str, float]:
-        """The lateness of all requests; one that was in time counts as 0 ms."""
-        return {
-            "late_frames": self.late_frames,
-            "frames": requests,
-            "p50_ms": self._percentile(0.5, requests),
-            "p99_ms": self._percentile(0.99, requests),
-            "max_ms": round(self._max_late_ns / MS, 3),
-        }
-
-    def _percentile(self, share: float, requests: int) -> float:
-        wanted = share * requests
-        seen = requests - self.late_frames
-        if seen >= wanted:
-            return 0.0
-        for index, count in enumerate(self._lateness):
-            seen += count
-            if seen >= wanted and index < len(_LATENESS_STEPS):
-                return float(_LATENESS_STEPS[index])
-        return round(self._max_late_ns / MS, 3)

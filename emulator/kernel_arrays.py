@@ -7,12 +7,12 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from emulator.chance import MODULUS
 from emulator.channel.error_rate import header_rates, log_success_per_bit
 from emulator.channel.fading import law_of, seeds
 from emulator.channel.propagation import LinkTable, milliwatt, noise_mw
 from emulator.kernel import state as s
 from emulator.kernel.entry import KernelEntry
+from emulator.kernel.random_numbers import MODULUS
 from fanet_mw.airtime import DETECT_NS, Timing
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Radio, Scenario

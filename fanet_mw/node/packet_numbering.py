@@ -18,7 +18,7 @@ from fanet_mw.wire import Header, Kind
 _new: Final = tuple.__new__  # for what is made once per frame
 
 
-class OwnPackets:
+class PacketNumbering:
     """Makes the packets of one node."""
 
     def __init__(self, node: NodeId, duplicate_set: DuplicateSet, *, most_bytes: int) -> None:

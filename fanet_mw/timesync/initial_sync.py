@@ -17,7 +17,7 @@ _ENOUGH: Final = 2
 """The number of neighbors that must agree."""
 
 
-class FirstBelief:
+class InitialSync:
     """The statements of neighbors while none has been accepted."""
 
     def __init__(self, oscillator: Oscillator, *, leader: NodeId, wait_ns: int, memory_ns: int) -> None:

@@ -2,8 +2,8 @@
 
 import pytest
 
-from fanet_mw.routing.clustered.roles.failure_detector import FailureDetector
 from fanet_mw.routing.clustered.roles.liveness import Liveness
+from fanet_mw.routing.clustered.roles.neighbor_failure_detector import NeighborFailureDetector
 from fanet_mw.units import NodeId, S
 
 OTHER = NodeId(7)
@@ -15,8 +15,8 @@ def liveness() -> Liveness:
 
 
 @pytest.fixture
-def detector(liveness: Liveness) -> FailureDetector:
-    found = FailureDetector(liveness, hello_ns=S)
+def detector(liveness: Liveness) -> NeighborFailureDetector:
+    found = NeighborFailureDetector(liveness, hello_ns=S)
     found.on_hello(OTHER, now_ns=10 * S)
     liveness.on_sign_of_life(OTHER, born_ns=10 * S)
     return found
@@ -26,7 +26,9 @@ def everyone(_: NodeId) -> bool:
     return True
 
 
-def test_a_neighbor_is_silent_after_four_hellos_and_is_told_of_again_after_a_while(detector: FailureDetector) -> None:
+def test_a_neighbor_is_silent_after_four_hellos_and_is_told_of_again_after_a_while(
+    detector: NeighborFailureDetector,
+) -> None:
     assert detector.find_suspect(everyone, now_ns=14 * S - 1) is None
     assert detector.find_suspect(everyone, now_ns=14 * S) == OTHER
     detector.on_report(OTHER, now_ns=14 * S)
@@ -34,13 +36,17 @@ def test_a_neighbor_is_silent_after_four_hellos_and_is_told_of_again_after_a_whi
     assert detector.find_suspect(everyone, now_ns=24 * S) == OTHER
 
 
-def test_whose_packets_still_come_over_others_is_not_silent(detector: FailureDetector, liveness: Liveness) -> None:
+def test_whose_packets_still_come_over_others_is_not_silent(
+    detector: NeighborFailureDetector, liveness: Liveness
+) -> None:
     for second in range(11, 40):
         liveness.on_sign_of_life(OTHER, born_ns=second * S)
         assert detector.find_suspect(everyone, now_ns=second * S) is None
 
 
-def test_who_objects_is_let_alone_until_it_is_heard_again(detector: FailureDetector, liveness: Liveness) -> None:
+def test_who_objects_is_let_alone_until_it_is_heard_again(
+    detector: NeighborFailureDetector, liveness: Liveness
+) -> None:
     detector.on_report(OTHER, now_ns=14 * S)
     liveness.on_sign_of_life(OTHER, born_ns=15 * S)
     assert all(detector.find_suspect(everyone, now_ns=second * S) is None for second in range(15, 60))
@@ -49,14 +55,14 @@ def test_who_objects_is_let_alone_until_it_is_heard_again(detector: FailureDetec
     assert detector.find_suspect(everyone, now_ns=64 * S) == OTHER
 
 
-def test_who_is_in_no_schedule_and_who_was_never_heard_concern_nobody(detector: FailureDetector) -> None:
+def test_who_is_in_no_schedule_and_who_was_never_heard_concern_nobody(detector: NeighborFailureDetector) -> None:
     detector.on_report(NodeId(8), now_ns=12 * S)
     assert detector.find_suspect(lambda _: False, now_ns=14 * S) is None
     assert detector.find_suspect(everyone, now_ns=15 * S) is None
 
 
 def test_who_has_been_silent_for_a_minute_is_forgotten_though_nothing_was_said() -> None:
-    detector = FailureDetector(Liveness(), hello_ns=S)
+    detector = NeighborFailureDetector(Liveness(), hello_ns=S)
     detector.on_hello(NodeId(4), now_ns=0)
     assert detector.find_suspect(lambda _: True, now_ns=60 * S) == 4
     assert detector.find_suspect(lambda _: True, now_ns=60 * S + 1) is None

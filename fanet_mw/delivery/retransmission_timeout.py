@@ -8,7 +8,7 @@ _LEAST_WAIT_NS: Final = 300 * MS
 """The shortest wait, however soon earlier receipts came."""
 
 
-class RoundTrips:
+class RetransmissionTimeout:
     """The mean time until the receipt of each target, and its variation, both smoothed."""
 
     def __init__(self, first_wait_ns: int) -> None:

@@ -9,11 +9,11 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from emulator.arrays import MOST_ASKED, arrays_of
 from emulator.faults import Faults
 from emulator.kernel import kernel
 from emulator.kernel import state as s
-from emulator.link_book import LinkBook
+from emulator.kernel_arrays import MOST_ASKED, arrays_of
+from emulator.link_counters import LinkCounters
 from emulator.placement import Placement
 from fanet_mw.airtime import OVERHEAD_BYTES, airtime_ns
 from fanet_mw.bus.link_stats import LinkStats
@@ -25,13 +25,13 @@ _pack, _unpack, _ROW_BYTES = _ROW.pack_into, _ROW.iter_unpack, _ROW.size
 Rows = list[tuple[int, ...]]
 
 
-class Air:
+class KernelInterface:
     """The state of the channel and of the MAC of every station."""
 
     def __init__(self, scenario: Scenario, *, stations: int, faults: Faults, capture: bool = False) -> None:
         self._radio = scenario.radio
         self.faults = faults
-        self.book = LinkBook(stations)
+        self.book = LinkCounters(stations)
         self._placement = Placement(scenario, stations=stations)
         self.arrays = arrays_of(scenario, self._placement.links(spare=0), stations=stations, capture=capture)
         # These views share memory with numpy arrays; a few numbers are read faster through the buffer protocol.

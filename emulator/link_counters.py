@@ -17,7 +17,7 @@ _ROWS = slice(s.RSSI_SUM, s.N_CUT + 1)
 """The rows of a link that are counters: the sum of RSSI, then one for each name in COUNTS."""
 
 
-class LinkBook:
+class LinkCounters:
     """The traffic of all links since the last report."""
 
     def __init__(self, stations: int) -> None:

@@ -1,18 +1,18 @@
 """A node without a time, and what its neighbors say of it: whose word is taken, when, and against whom."""
 
 from fanet_mw.timesync.clock_fit import Oscillator, Pair
-from fanet_mw.timesync.first_belief import FirstBelief
+from fanet_mw.timesync.initial_sync import InitialSync
 from fanet_mw.units import MS, US, NodeId, S
 
 LEADER = NodeId(1)
 TRUE_NS, LIE_NS = 30 * MS, 2 * S
 
 
-def nobody_believed() -> FirstBelief:
-    return FirstBelief(Oscillator(40e-6, 0.0, US), leader=LEADER, wait_ns=1500 * MS, memory_ns=4 * S)
+def nobody_believed() -> InitialSync:
+    return InitialSync(Oscillator(40e-6, 0.0, US), leader=LEADER, wait_ns=1500 * MS, memory_ns=4 * S)
 
 
-def says(first: FirstBelief, src: int, at_ms: int, offset_ns: int = TRUE_NS, *, reference: int = 1) -> bool:
+def says(first: InitialSync, src: int, at_ms: int, offset_ns: int = TRUE_NS, *, reference: int = 1) -> bool:
     pair = Pair((at_ms - 1000) * MS, offset_ns, 5 * US)
     return first.on_statement(NodeId(src), reference, pair, local_ns=at_ms * MS)
 

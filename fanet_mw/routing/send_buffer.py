@@ -13,7 +13,7 @@ class Held(NamedTuple):
     ends_ns: int
 
 
-class WaitingRoom:
+class SendBuffer:
     """The packets of one node that wait for routes, first in, first out."""
 
     def __init__(self, *, capacity: int, hold_ns: int) -> None:

@@ -22,7 +22,7 @@ _AGAIN_NS: Final = 10 * S
 _FORGOTTEN_NS: Final = 60 * S
 
 
-class FailureDetector:
+class NeighborFailureDetector:
     """Watches the neighbors of one node."""
 
     def __init__(self, liveness: Liveness, *, hello_ns: int) -> None:

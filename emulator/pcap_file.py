@@ -34,7 +34,7 @@ def captures(path: Path) -> list[Path]:
     return [found for found in named if re.fullmatch(rf"{re.escape(path.stem)}(-\d+)?", found.stem)]
 
 
-class CaptureFile:
+class PcapFile:
     """A `Pcap` that writes to a file; raises ConfigError when the file cannot be opened."""
 
     def __init__(self, path: Path, radio: Radio, *, receptions: bool = False) -> None:

@@ -1,0 +1,52 @@
+"""Late requests: those that come to the medium after the instant at which their frame was to start.
+
+A late request is counted. Its frame starts at once, unless it is more than `TOO_LATE_NS` late: then it is dropped.
+"""
+
+from typing import Final
+
+from fanet_mw.units import MS
+
+TOO_LATE_NS: Final = 50 * MS
+"""A request that is later than this is dropped, because its slot belongs to another node by then."""
+_STEPS: Final = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
+"""The upper edges of the bins of the histogram [ms]; a percentile is stated as the upper edge of its bin."""
+
+
+class LateRequests:
+    """The number of late requests, and a histogram of how late they were."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._most_ns = 0
+        self._histogram = [0] * (len(_STEPS) + 1)
+
+    def is_too_late(self, late_ns: int) -> bool:
+        """Count a request that is `late_ns` late; returns True if it is to be dropped."""
+        self._count += 1
+        self._most_ns = max(self._most_ns, late_ns)
+        late_ms = late_ns / MS
+        index = next((i for i, edge in enumerate(_STEPS) if late_ms <= edge), len(_STEPS))
+        self._histogram[index] += 1
+        return late_ns > TOO_LATE_NS
+
+    def report(self, requests: int) -> dict[str, float]:
+        """The lateness of all requests; one that was in time counts as 0 ms."""
+        return {
+            "late_frames": self._count,
+            "frames": requests,
+            "p50_ms": self._percentile(0.5, requests),
+            "p99_ms": self._percentile(0.99, requests),
+            "max_ms": round(self._most_ns / MS, 3),
+        }
+
+    def _percentile(self, share: float, requests: int) -> float:
+        wanted = share * requests
+        seen = requests - self._count
+        if seen >= wanted:
+            return 0.0
+        for index, count in enumerate(self._histogram):
+            seen += count
+            if seen >= wanted and index < len(_STEPS):
+                return float(_STEPS[index])
+        return round(self._most_ns / MS, 3)

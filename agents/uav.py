@@ -13,7 +13,7 @@ from agents.applications.telemetry import Telemetry
 from agents.applications.traffic import Load
 from agents.hello_schedule import HelloSchedule, HelloTime
 from agents.mission.applications import PlannedSearch, Rescue
-from agents.mission.following.application import FormationFlight
+from agents.mission.formation_flight.application import FormationFlight
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.onboard import Onboard
 from agents.positioning.dead_reckoning import DeadReckoning

@@ -2,8 +2,8 @@
 
 from agents.mission.flight.flight import Flight
 from agents.mission.flight.return_home import ReturnHome
-from agents.mission.formation.formation_place import FormationPlace
 from agents.mission.outbox import Outbox
+from agents.mission.search_formation.formation_place import FormationPlace
 from fanet_mw.trace import MissionModeChanged
 from fanet_mw.units import NodeId
 

@@ -30,19 +30,19 @@ from agents.mission.flight.reciprocal_avoidance import ReciprocalAvoidance
 from agents.mission.flight.return_home import ReturnHome
 from agents.mission.flight.take_off import TakeOff, take_off_ns
 from agents.mission.flight.velocity_choice import VelocityChoice
-from agents.mission.formation.formation_place import FormationPlace
-from agents.mission.formation.formation_planner import FormationPlanner
-from agents.mission.formation.gaps import Gaps
-from agents.mission.formation.pattern import Pattern, fitted
-from agents.mission.formation.plan_exchange import PlanExchange
-from agents.mission.formation.shape import Demands, ShapeName
 from agents.mission.mode_record import ModeRecord
 from agents.mission.navigation.known_obstacles import KnownObstacles
-from agents.mission.navigation.navigation import Navigation
 from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.onboard_map import OnboardMap
+from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.navigation.radar_watch import RadarWatch
 from agents.mission.outbox import Outbox
+from agents.mission.search_formation.formation_place import FormationPlace
+from agents.mission.search_formation.formation_planner import FormationPlanner
+from agents.mission.search_formation.missed_cells import MissedCells
+from agents.mission.search_formation.pattern import Pattern, fitted
+from agents.mission.search_formation.plan_exchange import PlanExchange
+from agents.mission.search_formation.shape import Demands, ShapeName
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import Bidding
 from agents.mission.tasking.listening import Listening
@@ -71,10 +71,10 @@ class Searcher:
         self._random = stream(scenario.seed, "mission", node).random
         self._finds = finds = Finds(phone_model(scenario))
         obstacles = KnownObstacles(onboard_map, scenario.world.no_fly_m)
-        navigation = Navigation(position, obstacles)
+        own_motion = OwnMotion(position, obstacles)
         self._neighbors = neighbors = NeighborMotions()
-        self._radar = RadarWatch(navigation, obstacles, neighbors, mission.avoid_by)
-        self._place = place = FormationPlace(node, navigation, reach_m=reach_m)
+        self._radar = RadarWatch(own_motion, obstacles, neighbors, mission.avoid_by)
+        self._place = place = FormationPlace(node, own_motion, reach_m=reach_m)
         least_m_s, _ = mission.approach_speeds_m_s
         nodes = scenario.nodes
         planner = FormationPlanner(
@@ -82,40 +82,40 @@ class Searcher:
             take_off_ns=take_off_ns(nodes.altitude_m) if nodes.on_ground else 0,
         )  # fmt: skip
         self._plans = PlanExchange(
-            node, planner, place, navigation, outbox,
+            node, planner, place, own_motion, outbox,
             pattern=formation(scenario, nodes.count), random=self._random,
         )  # fmt: skip
         coverage = coverage_map(scenario)
-        self._reception = PhoneReception(scenario, node, finds, navigation, outbox, coverage)
-        self._sightings = Sightings(scenario, node, finds, navigation, outbox)
+        self._reception = PhoneReception(scenario, node, finds, own_motion, outbox, coverage)
+        self._sightings = Sightings(scenario, node, finds, own_motion, outbox)
         self._announcing = Announcing(node, finds, outbox)
-        approach = Approach(node, finds, navigation, outbox, arrival_m=mission.arrival_m, speed_m_s=speed_m_s)
+        approach = Approach(node, finds, own_motion, outbox, arrival_m=mission.arrival_m, speed_m_s=speed_m_s)
         self._bidding = Bidding(
-            scenario, node, finds=finds, navigation=navigation, formation=place, approach=approach, outbox=outbox,
+            scenario, node, finds=finds, own_motion=own_motion, formation=place, approach=approach, outbox=outbox,
             speed_m_s=speed_m_s,
         )  # fmt: skip
         self._return_home = ReturnHome(
-            position, navigation, outbox,
+            position, own_motion, outbox,
             speed_m_s=speed_m_s, height_m=scenario.nodes.altitude_m, reserve=mission.reserve_charge,
             lost_link_ns=seconds_to_ns(mission.lost_link_s),
         )  # fmt: skip
         velocity_choice = VelocityChoice(
-            navigation,
+            own_motion,
             obstacles,
             most_m_s=speed_m_s,
-            hard=[ReciprocalAvoidance(navigation, self._radar.avoided, obstacles)],
-            soft=[ConnectivityMaintenance(navigation, neighbors, place, reach_m=reach_m)],
+            hard=[ReciprocalAvoidance(own_motion, self._radar.avoided, obstacles)],
+            soft=[ConnectivityMaintenance(own_motion, neighbors, place, reach_m=reach_m)],
         )
-        gaps = None if coverage is None else Gaps(coverage, place)
+        missed_cells = None if coverage is None else MissedCells(coverage, place)
         heard = scenario.sensors.voice_hz > 0
-        listening = Listening(scenario, node, navigation, neighbors, speed_m_s=speed_m_s) if heard else None
-        goal = Goal(finds, navigation, place, approach, gaps, listening)
+        listening = Listening(scenario, node, own_motion, neighbors, speed_m_s=speed_m_s) if heard else None
+        goal = Goal(finds, own_motion, place, approach, missed_cells, listening)
         take_off = TakeOff(
             node, position,
-            navigation=navigation, neighbors=neighbors, outbox=outbox, height_m=nodes.altitude_m,
+            own_motion=own_motion, neighbors=neighbors, outbox=outbox, height_m=nodes.altitude_m,
         ) if nodes.on_ground else None  # fmt: skip
         self._flight = Flight(
-            navigation, place, goal, velocity_choice, take_off=take_off, return_home=self._return_home
+            own_motion, place, goal, velocity_choice, take_off=take_off, return_home=self._return_home
         )
         self._mode = ModeRecord(node, place, self._flight, self._return_home, outbox)
         self._node = node

@@ -8,7 +8,7 @@ from typing import Final
 
 from agents.mission.finding.coverage_map import CoverageMap
 from agents.mission.finding.finds import Finds
-from agents.mission.navigation.navigation import Navigation
+from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox, ReportFormat
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Detected
@@ -28,13 +28,13 @@ class PhoneReception:
         scenario: Scenario,
         node: NodeId,
         finds: Finds,
-        navigation: Navigation,
+        own_motion: OwnMotion,
         outbox: Outbox,
         coverage: CoverageMap | None,
     ) -> None:
         """`coverage`: the map of searched cells, for UAVs that share one."""
         self._node = node
-        self._finds, self._navigation, self._outbox = finds, navigation, outbox
+        self._finds, self._own_motion, self._outbox = finds, own_motion, outbox
         self._format = ReportFormat(scenario, node)
         self._silent_after_ns = MISSED_SCANS * scenario.mission.scan_interval_s * S
         self._report_every_ns = seconds_to_ns(scenario.mission.report_interval_s)
@@ -45,14 +45,14 @@ class PhoneReception:
     def review(self, now_ns: int) -> None:
         """If there was no scan for a while, assume one without phones at the present place."""
         if self._coverage is not None:
-            self._coverage.fly_over(self._navigation.position)
+            self._coverage.fly_over(self._own_motion.position)
         if now_ns - self._scan_ns > self._silent_after_ns:
             self.scan((), now_ns=now_ns)
 
     def scan(self, heard: Sequence[tuple[int, float]], *, now_ns: int) -> None:
         """The receiver detects these phones with these powers [dBm], and no others."""
         self._scan_ns = now_ns
-        here = self._navigation.position
+        here = self._own_motion.position
         in_reach = {survivor for survivor, _ in heard}
         for survivor in self._finds.unconfirmed():
             if survivor not in in_reach:

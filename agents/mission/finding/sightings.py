@@ -7,7 +7,7 @@ from typing import Final
 from agents.mission.finding.contradictions import Contradictions
 from agents.mission.finding.finds import Finds
 from agents.mission.finding.identities import Identities
-from agents.mission.navigation.navigation import Navigation
+from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Sighted
@@ -27,11 +27,11 @@ class Sightings:
     with phones.
     """
 
-    def __init__(self, scenario: Scenario, node: NodeId, finds: Finds, navigation: Navigation, outbox: Outbox) -> None:
+    def __init__(self, scenario: Scenario, node: NodeId, finds: Finds, own_motion: OwnMotion, outbox: Outbox) -> None:
         self._node = node
         self._identities = Identities(finds)
         self._contradictions = Contradictions(finds, self._identities)
-        self._navigation, self._outbox = navigation, outbox
+        self._own_motion, self._outbox = own_motion, outbox
         self._voice_rad = math.radians(scenario.sensors.voice_sigma_deg)
 
     def camera(self, people: Sequence[tuple[float, float]], *, now_ns: int) -> None:
@@ -57,7 +57,7 @@ class Sightings:
 
     def _sighted(self, sensor: str, direction: tuple[float, float], *, sigma_rad: float, now_ns: int) -> None:
         """Take in that a sensor detects a person in a direction, if the place on the ground is not too far away."""
-        here = self._navigation.over_ground(now_ns)
+        here = self._own_motion.over_ground(now_ns)
         looked = ground_place(here, bearing_rad=direction[0], elevation_rad=direction[1])
         if looked is None or looked[2] > 2 * _CLOSE_M:
             return

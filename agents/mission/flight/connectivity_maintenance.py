@@ -5,10 +5,10 @@ that the swarm stays one network while it searches.
 import math
 from typing import Final
 
-from agents.mission.formation.formation_place import FormationPlace
 from agents.mission.navigation.half_planes import HalfPlane, Velocity
-from agents.mission.navigation.navigation import Navigation
 from agents.mission.navigation.neighbor_motions import NeighborMotions
+from agents.mission.navigation.own_motion import OwnMotion
+from agents.mission.search_formation.formation_place import FormationPlace
 from fanet_mw.units import Enu
 
 _TETHER: Final = 0.95
@@ -23,9 +23,9 @@ class ConnectivityMaintenance:
     """
 
     def __init__(
-        self, navigation: Navigation, neighbors: NeighborMotions, formation: FormationPlace, *, reach_m: float
+        self, own_motion: OwnMotion, neighbors: NeighborMotions, formation: FormationPlace, *, reach_m: float
     ) -> None:
-        self._navigation, self._neighbors = navigation, neighbors
+        self._own_motion, self._neighbors = own_motion, neighbors
         self._formation = formation
         self._tether_m = _TETHER * reach_m
 
@@ -39,7 +39,7 @@ class ConnectivityMaintenance:
             if motion is None:
                 continue
             plane = tether_plane(
-                motion.offset_from(self._navigation.position, now_ns),
+                motion.offset_from(self._own_motion.position, now_ns),
                 (motion.velocity.east, motion.velocity.north),
                 tether_m=self._tether_m,
                 within_s=_TETHER_S,
@@ -53,7 +53,7 @@ class ConnectivityMaintenance:
         plan = self._formation.plan
         assert plan is not None, "who has a place has a plan"
         near = [
-            (motion.offset_from(self._navigation.position, now_ns).norm(), other)
+            (motion.offset_from(self._own_motion.position, now_ns).norm(), other)
             for other in places
             if (motion := self._neighbors.motion(plan.nodes[other], now_ns=now_ns)) is not None
         ]

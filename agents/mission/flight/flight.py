@@ -4,8 +4,8 @@ from agents.mission.flight.goal import Goal
 from agents.mission.flight.return_home import ReturnHome
 from agents.mission.flight.take_off import TakeOff
 from agents.mission.flight.velocity_choice import VelocityChoice
-from agents.mission.formation.formation_place import FormationPlace
-from agents.mission.navigation.navigation import Navigation
+from agents.mission.navigation.own_motion import OwnMotion
+from agents.mission.search_formation.formation_place import FormationPlace
 from fanet_mw.units import STILL, Enu
 
 
@@ -14,7 +14,7 @@ class Flight:
 
     def __init__(
         self,
-        navigation: Navigation,
+        own_motion: OwnMotion,
         place: FormationPlace,
         goal: Goal,
         velocity_choice: VelocityChoice,
@@ -23,7 +23,7 @@ class Flight:
         return_home: ReturnHome,
     ) -> None:
         """`take_off`: None for a UAV that is in the air from the start."""
-        self._navigation, self._place, self._goal = navigation, place, goal
+        self._own_motion, self._place, self._goal = own_motion, place, goal
         self._velocity_choice = velocity_choice
         self._take_off, self._return_home = take_off, return_home
         self.velocity: Enu | None = None
@@ -31,11 +31,11 @@ class Flight:
 
     def altimeter(self, above_ground_m: float | None, *, now_ns: int) -> None:
         """The rangefinder has measured the height over whatever is below; None if nothing is within its range."""
-        self._navigation.altimeter(above_ground_m, now_ns=now_ns)
+        self._own_motion.altimeter(above_ground_m, now_ns=now_ns)
 
     def fix(self, position: Enu, velocity: Enu, survivor: int | None, *, now_ns: int) -> None:
         """A position fix: choose a velocity. `survivor` is the one to whom this UAV flies, if any."""
-        self._navigation.fix(position, velocity, now_ns=now_ns)
+        self._own_motion.fix(position, velocity, now_ns=now_ns)
         if self.takes_off and self._climbs(now_ns):
             self.velocity = None
         elif not self._return_home.leaves:

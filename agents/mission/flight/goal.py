@@ -3,9 +3,9 @@
 from typing import Final
 
 from agents.mission.finding.finds import Finds
-from agents.mission.formation.formation_place import FormationPlace, along
-from agents.mission.formation.gaps import Gaps
-from agents.mission.navigation.navigation import Navigation
+from agents.mission.navigation.own_motion import OwnMotion
+from agents.mission.search_formation.formation_place import FormationPlace, along
+from agents.mission.search_formation.missed_cells import MissedCells
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import FAR_M, VAGUE_M
 from agents.mission.tasking.listening import Listening
@@ -21,18 +21,18 @@ class Goal:
     def __init__(
         self,
         finds: Finds,
-        navigation: Navigation,
+        own_motion: OwnMotion,
         formation: FormationPlace,
         approach: Approach,
-        gaps: Gaps | None,
+        missed_cells: MissedCells | None,
         listening: Listening | None,
     ) -> None:
-        """`gaps`: the cells that the formation has left unsearched; None if UAVs do not share what
+        """`missed_cells`: the cells that the formation has left unsearched; None if UAVs do not share what
         they have searched. `listening`: takes a UAV with microphones down; None for a UAV without.
         """
-        self._finds, self._navigation = finds, navigation
+        self._finds, self._own_motion = finds, own_motion
         self._formation, self._approach = formation, approach
-        self._gaps, self._listening = gaps, listening
+        self._missed_cells, self._listening = missed_cells, listening
 
     def at(self, task: int | None, now_ns: int) -> tuple[Enu, Enu]:
         """The place to fly to, and how it moves; `task` is the survivor that this UAV has won, if any."""
@@ -58,13 +58,13 @@ class Goal:
     def _gap(self, now_ns: int) -> tuple[float, float] | None:
         """The nearest unsearched gap, if this UAV is a follower; None for all other UAVs, or if there is no gap."""
         formation = self._formation
-        if self._gaps is None or not formation.is_free or formation.place is None:
+        if self._missed_cells is None or not formation.is_free or formation.place is None:
             return None
-        return self._gaps.nearest(self._navigation.position, now_ns)
+        return self._missed_cells.nearest(self._own_motion.position, now_ns)
 
     def _in_lane(self, lane: Enu, moves: Enu, now_ns: int) -> int | None:
         """The nearest survivor beside the UAV's lane, whom it examines in passing, without leaving the formation."""
-        formation, here = self._formation, self._navigation.position
+        formation, here = self._formation, self._own_motion.position
         pattern = formation.pattern
         if pattern is None or not formation.searches or not formation.is_taken_up(now_ns):
             return None

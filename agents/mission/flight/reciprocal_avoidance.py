@@ -10,8 +10,8 @@ from typing import Final
 
 from agents.mission.navigation.half_planes import HalfPlane, Velocity
 from agents.mission.navigation.known_obstacles import KnownObstacles
-from agents.mission.navigation.navigation import Navigation
 from agents.mission.navigation.neighbor_motions import NeighborMotions
+from agents.mission.navigation.own_motion import OwnMotion
 from fanet_mw.motion import Motion
 from fanet_mw.units import Enu, S
 
@@ -35,11 +35,11 @@ class ReciprocalAvoidance:
     grows with the age of the position.
     """
 
-    def __init__(self, navigation: Navigation, neighbors: NeighborMotions, obstacles: KnownObstacles) -> None:
-        self._navigation, self._neighbors, self._obstacles = navigation, neighbors, obstacles
+    def __init__(self, own_motion: OwnMotion, neighbors: NeighborMotions, obstacles: KnownObstacles) -> None:
+        self._own_motion, self._neighbors, self._obstacles = own_motion, neighbors, obstacles
 
     def planes(self, now_ns: int) -> list[HalfPlane]:
-        here, flown = self._navigation.position, self._navigation.velocity
+        here, flown = self._own_motion.position, self._own_motion.velocity
         planes: list[tuple[float, HalfPlane]] = []
         seen = [Motion(*mover) for mover in self._obstacles.movers(now_ns)]
         for motion in (*self._neighbors.all(now_ns=now_ns), *seen):

@@ -8,7 +8,7 @@ from enum import StrEnum
 from typing import Final
 
 from agents.mission.flight.endurance import Endurance
-from agents.mission.navigation.navigation import Navigation
+from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
 from fanet_mw.application import Course
 from fanet_mw.units import Enu
@@ -36,7 +36,7 @@ class ReturnHome:
     def __init__(
         self,
         home: Enu,
-        navigation: Navigation,
+        own_motion: OwnMotion,
         outbox: Outbox,
         *,
         speed_m_s: float,
@@ -48,7 +48,7 @@ class ReturnHome:
         land. `lost_link_ns`: how long it may hear nobody; 0 for as long as it likes.
         """
         self._home = home._replace(up=height_m + _HIGHER_M)
-        self._navigation, self._outbox = navigation, outbox
+        self._own_motion, self._outbox = own_motion, outbox
         self._endurance = Endurance(home, speed_m_s=speed_m_s, reserve=reserve)
         self._lost_link_ns = lost_link_ns
         self._heard_ns: int | None = None
@@ -61,7 +61,7 @@ class ReturnHome:
     def on_battery(self, charge: float, *, now_ns: int) -> bool:
         """A reading of the battery; returns True if the UAV must leave now."""
         self._endurance.read(charge, now_ns=now_ns)
-        if self.reason is ReturnReason.BATTERY or self._endurance.margin(self._navigation.position) > 0.0:
+        if self.reason is ReturnReason.BATTERY or self._endurance.margin(self._own_motion.position) > 0.0:
             return False
         self.reason = ReturnReason.BATTERY
         return True
@@ -94,7 +94,7 @@ class ReturnHome:
         """
         if self.leaves:
             return 0
-        return max(1, round(100 * self._endurance.margin(self._navigation.position)))
+        return max(1, round(100 * self._endurance.margin(self._own_motion.position)))
 
     @property
     def goal(self) -> Enu:
@@ -106,7 +106,7 @@ class ReturnHome:
 
         Each call commands it again, because a setpoint may get lost on its way to the flight controller.
         """
-        here = self._navigation.position
+        here = self._own_motion.position
         if math.hypot(here.east - self._home.east, here.north - self._home.north) <= _HOME_M:
             self.lands = True
         if self.lands:

@@ -4,8 +4,8 @@ import math
 from typing import Final
 
 from agents.mission.flight.reciprocal_avoidance import CLEARANCE_M
-from agents.mission.navigation.navigation import Navigation
 from agents.mission.navigation.neighbor_motions import NeighborMotions
+from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
 from fanet_mw.application import Course
 from fanet_mw.units import Enu, NodeId, S, seconds_to_ns
@@ -40,14 +40,14 @@ class TakeOff:
         node: NodeId,
         pad: Enu,
         *,
-        navigation: Navigation,
+        own_motion: OwnMotion,
         neighbors: NeighborMotions,
         outbox: Outbox,
         height_m: float,
     ) -> None:
         """`pad`: the place on which the UAV stands. `height_m`: the height of the lanes above ground."""
         self._node, self._pad = node, pad
-        self._navigation, self._neighbors, self._outbox = navigation, neighbors, outbox
+        self._own_motion, self._neighbors, self._outbox = own_motion, neighbors, outbox
         self._height_m = height_m
         self._began_ns: int | None = None
         self._told_ns: int | None = None
@@ -59,7 +59,7 @@ class TakeOff:
         """A position fix: wait, command the take-off, or find that it is over."""
         if self._began_ns is None:
             self._began_ns = now_ns
-        climb_m_s = self._navigation.velocity.up
+        climb_m_s = self._own_motion.velocity.up
         if self._told_ns is None:
             if not self._is_clear(now_ns - self._began_ns, now_ns):
                 return
@@ -88,5 +88,5 @@ class TakeOff:
 
     def _is_up(self, climb_m_s: float) -> bool:
         """True once the UAV has climbed far enough, or no farther than its altitude is measured wrongly."""
-        climbed = (self._navigation.position.up - self._pad.up) / self._height_m
+        climbed = (self._own_motion.position.up - self._pad.up) / self._height_m
         return climbed >= _UP or (climbed >= 0.5 * _UP and climb_m_s < _STOPPED_M_S)

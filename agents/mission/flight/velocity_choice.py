@@ -14,7 +14,7 @@ from typing import Final, Protocol
 from agents.mission.flight.terrain_following import TerrainFollowing
 from agents.mission.navigation.half_planes import HalfPlane, Velocity, nearest
 from agents.mission.navigation.known_obstacles import KnownObstacles
-from agents.mission.navigation.navigation import Navigation
+from agents.mission.navigation.own_motion import OwnMotion
 from fanet_mw.units import Enu
 
 _LANE_GAIN: Final = 0.4
@@ -36,21 +36,21 @@ class VelocityChoice:
 
     def __init__(
         self,
-        navigation: Navigation,
+        own_motion: OwnMotion,
         obstacles: KnownObstacles,
         *,
         most_m_s: float,
         hard: list[Constraint],
         soft: list[Constraint],
     ) -> None:
-        self._navigation, self._obstacles = navigation, obstacles
-        self._terrain = TerrainFollowing(navigation, obstacles)
+        self._own_motion, self._obstacles = own_motion, obstacles
+        self._terrain = TerrainFollowing(own_motion, obstacles)
         self._most_m_s = most_m_s
         self._hard, self._soft = hard, soft
 
     def velocity(self, goal: Enu, feed: Enu, now_ns: int) -> Enu:
         """The velocity to fly to a place `goal`, which moves at the velocity `feed`."""
-        here, obstacles = self._navigation.position, self._obstacles
+        here, obstacles = self._own_motion.position, self._obstacles
         off = goal.minus(here)
         wanted = feed.east + _LANE_GAIN * off.east, feed.north + _LANE_GAIN * off.north
         corner = obstacles.way_to(here, goal, feed, now_ns=now_ns)
@@ -71,7 +71,7 @@ class VelocityChoice:
         """The velocity to a corner on the way around an obstacle; near the corner it is as slow as the goal itself
         requires.
         """
-        off = corner.minus(self._navigation.position)
+        off = corner.minus(self._own_motion.position)
         distance = math.hypot(off.east, off.north)
         speed = min(self._most_m_s, max(speed_m_s, 0.5 * self._most_m_s), max(_LEAST_M_S, distance))
         return off.east / max(distance, 1e-6) * speed, off.north / max(distance, 1e-6) * speed

@@ -9,7 +9,7 @@ from typing import Final
 
 from agents.mission.finding.finds import Finds
 from agents.mission.finding.phone_localization import Estimate
-from agents.mission.navigation.navigation import Navigation
+from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
 from fanet_mw.trace import Arrived
 from fanet_mw.units import GOLDEN_ANGLE, NodeId, S
@@ -34,7 +34,7 @@ class Approach:
         self,
         node: NodeId,
         finds: Finds,
-        navigation: Navigation,
+        own_motion: OwnMotion,
         outbox: Outbox,
         *,
         arrival_m: float,
@@ -42,7 +42,7 @@ class Approach:
     ) -> None:
         """`speed_m_s`: the greatest speed of this UAV."""
         self._node = node
-        self._finds, self._navigation = finds, navigation
+        self._finds, self._own_motion = finds, own_motion
         self._outbox = outbox
         self._arrival_m = arrival_m
         self._along_m_s = _SPEED_SHARE * speed_m_s
@@ -63,7 +63,7 @@ class Approach:
         """
         arrived_ns = self.arrived_ns.get(survivor)
         if arrived_ns is None:
-            if place.distance_m(self._navigation.position) > self._arrival_m:
+            if place.distance_m(self._own_motion.position) > self._arrival_m:
                 return place.east_m, place.north_m
             arrived_ns = self.arrived_ns[survivor] = now_ns
             if responding:

@@ -10,9 +10,9 @@ from collections.abc import Iterable
 from typing import Final
 
 from agents.mission.finding.finds import Find, Finds
-from agents.mission.formation.formation_place import FormationPlace, along
-from agents.mission.navigation.navigation import Navigation
+from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
+from agents.mission.search_formation.formation_place import FormationPlace, along
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.auction import Auction
 from agents.mission.tasking.listening import descent_ns
@@ -45,7 +45,7 @@ class Bidding:
         node: NodeId,
         *,
         finds: Finds,
-        navigation: Navigation,
+        own_motion: OwnMotion,
         formation: FormationPlace,
         approach: Approach,
         outbox: Outbox,
@@ -54,7 +54,7 @@ class Bidding:
         self._node = node
         self._config = scenario.mission
         self._cruise_m_s = max(0.1, scenario.mobility.speed_m_s)
-        self._finds, self._navigation, self._formation = finds, navigation, formation
+        self._finds, self._own_motion, self._formation = finds, own_motion, formation
         self._approach = approach
         self._outbox = outbox
         self._speed_m_s = speed_m_s
@@ -99,7 +99,7 @@ class Bidding:
             return
         for survivor in self._finds.unconfirmed():
             find = self._finds.known[survivor]
-            if self._auction.has_bid(survivor) or not find.filter.near(self._navigation.position, within_m=FAR_M):
+            if self._auction.has_bid(survivor) or not find.filter.near(self._own_motion.position, within_m=FAR_M):
                 continue
             if not self._is_reported(find) and (
                 self._node in find.reporters or now_ns - find.first_ns < _SCOUT_AFTER_NS
@@ -169,13 +169,13 @@ class Bidding:
 
     def _distance_m(self, survivor: int) -> float:
         place = self._finds.known[survivor].place()
-        return math.inf if place is None else place.distance_m(self._navigation.position)
+        return math.inf if place is None else place.distance_m(self._own_motion.position)
 
     def _eta_s(self, survivor: int, now_ns: int) -> float | None:
         """The time in which this UAV could be at a survivor; None if its place in the formation
         does not permit that.
         """
-        formation, here = self._formation, self._navigation.position
+        formation, here = self._formation, self._own_motion.position
         place = self._finds.known[survivor].place()
         if place is None or (place.sigma_m > VAGUE_M and not formation.is_free):
             return None

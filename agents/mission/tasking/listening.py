@@ -13,8 +13,8 @@ import math
 from typing import Final
 
 from agents.mission.finding.phone_localization import Estimate
-from agents.mission.navigation.navigation import Navigation
 from agents.mission.navigation.neighbor_motions import NeighborMotions
+from agents.mission.navigation.own_motion import OwnMotion
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import GOLDEN_ANGLE, Enu, NodeId, S
 
@@ -75,11 +75,11 @@ class Listening:
     """The descent of one UAV to the survivor whom it examines, and its way around the place down there."""
 
     def __init__(
-        self, scenario: Scenario, node: NodeId, navigation: Navigation, neighbors: NeighborMotions, *, speed_m_s: float
+        self, scenario: Scenario, node: NodeId, own_motion: OwnMotion, neighbors: NeighborMotions, *, speed_m_s: float
     ) -> None:
         """`speed_m_s`: the greatest speed of this UAV."""
         self._node = node
-        self._navigation, self._neighbors = navigation, neighbors
+        self._own_motion, self._neighbors = own_motion, neighbors
         self._speed_m_s = speed_m_s
         self._height_m = listening_height_m(scenario)
         range_m = hearing_m(scenario)
@@ -104,7 +104,7 @@ class Listening:
             return goal
         if survivor != self._survivor:
             self._survivor, self._near_ns, self._low_ns, self._step_m = survivor, None, None, goal.up
-        if place.distance_m(self._navigation.position) > _NEAR_M:
+        if place.distance_m(self._own_motion.position) > _NEAR_M:
             self._near_ns = self._low_ns = None
             self._step_m = goal.up
             return goal
@@ -122,7 +122,7 @@ class Listening:
     def _step_down(self, place: Estimate, up_m: float, height_m: float, now_ns: int) -> None:
         """Begin the next step if this one is done and the way down is free."""
         self._step_m = min(self._step_m, up_m)
-        if self._navigation.height_m(now_ns) > self._step_m + _STEP_DONE_M:
+        if self._own_motion.height_m(now_ns) > self._step_m + _STEP_DONE_M:
             return
         if self._step_m <= height_m:
             self._low_ns = now_ns if self._low_ns is None else self._low_ns
@@ -133,7 +133,7 @@ class Listening:
 
     def _is_first(self, place: Estimate, now_ns: int) -> bool:
         """True if no other UAV near the estimated place is lower than this one, or as low and has a lower id."""
-        here = self._navigation.position
+        here = self._own_motion.position
         for node, motion in self._neighbors.by_node(now_ns=now_ns):
             other = motion.position_at(now_ns)
             if place.distance_m(other) > _ALONE_M:

@@ -6,15 +6,15 @@ from agents.mission.finding.announcing import Announcing
 from agents.mission.finding.finds import Finds
 from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, PhoneModel
 from agents.mission.flight.goal import Goal
-from agents.mission.formation.formation_place import FormationPlace
-from agents.mission.formation.formation_planner import plan_of
-from agents.mission.formation.pattern import fitted
-from agents.mission.formation.shape import Demands
 from agents.mission.navigation.known_obstacles import KnownObstacles
-from agents.mission.navigation.navigation import Navigation
 from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.onboard_map import NO_MAP
+from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
+from agents.mission.search_formation.formation_place import FormationPlace
+from agents.mission.search_formation.formation_planner import plan_of
+from agents.mission.search_formation.pattern import fitted
+from agents.mission.search_formation.shape import Demands
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import Bidding
 from fanet_mw.scenario import config
@@ -49,16 +49,16 @@ class Board:
     def __init__(self, node: NodeId, at: Enu, *, planned: bool = True) -> None:
         self.out = Outbox()
         self.finds = Finds(MODEL)
-        self.navigation, self.neighbors = Navigation(at, OPEN), NeighborMotions()
-        self.place = FormationPlace(node, self.navigation, reach_m=REACH_M)
+        self.own_motion, self.neighbors = OwnMotion(at, OPEN), NeighborMotions()
+        self.place = FormationPlace(node, self.own_motion, reach_m=REACH_M)
         if planned:
             self.place.adopt(PLAN, 0)
-        self.approach = Approach(node, self.finds, self.navigation, self.out, arrival_m=30, speed_m_s=10.0)
+        self.approach = Approach(node, self.finds, self.own_motion, self.out, arrival_m=30, speed_m_s=10.0)
         self.tasks = Bidding(
-            SCENARIO, node, finds=self.finds, navigation=self.navigation, formation=self.place,
+            SCENARIO, node, finds=self.finds, own_motion=self.own_motion, formation=self.place,
             approach=self.approach, outbox=self.out, speed_m_s=10.0,
         )  # fmt: skip
-        self.goal = Goal(self.finds, self.navigation, self.place, self.approach, None, None)
+        self.goal = Goal(self.finds, self.own_motion, self.place, self.approach, None, None)
         self.announcing = Announcing(node, self.finds, self.out)
 
     def hear(self, survivor: int, truth: Enu, reporters: range, *, now_ns: int) -> None:
@@ -72,6 +72,6 @@ class Board:
 
 
 def lane_of(node: int, at_ns: int) -> Enu:
-    place = FormationPlace(NodeId(node), Navigation(Enu(0, 0, UP_M), OPEN), reach_m=REACH_M)
+    place = FormationPlace(NodeId(node), OwnMotion(Enu(0, 0, UP_M), OPEN), reach_m=REACH_M)
     place.adopt(PLAN, 0)
     return place.lane(at_ns)[0]

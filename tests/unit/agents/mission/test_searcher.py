@@ -5,9 +5,9 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
-from agents.mission.formation.formation_planner import plan_of
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.mission.outbox import Outbox
+from agents.mission.search_formation.formation_planner import plan_of
 from agents.mission.searcher import Searcher, formation, phone_model
 from fanet_mw.bus.messages import Echo
 from fanet_mw.motion import Motion

@@ -7,14 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agents.mission.finding.coverage_map import TELL_NS, CoverageMap
-from agents.mission.formation.formation_place import FormationPlace
-from agents.mission.formation.formation_planner import plan_of
-from agents.mission.formation.gaps import Gaps
-from agents.mission.formation.pattern import Pattern, fitted
-from agents.mission.formation.shape import Demands, ShapeName
 from agents.mission.navigation.known_obstacles import KnownObstacles
-from agents.mission.navigation.navigation import Navigation
 from agents.mission.navigation.onboard_map import NO_MAP
+from agents.mission.navigation.own_motion import OwnMotion
+from agents.mission.search_formation.formation_place import FormationPlace
+from agents.mission.search_formation.formation_planner import plan_of
+from agents.mission.search_formation.missed_cells import MissedCells
+from agents.mission.search_formation.pattern import Pattern, fitted
+from agents.mission.search_formation.shape import Demands, ShapeName
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire import COVERED, HEADER_BYTES
@@ -82,12 +82,12 @@ class Follower:
         plan = plan_of(made, tuple(range(1, made.places + 1)), planner=1, start_us=0, deploy_ds=0)
         here = made.at(made.followers.start, 0.0)
         self.place = FormationPlace(
-            NodeId(made.followers.start + 1), Navigation(here, KnownObstacles(NO_MAP)), reach_m=250.0
+            NodeId(made.followers.start + 1), OwnMotion(here, KnownObstacles(NO_MAP)), reach_m=250.0
         )
         self.place.adopt(plan, 0)
         assert plan.start_us * US == 0
         self.map, self.lost = empty(), lost
-        self.gaps = Gaps(self.map, self.place)
+        self.gaps = MissedCells(self.map, self.place)
 
     def gap_after(self, seconds: int, *, late_s: int = 0) -> tuple[float, float] | None:
         """What it would fly to at last, when the formation has swept for so long, and others tell it so late."""

@@ -24,5 +24,5 @@ def test_a_uav_of_a_line_is_tied_to_those_beside_it_and_a_follower_to_the_neares
         for other in range(1, COUNT + 1):
             if other != node:
                 board.neighbors.on_hello(other, Motion(lane_of(other, now_ns), Enu(0, 0, 0), now_ns))
-        tied = ConnectivityMaintenance(board.navigation, board.neighbors, board.place, reach_m=REACH_M)
+        tied = ConnectivityMaintenance(board.own_motion, board.neighbors, board.place, reach_m=REACH_M)
         assert len(tied.planes(now_ns)) == ties

@@ -8,8 +8,8 @@ from search_board import OPEN, UP_M
 
 from agents.mission.flight.reciprocal_avoidance import ReciprocalAvoidance, avoidance_plane
 from agents.mission.navigation.half_planes import HalfPlane, nearest
-from agents.mission.navigation.navigation import Navigation
 from agents.mission.navigation.neighbor_motions import NeighborMotions
+from agents.mission.navigation.own_motion import OwnMotion
 from fanet_mw.motion import Motion
 from fanet_mw.units import Enu, S
 
@@ -54,9 +54,9 @@ def test_two_that_both_avoid_never_come_nearer_than_the_clearance(aside_m: float
 
 
 def test_neighbors_are_avoided_while_they_are_heard_at_their_level() -> None:
-    navigation, neighbors = Navigation(Enu(0, 0, UP_M), OPEN), NeighborMotions()
-    navigation.fix(Enu(0, 0, UP_M), Enu(5, 0, 0), now_ns=0)
-    clear = ReciprocalAvoidance(navigation, neighbors, OPEN)
+    own_motion, neighbors = OwnMotion(Enu(0, 0, UP_M), OPEN), NeighborMotions()
+    own_motion.fix(Enu(0, 0, UP_M), Enu(5, 0, 0), now_ns=0)
+    clear = ReciprocalAvoidance(own_motion, neighbors, OPEN)
     neighbors.on_hello(2, Motion(Enu(60, 0, UP_M), Enu(-5, 0, 0), 0))
     neighbors.on_hello(3, Motion(Enu(60, 0, UP_M + 12), Enu(0, 0, 0), 0))
     assert len(clear.planes(S)) == 1

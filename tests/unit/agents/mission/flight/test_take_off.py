@@ -6,9 +6,9 @@ import pytest
 
 from agents.mission.flight.take_off import TakeOff, take_off_ns
 from agents.mission.navigation.known_obstacles import KnownObstacles
-from agents.mission.navigation.navigation import Navigation
 from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.onboard_map import NO_MAP
+from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
 from fanet_mw.motion import Motion
 from fanet_mw.units import MS, STILL, Enu, NodeId, S
@@ -21,11 +21,11 @@ class Pad:
     """The UAV 5 on its pad, its clock, and the courses that it has commanded."""
 
     def __init__(self) -> None:
-        self.navigation = Navigation(PAD, KnownObstacles(NO_MAP))
+        self.own_motion = OwnMotion(PAD, KnownObstacles(NO_MAP))
         self.neighbors, self.outbox = NeighborMotions(), Outbox()
         self.take_off = TakeOff(
             NodeId(5), PAD,
-            navigation=self.navigation, neighbors=self.neighbors, outbox=self.outbox, height_m=HEIGHT_M,
+            own_motion=self.own_motion, neighbors=self.neighbors, outbox=self.outbox, height_m=HEIGHT_M,
         )  # fmt: skip
         self.up_m, self.now_ns = PAD.up, 0
         self.told_s: list[float] = []
@@ -40,7 +40,7 @@ class Pad:
                 place = Enu(PAD.east + east_m, PAD.north, PAD.up + above_m)
                 self.neighbors.on_hello(node, Motion(place, STILL, self.now_ns))
             self.up_m += 0.2 * climb_m_s
-            self.navigation.fix(PAD._replace(up=self.up_m), Enu(0.0, 0.0, climb_m_s), now_ns=self.now_ns)
+            self.own_motion.fix(PAD._replace(up=self.up_m), Enu(0.0, 0.0, climb_m_s), now_ns=self.now_ns)
             self.take_off.fix(self.now_ns)
             course, self.outbox.course = self.outbox.course, None
             if course is not None:

@@ -5,7 +5,7 @@ from search_board import OPEN, UP_M
 
 from agents.mission.flight.velocity_choice import VelocityChoice
 from agents.mission.navigation.half_planes import HalfPlane
-from agents.mission.navigation.navigation import Navigation
+from agents.mission.navigation.own_motion import OwnMotion
 from fanet_mw.units import Enu
 
 
@@ -26,6 +26,6 @@ def test_a_velocity_obeys_hard_constraints_and_gives_soft_ones_up() -> None:
         def planes(self, now_ns: int) -> list[HalfPlane]:
             return [away]
 
-    steering = VelocityChoice(Navigation(Enu(0, 0, UP_M), OPEN), OPEN, most_m_s=10, hard=[Wall(2)], soft=[Tether()])
+    steering = VelocityChoice(OwnMotion(Enu(0, 0, UP_M), OPEN), OPEN, most_m_s=10, hard=[Wall(2)], soft=[Tether()])
     flown = steering.velocity(Enu(1000, 0, UP_M), Enu(0, 0, 0), 0)
     assert flown.east == pytest.approx(2)

@@ -7,8 +7,8 @@ import pytest
 from search_board import OPEN, UP_M
 
 from agents.mission.finding.phone_localization import Estimate
-from agents.mission.navigation.navigation import Navigation
 from agents.mission.navigation.neighbor_motions import NeighborMotions
+from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.tasking.listening import Listening, descent_ns, listening_height_m
 from fanet_mw.motion import Motion
 from fanet_mw.scenario import Scenario
@@ -26,9 +26,9 @@ class Descent:
     def __init__(self, make_scenario: MakeScenario, node: int = 5, **keys: object) -> None:
         wanted = {"nodes.altitude_m": UP_M, "sensors.voice_hz": 2, **keys}
         self.at, self.now_ns = Enu(PLACE.east_m, PLACE.north_m, UP_M), 0
-        self.navigation, self.neighbors = Navigation(self.at, OPEN), NeighborMotions()
+        self.own_motion, self.neighbors = OwnMotion(self.at, OPEN), NeighborMotions()
         self.listening = Listening(
-            make_scenario(**wanted), NodeId(node), self.navigation, self.neighbors, speed_m_s=10.0
+            make_scenario(**wanted), NodeId(node), self.own_motion, self.neighbors, speed_m_s=10.0
         )
 
     def fly(self, seconds: int, *, seen: bool = False, survivor: int = 1, place: Estimate = PLACE) -> list[float]:
@@ -41,7 +41,7 @@ class Descent:
             up_m = self.at.up + max(-2.5, min(2.5, goal.up - self.at.up))
             near = place.distance_m(self.at) < 100
             self.at = goal._replace(up=up_m) if near else self.at._replace(up=up_m)
-            self.navigation.position = self.at
+            self.own_motion.position = self.at
             heights.append(up_m)
         return heights
 

@@ -7,9 +7,9 @@ near its team. A UAV that has no place yet waits where it is. (`shape.py` explai
 from typing import Final
 
 from agents.mission.finding.phone_localization import Estimate
-from agents.mission.formation.formation_planner import pattern_of
-from agents.mission.formation.pattern import Pattern
-from agents.mission.navigation.navigation import Navigation
+from agents.mission.navigation.own_motion import OwnMotion
+from agents.mission.search_formation.formation_planner import pattern_of
+from agents.mission.search_formation.pattern import Pattern
 from fanet_mw.units import MS, STILL, US, Enu, NodeId, S
 from fanet_mw.wire.search import Search
 
@@ -30,9 +30,9 @@ _LAG_M: Final = 140.0
 class FormationPlace:
     """The place of one UAV in the plan that it follows."""
 
-    def __init__(self, node: NodeId, navigation: Navigation, *, reach_m: float) -> None:
+    def __init__(self, node: NodeId, own_motion: OwnMotion, *, reach_m: float) -> None:
         self._node = node
-        self._navigation = navigation
+        self._own_motion = own_motion
         self._most_m = _FREE_REACH * reach_m
         self.plan: Search | None = None
         self.pattern: Pattern | None = None
@@ -54,7 +54,7 @@ class FormationPlace:
     def depart(self, now_ns: int) -> None:
         """Fly to the place from here, and not before the plan begins."""
         begins_ns = now_ns if self.plan is None else self.plan.start_us * US
-        self._left_from, self._left_ns = self._navigation.over_ground(now_ns), max(now_ns, begins_ns)
+        self._left_from, self._left_ns = self._own_motion.over_ground(now_ns), max(now_ns, begins_ns)
 
     def leave(self) -> None:
         """Give up the place, even if the plan still has it."""
@@ -82,7 +82,7 @@ class FormationPlace:
         """
         plan, pattern, place = self.plan, self.pattern, self.place
         if plan is None or pattern is None or place is None:
-            return self._left_from or self._navigation.over_ground(now_ns), STILL
+            return self._left_from or self._own_motion.over_ground(now_ns), STILL
         arrival_ns = _taken_up_ns(plan)
         if now_ns >= arrival_ns or self._left_from is None:
             swept_s = (now_ns - arrival_ns) / S

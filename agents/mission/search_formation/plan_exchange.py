@@ -5,11 +5,11 @@ follow the newest plan.
 from collections.abc import Callable
 from typing import Final
 
-from agents.mission.formation.formation_place import FormationPlace
-from agents.mission.formation.formation_planner import STATUS_S, FormationPlanner
-from agents.mission.formation.pattern import Pattern
-from agents.mission.navigation.navigation import Navigation
+from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox, OutgoingPacket
+from agents.mission.search_formation.formation_place import FormationPlace
+from agents.mission.search_formation.formation_planner import STATUS_S, FormationPlanner
+from agents.mission.search_formation.pattern import Pattern
 from fanet_mw.trace import Planned
 from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire.search import Search, SearchStatus
@@ -26,7 +26,7 @@ class PlanExchange:
         node: NodeId,
         planner: FormationPlanner,
         place: FormationPlace,
-        navigation: Navigation,
+        own_motion: OwnMotion,
         outbox: Outbox,
         *,
         pattern: Pattern | None,
@@ -35,7 +35,7 @@ class PlanExchange:
         """`pattern`: the formation to plan, if this UAV has to; None if the UAVs are too few for one."""
         self._node = node
         self._planner, self._place = planner, place
-        self._navigation, self._outbox = navigation, outbox
+        self._own_motion, self._outbox = own_motion, outbox
         self._pattern = pattern
         self._random = random
         self._next_status_ns = 0
@@ -59,7 +59,7 @@ class PlanExchange:
         """Send this UAV's status: its position, its plan, and the percentage of its battery that it may still spend."""
         plan = self._planner.plan
         status = SearchStatus(
-            now_ns // US, self._navigation.position, self._node, plan.revision if plan else 0, percent
+            now_ns // US, self._own_motion.position, self._node, plan.revision if plan else 0, percent
         )
         self._planner.status(status, now_ns=now_ns)
         self._outbox.packets.append(OutgoingPacket(status.encode_frame(self._node)))

@@ -5,9 +5,9 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-from agents.mission.following.ring import place_on_ring
-from agents.mission.following.route import Route
-from agents.mission.following.station import Clusters, Station
+from agents.mission.formation_flight.flight_place import Clusters, FlightPlace
+from agents.mission.formation_flight.ring import place_on_ring
+from agents.mission.formation_flight.route import Route
 from agents.mission.navigation.neighbor_motions import NeighborMotions
 from fanet_mw.motion import Motion
 from fanet_mw.units import MS, Enu, NodeId, S
@@ -32,7 +32,7 @@ class Swarm:
         self._velocity = dict.fromkeys(self.at, Enu(0, 0, 0))
         self._motions = {node: NeighborMotions() for node in self.at}
         self._stations = {
-            node: Station(
+            node: FlightPlace(
                 NodeId(node), self._motions[node], Route(route, speed_m_s=CRUISE_M_S), radius_m=RADIUS_M,
                 clusters=lambda: self.clusters,
             )

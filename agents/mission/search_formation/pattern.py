@@ -6,11 +6,11 @@ The words place, team, lane, relay and follower are explained in `shape.py`.
 from collections.abc import Callable, Mapping
 from typing import Final, assert_never
 
-from agents.mission.formation import lines, sectors, spiral
-from agents.mission.formation.lines import Lines
-from agents.mission.formation.sectors import Sectors
-from agents.mission.formation.shape import Demands, Dimensions, Shape, ShapeName
-from agents.mission.formation.spiral import Spiral
+from agents.mission.search_formation import lines, sectors, spiral
+from agents.mission.search_formation.lines import Lines
+from agents.mission.search_formation.sectors import Sectors
+from agents.mission.search_formation.shape import Demands, Dimensions, Shape, ShapeName
+from agents.mission.search_formation.spiral import Spiral
 from fanet_mw.units import STILL, Enu
 from fanet_mw.wire.search import MOST_PLACES
 

@@ -18,7 +18,7 @@ single place.
 import math
 from typing import Final
 
-from agents.mission.formation.shape import (
+from agents.mission.search_formation.shape import (
     EDGE_M,
     FIRST_M,
     FOLLOW_M,

@@ -14,8 +14,8 @@ received messages: the hellos of neighbors, and the floods of heads. A UAV is lo
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Final
 
-from agents.mission.following.ring import place_on_ring
-from agents.mission.following.route import Route
+from agents.mission.formation_flight.ring import place_on_ring
+from agents.mission.formation_flight.route import Route
 from agents.mission.navigation.neighbor_motions import NeighborMotions
 from fanet_mw.motion import Motion
 from fanet_mw.units import STILL, Enu, NodeId
@@ -26,7 +26,7 @@ of the clusters then do not touch, as long as no more than six other heads are s
 Clusters = Mapping[NodeId, tuple[NodeId, ...]]
 
 
-class Station:
+class FlightPlace:
     """Computes the place of one UAV."""
 
     def __init__(

@@ -12,7 +12,7 @@ _RANGED_NS: Final = 1 * S
 """How long a height from the rangefinder is used."""
 
 
-class Navigation:
+class OwnMotion:
     """The motion of one UAV: fixes smoothed by dead reckoning, and the height by rangefinder and map."""
 
     def __init__(self, position: Enu, obstacles: KnownObstacles) -> None:

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import pytest
 
-from agents.mission.formation.formation_planner import FormationPlanner, plan_of
-from agents.mission.formation.pattern import Pattern, fitted
-from agents.mission.formation.shape import Demands, ShapeName
+from agents.mission.search_formation.formation_planner import FormationPlanner, plan_of
+from agents.mission.search_formation.pattern import Pattern, fitted
+from agents.mission.search_formation.shape import Demands, ShapeName
 from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire.search import Search, SearchStatus
 

@@ -1,12 +1,12 @@
-"""The gaps of the search: cells of the coverage map that the formation has passed, by its plan, but that no UAV is
-known to have searched.
+"""The missed cells: cells of the coverage map that the formation has passed, by its plan, but that no UAV is known to
+have searched.
 """
 
 import math
 from typing import Final
 
 from agents.mission.finding.coverage_map import CoverageMap
-from agents.mission.formation.formation_place import FormationPlace
+from agents.mission.search_formation.formation_place import FormationPlace
 from fanet_mw.units import Enu, S
 
 _EXPECT_NS: Final = 4 * S
@@ -16,11 +16,11 @@ _LATE_S: Final = 18.0
 _LANE: Final = 0.5
 """A UAV of a team is expected to search the cells up to this share of the distance of two lanes away from it."""
 _NEAR_M: Final = 450.0
-"""A UAV flies to a gap at most this far away, because its knowledge of farther places is older."""
+"""A UAV flies to a missed cell at most this far away, because its knowledge of farther places is older."""
 
 
-class Gaps:
-    """The gaps that one UAV knows."""
+class MissedCells:
+    """The missed cells that one UAV knows."""
 
     def __init__(self, coverage: CoverageMap, formation: FormationPlace) -> None:
         self._coverage, self._formation = coverage, formation
@@ -29,21 +29,23 @@ class Gaps:
         self._expected_ns: int | None = None
 
     def nearest(self, here: Enu, now_ns: int) -> tuple[float, float] | None:
-        """East and north of the gap to which the UAV may fly: the mean of the cells around the nearest one from which
-        the UAV's team is within radio reach. None if there is no such cell.
+        """East and north of the missed cells to which the UAV may fly: the mean of the cells around the nearest one
+        from which the UAV's team is within radio reach. None if there is no such cell.
         """
         self._expect(now_ns)
         coverage, formation = self._coverage, self._formation
-        gaps = [
+        missed = [
             (math.hypot(east - here.east, north - here.north), east, north)
             for east, north in coverage.middles(self._expected & ~coverage.cells)
         ]
-        near = sorted(gap for gap in gaps if gap[0] <= _NEAR_M and formation.keeps_line(*gap[1:], now_ns, within_s=0.0))
+        near = sorted(
+            cell for cell in missed if cell[0] <= _NEAR_M and formation.keeps_line(*cell[1:], now_ns, within_s=0.0)
+        )
         if not near:
             return None
         _, east, north = near[0]
-        around = [gap for gap in near if math.hypot(gap[1] - east, gap[2] - north) <= coverage.seen_m]
-        return math.fsum(gap[1] for gap in around) / len(around), math.fsum(gap[2] for gap in around) / len(around)
+        around = [cell for cell in near if math.hypot(cell[1] - east, cell[2] - north) <= coverage.seen_m]
+        return math.fsum(cell[1] for cell in around) / len(around), math.fsum(cell[2] for cell in around) / len(around)
 
     def _expect(self, now_ns: int) -> None:
         """Add the cells that the formation has passed since the last time."""

@@ -16,9 +16,9 @@ follower are explained in `shape.py`.
 from itertools import zip_longest
 from typing import Final, NamedTuple
 
-from agents.mission.formation.pattern import Pattern
-from agents.mission.formation.shape import Dimensions, ShapeName
 from agents.mission.hungarian import assign
+from agents.mission.search_formation.pattern import Pattern
+from agents.mission.search_formation.shape import Dimensions, ShapeName
 from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire.search import Search, SearchStatus
 

@@ -21,7 +21,7 @@ slower.
 import math
 from typing import Final
 
-from agents.mission.formation.shape import FOLLOWER_HIGHER_M, Demands, Dimensions, ShapeName, nearest_m
+from agents.mission.search_formation.shape import FOLLOWER_HIGHER_M, Demands, Dimensions, ShapeName, nearest_m
 from fanet_mw.units import Enu
 
 _BEHIND_S: Final = 15.0

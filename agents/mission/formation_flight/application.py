@@ -6,12 +6,12 @@ from agents.mission.courses import course_at
 from agents.mission.flight.approach_speed import approach_speed_m_s
 from agents.mission.flight.reciprocal_avoidance import ReciprocalAvoidance
 from agents.mission.flight.velocity_choice import VelocityChoice
-from agents.mission.following.route import Route
-from agents.mission.following.station import Station
+from agents.mission.formation_flight.flight_place import FlightPlace
+from agents.mission.formation_flight.route import Route
 from agents.mission.navigation.known_obstacles import KnownObstacles
-from agents.mission.navigation.navigation import Navigation
 from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
+from agents.mission.navigation.own_motion import OwnMotion
 from agents.positioning.received_motion import motion_in
 from fanet_mw import mavlink
 from fanet_mw.application import Application, AppPort, Received
@@ -33,18 +33,18 @@ class FormationFlight(Application):
     def __init__(self, scenario: Scenario, node: NodeId, *, position: Enu, onboard_map: OnboardMap = NO_MAP) -> None:
         """`onboard_map`: the map that the UAV carries."""
         obstacles = KnownObstacles(onboard_map, scenario.world.no_fly_m)
-        self._navigation = navigation = Navigation(position, obstacles)
+        self._own_motion = own_motion = OwnMotion(position, obstacles)
         self._motions = motions = NeighborMotions()
         self._height_m = scenario.nodes.altitude_m
         self._velocity_choice = VelocityChoice(
-            navigation,
+            own_motion,
             obstacles,
             most_m_s=approach_speed_m_s(scenario, node),
-            hard=[ReciprocalAvoidance(navigation, motions, obstacles)],
+            hard=[ReciprocalAvoidance(own_motion, motions, obstacles)],
             soft=[],
         )
         route = Route(scenario.mission.route_m, speed_m_s=scenario.mobility.speed_m_s)
-        self._station = Station(
+        self._place = FlightPlace(
             node, motions, route, radius_m=scenario.mission.formation_m, clusters=lambda: self.port.clusters()
         )
         self._begins_ns = seconds_to_ns(scenario.warmup_s)
@@ -79,7 +79,7 @@ class FormationFlight(Application):
 
     def on_sensor(self, reading: SensorReading, now_ns: int) -> None:
         if isinstance(reading, Altimeter):
-            self._navigation.altimeter(reading.above_ground_m, now_ns=now_ns)
+            self._own_motion.altimeter(reading.above_ground_m, now_ns=now_ns)
 
     # --- flight ---------------------------------------------------------------------------------------------------
 
@@ -87,17 +87,17 @@ class FormationFlight(Application):
         """Choose a velocity towards the place in the formation, clear of all others; hover until formation flight
         begins.
         """
-        self._navigation.fix(fix.position, fix.velocity, now_ns=now_ns)
+        self._own_motion.fix(fix.position, fix.velocity, now_ns=now_ns)
         if now_ns < self._begins_ns:
             return
-        place, moves = self._station.at(self._navigation.position, now_ns)
+        place, moves = self._place.at(self._own_motion.position, now_ns)
         velocity = self._velocity_choice.velocity(place._replace(up=self._height_m), moves, now_ns)
         self.port.fly(course_at(self.port.position, velocity))
 
     def wake(self, now_ns: int) -> None:
         self._next_ns = now_ns + _TELL_NS
-        if self._station.is_head:
-            here, port = self._navigation.position, self.port
+        if self._place.is_head:
+            here, port = self._own_motion.position, self.port
             frames = self._encoder.global_position(here, port.velocity, yaw=None, now_ns=now_ns)
             port.send(frames, priority=PRIORITY_REPORT)
 

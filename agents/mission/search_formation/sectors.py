@@ -16,7 +16,7 @@ depth of a sector apart. The words place, lane, team and follower are explained 
 
 import math
 
-from agents.mission.formation.shape import (
+from agents.mission.search_formation.shape import (
     EDGE_M,
     FIRST_M,
     FOLLOW_M,

@@ -11,7 +11,7 @@ their frames meet at a receiver that hears both.
 
 import math
 
-from emulator.kernel.channel_access import on_busy, on_idle
+from emulator.kernel.carrier_sense import busier, energy_fell, energy_rose, quieter
 from emulator.kernel.ending import lost, put, release
 from emulator.kernel.frame_exchange import acknowledged
 from emulator.kernel.heap import push
@@ -26,14 +26,12 @@ from emulator.kernel.state import (
     BEGINS,
     CHANGED_AT,
     COPY,
-    CS,
     DATA,
     DETECT_NS,
     DETECT_RATIO,
     DST,
     EIFS_EXTRA_NS,
     ENDS,
-    ENERGY,
     EVERYONE,
     EXTENSION_NS,
     FATE,
@@ -79,8 +77,6 @@ from emulator.kernel.state import (
     SEEKING_UNTIL,
     SEND_ACK,
     SENSED,
-    SENSES_SUMS,
-    SENSITIVITY_MW,
     SIFS_NS,
     SPARED,
     TAKE_OVER,
@@ -150,9 +146,7 @@ def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link
     audible = lk[SENSED, link] == 1
     if audible:
         busier(p, st, r, t)
-    if p[SENSES_SUMS] == 1 and st[ENERGY, r] == 0 and sf[POWER, r] >= pf[SENSITIVITY_MW]:
-        st[ENERGY, r] = 1
-        busier(p, st, r, t)
+    energy_rose(p, pf, st, sf, r, t)
     wanted = lp[ON_AIR, link]
     if p[INTERFERENCE] == 0:
         clear = st[NSIG, r] == 1
@@ -179,22 +173,6 @@ def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link
         sf[OVERLOOKED, r] = 0.0
         if p[OVERLOOKS] == 1 and st[CHANGED_AT, r] == lk[BEGINS, link]:
             sf[OVERLOOKED, r] = sf[POWER, r] - wanted - sf[BEFORE_SEEKING, r]
-
-
-@jit
-def busier(p: Ints, st: Ints, r: int, t: int) -> None:
-    """Add one reason to call a station's medium busy."""
-    st[CS, r] += 1
-    if st[CS, r] == 1 and st[TX_KIND, r] == NOTHING:
-        on_busy(p, st, r, t)
-
-
-@jit
-def quieter(g: Ints, p: Ints, st: Ints, hs: Ints, r: int, t: int) -> None:
-    """Remove one reason to call a station's medium busy."""
-    st[CS, r] -= 1
-    if st[CS, r] == 0 and st[TX_KIND, r] == NOTHING:
-        on_idle(g, p, st, hs, r, t)
 
 
 @jit
@@ -263,9 +241,7 @@ def rx_end(
         acknowledged(g, p, st, fr, out, r, t)
     if lk[SENSED, link] == 1:
         quieter(g, p, st, hs, r, t)
-    if st[ENERGY, r] == 1 and sf[POWER, r] < pf[SENSITIVITY_MW]:
-        st[ENERGY, r] = 0
-        quieter(g, p, st, hs, r, t)
+    energy_fell(g, p, pf, st, sf, hs, r, t)
     release(g, fr, out, lk[LINK_FRAME, link], t)
 
 

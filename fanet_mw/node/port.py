@@ -1,7 +1,6 @@
 """The port of a node, through which its protocol sends frames, makes control packets, and drops packets.
 
-It also aggregates (`routing.aggregate`): packets that are sent together share one frame, a bundle. Which packets go
-together is chosen by the protocol's access (`tdma/slot_access.py`, `tdma/root_release.py`) and by the queue's order.
+It also aggregates (`routing.aggregate`): packets that are sent together share a frame (`wire/aggregation.py`).
 
 The port calls neither the node nor the protocol. Transmissions wait in `requests` until the actor takes them.
 """
@@ -22,6 +21,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Dropped, LetOut, Record
 from fanet_mw.units import BROADCAST, STILL, Enu, NodeId
 from fanet_mw.wire import Kind
+from fanet_mw.wire.aggregation import aggregated
 
 _new: Final = tuple.__new__  # for what is made once per frame
 
@@ -95,29 +95,15 @@ class NodePort:
             return self.forwarded(packet, flags=flags)
         return wire.rewrite(packet.frame, self.node, header.hop_limit, header.hops, flags)
 
-    def _share(self, frames: Sequence[tuple[int, bytes]]) -> None:
-        """Broadcast packets in as few frames as possible; a frame is sent at the earliest instant
-        of the packets in it.
-        """
-        chunk: list[bytes] = []
-        first_ns, size, most = 0, 0, self.scenario.radio.max_frame_bytes
-        for start_ns, frame in frames:
-            if self._held:
-                self._let_out(frame, start_ns)
-            if chunk and size + len(frame) > most:
-                self._broadcast(chunk, first_ns)
-                chunk, size = [], 0
-            first_ns = min(first_ns, start_ns) if chunk else start_ns
-            chunk.append(frame)
-            size += len(frame)
-        if chunk:
-            self._broadcast(chunk, first_ns)
-
-    def _broadcast(self, frames: list[bytes], start_ns: int) -> None:
-        frame = frames[0] if len(frames) == 1 else wire.bundle(frames)
-        seq = self.frames_sent
-        self.frames_sent = seq + 1
-        self.requests.append(_new(TxRequest, (seq, start_ns, frame, BROADCAST, False)))
+    def _share(self, packets: Sequence[tuple[int, bytes]]) -> None:
+        """Broadcast packets in as few frames as possible."""
+        if self._held:
+            for start_ns, packet in packets:
+                self._let_out(packet, start_ns)
+        for start_ns, frame in aggregated(packets, most_bytes=self.scenario.radio.max_frame_bytes):
+            seq = self.frames_sent
+            self.frames_sent = seq + 1
+            self.requests.append(_new(TxRequest, (seq, start_ns, frame, BROADCAST, False)))
 
     def _let_out(self, frame: bytes, start_ns: int) -> None:
         """Record when the first frame of an own application's packet is sent."""

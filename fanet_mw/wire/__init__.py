@@ -3,6 +3,7 @@
 The header and the framing are re-exported here; each group of inner messages has a module of its own.
 """
 
+from fanet_mw.wire.aggregation import bundle, unbundle
 from fanet_mw.wire.frame import (
     ANY_NODE,
     BEACON,
@@ -54,7 +55,6 @@ from fanet_mw.wire.frame import (
     Kind,
     Packed,
     Spec,
-    bundle,
     checked,
     decode_every,
     decode_first,
@@ -68,7 +68,6 @@ from fanet_mw.wire.frame import (
     renumbered,
     rewrite,
     system_id,
-    unbundle,
 )
 
 __all__ = [

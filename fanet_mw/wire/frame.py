@@ -7,7 +7,7 @@ docs/reference/air-format.md.
 """
 
 import struct
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from enum import IntEnum
 from functools import lru_cache
 from types import MappingProxyType
@@ -93,7 +93,8 @@ def encode_inner(spec: Spec, payload: bytes, *, node: int, seq: int = 0) -> byte
     return head + payload + _CRC.pack(crc)
 
 
-def _message_id(frame: bytes, at: int = 0) -> int:
+def message_id(frame: bytes, at: int = 0) -> int:
+    """The id of the message in the MAVLink 2 frame at an offset."""
     return frame[at + 7] | frame[at + 8] << 8 | frame[at + 9] << 16
 
 
@@ -218,27 +219,11 @@ def rewrite(frame: bytes, prev_hop: int, hop_limit: int, hops: int, flags: int) 
     return _HEADER.pack(_START, body, mcrf4xx(body)) + frame[HEADER_BYTES:]
 
 
-def bundle(packets: Sequence[bytes]) -> bytes:
-    """One radio frame with several packets, each with its own header; the packets must have been decoded."""
-    return b"".join((*(_with_more(packet) for packet in packets[:-1]), packets[-1]))
-
-
-def _with_more(packet: bytes) -> bytes:
+def with_more(packet: bytes) -> bytes:
+    """The packet with the flag that another one follows it in the same frame."""
     body = bytearray(packet[:_BODY_END])
     body[_FLAGS_AT] |= FLAG_MORE
     return b"".join((body, _CRC.pack(mcrf4xx(bytes(body[1:]) + _EXTRA)), packet[HEADER_BYTES:]))
-
-
-def unbundle(frame: bytes) -> list[bytes]:
-    """The packets in a radio frame, each as if it had come alone except for its flag; raises MalformedFrameError."""
-    starts, at = [], 0
-    for inner in frames(frame):
-        if _message_id(inner) == ROUTE.msgid:
-            starts.append(at)
-        at += len(inner)
-    if not starts or starts[0]:
-        raise MalformedFrameError("a bundle that does not begin with a routing header")
-    return [frame[begin:end] for begin, end in zip(starts, [*starts[1:], len(frame)], strict=True)]
 
 
 # --- inner frames -------------------------------------------------------------------------------------------------
@@ -300,7 +285,7 @@ def _found_in(frame: bytes) -> Iterator[tuple[int, bytes]]:
     message's definition.
     """
     for inner in frames(frame, start=HEADER_BYTES):
-        msgid = _message_id(inner)
+        msgid = message_id(inner)
         spec = _OURS.get(msgid)
         if spec is not None:
             end = OVERHEAD + inner[1]

@@ -1,0 +1,46 @@
+"""Aggregation: several packets share one radio frame, a bundle, each with its own header.
+
+The flag FLAG_MORE in a header says that another packet follows. Which packets are sent together is chosen by the
+protocol's access (`tdma/slot_access.py`, `tdma/root_release.py`) and by the order of the queue.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.wire.frame import ROUTE, frames, message_id, with_more
+
+
+def aggregated(packets: Iterable[tuple[int, bytes]], *, most_bytes: int) -> Iterator[tuple[int, bytes]]:
+    """As few radio frames as possible for packets in their order, each at most `most_bytes` long.
+
+    With each packet, and with each frame, comes the instant at which it starts; a frame starts at the earliest instant
+    of the packets in it.
+    """
+    chunk: list[bytes] = []
+    first_ns = size = 0
+    for start_ns, packet in packets:
+        if chunk and size + len(packet) > most_bytes:
+            yield first_ns, bundle(chunk)
+            chunk, size = [], 0
+        first_ns = min(first_ns, start_ns) if chunk else start_ns
+        chunk.append(packet)
+        size += len(packet)
+    if chunk:
+        yield first_ns, bundle(chunk)
+
+
+def bundle(packets: Sequence[bytes]) -> bytes:
+    """One radio frame with several packets, or with a single one; the packets must have been decoded."""
+    return b"".join((*(with_more(packet) for packet in packets[:-1]), packets[-1]))
+
+
+def unbundle(frame: bytes) -> list[bytes]:
+    """The packets in a radio frame, each as if it had come alone except for its flag; raises MalformedFrameError."""
+    starts, at = [], 0
+    for inner in frames(frame):
+        if message_id(inner) == ROUTE.msgid:
+            starts.append(at)
+        at += len(inner)
+    if not starts or starts[0]:
+        raise MalformedFrameError("a bundle that does not begin with a routing header")
+    return [frame[begin:end] for begin, end in zip(starts, [*starts[1:], len(frame)], strict=True)]

@@ -12,7 +12,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record
 from fanet_mw.units import NodeId
 from fanet_mw.wire import HEADER_BYTES, PRIORITIES, PRIORITY_REPORT, filler
-from fanet_mw.wire.inner import Survivor
+from fanet_mw.wire.survivors import Survivor
 
 
 class OutgoingPacket(NamedTuple):

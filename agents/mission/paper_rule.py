@@ -17,7 +17,7 @@ from fanet_mw.application import HOME, Course
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Approaching, Arrived, Detected
 from fanet_mw.units import GOLDEN_ANGLE, US, Enu, NodeId, S, seconds_to_ns
-from fanet_mw.wire.inner import Survivor
+from fanet_mw.wire.survivors import Survivor
 
 _RING_M: Final = 20.0
 """UAVs hold on a circle of this radius around the survivor, each at an angle of its own, so that they see it from

@@ -51,8 +51,11 @@ from fanet_mw.motion import Motion
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S, seconds_to_ns
-from fanet_mw.wire.inner import Survivor
-from fanet_mw.wire.search import MOST_PLACES, Bids, Covered, Found, Search, SearchStatus, Standing, Told, encode_bids
+from fanet_mw.wire.bids import Bids, encode_bids
+from fanet_mw.wire.search import Told
+from fanet_mw.wire.search_plan import MOST_PLACES, Search, SearchStatus
+from fanet_mw.wire.searched_cells import Covered
+from fanet_mw.wire.survivors import Found, Standing, Survivor
 
 _OFFSET_DB: Final = 1.0
 """The standard deviation that is assumed for the difference between one phone's power and the mean of all phones."""

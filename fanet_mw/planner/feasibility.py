@@ -28,7 +28,8 @@ from fanet_mw.planner.uplink_delay import Ways, access_outcome, ways
 from fanet_mw.routing.clustered.claimed.claiming import geometry, turn_bytes
 from fanet_mw.routing.clustered.clustering import Cluster, balanced
 from fanet_mw.routing.clustered.tdma.turns import receipt_ns
-from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, schedule_parts, superframe
+from fanet_mw.routing.clustered.timetable.turn_plan import Fitted
+from fanet_mw.routing.clustered.timetable.turn_size import schedule_parts, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S
 

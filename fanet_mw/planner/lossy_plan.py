@@ -13,7 +13,8 @@ from typing import Final, NamedTuple
 from fanet_mw.planner.demand import TrafficClass
 from fanet_mw.routing.clustered.tdma.turns import receipt_ns
 from fanet_mw.routing.clustered.timetable.likely_delay import likely_delay_ns
-from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, Places, TurnPlan, fit_measured
+from fanet_mw.routing.clustered.timetable.turn_allocation import Places, fit_measured
+from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, TurnPlan
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.links import Link, frames_of

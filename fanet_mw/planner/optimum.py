@@ -21,7 +21,7 @@ from fanet_mw.planner.flood_cost import frame_ns
 from fanet_mw.planner.scenario_change import WINDOWS, hopeless
 from fanet_mw.planner.uplink_delay import ways
 from fanet_mw.planner.variant import Variant, vary
-from fanet_mw.routing.clustered.timetable.turn_plan import schedule_bytes
+from fanet_mw.routing.clustered.timetable.turn_size import schedule_bytes
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S, seconds_to_ns
 

@@ -20,7 +20,8 @@ from fanet_mw.planner.feasibility import Plan, Site, evaluate, heads_of
 from fanet_mw.planner.goodput_bound import in_turns
 from fanet_mw.planner.variant import Value, Variant, vary
 from fanet_mw.routing.clustered.tdma.turns import turn_slack_ns
-from fanet_mw.routing.clustered.timetable.turn_plan import least_interval_ns, most_together, superframe
+from fanet_mw.routing.clustered.timetable.turn_allocation import least_interval_ns
+from fanet_mw.routing.clustered.timetable.turn_size import most_together, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import US, Enu, NodeId
 

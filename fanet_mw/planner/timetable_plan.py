@@ -26,7 +26,9 @@ from fanet_mw.routing.clustered.tdma.own_bound import RootTurns
 from fanet_mw.routing.clustered.tdma.turns import Turns, turn_slack_ns
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, timetable
-from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, Places, fit, links, superframe
+from fanet_mw.routing.clustered.timetable.turn_allocation import Places, fit
+from fanet_mw.routing.clustered.timetable.turn_plan import Fitted
+from fanet_mw.routing.clustered.timetable.turn_size import links, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import US, NodeId
 

@@ -322,8 +322,8 @@ def decode_first(spec: Spec, packed: Packed) -> tuple[Any, ...]:
     return found[0]
 
 
-# The codecs of these messages are in `inner`, `digest`, `places`, `loads`, `claims`, `links`, `message`, `search` and
-# `routing.control`.
+# The codecs of these messages are in the other files of this package; that of ROUTING is in
+# `routing/rival_control_messages.py`.
 BEACON: Final = Spec(53001, 43, struct.Struct("<IHHHHHHHBBB"))
 SCHEDULE: Final = Spec(53002, 88, struct.Struct("<QIIIHHH56H56HBBBB"))
 SURVIVOR: Final = Spec(53003, 240, struct.Struct("<QIffffHB"))

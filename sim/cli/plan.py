@@ -35,7 +35,7 @@ from fanet_mw.planner.claimed_turns import ClaimedPlan
 from fanet_mw.planner.timetable_plan import TimetablePlan
 from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE
 from fanet_mw.routing.clustered.timetable.timetable import Timetable
-from fanet_mw.routing.clustered.timetable.turn_plan import links
+from fanet_mw.routing.clustered.timetable.turn_size import links
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.places import rounded

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario, config
-from fanet_mw.wire.search import MOST_PLACES
+from fanet_mw.wire.search_plan import MOST_PLACES
 from sim.scenarios.shipped import Entry, entry, shipped
 
 __all__ = ["Entry", "find", "shipped", "text_of"]

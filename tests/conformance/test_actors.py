@@ -31,7 +31,9 @@ from fanet_mw.scenario import Clock, Scenario
 from fanet_mw.scenario.routing import PROTOCOLS
 from fanet_mw.trace import Generated
 from fanet_mw.units import MS, Enu, NodeId, S
-from fanet_mw.wire.inner import Join, Member, Schedule, Survivor, TimeBeacon
+from fanet_mw.wire.clusters import Join, Member, Schedule
+from fanet_mw.wire.survivors import Survivor
+from fanet_mw.wire.time_beacon import TimeBeacon
 from sim.scenarios import catalog
 from sim.world.world import WorldActor
 

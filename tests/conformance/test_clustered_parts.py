@@ -15,8 +15,8 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, PRIORITY_BULK, Header, Kind, filler
 from fanet_mw.wire.claims import Claims, SlotStatus
+from fanet_mw.wire.clusters import Beacon, Role
 from fanet_mw.wire.digest import Digest
-from fanet_mw.wire.inner import Beacon, Role
 
 OURS, THEIRS = NodeId(2), NodeId(3)
 NOW_NS = 1 * S

@@ -16,9 +16,11 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, Kind
 from fanet_mw.wire.claims import Claims, HeardNeighbor, SlotStatus
+from fanet_mw.wire.clusters import Beacon, Join, Member, Role, Schedule
 from fanet_mw.wire.digest import Digest, Holding
-from fanet_mw.wire.inner import Beacon, Join, Member, Role, Schedule, Survivor, TimeBeacon
 from fanet_mw.wire.links import Link, Links
+from fanet_mw.wire.survivors import Survivor
+from fanet_mw.wire.time_beacon import TimeBeacon
 from sim.scenarios import catalog
 
 EVIL: Final = NodeId(5)

@@ -15,7 +15,7 @@ from fanet_mw import tlog
 from fanet_mw.dialect import definitions
 from fanet_mw.errors import ConfigError
 from fanet_mw.units import Enu, NodeId, S
-from fanet_mw.wire.inner import Survivor
+from fanet_mw.wire.survivors import Survivor
 from sim.cli.app import app
 
 INSTALLED = Path(pymavlink.__file__).parent

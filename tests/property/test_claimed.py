@@ -23,7 +23,7 @@ from fanet_mw.scenario import config
 from fanet_mw.units import MS, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Kind
 from fanet_mw.wire.claims import Claims, HeardNeighbor, SlotStatus
-from fanet_mw.wire.inner import Beacon
+from fanet_mw.wire.clusters import Beacon
 
 
 def scenario_of(*, aggregate: bool = False, **clusters: Any) -> Any:

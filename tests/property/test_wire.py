@@ -13,22 +13,11 @@ from hypothesis import strategies as st
 from fanet_mw import wire
 from fanet_mw.dialect import fanet
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
-from fanet_mw.units import Enu
+from fanet_mw.units import FARTHEST_M, FASTEST_M_S, Enu
 from fanet_mw.wire import Header
-from fanet_mw.wire.inner import (
-    CAPACITY,
-    FARTHEST_M,
-    FASTEST_M_S,
-    MOST_DBM,
-    MOST_SURVIVORS,
-    Beacon,
-    Join,
-    Member,
-    Role,
-    Schedule,
-    Survivor,
-    TimeBeacon,
-)
+from fanet_mw.wire.clusters import CAPACITY, Beacon, Join, Member, Role, Schedule
+from fanet_mw.wire.survivors import MOST_DBM, MOST_SURVIVORS, Survivor
+from fanet_mw.wire.time_beacon import TimeBeacon
 
 u8, u16, u32, u64 = (st.integers(0, 2**bits - 1) for bits in (8, 16, 32, 64))
 ids = st.integers(1, 0xFFFE)

@@ -12,8 +12,7 @@ from agents.mission.finding.finds import Finds
 from agents.mission.outbox import Outbox, OutgoingPacket
 from fanet_mw.trace import Confirmed, Refuted
 from fanet_mw.units import US, NodeId, S
-from fanet_mw.wire.inner import Survivor
-from fanet_mw.wire.search import Found, Standing
+from fanet_mw.wire.survivors import Found, Standing, Survivor
 
 _TELLINGS: Final = 3
 """The number of times that a UAV floods a verdict of its own."""

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from fanet_mw.units import Enu, S
-from fanet_mw.wire.search import COVERED_SIDE, Covered
+from fanet_mw.wire.searched_cells import COVERED_SIDE, Covered
 
 TELL_NS: Final = 4 * S
 

@@ -19,8 +19,7 @@ from typing import Final, NamedTuple, assert_never
 from agents.mission.finding.calibration import common_offset, likelihood
 from agents.mission.finding.phone_localization import AS_ASSUMED, Estimate, PhoneFilter, PhoneModel, PhoneOffset
 from fanet_mw.units import US, Enu, S
-from fanet_mw.wire.inner import Survivor
-from fanet_mw.wire.search import Found, Standing
+from fanet_mw.wire.survivors import Found, Standing, Survivor
 
 _PASSED_ON: Final = 5
 """The greatest number of reports in one hello."""

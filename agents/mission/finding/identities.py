@@ -20,7 +20,7 @@ from agents.mission.finding.finds import SAME_PLACE_M, Finds, estimate_of
 from agents.mission.finding.phone_localization import Estimate
 from agents.mission.hungarian import assign
 from fanet_mw.units import Enu, S
-from fanet_mw.wire.search import Found
+from fanet_mw.wire.survivors import Found
 
 _SAME_SIGMAS: Final = 2.5
 """A sighting also belongs to a person within this number of its standard deviations; voices have wide ones."""

@@ -13,8 +13,8 @@ from agents.mission.outbox import Outbox, ReportFormat
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Detected
 from fanet_mw.units import US, NodeId, S, seconds_to_ns
-from fanet_mw.wire.inner import Survivor
-from fanet_mw.wire.search import Covered
+from fanet_mw.wire.searched_cells import Covered
+from fanet_mw.wire.survivors import Survivor
 
 MISSED_SCANS: Final = 1.5
 """After this number of scan intervals without a scan, the receiver is taken to detect no phone."""

@@ -11,7 +11,7 @@ from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.search_formation.formation_planner import pattern_of
 from agents.mission.search_formation.pattern import Pattern
 from fanet_mw.units import MS, STILL, US, Enu, NodeId, S
-from fanet_mw.wire.search import Search
+from fanet_mw.wire.search_plan import Search
 
 _FREE_REACH: Final = 0.84
 """A follower stays within this share of the radio's reach from its team, so that the team receives it wherever it

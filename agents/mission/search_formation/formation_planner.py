@@ -20,7 +20,7 @@ from agents.mission.hungarian import assign
 from agents.mission.search_formation.pattern import Pattern
 from agents.mission.search_formation.shape import Dimensions, ShapeName
 from fanet_mw.units import US, Enu, NodeId, S
-from fanet_mw.wire.search import Search, SearchStatus
+from fanet_mw.wire.search_plan import Search, SearchStatus
 
 STATUS_S: Final = 12.0
 """The interval at which a UAV sends its status."""

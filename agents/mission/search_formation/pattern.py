@@ -12,7 +12,7 @@ from agents.mission.search_formation.sectors import Sectors
 from agents.mission.search_formation.shape import Demands, Dimensions, Shape, ShapeName
 from agents.mission.search_formation.spiral import Spiral
 from fanet_mw.units import STILL, Enu
-from fanet_mw.wire.search import MOST_PLACES
+from fanet_mw.wire.search_plan import MOST_PLACES
 
 _SHAPES: Final[Mapping[ShapeName, Callable[[Dimensions], Shape]]] = {
     ShapeName.LINES: Lines,

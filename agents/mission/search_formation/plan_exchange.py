@@ -12,7 +12,7 @@ from agents.mission.search_formation.formation_planner import STATUS_S, Formatio
 from agents.mission.search_formation.pattern import Pattern
 from fanet_mw.trace import Planned
 from fanet_mw.units import US, Enu, NodeId, S
-from fanet_mw.wire.search import Search, SearchStatus
+from fanet_mw.wire.search_plan import Search, SearchStatus
 
 _FIRST_STATUS_S: Final = 2
 """A UAV sends its first status at a random instant within this time after its start."""

@@ -19,7 +19,7 @@ from agents.mission.tasking.listening import descent_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Approaching
 from fanet_mw.units import NodeId, S
-from fanet_mw.wire.search import Bid
+from fanet_mw.wire.bids import Bid
 
 VAGUE_M: Final = 50.0
 """An estimate with a greater standard deviation makes no UAV leave its place in a team; a follower may go there."""

@@ -61,7 +61,7 @@ from fanet_mw.routing.clustered.timetable.promises import Promises
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TurnPlans
 from fanet_mw.routing.clustered.timetable.timetabling import FromPlaces, NoTimetable, Timetabling
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
-from fanet_mw.routing.clustered.timetable.turn_plan import leader_load
+from fanet_mw.routing.clustered.timetable.turn_allocation import leader_load
 from fanet_mw.units import MS, seconds_to_ns
 
 _STORE_PACKETS: Final = 4096

@@ -30,8 +30,8 @@ from fanet_mw.routing.clustered.timetable.promises import Promises
 from fanet_mw.units import BROADCAST, US, NodeId
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, HEADER_BYTES, Kind
 from fanet_mw.wire.claims import MESSAGE_BYTES, Claims
+from fanet_mw.wire.clusters import Beacon
 from fanet_mw.wire.digest import Digest, capacity
-from fanet_mw.wire.inner import Beacon
 
 _DATA: Final = int(Kind.DATA)
 _POSITION_BYTES: Final = 61

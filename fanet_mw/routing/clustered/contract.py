@@ -20,7 +20,7 @@ from fanet_mw.routing.clustered.forwarding.gradient import RouteToHead
 from fanet_mw.units import NodeId
 from fanet_mw.wire import Kind
 from fanet_mw.wire.claims import Claims
-from fanet_mw.wire.inner import Beacon
+from fanet_mw.wire.clusters import Beacon
 
 
 class Roles(Protocol):

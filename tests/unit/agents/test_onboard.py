@@ -16,7 +16,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Generated
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, PRIORITY_REPORT, SURVIVOR, Header, Kind
-from fanet_mw.wire.inner import Survivor
+from fanet_mw.wire.survivors import Survivor
 
 NAMES, OWN, OTHER = Topics("u"), NodeId(2), NodeId(3)
 HELLO = Data(5, b"hello")

@@ -13,7 +13,7 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, PRIORITY_REPORT, Header, Kind
-from fanet_mw.wire.inner import Survivor
+from fanet_mw.wire.survivors import Survivor
 
 NAMES, LEAD_NS = Topics("u"), 20 * MS
 MakeScenario = Callable[..., Scenario]

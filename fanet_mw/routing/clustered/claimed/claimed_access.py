@@ -31,7 +31,7 @@ from fanet_mw.routing.clustered.tdma.turns import clocks_fit
 from fanet_mw.units import MS, US, seconds_to_ns
 from fanet_mw.wire import Kind
 from fanet_mw.wire.claims import Claims
-from fanet_mw.wire.inner import Beacon
+from fanet_mw.wire.clusters import Beacon
 
 
 class ClaimedAccess:

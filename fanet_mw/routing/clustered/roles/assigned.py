@@ -31,7 +31,7 @@ from fanet_mw.routing.clustered.timetable.link_quality import LinkQuality
 from fanet_mw.routing.clustered.timetable.timetabling import Timetabling
 from fanet_mw.units import US, NodeId
 from fanet_mw.wire import Kind
-from fanet_mw.wire.inner import Beacon, Join, Schedule
+from fanet_mw.wire.clusters import Beacon, Join, Schedule
 from fanet_mw.wire.links import Links
 
 

@@ -21,7 +21,7 @@ from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import Membership
 from fanet_mw.routing.clustered.roles.states import Action, Event, State, step
 from fanet_mw.units import MS, NodeId
-from fanet_mw.wire.inner import Join, Schedule
+from fanet_mw.wire.clusters import Join, Schedule
 
 SILENT_HELLOS: Final = 4.0
 """The number of hello intervals after which a head is silent; with a timetable, any neighbor."""

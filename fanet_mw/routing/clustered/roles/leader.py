@@ -30,11 +30,11 @@ from fanet_mw.routing.clustered.roles.position_updates import lost_ns
 from fanet_mw.routing.clustered.roles.roster import Roster, sure_m
 from fanet_mw.routing.clustered.timetable.heard_load import HeardLoads
 from fanet_mw.routing.clustered.timetable.link_state import LinkState, adjacency, worth_a_change
-from fanet_mw.routing.clustered.timetable.turn_plan import measured_period_ns
+from fanet_mw.routing.clustered.timetable.turn_size import measured_period_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.serial_number import following, newer
 from fanet_mw.units import MS, US, Enu, NodeId, S, seconds_to_ns
-from fanet_mw.wire.inner import CAPACITY, Join, Member, Schedule
+from fanet_mw.wire.clusters import CAPACITY, Join, Member, Schedule
 from fanet_mw.wire.links import Link
 from fanet_mw.wire.loads import AS_EXPECTED
 

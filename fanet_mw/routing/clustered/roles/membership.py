@@ -13,7 +13,7 @@ from fanet_mw.routing.clustered.roles.states import Event
 from fanet_mw.routing.clustered.tdma.slots import Superframe
 from fanet_mw.trace import RoleChanged
 from fanet_mw.units import US, NodeId
-from fanet_mw.wire.inner import Member, Role, Schedule
+from fanet_mw.wire.clusters import Member, Role, Schedule
 
 
 class ClusterPlace(NamedTuple):

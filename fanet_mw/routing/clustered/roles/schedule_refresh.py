@@ -14,7 +14,7 @@ from fanet_mw.routing.clustered.forwarding.repair import AGAIN_NS, ASSESS_NS, FL
 from fanet_mw.routing.clustered.roles.lease import Authority
 from fanet_mw.routing.clustered.roles.membership import EPOCH_BITS
 from fanet_mw.serial_number import newer
-from fanet_mw.wire.inner import Beacon
+from fanet_mw.wire.clusters import Beacon
 
 
 class ScheduleRefresh:

@@ -20,9 +20,10 @@ from fanet_mw.routing.clustered.roles.membership import Membership, Version
 from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
 from fanet_mw.routing.clustered.timetable.promises import Promises
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
-from fanet_mw.routing.clustered.timetable.turn_plan import NO_LOADS, Fitted, TurnPlan, fit, fit_measured
+from fanet_mw.routing.clustered.timetable.turn_allocation import fit, fit_measured
+from fanet_mw.routing.clustered.timetable.turn_plan import NO_LOADS, Fitted, TurnPlan
 from fanet_mw.units import US, Enu, NodeId
-from fanet_mw.wire.inner import Schedule
+from fanet_mw.wire.clusters import Schedule
 from fanet_mw.wire.links import Link, Links, frames_of
 from fanet_mw.wire.loads import AS_EXPECTED, Loads
 from fanet_mw.wire.places import Places, rounded

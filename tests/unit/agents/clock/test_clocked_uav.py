@@ -9,7 +9,7 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, PRIORITY_CONTROL, Header, Kind
-from fanet_mw.wire.inner import Member, Schedule
+from fanet_mw.wire.clusters import Member, Schedule
 
 NAMES = Topics("c")
 MakeScenario = Callable[..., Scenario]

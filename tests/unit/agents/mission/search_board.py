@@ -19,8 +19,8 @@ from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import Bidding
 from fanet_mw.scenario import config
 from fanet_mw.units import US, Enu, NodeId, S
-from fanet_mw.wire.inner import Survivor
-from fanet_mw.wire.search import Search
+from fanet_mw.wire.search_plan import Search
+from fanet_mw.wire.survivors import Survivor
 
 MODEL = PhoneModel(power_dbm=15, exponent=3, shadowing_db=4, offset_db=1, threshold_dbm=-90)
 REACH_M = 250.0

@@ -13,7 +13,7 @@ from fanet_mw.scenario import Scenario, config
 from fanet_mw.trace import Approaching, Arrived, Detected
 from fanet_mw.units import Enu, NodeId, S
 from fanet_mw.wire import HEADER_BYTES, PRIORITY_BULK, PRIORITY_REPORT
-from fanet_mw.wire.inner import Survivor
+from fanet_mw.wire.survivors import Survivor
 
 HERE = Enu(0, 0, 50)
 KEYS: dict[str, Any] = {

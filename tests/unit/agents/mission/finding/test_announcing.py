@@ -7,8 +7,8 @@ from search_board import FOLLOWER, MODEL, UP_M, Board
 from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, Estimate
 from fanet_mw.trace import Confirmed, Refuted
 from fanet_mw.units import Enu, S
-from fanet_mw.wire.inner import Survivor
-from fanet_mw.wire.search import Found, Standing, told_in
+from fanet_mw.wire.search import told_in
+from fanet_mw.wire.survivors import Found, Standing, Survivor
 
 
 def confirmed(board: Board) -> list[Found]:

@@ -14,8 +14,7 @@ from agents.mission.finding.calibration import common_offset, likelihood
 from agents.mission.finding.finds import Finds
 from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, Estimate, PhoneModel
 from fanet_mw.units import Enu
-from fanet_mw.wire.inner import MOST_DBM, Survivor
-from fanet_mw.wire.search import Found, Standing
+from fanet_mw.wire.survivors import MOST_DBM, Found, Standing, Survivor
 
 MODEL: Final = PhoneModel(power_dbm=15, exponent=3, shadowing_db=4, offset_db=1, threshold_dbm=-90)
 UP_M: Final = 50.0

@@ -19,7 +19,7 @@ from fanet_mw.errors import MalformedFrameError
 from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire import COVERED, HEADER_BYTES
 from fanet_mw.wire.frame import encode_inner
-from fanet_mw.wire.search import COVERED_SIDE, Covered
+from fanet_mw.wire.searched_cells import COVERED_SIDE, Covered
 
 AREA_M, SEEN_M = 2500.0, 131.0
 cells = st.integers(0, (1 << COVERED_SIDE * COVERED_SIDE) - 1)

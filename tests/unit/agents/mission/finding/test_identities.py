@@ -13,8 +13,7 @@ from agents.mission.finding.finds import Finds
 from agents.mission.finding.identities import Identities
 from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, PhoneModel
 from fanet_mw.units import US, Enu, S
-from fanet_mw.wire.inner import Survivor
-from fanet_mw.wire.search import Found, Standing
+from fanet_mw.wire.survivors import Found, Standing, Survivor
 
 MODEL: Final = PhoneModel(power_dbm=15, exponent=3, shadowing_db=4, offset_db=1, threshold_dbm=-90)
 UP_M: Final = 65.0

@@ -10,7 +10,7 @@ from agents.mission.search_formation.formation_planner import FormationPlanner, 
 from agents.mission.search_formation.pattern import Pattern, fitted
 from agents.mission.search_formation.shape import Demands, ShapeName
 from fanet_mw.units import US, Enu, NodeId, S
-from fanet_mw.wire.search import Search, SearchStatus
+from fanet_mw.wire.search_plan import Search, SearchStatus
 
 REACH_M = 250.0
 DEMANDS = Demands(area_m=2500, seen_m=137, reach_m=REACH_M, height_m=50, speed_m_s=7.5)

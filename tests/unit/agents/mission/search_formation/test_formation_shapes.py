@@ -15,7 +15,7 @@ from agents.mission.search_formation.shape import Demands, ShapeName
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.units import Enu
 from fanet_mw.wire import HEADER_BYTES
-from fanet_mw.wire.search import MOST_PLACES, Search
+from fanet_mw.wire.search_plan import MOST_PLACES, Search
 
 REACH_M, SEEN_M, SPEED_M_S = 250.0, 131.0, 7.5
 

@@ -4,7 +4,7 @@ from search_board import FOLLOWER, TAKEN_UP_NS, Board, lane_of
 
 from fanet_mw.trace import Approaching, Arrived
 from fanet_mw.units import Enu, S
-from fanet_mw.wire.search import Bid
+from fanet_mw.wire.bids import Bid
 
 NOW_NS = TAKEN_UP_NS + 20 * S
 

@@ -14,7 +14,7 @@ from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 from fanet_mw.wire import Header, Kind
 from fanet_mw.wire.claims import Claims, SlotStatus
-from fanet_mw.wire.inner import Beacon, Role
+from fanet_mw.wire.clusters import Beacon, Role
 from tests.conftest import MakeScenario
 
 

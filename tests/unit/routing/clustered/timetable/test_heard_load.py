@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.routing.clustered.timetable.heard_load import HeardLoads
-from fanet_mw.routing.clustered.timetable.turn_plan import NO_LOADS, Fitted, fit
+from fanet_mw.routing.clustered.timetable.turn_allocation import fit
+from fanet_mw.routing.clustered.timetable.turn_plan import NO_LOADS, Fitted
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S
 from fanet_mw.wire import HEADER_BYTES

@@ -6,7 +6,8 @@ import pytest
 
 from fanet_mw.routing.clustered.tdma.turns import Turns, clocks_fit, turn_ns
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
-from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, TurnPlan, links, superframe
+from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, TurnPlan
+from fanet_mw.routing.clustered.timetable.turn_size import links, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, US, NodeId
 

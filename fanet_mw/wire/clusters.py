@@ -1,36 +1,19 @@
-"""The inner messages of clusters, clocks and the mission: beacon, schedule, join, survivor, time.
+"""The messages by which clusters are formed: beacon, schedule and join.
 
 Like all messages of this dialect (`fanet_mw.wire`) they are coded by struct. Any bytes decode to a message or to
-MalformedFrameError; values that no node of this project would send are malformed. Digests, places, claims and links
-have files of their own.
+MalformedFrameError; values that no node of this project would send are malformed.
 """
 
 from enum import IntEnum
-from typing import Any, Final, NamedTuple, Self
+from typing import Final, NamedTuple, Self
 
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
-from fanet_mw.units import FARTHEST_M, FASTEST_M_S, STILL, US, Enu
-from fanet_mw.wire import (
-    ANY_NODE,
-    BEACON,
-    JOIN,
-    LATEST_US,
-    SCHEDULE,
-    SURVIVOR,
-    TIME,
-    VERSION,
-    Packed,
-    decode_first,
-    encode_inner,
-    inner_frames,
-)
+from fanet_mw.units import FARTHEST_M, FASTEST_M_S, STILL, Enu
+from fanet_mw.wire.checks import place_within, require_sender
+from fanet_mw.wire.frame import ANY_NODE, BEACON, JOIN, SCHEDULE, VERSION, Packed, decode_first, encode_inner
 
 CAPACITY: Final = 56
 """The number of entries in one part of a schedule."""
-MOST_DBM: Final = 300.0
-"""The greatest absolute value of a received power."""
-MOST_SURVIVORS: Final = 10_000
-"""The greatest id of a survivor, which bounds how much must be remembered."""
 
 
 class Role(IntEnum):
@@ -39,11 +22,6 @@ class Role(IntEnum):
     ISOLATED = 0
     MEMBER = 1
     HEAD = 2
-
-
-def _check(version: int, node: int, *, t_us: int = 0) -> None:
-    if version != VERSION or not 0 < node < ANY_NODE or t_us > LATEST_US:
-        raise MalformedFrameError(f"version {version}, node {node}, instant {t_us} us")
 
 
 class Beacon(NamedTuple):
@@ -70,7 +48,7 @@ class Beacon(NamedTuple):
     def decode_frame(cls, packed: Packed) -> Self:
         term, of, head, seq, cluster, epoch, slot, leader, role, hops, version = decode_first(BEACON, packed)
         beacon = cls(of, head, seq, cluster, epoch, slot, role, hops, term, leader)
-        _check(version, beacon.node)
+        require_sender(version, beacon.node)
         if beacon.role > Role.HEAD or ANY_NODE in (beacon.head, beacon.leader):
             raise MalformedFrameError(f"beacon of role {beacon.role}, head {beacon.head}")
         return beacon
@@ -139,7 +117,7 @@ class Schedule(NamedTuple):
         )
         start_us, period_us, slot_us, term, epoch, leader, clusters = fields[:7]
         schedule = cls(start_us, period_us, slot_us, epoch, leader, clusters, part, parts, members, term)
-        _check(version, schedule.leader, t_us=start_us)
+        require_sender(version, schedule.leader, t_us=start_us)
         if not 0 < slot_us * clusters <= period_us or bool(epoch) != bool(members):
             raise MalformedFrameError(
                 f"schedule {epoch}: {clusters} slots of {slot_us} us in {period_us} us, {count} entries"
@@ -169,76 +147,8 @@ class Join(NamedTuple):
     @classmethod
     def decode_frame(cls, packed: Packed) -> Self:
         *numbers, node, instead_of, version = decode_first(JOIN, packed)
-        _check(version, node)
+        require_sender(version, node)
         if instead_of == ANY_NODE:
             raise MalformedFrameError(f"join of {node} instead of {instead_of}")
-        position, velocity = _within(*numbers[:3], most=FARTHEST_M), _within(*numbers[3:], most=FASTEST_M_S)
+        position, velocity = place_within(*numbers[:3], most=FARTHEST_M), place_within(*numbers[3:], most=FASTEST_M_S)
         return cls(node, position, velocity, instead_of)
-
-
-class Survivor(NamedTuple):
-    """FANET_SURVIVOR: `reporter`, at `position`, receives the phone of `survivor`."""
-
-    t_us: int
-    survivor: int
-    reporter: int
-    position: Enu
-    rssi_dbm: float
-
-    def encode_frame(self, node: int) -> bytes:
-        payload = SURVIVOR.layout.pack(self.t_us, self.survivor, *self.position, self.rssi_dbm, self.reporter, VERSION)
-        return encode_inner(SURVIVOR, payload, node=node)
-
-    @classmethod
-    def decode_frame(cls, packed: Packed) -> Self:
-        return cls.checked(decode_first(SURVIVOR, packed))
-
-    @classmethod
-    def checked(cls, fields: tuple[Any, ...]) -> Self:
-        """The report of these fields; raises MalformedFrameError."""
-        t_us, survivor, east, north, up, rssi_dbm, reporter, version = fields
-        _check(version, reporter, t_us=t_us)
-        if not abs(rssi_dbm) <= MOST_DBM or not 0 < survivor <= MOST_SURVIVORS:  # also true for NaN
-            raise MalformedFrameError(f"rssi {rssi_dbm} of survivor {survivor}")
-        return cls(t_us, survivor, reporter, _within(east, north, up, most=FARTHEST_M), rssi_dbm)
-
-
-class TimeBeacon(NamedTuple):
-    """FANET_TIME: the swarm time at which hello number `hello` of its sender ended; bounds in ns."""
-
-    t_ns: int
-    error_ns: int
-    rate_ppb: int
-    worst_ns: int
-    hello: int
-    round: int
-    node: int
-    reference: int
-    worst_age_s: int
-    hops: int
-
-    def encode_frame(self, node: int) -> bytes:
-        return encode_inner(TIME, TIME.layout.pack(*self, VERSION), node=node)
-
-    @classmethod
-    def decode_frame(cls, packed: Packed) -> Self:
-        """Decode a beacon; raises MalformedFrameError. Only a beacon of the reference itself has 0 hops."""
-        *fields, version = decode_first(TIME, packed)
-        beacon = cls(*fields)
-        _check(version, beacon.node, t_us=beacon.t_ns // US)
-        if not 0 < beacon.reference < ANY_NODE or (beacon.reference == beacon.node) != (beacon.hops == 0):
-            raise MalformedFrameError(f"time of node {beacon.reference}, {beacon.hops} hops from {beacon.node}")
-        return beacon
-
-    @classmethod
-    def in_hello(cls, hello: Packed) -> Self | None:
-        """The beacon in a hello; None when it has none. Raises MalformedFrameError."""
-        has_time = any(message == TIME.msgid for message, _ in inner_frames(hello))
-        return cls.decode_frame(hello) if has_time else None
-
-
-def _within(east: float, north: float, up: float, *, most: float) -> Enu:
-    found = Enu(east, north, up)
-    if not found.is_within(most):
-        raise MalformedFrameError(f"{east}, {north}, {up} must be within {most:g}")
-    return found

@@ -1,0 +1,83 @@
+"""How large the frames of a timetable are, and so how long its turns, and how many a superframe holds."""
+
+from typing import Final
+
+from fanet_mw.routing.clustered.tdma.reserved_room import reserved
+from fanet_mw.routing.clustered.tdma.turns import Turns, turn_ns
+from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import MS, seconds_to_ns
+from fanet_mw.wire import DIGEST, HEADER_BYTES, LINKS, LOADS, OVERHEAD, PLACES, SCHEDULE
+from fanet_mw.wire.clusters import CAPACITY
+from fanet_mw.wire.digest import CAPACITY as DIGEST_CAPACITY
+from fanet_mw.wire.links import MESSAGES
+from fanet_mw.wire.places import CAPACITY as PLACES_CAPACITY
+
+_SCHEDULE_BYTES: Final = SCHEDULE.layout.size + OVERHEAD
+_PLACES_BYTES: Final = PLACES.layout.size + OVERHEAD
+_MOST_DIGESTS: Final = 4
+_HELLO_BYTES: Final = 200
+"""The size of a hello without its digest."""
+_MOST_PERIODS: Final = 4
+"""The greatest length of a superframe with measured links, in flooding periods."""
+LOAD: Final = 0.9
+"""The share of a node's root turns that its packets use with measured links; its other messages need the rest."""
+
+
+def largest_frame(scenario: Scenario, *, together: int = 1) -> int:
+    """The largest frame of a turn: bulk packets and the reserved room, or a leader's announcement."""
+    links_bytes = HEADER_BYTES + MESSAGES * (LINKS.layout.size + OVERHEAD) if scenario.measures_links else 0
+    longest = max(together * scenario.traffic.payload_bytes, schedule_bytes(scenario), links_bytes)
+    return longest + sum(reserved(scenario).values())
+
+
+def schedule_bytes(scenario: Scenario) -> int:
+    """The size of a part of a schedule with its positions."""
+    members = min(scenario.nodes.count, CAPACITY)
+    loads_bytes = LOADS.layout.size + OVERHEAD if scenario.hears_load else 0
+    return HEADER_BYTES + _SCHEDULE_BYTES + _PLACES_BYTES * -(-members // PLACES_CAPACITY) + loads_bytes
+
+
+def superframe(scenario: Scenario, *, origin_ns: int = 0, period_ns: int | None = None, together: int = 1) -> Turns:
+    """The superframe of a scenario if each turn holds `together` packets."""
+    turn = turn_ns(scenario, payload_bytes=largest_frame(scenario, together=together))
+    whole_ns = scenario.clusters.period_ns if period_ns is None else period_ns
+    contention_ns = round(scenario.clusters.contention_ms * MS)
+    return Turns(origin_ns, whole_ns, contention_ns, turn, max(0, whole_ns - contention_ns) // turn)
+
+
+def links(scenario: Scenario, turns: Turns) -> Geometry:
+    """The geometry for which a timetable of this scenario is computed."""
+    clusters, radio = scenario.clusters, scenario.radio
+    wait_ns = radio.lead_ns + radio.handover_ns
+    return Geometry(
+        link_m=clusters.link_m or radio.range_m,
+        interference_m=clusters.interference_m or radio.range_m * (1 if radio.channel == "range" else 2),
+        turns=turns.per_superframe,
+        hop_turns=1 + -(-wait_ns // turns.turn_ns),
+    )
+
+
+def measured_period_ns(scenario: Scenario) -> int:
+    """The length of a superframe with measured links: a little less than one packet of each source takes, so that there
+    is room for repetitions; at least one flooding period, at most four.
+    """
+    one_each_ns = int(LOAD * seconds_to_ns(scenario.traffic.interval_s))
+    return max(scenario.clusters.period_ns, min(_MOST_PERIODS * scenario.clusters.period_ns, one_each_ns))
+
+
+def hello_bytes(scenario: Scenario) -> int:
+    """The size of the largest hello with a digest."""
+    digests = min(_MOST_DIGESTS, -(-scenario.nodes.count // DIGEST_CAPACITY))
+    return HEADER_BYTES + _HELLO_BYTES + digests * (DIGEST.layout.size + OVERHEAD)
+
+
+def most_together(scenario: Scenario) -> int:
+    """The greatest number of bulk packets that fit into a frame besides the reserved room."""
+    room = scenario.radio.max_frame_bytes - sum(reserved(scenario).values())
+    return max(1, room // scenario.traffic.payload_bytes)
+
+
+def schedule_parts(scenario: Scenario) -> int:
+    """The number of turns that the leader's schedules take in each superframe."""
+    return max(1, -(-(scenario.nodes.count - 1) // CAPACITY))

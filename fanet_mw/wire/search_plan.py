@@ -1,0 +1,122 @@
+"""The messages by which UAVs agree on the plan of a search: their statuses, and the plan.
+
+Like all messages of this dialect (`fanet_mw.wire`) they are coded by struct. Any bytes decode to a message or to
+MalformedFrameError; values that no node of this project would send are malformed.
+"""
+
+from typing import Any, Final, NamedTuple, Self
+
+from fanet_mw.errors import LocalProtocolError
+from fanet_mw.units import FARTHEST_M, Enu
+from fanet_mw.wire.checks import refuse_unless
+from fanet_mw.wire.frame import ANY_NODE, LATEST_US, SEARCH, STATUS, VERSION, Packed, decode_first, encode_inner
+
+MOST_PLACES: Final = 79
+"""The number of places of a formation that one message can assign."""
+_LINES: Final = 0
+_SPIRAL: Final = 1
+_LAST_SHAPE: Final = 2
+_LEAST_M: Final = 1.0
+"""The least value of those lengths of a formation that must not be 0."""
+_FASTEST_M_S: Final = 1000.0
+
+
+class Search(NamedTuple):
+    """FANET_SEARCH: the plan of a search."""
+
+    start_us: int
+    half_width_m: float
+    first_m: float
+    last_m: float
+    height_m: float
+    speed_m_s: float
+    deploy_ds: int
+    revision: int
+    planner: int
+    nodes: tuple[int, ...]
+    """The node at each place; 0 if the place is vacant."""
+    lanes: int
+    relays: int
+    followers: int
+    shape: int = 0
+    """0: lines, 1: spiral, 2: sectors."""
+    teams: int = 2
+
+    def encode_frame(self, node: int) -> bytes:
+        if len(self.nodes) > MOST_PLACES:
+            raise LocalProtocolError(f"a plan of {len(self.nodes)} places must have <= {MOST_PLACES}")
+        unused = (0,) * (MOST_PLACES - len(self.nodes))
+        return encode_inner(SEARCH, SEARCH.layout.pack(*self[:9], *self.nodes, *unused, *self[10:], VERSION), node=node)
+
+    @classmethod
+    def decode_frame(cls, packed: Packed) -> Self:
+        """The first plan in a frame; raises MalformedFrameError for a plan that no swarm could fly."""
+        return cls.checked(decode_first(SEARCH, packed))
+
+    @classmethod
+    def checked(cls, fields: tuple[Any, ...]) -> Self:
+        """The plan of these fields; raises MalformedFrameError."""
+        lanes, relays, followers, shape, teams, version = fields[-6:]
+        places = teams * lanes + relays + followers
+        in_lines = shape == _LINES and teams == 2 and lanes >= 2
+        other = _LINES < shape <= _LAST_SHAPE and teams >= 1 and lanes >= 1 and relays == 0
+        refuse_unless(
+            version == VERSION and (in_lines or other) and places <= MOST_PLACES,
+            f"a plan of {places} places in {teams} teams, shape {shape}",
+        )
+        nodes = fields[9 : 9 + places]
+        plan = cls._make((*fields[:9], nodes, lanes, relays, followers, shape, teams))
+        named = [node for node in nodes if node]
+        refuse_unless(
+            plan.start_us <= LATEST_US
+            and 0 < plan.planner < ANY_NODE
+            and plan.revision > 0
+            and ANY_NODE not in named
+            and len(set(named)) == len(named),
+            f"plan {plan.revision} of {plan.planner}",
+        )
+        lengths = (plan.half_width_m, plan.first_m, plan.last_m, plan.height_m)
+        refuse_unless(
+            all(0 <= length <= FARTHEST_M for length in lengths)
+            and plan.last_m - plan.first_m >= (0.0 if shape == _SPIRAL else _LEAST_M)
+            and (shape == _LINES or (plan.first_m >= _LEAST_M and plan.half_width_m >= _LEAST_M))
+            and 0.1 <= plan.speed_m_s <= _FASTEST_M_S,
+            f"a formation of {lengths} m at {plan.speed_m_s} m/s",
+        )
+        return plan
+
+
+class SearchStatus(NamedTuple):
+    """FANET_STATUS: the position and the state of a UAV."""
+
+    t_us: int
+    position: Enu
+    node: int
+    revision: int
+    charge: int
+    """The percentage of the battery that may still be spent, above the way home and a reserve; 0:
+    the UAV flies home."""
+
+    def encode_frame(self, node: int) -> bytes:
+        payload = STATUS.layout.pack(self.t_us, *self.position, *self[2:], VERSION)
+        return encode_inner(STATUS, payload, node=node)
+
+    @classmethod
+    def decode_frame(cls, packed: Packed) -> Self:
+        """The first FANET_STATUS in a frame; raises MalformedFrameError."""
+        return cls.checked(decode_first(STATUS, packed))
+
+    @classmethod
+    def checked(cls, fields: tuple[Any, ...]) -> Self:
+        """The status of these fields; raises MalformedFrameError."""
+        t_us, east, north, up, node, revision, charge, version = fields
+        position = Enu(east, north, up)
+        refuse_unless(
+            version == VERSION
+            and 0 < node < ANY_NODE
+            and t_us <= LATEST_US
+            and charge <= 100
+            and position.is_within(FARTHEST_M),
+            f"status of {node}: {position}, {charge} %",
+        )
+        return cls(t_us, position, node, revision, charge)

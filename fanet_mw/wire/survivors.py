@@ -1,0 +1,99 @@
+"""The messages about survivors: a report that a phone was received, and an estimate or a verdict about a place.
+
+Like all messages of this dialect (`fanet_mw.wire`) they are coded by struct. Any bytes decode to a message or to
+MalformedFrameError; values that no node of this project would send are malformed.
+"""
+
+import math
+from enum import IntEnum
+from typing import Any, Final, NamedTuple, Self
+
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.units import FARTHEST_M, Enu
+from fanet_mw.wire.checks import place_within, refuse_unless, require_sender
+from fanet_mw.wire.frame import ANY_NODE, FOUND, LATEST_US, SURVIVOR, VERSION, Packed, decode_first, encode_inner
+
+MOST_DBM: Final = 300.0
+"""The greatest absolute value of a received power."""
+MOST_SURVIVORS: Final = 10_000
+"""The greatest id of a survivor, which bounds how much must be remembered."""
+_MOST_VARIANCE_M2: Final = 1e10
+
+
+class Survivor(NamedTuple):
+    """FANET_SURVIVOR: `reporter`, at `position`, receives the phone of `survivor`."""
+
+    t_us: int
+    survivor: int
+    reporter: int
+    position: Enu
+    rssi_dbm: float
+
+    def encode_frame(self, node: int) -> bytes:
+        payload = SURVIVOR.layout.pack(self.t_us, self.survivor, *self.position, self.rssi_dbm, self.reporter, VERSION)
+        return encode_inner(SURVIVOR, payload, node=node)
+
+    @classmethod
+    def decode_frame(cls, packed: Packed) -> Self:
+        return cls.checked(decode_first(SURVIVOR, packed))
+
+    @classmethod
+    def checked(cls, fields: tuple[Any, ...]) -> Self:
+        """The report of these fields; raises MalformedFrameError."""
+        t_us, survivor, east, north, up, rssi_dbm, reporter, version = fields
+        require_sender(version, reporter, t_us=t_us)
+        if not abs(rssi_dbm) <= MOST_DBM or not 0 < survivor <= MOST_SURVIVORS:  # also true for NaN
+            raise MalformedFrameError(f"rssi {rssi_dbm} of survivor {survivor}")
+        return cls(t_us, survivor, reporter, place_within(east, north, up, most=FARTHEST_M), rssi_dbm)
+
+
+class Standing(IntEnum):
+    """The meaning of a FANET_FOUND for the place that it names."""
+
+    ESTIMATED = 0
+    CONFIRMED = 1
+    REFUTED = 2
+    """Confirmations at this place are taken back, because later receptions contradict them."""
+
+
+class Found(NamedTuple):
+    """FANET_FOUND: the estimated place of a survivor, a confirmation at that place, or its refutation."""
+
+    t_us: int
+    survivor: int
+    east_m: float
+    north_m: float
+    east_variance_m2: float
+    covariance_m2: float
+    north_variance_m2: float
+    node: int
+    standing: Standing
+
+    def encode_frame(self, node: int) -> bytes:
+        return encode_inner(FOUND, FOUND.layout.pack(*self, VERSION), node=node)
+
+    @classmethod
+    def decode_frame(cls, packed: Packed) -> Self:
+        """The first FANET_FOUND in a frame; raises MalformedFrameError, also for an impossible covariance."""
+        return cls.checked(decode_first(FOUND, packed))
+
+    @classmethod
+    def checked(cls, fields: tuple[Any, ...]) -> Self:
+        """The estimate of these fields; raises MalformedFrameError."""
+        *values, standing, version = fields
+        refuse_unless(version == VERSION and standing <= Standing.REFUTED, f"a find of standing {standing}")
+        found = cls._make((*values, Standing(standing)))
+        refuse_unless(
+            0 < found.survivor <= MOST_SURVIVORS and 0 < found.node < ANY_NODE and found.t_us <= LATEST_US,
+            f"survivor {found.survivor} found by {found.node}",
+        )
+        east, north = found.east_variance_m2, found.north_variance_m2
+        refuse_unless(
+            abs(found.east_m) <= FARTHEST_M
+            and abs(found.north_m) <= FARTHEST_M
+            and 0 <= east <= _MOST_VARIANCE_M2
+            and 0 <= north <= _MOST_VARIANCE_M2
+            and abs(found.covariance_m2) <= math.sqrt(east * north) * (1 + 1e-3) + 1e-3,
+            f"an estimate with variances {east}, {north} and covariance {found.covariance_m2}",
+        )
+        return found

@@ -1,14 +1,12 @@
 """The simulated flight controllers: the velocity that each UAV should fly now, by its mobility model or its setpoint.
 
 A UAV follows a moving place by a proportional controller, to which the velocity of the place is added (feed-forward).
-When the world keeps UAVs apart, the speed of a UAV towards each near neighbor is capped, and UAVs that are too near are
-pushed apart, so that several UAVs that are sent to one point settle around it.
+If the scenario says so, the world keeps UAVs apart (`separation_keeping.py`).
 
 Whatever a flight controller is asked to do, it holds its position when velocity setpoints are no longer renewed, brakes
-before the geofence, and lands at once when its battery is nearly empty.
+before the geofence (`geofence.py`), and lands at once when its battery is nearly empty.
 """
 
-import math
 from collections.abc import Callable, Mapping
 from enum import StrEnum
 from typing import Final, NamedTuple, assert_never
@@ -24,22 +22,12 @@ from sim.world.engines.contract import Flags, Rows, Values
 from sim.world.mobility.contract import MobilityModel, Track
 from sim.world.mobility.crossing import Crossing
 from sim.world.mobility.formation import Formation
+from sim.world.mobility.geofence import HOLD_M_S, Geofence
 from sim.world.mobility.random_waypoint import RandomWaypoint
+from sim.world.mobility.separation_keeping import CLEAR_M, kept_clear
 
 _GAIN: Final = 0.8
 """The gain of the position controller: velocity by distance from the wanted place [1/s]."""
-_CLEAR_M: Final = 4.0
-"""The distance that UAVs keep from each other; UAVs within twice this distance are pushed apart."""
-_BRAKE_M_S2: Final = 2.5
-"""The deceleration with which braking is planned: half of what a UAV can do, because it reacts with a lag."""
-_PUSH_M_S: Final = 4.0
-"""The greatest speed by which one neighbor pushes a UAV away."""
-_ROUNDS: Final = 4
-"""How often the speed towards the worst neighbor is reduced, because reducing one may increase another."""
-FLOOR_M: Final = 5.0
-"""A position or take-off setpoint below this height is raised to it."""
-_HOLD_M_S: Final = 5.0
-"""The greatest speed at which a UAV that was moved away from the position it holds comes back to it."""
 _LEAST_CLIMB_M_S: Final = 0.5
 """The speed of a take-off whose setpoint asks for less."""
 _FORCED_M_S: Final = 2.0
@@ -50,8 +38,6 @@ _FLARE_PER_S: Final = 0.5
 """Near the ground a landing UAV sinks at most at its height times this."""
 _ON_GROUND_M: Final = 0.3
 """A UAV below this height stands on the ground."""
-FENCE_M: Final = 50.0
-"""The distance of the geofence from the area; a UAV with a velocity setpoint brakes before it reaches the geofence."""
 
 
 class FlightMode(StrEnum):
@@ -120,7 +106,7 @@ class Guidance:
         self._see_m = 0.0 if self._onboard else scenario.mobility.see_m
         half = scenario.world.area_m / 2
         reach = np.maximum(half, np.abs(starts[:, :2]).max(axis=0)) if self._onboard else (half, half)
-        self._half_east, self._half_north = float(reach[0]), float(reach[1])
+        self._fence = Geofence(half_east_m=float(reach[0]), half_north_m=float(reach[1]))
         self._starts = starts.copy()
         """The place at which each UAV holds while neither a mobility model nor a setpoint moves it."""
         self._model: MobilityModel | None = (
@@ -222,19 +208,14 @@ class Guidance:
         return [row for row in self._grounded if row not in self._commands]
 
     def _hold(self, row: int, here: Enu) -> None:
-        self._command(row, _GoTo(here, _HOLD_M_S))
+        self._command(row, _GoTo(here, HOLD_M_S))
 
     def steer(self, node: int, place: Enu, *, speed_m_s: float) -> None:
         """Send a UAV to a place, which is clipped to the area; at a speed of 0 or less it goes back to its track."""
         if speed_m_s <= 0:
             self._command(node - 1, None)
             return
-        inside = Enu(
-            max(-self._half_east, min(self._half_east, place.east)),
-            max(-self._half_north, min(self._half_north, place.north)),
-            max(FLOOR_M, min(1000.0, place.up)),
-        )
-        self._command(node - 1, _GoTo(inside, speed_m_s))
+        self._command(node - 1, _GoTo(self._fence.clipped(place), speed_m_s))
 
     def track(self, t_s: float) -> Track:
         """Where the mobility model wants all UAVs to be; setpoints do not count here."""
@@ -256,11 +237,11 @@ class Guidance:
         flown = {row: command.velocity for row, command in self._commands.items() if isinstance(command, _FlyAt)}
         if flown:
             rows = [*flown]
-            wish[rows] = self._within_fence(np.array([*flown.values()]), at[rows])
+            wish[rows] = self._fence.brake(np.array([*flown.values()]), at[rows])
         landings = {row: command.speed_m_s for row, command in self._commands.items() if isinstance(command, _Land)}
         if landings or self._grounded:
             self._near_the_ground(wish, at, landings)
-        return _keep_clear(wish, at, self._see_m) if len(at) > 1 and self._see_m else wish
+        return kept_clear(wish, at, self._see_m) if len(at) > 1 and self._see_m else wish
 
     def _expire(self, t_s: float, at: Rows) -> None:
         """Let every UAV hold its position whose velocity setpoint was not renewed in time."""
@@ -268,16 +249,6 @@ class Guidance:
         for row in [row for row, told in commands if isinstance(told, _FlyAt) and t_s >= told.until_s]:
             self._hold(row, Enu(*at[row].tolist()))
             self._enter(row, FlightMode.FAILSAFE)
-
-    def _within_fence(self, wish: Rows, at: Rows) -> Rows:
-        """Velocities limited so that each UAV can brake before the geofence; a UAV beyond it is brought back."""
-        limited = wish.copy()
-        for axis, half in ((0, self._half_east), (1, self._half_north)):
-            outwards = np.copysign(1.0, at[:, axis])
-            left_m = half + FENCE_M - np.abs(at[:, axis])
-            most = np.where(left_m > 0, np.sqrt(2 * _BRAKE_M_S2 * np.maximum(left_m, 0.0)), -_HOLD_M_S)
-            limited[:, axis] = np.where(wish[:, axis] * outwards > most, most * outwards, wish[:, axis])
-        return limited
 
     def _near_the_ground(self, wish: Rows, at: Rows, landings: Mapping[int, float]) -> None:
         """Set the velocities of UAVs that land or stand on the ground.
@@ -289,33 +260,6 @@ class Guidance:
         for row, speed_m_s in landings.items():
             sink = min(speed_m_s, max(_TOUCHDOWN_M_S, _FLARE_PER_S * float(height[row])))
             wish[row] = [0.0, 0.0, -sink if height[row] > _ON_GROUND_M else 0.0]
-        for row in [row for row in self._grounded if height[row] > _CLEAR_M]:
+        for row in [row for row in self._grounded if height[row] > CLEAR_M]:
             self._grounded.discard(row)
         wish[self._waiting()] = 0.0
-
-
-def _keep_clear(wish: Rows, at: Rows, see_m: float) -> Rows:
-    """Cap each UAV's own speed towards each neighbor within `see_m`, and push UAVs apart that are too near.
-
-    Two UAVs that fly towards each other at v each, and brake at `_BRAKE_M_S2`, need v^2 / _BRAKE_M_S2 to stop. The cap
-    is the v for which this is the gap between them less `_CLEAR_M`.
-    """
-    apart = at[:, None] - at[None]
-    distance = np.sqrt((apart**2).sum(axis=2))
-    np.fill_diagonal(distance, math.inf)
-    near = distance < see_m
-    rows = np.flatnonzero(near.any(axis=1))
-    if not len(rows):
-        return wish
-    gap = np.where(near[np.ix_(rows, rows)], distance[np.ix_(rows, rows)], math.inf)
-    away = apart[np.ix_(rows, rows)] / np.maximum(distance[np.ix_(rows, rows)], 1e-6)[..., None]
-    cap = np.sqrt(_BRAKE_M_S2 * np.maximum(0.0, gap - _CLEAR_M))
-    push = np.maximum(0.0, 1 - gap / (2 * _CLEAR_M))
-    own = wish[rows] + _PUSH_M_S * (push[..., None] * away).sum(axis=1)
-    every = np.arange(len(rows))
-    for _ in range(_ROUNDS):  # the worst neighbor first; a correction for one may close in on another
-        excess = -np.einsum("ik,ijk->ij", own, away) - cap
-        worst = excess.argmax(axis=1)
-        own += np.maximum(0.0, excess[every, worst])[:, None] * away[every, worst]
-    wish[rows] = own
-    return wish

@@ -2,11 +2,9 @@
 
     announcements, stand-ins, signs of life, instants -> events -> `states.TRANSITIONS` -> actions for `assigned.py`
 
-A head counts as silent when for four hello intervals no packet that it generated has arrived, and no newer sequence
-number of it in hellos. Two intervals are enough once the MAC has failed to reach it. Then the first member of the
-succession (the order in which a schedule lists the members of a cluster) stands in for it, and each further member half
-an interval later if none before it has. Only members that have had news of the head judge it, because others may never
-have been near it.
+`head_failure_detector.py` tells a member from when on its head is silent. Then the first member of the succession (the
+order in which a schedule lists the members of a cluster) stands in for the head, or a later member if none before it
+has.
 
 A stand-in floods a join that names the silent node. Without a timetable it also uses the slot of the head from then on.
 With a timetable there is no slot to take over: the stand-in only informs the leader, and any silent neighbor is
@@ -16,6 +14,7 @@ reported in the same way (`neighbor_failure_detector.py`).
 from typing import Final
 
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
+from fanet_mw.routing.clustered.roles.head_failure_detector import HeadFailureDetector
 from fanet_mw.routing.clustered.roles.lease import Authority, Lease
 from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import Membership
@@ -23,12 +22,6 @@ from fanet_mw.routing.clustered.roles.states import Action, Event, State, step
 from fanet_mw.units import MS, NodeId
 from fanet_mw.wire.clusters import Join, Schedule
 
-SILENT_HELLOS: Final = 4.0
-"""The number of hello intervals after which a head is silent; with a timetable, any neighbor."""
-_GIVEN_UP_HELLOS: Final = 2.0
-"""The same for a head that the MAC has failed to reach."""
-_TURN_HELLOS: Final = 0.5
-"""The number of hello intervals that each member of the succession leaves to the one before it."""
 _AGAIN_HELLOS: Final = 2.0
 """The number of hello intervals after which a stand-in announces itself again, until a schedule confirms it or the head
 objects."""
@@ -58,7 +51,7 @@ class Failover:
         self._takes_slot = takes_slot
         self._node = node
         self._membership = membership
-        self._gradient = gradient
+        self._detector = HeadFailureDetector(gradient, liveness, hello_ns=hello_ns)
         self._liveness = liveness
         self._lease = lease
         self._hello_ns = hello_ns
@@ -66,8 +59,6 @@ class Failover:
         """The instant at which this node began to follow its present head."""
         self._named = NodeId(0)
         """The head that the last schedule named for this node's cluster."""
-        self._unreachable_ns = -1
-        """The instant at which the MAC last failed to reach the head."""
         self._object_ns = 0
         """The instant from which this node may object again."""
         self._watch_ns: int | None = None
@@ -150,7 +141,7 @@ class Failover:
     def on_unreachable(self, node: NodeId, *, now_ns: int) -> None:
         """The MAC has failed to reach this neighbor."""
         if node == self._membership.head and self.state is State.MEMBER:
-            self._unreachable_ns = now_ns
+            self._detector.on_unreachable(now_ns)
             self._watch_ns = now_ns
 
     # --- time -----------------------------------------------------------------------------------------------------
@@ -181,15 +172,12 @@ class Failover:
         if self.state is not State.MEMBER or not rank or current is None or rank <= current:
             self._watch_ns = None
             return []
-        news_ns = self._gradient.news_ns(member.head)
-        if news_ns is None or news_ns < self._since_ns:
+        silent_ns = self._detector.silent_from_ns(member.head, since_ns=self._since_ns, before=rank - current - 1)
+        if silent_ns is None:
             self._watch_ns = now_ns + self._hello_ns
             return []  # this node has not been near the head since it began to follow it
-        sign_ns = max(news_ns, self._liveness.last_ns(member.head) or 0)
-        hellos = _GIVEN_UP_HELLOS if self._unreachable_ns > sign_ns else SILENT_HELLOS
-        due_ns = sign_ns + int((hellos + (rank - current - 1) * _TURN_HELLOS) * self._hello_ns)
-        if now_ns < due_ns:
-            self._watch_ns = due_ns
+        if now_ns < silent_ns:
+            self._watch_ns = silent_ns
             return []
         self._watch_ns = now_ns + int(_AGAIN_HELLOS * self._hello_ns)
         return [self._take(Event.HEAD_SILENT, now_ns)]

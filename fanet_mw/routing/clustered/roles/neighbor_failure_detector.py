@@ -13,7 +13,7 @@ the number of nodes.
 from collections.abc import Callable
 from typing import Final
 
-from fanet_mw.routing.clustered.roles.failover import SILENT_HELLOS
+from fanet_mw.routing.clustered.roles.head_failure_detector import SILENT_HELLOS
 from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.units import NodeId, S
 

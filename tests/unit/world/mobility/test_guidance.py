@@ -7,7 +7,8 @@ import pytest
 
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu
-from sim.world.mobility.guidance import FLOOR_M, Guidance
+from sim.world.mobility.geofence import FLOOR_M
+from sim.world.mobility.guidance import Guidance
 
 STARTS = np.array([[0.0, 0, 50], [100, 0, 50], [0, 100, 50]])
 MakeScenario = Callable[..., Scenario]

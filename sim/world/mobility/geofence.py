@@ -1,0 +1,48 @@
+"""The geofence of the world: no setpoint takes a UAV out of the area and the margin around it.
+
+A position is clipped to the area. A velocity is limited so that the UAV can brake before it reaches the geofence, which
+lies `FENCE_M` outside the area.
+"""
+
+from typing import Final
+
+import numpy as np
+
+from fanet_mw.units import Enu
+from sim.world.engines.contract import Rows
+
+FENCE_M: Final = 50.0
+"""The distance of the geofence from the area; a UAV with a velocity setpoint brakes before it reaches the geofence."""
+FLOOR_M: Final = 5.0
+"""A position or take-off setpoint below this height is raised to it."""
+_CEILING_M: Final = 1000.0
+"""A position above this height is lowered to it."""
+BRAKE_M_S2: Final = 2.5
+"""The deceleration with which braking is planned: half of what a UAV can do, because it reacts with a lag."""
+HOLD_M_S: Final = 5.0
+"""The greatest speed at which a UAV that was moved away from the position it holds comes back to it."""
+
+
+class Geofence:
+    """The area of a swarm, which reaches so far to the east and the north of its middle, and the fence around it."""
+
+    def __init__(self, *, half_east_m: float, half_north_m: float) -> None:
+        self._half_east_m, self._half_north_m = half_east_m, half_north_m
+
+    def clipped(self, place: Enu) -> Enu:
+        """The place in the area that is nearest to a place."""
+        return Enu(
+            max(-self._half_east_m, min(self._half_east_m, place.east)),
+            max(-self._half_north_m, min(self._half_north_m, place.north)),
+            max(FLOOR_M, min(_CEILING_M, place.up)),
+        )
+
+    def brake(self, wish: Rows, at: Rows) -> Rows:
+        """Velocities limited so that each UAV can brake before the geofence; a UAV beyond it is brought back."""
+        limited = wish.copy()
+        for axis, half in ((0, self._half_east_m), (1, self._half_north_m)):
+            outwards = np.copysign(1.0, at[:, axis])
+            left_m = half + FENCE_M - np.abs(at[:, axis])
+            most = np.where(left_m > 0, np.sqrt(2 * BRAKE_M_S2 * np.maximum(left_m, 0.0)), -HOLD_M_S)
+            limited[:, axis] = np.where(wish[:, axis] * outwards > most, most * outwards, wish[:, axis])
+        return limited

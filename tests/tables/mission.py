@@ -4,9 +4,9 @@ import statistics
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from tests.tables.kept import KEPT, Kept, Run
+from tests.tables.kept import Kept, Run
 from tests.tables.markdown import Rows
-from tests.tables.missions import Case, flown, fly
+from tests.tables.missions import Case, all_flown, flown
 
 _FEW_UAVS: Final = (
     "nodes.count=12", "nodes.spacing_m=100", "nodes.telemetry_hz=0", "world.area_m=500", "mission.survivors=6",
@@ -38,17 +38,17 @@ SMALL: Final = {
         "rescue", (*_FEW_UAVS, "mission.avoid_by=[]"), _FIRST_SEEDS
     ),
 }
-WHOLE: Final = _cases(("duration_s=240",), (1,), (0.0, 0.8))
+WHOLE: Final = _cases(("duration_s=240",), (1,), (0.0, 0.3, 0.5, 0.7, 0.8))
 
 
 def over_networks(kept: Kept | None = None) -> Rows:
     """Scenario `rescue` in small."""
-    return _table(SMALL, kept or Kept(KEPT, fly))
+    return _table(SMALL, all_flown(SMALL, kept))
 
 
 def over_networks_whole(kept: Kept | None = None) -> Rows:
     """Scenario `rescue` as it is, until the sweep is over."""
-    return _table(WHOLE, kept or Kept(KEPT, fly))
+    return _table(WHOLE, all_flown(WHOLE, kept))
 
 
 def _table(cases: Mapping[str, Case], kept: Kept) -> Rows:

@@ -1,7 +1,8 @@
 """Measured tables of planned searches: in difficult places, and how near UAVs come to each other.
 
 A mission costs a minute of CPU or more, so those that were flown are kept (`kept.py`) and the tables made of them.
-`python -m tests.tables.pieces --seconds 600 places` flies as many that are still missing as fit into ten minutes.
+`python -m tests.tables.pieces --seconds 600 places` flies as many that are still missing as fit into ten minutes; no
+table is written before all of its missions are there.
 """
 
 import itertools
@@ -22,10 +23,16 @@ from sim.run.virtual import simulate
 from sim.scenarios import catalog
 from sim.sweep.measures import enough_heard_s
 from sim.world.environment.survivors import Survivors
-from tests.tables.kept import KEPT, Kept, Run
+from tests.tables.kept import KEPT, Kept, Missing, Run
 from tests.tables.markdown import Rows
 
 _NEAR_M: Final = (10.0, 20.0, 50.0)
+
+_OF_THE_SUMMARY: Final = (
+    "survivors", "detected", "confirmed", "mistaken", "reopened", "time_to_confirm_s", "confirmed_error_m",
+    "uavs_approaching", "collisions", "coverage", "covered_95_s", "connected", "nearest_m",
+)  # fmt: skip
+"""What tables read of the summary's table `mission`."""
 
 
 class Case(NamedTuple):
@@ -36,6 +43,15 @@ class Case(NamedTuple):
     seeds: tuple[int, ...]
     loss: float = 0.0
     """Every link loses this share of the frames from the beginning to the end."""
+
+    def missing(self, kept: Kept) -> list[int]:
+        """The seeds of which no mission is kept."""
+        return [seed for seed in self.seeds if self.with_seed(seed) not in kept]
+
+    def flown(self, kept: Kept, seed: int) -> Run:
+        """What the mission with this seed came to."""
+        lossy = [f"every link loses {self.loss:.0%} of all frames"] if self.loss else []
+        return kept.of(self.with_seed(seed), [*self.settings, *lossy])
 
     def with_seed(self, seed: int) -> Scenario:
         return degraded(catalog.find(self.scenario, [*self.settings, f"seed={seed}"]), self.loss)
@@ -56,6 +72,8 @@ COUNTRY: Final[Mapping[str, Case]] = {
     "`rescue`": Case("rescue", (), _TWENTY),
     "`hills`": Case("hills", (), _TWENTY),
     "`night`": Case("night", (), _TWENTY),
+}
+FROM_THE_GROUND: Final[Mapping[str, Case]] = {
     "`rescue-base`": Case("rescue-base", (), (1, 2, 3)),
 }
 _SMALL: Final = (
@@ -75,6 +93,10 @@ CLEAR: Final[Mapping[str, Case]] = {
     "radar alone": Case("town", ('mission.avoid_by=["radar"]',), _TWENTY[:10]),
     "neither": Case("town", ("mission.avoid_by=[]",), _TWENTY[:10]),
 }
+RESCUE_CLEAR: Final[Mapping[str, Case]] = {
+    "hellos of neighbors": Case("rescue", (), (1, 2, 3)),
+    "nothing": Case("rescue", ("mission.avoid_by=[]",), (1, 2, 3)),
+}
 
 
 def fly(scenario: Scenario) -> Run:
@@ -85,7 +107,8 @@ def fly(scenario: Scenario) -> Run:
     summary = finish(outcome, out=None)
     nearest = np.concatenate(list(_nearest_m(records)))
     return {
-        **summary["mission"],
+        **{name: summary["mission"][name] for name in _OF_THE_SUMMARY},
+        "half_approached_s": half_approached_s(scenario.nodes.count, summary["mission"]["time_to_approach_s"]),
         **_under_rubble(scenario, records),
         "pdr": summary["pdr"],
         "reports": summary.get("reports", {}).get("pdr"),
@@ -104,9 +127,24 @@ def fly(scenario: Scenario) -> Run:
     }
 
 
+def half_approached_s(uavs: int, times_s: Sequence[float]) -> float | None:
+    """When half of the swarm had turned towards survivors; None if fewer ever did."""
+    half = uavs // 2
+    return times_s[half - 1] if 0 < half <= len(times_s) else None
+
+
 def flown(case: Case, kept: Kept) -> list[Run]:
     """What the missions of a case came to, seed by seed."""
-    return [kept.of(case.with_seed(seed)) for seed in case.seeds]
+    return [case.flown(kept, seed) for seed in case.seeds]
+
+
+def all_flown(cases: Mapping[str, Case], kept: Kept | None = None) -> Kept:
+    """The kept missions of a table. Raises Missing, with the seeds by case, if not all of them were flown."""
+    kept = kept or Kept(KEPT)
+    missing = {name: case.missing(kept) for name, case in cases.items()}
+    if any(missing.values()):
+        raise Missing([f"{name}: seeds {seeds}" for name, seeds in missing.items() if seeds])
+    return kept
 
 
 def _under_rubble(scenario: Scenario, records: Collection[Record]) -> Run:
@@ -199,13 +237,19 @@ def clear_row(name: str, runs: Sequence[Run]) -> list[str]:
 
 def places(kept: Kept | None = None) -> Rows:
     """Searches in a town."""
-    kept = kept or Kept(KEPT, fly)
+    kept = all_flown(PLACES, kept)
     return [PLACES_HEAD, *(places_row(name, flown(case, kept)) for name, case in PLACES.items())]
+
+
+def from_the_ground(kept: Kept | None = None) -> Rows:
+    """The whole rescue from a base."""
+    kept = all_flown(FROM_THE_GROUND, kept)
+    return [PLACES_HEAD, *(places_row(name, flown(case, kept)) for name, case in FROM_THE_GROUND.items())]
 
 
 def country(kept: Kept | None = None) -> Rows:
     """The whole rescue over a plain, over hills, and with an outage of GPS."""
-    kept = kept or Kept(KEPT, fly)
+    kept = all_flown(COUNTRY, kept)
     return [PLACES_HEAD, *(places_row(name, flown(case, kept)) for name, case in COUNTRY.items())]
 
 
@@ -243,11 +287,17 @@ def shapes_row(name: str, case: Case, runs: Sequence[Run]) -> list[str]:
 
 def shapes(kept: Kept | None = None) -> Rows:
     """Searches over the same square kilometre in all shapes."""
-    kept = kept or Kept(KEPT, fly)
+    kept = all_flown(SHAPES, kept)
     return [SHAPES_HEAD, *(shapes_row(name, case, flown(case, kept)) for name, case in SHAPES.items())]
 
 
 def keeping_clear(kept: Kept | None = None) -> Rows:
     """How near UAVs come to each other in a town, with and without what the network delivers."""
-    kept = kept or Kept(KEPT, fly)
+    kept = all_flown(CLEAR, kept)
     return [CLEAR_HEAD, *(clear_row(name, flown(case, kept)) for name, case in CLEAR.items())]
+
+
+def keeping_clear_rescue(kept: Kept | None = None) -> Rows:
+    """The same over open ground, where no UAV has a radar."""
+    kept = all_flown(RESCUE_CLEAR, kept)
+    return [CLEAR_HEAD, *(clear_row(name, flown(case, kept)) for name, case in RESCUE_CLEAR.items())]

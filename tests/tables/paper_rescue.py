@@ -8,12 +8,10 @@ import statistics
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from tests.tables.kept import KEPT, Kept, Run
+from tests.tables.kept import Kept, Run
 from tests.tables.markdown import Rows
-from tests.tables.missions import Case, flown, fly
+from tests.tables.missions import Case, all_flown, flown
 
-_UAVS: Final = 45
-_HALF: Final = _UAVS // 2
 PAPER: Final[Mapping[str, Case]] = {
     interval_s: Case("rescue-paper", (f"mission.report_interval_s={interval_s}",), tuple(range(1, 21)))
     for interval_s in ("1.0", "0.5", "0.1")
@@ -27,31 +25,25 @@ _HEAD: Final = [
 
 def paper_rescues(kept: Kept | None = None) -> Rows:
     """The missions of all seeds, for each interval of app_2."""
-    kept = kept or Kept(KEPT, fly)
+    kept = all_flown(PAPER, kept)
     return [_HEAD, *(paper_row(interval_s, flown(case, kept)) for interval_s, case in PAPER.items())]
 
 
 def paper_row(interval_s: str, runs: Sequence[Run]) -> list[str]:
     """One line of the table. Where nobody turns, no time is counted."""
-    turned = [run for run in runs if run["uavs_approaching"] >= _HALF]
+    turned = [run for run in runs if run["half_approached_s"] is not None]
     return [
         interval_s,
         f"{len(runs)}",
         f"{sum(run['uavs_approaching'] > 0 for run in runs)}",
         _spread([run["uavs_approaching"] for run in runs], 0),
-        _spread([_half_s(run) for run in turned], 0),
-        _spread([_half_s(run) - run["enough_heard_s"] for run in turned], 2),
+        _spread([run["half_approached_s"] for run in turned], 0),
+        _spread([run["half_approached_s"] - run["enough_heard_s"] for run in turned], 2),
         _spread([run["reports"] for run in runs if run["reports"] is not None], 2),
         _spread([run["pdr"] for run in runs], 2),
         _spread([100 * run["connected"] for run in runs], 0),
         f"{sum(run['collisions'] for run in runs)}",
     ]
-
-
-def _half_s(run: Run) -> float:
-    """When half of the swarm had turned."""
-    instant_s: float = run["time_to_approach_s"][_HALF - 1]
-    return instant_s
 
 
 def _spread(values: Sequence[float], digits: int) -> str:

@@ -9,12 +9,13 @@ from typing import Final
 
 from tests.tables.kept import KEPT, Kept, OutOfTime
 from tests.tables.mission import SMALL, WHOLE
-from tests.tables.missions import CLEAR, COUNTRY, PLACES, SHAPES, Case, fly
+from tests.tables.missions import CLEAR, COUNTRY, FROM_THE_GROUND, PLACES, RESCUE_CLEAR, SHAPES, Case, fly
 from tests.tables.paper_rescue import PAPER
 from tests.tables.small_rescues import ENGINES, SENSES
 
 TABLES: Final[Mapping[str, Mapping[str, Case]]] = {
-    "places": PLACES, "country": COUNTRY, "shapes": SHAPES, "keeping-clear": CLEAR, "mission-network": SMALL,
+    "places": PLACES, "country": COUNTRY, "from-the-ground": FROM_THE_GROUND, "shapes": SHAPES, "keeping-clear": CLEAR,
+    "keeping-clear-rescue": RESCUE_CLEAR, "mission-network": SMALL,
     "mission-network-whole": WHOLE, "rescue-paper": PAPER, "engines": ENGINES, "senses": SENSES,
 }  # fmt: skip
 
@@ -30,7 +31,7 @@ def main() -> None:
     for name, case in cases:
         for seed in case.seeds:
             try:
-                found = kept.of(case.with_seed(seed))
+                found = case.flown(kept, seed)
             except OutOfTime:
                 return
             print(

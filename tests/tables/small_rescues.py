@@ -4,9 +4,9 @@ import statistics
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from tests.tables.kept import KEPT, Kept, Run
+from tests.tables.kept import Kept, Run
 from tests.tables.markdown import Rows
-from tests.tables.missions import Case, flown, fly
+from tests.tables.missions import Case, all_flown, flown
 
 _SMALL: Final = (
     "nodes.count=12", "nodes.spacing_m=100", "nodes.telemetry_hz=0", "traffic.interval_s=4", "world.area_m=500",
@@ -37,7 +37,7 @@ SENSES: Final[Mapping[str, Case]] = {
 
 def senses(kept: Kept | None = None) -> Rows:
     """The same rescue by ear alone, and with half of the survivors under rubble, from high up and from low down."""
-    kept = kept or Kept(KEPT, fly)
+    kept = all_flown(SENSES, kept)
     head = [
         "buried", "people are seen by", "searched from", "seeds", "detected", "confirmed", "last find [s]", "contacts",
         "buried: detected", "buried: confirmed", "buried: last estimate off by [m], median", "area covered",
@@ -59,7 +59,7 @@ def _sense_cells(runs: Sequence[Run]) -> list[str]:
 
 def engines(kept: Kept | None = None) -> Rows:
     """The same rescue with the fast model, with rotors, in gusts, and with batteries that are nearly empty."""
-    kept = kept or Kept(KEPT, fly)
+    kept = all_flown(ENGINES, kept)
     head = [
         "flown with", "seeds", "detected", "confirmed", "last find [s]", "contacts", "nearest UAV [m]",
         "least charge at the end [%]", "landed early / fell", "times real time",

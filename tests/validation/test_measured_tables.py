@@ -3,6 +3,7 @@
 import pytest
 
 from tests.tables.command import check
+from tests.tables.kept import Missing
 from tests.tables.registry import TABLES
 
 
@@ -10,4 +11,7 @@ from tests.tables.registry import TABLES
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("name", TABLES)
 def test_a_table_in_the_documents_is_what_a_measurement_gives_now(name: str) -> None:
-    assert check(name) == []
+    try:
+        assert check(name) == []
+    except Missing as missing:
+        pytest.skip(f"missions are not flown yet in {len(missing.missions)} cases")

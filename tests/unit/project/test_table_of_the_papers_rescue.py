@@ -4,12 +4,14 @@ from typing import Any
 
 import pytest
 
+from tests.tables.missions import half_approached_s
 from tests.tables.paper_rescue import paper_row
 
 
 def _run(times_s: list[float], **others: Any) -> dict[str, Any]:
     found = {"enough_heard_s": 20.0, "reports": 0.9, "pdr": 0.99, "connected": 1.0, "collisions": 0}
-    return {"uavs_approaching": len(times_s), "time_to_approach_s": times_s, **found, **others}
+    turned = {"uavs_approaching": len(times_s), "half_approached_s": half_approached_s(45, times_s)}
+    return {**turned, **found, **others}
 
 
 def test_a_seed_in_which_nobody_hears_a_phone_counts_as_nobody_turning_and_for_no_time() -> None:

@@ -245,7 +245,7 @@ def _commands(figures: Sequence[tuple[Path, dict[str, Any]]]) -> list[Block]:
             ],
         ),
         Text(
-            "The code of a figure is the version and a digest of every source file on which a run depends. "
+            "The code of a figure is the version and a digest of the sources on which its rows depend. "
             "Every row of a sweep's runs.parquet has the command that repeats its run alone. Beside each picture are "
             "the numbers in it (CSV), an SVG, and the verdicts as JSON."
         ),

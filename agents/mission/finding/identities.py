@@ -1,6 +1,6 @@
 """Decides which person carries which phone: cameras and microphones show people, receivers identify phones.
 
-    sightings near each other     are taken for one person, whose position a Kalman filter estimates
+    sightings near each other     are taken for one person (`person_track.py`)
     all people and all phones     are assigned at once, so that all received powers together are most likely
     a person's phone is certain   when every other assignment of this person is far less likely
 
@@ -13,10 +13,10 @@ and after a while it is content with less certainty.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final
 
 from agents.mission.finding.finds import SAME_PLACE_M, Finds, estimate_of
+from agents.mission.finding.person_track import PersonTrack
 from agents.mission.finding.phone_localization import Estimate
 from agents.mission.hungarian import assign
 from fanet_mw.units import Enu, S
@@ -34,10 +34,6 @@ _NEAR_M: Final = 400.0
 """A person does not carry a phone if the middle of its filter's grid, near the strongest power, is farther away."""
 _BESIDE_M: Final = 150.0
 """A confirmed survivor can only have been mistaken for people within this distance."""
-_FORGOTTEN_NS: Final = 60 * S
-"""A person of whom there was no further sighting for this long is forgotten."""
-_FALSE_ALARM_NS: Final = 10 * S
-"""A single sighting without another one within this time was a false alarm."""
 _SIGHTINGS: Final = 2
 """A person is not confirmed before this number of sightings from close by."""
 _SURE_M: Final = 3.5
@@ -60,57 +56,10 @@ _IMPATIENT_NS: Final = 50 * S
 """The time since the first sighting from which only the least margin is required; it decreases linearly in between."""
 _REFUTED_COST: Final = 9.0
 """An additional cost at a place where the same survivor was confirmed by mistake, because other UAVs know better."""
-_SECOND_SIGHTINGS: Final = 20
-"""A second person at a place where a survivor is confirmed is believed after this number of further sightings."""
 _SECOND_GATE: Final = 6.0
 """The cost of assigning no phone to a second person, who is then not taken for a second one."""
 _SECOND_SIGMA_M: Final = 30.0
 """A second person can only carry a phone whose place is known from received powers with this standard deviation."""
-
-
-@dataclass
-class PersonTrack:
-    """One person on the ground, by the sightings so far."""
-
-    place: Estimate
-    first_ns: int
-    last_ns: int
-    sightings: int = 1
-    close_sightings: int = 0
-    """The number of sightings from close by."""
-    survivor: int | None = None
-    """The survivor whose phone was last assigned to this person."""
-    confirmed_at: int | None = None
-    """The number of sightings at which a survivor was found to be confirmed at this place; None if none is."""
-
-    def on_sighting(self, at: Enu, variance_m2: float, now_ns: int) -> None:
-        """Add a sighting, by a Kalman filter with the same variance along each axis."""
-        before = self.place
-        gain = before.east_variance_m2 / (before.east_variance_m2 + variance_m2)
-        self.place = Estimate(
-            before.east_m + gain * (at.east - before.east_m),
-            before.north_m + gain * (at.north - before.north_m),
-            before.east_variance_m2 * (1 - gain),
-            0.0,
-            before.north_variance_m2 * (1 - gain),
-        )
-        self.sightings += 1
-        self.last_ns = now_ns
-
-    def on_neighborhood(self, *, confirmed: bool, refuted: bool, now_ns: int) -> None:
-        """Note whether a survivor is confirmed at this place now, and whether a confirmation here was taken back.
-
-        From the moment of a confirmation, only further sightings show that a second person lies here.
-        """
-        if confirmed and self.confirmed_at is None:
-            self.confirmed_at, self.first_ns = self.sightings, now_ns
-        elif refuted and not confirmed:
-            self.confirmed_at = None
-
-    @property
-    def is_believed(self) -> bool:
-        """False if this may be only the survivor who is confirmed at this place already."""
-        return self.confirmed_at is None or self.sightings - self.confirmed_at >= _SECOND_SIGHTINGS
 
 
 class Identities:
@@ -137,7 +86,7 @@ class Identities:
 
     def review(self, now_ns: int) -> list[int]:
         """Assign phones to people anew; returns the survivors who may be confirmed now, in the order of ids."""
-        self._people = [person for person in self._people if _is_remembered(person, now_ns)]
+        self._people = [person for person in self._people if person.is_remembered(now_ns)]
         for person in self._people:
             confirmed = self._has_confirmed(person.place.at)
             refuted = not confirmed and any(
@@ -258,11 +207,6 @@ class Identities:
             and self._is_heard_within(_VAGUE_M if person.confirmed_at is None else _SECOND_SIGMA_M, survivor)
             and find.filter.included_powers >= enough
         )
-
-
-def _is_remembered(person: PersonTrack, now_ns: int) -> bool:
-    """True while a person has been seen recently enough; a single sighting is forgotten sooner."""
-    return now_ns - person.last_ns <= (_FORGOTTEN_NS if person.sightings > 1 else _FALSE_ALARM_NS)
 
 
 def _required_margin(person: PersonTrack, now_ns: int) -> float:

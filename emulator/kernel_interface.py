@@ -31,7 +31,7 @@ class KernelInterface:
     def __init__(self, scenario: Scenario, *, stations: int, faults: Faults, capture: bool = False) -> None:
         self._radio = scenario.radio
         self.faults = faults
-        self.book = LinkCounters(stations)
+        self.link_counters = LinkCounters(stations)
         self._placement = Placement(scenario, stations=stations)
         self.arrays = arrays_of(scenario, self._placement.links(spare=0), stations=stations, capture=capture)
         # These views share memory with numpy arrays; a few numbers are read faster through the buffer protocol.
@@ -58,7 +58,7 @@ class KernelInterface:
         """Compute the links anew, because stations have moved or faults have changed."""
         a = self.arrays
         self._take_in()
-        self.book.take(a.lk)
+        self.link_counters.take(a.lk)
         spare = int(a.lk[s.UNDERWAY].sum())
         links = self._placement.links(spare=spare)
         a.sf[s.NOISE] = self.faults.apply(links, self._placement.at)
@@ -75,8 +75,8 @@ class KernelInterface:
 
     def links(self, now_ns: int) -> LinkStats | None:
         """The traffic of all links since the previous call; None if there was none."""
-        self.book.take(self.arrays.lk)
-        return self.book.close(now_ns)
+        self.link_counters.take(self.arrays.lk)
+        return self.link_counters.close(now_ns)
 
     def copies_under_way(self) -> int:
         """The number of copies of data frames that have been counted as on the air and have not ended yet."""

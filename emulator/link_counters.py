@@ -37,7 +37,7 @@ class LinkCounters:
         self.next_ns = (now_ns // S + 1) * S
 
     def take(self, lk: Ints) -> None:
-        """Move the counts of these links into the book."""
+        """Move the counts of these links here, and leave zeros there."""
         used = np.flatnonzero(lk[s.N_RECEIVED : s.N_CUT + 1].any(axis=0))
         if len(used):
             self._keys.append(lk[s.LINK_SRC, used] * self._stations + lk[s.LINK_DST, used])

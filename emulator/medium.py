@@ -71,7 +71,7 @@ class Medium(Actor):
 
     def start(self, now_ns: int) -> None:
         self.wake(now_ns)
-        self._kernel.book.begin(now_ns)
+        self._kernel.link_counters.begin(now_ns)
 
     def receive(self, topic: str, message: Message, now_ns: int) -> None:
         if type(message) is TxRequest:
@@ -165,8 +165,8 @@ class Medium(Actor):
         if start_ns < self._now_ns:
             start_ns = self._now_ns
         self._kernel.submit(slot, station, s.EVERYONE if dst == BROADCAST else dst - 1, size, start_ns, wants_status)
-        if self._kernel.book.next_ns is None:
-            self._kernel.book.plan(self._now_ns)
+        if self._kernel.link_counters.next_ns is None:
+            self._kernel.link_counters.plan(self._now_ns)
             self._due_ns = self._next_due_ns()
 
     def _refuse_shape(self, station: int, request: TxRequest, now_ns: int) -> None:
@@ -209,16 +209,16 @@ class Medium(Actor):
         fault_ns = self._kernel.faults.next_ns()
         if fault_ns is not None and fault_ns <= due_ns:
             self._take_in_faults(*self._kernel.faults.pass_time(due_ns))
-        book = self._kernel.book
-        if book.next_ns is not None and book.next_ns <= due_ns:
+        links = self._kernel.link_counters
+        if links.next_ns is not None and links.next_ns <= due_ns:
             if self._report_links(due_ns) or self._slots.in_flight:
-                book.plan(due_ns)
+                links.plan(due_ns)
             else:
-                book.next_ns = None
+                links.next_ns = None
         self._due_ns = self._next_due_ns()
 
     def _next_due_ns(self) -> int | None:
-        return earliest(self._measurement.next_ns(), self._kernel.faults.next_ns(), self._kernel.book.next_ns)
+        return earliest(self._measurement.next_ns(), self._kernel.faults.next_ns(), self._kernel.link_counters.next_ns)
 
     def _sample(self) -> Sample:
         arrays, now_ns = self._kernel.arrays, self._now_ns

@@ -108,7 +108,7 @@ class Fate(StrEnum):
     ACKNOWLEDGED = "acknowledged"
     """The application of a node (`Status.nodes`) has received it; reported once per node."""
     UNWANTED = "unwanted"
-    """No application of that node listens to it."""
+    """It has reached a node (`Status.nodes`) on which no application listens to it."""
     EXPIRED = "expired"
     """Its lifetime is over; `Status.nodes` are the nodes that have not acknowledged it, if it was to be confirmed."""
     DROPPED = "dropped"

@@ -10,7 +10,7 @@ from fanet_mw.units import Enu
 
 
 class ClosestApproach(NamedTuple):
-    """The closest approach of two bodies: when it is, and how they then lie to each other."""
+    """The instant at which two bodies are closest to each other, and the vector between them at that instant."""
 
     closest_s: float
     """The time until then, from now; 0 when they are nearest now."""

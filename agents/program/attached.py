@@ -40,7 +40,7 @@ class NodeClosedError(BusError):
 
 
 class Drive(Protocol):
-    """Drives the time of a joined node."""
+    """The host of a joined node, as the node's program needs it."""
 
     def nudge(self) -> None:
         """Let the UAV look at what has been handed to it."""

@@ -54,7 +54,7 @@ class Message(NamedTuple):
     """The time since the other application handed it over, as exact as the clocks of the two nodes agree."""
 
     def mavlink(self) -> list[Any]:
-        """Its MAVLink messages, as objects of pymavlink; none if it was sent to a port.
+        """The MAVLink messages that it consists of, as objects of pymavlink; none if it was sent to a port.
 
         Raises MalformedFrameError for frames that make no sense.
         """

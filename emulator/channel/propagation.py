@@ -125,7 +125,7 @@ class Channel(Protocol):
         ...
 
     def reach_m(self, budget_db: float) -> float:
-        """A distance beyond which each link loses more than the budget."""
+        """A distance beyond which each link loses more than `budget_db`."""
         ...
 
 
@@ -184,7 +184,7 @@ class LinkTable:
         used = slice(self.count)
         dead = self.reals[LINK_POWER, used] == 0.0
         if dead.any():
-            order = np.lexsort((dead, self.ints[LINK_SRC, used]))  # a stable sort keeps the order otherwise
+            order = np.lexsort((dead, self.ints[LINK_SRC, used]))  # the sort is stable: links with power stay in order
             self.ints[:, used] = self.ints[:, used][:, order]
             self.reals[:, used] = self.reals[:, used][:, order]
 

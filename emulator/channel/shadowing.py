@@ -63,7 +63,8 @@ class Shadowing:
     def loss_db(self, at: Reals, found: Ints, distance: Reals) -> Reals:
         """Loss [dB] of each ordered pair [n, 2] of stations at `at` [m], `distance` [m] apart; zero mean.
 
-        Where the ends are close, both ways round give nearly the same, and the sum is scaled to keep its variance.
+        The loss is the sum of the field taken from one end and from the other. If the ends are close to each other,
+        both terms are nearly equal, so the sum is scaled down to keep its variance.
         """
         if not len(found):
             return np.zeros(0)

@@ -40,7 +40,9 @@ def pairs(
                     n += 1
                     continue
                 j = n
-                while j > first and found[j - 1, 1] > b:  # destinations are sorted, whatever the cells
+                while (
+                    j > first and found[j - 1, 1] > b
+                ):  # keeps the destinations ascending, whichever cells they are in
                     found[j, 1] = found[j - 1, 1]
                     distance[j] = distance[j - 1]
                     j -= 1
@@ -61,7 +63,7 @@ def neighbors(at: npt.NDArray[np.float64], reach: float) -> tuple[Ints, Reals]:
         return np.zeros((0, 2), np.int64), np.zeros(0, np.float64)
     here = np.ascontiguousarray(at[known])
     east, north = np.floor((here[:, :2] - here[:, :2].min(axis=0)) / reach).astype(np.int64).T
-    rows = int(north.max()) + 3  # one empty cell at either end keeps columns apart
+    rows = int(north.max()) + 3  # with an empty cell at either end, no column borders on the next one
     cell = east * rows + north
     order = np.argsort(cell, kind="stable")
     room = 32 * len(here)

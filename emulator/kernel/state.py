@@ -191,7 +191,7 @@ DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED, DEGRAD
     LIFETIME_NS,
     DIFS_FIRST,  # 1, as ns-3: a frame waits one DIFS after it is queued, and draws nothing if it is interrupted
     EIFS_FROM_FRAME,  # 1, as ns-3: EIFS begins at the end of a bad frame, not when the medium is idle after it
-    SENSES_SUMS,  # 1, as ns-3: signals too weak to be sensed are sensed together
+    SENSES_SUMS,  # 1, as ns-3: signals that are too weak alone are sensed by the sum of their powers
     OVERLOOKS,  # 1, as ns-3: interference that begins within a detection window is overlooked
     KEEPS_WINDOW,  # 1, as ns-3: CW is reset at the failure after MAX_ATTEMPTS in a row, not when a frame is given up
     INTERFERENCE,  # 0: any overlap destroys a frame; 1: loss by SINR and error rate
@@ -208,6 +208,6 @@ DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED, DEGRAD
     ACK_BITS_PER_NS,
     TAKE_OVER_RATIO,
     SENSITIVITY_MW,
-    FADING_SHAPE,  # m, or K as a ratio
+    FADING_SHAPE,  # m of Nakagami fading, or K of Rician fading as a ratio
     REALS,
 ) = range(8)

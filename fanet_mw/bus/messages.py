@@ -25,7 +25,7 @@ class TxRequest(NamedTuple):
     start_ns: int
     """Swarm instant from which the MAC may contend for the channel."""
     frame: bytes
-    """Whole MAVLink frames, the routing header first. Its length is the UDP payload that is charged on the air."""
+    """Whole MAVLink frames, the routing header first. Their total length is that of the UDP payload on the air."""
     dst: NodeId
     """A neighbor (unicast, acknowledged) or BROADCAST."""
     wants_status: bool

@@ -80,7 +80,7 @@ class Settings(NamedTuple):
 
 @dataclass(slots=True)
 class _LastBeacon:
-    """The last beacon of a neighbor, and when its hellos ended by the own clock."""
+    """The last beacon of a neighbor, and when the neighbor's hellos ended by this node's clock."""
 
     heard_ns: int
     reference: int = 0

@@ -48,7 +48,7 @@ class Statement:
     threshold: float
     unit: str = ""
     possible: Possible = ANY
-    """What the quantity can be; its interval holds nothing else."""
+    """The values that the quantity can have; the interval of its mean is cut to them."""
 
     @property
     def interval(self) -> Interval:

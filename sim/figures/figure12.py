@@ -110,7 +110,7 @@ class _TimeAxis(NamedTuple):
     bars_s: Sequence[float]
     log: bool
     quantity: Callable[[float], Callable[[Row], float]]
-    """The number of UAVs at an instant."""
+    """For an instant, a function that gives the number of UAVs of a run that have turned by then."""
 
 
 def _draw_shares(axes: Axes, look: Look, rows: Sequence[Row], clock: _TimeAxis, place: int) -> list[Mapping[str, Any]]:

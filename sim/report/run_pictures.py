@@ -184,7 +184,7 @@ class _Frame(NamedTuple):
 
 
 def slots(run: RunRecords, reports: Mapping[int, Mapping[str, Any]]) -> RunPicture | None:
-    """The instants at which packets were let out, over the slots or turns of their owners."""
+    """The picture of the instants at which nodes let packets out, drawn over the slots or turns that the nodes own."""
     frame = _frame(reports)
     if run.scenario.routing.protocol != "clustered" or not run.let_out:
         return None

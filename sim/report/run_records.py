@@ -39,14 +39,14 @@ class PlacesOnMap(NamedTuple):
 
     at: Mapping[int, tuple[float, float]]
     said: str
-    """When they were there, for the caption."""
+    """The instant at which the UAVs were at these places, in words for the caption."""
     moved: bool
     """True if UAVs flew during the run, so that links differ from one time to another."""
 
 
 @dataclass(slots=True)
 class RunRecords:
-    """The content of a trace."""
+    """The records of a trace, sorted by what the pictures show."""
 
     scenario: Scenario
     sent: dict[tuple[int, int], int] = field(default_factory=dict)

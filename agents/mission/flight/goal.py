@@ -45,8 +45,8 @@ class Goal:
                 survivor = self._in_lane(lane, moves, now_ns)
         place = None if survivor is None else self._finds.known[survivor].place()
         if survivor is None or place is None:
-            gap = self._gap(now_ns)
-            return (lane, moves) if gap is None else (Enu(*gap, lane.up), STILL)
+            missed = self._missed_place(now_ns)
+            return (lane, moves) if missed is None else (Enu(*missed, lane.up), STILL)
         east, north = self._approach.next_point(survivor, place, now_ns, responding=survivor == task)
         if self._listening is None:
             return formation.bounded(east, north, lane, moves)
@@ -55,8 +55,10 @@ class Goal:
         goal, feed = formation.bounded(look.east, look.north, lane, moves)
         return goal._replace(up=look.up), feed
 
-    def _gap(self, now_ns: int) -> tuple[float, float] | None:
-        """The nearest unsearched gap, if this UAV is a follower; None for all other UAVs, or if there is no gap."""
+    def _missed_place(self, now_ns: int) -> tuple[float, float] | None:
+        """The place of the nearest missed cells, if this UAV is a follower; None for all other UAVs, or if no cell is
+        missed.
+        """
         formation = self._formation
         if self._missed_cells is None or not formation.is_free or formation.place is None:
             return None

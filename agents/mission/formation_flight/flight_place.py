@@ -65,7 +65,7 @@ class FlightPlace:
         return self._around(followed, sorted(others - {head, self._node}), radius_m, here, now_ns)
 
     def _head_of(self, node: int, place: Enu, clusters: Clusters, now_ns: int) -> int | None:
-        """The head of a UAV that is none itself: that of its cluster, or the nearest known one; None if no head is
+        """The head of a UAV that is no head itself: that of its cluster, or the nearest known one; None if no head is
         known.
         """
         own = next((head for head, nodes in clusters.items() if node in nodes), None)

@@ -49,7 +49,7 @@ node that they name."""
 _ABOUT_NOBODY: Final = (MissionModeChanged, Sighted)
 """The kinds of records in which survivor 0 means none."""
 _ABOUT_NODES: Final = ("origin", "other", "reference")
-"""The fields of records that name a node, or 0."""
+"""The fields of records that hold the id of a node, or 0 for none."""
 
 Count = Annotated[int, Field(ge=0, le=2**53)]
 Number = Annotated[float, Field(ge=-1e18, le=1e18)]

@@ -11,7 +11,7 @@ from sim.world.engines.contract import Rows
 
 
 class NoFlyEntries:
-    """Upright cylinders without a top."""
+    """Counts entries into areas that are upright cylinders without a top."""
 
     def __init__(self, areas: Sequence[tuple[float, float, float]], starts: Rows) -> None:
         """`areas`: (east, north, radius) [m]; raises ConfigError if a UAV would start in one."""
@@ -24,7 +24,7 @@ class NoFlyEntries:
             raise ConfigError(f"world.no_fly_m.{columns[0]}: node {rows[0] + 1} starts within it")
 
     def watch(self, at: Rows) -> None:
-        """Watch one step of all UAVs, at [nodes, 3]."""
+        """Count the UAVs that have entered an area since the previous call; `at` has the positions of all."""
         if not len(self._areas):
             return
         within = self._inside(at)

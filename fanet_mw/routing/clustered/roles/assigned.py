@@ -78,7 +78,7 @@ class AssignedRoles:
         self._make_leader = make_leader
         self._leader: Leader | None = None
         self._standing = parts.membership.standing
-        """The role of the node that the access was last told of."""
+        """The role of this node, as the access was last told."""
 
     def start(self, now_ns: int) -> None:
         leads = self._port.node == self._port.scenario.leader

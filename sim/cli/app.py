@@ -12,7 +12,7 @@ from cyclopts import App
 from fanet_mw import __version__
 from fanet_mw.errors import FanetError
 from fanet_mw.hosts import interrupts
-from sim.cli import figures, runs, scenario_files, single_services, swarms, sweep, tool_files
+from sim.cli import figures, replay, runs, scenario_files, single_services, swarms, sweep, tool_files
 from sim.cli.air import app as air_app
 from sim.cli.console import Console, nobody_reads
 
@@ -25,7 +25,7 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 app.command(air_app)
-for commands in (scenario_files, sweep, figures, runs, single_services, swarms, tool_files):
+for commands in (scenario_files, sweep, figures, runs, replay, single_services, swarms, tool_files):
     commands.add_to(app)
 app.register_install_completion_command()
 

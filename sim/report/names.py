@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import Final
 
-PAGES: Final = ("report.html", "report.md")
+REPLAY: Final = "replay.html"
+PAGES: Final = ("report.html", "report.md", REPLAY)
 PICTURES: Final = "pictures"
 """The folder of a run's pictures, beside the page."""
 KINDS: Final = ("delays", "delivery", "links", "slots", "mission", "tracks")

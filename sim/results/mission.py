@@ -221,6 +221,11 @@ class OverflownCells:
     def share(self) -> float:
         return float(self._seen.mean())
 
+    @property
+    def seen(self) -> Flags:
+        """The cells, row by row from south to north, each row from west to east; true of those flown over."""
+        return self._seen.copy()
+
     def add(self, at: Iterable[tuple[float, float, float]]) -> None:
         """UAVs were at these places."""
         for east, north, up in at:

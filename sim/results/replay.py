@@ -1,6 +1,7 @@
 """Replays a mission from the files of its run: where each UAV was, what it did, and which area was covered.
 
 position      `posed`, once a second; in between on a straight line
+cluster       `role_changed`: the role and the head
 flight        `flight_mode_changed`: the mode of the flight controller; from `fallen` on the UAV is a wreck
 mission       `mission_mode_changed`: the UAV's decision, and for which survivor; `planned`: its place in the plan
 sensors       `detected`, `sighted`
@@ -11,18 +12,36 @@ import tomllib
 from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple, Self, TypeVar
+from typing import Any, Final, NamedTuple, Self, TypeVar
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import FlightModeChanged, MissionModeChanged, Planned, Posed, Record
+from fanet_mw.trace import (
+    Approaching,
+    Arrived,
+    Confirmed,
+    Detected,
+    FlightModeChanged,
+    MissionModeChanged,
+    Planned,
+    Posed,
+    Record,
+    Refuted,
+    RoleChanged,
+)
 from fanet_mw.units import Enu, NodeId, S
 from sim.results.file_names import SCENARIO_FILE
-from sim.results.mission import OverflownCells, mission
+from sim.results.mission import Confirmations, OverflownCells, mission
 from sim.results.trace_file import read_trace
+from sim.world.environment.survivors import place
 
-R = TypeVar("R", FlightModeChanged, MissionModeChanged, Planned)
+UNHEARD: Final = "not heard"
+_STAGES: Final[Mapping[type[Any], str]] = {Detected: "detected", Approaching: "approached", Arrived: "reached"}
+_ORDER: Final = (UNHEARD, *_STAGES.values())
+
+R = TypeVar("R", FlightModeChanged, MissionModeChanged, Planned, RoleChanged)
 
 
 class UavState(NamedTuple):
@@ -37,6 +56,21 @@ class UavState(NamedTuple):
     """The survivor to whom it flew; 0 if there was none."""
     place: int
     """Its place in the plan; -1 if it had none."""
+    role: str
+    """Its role in its cluster; empty if it had none yet."""
+    head: int
+    """The head of its cluster; 0 if it had none."""
+
+
+class SurvivorState(NamedTuple):
+    """The state of one survivor from an instant on."""
+
+    t_ns: int
+    status: str
+    """`not heard`, `detected`, `approached`, `reached`, `confirmed`, `mistaken` (confirmed far from the true place), or
+    `reopened` (the confirmation was taken back)."""
+    node: int
+    """The UAV that brought this about; 0 if there was none."""
 
 
 class Replay:
@@ -49,6 +83,7 @@ class Replay:
         self._flight: dict[int, list[FlightModeChanged]] = defaultdict(list)
         self._mission: dict[int, list[MissionModeChanged]] = defaultdict(list)
         self._planned: dict[int, list[Planned]] = defaultdict(list)
+        self._roles: dict[int, list[RoleChanged]] = defaultdict(list)
         for record in records:
             if isinstance(record, Posed):
                 self._posed[record.node].append(record)
@@ -58,15 +93,19 @@ class Replay:
                 self._mission[record.node].append(record)
             elif isinstance(record, Planned):
                 self._planned[record.node].append(record)
+            elif isinstance(record, RoleChanged):
+                self._roles[record.node].append(record)
 
     @classmethod
-    def read(cls, folder: Path) -> Self:
-        """Read what `fanet simulate --out` or `fanet launch --out` has written; raises ConfigError."""
+    def read(cls, folder: Path, *kinds: type[Any]) -> Self:
+        """Read what `fanet simulate --out` or `fanet launch --out` has written, or records of these kinds alone; raises
+        ConfigError.
+        """
         try:
             keys = tomllib.loads((folder / SCENARIO_FILE).read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             raise ConfigError(f"{folder}: cannot be replayed: {error}") from error
-        return cls(Scenario.model_validate(keys), list(read_trace(folder)))
+        return cls(Scenario.model_validate(keys), list(read_trace(folder, *kinds)))
 
     def at(self, t_s: float) -> Mapping[NodeId, UavState]:
         """The states of all UAVs at an instant. A wreck is where it was last seen flying."""
@@ -76,14 +115,43 @@ class Replay:
             flight = _last(self._flight[node], t_ns)
             decided = _last(self._mission[node], t_ns)
             planned = _last(self._planned[node], t_ns)
+            role = _last(self._roles[node], t_ns)
             found[NodeId(node)] = UavState(
                 _between(posed, t_ns),
                 flight.mode if flight else "",
                 decided.mode if decided else "",
                 decided.survivor if decided else 0,
                 planned.place if planned else -1,
+                role.role if role else "",
+                role.head if role else 0,
             )
         return found
+
+    @cached_property
+    def survivors(self) -> Sequence[Enu]:
+        """The true places of the survivors, in the order of their ids; raises ConfigError if they are not known."""
+        return place(self.scenario)
+
+    @cached_property
+    def finds(self) -> Mapping[int, Sequence[SurvivorState]]:
+        """All states of each survivor, in the order of time; the first one is `not heard`, from the start."""
+        held = Confirmations(self.survivors)
+        states = {survivor: [SurvivorState(0, UNHEARD, 0)] for survivor in range(1, len(self.survivors) + 1)}
+        for record in self.records:
+            if isinstance(record, Detected | Approaching | Arrived | Confirmed | Refuted) and record.survivor in states:
+                held.add(record)
+                so_far = states[record.survivor]
+                status = _status(record, so_far[-1].status, held)
+                if status != so_far[-1].status:
+                    so_far.append(SurvivorState(record.t_ns, status, record.node))
+        return states
+
+    def found(self, t_s: float) -> Mapping[int, SurvivorState]:
+        """The states of all survivors at an instant."""
+        return {
+            survivor: next(state for state in reversed(states) if state.t_ns <= max(0, round(t_s * S)))
+            for survivor, states in self.finds.items()
+        }
 
     def coverage(self, t_s: float) -> float:
         """The share of the area that was covered by an instant."""
@@ -96,6 +164,18 @@ class Replay:
     def mission(self) -> Mapping[str, Any]:
         """The table `mission` of the summary, computed anew."""
         return mission(self.scenario, self.records)
+
+
+def _status(record: Record, before: str, held: Confirmations) -> str:
+    """The status of the survivor of a record that was taken in; one who is confirmed does not go back to `detected`."""
+    if isinstance(record, Confirmed | Refuted):
+        if record.survivor in {one.survivor for one in held.right()}:
+            return "confirmed"
+        if record.survivor in {one.survivor for one in held.mistaken()}:
+            return "mistaken"
+        return "reopened" if before in ("confirmed", "mistaken") else before
+    stage = _STAGES[type(record)]
+    return stage if before in _ORDER and _ORDER.index(stage) > _ORDER.index(before) else before
 
 
 def _last(records: Sequence[R], t_ns: int) -> R | None:

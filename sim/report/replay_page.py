@@ -1,0 +1,186 @@
+"""The page that replays a run in a browser: `replay.html`, one file that asks for nothing else.
+
+The content of the run is JSON within the page (`content` below), and `replay.html` beside this module draws it.
+Positions are sampled once a second, in longer or larger runs so rarely that there are at most `_MOST_POINTS` of them.
+"""
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+from importlib.resources import files
+from itertools import groupby
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from fanet_mw.errors import ConfigError
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import (
+    Approaching,
+    Arrived,
+    Collided,
+    Confirmed,
+    Detected,
+    FlightModeChanged,
+    MissionModeChanged,
+    Posed,
+    ProcessEnded,
+    RadioFault,
+    Record,
+    Refuted,
+    RoleChanged,
+)
+from fanet_mw.units import NodeId, S
+from sim.figures import colors
+from sim.results.mission import OverflownCells
+from sim.results.replay import Replay
+from sim.world.environment.obstacles import Box, obstacles
+from sim.world.mobility.layout import positions
+
+REPLAYED: Final = (
+    Posed, RoleChanged, FlightModeChanged, MissionModeChanged, Detected, Approaching, Arrived, Confirmed, Refuted,
+    Collided, ProcessEnded, RadioFault,
+)  # fmt: skip
+"""The kinds of records that a replay needs: few of a trace, most of which are deliveries."""
+_MOST_POINTS: Final = 150_000
+"""The greatest number of positions of UAVs in a page, which are about ten bytes each."""
+_COLORS: Final = {name: value for name, value in vars(colors).items() if name.isupper()}
+
+
+def write(replay: Replay, path: Path) -> None:
+    """Write the page; raises ConfigError if the run has no positions or the file cannot be written."""
+    template = files("sim.report").joinpath("replay.html").read_text("utf-8")
+    text = json.dumps(content(replay), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    for name, value in _COLORS.items():
+        template = template.replace(f"%{name}%", value)
+    try:
+        path.write_text(template.replace("%CONTENT%", text), "utf-8")
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def content(replay: Replay) -> dict[str, Any]:
+    """All that the page shows, as plain values: metres and seconds, lists by time."""
+    scenario = replay.scenario
+    posed = sorted((one for one in replay.records if isinstance(one, Posed)), key=lambda one: one.t_ns)
+    if not posed:
+        raise ConfigError("the trace has no positions of UAVs (`posed`), so there is nothing to replay")
+    nodes = [NodeId(node) for node in sorted({one.node for one in posed})]
+    end_s = posed[-1].t_ns / S
+    step_s = max(1, math.ceil(end_s * len(nodes) / _MOST_POINTS))
+    return {
+        "name": scenario.name,
+        "seed": scenario.seed,
+        "description": scenario.description,
+        "end_s": end_s,
+        "step_s": step_s,
+        "half_m": scenario.world.area_m / 2,
+        "reach_m": scenario.radio.range_m,
+        "searches": scenario.mission.survivors > 0 or scenario.mission.search != "none",
+        "nodes": nodes,
+        "at": _positions(replay, nodes, end_s, step_s),
+        "flight": _modes(replay.records, FlightModeChanged, nodes),
+        "mission": _modes(replay.records, MissionModeChanged, nodes),
+        "role": _modes(replay.records, RoleChanged, nodes),
+        "ended": {one.node: one.t_ns / S for one in replay.records if isinstance(one, ProcessEnded) and one.node},
+        **_people(replay),
+        "covered": _covered(scenario, posed),
+        "solids": _solids(scenario),
+        "no_fly": scenario.world.no_fly_m,
+        "events": list(_events(replay.records)),
+    }
+
+
+def _positions(replay: Replay, nodes: Sequence[NodeId], end_s: float, step_s: int) -> list[list[int]]:
+    """For each sample east, north and up of every UAV, one after the other [m]; the last one is of the end."""
+    rows = []
+    for sample in range(math.ceil(end_s / step_s) + 1):
+        at = replay.at(sample * step_s)
+        rows.append([round(value) for node in nodes for value in at[node].position])
+    return rows
+
+
+def _modes(records: Sequence[Record], kind: type[Any], nodes: Sequence[NodeId]) -> dict[int, list[list[Any]]]:
+    """For each UAV the instants at which a mode changed, each with the other fields of its record."""
+    found: dict[int, list[list[Any]]] = {int(node): [] for node in nodes}
+    for record in records:
+        if type(record) is kind and record.node in found:
+            found[record.node].append([round(record.t_ns / S, 2), *record[2:]])
+    return found
+
+
+def _people(replay: Replay) -> dict[str, Any]:
+    """The places of the survivors and their states; without places, of a scenario whose map is gone, why."""
+    try:
+        places = [[round(at.east), round(at.north)] for at in replay.survivors]
+    except ConfigError as error:
+        return {"survivors": [], "finds": [], "unplaced": str(error)}
+    finds = [
+        [[round(state.t_ns / S, 2), state.status, state.node] for state in states] for states in replay.finds.values()
+    ]
+    return {"survivors": places, "finds": finds, "unplaced": ""}
+
+
+def _covered(scenario: Scenario, posed: Sequence[Posed]) -> list[int]:
+    """The second in which each cell was covered, -1: never; cells by rows from south to north."""
+    cells = OverflownCells(scenario)
+    first = np.full(cells.seen.shape, -1)
+    for t_ns, together in groupby(posed, key=lambda one: one.t_ns):
+        cells.add([(one.east_m, one.north_m, one.up_m) for one in together])
+        first[cells.seen & (first < 0)] = round(t_ns / S)
+    return [int(value) for value in first.ravel()]
+
+
+def _solids(scenario: Scenario) -> list[list[list[int]]]:
+    """The outlines of buildings; none if the map is gone."""
+    if not (scenario.world.buildings or scenario.world.buildings_geojson):
+        return []
+    try:
+        return [_outline(box) for box in obstacles(scenario, np.array(positions(scenario))).boxes]
+    except ConfigError:
+        return []
+
+
+def _outline(box: Box) -> list[list[int]]:
+    """The corners of a building."""
+    cos, sin = math.cos(box.yaw), math.sin(box.yaw)
+    corners = []
+    for along, across in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
+        x, y = along * box.width / 2, across * box.depth / 2
+        corners.append([round(box.east + cos * x - sin * y), round(box.north + sin * x + cos * y)])
+    return corners
+
+
+def _events(records: Sequence[Record]) -> Iterator[list[Any]]:
+    """What a person wants to know of, as text, with its instant and UAV."""
+    for record in records:
+        text = _said(record)
+        if text:
+            yield [round(record.t_ns / S, 2), record.node, text]
+
+
+def _said(record: Record) -> str:
+    match record:
+        case Detected():
+            return f"hears the phone of survivor {record.survivor}"
+        case Approaching():
+            return f"turns towards survivor {record.survivor}"
+        case Arrived():
+            return f"arrives at survivor {record.survivor}"
+        case Confirmed():
+            return f"confirms survivor {record.survivor}"
+        case Refuted():
+            return f"takes back the confirmation of survivor {record.survivor}"
+        case Collided():
+            return f"collides with {f'UAV {record.other}' if record.other else 'the ground or something solid'}"
+        case FlightModeChanged() if record.mode in ("fallen", "failsafe"):
+            return f"has flight mode {record.mode}"
+        case MissionModeChanged() if record.mode in ("return", "lost_link", "land"):
+            return f"has mission mode {record.mode}"
+        case ProcessEnded():
+            return f"process {record.name} ended"
+        case RadioFault():
+            return f"radio fault {record.kind} {record.label} {'begins' if record.active else 'ends'}"
+        case _:
+            return ""

@@ -19,6 +19,9 @@ def spoiled(frame: bytes, at: int) -> bytes:
 FRAMES = [
     FLOODED.encode(),
     FLOODED._replace(origin=4).encode() + wire.filler(100),
+    FLOODED._replace(origin=4, prev_hop=9, hops=1).encode() + wire.filler(100),
+    FLOODED._replace(origin=4).encode() + wire.filler(101),
+    FLOODED._replace(origin=4).encode() + wire.filler(100, node=2),
     FLOODED._replace(flags=0).encode(),
     FLOODED._replace(flags=wire.FLAG_TO_HEAD).encode(),
     FLOODED._replace(flags=wire.PHASE_MASK).encode(),
@@ -35,9 +38,9 @@ def inner_frames(content: wire.Content) -> int:
 def what(reader: Reader, frame: bytes) -> object:
     reader.look(frame)
     try:
-        return reader.key, reader.phase, reader.packet or reader.read()
+        return reader.hash, reader.key, reader.phase, reader.packet or reader.read()
     except MalformedFrameError as error:
-        return reader.key, reader.phase, str(error)
+        return reader.hash, reader.key, reader.phase, str(error)
 
 
 @given(order=st.lists(st.sampled_from(FRAMES), max_size=12))
@@ -54,7 +57,7 @@ def test_all_who_hear_one_frame_hold_one_packet() -> None:
     assert reader.packet.header == FLOODED
 
 
-@pytest.mark.parametrize("frame", FRAMES[4:], ids=["two phases", "no header", "wrong CRC", "nothing"])
+@pytest.mark.parametrize("frame", FRAMES[7:], ids=["two phases", "no header", "wrong CRC", "nothing"])
 def test_a_frame_without_a_packet_is_named_each_time(frame: bytes) -> None:
     reader = Reader()
     reader.look(frame)
@@ -90,3 +93,20 @@ def test_a_broken_packet_is_named_to_each_who_asks() -> None:
     for _ in range(2):
         with pytest.raises(MalformedFrameError):
             made.of(frame, inner_frames)
+
+
+def test_copies_have_one_hash_and_other_packets_of_that_name_have_others_also_when_many_packets_came_between() -> None:
+    reader = Reader()
+    packet, copy, longer, forged = FRAMES[1:5]
+    found = []
+    for frame in (packet, copy, longer, forged, copy):
+        reader.look(frame)
+        found.append(reader.hash)
+        assert reader.hash == duplicates.hash_of(frame)
+    assert found[0] == found[1] == found[4]
+    assert len(set(found)) == 3
+    for seq in range(2000):
+        reader.look(FLOODED._replace(seq=seq).encode())
+    reader.look(copy)
+    assert reader.hash == found[0]
+    assert len(reader._hashes) < 1000

@@ -18,6 +18,7 @@ from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.onboard import Onboard
 from agents.positioning.dead_reckoning import DeadReckoning
 from agents.positioning.steady_fix import SteadyFix
+from agents.setpoints import Setpoints
 from fanet_mw.actor import Actor
 from fanet_mw.application import Application, Course
 from fanet_mw.bus.messages import (
@@ -27,8 +28,6 @@ from fanet_mw.bus.messages import (
     Message,
     Reception,
     SensorReading,
-    Setpoint,
-    SetpointKind,
     TxStatus,
 )
 from fanet_mw.bus.topics import Topics
@@ -79,7 +78,6 @@ class Uav(Actor):
         topics = Topics(swarm)
         super().__init__(f"agent-{node}", (topics.radio_rx(node), topics.sensors(node)))
         self.slack_ns = min(scenario.radio.handover_ns, scenario.radio.lead_ns // 2)  # the rest is for the bus
-        self._id = node
         self._topics = _OutTopics(topics.radio_tx(node), topics.setpoint(node), topics.mavlink(node))
         self._prompt_ns = scenario.radio.handover_ns + scenario.radio.lead_ns
         """The greatest delay of a reception after the end of its frame: a relay must still be
@@ -100,6 +98,7 @@ class Uav(Actor):
             fly=self._steer,
             tap=self._tap,
         )
+        self._setpoints = Setpoints(scenario)
         self._hellos = HelloSchedule(scenario, self._node, hello_time)
         self._own_wake_ns: int | None = None
         """The instant at which an application or a hello is due; it may change whenever an application is called."""
@@ -148,6 +147,9 @@ class Uav(Actor):
         self._autopilot.fix(fix)
         self._node.moved(self._fixes.position(fix), fix.velocity)
         self._onboard.fix(fix, now_ns)
+        again = self._setpoints.repeated(now_ns)
+        if again is not None:
+            self.outbox.append((self._topics.setpoint, again))
 
     def wake(self, now_ns: int) -> None:
         self._node.wake(now_ns)
@@ -175,7 +177,7 @@ class Uav(Actor):
     def report(self) -> Mapping[str, Any]:
         own: dict[str, Any] = {
             "kind": "agent",
-            "node": self._id,
+            "node": self._node.node,
             "generated": 0,
             "bus_malformed": self._malformed,
             "heard_late": self._heard_late,
@@ -229,14 +231,7 @@ class Uav(Actor):
         return earliest(self._onboard.next_wake_ns(), self._hellos.due_ns())
 
     def _steer(self, course: Course, now_ns: int) -> None:
-        setpoint = Setpoint(now_ns, course.position, course.speed_m_s)
-        if course.velocity is not None:
-            setpoint = setpoint._replace(kind=SetpointKind.VELOCITY, velocity=course.velocity)
-        elif course.land:
-            setpoint = setpoint._replace(kind=SetpointKind.LAND)
-        elif course.take_off:
-            setpoint = setpoint._replace(kind=SetpointKind.TAKEOFF)
-        self.outbox.append((self._topics.setpoint, setpoint))
+        self.outbox.append((self._topics.setpoint, self._setpoints.of(course, now_ns)))
 
     def _tap(self, frames: bytes, now_ns: int) -> None:
         self.outbox.append((self._topics.tap, MavlinkTap(now_ns, frames)))

@@ -31,6 +31,8 @@ _FARTHEST_BASE: Final = 2.0
 _RIVALS: Final = ("aodv", "olsr", "dsdv", "geographic")
 _MOST_CLUSTERS_ABREAST: Final = 7
 """The greatest number of clusters side by side: a circle around one head has room for six more heads."""
+_MOVING_MODELS: Final = ("formation", "random_waypoint", "crossing")
+"""The mobility models of the world by which UAVs move without being commanded."""
 _LINKS: Final = 36
 """The number of links in one FANET_LINKS message."""
 _MOST_LINKS_MESSAGES: Final = 4
@@ -65,6 +67,8 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
     found += _blind_warnings(scenario)
     found += _deaf_search(scenario)
     found += _impossible_formation(scenario)
+    found += _unasked_return(scenario)
+    found += _never_taking_off(scenario)
     found += _impossible_faults(scenario)
     found += [
         f"applications.{index}.nodes names node {node}, which must be <= nodes.count = {count}"
@@ -164,6 +168,26 @@ def _impossible_formation(scenario: Scenario) -> Iterator[str]:
         yield f'{wanted} routing.protocol = "clustered", and a clusters.relay that makes clusters'
     if scenario.clusters.count > _MOST_CLUSTERS_ABREAST:
         yield f"{wanted} clusters.count = {scenario.clusters.count} <= {_MOST_CLUSTERS_ABREAST}"
+
+
+def _unasked_return(scenario: Scenario) -> Iterator[str]:
+    """A return of UAVs that follow a mobility model and need no setpoints."""
+    mobility = scenario.mobility
+    if mobility.model != "onboard" and (mobility.return_after_s or mobility.geofence == "return"):
+        yield (
+            f"mobility.return_after_s = {mobility.return_after_s:g}, geofence = {mobility.geofence!r}: a return needs "
+            f'mobility.model = "onboard", not {mobility.model!r}'
+        )
+
+
+def _never_taking_off(scenario: Scenario) -> Iterator[str]:
+    """UAVs that stand on the ground and follow a mobility model, which moves them at the height of their start."""
+    model = scenario.mobility.model
+    if scenario.nodes.on_ground and model in _MOVING_MODELS:
+        yield (
+            f"nodes.on_ground = true: UAVs that follow mobility.model = {model!r} do not take off; "
+            'it needs "onboard", or "static" and an application that commands them'
+        )
 
 
 def _wrong_for_rivals(scenario: Scenario) -> Sequence[str]:

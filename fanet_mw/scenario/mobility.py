@@ -1,11 +1,12 @@
 """The `[mobility]` table: how UAVs move as long as the mission does not decide it."""
 
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field
 
 from fanet_mw.extensions import Options, OptionsOf, PartName
 from fanet_mw.scenario.sections import (
+    Duration,
     Length,
     Section,
     Speed,
@@ -28,3 +29,14 @@ class Mobility(Section):
     """Cruising speed."""
     see_m: Length = 50.0
     """Within this distance the world keeps UAVs clear of each other, without any radio; 0: it does not."""
+    return_after_s: Duration = 0.0
+    """`onboard`: a UAV whose computer has died, so that its last setpoint is older than this while it flies, returns to
+    its start, flown by its flight controller alone: it climbs to `return_height_m`, flies there straight at
+    `speed_m_s`, and lands; the next setpoint takes over from it. Computers repeat their last setpoint three times as
+    often. 0: it holds its position."""
+    return_height_m: Annotated[float, Field(ge=5, le=1000)] = 100.0
+    """The height above the ground at its start at which a UAV returns; one that is higher stays as high. It should
+    clear every obstacle."""
+    geofence: Literal["brake", "return"] = "brake"
+    """`onboard`: what becomes of a UAV whose velocity setpoints take it to the geofence, 50 m outside the area: it
+    brakes before it, or it returns as soon as it is beyond, and obeys no setpoint until it has landed."""

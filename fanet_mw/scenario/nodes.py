@@ -38,7 +38,7 @@ class Nodes(Section):
     on_ground: bool = False
     """Whether UAVs stand on the ground at the start; otherwise they start at `altitude_m`. UAVs of a planned search
     (`mission.search`) take off by themselves, straight up to `altitude_m` above their pads; others when an application
-    commands it."""
+    commands it, which `mobility.model` must be `"onboard"` or `"static"` for."""
     telemetry_hz: Rate = 1.0
     """Rate of each node's MAVLink telemetry on its tap; 0 sends none."""
     positions_m: tuple[tuple[Coordinate, Coordinate, Coordinate], ...] = ()

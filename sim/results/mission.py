@@ -43,6 +43,8 @@ from sim.world.sensors.phone import REFERENCE_LOSS_DB
 _HOMEWARD: Final = frozenset({"return", "land"})
 """The mission modes of a UAV that has left the search."""
 _WRECKED: Final = "fallen"
+_RETURNING: Final = "return"
+"""The flight mode of a UAV that its flight controller brings home."""
 _CELL_M: Final = 25.0
 _NEARLY_ALL: Final = 0.95
 MISTAKEN_M: Final = 25.0
@@ -171,6 +173,7 @@ def _instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows, Flags]]:
     dead: set[int] = set()
     wrecked: set[int] = set()
     homeward: set[int] = set()
+    returning: set[int] = set()
     rows: list[tuple[float, float, float]] = []
     searching: list[bool] = []
     t_ns = 0
@@ -179,6 +182,7 @@ def _instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows, Flags]]:
             dead.add(record.node)
         elif type(record) is FlightModeChanged:
             wrecked |= {record.node} if record.mode == _WRECKED else set()
+            returning = returning | {record.node} if record.mode == _RETURNING else returning - {record.node}
         elif type(record) is MissionModeChanged:
             homeward = homeward | {record.node} if record.mode in _HOMEWARD else homeward - {record.node}
         elif type(record) is Posed:
@@ -188,7 +192,7 @@ def _instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows, Flags]]:
             t_ns = record.t_ns
             if record.node not in dead:
                 rows.append((record.east_m, record.north_m, record.up_m))
-                searching.append(record.node not in homeward and record.node not in wrecked)
+                searching.append(record.node not in homeward | wrecked | returning)
     if rows:
         yield t_ns, np.array(rows), np.array(searching)
 

@@ -1,7 +1,8 @@
 """The geofence of the world: no setpoint takes a UAV out of the area and the margin around it.
 
 A position is clipped to the area. A velocity is limited so that the UAV can brake before it reaches the geofence, which
-lies `FENCE_M` outside the area.
+lies `FENCE_M` outside the area; with `mobility.geofence = "return"` it is not limited, and a UAV beyond the geofence
+flies home.
 """
 
 from typing import Final
@@ -9,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from fanet_mw.units import Enu
-from sim.world.engines.contract import Rows
+from sim.world.engines.contract import Flags, Rows
 
 FENCE_M: Final = 50.0
 """The distance of the geofence from the area; a UAV with a velocity setpoint brakes before it reaches the geofence."""
@@ -36,6 +37,11 @@ class Geofence:
             max(-self._half_north_m, min(self._half_north_m, place.north)),
             max(FLOOR_M, min(_CEILING_M, place.up)),
         )
+
+    def beyond(self, at: Rows) -> Flags:
+        """True for each UAV that is beyond the geofence."""
+        reach = np.array([self._half_east_m, self._half_north_m]) + FENCE_M
+        return np.asarray((np.abs(at[:, :2]) > reach).any(axis=1))
 
     def brake(self, wish: Rows, at: Rows) -> Rows:
         """Velocities limited so that each UAV can brake before the geofence; a UAV beyond it is brought back."""

@@ -4,7 +4,8 @@ A UAV follows a moving place by a proportional controller, to which the velocity
 If the scenario says so, the world keeps UAVs apart (`separation_keeping.py`).
 
 Whatever a flight controller is asked to do, it holds its position when velocity setpoints are no longer renewed, brakes
-before the geofence (`geofence.py`), and lands at once when its battery is nearly empty.
+before the geofence or returns from it (`geofence.py`), and lands at once when its battery is nearly empty. If the
+scenario says so, it also returns when its computer falls silent (`return_mode.py`).
 """
 
 from collections.abc import Callable, Mapping
@@ -24,6 +25,7 @@ from sim.world.mobility.crossing import Crossing
 from sim.world.mobility.formation import Formation
 from sim.world.mobility.geofence import HOLD_M_S, Geofence
 from sim.world.mobility.random_waypoint import RandomWaypoint
+from sim.world.mobility.return_mode import Homeward, ReturnMode
 from sim.world.mobility.separation_keeping import CLEAR_M, kept_clear
 
 _GAIN: Final = 0.8
@@ -31,7 +33,7 @@ _GAIN: Final = 0.8
 _LEAST_CLIMB_M_S: Final = 0.5
 """The speed of a take-off whose setpoint asks for less."""
 _FORCED_M_S: Final = 2.0
-"""The sinking speed of a UAV that lands because its battery is nearly empty."""
+"""The sinking speed of a UAV that lands because its battery is nearly empty, or at the end of its return."""
 _TOUCHDOWN_M_S: Final = 0.5
 """The sinking speed at which a UAV touches the ground, as in ArduPilot (LAND_SPEED)."""
 _FLARE_PER_S: Final = 0.5
@@ -50,6 +52,8 @@ class FlightMode(StrEnum):
     HOLD = "hold"
     TAKEOFF = "takeoff"
     LAND = "land"
+    RETURN = "return"
+    """The UAV flies home and lands, because its computer has fallen silent or because it was beyond the geofence."""
     FAILSAFE = "failsafe"
     """The UAV holds its position because velocity setpoints are no longer renewed, or lands because its battery is
     nearly empty."""
@@ -77,7 +81,7 @@ class _Land(NamedTuple):
     speed_m_s: float
 
 
-_Command = _GoTo | _FlyAt | _Land
+_Command = _GoTo | _FlyAt | _Land | Homeward
 
 
 def makes_sense(setpoint: Setpoint) -> bool:
@@ -107,6 +111,7 @@ class Guidance:
         half = scenario.world.area_m / 2
         reach = np.maximum(half, np.abs(starts[:, :2]).max(axis=0)) if self._onboard else (half, half)
         self._fence = Geofence(half_east_m=float(reach[0]), half_north_m=float(reach[1]))
+        self._returns = ReturnMode(starts, scenario, ground_m=self._ground_m)
         self._starts = starts.copy()
         """The place at which each UAV holds while neither a mobility model nor a setpoint moves it."""
         self._model: MobilityModel | None = (
@@ -136,6 +141,7 @@ class Guidance:
         row = node - 1
         if not self._obeys(row):
             return
+        self._returns.on_setpoint(row, t_s)
         kind, place, speed_m_s = setpoint.kind, setpoint.position, setpoint.speed_m_s
         if kind is not SetpointKind.LAND and isinstance(self._commands.get(row), _Land):
             self._grounded.add(row)  # a UAV that was landing may stand on the ground until it has climbed
@@ -176,10 +182,13 @@ class Guidance:
         self._enter(row, FlightMode.FALLEN)
 
     def _obeys(self, row: int) -> bool:
-        """False for a UAV that has crashed, or that lands because its battery is nearly empty."""
+        """False for a UAV that has crashed, that lands because its battery is nearly empty, or that returns from beyond
+        the geofence.
+        """
         mode = self._modes.get(row)
         landing = isinstance(self._commands.get(row), _Land)
-        return mode is not FlightMode.FALLEN and not (mode is FlightMode.FAILSAFE and landing)
+        forced = (mode is FlightMode.FAILSAFE and landing) or row in self._returns.from_fence
+        return mode is not FlightMode.FALLEN and not forced
 
     def _command(self, row: int, command: _Command | None) -> None:
         """Replace the command of a row; None lets it follow the mobility model."""
@@ -227,8 +236,15 @@ class Guidance:
         places, feed = places.copy(), feed.copy()
         limit = np.linalg.norm(feed, axis=1) + 5.0
         self._expire(t_s, at)
-        for row, command in self._commands.items():
-            if isinstance(command, _GoTo):
+        if self._returns.watches:
+            self._begin_returns(t_s, at)
+        for row, command in [*self._commands.items()]:
+            if isinstance(command, Homeward):
+                goal = command.goal(Enu(*at[row].tolist()))
+                self._command(row, _Land(_FORCED_M_S) if goal is None else command)
+                places[row], limit[row] = goal or at[row], command.speed_m_s
+                feed[row] = 0.0
+            elif isinstance(command, _GoTo):
                 places[row], limit[row] = command
                 feed[row] = 0.0
         wish = feed + _GAIN * (places - at)
@@ -237,7 +253,8 @@ class Guidance:
         flown = {row: command.velocity for row, command in self._commands.items() if isinstance(command, _FlyAt)}
         if flown:
             rows = [*flown]
-            wish[rows] = self._fence.brake(np.array([*flown.values()]), at[rows])
+            asked = np.array([*flown.values()])
+            wish[rows] = asked if self._returns.at_fence else self._fence.brake(asked, at[rows])
         landings = {row: command.speed_m_s for row, command in self._commands.items() if isinstance(command, _Land)}
         if landings or self._grounded:
             self._near_the_ground(wish, at, landings)
@@ -249,6 +266,18 @@ class Guidance:
         for row in [row for row, told in commands if isinstance(told, _FlyAt) and t_s >= told.until_s]:
             self._hold(row, Enu(*at[row].tolist()))
             self._enter(row, FlightMode.FAILSAFE)
+
+    def _begin_returns(self, t_s: float, at: Rows) -> None:
+        """Send those UAVs home that fly without having heard from their computers, or are beyond the geofence."""
+        stands = self.grounded(at)
+        self._returns.from_fence -= set(np.flatnonzero(stands).tolist())
+        able = [
+            row for row in range(len(at))
+            if not stands[row] and self._obeys(row) and not isinstance(self._commands.get(row), _Land | Homeward)
+        ]  # fmt: skip
+        for row, homeward in self._returns.due(able, at, self._fence.beyond(at), t_s):
+            self._command(row, homeward)
+            self._enter(row, FlightMode.RETURN)
 
     def _near_the_ground(self, wish: Rows, at: Rows, landings: Mapping[int, float]) -> None:
         """Set the velocities of UAVs that land or stand on the ground.

@@ -35,6 +35,13 @@ def test_the_dead_need_no_connection() -> None:
     assert found["connected"] == 1.0
 
 
+@pytest.mark.parametrize("back", ["goto", "return"])
+def test_who_is_brought_home_by_its_flight_controller_need_not_be_in_reach(back: str) -> None:
+    away = [*at(1, 0, 100, 900), *at(2, 0, 100, 900)]
+    modes = [FlightModeChanged(S, 3, "return"), FlightModeChanged(S, 3, back)]
+    assert measured([*modes, *away])["connected"] == (1.0 if back == "return" else 0.0)
+
+
 @pytest.mark.parametrize("gone", [MissionModeChanged(S, 3, "return", 0), FlightModeChanged(S, 3, "fallen")])
 def test_who_has_left_the_search_or_has_fallen_need_not_be_in_reach(
     gone: MissionModeChanged | FlightModeChanged,

@@ -38,6 +38,19 @@ def test_what_tables_disagree_about_is_reported_with_both_keys() -> None:
     assert "traffic.destination = 7 must be <= nodes.count = 5" in message
 
 
+@pytest.mark.parametrize("keys", ["return_after_s = 5", 'geofence = "return"'])
+def test_a_return_of_uavs_that_need_no_setpoints_is_refused(keys: str) -> None:
+    message = refusal(f'[mobility]\nmodel = "formation"\n{keys}\n')
+    assert "a return needs mobility.model = \"onboard\", not 'formation'" in message
+    config.parse(f'[mobility]\nmodel = "onboard"\n{keys}\n', source="a.toml", name="a")
+
+
+@pytest.mark.parametrize("model", ["formation", "random_waypoint", "crossing"])
+def test_uavs_on_the_ground_that_nobody_would_let_take_off_are_refused(model: str) -> None:
+    message = refusal(f'[nodes]\non_ground = true\n[mobility]\nmodel = "{model}"\n')
+    assert f"nodes.on_ground = true: UAVs that follow mobility.model = '{model}' do not take off" in message
+
+
 def test_a_guard_longer_than_its_slot_is_refused() -> None:
     assert "guard_ms = 2000" in refusal("[clusters]\nguard_ms = 2000\nflooding_period_s = 5\ncount = 4\n")
 

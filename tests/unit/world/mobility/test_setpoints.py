@@ -229,6 +229,90 @@ def test_nobody_who_flies_at_a_velocity_leaves_the_geofence(make_scenario: MakeS
     assert flying.at(1)[:2] == pytest.approx([-150, 150], abs=3)
 
 
+RETURN = {"mobility.return_after_s": 5.0, "mobility.return_height_m": 70.0, "world.crash": "falls"}
+
+
+@pytest.mark.parametrize("engine", ["kinematic", "rotors"])
+def test_a_uav_whose_computer_falls_silent_climbs_flies_home_and_lands(
+    make_scenario: MakeScenario, engine: str
+) -> None:
+    flying = Flying(make_scenario, **RETURN, **{"world.engine": engine})
+    flying.ask(1, SetpointKind.POSITION, Enu(60.0, 80.0, 50.0), speed_m_s=10.0)
+    flying.fly(4)
+    for _ in range(20):
+        flying.ask(2, SetpointKind.VELOCITY)
+        flying.fly(0.5)
+    assert flying.modes == [(1, "goto"), (2, "velocity"), (1, "return")], "nobody heard of the first for five seconds"
+    heights = []
+    for _ in range(160):
+        flying.ask(2, SetpointKind.VELOCITY)
+        flying.fly(0.5)
+        place = flying.at(1)
+        heights.append((float(np.hypot(place[0] + 50, place[1])), float(place[2])))
+    assert all(up > 69 for off, up in heights if 5 < off < 60), "it flies home at a height that is free of obstacles"
+    assert flying.at(1) == pytest.approx([-50, 0, 0.1], abs=2.0)
+    assert flying.at(2) == pytest.approx([50, 0, 50], abs=0.5), "the other one obeys its computer"
+    assert flying.modes[3:] == []
+    assert flying.collisions == []
+
+
+def test_who_flies_above_the_height_of_return_stays_as_high_on_its_way(make_scenario: MakeScenario) -> None:
+    flying = Flying(make_scenario, **RETURN)
+    flying.ask(1, SetpointKind.POSITION, Enu(-50.0, 60.0, 90.0), speed_m_s=20.0)
+    flying.fly(15)
+    assert 85 < flying.at(1)[2] < 93
+    assert (1, "return") in flying.modes
+
+
+def test_a_computer_that_speaks_again_takes_over_from_a_return(make_scenario: MakeScenario) -> None:
+    flying = Flying(make_scenario, **RETURN)
+    flying.ask(1, SetpointKind.HOLD)
+    flying.fly(12)
+    assert flying.modes == [(1, "hold"), (1, "return")], "the other one was never told anything"
+    flying.ask(1, SetpointKind.POSITION, Enu(-50.0, 30.0, 40.0), speed_m_s=10.0)
+    flying.fly(4.5)
+    assert flying.modes[-1] == (1, "goto")
+    assert flying.at(1)[1] > 20
+
+
+def test_who_stands_on_its_pad_or_lands_does_not_return(make_scenario: MakeScenario) -> None:
+    flying = Flying(make_scenario, **RETURN, **{"nodes.on_ground": True})
+    flying.ask(2, SetpointKind.TAKEOFF, Enu(0.0, 0.0, 30.0), speed_m_s=3.0)
+    flying.fly(3)
+    flying.ask(2, SetpointKind.LAND)
+    flying.fly(30)
+    assert flying.modes == [(2, "takeoff"), (2, "land")]
+    assert max(flying.at(1)[2], flying.at(2)[2]) < 0.35
+
+
+def test_without_the_key_a_silent_computer_leaves_its_uav_where_it_is(make_scenario: MakeScenario) -> None:
+    flying = Flying(make_scenario)
+    flying.ask(1, SetpointKind.VELOCITY, v=Enu(0.0, 4.0, 0.0))
+    flying.fly(60)
+    assert flying.modes == [(1, "velocity"), (1, "failsafe")]
+
+
+def test_at_a_geofence_of_return_a_uav_flies_home_whatever_it_is_asked_and_obeys_once_it_has_landed(
+    make_scenario: MakeScenario,
+) -> None:
+    keys = {"world.area_m": 200, "mobility.geofence": "return", "mobility.return_height_m": 20.0}
+    flying = Flying(make_scenario, **keys, **{"nodes.altitude_m": 20.0})
+    farthest = 0.0
+    for _ in range(60):
+        flying.ask(1, SetpointKind.VELOCITY, v=Enu(-8.0, 0.0, 0.0))
+        flying.fly(0.5)
+        farthest = max(farthest, -float(flying.at(1)[0]))
+    assert 150 < farthest < 165, "50 m outside of the area, and as far as it takes to stop"
+    assert flying.modes == [(1, "velocity"), (1, "return")]
+    flying.fly(40)
+    assert flying.at(1) == pytest.approx([-50, 0, 0.1], abs=2.0)
+    assert flying.modes[2:] == []
+    flying.ask(1, SetpointKind.TAKEOFF, Enu(0.0, 0.0, 15.0), speed_m_s=3.0)
+    flying.fly(10)
+    assert flying.at(1)[2] == pytest.approx(15, abs=0.5)
+    assert flying.collisions == []
+
+
 def test_a_flight_controller_lands_when_its_battery_is_nearly_empty_whatever_it_is_asked(
     make_scenario: MakeScenario,
 ) -> None:

@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Self
 
 import air_attacks
+import pytest
 from realtime_attacks import attacked_in_real_time
+from undisturbed import LIMIT_S, undisturbed
 
 from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import ClockEpoch, ClockState, MavlinkTap, Message, Report, TraceBatch
@@ -84,8 +86,9 @@ def test_a_forged_clock_that_is_stopped_stops_nobody() -> None:
     assert outcome.aborted is None
 
 
+@pytest.mark.timeout(LIMIT_S)
 def test_nonsense_for_the_launcher_is_counted_and_the_result_is_that_of_the_swarm(tmp_path: Path) -> None:
-    outcome = attacked(NONSENSE)
+    outcome, _ = undisturbed(lambda slower: attacked(NONSENSE, slower))
     summary = finish(outcome, out=tmp_path)
     assert set(summary["heard"]["why"]) == {
         "report: shape", "trace: node", "trace: survivor", "trace: unknown actor", "telemetry: instant",

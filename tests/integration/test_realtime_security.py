@@ -11,6 +11,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
+from undisturbed import LIMIT_S, undisturbed
 
 from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import (
@@ -32,9 +33,9 @@ from fanet_mw.errors import BusError, ConfigError
 from fanet_mw.hosts.bus import Bus, exposure
 from fanet_mw.hosts.clock import ClockKeeper, ClockListener
 from fanet_mw.units import BROADCAST, Enu, NodeId, S
-from sim.results.files import finish
 from sim.run.bus.certificates import make
 from sim.run.launcher.swarm import free_endpoint, launch
+from sim.run.outcome import Outcome
 from sim.scenarios import catalog
 
 NAMES = Topics("test")
@@ -179,9 +180,12 @@ async def test_an_agent_cannot_answer_for_the_keeper_of_the_clock(keys: Path) ->
         await asyncio.wait_for(listener.stopped.wait(), 60)
 
 
+@pytest.mark.timeout(LIMIT_S)
 def test_a_swarm_of_processes_works_with_keys_and_access_lists(keys: Path) -> None:
-    outcome = asyncio.run(launch(catalog.find("quick", SMALL), swarm="test", zenoh_config=keys))
-    summary = finish(outcome, out=None)
+    def run(slower: str) -> Outcome:
+        return asyncio.run(launch(catalog.find("quick", [*SMALL, slower]), swarm="test", zenoh_config=keys))
+
+    _, summary = undisturbed(run)
     assert summary["absent"] == {}
     assert summary["heard"]["malformed"] == 0
     assert summary["frames"]["sent"] > 30

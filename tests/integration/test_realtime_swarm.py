@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from undisturbed import LIMIT_S, undisturbed
 
 from agents.__main__ import run as run_agent
 from emulator.kernel.compile import must_compile, warm_up
@@ -75,12 +76,13 @@ def _nothing_left_behind() -> Iterator[None]:
     assert left == []
 
 
+@pytest.mark.timeout(LIMIT_S)
 @pytest.mark.parametrize("relay", ["scheduled", "claimed"])
 def test_turns_announced_ahead_are_kept_by_real_processes(relay: str) -> None:
     """Collision-free floods leave no time between hops but the lead: what is late is lost."""
     keys = ["nodes.count=9", "nodes.layout=grid", "traffic.sources=8", "clusters.count=8", "radio.lead_ms=150"]
     times = ["duration_s=11", "warmup_s=7.5", "drain_s=1", f"clusters.relay={relay}"]
-    summary = finish(run(catalog.find("clusters", [*keys, *times]))[0], out=None)
+    _, summary = undisturbed(lambda slower: run(catalog.find("clusters", [*keys, *times, slower]))[0])
     assert summary["frames"]["closes"]
     assert summary["pdr"] > 0.9
     assert summary["bound"].get("violations", 0) == 0
@@ -105,8 +107,9 @@ def test_links_are_measured_and_a_timetable_made_of_them_by_real_processes() -> 
     assert not summary["valid"] or summary["likely"]["within_share"] >= summary["likely"]["share"]
 
 
+@pytest.mark.timeout(LIMIT_S)
 def test_a_swarm_of_processes_delivers_and_accounts_for_every_frame(tmp_path: Path) -> None:
-    outcome, _ = run(scenario())
+    outcome, _ = undisturbed(lambda slower: run(scenario(slower))[0])
     summary = finish(outcome, out=tmp_path / "out")
     assert summary["mode"] == "realtime"
     assert summary["frames"]["closes"]

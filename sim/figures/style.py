@@ -1,6 +1,6 @@
 """The common style of all figures: sizes, lines and colors that can be distinguished by the color-blind and in print.
 
-The colors are those of Okabe and Ito (2008). No line differs from others by its color alone: each has a marker and a
+The colors are in `colors.py`. No line differs from others by its color alone: each has a marker and a
 dash pattern of its own.
 """
 
@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
+from sim.figures.colors import BLUE, GRAY, GREEN, ORANGE, PINK, RED
 from sim.figures.statistics import Interval
 
 
@@ -33,23 +34,23 @@ class Look(NamedTuple):
 CONTROL: Final = "flooding, cw_min 1"
 """The case that floods with the contention window of the timetable's runs: it tells what the window makes of them."""
 LOOKS: Final[Mapping[str, Look]] = {
-    "ours": Look("fanet-mw", "#0072B2", "o", "-"),
-    "paper": Look("the paper's method", "#D55E00", "s", "--"),
-    "flooding": Look("plain flooding", "#009E73", "^", "-."),
-    "aodv": Look("AODV", "#CC79A7", "D", (0, (5, 1))),
-    "olsr": Look("OLSR", "#E69F00", "v", (0, (3, 1, 1, 1))),
-    "gossip": Look("gossip", "#CC79A7", "D", (0, (5, 1))),
-    "counter": Look("counter-based", "#E69F00", "v", (0, (3, 1, 1, 1))),
-    CONTROL: Look("plain flooding, cw_min 1", "#777777", "x", (0, (2, 1))),
+    "ours": Look("fanet-mw", BLUE, "o", "-"),
+    "paper": Look("the paper's method", RED, "s", "--"),
+    "flooding": Look("plain flooding", GREEN, "^", "-."),
+    "aodv": Look("AODV", PINK, "D", (0, (5, 1))),
+    "olsr": Look("OLSR", ORANGE, "v", (0, (3, 1, 1, 1))),
+    "gossip": Look("gossip", PINK, "D", (0, (5, 1))),
+    "counter": Look("counter-based", ORANGE, "v", (0, (3, 1, 1, 1))),
+    CONTROL: Look("plain flooding, cw_min 1", GRAY, "x", (0, (2, 1))),
     "limit": Look("a path exists", "#000000", "", (0, (1, 2))),
 }
 """The look of each case of a sweep."""
 SERIES: Final = (
-    Look("", "#0072B2", "o", "-"),
-    Look("", "#D55E00", "s", "--"),
-    Look("", "#009E73", "^", "-."),
-    Look("", "#CC79A7", "D", (0, (5, 1))),
-    Look("", "#E69F00", "v", (0, (3, 1, 1, 1))),
+    Look("", BLUE, "o", "-"),
+    Look("", RED, "s", "--"),
+    Look("", GREEN, "^", "-."),
+    Look("", PINK, "D", (0, (5, 1))),
+    Look("", ORANGE, "v", (0, (3, 1, 1, 1))),
 )
 """The looks of lines for the values of a setting, in their order."""
 

@@ -11,15 +11,14 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from fanet_mw.trace import Approaching, Arrived, Detected
 from fanet_mw.units import S
-from sim.figures.style import SERIES, canvas, legend_above
+from sim.figures.colors import BLUE, DARK, GREEN, ORANGE, PINK, RED
+from sim.figures.style import canvas, legend_above
 from sim.report.run_pictures import RunPicture, map_canvas
 from sim.report.run_records import RunRecords
 from sim.results.mission import Confirmations, OverflownCells
 
-_BLUE, _RED, _GREEN, _PINK, _ORANGE = (look.color for look in SERIES)
-_DARK: Final = "#222222"
-_STEPS: Final = ((Detected, "detected", _ORANGE, "o", "-"), (Approaching, "approached", _BLUE, "s", "--"),
-                 (Arrived, "reached", _PINK, "^", "-."))  # fmt: skip
+_STEPS: Final = ((Detected, "detected", ORANGE, "o", "-"), (Approaching, "approached", BLUE, "s", "--"),
+                 (Arrived, "reached", PINK, "^", "-."))  # fmt: skip
 
 Step = tuple[float, float]
 """An instant [s], and the value from then on."""
@@ -36,13 +35,13 @@ def progress(run: RunRecords) -> RunPicture | None:
     figure, axes = canvas(1, panels, width=6.5, height=2.6)
     if lines:
         _draw_counts(axes[0], lines, end_s=run.end_s)
-        axes[0].axhline(people, color=_DARK, linewidth=0.9, linestyle=(0, (1, 2)), label=f"all {people} survivors")
+        axes[0].axhline(people, color=DARK, linewidth=0.9, linestyle=(0, (1, 2)), label=f"all {people} survivors")
         axes[0].set_ylabel("survivors")
         axes[0].set_ylim(0, people * 1.06)
         axes[0].yaxis.set_major_locator(MaxNLocator(integer=True))
         legend_above(figure, axes[0])
     if covered:
-        axes[-1].plot(*zip(*covered, strict=True), color=_GREEN)
+        axes[-1].plot(*zip(*covered, strict=True), color=GREEN)
         axes[-1].set_ylabel("area covered")
         axes[-1].set_ylim(0, 1.05)
         axes[-1].yaxis.set_major_formatter(PercentFormatter(1.0))
@@ -82,7 +81,7 @@ def _lines(run: RunRecords) -> Iterator[tuple[str, list[Step], str, str, str]]:
         if count != before:
             confirmed.append((record.t_ns / S, float(count)))
         before = count
-    yield "confirmed", confirmed, _GREEN, "D", "-"
+    yield "confirmed", confirmed, GREEN, "D", "-"
 
 
 def _draw_counts(axes: Axes, lines: Sequence[tuple[str, list[Step], str, str, str]], *, end_s: float) -> None:
@@ -108,11 +107,11 @@ def tracks(run: RunRecords) -> RunPicture | None:
     half = run.scenario.world.area_m / 2
     flown = [[(one.east_m, one.north_m) for one in track] for track in run.tracks.values()]
     figure, axes = map_canvas([(-half, -half), (half, half), *(at for track in flown for at in track)])
-    axes.add_patch(Rectangle((-half, -half), 2 * half, 2 * half, fill=False, edgecolor=_DARK, linestyle="--",
+    axes.add_patch(Rectangle((-half, -half), 2 * half, 2 * half, fill=False, edgecolor=DARK, linestyle="--",
                              linewidth=0.9, label="area to be searched"))  # fmt: skip
-    axes.add_collection(LineCollection(flown, colors=_BLUE, linewidths=0.8, alpha=0.6, label="tracks"))
+    axes.add_collection(LineCollection(flown, colors=BLUE, linewidths=0.8, alpha=0.6, label="tracks"))
     ends = [track[-1] for track in flown]
-    axes.scatter([at[0] for at in ends], [at[1] for at in ends], s=14, color=_BLUE, zorder=3, label="UAVs at the end")
+    axes.scatter([at[0] for at in ends], [at[1] for at in ends], s=14, color=BLUE, zorder=3, label="UAVs at the end")
     confirms = run.scenario.mission.search != "none"
     held = Confirmations(run.survivors)
     for record in run.mission:
@@ -122,10 +121,10 @@ def tracks(run: RunRecords) -> RunPicture | None:
     missed = [at for survivor, at in enumerate(run.survivors, 1) if survivor not in found]
     had = [at for survivor, at in enumerate(run.survivors, 1) if survivor in found]
     for places, label, color, marker in (
-        ([(at.east, at.north) for at in had], "survivor, confirmed", _DARK, "o"),
-        ([(at.east, at.north) for at in missed], "survivor, not confirmed" if confirms else "survivor", _RED, "x"),
-        ([(one.east_m, one.north_m) for one in right], "place confirmed", _GREEN, "+"),
-        ([(one.east_m, one.north_m) for one in mistaken], "place confirmed by mistake", _PINK, "v"),
+        ([(at.east, at.north) for at in had], "survivor, confirmed", DARK, "o"),
+        ([(at.east, at.north) for at in missed], "survivor, not confirmed" if confirms else "survivor", RED, "x"),
+        ([(one.east_m, one.north_m) for one in right], "place confirmed", GREEN, "+"),
+        ([(one.east_m, one.north_m) for one in mistaken], "place confirmed by mistake", PINK, "v"),
     ):
         if places:
             axes.scatter([at[0] for at in places], [at[1] for at in places], s=55, marker=marker, linewidths=1.5,

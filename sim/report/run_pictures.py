@@ -13,7 +13,8 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from fanet_mw.trace import LetOut
 from fanet_mw.units import MS, S
-from sim.figures.style import SERIES, canvas, legend_above
+from sim.figures.colors import BLUE, DARK, RED, SHADE
+from sim.figures.style import canvas, legend_above
 from sim.report.run_records import RunRecords
 
 _WINDOWS: Final = 40
@@ -27,9 +28,6 @@ _NARROWEST: Final = 0.35
 """The least ratio of a map's sides."""
 _MOST_NAMED: Final = 12
 """The greatest number of slots whose owners are named above them."""
-_BLUE, _RED, _GREEN, _PINK, _ORANGE = (look.color for look in SERIES)
-_DARK: Final = "#222222"
-_SHADE: Final = "#f3cf86"
 
 
 class RunPicture(NamedTuple):
@@ -48,9 +46,9 @@ def delays(run: RunRecords) -> RunPicture | None:
     bounds = [bound for name, bound in run.bounds.items() if name in run.sent]
     late_ns = [one.delay_ns for one in run.delivered]
     unit, unit_ns = ("s", S) if max(late_ns + bounds) >= _LONG_NS else ("ms", MS)
-    _steps(axes, [delay / unit_ns for delay in late_ns], whole, "delay", _BLUE, "-")
+    _steps(axes, [delay / unit_ns for delay in late_ns], whole, "delay", BLUE, "-")
     if bounds:
-        _steps(axes, [bound / unit_ns for bound in bounds], len(run.sent), "bound stated by the origin", _RED, "--")
+        _steps(axes, [bound / unit_ns for bound in bounds], len(run.sent), "bound stated by the origin", RED, "--")
         legend_above(figure, axes)
     axes.set_xlabel(f"end-to-end delay [{unit}]")
     axes.set_ylabel("share of packets x targets")
@@ -89,10 +87,10 @@ def delivery(run: RunRecords) -> RunPicture | None:
         of_node[one.node][0] += 1
     steps = sorted(wanted)
     times = [(start_ns + (step + 0.5) * step_ns) / S for step in steps]
-    over_time.plot(times, [had[step] / wanted[step] for step in steps], color=_BLUE)
+    over_time.plot(times, [had[step] / wanted[step] for step in steps], color=BLUE)
     over_time.set_xlabel("instant at which packets were generated [s]")
     nodes = sorted(of_node)
-    per_node.bar(nodes, [of_node[node][0] / of_node[node][1] for node in nodes], color=_BLUE)
+    per_node.bar(nodes, [of_node[node][0] / of_node[node][1] for node in nodes], color=BLUE)
     per_node.set_xlabel("receiver (node id)")
     per_node.xaxis.set_major_locator(MaxNLocator(integer=True))
     for axes in (over_time, per_node):
@@ -128,7 +126,7 @@ def links(run: RunRecords, counted: Sequence[Mapping[str, Any]]) -> RunPicture |
         chosen = [at for node, at in places.at.items() if (node in heads) == wanted]
         if chosen:
             axes.scatter([at[0] for at in chosen], [at[1] for at in chosen], marker=marker, s=26, zorder=3,
-                         color=_DARK if wanted else "#ffffff", edgecolors=_DARK, label=label)  # fmt: skip
+                         color=DARK if wanted else "#ffffff", edgecolors=DARK, label=label)  # fmt: skip
     legend_above(figure, axes)
     figure.colorbar(
         lines, ax=axes, fraction=0.05, label="copies received / copies in range", format=PercentFormatter(1.0)
@@ -196,7 +194,7 @@ def slots(run: RunRecords, reports: Mapping[int, Mapping[str, Any]]) -> RunPictu
     _draw_owners(axes, frame)
     owners = {own.node for own in frame.own}
     words = ("nodes with turns", "other nodes") if frame.called == "turn" else ("heads", "members")
-    for wanted, label, color, marker in ((True, words[0], _BLUE, "|"), (False, words[1], _DARK, ".")):
+    for wanted, label, color, marker in ((True, words[0], BLUE, "|"), (False, words[1], DARK, ".")):
         chosen = [one for one in shown if (one.node in (owners or heads)) == wanted]
         if chosen:
             places = [frame.place_ns(one) / MS for one in chosen]
@@ -210,7 +208,9 @@ def slots(run: RunRecords, reports: Mapping[int, Mapping[str, Any]]) -> RunPictu
     axes.set_ylim(0.2, run.scenario.nodes.count + 0.8)
     if axes.get_legend_handles_labels()[0]:
         legend_above(figure, axes)
-    return RunPicture(figure, _slots_said(frame, shown))
+    by_lot = any(report.get("lots") for report in reports.values())
+    said = " Turns that nobody claims go to nodes by lot; they are not shaded." if by_lot else ""
+    return RunPicture(figure, _slots_said(frame, shown) + said)
 
 
 def _draw_owners(axes: Axes, frame: _Frame) -> None:
@@ -220,7 +220,7 @@ def _draw_owners(axes: Axes, frame: _Frame) -> None:
     for index, own in enumerate(frame.own):
         start_ms, length_ms = own.start_ns / MS, own.length_ns / MS
         axes.barh(
-            own.node, length_ms, left=start_ms, height=0.8, color=_SHADE, edgecolor=_SHADE, zorder=1,
+            own.node, length_ms, left=start_ms, height=0.8, color=SHADE, edgecolor=SHADE, zorder=1,
             label=None if index else f"the owner's {frame.called}",
         )  # fmt: skip
         if frame.called == "slot":

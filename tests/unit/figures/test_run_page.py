@@ -1,5 +1,6 @@
 """The page of one run: its rows and its pictures, from records written by hand."""
 
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -11,8 +12,9 @@ from matplotlib.patches import Rectangle
 from fanet_mw.trace import Confirmed, Detected, Generated, LetOut, Posed, Record, Refuted, RoleChanged
 from fanet_mw.units import MS, S
 from sim.report import mission_pictures, run_pictures, run_rows
-from sim.report.run_records import RunRecords
+from sim.report.run_records import RunRecords, agents
 from sim.results.mission import mission
+from sim.run.virtual import simulate
 from tests.conftest import MakeScenario
 
 SEARCH = {
@@ -141,3 +143,21 @@ def test_packets_are_held_against_the_slots_of_their_heads(make_scenario: MakeSc
     assert bars == [(0, 498, 2), (500, 498, 3)]
     assert [text.get_text() for text in drawing.figure.axes[0].texts] == ["head 2", "head 3"]
     assert legend(drawing.figure) == ["packets of heads", "packets of members", "the owner's slot"]
+
+
+def test_turns_that_nodes_claim_are_those_in_which_they_let_packets_out(make_scenario: MakeScenario) -> None:
+    """Four nodes in reach of each other; nobody has more to send than its claim carries, so nobody draws lots."""
+    scenario = make_scenario(**{
+        "nodes.count": 4, "nodes.spacing_m": 50, "duration_s": 12, "warmup_s": 6, "drain_s": 1, "traffic.interval_s": 1,
+        "routing.protocol": "clustered", "clusters.relay": "claimed", "radio.lead_ms": 0,
+    })  # fmt: skip
+    outcome = simulate(scenario)
+    reports = agents(outcome.reports)
+    drawing = run_pictures.slots(run_of(scenario, *outcome.records), reports)
+    assert drawing is not None
+    assert {len(report["turns"]["own"]) > 0 for report in reports.values()} == {True}
+    owned, kept = (
+        int(word) for word in re.findall(r"Of (\d+) packets of nodes with turns, (\d+) were", drawing.caption)[0]
+    )
+    assert owned == kept > 10
+    assert "lot" not in drawing.caption

@@ -178,9 +178,16 @@ class Claiming:
             "slot": None if share is None else share.slot,
             "superframe": None if share is None else share.length,
             "claimed_ms": None if self._claimed_ns is None else self._claimed_ns / MS,
+            "turns": None if self._claimed_ns is None else self._turns_since(self._claimed_ns),
             "clashes": self._claims.repairs,
             "lots": self._load.drawn(),
         }
+
+    def _turns_since(self, claimed_ns: int) -> Mapping[str, object]:
+        """The geometry from the first whole superframe of the claim on, and the turns that the claim gives."""
+        turns = self.own.turns
+        start_ns = turns.superframe_start_ns(claimed_ns) + turns.period_ns
+        return {**turns._replace(origin_ns=start_ns).report(), "own": list(self.own.claimed())}
 
 
 def _rank(slot: int | None) -> float:

@@ -29,6 +29,7 @@ def figures(
     scheduler: str | None = None,
     retry: Annotated[bool, Parameter(negative="")] = False,
     draw_only: Annotated[bool, Parameter(negative="")] = False,
+    kept: Path | None = None,
 ) -> int:
     """Recreate the paper's figures 8 to 12, and figures beyond it, and say which of its claims hold.
 
@@ -52,25 +53,35 @@ def figures(
         Repeat runs that failed, among them those in real time for which the machine was too busy.
     draw_only
         Draw from the runs that are finished, and run nothing.
+    kept
+        With --draw-only: a folder of kept tables of sweeps, for example docs/results/sweeps; those are drawn alone.
 
     """
     from sim.figures.all_figures import chosen
     from sim.figures.claims import BEYOND
+    from sim.figures.kept_tables import read_kept
     from sim.figures.render import render
     from sim.results.run_table import read
     from sim.sweep import spec
 
     if quick and full:
         raise ConfigError("--quick and --full exclude each other")
+    if kept is not None and not draw_only:
+        raise ConfigError("--kept is for --draw-only: kept tables are drawn, and never added to")
     variant = "full" if full else "quick"
     verdicts = []
+    missing: list[str] = []
     code = 0
     for recipe in chosen(which):
         runs = out / "sweeps" / f"{recipe.sweep}-{variant}"
         if not draw_only:
             found = spec.find(recipe.sweep).variant(variant)
             code |= carry_out(recipe.sweep, found, out=runs, jobs=jobs, scheduler=scheduler, retry=retry)
-        verdicts += [(recipe.name, claim) for claim in render(recipe, read(runs), out, variant=variant)]
+        table = read(runs) if kept is None else read_kept(kept, recipe.sweep, variant)
+        if table is None:
+            missing.append(recipe.sweep)
+            continue
+        verdicts += [(recipe.name, claim) for claim in render(recipe, table, out, variant=variant)]
     console = Console()
     table = Table("figure", "claim", "verdict", box=None, header_style="bold", padding=(0, 2, 0, 0))
     for name, claim in verdicts:
@@ -78,6 +89,9 @@ def figures(
         for statement in claim.statements:
             table.add_row("", f"[dim]{statement.text()}[/]", "")
     console.print(table)
+    if missing:
+        console.print(f"not drawn, because {kept} has no table of it: {', '.join(missing)}", highlight=False)
+        code = 1
     console.print(f"figures, data and verdicts in {out}; fanet report {out} makes a page of them", highlight=False)
     return code
 

@@ -14,6 +14,7 @@ import pytest
 from fanet_mw.errors import ConfigError
 from sim.figures.all_figures import FIGURES, chosen
 from sim.figures.claims import Claim, Finding, Reason, Statement, Verdict, above, below
+from sim.figures.kept_tables import keep, read_kept
 from sim.figures.render import render
 from sim.figures.rescue import confirmed_s, loss_share
 from sim.figures.runs import Runs, differences, max_per_seed, mean_per_seed
@@ -231,6 +232,21 @@ def test_the_same_table_gives_the_same_picture(nine, tmp_path) -> None:
     render(FIGURES["9"], table, tmp_path)
     for name in ("figure-9.svg", "figure-9.csv", "figure-9.json"):
         assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()
+
+
+def test_a_kept_table_gives_the_same_figure_and_verdicts(nine, tmp_path) -> None:
+    table, folder, claims = nine
+    assert read_kept(tmp_path, "fig9", "quick") is None
+    keep(table, tmp_path, "fig9", "quick")
+    kept = read_kept(tmp_path, "fig9", "quick")
+    assert kept is not None
+    assert render(FIGURES["9"], kept, tmp_path) == claims
+    for kind in ("csv", "json", "png"):
+        assert (tmp_path / f"figure-9.{kind}").read_bytes() == (folder / f"figure-9.{kind}").read_bytes(), kind
+    assert set(table.column_names) - set(kept.column_names) == {"summary", "trace_sha256"}
+    (tmp_path / "fig9-quick.parquet").write_bytes(b"PAR1, and no more")
+    with pytest.raises(ConfigError, match=r"fig9-quick\.parquet: cannot be read"):
+        read_kept(tmp_path, "fig9", "quick")
 
 
 def test_failed_runs_are_in_no_figure(nine) -> None:

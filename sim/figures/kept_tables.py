@@ -1,0 +1,37 @@
+"""The tables of sweeps as they are kept in the repository: small, and enough to draw and judge every figure anew.
+
+FOLDER/SWEEP-VARIANT.parquet    `runs.parquet` of the sweep without the columns that no figure is made from
+"""
+
+from pathlib import Path
+from typing import Final
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from fanet_mw.errors import ConfigError
+
+_LEFT_OUT: Final = ("summary", "trace_sha256")
+"""The summary as JSON, whose figures are columns, and the hash of each trace, which nothing compresses: half of the
+file."""
+
+
+def keep(table: pa.Table, folder: Path, sweep: str, variant: str) -> Path:
+    """Write the table of a sweep; the same table always gives the same bytes."""
+    folder.mkdir(parents=True, exist_ok=True)
+    kept = table.drop_columns([name for name in _LEFT_OUT if name in table.column_names])
+    pq.write_table(kept, _path(folder, sweep, variant), compression="zstd", compression_level=19)
+    return _path(folder, sweep, variant)
+
+
+def read_kept(folder: Path, sweep: str, variant: str) -> pa.Table | None:
+    """The kept table of a sweep; None if there is none."""
+    path = _path(folder, sweep, variant)
+    try:
+        return pq.read_table(path) if path.exists() else None
+    except (OSError, pa.ArrowException) as error:
+        raise ConfigError(f"{path}: cannot be read: {error}") from error
+
+
+def _path(folder: Path, sweep: str, variant: str) -> Path:
+    return folder / f"{sweep}-{variant}.parquet"

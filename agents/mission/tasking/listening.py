@@ -26,6 +26,9 @@ _NEAR_M: Final = 80.0
 """A UAV goes down within this horizontal distance of the estimated place."""
 _LOOK_NS: Final = 10 * S
 """How long a UAV with a camera looks around from above before it goes down."""
+_STANDS_M: Final = LEAST_M / 2
+"""A UAV that is less than this above the ground stands there, on its pad or because it has landed, and does not
+listen. The ground is that below the UAV that judges."""
 _ALONE_M: Final = 70.0
 """Other UAVs within this horizontal distance of the estimated place take part in who goes down first."""
 _STEP_DONE_M: Final = 4.0
@@ -132,11 +135,14 @@ class Listening:
             self._step_m = below_m
 
     def _is_first(self, place: Estimate, now_ns: int) -> bool:
-        """True if no other UAV near the estimated place is lower than this one, or as low and has a lower id."""
+        """True if no other UAV in flight near the estimated place is lower than this one, or as low and has a lower
+        id.
+        """
         here = self._own_motion.position
+        ground_m = here.up - self._own_motion.height_m(now_ns)
         for node, motion in self._neighbors.by_node(now_ns=now_ns):
             other = motion.position_at(now_ns)
-            if place.distance_m(other) > _ALONE_M:
+            if place.distance_m(other) > _ALONE_M or other.up < ground_m + _STANDS_M:
                 continue
             higher_m = other.up - here.up
             if higher_m <= -_LEVEL_M or (higher_m < _LEVEL_M and node < self._node):

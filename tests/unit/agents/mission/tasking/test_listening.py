@@ -84,6 +84,16 @@ def test_two_at_one_place_take_turns_below_half_of_the_height(make_scenario: Mak
         assert uav.at.up == pytest.approx(HEARD_M / math.sqrt(2)), "the other one has not been heard of for a while"
 
 
+def test_a_uav_that_stands_beside_the_place_keeps_nobody_from_going_down(
+    make_scenario: MakeScenario,
+) -> None:
+    uav = Descent(make_scenario, node=5)
+    for _ in range(60):
+        uav.neighbors.on_hello(3, Motion(Enu(PLACE.east_m + 40, PLACE.north_m, 0.2), STILL, uav.now_ns))
+        uav.fly(1)
+    assert uav.at.up == pytest.approx(HEARD_M / math.sqrt(2))
+
+
 def test_a_camera_looks_from_above_first_and_keeps_whom_it_sees_in_view_from_there(
     make_scenario: MakeScenario,
 ) -> None:

@@ -6,6 +6,7 @@ Scenario `clusters` (grid 9 x 5, 44 sources of 1024 B) and the same on a disc of
 """
 
 import sys
+from collections.abc import Iterator
 
 from agents.applications.traffic import sources_of
 from fanet_mw.planner import Plan, plan
@@ -23,28 +24,39 @@ CASES: tuple[tuple[str, tuple[str, ...], tuple[float, ...]], ...] = (
 )
 
 
-def main(seconds: float) -> None:
-    print("| swarm | interval [s] | plan | used | PDR | delay p50 / p95 [ms] | hop, plan / greatest [ms] |")
+HEAD = ("swarm", "interval [s]", "plan", "used", "PDR", "delay p50 / p95 [ms]", "hop, plan / greatest in flight [ms]")
+
+
+def rows(seconds: float) -> Iterator[tuple[str, ...]]:
+    """One row of cells for each swarm and interval."""
     for name, settings, intervals in CASES:
         for interval_s in intervals:
-            times = [f"duration_s={seconds + 25}", "warmup_s=15", "drain_s=10", f"traffic.interval_s={interval_s}"]
-            scenario = catalog.find("clusters", ["clusters.relay=claimed", *settings, *times])
-            at = {NodeId(i + 1): place for i, place in enumerate(positions(scenario))}
-            found = plan(scenario, at, sources=[NodeId(node) for node in sources_of(scenario)])
-            assert isinstance(found, Plan)
-            assert found.claims is not None
-            outcome = simulate(scenario)
-            summary = finish(outcome, out=None)
-            hops = [r["hop_ms"] for r in outcome.reports.values() if r.get("hop_ms") is not None]
-            delay = summary["delay_ms"]
-            used = found.claims.fullest.utilization
-            planned_ms = (found.claims.hop_ns or 0) / 1e6
-            verdict = "feasible" if found.feasible else "not feasible"
-            print(
-                f"| {name} | {interval_s:g} | {verdict} | {100 * used:.0f} % | {summary['pdr']:.4f} "
-                f"| {delay['p50']:.0f} / {delay['p95']:.0f} | {planned_ms:.0f} / {max(hops):.0f} |",
-                flush=True,
-            )
+            yield name, f"{interval_s:g}", *_compared(settings, interval_s, seconds)
+
+
+def _compared(settings: tuple[str, ...], interval_s: float, seconds: float) -> tuple[str, ...]:
+    times = [f"duration_s={seconds + 25}", "warmup_s=15", "drain_s=10", f"traffic.interval_s={interval_s}"]
+    scenario = catalog.find("clusters", ["clusters.relay=claimed", *settings, *times])
+    at = {NodeId(i + 1): place for i, place in enumerate(positions(scenario))}
+    found = plan(scenario, at, sources=[NodeId(node) for node in sources_of(scenario)])
+    assert isinstance(found, Plan)
+    assert found.claims is not None
+    outcome = simulate(scenario)
+    summary = finish(outcome, out=None)
+    hops = [r["hop_ms"] for r in outcome.reports.values() if r.get("hop_ms") is not None]
+    delay = summary["delay_ms"]
+    return (
+        "feasible" if found.feasible else "not feasible",
+        f"{100 * found.claims.fullest.utilization:.0f} %",
+        f"{summary['pdr']:.4f}",
+        f"{delay['p50']:.0f} / {delay['p95']:.0f}",
+        f"{(found.claims.hop_ns or 0) / 1e6:.0f} / {max(hops):.0f}",
+    )
+
+
+def main(seconds: float) -> None:
+    for row in (HEAD, *rows(seconds)):
+        print(f"| {' | '.join(row)} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ delay of any delivery must stay below the bound of a feasible plan; losses are n
 """
 
 import sys
+from typing import NamedTuple
 
 from fanet_mw.bounds import Bounded
 from fanet_mw.planner import Plan, plan
@@ -19,30 +20,53 @@ CASES = ((2.0, 4, 5.0), (1.0, 4, 5.0), (1.0, 8, 2.0), (1.0, 22, 1.0), (0.5, 4, 5
 """Interval [s], clusters, flooding period [s]."""
 
 
+class Compared(NamedTuple):
+    """A plan, and what came of it."""
+
+    feasible: bool
+    used: float
+    """The fullest slot's load over its length."""
+    bound_s: float | None
+    greatest_delay_s: float
+    pdr: float
+
+
+def compared(interval_s: float, clusters: int, period_s: float, *, seconds: float) -> Compared:
+    """Plans one swarm, and simulates it."""
+    scenario = config.build(
+        {
+            "duration_s": seconds,
+            "warmup_s": 8,
+            "drain_s": 22,
+            "nodes": {"count": 45, "telemetry_hz": 0},
+            "clusters": {"count": clusters, "flooding_period_s": period_s},
+            "traffic": {"payload_bytes": 1024, "interval_s": interval_s},
+            "radio": {"lead_ms": 5},
+        }
+    )
+    found = plan(scenario, {NodeId(i + 1): at for i, at in enumerate(positions(scenario))})
+    assert isinstance(found, Plan)
+    outcome = simulate(scenario)
+    bound = found.classes[0].bound
+    return Compared(
+        feasible=found.feasible,
+        used=found.bottleneck.utilization if found.bottleneck else 0.0,
+        bound_s=bound.delay_ns / S if isinstance(bound, Bounded) else None,
+        greatest_delay_s=max(record.delay_ns for record in outcome.records if isinstance(record, Delivered)) / S,
+        pdr=finish(outcome, out=None)["pdr"],
+    )
+
+
 def main(seconds: float) -> None:
     print("interval clusters period  plan           used %  bound s  greatest delay s  PDR")
     for interval_s, clusters, period_s in CASES:
-        scenario = config.build(
-            {
-                "duration_s": seconds,
-                "warmup_s": 8,
-                "drain_s": 22,
-                "nodes": {"count": 45, "telemetry_hz": 0},
-                "clusters": {"count": clusters, "flooding_period_s": period_s},
-                "traffic": {"payload_bytes": 1024, "interval_s": interval_s},
-                "radio": {"lead_ms": 5},
-            }
-        )
-        found = plan(scenario, {NodeId(i + 1): at for i, at in enumerate(positions(scenario))})
-        assert isinstance(found, Plan)
-        outcome = simulate(scenario)
-        pdr = finish(outcome, out=None)["pdr"]
-        worst = max(record.delay_ns for record in outcome.records if isinstance(record, Delivered)) / S
-        bound = found.classes[0].bound
-        said = f"{bound.delay_ns / S:7.2f}" if isinstance(bound, Bounded) else "      -"
-        used = 100 * found.bottleneck.utilization if found.bottleneck else 0
+        found = compared(interval_s, clusters, period_s, seconds=seconds)
+        bound = "      -" if found.bound_s is None else f"{found.bound_s:7.2f}"
         verdict = "feasible" if found.feasible else "not feasible"
-        print(f"{interval_s:8} {clusters:8} {period_s:6}  {verdict:14} {used:6.0f}  {said}  {worst:16.2f}  {pdr:.3f}")
+        print(
+            f"{interval_s:8} {clusters:8} {period_s:6}  {verdict:14} {100 * found.used:6.0f}  {bound}  "
+            f"{found.greatest_delay_s:16.2f}  {found.pdr:.3f}"
+        )
 
 
 if __name__ == "__main__":

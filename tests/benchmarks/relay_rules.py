@@ -8,6 +8,8 @@ the running protocol, for more nodes at the density of the grid, with no traffic
 import statistics
 import sys
 from collections import Counter
+from collections.abc import Mapping
+from typing import Any
 
 from sim.results.files import finish
 from sim.run.virtual import simulate
@@ -22,19 +24,35 @@ FEWER = ["clusters.count=8"]
 """With every node a head `heads` is `all`."""
 
 
+def measured(rule: str, swarm: str, *, seconds: int) -> list[dict[str, Any]]:
+    """The summaries of seeds 1 to 3; none for a rule that is not measured in this swarm."""
+    if rule == "claimed, 10 slots" and swarm == "dense":
+        return []
+    chosen = [
+        f"clusters.relay={rule.split(',')[0]}", "clusters.flooding_period_s=1", f"duration_s={seconds}",
+        *SWARMS[swarm], *RULES[rule], *(FEWER if rule == "heads" else []),
+    ]  # fmt: skip
+    return [finish(simulate(catalog.find("clusters", [*chosen, f"seed={seed}"])), out=None) for seed in (1, 2, 3)]
+
+
+def claiming(layout: str, count: int) -> list[Mapping[str, Any]]:
+    """What nodes report after 20 s in which they claimed slots and sent no data."""
+    side = ["nodes.layout=disc", f"nodes.radius_m={112.8 * count**0.5:.0f}"] if layout == "disc" else []
+    keys = [
+        "clusters.relay=claimed", f"nodes.count={count}", f"clusters.count={count - 1}", "duration_s=20",
+        "traffic.arrivals=none", "traffic.sources=all", "clusters.guard_ms=0", *side,
+    ]  # fmt: skip
+    outcome = simulate(catalog.find("clusters", keys))
+    return [report for report in outcome.reports.values() if report.get("kind") == "agent"]
+
+
 def relays(seconds: int) -> None:
     print("swarm  rule               PDR     frames/packet  delay mean  p95     max [ms]")
-    for swarm, places in SWARMS.items():
-        for rule, keys in RULES.items():
-            if rule == "claimed, 10 slots" and swarm == "dense":
+    for swarm in SWARMS:
+        for rule in RULES:
+            found = measured(rule, swarm, seconds=seconds)
+            if not found:
                 continue
-            chosen = [
-                f"clusters.relay={rule.split(',')[0]}", "clusters.flooding_period_s=1", f"duration_s={seconds}",
-                *places, *keys, *(FEWER if rule == "heads" else []),
-            ]  # fmt: skip
-            found = [
-                finish(simulate(catalog.find("clusters", [*chosen, f"seed={seed}"])), out=None) for seed in (1, 2, 3)
-            ]
             pdr = " ".join(f"{s['pdr']:.4f}" for s in found)
             sent = statistics.mean(s["frames"]["sent"] / s["generated"] for s in found)
             delay = {k: statistics.mean(s["delay_ms"][k] for s in found) for k in ("mean", "p95", "max")}
@@ -48,13 +66,7 @@ def superframes() -> None:
     print("layout   UAVs  superframe (UAVs)   highest slot + 1  clashes settled after [s]  without a slot")
     for layout in ("grid", "disc"):
         for count in (45, 100, 200):
-            side = ["nodes.layout=disc", f"nodes.radius_m={112.8 * count**0.5:.0f}"] if layout == "disc" else []
-            keys = [
-                "clusters.relay=claimed", f"nodes.count={count}", f"clusters.count={count - 1}", "duration_s=20",
-                "traffic.arrivals=none", "traffic.sources=all", "clusters.guard_ms=0", *side,
-            ]  # fmt: skip
-            outcome = simulate(catalog.find("clusters", keys))
-            nodes = [report for report in outcome.reports.values() if report.get("kind") == "agent"]
+            nodes = claiming(layout, count)
             lengths = Counter(report["superframe"] for report in nodes)
             slots = [report["slot"] for report in nodes if report["slot"] is not None]
             last_s = max(report["claimed_ms"] or 0 for report in nodes) / 1000

@@ -8,7 +8,9 @@ depends on who was heard first.
 import math
 import statistics
 import sys
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Final, NamedTuple
 
 sys.path.append(str(Path(__file__).parents[1] / "property"))
 
@@ -53,29 +55,50 @@ def mpr_transmissions(adjacency: Adjacency, root: NodeId) -> int:
     return sent
 
 
+class Floods(NamedTuple):
+    """What one flood takes, on the average over roots."""
+
+    hops: float
+    """From the root to the node that is farthest from it."""
+    by_method: Mapping[str, tuple[float, float]]
+    """Transmissions and sub-slots of each method."""
+    mpr: float
+    """Transmissions with multipoint relays."""
+
+
+_METHODS: Final = {
+    "all": lambda adjacency, root: tuple(adjacency),
+    "Wu-Li, rule k": lambda adjacency, root: wu_li(adjacency),
+    "Guha-Khuller": lambda adjacency, root: guha_khuller(adjacency),
+    "shortest": shortest_relays,
+}
+
+
+def floods(adjacency: Adjacency, *, seed_of: int) -> Floods:
+    """Measures floods from roots that are drawn for a swarm of `seed_of` UAVs."""
+    roots = stream(1, "roots", seed_of).sample(sorted(adjacency), ROOTS)
+    by_method = {}
+    for method, build in _METHODS.items():
+        found = [broadcast_schedule(adjacency, root, build(adjacency, root), prune=method != "all") for root in roots]
+        sent = statistics.mean(len(schedule.turns) for schedule in found)
+        by_method[method] = sent, statistics.mean(schedule.subslots for schedule in found)
+    return Floods(
+        hops=statistics.mean(max(levels(adjacency, root).values()) for root in roots),
+        by_method=by_method,
+        mpr=statistics.mean(mpr_transmissions(adjacency, root) for root in roots[:5]),
+    )
+
+
 def main() -> None:
-    builds = {
-        "all": lambda adjacency, root: tuple(adjacency),
-        "Wu-Li, rule k": lambda adjacency, root: wu_li(adjacency),
-        "Guha-Khuller": lambda adjacency, root: guha_khuller(adjacency),
-        "shortest": shortest_relays,
-    }
     for name, make in (("grid", grid), ("uniform", uniform)):
         for count in (45, 200, 1000):
             adjacency = make(count)
-            roots = stream(1, "roots", count).sample(sorted(adjacency), ROOTS)
-            depth = statistics.mean(max(levels(adjacency, root).values()) for root in roots)
+            found = floods(adjacency, seed_of=count)
             degree = statistics.mean(len(near) for near in adjacency.values())
-            print(f"{name} {len(adjacency)} of {count} UAVs, {degree:.1f} neighbors, {depth:.1f} hops deep")
-            for method, build in builds.items():
-                found = [
-                    broadcast_schedule(adjacency, root, build(adjacency, root), prune=method != "all") for root in roots
-                ]
-                sent = statistics.mean(len(schedule.turns) for schedule in found)
-                subslots = statistics.mean(schedule.subslots for schedule in found)
+            print(f"{name} {len(adjacency)} of {count} UAVs, {degree:.1f} neighbors, {found.hops:.1f} hops deep")
+            for method, (sent, subslots) in found.by_method.items():
                 print(f"  {method:14} {sent:7.1f} transmissions {subslots:6.1f} sub-slots")
-            mpr = statistics.mean(mpr_transmissions(adjacency, root) for root in roots[:5])
-            print(f"  {'MPR (RFC 3626)':14} {mpr:7.1f} transmissions")
+            print(f"  {'MPR (RFC 3626)':14} {found.mpr:7.1f} transmissions")
 
 
 if __name__ == "__main__":

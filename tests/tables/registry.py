@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 
 from tests.tables import (
     attacks,
+    clusters,
     emulator,
     flight,
     formation_flight,
@@ -16,6 +17,7 @@ from tests.tables import (
     mission,
     missions,
     paper_rescue,
+    plans,
     protocol,
     small_rescues,
 )
@@ -49,6 +51,22 @@ TABLES: Final[Mapping[str, Table]] = {
     "assumptions": Table("explanation/lossy-links.md", protocol.assumptions, Tolerance(absolute=0.02, relative=0.1)),
     "phones": Table("explanation/finding.md", protocol.phones, Tolerance(absolute=1, relative=0.1)),
     "warnings": Table("explanation/protocol.md", protocol.warnings, Tolerance(absolute=0.1, relative=0.3)),
+    "lasting-heads": Table("explanation/clusters.md", clusters.lasting_heads, Tolerance(absolute=0.2, relative=0.02)),
+    "new-clusters": Table("explanation/clusters.md", clusters.new_clusters, Tolerance(absolute=0.02, relative=0.1)),
+    "silent-neighbors": Table(
+        "explanation/roles.md", clusters.silent_neighbors, Tolerance(absolute=0.02, relative=0.1)
+    ),
+    "reused-slots": Table("explanation/clusters.md", clusters.reused_slots, Tolerance()),
+    "few-relays": Table("explanation/clusters.md", clusters.few_relays, Tolerance(relative=0.01)),
+    "rescue-settings": Table(
+        "explanation/protocol.md", clusters.settings_of_rescue, Tolerance(absolute=0.02, relative=0.1)
+    ),
+    "together": Table("explanation/claimed-slots.md", clusters.together, Tolerance(absolute=0.02, relative=0.1)),
+    "relay-rules": Table("explanation/claimed-slots.md", clusters.rules, Tolerance(absolute=0.02, relative=0.1)),
+    "superframes": Table("explanation/claimed-slots.md", clusters.superframes, Tolerance(absolute=1, relative=0.1)),
+    "plans-of-relays": Table("results/plans.md", plans.contending, Tolerance(absolute=0.02, relative=0.1)),
+    "plans-of-claims": Table("results/plans.md", plans.claimed, Tolerance(absolute=0.02, relative=0.1)),
+    "wrong-places": Table("explanation/lossy-links.md", plans.wrong_places, Tolerance(absolute=0.02)),
     "goodput": Table("explanation/planning.md", protocol.goodput, Tolerance(absolute=0.02, relative=0.1)),
     "rivals": Table("results/rivals.md", protocol.rivals, Tolerance(absolute=0.02, relative=0.1)),
     "protocol-cost": Table(

@@ -1,0 +1,207 @@
+"""Measured tables of clusters, slots and relays: how lasting, how short and how few they are. Each costs minutes."""
+
+import statistics
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
+from typing import Any, Final
+from unittest import mock
+
+from fanet_mw.routing.clustered.roles.neighbor_failure_detector import NeighborFailureDetector
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
+from tests.benchmarks import head_changes, moving_swarm, relay_rules, relay_sets, slot_reuse
+from tests.tables.markdown import Rows
+
+_SEEDS: Final = (1, 2, 3)
+_WALK_SEEDS, _WALK_S = 10, 300
+_REFERENCE: Final = "lowest-ID, kept (LCC)"
+"""The method with which the others are compared."""
+_MOBILITIES: Final = {"static": "at rest", "formation": "formation", "random_waypoint": "random waypoint"}
+_UAVS: Final = (45, 100, 200, 500, 1000)
+_OF_RESCUE: Final = {
+    "as it is": (),
+    "`clusters.repair_s=0`": ("clusters.repair_s=0",),
+    "`clusters.reassign_s=0`": ("clusters.reassign_s=0",),
+    "`clusters.relay=all`": ("clusters.relay=all",),
+    "`radio.lead_ms=40`, `radio.handover_ms=10`": ("radio.lead_ms=40", "radio.handover_ms=10"),
+}
+_RESCUE_S: Final = 150
+_NO_REPORTS: Final = mock.patch.object(NeighborFailureDetector, "find_suspect", return_value=None)
+_TOGETHER: Final = (
+    ("claimed", 1.0), ("claimed", 0.2), ("claimed", 0.1), ("claimed", 0.05), ("all", 1.0), ("all", 0.2),
+)  # fmt: skip
+
+
+def _finished(scenario: str, keys: Sequence[str]) -> dict[str, Any]:
+    return finish(simulate(catalog.find(scenario, list(keys))), out=None)
+
+
+def lasting_heads() -> Rows:
+    """Head changes per minute of the clustering methods, on random waypoints."""
+    sides_m = (2500.0, 1000.0)
+    rows = [["method", *(f"{side_m:.0f} m: heads, changes (standard deviation)" for side_m in sides_m)]]
+    cells = {name: [] for name in head_changes.RULES}
+    for side_m in sides_m:
+        found = {
+            name: [
+                head_changes.run(rule, side_m=side_m, seed=seed, seconds=_WALK_S) for seed in range(1, _WALK_SEEDS + 1)
+            ]
+            for name, rule in head_changes.RULES.items()
+        }
+        reference = statistics.mean(run.changes_per_min for run in found[_REFERENCE])
+        for name, runs in found.items():
+            changes = [run.changes_per_min for run in runs]
+            mean = statistics.mean(changes)
+            heads = statistics.mean(run.heads for run in runs)
+            compared = "" if name == _REFERENCE else f" [{100 * (mean / reference - 1):+.0f} %]"
+            cells[name].append(f"{heads:.1f}, {mean:.1f} ({statistics.stdev(changes):.1f}){compared}")
+    return [*rows, *([name, *found] for name, found in cells.items())]
+
+
+def new_clusters() -> Rows:
+    """What it is worth to a swarm that moves to assign its clusters anew."""
+    rows = [["relay, mobility, m/s", "PDR, assigned once", "PDR, anew", "epochs, once / anew"]]
+    for relay, model, speed_m_s in moving_swarm.cases():
+        once, anew = (
+            [
+                moving_swarm.measured(moving_swarm.scenario(relay, model, speed_m_s, reassign_s=reassign_s, seed=seed))
+                for seed in _SEEDS
+            ]
+            for reassign_s in (0.0, 10.0)
+        )
+        pdr = [f"{statistics.mean(run.pdr for run in runs):.3f}" for runs in (once, anew)]
+        epochs = " / ".join(f"{statistics.mean(run.epochs for run in runs):.1f}" for runs in (once, anew))
+        speed = f", {speed_m_s:g}" if speed_m_s else ""
+        rows.append([f"`{relay}`, {_MOBILITIES[model]}{speed}", *pdr, epochs])
+    return rows
+
+
+def silent_neighbors() -> Rows:
+    """What reports of silent neighbors do to a swarm that moves, where most of those neighbors flew away."""
+    rows = [["speed", "silent neighbors are", "PDR", "epochs in 90 s", "control frames per second and node"]]
+    for speed_m_s in (5.0, 10.0):
+        for reported in (False, True):
+            with nullcontext() if reported else _NO_REPORTS:
+                found = [
+                    moving_swarm.measured(
+                        moving_swarm.scenario("scheduled", "random_waypoint", speed_m_s, reassign_s=10, seed=seed)
+                    )
+                    for seed in _SEEDS
+                ]
+            rows.append([
+                f"{speed_m_s:g} m/s",
+                "reported" if reported else "not reported",
+                f"{statistics.mean(run.pdr for run in found):.3f}",
+                f"{statistics.mean(run.epochs for run in found):.1f}",
+                f"{statistics.mean(run.control for run in found):.1f}",
+            ])  # fmt: skip
+    return rows
+
+
+def settings_of_rescue() -> Rows:
+    """Scenario `rescue` with single keys changed."""
+    rows = [
+        ["changed", "PDR, seeds 1-3", "reports delivered, mean", "frames sent per second and UAV", "radio busy [%]"]
+    ]
+    for name, keys in _OF_RESCUE.items():
+        found = [_finished("rescue", (f"duration_s={_RESCUE_S}", *keys, f"seed={seed}")) for seed in _SEEDS]
+        frames = statistics.mean(run["frames"]["sent"] / run["simulated_s"] / run["nodes"] for run in found)
+        rows.append([
+            name,
+            ", ".join(f"{run['pdr']:.3f}" for run in found),
+            f"{statistics.mean(run['reports']['pdr'] for run in found):.3f}",
+            f"{frames:.1f}",
+            f"{100 * statistics.mean(run['air']['busy'] for run in found):.0f}",
+        ])  # fmt: skip
+    return rows
+
+
+def reused_slots() -> Rows:
+    """The lengths of superframes in which no two nodes within two hops share a slot."""
+    head = ["layout, UAVs", "without reuse", "Welsh-Powell", "DSATUR", "claims", "claims, 20 % of hellos lost"]
+    rows = [head]
+    for name, make in (("grid", slot_reuse.grid), ("uniform", lambda count: slot_reuse.uniform(count, seed=1))):
+        for count in _UAVS:
+            adjacency = make(count)
+            colored = [
+                f"{slot_reuse.length(color(adjacency), adjacency)}"
+                for color in (slot_reuse.welsh_powell, slot_reuse.dsatur)
+            ]
+            claims = [
+                f"{slots} ({superframes})"
+                for slots, superframes in (slot_reuse.claimed(adjacency, loss) for loss in (0.0, 0.2))
+            ]
+            rows.append([f"{name}, {count}", f"{count}", *colored, *claims])
+    return rows
+
+
+def few_relays() -> Rows:
+    """Transmissions and sub-slots of one flood."""
+    rows = [["swarm", "all relay", "Wu-Li", "Guha-Khuller", "shortest relays", "MPR"]]
+    for name, make in (("grid", relay_sets.grid), ("uniform", relay_sets.uniform)):
+        for count in (45, 200, 1000):
+            adjacency = make(count)
+            found = relay_sets.floods(adjacency, seed_of=count)
+            pairs = [" / ".join(_three_digits(mean) for mean in pair) for pair in found.by_method.values()]
+            rows.append([f"{name}, {count}, {found.hops:.0f} hops", *pairs, _three_digits(found.mpr)])
+    return rows
+
+
+def _three_digits(mean: float) -> str:
+    return f"{mean:.0f}" if mean >= 99.95 else f"{mean:.1f}"
+
+
+def rules() -> Rows:
+    """Every rule of `clusters.relay`, in a grid and in a dense swarm."""
+    swarms = [*relay_rules.SWARMS]
+    columns = [f"{swarm}: {what}" for swarm in swarms for what in ("PDR", "frames", "delay mean / p95 / max [ms]")]
+    rows = [["rule", *columns]]
+    for rule in relay_rules.RULES:
+        cells: list[str] = []
+        for swarm in swarms:
+            found = relay_rules.measured(rule, swarm, seconds=40)
+            cells += _cells_of_rule(found) if found else ["", "", ""]
+        rows.append([f"`{rule.split(',')[0]}`{rule.partition(',')[1]}{rule.partition(',')[2]}", *cells])
+    return rows
+
+
+def _cells_of_rule(found: Sequence[dict[str, Any]]) -> Iterator[str]:
+    yield ", ".join(f"{run['pdr']:.4f}" for run in found)
+    yield f"{statistics.mean(run['frames']['sent'] / run['generated'] for run in found):.1f}"
+    yield " / ".join(f"{statistics.mean(run['delay_ms'][key] for run in found):.0f}" for key in ("mean", "p95", "max"))
+
+
+def superframes() -> Rows:
+    """The superframes of claimed slots in the running protocol."""
+    rows = [["layout, UAVs", "superframe: UAVs", "highest slot + 1", "last change of a claim [s]", "without a slot"]]
+    for layout in ("grid", "disc"):
+        for count in (45, 100, 200):
+            nodes = relay_rules.claiming(layout, count)
+            lengths = Counter(node["superframe"] for node in nodes)
+            slots = [node["slot"] for node in nodes if node["slot"] is not None]
+            last_s = max(node["claimed_ms"] or 0 for node in nodes) / 1000
+            told = "; ".join(f"{length}: {uavs}" for length, uavs in sorted(lengths.items(), reverse=True))
+            rows.append([f"{layout}, {count}", told, f"{max(slots) + 1}", f"{last_s:.1f}", f"{count - len(slots)}"])
+    return rows
+
+
+def together() -> Rows:
+    """Packets of 64 B alone in their frames, and several in each."""
+    what = "PDR, frames, delay mean / p95 [ms]"
+    rows = [["rule, interval", f"alone: {what}", f"together: {what}"]]
+    for rule, interval_s in _TOGETHER:
+        keys = [
+            "duration_s=27", "traffic.payload_bytes=64", "radio.max_frame_bytes=1024", f"clusters.relay={rule}",
+            f"traffic.interval_s={interval_s}",
+            *(("clusters.count=8", "clusters.flooding_period_s=1") if rule == "all" else ()),
+        ]  # fmt: skip
+        found = [_finished("clusters", (*keys, f"routing.aggregate={shared}")) for shared in ("false", "true")]
+        rows.append([f"`{rule}`, {interval_s:g} s", *(_alone_or_together(run) for run in found)])
+    return rows
+
+
+def _alone_or_together(run: dict[str, Any]) -> str:
+    delay = run["delay_ms"]
+    return f"{run['pdr']:.3f}, {run['frames']['sent']:,}, {delay['mean']:.0f} / {delay['p95']:.0f}"

@@ -232,7 +232,7 @@ def test_nobody_who_flies_at_a_velocity_leaves_the_geofence(make_scenario: MakeS
 RETURN = {"mobility.return_after_s": 5.0, "mobility.return_height_m": 70.0, "world.crash": "falls"}
 
 
-@pytest.mark.parametrize("engine", ["kinematic", "rotors"])
+@pytest.mark.parametrize("engine", ["kinematic", pytest.param("rotors", marks=pytest.mark.slow)])
 def test_a_uav_whose_computer_falls_silent_climbs_flies_home_and_lands(
     make_scenario: MakeScenario, engine: str
 ) -> None:

@@ -39,10 +39,7 @@ SMALL: Final = {
     ),
 }
 _ONE_SWEEP: Final = ("duration_s=240",)
-WHOLE: Final = {
-    **_cases(_ONE_SWEEP, (1,), (0.0, 0.8)),
-    "ours, as `rescue` has it | 30%": Case("rescue", _ONE_SWEEP, (1,), 0.3),
-}
+WHOLE: Final = _cases(_ONE_SWEEP, (1,), (0.0, 0.3, 0.5, 0.7, 0.8))
 
 
 def over_networks(kept: Kept | None = None) -> Rows:

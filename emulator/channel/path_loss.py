@@ -9,7 +9,8 @@
 
 Distances and heights are in metres, frequencies in MHz, losses in dB between isotropic antennas. Below 1 m the loss is
 that at 1 m. Not modeled: antenna patterns and airframes, weather, the curvature of the earth, and the oscillation of
-two rays before the crossover. The ranges of validity are in docs/explanation/channel.md.
+two rays before the crossover. The ranges of validity are in docs/explanation/channel.md. Shadowing and fading have
+files of their own, and `propagation.py` puts all three together.
 """
 
 import math

@@ -1,6 +1,7 @@
 """Options that several commands of `fanet` share, and what follows from them.
 
-The names of the fields are the flags and their docstrings the help text; the command line reads both at run time.
+The names of the fields are the flags and their docstrings the help text; the command line reads both at run time. How
+`--set KEY=VALUE` changes a file's values is in `fanet_mw/scenario/config.py`.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,8 @@
-"""Carries out the remaining runs of a sweep (`remaining_runs.py`), and stores each result at once."""
+"""Carries out the remaining runs of a sweep (`remaining_runs.py`), and stores each result at once.
+
+The file of a sweep is read in `spec.py` and its grid becomes tasks in `tasks.py`, which `pool.py` or `dask_cluster.py`
+carry out side by side.
+"""
 
 import time
 from collections.abc import Callable, Iterator, Sequence

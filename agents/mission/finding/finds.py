@@ -10,7 +10,8 @@ that nothing refutes, the first to arrive stays. Of the announced estimates only
 refutation has removed that one, a worse but younger one does not come back.
 
 The powers of the phones of confirmed survivors tell by how much all phones are stronger or weaker than assumed
-(`calibration.py`). The filters of the unconfirmed survivors' phones are calibrated by that.
+(`calibration.py`). The filters of the unconfirmed survivors' phones are calibrated by that. When sightings suffice for
+a confirmation, and whose phone it was, is decided in `identities.py`.
 """
 
 from dataclasses import dataclass, field

@@ -1,7 +1,7 @@
 """A cheap engine: point masses with limited acceleration, for work on protocols, where only distances matter.
 
-Not modeled: attitude and drag; gravity only acts on crashed UAVs. Bodies are spheres of `RADIUS_M` whose contacts are
-detected, but which do not bounce.
+Not modeled: attitude, drag and wind; gravity only acts on crashed UAVs. Bodies are spheres of `RADIUS_M` whose contacts
+are detected, but which do not bounce. The greatest speed is in `sim/world/mobility/guidance.py`.
 """
 
 from typing import Final

@@ -2,7 +2,7 @@
 
 Only pairs within the radio's reach are examined, and only if one end is below the highest obstacle. Not modeled:
 diffraction over an edge, the Fresnel zone, and the thickness of an obstacle. Survivors' phones are not examined,
-because they can be received through walls.
+because they can be received through walls. The rays are cast by the engine; those of sensors are in `solids.py`.
 """
 
 from array import array

@@ -11,7 +11,8 @@ which nodes are ranked (lower is better; of equal scores the lower id):
 
 Hysteresis: the score of a standing head is improved by `keep`. If `keep` is infinite, a head is deposed only by a
 better head in range (least cluster change, Chiang et al. 1997); pairs of heads under `truce` may hear each other for
-the time being. A member keeps its head as long as it hears it.
+the time being. A member keeps its head as long as it hears it. What happens when a head falls silent is in
+`roles/failover.py`.
 """
 
 import math

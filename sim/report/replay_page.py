@@ -96,8 +96,8 @@ def _positions(replay: Replay, nodes: Sequence[NodeId], end_s: float, step_s: in
     """For each sample east, north and up of every UAV, one after the other [m]; the last one is of the end."""
     rows = []
     for sample in range(math.ceil(end_s / step_s) + 1):
-        at = replay.at(sample * step_s)
-        rows.append([round(value) for node in nodes for value in at[node].position])
+        at = replay.positions(sample * step_s)
+        rows.append([round(value) for node in nodes for value in at[node]])
     return rows
 
 

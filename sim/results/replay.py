@@ -111,13 +111,13 @@ class Replay:
         """The states of all UAVs at an instant. A wreck is where it was last seen flying."""
         t_ns = round(t_s * S)
         found = {}
-        for node, posed in sorted(self._posed.items()):
+        for node, position in self.positions(t_s).items():
             flight = _last(self._flight[node], t_ns)
             decided = _last(self._mission[node], t_ns)
             planned = _last(self._planned[node], t_ns)
             role = _last(self._roles[node], t_ns)
-            found[NodeId(node)] = UavState(
-                _between(posed, t_ns),
+            found[node] = UavState(
+                position,
                 flight.mode if flight else "",
                 decided.mode if decided else "",
                 decided.survivor if decided else 0,
@@ -126,6 +126,11 @@ class Replay:
                 role.head if role else 0,
             )
         return found
+
+    def positions(self, t_s: float) -> Mapping[NodeId, Enu]:
+        """The positions alone of all UAVs at an instant."""
+        t_ns = round(t_s * S)
+        return {NodeId(node): _between(posed, t_ns) for node, posed in sorted(self._posed.items())}
 
     @cached_property
     def survivors(self) -> Sequence[Enu]:

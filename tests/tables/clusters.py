@@ -8,11 +8,9 @@ from typing import Any, Final
 from unittest import mock
 
 from fanet_mw.routing.clustered.roles.neighbor_failure_detector import NeighborFailureDetector
-from sim.results.files import finish
-from sim.run.virtual import simulate
-from sim.scenarios import catalog
 from tests.benchmarks import head_changes, moving_swarm, relay_rules, relay_sets, slot_reuse
 from tests.tables.markdown import Rows
+from tests.tables.summaries import summarized
 
 _SEEDS: Final = (1, 2, 3)
 _WALK_SEEDS, _WALK_S = 10, 300
@@ -32,10 +30,6 @@ _NO_REPORTS: Final = mock.patch.object(NeighborFailureDetector, "find_suspect", 
 _TOGETHER: Final = (
     ("claimed", 1.0), ("claimed", 0.2), ("claimed", 0.1), ("claimed", 0.05), ("all", 1.0), ("all", 0.2),
 )  # fmt: skip
-
-
-def _finished(scenario: str, keys: Sequence[str]) -> dict[str, Any]:
-    return finish(simulate(catalog.find(scenario, list(keys))), out=None)
 
 
 def lasting_heads() -> Rows:
@@ -106,7 +100,7 @@ def settings_of_rescue() -> Rows:
         ["changed", "PDR, seeds 1-3", "reports delivered, mean", "frames sent per second and UAV", "radio busy [%]"]
     ]
     for name, keys in _OF_RESCUE.items():
-        found = [_finished("rescue", (f"duration_s={_RESCUE_S}", *keys, f"seed={seed}")) for seed in _SEEDS]
+        found = [summarized("rescue", f"duration_s={_RESCUE_S}", *keys, f"seed={seed}") for seed in _SEEDS]
         frames = statistics.mean(run["frames"]["sent"] / run["simulated_s"] / run["nodes"] for run in found)
         rows.append([
             name,
@@ -197,7 +191,7 @@ def together() -> Rows:
             f"traffic.interval_s={interval_s}",
             *(("clusters.count=8", "clusters.flooding_period_s=1") if rule == "all" else ()),
         ]  # fmt: skip
-        found = [_finished("clusters", (*keys, f"routing.aggregate={shared}")) for shared in ("false", "true")]
+        found = [summarized("clusters", *keys, f"routing.aggregate={shared}") for shared in ("false", "true")]
         rows.append([f"`{rule}`, {interval_s:g} s", *(_alone_or_together(run) for run in found)])
     return rows
 

@@ -2,11 +2,9 @@
 
 from typing import Final
 
-from sim.results.files import finish
-from sim.run.virtual import simulate
-from sim.scenarios import catalog
 from tests.benchmarks import claimed_plans, plan_against_runs
 from tests.tables.markdown import Rows
+from tests.tables.summaries import summarized
 
 _SIGMAS_M: Final = (0, 10, 15, 30)
 
@@ -37,9 +35,6 @@ def wrong_places() -> Rows:
     rows = [["SIGMA [m]", "links by places", "links as measured"]]
     for sigma_m in _SIGMAS_M:
         keys = [f"world.gps_sigma_m={sigma_m}", "duration_s=45", "nodes.telemetry_hz=1"]
-        pdr = [
-            finish(simulate(catalog.find("clusters", [*keys, f"clusters.links={links}"])), out=None)["pdr"]
-            for links in ("places", "measured")
-        ]
+        pdr = [summarized("clusters", *keys, f"clusters.links={links}")["pdr"] for links in ("places", "measured")]
         rows.append([f"{sigma_m}", *(f"{share:.3f}" for share in pdr)])
     return rows

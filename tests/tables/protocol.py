@@ -3,11 +3,9 @@
 import statistics
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, Final
+from typing import Final
 
 from scripts.rivals import connectivity
-from sim.results.files import finish
-from sim.run.virtual import simulate
 from sim.scenarios import catalog
 from tests.benchmarks import (
     clock_sync,
@@ -18,6 +16,7 @@ from tests.benchmarks import (
     relay_failure,
 )
 from tests.tables.markdown import Rows
+from tests.tables.summaries import summarized
 
 _SPEEDS: Final = (0, 10, 20)
 _SEEDS: Final = (1, 2, 3)
@@ -85,7 +84,7 @@ def promises() -> Rows:
     """The same with what may break a bound, or leave a packet without one."""
     rows = [["changed", "PDR, seeds 1-3", "packets with a bound", "within", "worst delay / bound [ms]", "broken"]]
     for keys in _DISTURBED:
-        found = [_summary("clusters", "duration_s=30", f"seed={seed}", *keys)["bound"] for seed in _SEEDS]
+        found = [summarized("clusters", "duration_s=30", f"seed={seed}", *keys)["bound"] for seed in _SEEDS]
         stated = statistics.fmean(bound.get("stated_share", 0.0) for bound in found)
         pdr, *cells = _bound_cells(keys)
         rows.append([", ".join(f"`{key}`" for key in keys), pdr, f"{stated:.3f}", *cells])
@@ -103,8 +102,8 @@ def lossy() -> Rows:
     for key in ("radio.shadowing_db=4", "radio.fading=rician"):
         for seed in _SEEDS:
             keys = ("radio.channel=log_distance", key, f"seed={seed}")
-            found = _summary("clusters", "duration_s=60", *keys)
-            places = _summary("clusters", "duration_s=30", "clusters.links=places", *keys)
+            found = summarized("clusters", "duration_s=60", *keys)
+            places = summarized("clusters", "duration_s=30", "clusters.links=places", *keys)
             delay_ms, likely = found["delay_ms"], found["likely"]
             rows.append(
                 [
@@ -122,7 +121,7 @@ def lossy() -> Rows:
 
 def _bound_cells(keys: Sequence[str]) -> list[str]:
     """PDR, share within the bound, the worst delay and the bound, and how often it was broken."""
-    found = [_summary("clusters", "duration_s=30", f"seed={seed}", *keys) for seed in _SEEDS]
+    found = [summarized("clusters", "duration_s=30", f"seed={seed}", *keys) for seed in _SEEDS]
     stated = [summary["bound"] for summary in found if summary["bound"]]
     pdr = f"{statistics.fmean(summary['pdr'] for summary in found):.4f}"
     if not stated:
@@ -142,7 +141,7 @@ def goodput() -> Rows:
     """44 sources every 0.1 s on the grid: deliveries over receivers and seconds."""
     rows = [["protocol", "PDR", "goodput [packets/s]", "of the bound", "p95 delay"]]
     for name, keys in _LOADED.items():
-        summary = _summary("clusters", "duration_s=28", "traffic.interval_s=0.1", *keys)
+        summary = summarized("clusters", "duration_s=28", "traffic.interval_s=0.1", *keys)
         per_second = 440 * summary["pdr"]
         share = per_second / _MOST_PER_S
         p95_s = summary["delay_ms"]["p95"] / 1000
@@ -157,7 +156,7 @@ def rivals() -> Rows:
     rows = [["protocol", "PDR at 0 / 10 / 20 m/s", "mean delay [ms]", "frames per packet"]]
     for name in ("geographic", "dsdv", "gossip", "counter", "flooding"):
         keys = [[f"routing.protocol={name}", f"mobility.speed_m_s={speed}"] for speed in _SPEEDS]
-        found = [[_summary("rivals", *chosen, f"seed={seed}") for seed in _SEEDS] for chosen in keys]
+        found = [[summarized("rivals", *chosen, f"seed={seed}") for seed in _SEEDS] for chosen in keys]
         pdr = [f"{statistics.fmean(s['pdr'] for s in runs):.3f}" for runs in found]
         delay = [f"{statistics.fmean(s['delay_ms']['mean'] or 0.0 for s in runs):.1f}" for runs in found]
         sent = [f"{statistics.fmean(s['frames']['sent'] / s['generated'] for s in runs):.1f}" for runs in found]
@@ -212,8 +211,3 @@ def clocks() -> Rows:
 @lru_cache(maxsize=1)
 def _clocks() -> clock_sync.Measured:
     return clock_sync.measured(seeds=len(_SEEDS))
-
-
-@lru_cache(maxsize=64)
-def _summary(scenario: str, *settings: str) -> dict[str, Any]:
-    return finish(simulate(catalog.find(scenario, list(settings))), out=None)

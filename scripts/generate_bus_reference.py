@@ -38,8 +38,9 @@ clock.
    `alive/<name>/<fingerprint>/<instance>` instead: the router names those that are missing, there twice, or of
    another scenario.
 4. Ask `clock` every half second until a `ClockEpoch` in state RUNNING is the answer; puts there are only hints to ask
-   again. Swarm instant = (unix time - `epoch_unix_ns`) x `time_scale`; on the machine of the keeper (`machine` says
-   which) monotonic time and `epoch_mono_ns` are better.
+   again: with `--slow-down-to` the launcher announces later epochs with a smaller scale, which give the same instant at
+   that moment. Swarm instant = (unix time - `epoch_unix_ns`) x `time_scale`; on the machine of the keeper
+   (`machine` says which) monotonic time and `epoch_mono_ns` are better.
 5. When the clock is STOPPED or the scenario's duration is over, send a last report and leave.
 
 A world puts all poses ten times a second (`world.tick_ms`), from instant 0 on, and a fix per node on

@@ -4,6 +4,10 @@ The keeper fixes the epoch in unix time and in the monotonic time of its machine
 from the monotonic epoch, whenever it starts: all of these agree to microseconds, and no step of the system's clock
 moves any of them. A process of another machine reads its unix time once, when it starts, and continues by its own
 monotonic clock: it is as accurate as the agreement of the two machines' unix clocks at the epoch and at its start.
+
+While the swarm runs, the keeper may slow the clock down: it announces an epoch and a smaller scale that give the same
+instant at that moment. A process that hears of it later is ahead, and its instant stands still until the slower clock
+has come so far. Swarm time never goes back, and never passes faster again.
 """
 
 import asyncio
@@ -40,20 +44,38 @@ class SwarmClock:
         self.epoch_unix_ns = clock.epoch_unix_ns
         """The unix time of swarm instant 0."""
         self._mono_ns = timebase.mono_ns
-        if clock.machine and clock.machine == timebase.machine:
-            self._epoch_mono_ns = clock.epoch_mono_ns
-        else:
-            self._epoch_mono_ns = clock.epoch_unix_ns - (timebase.unix_ns() - timebase.mono_ns())
+        self._machine = timebase.machine
+        self._unix_less_mono_ns = timebase.unix_ns() - timebase.mono_ns()
+        self._epoch_mono_ns = self._on_this_machine(clock)
         self._scale = clock.time_scale
+        self._reached_ns = self._by_line_ns()
+        """The clock does not go back behind this instant."""
 
-    def now_ns(self) -> int:
-        """The swarm instant now; it is negative before the start."""
+    def _on_this_machine(self, clock: ClockEpoch) -> int:
+        """The epoch on the monotonic clock of this machine."""
+        if clock.machine and clock.machine == self._machine:
+            return clock.epoch_mono_ns
+        return clock.epoch_unix_ns - self._unix_less_mono_ns
+
+    def slow_down(self, clock: ClockEpoch) -> None:
+        """Go on by what the keeper has announced; a clock that is not slower than this one is ignored."""
+        if clock.time_scale < self._scale:
+            self._reached_ns = self.now_ns()
+            self._epoch_mono_ns = self._on_this_machine(clock)
+            self._scale = clock.time_scale
+
+    def _by_line_ns(self) -> int:
         elapsed_ns = self._mono_ns() - self._epoch_mono_ns
         return elapsed_ns if self._scale == 1 else round(elapsed_ns * self._scale)
 
+    def now_ns(self) -> int:
+        """The swarm instant now; it is negative before the start."""
+        now_ns = self._by_line_ns()
+        return now_ns if now_ns > self._reached_ns else self._reached_ns
+
     def wait_s(self, instant_ns: int) -> float:
         """Seconds of real time until a swarm instant; negative when it has passed."""
-        return (instant_ns - self.now_ns()) / self._scale / S
+        return (instant_ns - self._by_line_ns()) / self._scale / S
 
 
 class ClockKeeper:
@@ -119,6 +141,18 @@ class ClockKeeper:
         assert self.clock is not None, "just published"
         return self.clock
 
+    def slow_down(self, time_scale: float) -> ClockEpoch:
+        """Let swarm time pass more slowly from this instant on; every host follows as soon as it hears of it."""
+        clock = self.clock
+        assert clock is not None, "the clock runs"
+        assert time_scale < clock.time_scale, "it runs faster"
+        elapsed_ns = self._timebase.mono_ns() - clock.epoch_mono_ns
+        later_ns = elapsed_ns - round(elapsed_ns * clock.time_scale / time_scale)
+        unix_ns, mono_ns = clock.epoch_unix_ns + later_ns, clock.epoch_mono_ns + later_ns
+        slower = clock._replace(epoch_unix_ns=unix_ns, epoch_mono_ns=mono_ns, time_scale=time_scale)
+        self._publish(slower)
+        return slower
+
     def stop(self) -> None:
         """Stop the clock, so that every process ends at once."""
         clock = self.clock or ClockEpoch(0, self._time_scale, ClockState.STOPPED)
@@ -142,7 +176,7 @@ class ClockListener:
         self._bus = bus
         self._names = names
         self._loop = asyncio.get_running_loop()
-        self._running: asyncio.Future[ClockEpoch] = self._loop.create_future()
+        self._running: asyncio.Future[SwarmClock] = self._loop.create_future()
         self.stopped = asyncio.Event()
         self._asked_s = -math.inf
         self._asks_again: asyncio.TimerHandle | None = None
@@ -181,17 +215,20 @@ class ClockListener:
             if isinstance(message, ClockEpoch):
                 if message.state is ClockState.STOPPED:
                     self.stopped.set()
-                if not self._running.done():
-                    self._running.set_result(message)
+                if self._running.done():
+                    self._running.result().slow_down(message)
+                else:
+                    self._running.set_result(SwarmClock(message, self._timebase))
 
     async def running(self, *, timeout_s: float) -> SwarmClock:
-        """The clock, once it has started; raises BusError if it does not start in time, or if the router goes away."""
+        """The clock, once it has started; it slows down when the keeper says so. Raises BusError if it does not start
+        in time, or if the router goes away.
+        """
         waited_s = 0.0
         while waited_s < timeout_s:
             self._ask_now()
             try:
-                clock = await asyncio.wait_for(asyncio.shield(self._running), _ASK_EVERY_S)
-                return SwarmClock(clock, self._timebase)
+                return await asyncio.wait_for(asyncio.shield(self._running), _ASK_EVERY_S)
             except TimeoutError:
                 waited_s += _ASK_EVERY_S
                 self._bus.check()

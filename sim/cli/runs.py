@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
+from cyclopts.validators import Number
 
 from sim.cli.completion import ScenarioName
 from sim.cli.console import Console
@@ -74,6 +75,7 @@ def launch(
     choice: ScenarioFlags = ScenarioFlags(),
     output: OutputFlags = OutputFlags(),
     respawn: Annotated[bool, Parameter(negative="")] = False,
+    slow_down_to: Annotated[float | None, Parameter(validator=Number(gte=1e-3, lte=100))] = None,
     no_world: Annotated[bool, Parameter(negative="")] = False,
     listen: str | None = None,
     connect: str | None = None,
@@ -88,6 +90,9 @@ def launch(
         A shipped scenario's name (see `fanet scenarios`) or a .toml file.
     respawn
         Start a process again when it dies.
+    slow_down_to
+        Let the swarm's clock slow down while this machine cannot keep up with it, at most to this share of real time;
+        by default it does not, and the run says that it is not valid.
     no_world
         Start no world: another program says where all UAVs are (see docs/reference/bus.md).
     listen
@@ -116,6 +121,7 @@ def launch(
                 listen=listen,
                 connect=connect,
                 respawn=respawn,
+                slow_down_to=slow_down_to,
                 own_world=not no_world,
                 zenoh_config=zenoh_config,
                 emulator_options={"pcap": output.capture_path(), "receptions": output.pcap_receptions},

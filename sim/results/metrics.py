@@ -46,6 +46,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "duration_s": scenario.duration_s,
         "simulated_s": round(outcome.simulated_ns / S, 3),
         "time_scale": scenario.time_scale if outcome.mode == "realtime" else None,
+        "slowed": [{"t_s": round(t_ns / S, 3), "time_scale": round(scale, 6)} for t_ns, scale in outcome.slowed],
         "wall_s": round(outcome.wall_s, 3),
         **packets[classes[0]],
         "classes": {name: packets[name] for name in classes} if len(classes) > 1 else {},

@@ -12,6 +12,8 @@ def show(summary: Mapping[str, Any], console: Console) -> None:
     mode = "virtual time" if summary["mode"] == "virtual" else "real processes"
     if summary["time_scale"] not in (None, 1):
         mode += f", swarm clock at {summary['time_scale']:g}"
+    if summary["slowed"]:
+        mode += f", slowed to {summary['slowed'][-1]['time_scale']:.3g}"
     pace = summary["simulated_s"] / summary["wall_s"] if summary["wall_s"] else 0.0
     length = f"{summary['duration_s']:g} s"
     if summary["simulated_s"] < summary["duration_s"]:
@@ -165,6 +167,6 @@ def _warnings(summary: Mapping[str, Any]) -> Iterator[str]:
         yield f"NOT VALID: {reason}"
     if any(item["value"] > item["limit"] for item in summary["disturbance"].values()):
         yield (
-            "This machine could not hold real time. "
-            "Lower the load, raise radio.lead_ms, or slow the swarm clock with --set time_scale=0.5"
+            "This machine could not hold real time. Lower the load, raise radio.lead_ms, "
+            "or let the swarm's clock slow down: fanet launch --slow-down-to 0.1"
         )

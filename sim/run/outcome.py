@@ -1,6 +1,6 @@
 """The outcome of a run, in virtual or in real time: the input of metrics and files."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -40,6 +40,9 @@ class Outcome:
     """The number of puts that the launcher received, and of refused items by what was wrong; in real time only."""
     absent: Mapping[str, str] = field(default_factory=dict)
     """Why the report of an actor is missing, by the actor's name; in real time only."""
+    slowed: Sequence[tuple[int, float]] = ()
+    """When the swarm's clock was slowed down because the machine could not keep up: swarm instant [ns] and the scale
+    from then on; in real time only."""
     stall_ms: float = 0.0
     """The longest time for which the launcher, and with it the bus, could do nothing; in real time only."""
 

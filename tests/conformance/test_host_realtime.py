@@ -414,6 +414,27 @@ def test_a_scaled_clock_runs_and_waits_by_its_scale(scale: float) -> None:
     assert clock.wait_s(now_ns + 8 * S) == pytest.approx(8 / scale)
 
 
+async def test_an_actor_follows_a_clock_that_slows_down_while_it_runs() -> None:
+    """The keeper slows the clock to a tenth at 0.5 s; a wake-up that was asked for comes at its swarm instant."""
+    endpoint, actor = free_endpoint(), Ticker()
+    with Bus.serve(endpoint) as bus:
+        observer = Observer(bus)
+        keeper = ClockKeeper(bus, NAMES, time_scale=1.0, expected=[])
+        clock = SwarmClock(await keeper.start(timeout_s=_PATIENCE_S))
+        host = asyncio.create_task(run_actor(actor, SwarmAddress("host", endpoint), until_ns=1000 * S))
+        await asyncio.sleep(clock.wait_s(500 * MS))
+        clock.slow_down(keeper.slow_down(0.1))
+        slowed_ns = clock.now_ns()
+        await asyncio.sleep(1)
+        assert slowed_ns < clock.now_ns() < slowed_ns + 500 * MS
+        while actor.next_ns < slowed_ns + 100 * MS and not host.done():  # noqa: ASYNC110  (real time passes)
+            await asyncio.sleep(0.01)
+        assert actor.next_ns < clock.now_ns() + 40 * MS, "not ahead of the keeper's clock"
+        keeper.stop()
+        await host
+        await observer.last_report()
+
+
 async def test_whoever_comes_late_gets_the_clock_that_runs() -> None:
     endpoint = free_endpoint()
     with Bus.serve(endpoint) as bus:

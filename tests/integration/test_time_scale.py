@@ -76,3 +76,24 @@ async def test_a_swarm_of_processes_lives_by_its_clock(tmp_path: Path, time_scal
     assert host["overflowed"] == host["malformed"] == 0
     seconds, _ = struct.unpack_from("<II", pcap.read_bytes(), 24)
     assert began_ns // S <= seconds <= began_ns // S + 60, "stamped with the epoch"
+
+
+@pytest.mark.parametrize("slow_down_to", [None, 5.0])
+async def test_a_machine_that_cannot_keep_up_slows_the_clock_if_it_may(slow_down_to: float | None) -> None:
+    """At 80 times real time no machine wakes ten processes in time."""
+    said: list[str] = []
+    changes = ["time_scale=80", "duration_s=240", "drain_s=10", "traffic.interval_s=0.2"]
+    scenario = catalog.find("quick", [*changes, "world.engine=kinematic", "mission.survivors=0"])
+    outcome = await launch(scenario, swarm="hurried", slow_down_to=slow_down_to, on_event=said.append)
+    summary = finish(outcome, out=None)
+    scales = [step["time_scale"] for step in summary["slowed"]]
+    assert sum("slows to" in text for text in said) == len(scales)
+    if slow_down_to is None:
+        assert scales == []
+        assert summary["wall_s"] < 240 / 80 + 2 + outcome.stall_ms / 1000
+    else:
+        assert scales == sorted(scales, reverse=True)
+        assert 5.0 <= scales[-1] < 80
+        assert summary["wall_s"] > 240 / 80 + 0.5
+    assert summary["frames"]["unaccounted"] == 0
+    assert not summary["processes"]["ended"]

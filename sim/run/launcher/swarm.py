@@ -1,6 +1,7 @@
 """A swarm of real processes: router and clock in this one; the emulator, the world and each UAV in one of their own.
 
     start all -> wait until all are present -> start the clock -> collect traces, reports and taps -> all end -> outcome
+                                               (and slow it down, if that is allowed, while the machine cannot keep up)
 
 If the process of a UAV dies, that is reported and the others go on. A run needs the emulator and the world, so it ends
 if either of them dies. With `respawn`, any process is started again, and continues by the clock.
@@ -30,6 +31,7 @@ from sim.run.bus.router import ROUTER, expected_names
 from sim.run.bus.running_swarms import registered
 from sim.run.collecting.collector import Collector
 from sim.run.launcher import limits
+from sim.run.launcher.clock_governor import ClockGovernor
 from sim.run.launcher.deaths import Deaths
 from sim.run.launcher.processes import Processes, describe
 from sim.run.launcher.services import Services
@@ -62,7 +64,14 @@ class SwarmRun:
     """One run in real time."""
 
     def __init__(
-        self, services: Services, bus: Bus, *, respawn: bool, tell: Tell, spool_folder: Path | None = None
+        self,
+        services: Services,
+        bus: Bus,
+        *,
+        respawn: bool,
+        tell: Tell,
+        spool_folder: Path | None = None,
+        slow_down_to: float | None = None,
     ) -> None:
         scenario, self.address = services.scenario, services.address
         names = Topics(self.address.swarm)
@@ -72,6 +81,11 @@ class SwarmRun:
         self._recorder = FlightRecorder(scenario, bus.subscribe, names) if respawn else None
         self._keeper = ClockKeeper(
             bus, names, time_scale=scenario.time_scale, expected=expected_names(scenario), scenario=scenario
+        )
+        self._governor = ClockGovernor(
+            scenario.time_scale,
+            least=scenario.time_scale if slow_down_to is None else slow_down_to,
+            late_limit=scenario.radio.late_limit,
         )
         protocol = module_of(scenario.routing.protocol)
         self.processes = Processes(self._process_ended, title=f"fanet {names.swarm}", preload=[protocol])
@@ -108,7 +122,7 @@ class SwarmRun:
             self._deaths.records,
             wall_s=wall_s,
             ready_s=ready_s,
-            epoch_unix_ns=self._keeper.clock.epoch_unix_ns if self._keeper.clock else 0,
+            epoch_unix_ns=self._clock.epoch_unix_ns if self._clock else 0,
         )
         if (failure := self._collector.disk_failure()) is not None:
             self._tell(f"the trace is incomplete: its temporary file could not be written: {failure}")
@@ -119,6 +133,7 @@ class SwarmRun:
             aborted=self._aborted,
             ended_ns=ended_ns,
             absent={name: why for name, why in heard.absent.items() if name not in foreign},
+            slowed=self._governor.steps,
             stall_ms=self._stall_s * 1000,
         )
 
@@ -174,6 +189,16 @@ class SwarmRun:
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._over.wait(), _PROGRESS_S)
             self._stall_s = max(self._stall_s, time.monotonic() - began_s - _PROGRESS_S)
+            self._govern()
+
+    def _govern(self) -> None:
+        """Slow the clock down if the reports say that the machine cannot keep up."""
+        assert self._clock is not None, "the clock was started"
+        now_ns = self._now_ns()
+        scale = None if self._over.is_set() else self._governor.slower(self._collector.reports(), now_ns)
+        if scale is not None:
+            self._clock.slow_down(self._keeper.slow_down(scale))
+            self._tell(f"the machine cannot keep up: at {now_ns / S:.1f} s the swarm's clock slows to {scale:.3g}")
 
     async def _wind_up(self) -> None:
         """End all processes, by the clock or by a signal, and wait for last reports."""
@@ -252,6 +277,7 @@ async def launch(
     listen: str | None = None,
     connect: str | None = None,
     respawn: bool = False,
+    slow_down_to: float | None = None,
     own_world: bool = True,
     emulator_options: Mapping[str, Any] | None = None,
     spool_folder: Path | None = None,
@@ -264,6 +290,7 @@ async def launch(
 ) -> Outcome:
     """Run a scenario as real processes. `on_started` receives the swarm while it runs, for tests and tools.
 
+    With `slow_down_to` the swarm's clock slows down, at most to that scale, while the machine cannot keep up with it.
     The nodes of `leave_out` are waited for and not started: a program of the user's own joins in their place.
     Without `own_world` the swarm waits for a foreign world, which declares the liveliness token of `world`.
     `zenoh_config` is Zenoh's own configuration: a file for all processes, or a folder with one file for each. What is
@@ -282,7 +309,9 @@ async def launch(
         on_event(f"swarm {swarm} on {endpoint}" + ("" if known else "; other commands must be told so: --connect"))
         address = SwarmAddress(swarm, endpoint, zenoh_config, READY_TIMEOUT_S)
         services = Services(scenario, address, own_world, frozenset(leave_out), emulator_options or {})
-        run = SwarmRun(services, bus, respawn=respawn, tell=on_event, spool_folder=spool_folder)
+        run = SwarmRun(
+            services, bus, respawn=respawn, tell=on_event, spool_folder=spool_folder, slow_down_to=slow_down_to
+        )
         loop = asyncio.get_running_loop()
         signals = interrupts.SIGNALS if heed_signals else ()
         for number in signals:

@@ -1,12 +1,17 @@
-"""Swarm instants out of unix time and a scale."""
+"""Swarm instants out of unix time and a scale, and of a clock that slows down."""
 
 import time
+from collections.abc import Callable
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from fanet_mw.bus.messages import ClockEpoch, ClockState
-from fanet_mw.hosts.clock import SwarmClock
-from fanet_mw.units import S
+from fanet_mw.bus.topics import Topics
+from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
+from fanet_mw.hosts.timebase import Timebase
+from fanet_mw.units import MS, S
 
 
 @pytest.mark.parametrize("scale", [0.5, 1.0, 2.0])
@@ -15,3 +20,100 @@ def test_swarm_time_is_unix_time_since_the_epoch_times_the_scale(scale: float) -
     assert clock.now_ns() / S == pytest.approx(100 * scale, abs=1)
     assert clock.wait_s(round((100 * scale + 30) * S)) == pytest.approx(30 / scale, abs=2)
     assert clock.wait_s(0) < 0, "it has passed"
+
+
+class Machine:
+    """Two machines with one time; the unix clock of the second began elsewhere on its monotonic clock."""
+
+    def __init__(self) -> None:
+        self.passed_ns = 0
+        self.keepers = Timebase(lambda: 10**18 + self.passed_ns, lambda: 7 * S + self.passed_ns, 7)
+        self.other = Timebase(lambda: 10**18 + self.passed_ns, lambda: 90 * S + self.passed_ns, 8)
+
+    def let_pass(self, seconds: float) -> None:
+        self.passed_ns += round(seconds * S)
+
+
+class Silent:
+    """A bus on which nobody listens."""
+
+    def answer(self, _key: str, _content: Callable[[], bytes | None]) -> None: ...
+    def watch(self, _expression: str, _on_change: Callable[[str, bool], None]) -> None: ...
+    def put(self, _topic: str, _payload: bytes, *, reliable: bool = False) -> None: ...
+
+
+async def started(machine: Machine, scale: float) -> tuple[ClockKeeper, ClockEpoch]:
+    """A keeper whose clock is at swarm instant 0."""
+    keeper = ClockKeeper(Silent(), Topics("slow"), time_scale=scale, expected=[], timebase=machine.keepers)  # type: ignore[arg-type]
+    told = await keeper.start(timeout_s=1)
+    machine.let_pass(0.3)
+    return keeper, told
+
+
+async def test_a_clock_slows_down_at_the_instant_that_it_has_reached() -> None:
+    machine = Machine()
+    keeper, told = await started(machine, 2.0)
+    same, other = SwarmClock(told, machine.keepers), SwarmClock(told, machine.other)
+    machine.let_pass(10)
+    slower = keeper.slow_down(0.5)
+    for clock in (same, other):
+        clock.slow_down(slower)
+        assert clock.now_ns() == 20 * S
+    machine.let_pass(4)
+    assert same.now_ns() == other.now_ns() == 22 * S
+    assert same.wait_s(23 * S) == other.wait_s(23 * S) == 2.0
+    assert SwarmClock(slower, machine.other).now_ns() == 22 * S, "a process that starts late"
+    assert same.epoch_unix_ns == told.epoch_unix_ns, "what files count from stays"
+
+
+async def test_a_process_that_hears_of_it_late_waits_for_the_others_and_does_not_go_back() -> None:
+    machine = Machine()
+    keeper, told = await started(machine, 1.0)
+    late = SwarmClock(told, machine.keepers)
+    machine.let_pass(10)
+    slower = keeper.slow_down(0.5)
+    machine.let_pass(0.2)
+    late.slow_down(slower)
+    assert late.now_ns() == 10 * S + 200 * MS, "the others are at 10.1 s"
+    assert late.wait_s(10 * S + 300 * MS) == pytest.approx(0.4), "by the clock of the others"
+    machine.let_pass(0.2)
+    assert late.now_ns() == 10 * S + 200 * MS, "they have come so far"
+    machine.let_pass(0.2)
+    assert late.now_ns() == 10 * S + 300 * MS
+
+
+async def test_an_older_word_of_the_keeper_makes_no_clock_faster_again() -> None:
+    machine = Machine()
+    keeper, told = await started(machine, 1.0)
+    clock = SwarmClock(told, machine.keepers)
+    machine.let_pass(10)
+    first, second = keeper.slow_down(0.5), keeper.slow_down(0.25)
+    for word in (second, first, told):
+        clock.slow_down(word)
+    machine.let_pass(8)
+    assert clock.now_ns() == 12 * S
+
+
+@given(
+    st.lists(st.tuples(st.floats(0.01, 50), st.floats(0.3, 0.99), st.floats(0, 2)), max_size=6),
+    st.floats(0.1, 20),
+)
+async def test_time_never_goes_back_and_every_clock_ends_where_the_keepers_is(
+    steps: list[tuple[float, float, float]], scale: float
+) -> None:
+    """Steps of: seconds that pass, by what the clock slows down, and how much later this process hears of it."""
+    machine = Machine()
+    keeper, told = await started(machine, scale)
+    clock, latest_ns = SwarmClock(told, machine.keepers), 0
+    for seconds, factor, later_s in steps:
+        machine.let_pass(seconds)
+        assert latest_ns <= (latest_ns := clock.now_ns())
+        scale *= factor
+        slower = keeper.slow_down(scale)
+        machine.let_pass(later_s)
+        assert latest_ns <= (latest_ns := clock.now_ns())
+        clock.slow_down(slower)
+        assert latest_ns <= clock.now_ns()
+    machine.let_pass(10_000)
+    assert keeper.clock is not None
+    assert clock.now_ns() == SwarmClock(keeper.clock, machine.keepers).now_ns()

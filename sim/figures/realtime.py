@@ -89,7 +89,8 @@ REALTIME: Final = Recipe(
     "realtime",
     "12 UAVs, 11 sources of 512 B every 0.25 s to everyone. Delays include the lead of 60 ms with which frames are "
     "announced and the handover every 20 ms, in both. radio.cw_min is 31 for flooding and 7 for the "
-    "timetable. Real time: 14 processes over the bus, one run at a time. Bands: 95 % of the mean.",
+    "timetable. Real time: 14 processes over the bus, one run at a time; their clock slows down, at most to a tenth, "
+    "while the machine cannot keep up. Bands: 95 % of the mean.",
     draw,
     claims,
 )

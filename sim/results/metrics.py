@@ -45,7 +45,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "nodes": scenario.nodes.count,
         "duration_s": scenario.duration_s,
         "simulated_s": round(outcome.simulated_ns / S, 3),
-        "time_scale": scenario.time_scale if outcome.mode == "realtime" else None,
+        "time_scale": _last_scale(outcome),
         "slowed": [{"t_s": round(t_ns / S, 3), "time_scale": round(scale, 6)} for t_ns, scale in outcome.slowed],
         "wall_s": round(outcome.wall_s, 3),
         **packets[classes[0]],
@@ -76,6 +76,13 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "aborted": outcome.aborted,
         "trace_sha256": trace_sha256,
     }
+
+
+def _last_scale(outcome: Outcome) -> float | None:
+    """The scale of the swarm's clock at the end; None in virtual time."""
+    if outcome.mode == "virtual":
+        return None
+    return round(outcome.slowed[-1][1], 6) if outcome.slowed else outcome.scenario.time_scale
 
 
 def _messages(outcome: Outcome) -> dict[str, int]:

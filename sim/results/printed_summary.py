@@ -11,9 +11,7 @@ def show(summary: Mapping[str, Any], console: Console) -> None:
     """Print a summary."""
     mode = "virtual time" if summary["mode"] == "virtual" else "real processes"
     if summary["time_scale"] not in (None, 1):
-        mode += f", swarm clock at {summary['time_scale']:g}"
-    if summary["slowed"]:
-        mode += f", slowed to {summary['slowed'][-1]['time_scale']:.3g}"
+        mode += f", swarm clock {'slowed to' if summary['slowed'] else 'at'} {summary['time_scale']:.3g}"
     pace = summary["simulated_s"] / summary["wall_s"] if summary["wall_s"] else 0.0
     length = f"{summary['duration_s']:g} s"
     if summary["simulated_s"] < summary["duration_s"]:

@@ -38,11 +38,12 @@ class Finished:
         return self.summary is None
 
 
-def _launched(scenario: Scenario) -> Outcome:
+def _launched(scenario: Scenario, *, slow_down_to: float | None) -> Outcome:
     """Run a scenario as processes; only a run in real time needs the bus and its packages."""
     from sim.run.launcher.swarm import launch
 
-    return asyncio.run(launch(scenario, swarm=f"{scenario.name}-sweep", heed_signals=False))
+    name = f"{scenario.name}-sweep"
+    return asyncio.run(launch(scenario, swarm=name, slow_down_to=slow_down_to, heed_signals=False))
 
 
 def _cpu_s() -> float:
@@ -60,7 +61,7 @@ def carry_out(task: Task) -> Finished:
 
     try:
         scenario = config.build(task.tree)
-        outcome = _launched(scenario) if task.realtime else simulate(scenario)
+        outcome = _launched(scenario, slow_down_to=task.slow_down_to) if task.realtime else simulate(scenario)
         summary = finish(outcome, out=None)
         if task.realtime and not summary["valid"]:
             raise HostError(f"not valid: {'; '.join(summary['invalid_because'])}")

@@ -10,6 +10,7 @@
     name = "flooding"
     set.routing.protocol = "flooding"
     realtime = true                     # as processes in real time; by default in virtual time
+    slow_down_to = 0.1                  # their clock may slow down to this while the machine cannot keep up
     [quick]                             # a variant replaces what it names
     seeds = 2
     [full]
@@ -28,7 +29,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from fanet_mw.errors import ConfigError
 from sim.sweep.toml_values import toml_value
@@ -72,6 +73,14 @@ class Case(_Table):
     grid: Axes = {}
     realtime: bool = False
     """True for runs as real processes: on this machine, one at a time, after all others."""
+    slow_down_to: Annotated[float, Field(ge=1e-3, le=100)] | None = None
+    """The scale to which the clock of runs as processes may slow down while the machine cannot keep up; None: never."""
+
+    @model_validator(mode="after")
+    def _only_processes_slow_down(self) -> "Case":
+        if self.slow_down_to is not None and not self.realtime:
+            raise ValueError("slow_down_to is for runs with realtime = true: virtual time keeps up with every machine")
+        return self
 
 
 class SweepVariant(_Table):
@@ -94,6 +103,7 @@ class Setting(_Table):
     case: str
     changes: dict[str, Any]
     realtime: bool = False
+    slow_down_to: float | None = None
 
     def overrides(self) -> list[str]:
         """The changes in the form of `--set`."""
@@ -157,7 +167,7 @@ class Sweep(_Table):
             axes = {**self.grid, **case.grid}
             for values in itertools.product(*axes.values()):
                 changes = {**self.set, **case.set, **dict(zip(axes, values, strict=True))}
-                yield Setting(case=case.name, changes=changes, realtime=case.realtime)
+                yield Setting(case=case.name, changes=changes, realtime=case.realtime, slow_down_to=case.slow_down_to)
 
     def count(self) -> int:
         """The number of runs."""

@@ -30,6 +30,8 @@ class Task:
     """The command that repeats this run alone."""
     realtime: bool = False
     """True for a run as real processes, which needs the machine to itself."""
+    slow_down_to: float | None = None
+    """The scale to which their clock may slow down."""
 
     def value(self, key: str) -> object:
         """The resolved value of a dotted scenario key; None if the scenario leaves it unset."""
@@ -60,7 +62,8 @@ def tasks_of(sweep: Sweep) -> list[Task]:
                 break
             sets = [f"--set {shlex.quote(override)}" for override in overrides]
             verb = "launch" if setting.realtime else "simulate"
-            command = " ".join([f"fanet {verb}", shlex.quote(sweep.base), *sets, f"--seed {seed}"])
+            slower = [] if setting.slow_down_to is None else [f"--slow-down-to {setting.slow_down_to:g}"]
+            command = " ".join([f"fanet {verb}", shlex.quote(sweep.base), *sets, f"--seed {seed}", *slower])
             tasks.append(_task(scenario, setting, sweep.measure, command))
     if mistakes:
         raise ConfigError("\n".join(f"{error} ({_first_of(settings)})" for error, settings in mistakes.items()))
@@ -78,4 +81,4 @@ def _task(scenario: Scenario, setting: Setting, measure: tuple[str, ...], comman
     named = {key: value for key, value in tree.items() if key != "description"}
     text = json.dumps([named, sorted(measure), *(["realtime"] if setting.realtime else [])], sort_keys=True)
     key = hashlib.sha256(text.encode()).hexdigest()[:16]
-    return Task(key, setting.case, scenario.seed, tree, measure, command, setting.realtime)
+    return Task(key, setting.case, scenario.seed, tree, measure, command, setting.realtime, setting.slow_down_to)

@@ -89,6 +89,16 @@ def test_a_run_in_real_time_is_another_run_with_the_command_that_launches_it() -
         tasks_of(spec.parse('base = "flooding"\ncase = [{name = "real", realtime = true}]', source="test"))
 
 
+def test_a_run_in_real_time_may_be_slowed_down_and_stays_the_same_run() -> None:
+    text = 'base = "quick"\ncase = [{{name = "real", realtime = true{}}}]'
+    (held,), (slowed,) = (
+        tasks_of(spec.parse(text.format(more), source="test")) for more in ("", ", slow_down_to = 0.1")
+    )
+    assert held.key == slowed.key
+    assert (held.slow_down_to, slowed.slow_down_to) == (None, 0.1)
+    assert slowed.command == "fanet launch quick --seed 1 --slow-down-to 0.1"
+
+
 @pytest.mark.parametrize(
     ("text", "mistake"),
     [
@@ -97,6 +107,7 @@ def test_a_run_in_real_time_is_another_run_with_the_command_that_launches_it() -
         ('base = "quick"\nseeds = 0', r"seeds.* = 0: .*greater than or equal to 1"),
         ('base = "quick"\n[grid]\nnodes.count = []', r"grid.nodes.count = \[\]"),
         ('base = "quick"\n[[case]]\nset.nodes.count = 5', "case.0.name: is missing"),
+        ('base = "quick"\n[[case]]\nname = "a"\nslow_down_to = 0.1', "case.0.*slow_down_to is for runs with realtime"),
         ("base = ", "not valid TOML"),
     ],
 )

@@ -2,6 +2,7 @@
 
 from array import array
 from collections.abc import Callable, Sequence
+from itertools import combinations
 from typing import Any, Final
 
 import pytest
@@ -155,6 +156,16 @@ def test_a_survivor_in_the_open_is_confirmed_by_voice_alone_from_a_uav_that_goes
     poses = [record for record in outcome.records if isinstance(record, Posed) and record.node == confirmed.node]
     assert min(pose.up_m for pose in poses if pose.t_ns <= confirmed.t_ns) < 14.1
     assert max(pose.up_m for pose in poses if pose.t_ns > confirmed.t_ns) > 30
+
+
+def test_without_a_network_every_uav_searches_a_lane_of_its_own_and_no_two_touch() -> None:
+    cuts = [f"{{kind='degrade', at_s=0, src={a}, dst={b}, loss_share=1}}" for a, b in combinations(range(1, 13), 2)]
+    outcome = flown(lambda uav, _: uav, seconds=60, keys=[f"faults=[{', '.join(cuts)}]"])
+    places = {record.node: record.place for record in outcome.records if isinstance(record, Planned)}
+    assert sorted(places.values()) == list(range(12))
+    found = mission_of(outcome)
+    assert not found["collisions"]
+    assert found["coverage"] >= 0.99
 
 
 class Lost(Around):

@@ -7,6 +7,8 @@
                 a relay, because those places keep the swarm connected and sweep the area
     take-off:   the first plan of UAVs on the ground begins when they have had time to climb
     leavers:    a node whose status says that its battery is only enough for the way home is replaced at once
+    alone:      a node that has received nobody takes the place with its own number, and keeps it; others that are
+                alone then search other lanes
 
 The first assignment minimizes the sum of the squared distances flown. If all UAVs leave and arrive at the same
 instants, their ways then do not cross, and UAVs that were near each other remain so. The words place, team, relay and
@@ -138,17 +140,18 @@ class FormationPlanner:
     def _first(self, pattern: Pattern, now_ns: int) -> Search:
         """The first plan of the search, for all UAVs that were received and stay."""
         nodes = sorted(node for node, member in self._members.items() if not member.leaves)[: pattern.places]
-        places = list(range(pattern.places))
+        alone = len(nodes) == 1
+        places = [(nodes[0] - 1) % pattern.places] if alone else list(range(pattern.places))
         goals = [pattern.at(place, 0.0) for place in places]
         costs = [[_distance2(self._members[node].position, goal) for goal in goals] for node in nodes]
         chosen = assign(costs)
         holders = [0] * pattern.places
-        for node, place in zip(nodes, chosen, strict=True):
-            holders[place] = node
+        for node, column in zip(nodes, chosen, strict=True):
+            holders[places[column]] = node
         holders = _filled(holders, pattern)
         assert self._began_ns is not None, "a plan is made in a review"
         start_ns = max(now_ns + _NOTICE_NS, self._began_ns + self._take_off_ns)
-        farthest_m = max(costs[row][place] for row, place in enumerate(chosen)) ** 0.5
+        farthest_m = max(costs[row][column] for row, column in enumerate(chosen)) ** 0.5
         return plan_of(
             pattern,
             tuple(holders),
@@ -201,7 +204,10 @@ def _filled(holders: list[int], pattern: Pattern) -> list[int]:
 
     If there are no followers left, the UAVs farther out in the team move up, so that the team stays connected and
     becomes shorter; in `sectors` the UAVs farther out in the whole row do so. The place of a relay then stays vacant.
+    A UAV that is alone has no team, and keeps its place.
     """
+    if sum(holder != 0 for holder in holders) == 1:
+        return holders
     filled = list(holders)
     for place in range(pattern.dimensions.fixed):
         if filled[place]:

@@ -88,6 +88,19 @@ def test_a_plan_gives_everyone_a_place_and_the_swarm_stays_in_one_piece_on_the_w
         assert is_one(places), share
 
 
+def test_uavs_that_hear_nobody_take_different_places_and_keep_them() -> None:
+    pattern, places = formation(), []
+    for node in range(1, 46):
+        planner = FormationPlanner(NodeId(node), expected=45, deploy_speed_m_s=9)
+        for second in range(40):
+            planner.on_neighbor(node, Enu(10.0 * node, 0.0, 50.0), now_ns=second * S)
+            planner.review(pattern, now_ns=second * S)
+        assert planner.plan is not None
+        assert planner.plan.revision == 1
+        places.append(planner.plan.nodes.index(node))
+    assert sorted(places) == list(range(45))
+
+
 def test_the_first_plan_begins_when_all_have_had_time_to_take_off() -> None:
     begins_s = []
     for take_off_s in (0, 5, 30):

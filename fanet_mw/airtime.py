@@ -10,7 +10,7 @@ stations that know only DSSS, 5 and 10 MHz channels, QoS access categories.
 import math
 from typing import Final, NamedTuple
 
-from fanet_mw.scenario.radio import Radio, is_ofdm
+from fanet_mw.scenario.tables.radio import Radio, is_ofdm
 from fanet_mw.units import US
 
 OVERHEAD_BYTES: Final = 8 + 20 + 8 + 24 + 4

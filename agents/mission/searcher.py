@@ -18,7 +18,7 @@ from typing import Final, assert_never
 
 from agents.mission.finding.announcing import Announcing
 from agents.mission.finding.coverage_map import CoverageMap
-from agents.mission.finding.finds import Finds
+from agents.mission.finding.known_survivors import KnownSurvivors
 from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, PhoneModel
 from agents.mission.finding.phone_reception import PhoneReception
 from agents.mission.finding.sightings import Sightings
@@ -42,7 +42,7 @@ from agents.mission.search_formation.formation_planner import FormationPlanner
 from agents.mission.search_formation.missed_cells import MissedCells
 from agents.mission.search_formation.pattern import Pattern, fitted
 from agents.mission.search_formation.plan_exchange import PlanExchange
-from agents.mission.search_formation.shape import Demands, ShapeName
+from agents.mission.search_formation.shapes.contract import Demands, ShapeName
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import Bidding
 from agents.mission.tasking.listening import Listening
@@ -72,7 +72,7 @@ class Searcher:
     ) -> None:
         mission, reach_m, speed_m_s = scenario.mission, scenario.radio.range_m, approach_speed_m_s(scenario, node)
         self._random = stream(scenario.seed, "mission", node).random
-        self._finds = finds = Finds(phone_model(scenario))
+        self._survivors = survivors = KnownSurvivors(phone_model(scenario))
         obstacles = KnownObstacles(onboard_map, scenario.world.no_fly_m)
         own_motion = OwnMotion(position, obstacles)
         self._neighbors = neighbors = NeighborMotions()
@@ -89,13 +89,13 @@ class Searcher:
             pattern=formation(scenario, nodes.count), random=self._random,
         )  # fmt: skip
         coverage = coverage_map(scenario)
-        self._reception = PhoneReception(scenario, node, finds, own_motion, outbox, coverage)
-        self._sightings = Sightings(scenario, node, finds, own_motion, outbox)
-        self._announcing = Announcing(node, finds, outbox)
-        approach = Approach(node, finds, own_motion, outbox, arrival_m=mission.arrival_m, speed_m_s=speed_m_s)
+        self._reception = PhoneReception(scenario, node, survivors, own_motion, outbox, coverage)
+        self._sightings = Sightings(scenario, node, survivors, own_motion, outbox)
+        self._announcing = Announcing(node, survivors, outbox)
+        approach = Approach(node, survivors, own_motion, outbox, arrival_m=mission.arrival_m, speed_m_s=speed_m_s)
         self._bidding = Bidding(
-            scenario, node, finds=finds, own_motion=own_motion, formation=place, approach=approach, outbox=outbox,
-            speed_m_s=speed_m_s,
+            scenario, node, survivors=survivors, own_motion=own_motion, formation=place, approach=approach,
+            outbox=outbox, speed_m_s=speed_m_s,
         )  # fmt: skip
         self._return_home = ReturnHome(
             position, own_motion, outbox,
@@ -112,7 +112,7 @@ class Searcher:
         missed_cells = None if coverage is None else MissedCells(coverage, place)
         heard = scenario.sensors.voice_hz > 0
         listening = Listening(scenario, node, own_motion, neighbors, speed_m_s=speed_m_s) if heard else None
-        goal = Goal(finds, own_motion, place, approach, missed_cells, listening)
+        goal = Goal(survivors, own_motion, place, approach, missed_cells, listening)
         take_off = TakeOff(
             node, position,
             own_motion=own_motion, neighbors=neighbors, outbox=outbox, height_m=nodes.altitude_m,
@@ -229,7 +229,7 @@ class Searcher:
         match message:
             case Survivor():
                 if message.reporter != self._node:
-                    self._finds.take_report(message, now_ns=now_ns)
+                    self._survivors.take_report(message, now_ns=now_ns)
                     if self._place.place is not None:
                         self._announcing.reported(message, now_ns)
             case Search():
@@ -247,13 +247,13 @@ class Searcher:
 
     def _on_found(self, found: Found, now_ns: int) -> None:
         """Another node states the place of a survivor: an estimate, a confirmation, or a refutation."""
-        if self._finds.on_found(found, now_ns=now_ns):
+        if self._survivors.on_found(found, now_ns=now_ns):
             self._announcing.decided(found.survivor, now_ns)
             if found.standing is Standing.CONFIRMED:
                 self._bidding.close(found.survivor, now_ns=now_ns)
             else:
                 self._bidding.reopen(found.survivor)
-        elif found.standing is Standing.CONFIRMED and self._finds.known[found.survivor].is_refuted(found):
+        elif found.standing is Standing.CONFIRMED and self._survivors.by_id[found.survivor].is_refuted(found):
             self._announcing.outdated(found, now_ns)
 
     # --- sent messages --------------------------------------------------------------------------------------------
@@ -262,7 +262,7 @@ class Searcher:
         """The inner frames for the next hello: the latest reports, the best bids, recent verdicts, and the map of
         searched cells.
         """
-        frames = b"".join(report.encode_frame(self._node) for report in self._finds.recent_reports(now_ns=now_ns))
+        frames = b"".join(report.encode_frame(self._node) for report in self._survivors.recent_reports(now_ns=now_ns))
         bids = self._bidding.bids_to_tell(now_ns=now_ns)
         if bids:
             frames += encode_bids(bids, node=self._node)

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from emulator.channel.ofdm_error_rate import bit_error
 from emulator.channel.propagation import DSSS_BANDWIDTH_HZ
 from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
-from fanet_mw.scenario.radio import is_ofdm
+from fanet_mw.scenario.tables.radio import is_ofdm
 
 _TOP_DB: Final = 35.0
 _SYMBOLS_PER_S: Final = 1.375e6

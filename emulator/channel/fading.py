@@ -14,7 +14,7 @@ from typing import Final
 
 from emulator.kernel.jit import jit
 from emulator.kernel.state import FADE_A, FADE_B, FADING, FADING_SHAPE, Ints, Reals
-from fanet_mw.scenario.radio import Radio
+from fanet_mw.scenario.tables.radio import Radio
 
 NONE: Final = 0
 NAKAGAMI: Final = 1

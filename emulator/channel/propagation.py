@@ -39,7 +39,7 @@ from emulator.kernel.state import (
     Reals,
 )
 from fanet_mw.extensions import load
-from fanet_mw.scenario.radio import CHANNELS, Radio, is_ofdm
+from fanet_mw.scenario.tables.radio import CHANNELS, Radio, is_ofdm
 
 THERMAL_DBM_PER_HZ: Final = -174.0
 DSSS_BANDWIDTH_HZ: Final = 22e6

@@ -18,7 +18,7 @@ import numpy as np
 from emulator.kernel.jit import jit
 from emulator.kernel.state import Ints, Reals
 from fanet_mw.rng import stream_seed
-from fanet_mw.scenario.radio import Radio
+from fanet_mw.scenario.tables.radio import Radio
 
 WAVES = 128  # a multiple of 4: see `one_way`
 

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from fanet_mw.airtime import Timing
-from fanet_mw.scenario.radio import Radio
+from fanet_mw.scenario.tables.radio import Radio
 from fanet_mw.units import US
 
 

@@ -23,7 +23,7 @@ from fanet_mw.planner.demand import TrafficClass
 from fanet_mw.routing.clustered.claimed.claiming import IDLE, LISTEN_HELLOS, geometry, longest_superframe, turn_bytes
 from fanet_mw.routing.clustered.claimed.own_turns import Share
 from fanet_mw.routing.clustered.claimed.slot_claims import SlotClaims
-from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, S, seconds_to_ns
 from fanet_mw.wire.claims import MOST_LOTS

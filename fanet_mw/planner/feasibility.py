@@ -27,7 +27,7 @@ from fanet_mw.planner.timetable_plan import Candidate, TimetablePlan, judge, tab
 from fanet_mw.planner.uplink_delay import Ways, access_outcome, ways
 from fanet_mw.routing.clustered.claimed.claiming import geometry, turn_bytes
 from fanet_mw.routing.clustered.clustering import Cluster, balanced
-from fanet_mw.routing.clustered.tdma.turns import receipt_ns
+from fanet_mw.routing.clustered.tdma.turn_timing import receipt_ns
 from fanet_mw.routing.clustered.timetable.turn_plan import Fitted
 from fanet_mw.routing.clustered.timetable.turn_size import schedule_parts, superframe
 from fanet_mw.scenario import Scenario

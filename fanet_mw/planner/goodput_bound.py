@@ -30,7 +30,7 @@ from typing import NamedTuple
 from fanet_mw.airtime import Timing
 from fanet_mw.graph.topology import Adjacency, components
 from fanet_mw.planner.flood_cost import frame_ns
-from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.turn_size import most_together
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, S

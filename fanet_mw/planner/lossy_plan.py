@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from fanet_mw.planner.demand import TrafficClass
-from fanet_mw.routing.clustered.tdma.turns import receipt_ns
+from fanet_mw.routing.clustered.tdma.turn_timing import receipt_ns
 from fanet_mw.routing.clustered.timetable.likely_delay import likely_delay_ns
 from fanet_mw.routing.clustered.timetable.turn_allocation import Places, fit_measured
 from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, TurnPlan

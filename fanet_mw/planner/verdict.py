@@ -7,7 +7,7 @@ from fanet_mw import wire
 from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.planner.demand import ClassPlan
 from fanet_mw.planner.head_slot import ClusterPlan
-from fanet_mw.routing.clustered.tdma.turns import least_slack_ns, turn_slack_ns
+from fanet_mw.routing.clustered.tdma.turn_timing import least_slack_ns, turn_slack_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.timesync.ftsp import MOST_STATED_NS
 from fanet_mw.units import MS, US, S

@@ -1,20 +1,22 @@
 """Reads a scenario: a TOML file and `KEY=VALUE` overrides become a frozen `Scenario`. All mistakes are reported at
 once.
 
-Each message names the file, the key, the value and the bound, because the user may see nothing but that line.
+Each message names the file, the key, the value and the bound, because the user may see nothing but that line
+(`validation_errors.py`).
 """
 
-import difflib
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
+from fanet_mw.scenario.overrides import apply_override
 from fanet_mw.scenario.quantities import in_unit_of, unit_of
+from fanet_mw.scenario.validation_errors import sentence
 
 _PATHS: Final = ("heightmap", "buildings_geojson")
 """Keys of `[world]` that name files."""
@@ -42,7 +44,7 @@ def parse(text: str, *, source: str, name: str, overrides: Iterable[str] = (), f
     if folder is not None:
         _from_folder(tree, folder)
     for override in overrides:
-        _apply(tree, override)
+        apply_override(tree, override)
     return build(tree, source=source)
 
 
@@ -55,7 +57,7 @@ def build(tree: Mapping[str, Any], *, source: str = "scenario") -> Scenario:
     try:
         return Scenario.model_validate(tree)
     except ValidationError as error:
-        lines = [_sentence(dict(item)) for item in error.errors()]
+        lines = [sentence(dict(item)) for item in error.errors()]
         raise ConfigError("\n".join(f"{source}: {text}" for text in dict.fromkeys(lines))) from error
 
 
@@ -118,33 +120,6 @@ def _is_number(text: str) -> bool:
     return text.replace(".", "", 1).replace("e-", "", 1).isdecimal()
 
 
-def _apply(tree: dict[str, Any], override: str) -> None:
-    """Set one dotted key; the value is TOML, or otherwise taken as a string."""
-    key, equals, text = override.partition("=")
-    key = key.strip()
-    if not equals or not key:
-        raise ConfigError(f"--set {override!r}: must be KEY=VALUE, for example nodes.count=10")
-    *path, last = key.split(".")
-    table: Any = tree
-    for part in path:
-        inner = _entry(table, part, override) if isinstance(table, list) else table.setdefault(part, {})
-        if not isinstance(inner, dict | list):
-            raise ConfigError(f"--set {override!r}: {part!r} is a value, not a table")
-        table = inner
-    if isinstance(table, list):
-        _entry(table, last, override)
-        table[int(last)] = one_value(text.strip())
-    else:
-        table[last] = one_value(text.strip())
-
-
-def _entry(entries: list[Any], part: str, override: str) -> Any:  # noqa: ANN401  (a value of a TOML file)
-    """One entry of an array by its number."""
-    if not part.isdecimal() or int(part) >= len(entries):
-        raise ConfigError(f"--set {override!r}: {part!r} must be the number of an entry, 0 to {len(entries) - 1}")
-    return entries[int(part)]
-
-
 def _plain(key: str, value: object, problems: list[str], path: str) -> object:
     """A value without its unit; what is wrong with the unit is added to `problems`."""
     if isinstance(value, Mapping):
@@ -159,40 +134,3 @@ def _plain(key: str, value: object, problems: list[str], path: str) -> object:
         problems.append(f"{path} = {value!r}: {error}")
         return value
     return value if number is None else number
-
-
-def one_value(text: str) -> object:
-    """The value of some TOML text; text that is no TOML is a string, so that names need no quotes."""
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text
-
-
-def _sentence(item: dict[str, Any]) -> str:
-    """One mistake as `key = value: bound`."""
-    path = [str(part) for part in item["loc"] if not _is_branch(str(part))]
-    key = ".".join(path)
-    if item["type"] == "extra_forbidden":
-        return f"{key}: unknown key{_suggestion(path)}"
-    message = str(item["msg"]).removeprefix("Value error, ")
-    if item["type"] == "value_error":
-        return message
-    return f"{key} = {item['input']!r}: {message[0].lower()}{message[1:]}"
-
-
-def _is_branch(part: str) -> bool:
-    """True for a part of a location that names the member of a union; pydantic adds it, and users do not know it."""
-    return "[" in part or part in {"int", "float", "constrained-int", "literal"}
-
-
-def _suggestion(path: list[str]) -> str:
-    model: type[BaseModel] = Scenario
-    for part in path[:-1]:
-        field = model.model_fields.get(part)
-        if field is None or not (isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel)):
-            return ""
-        model = field.annotation
-    close = difflib.get_close_matches(path[-1], model.model_fields, n=1)
-    known = ", ".join(sorted(model.model_fields))
-    return f"; did you mean {close[0]}?" if close else f"; known keys: {known}"

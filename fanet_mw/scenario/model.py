@@ -1,7 +1,8 @@
 """The scenario: one frozen model of all that a run depends on. Keys have units that people use, named in the key.
 
 A key is a contract with users, because renaming it breaks their files and sweeps. Derived values are properties, in
-integer nanoseconds. Each table has a file of its name and checks itself; `checks.py` checks what spans several tables.
+integer nanoseconds. Each table has a file of its name in `tables/` and checks itself; `checks.py` checks what spans
+several tables.
 """
 
 from collections.abc import Mapping
@@ -10,20 +11,20 @@ from typing import Annotated, Any, Final, Self
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from fanet_mw.bus.radio_control import Control
-from fanet_mw.scenario.applications import ForeignApplication
 from fanet_mw.scenario.checks import disagreements
-from fanet_mw.scenario.clock import Clock
-from fanet_mw.scenario.clusters import Clusters
-from fanet_mw.scenario.faults import AnyFault
-from fanet_mw.scenario.mission import Mission
-from fanet_mw.scenario.mobility import Mobility
-from fanet_mw.scenario.nodes import Nodes
-from fanet_mw.scenario.radio import Radio
-from fanet_mw.scenario.routing import Routing
-from fanet_mw.scenario.sections import Duration, Section, SomeTime
-from fanet_mw.scenario.sensors import Sensors
-from fanet_mw.scenario.traffic import Traffic
-from fanet_mw.scenario.world import World
+from fanet_mw.scenario.tables.applications import ForeignApplication
+from fanet_mw.scenario.tables.clock import Clock
+from fanet_mw.scenario.tables.clusters import Clusters
+from fanet_mw.scenario.tables.faults import AnyFault
+from fanet_mw.scenario.tables.mission import Mission
+from fanet_mw.scenario.tables.mobility import Mobility
+from fanet_mw.scenario.tables.nodes import Nodes
+from fanet_mw.scenario.tables.radio import Radio
+from fanet_mw.scenario.tables.routing import Routing
+from fanet_mw.scenario.tables.sections import Duration, Section, SomeTime
+from fanet_mw.scenario.tables.sensors import Sensors
+from fanet_mw.scenario.tables.traffic import Traffic
+from fanet_mw.scenario.tables.world import World
 from fanet_mw.units import MS, NodeId, seconds_to_ns
 
 _REPAIR_S: Final = 10.0

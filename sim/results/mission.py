@@ -20,7 +20,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from agents.mission.finding.finds import SAME_PLACE_M
+from agents.mission.finding.known_survivors import SAME_PLACE_M
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import (
     Approaching,

@@ -1,10 +1,10 @@
-"""Converts values to TOML text and back, as in `--set KEY=VALUE`. `toml_value` and `config.one_value` are inverse."""
+"""Converts values to TOML text and back, as in `--set KEY=VALUE`; `toml_value` is the inverse of `one_value`."""
 
 import json
 from collections.abc import Iterator, Mapping
 
 from fanet_mw.errors import ConfigError
-from fanet_mw.scenario.config import one_value
+from fanet_mw.scenario.overrides import one_value
 
 _OPENING = "[{"
 _CLOSING = "]}"

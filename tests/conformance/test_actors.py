@@ -28,7 +28,7 @@ from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
 from fanet_mw.bus.topics import Topics
 from fanet_mw.routing.clustered.build import RELAYS
 from fanet_mw.scenario import Clock, Scenario
-from fanet_mw.scenario.routing import PROTOCOLS
+from fanet_mw.scenario.tables.routing import PROTOCOLS
 from fanet_mw.trace import Generated
 from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire.clusters import Join, Member, Schedule

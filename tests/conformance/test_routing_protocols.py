@@ -16,7 +16,7 @@ from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.routing import MAKERS
 from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.scenario import Scenario, config
-from fanet_mw.scenario.routing import PROTOCOLS
+from fanet_mw.scenario.tables.routing import PROTOCOLS
 from fanet_mw.trace import Delivered, Dropped, Generated, Record
 from fanet_mw.units import MS, US
 from sim.results.files import finish

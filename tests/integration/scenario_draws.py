@@ -28,7 +28,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.extensions import PartName
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.scenario import Scenario, config
-from fanet_mw.scenario.sections import Section
+from fanet_mw.scenario.tables.sections import Section
 from fanet_mw.trace import Record
 from fanet_mw.units import S
 from sim.results.metrics import summarize

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from fanet_mw.routing.clustered.timetable.promises import Promises
+from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.trace import BoundStated
 from sim.results.files import finish
 from sim.run.virtual import simulate
@@ -17,15 +17,15 @@ TIMES = ["duration_s=16", "warmup_s=10", "clusters.flooding_period_s=0.2"]
 
 def run(monkeypatch: pytest.MonkeyPatch, promise: Callable[[int], int]) -> dict[str, Any]:
     """`promise`: what a node says instead of its bound."""
-    honest = Promises.state
+    honest = StatedDelays.state
 
-    def too_little(self: Promises, *given: Any, **instants: int) -> None:
+    def too_little(self: StatedDelays, *given: Any, **instants: int) -> None:
         honest(self, *given, **instants)
         records = self._port.records
         if isinstance(records[-1], BoundStated):
             records[-1] = records[-1]._replace(bound_ns=promise(records[-1].bound_ns))
 
-    monkeypatch.setattr(Promises, "state", too_little)
+    monkeypatch.setattr(StatedDelays, "state", too_little)
     return finish(simulate(catalog.find("clusters", [*LINE, *TIMES])), out=None)
 
 

@@ -13,7 +13,7 @@ from fanet_mw.bounds.guard_time import slot_guard_ns
 from fanet_mw.bus.messages import Reception
 from fanet_mw.bus.topics import Topics
 from fanet_mw.planner import plan
-from fanet_mw.routing.clustered.tdma.turns import clocks_fit
+from fanet_mw.routing.clustered.tdma.turn_timing import clocks_fit
 from fanet_mw.trace import Delivered, Generated
 from fanet_mw.units import MS, US, Enu, NodeId
 from sim.results.files import finish

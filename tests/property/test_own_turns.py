@@ -8,7 +8,7 @@ from test_slots_with_reuse import graphs
 from fanet_mw.graph.topology import two_hop
 from fanet_mw.rng import stream
 from fanet_mw.routing.clustered.claimed.own_turns import OwnTurns, Share, draws
-from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.units import MS, NodeId
 
 TURNS = Turns(origin_ns=0, period_ns=500 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_superframe=230)

@@ -10,10 +10,10 @@ from fanet_mw.bounds import Bounded, Refused
 from fanet_mw.graph.topology import within_range
 from fanet_mw.mavlink import Encoder
 from fanet_mw.planner import Plan, cheapest_change, describe, describe_change, plan
+from fanet_mw.planner.cheapest_change import _changes
 from fanet_mw.planner.demand import TrafficClass, demands
 from fanet_mw.planner.flood_cost import FloodCost
 from fanet_mw.planner.head_slot import ClassLoad, slot_delays, work_ns
-from fanet_mw.planner.scenario_change import _changes
 from fanet_mw.planner.timetable_plan import table_for
 from fanet_mw.planner.uplink_delay import ways
 from fanet_mw.rng import stream

@@ -10,7 +10,7 @@ from fanet_mw.bounds import Refused
 from fanet_mw.graph.topology import two_hop, within_range
 from fanet_mw.planner import Plan, cheapest_change, describe, plan
 from fanet_mw.planner.claimed_turns import converged_slots
-from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.scenario import config
 from fanet_mw.units import Enu, NodeId, S
 from sim.world.mobility.layout import positions

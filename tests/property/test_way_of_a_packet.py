@@ -18,7 +18,7 @@ from fanet_mw.node.node import Node
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing import make_protocol
 from fanet_mw.routing.clustered.clustered import Clustered
-from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, TurnPlan

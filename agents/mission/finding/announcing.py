@@ -8,7 +8,7 @@ another UAV does not seem to know of a verdict   -> some of those that know it f
 import math
 from typing import Final
 
-from agents.mission.finding.finds import Finds
+from agents.mission.finding.known_survivors import KnownSurvivors
 from agents.mission.outbox import Outbox, OutgoingPacket
 from fanet_mw.trace import Confirmed, Refuted
 from fanet_mw.units import US, NodeId, S
@@ -33,9 +33,9 @@ _TELLERS: Final = 4
 class Announcing:
     """Decides what one UAV floods about survivors, and when."""
 
-    def __init__(self, node: NodeId, finds: Finds, outbox: Outbox) -> None:
+    def __init__(self, node: NodeId, survivors: KnownSurvivors, outbox: Outbox) -> None:
         self._node = node
-        self._finds, self._outbox = finds, outbox
+        self._survivors, self._outbox = survivors, outbox
         self._told_sigma_m: dict[int, float] = {}
         self._tellings: dict[int, tuple[int, int]] = {}
         """For each survivor that this UAV has confirmed or refuted: how often the verdict must still be flooded, and
@@ -46,14 +46,14 @@ class Announcing:
 
     def confirm(self, survivor: int, now_ns: int) -> None:
         """The owner of this phone was seen and is certain: flood the confirmation."""
-        place = self._finds.known[survivor].filter.estimate()
+        place = self._survivors.by_id[survivor].filter.estimate()
         assert place is not None, "who was seen has a place"
         found = Found(now_ns // US, survivor, *place, self._node, Standing.CONFIRMED)
         self._decide(found, Confirmed, now_ns)
 
     def refute(self, survivor: int, now_ns: int) -> None:
         """A confirmed survivor cannot be at the confirmed place: flood the refutation."""
-        mistaken = self._finds.known[survivor].confirmed
+        mistaken = self._survivors.by_id[survivor].confirmed
         assert mistaken is not None, "only a confirmation is refuted"
         refuted = mistaken._replace(t_us=now_ns // US, node=self._node, standing=Standing.REFUTED)
         self._decide(refuted, Refuted, now_ns)
@@ -61,7 +61,7 @@ class Announcing:
     def _decide(self, verdict: Found, record: type[Confirmed | Refuted], now_ns: int) -> None:
         """Record a verdict of this UAV, and flood it from now on."""
         survivor, east_m, north_m = verdict.survivor, round(verdict.east_m, 2), round(verdict.north_m, 2)
-        self._finds.on_found(verdict, now_ns=now_ns)
+        self._survivors.on_found(verdict, now_ns=now_ns)
         self._outbox.records.append(record(now_ns, self._node, survivor, east_m, north_m))
         self._tellings[survivor] = _TELLINGS, now_ns
         self.decided(survivor, now_ns)
@@ -76,7 +76,7 @@ class Announcing:
         for survivor, (left, next_ns) in sorted(self._tellings.items()):
             if now_ns < next_ns:
                 continue
-            verdict = self._finds.known[survivor].verdict
+            verdict = self._survivors.by_id[survivor].verdict
             assert verdict is not None, "only a verdict is announced"
             self._flood(verdict)
             if left > 1:
@@ -88,7 +88,7 @@ class Announcing:
 
     def reported(self, report: Survivor, now_ns: int) -> None:
         """Another node reports a survivor, so it may not know yet that the survivor is confirmed."""
-        if self._finds.is_confirmed(report.survivor):
+        if self._survivors.is_confirmed(report.survivor):
             self._remind(report.survivor, report.reporter, now_ns)
 
     def outdated(self, found: Found, now_ns: int) -> None:
@@ -97,7 +97,7 @@ class Announcing:
 
     def _remind(self, survivor: int, of_node: int, now_ns: int) -> None:
         """Flood a verdict again, unless that was done recently or other UAVs are to do it."""
-        verdict = self._finds.known[survivor].verdict
+        verdict = self._survivors.by_id[survivor].verdict
         if verdict is None or now_ns - self._heard_ns.get(survivor, now_ns) <= _AGAIN_NS:
             return
         self._heard_ns[survivor] = now_ns
@@ -109,12 +109,12 @@ class Announcing:
         recent = [
             (heard_ns, survivor) for survivor, heard_ns in self._heard_ns.items() if now_ns - heard_ns < _PASSED_ON_NS
         ]
-        latest = [self._finds.known[survivor].verdict for _, survivor in sorted(recent, reverse=True)[:_PASSED_ON]]
+        latest = [self._survivors.by_id[survivor].verdict for _, survivor in sorted(recent, reverse=True)[:_PASSED_ON]]
         return b"".join(found.encode_frame(self._node) for found in latest if found is not None)
 
     def _tell_estimate(self, survivor: int, now_ns: int) -> None:
         """Flood the estimate of a responder if it has become clearly better."""
-        place = self._finds.known[survivor].filter.estimate()
+        place = self._survivors.by_id[survivor].filter.estimate()
         before_m = self._told_sigma_m.get(survivor, math.inf)
         if place is None or place.sigma_m > _IMPROVEMENT * before_m or place.sigma_m > _USEFUL_M:
             return

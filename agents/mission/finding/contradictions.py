@@ -9,8 +9,8 @@ is taken back.
 
 from typing import Final
 
-from agents.mission.finding.finds import Find, Finds
 from agents.mission.finding.identities import Identities
+from agents.mission.finding.known_survivors import KnownSurvivor, KnownSurvivors
 
 _FRESH: Final = 4
 """A confirmation is judged each time that this number of further powers of the phone has been received."""
@@ -27,8 +27,8 @@ Of 577 simulated pairs of people 35 to 100 m apart who were confirmed rightly, n
 class Contradictions:
     """Judges confirmations at one UAV, by its filters and by the people whom it has seen."""
 
-    def __init__(self, finds: Finds, identities: Identities) -> None:
-        self._finds, self._identities = finds, identities
+    def __init__(self, survivors: KnownSurvivors, identities: Identities) -> None:
+        self._survivors, self._identities = survivors, identities
         self._judged: dict[int, int] = {}
         """For each confirmed survivor, the number of received powers when the confirmation was judged last, or first
         noticed here."""
@@ -36,18 +36,19 @@ class Contradictions:
     def review(self) -> list[int]:
         """The survivors whose confirmations are contradicted, in order of id."""
         return [
-            survivor for survivor, find in sorted(self._finds.known.items()) if self._is_contradicted(survivor, find)
+            survivor
+            for survivor, known in sorted(self._survivors.by_id.items())
+            if self._is_contradicted(survivor, known)
         ]
 
-    def _is_contradicted(self, survivor: int, find: Find) -> bool:
-        if find.confirmed is None:
+    def _is_contradicted(self, survivor: int, known: KnownSurvivor) -> bool:
+        if known.confirmed is None:
             self._judged.pop(survivor, None)
             return False
-        received = find.filter.received_powers
+        received = known.filter.received_powers
         if received - self._judged.setdefault(survivor, received) < _FRESH:
             return False
         self._judged[survivor] = received
-        margin = self._identities.against(find.confirmed)  # this also makes the filter include all pending powers
-        heard = find.filter.estimate_by_power()
-        sure = heard is not None and heard.sigma_m <= _SURE_M and find.filter.included_powers >= _SAMPLES
+        margin = self._identities.against(known.confirmed)  # this also makes the filter include all pending powers
+        sure = known.is_heard_within(_SURE_M) and known.filter.included_powers >= _SAMPLES
         return sure and margin >= _MARGIN

@@ -2,24 +2,29 @@
 
     sightings near each other     are taken for one person (`person_track.py`)
     all people and all phones     are assigned at once, so that all received powers together are most likely
-    a person's phone is certain   when every other assignment of this person is far less likely
+    a person's phone is certain   when every other assignment of this person is far less likely (`confirmation.py`)
 
 A survivor is known by the id of the phone. The cost of a pair of person and phone tells how much less likely the
 phone's received powers are from the person's place than from the best place. It is twice a difference of
-log-likelihoods, so for the true pair it has a chi-square distribution with 2 degrees of freedom. If two people lie side
-by side, many powers are needed to tell their phones apart. A UAV that is not certain therefore waits and receives more,
-and after a while it is content with less certainty.
+log-likelihoods, so for the true pair it has a chi-square distribution with 2 degrees of freedom.
 """
 
 import math
 from collections.abc import Sequence
 from typing import Final
 
-from agents.mission.finding.finds import SAME_PLACE_M, Finds, estimate_of
+from agents.mission.finding.confirmation import (
+    GREATEST_MARGIN,
+    SECOND_SIGMA_M,
+    is_confirmable,
+    is_seen_enough,
+    required_margin,
+)
+from agents.mission.finding.known_survivors import SAME_PLACE_M, KnownSurvivors, estimate_of
 from agents.mission.finding.person_track import PersonTrack
 from agents.mission.finding.phone_localization import Estimate
 from agents.mission.hungarian import assign
-from fanet_mw.units import Enu, S
+from fanet_mw.units import Enu
 from fanet_mw.wire.survivors import Found
 
 _SAME_SIGMAS: Final = 2.5
@@ -28,45 +33,23 @@ _GATE: Final = 16.0
 """The cost of assigning no phone to a person, so that a phone of a greater cost is never assigned. The value is above
 11.8, the 99.7 % quantile of chi-square with 2 degrees of freedom, because the shadowing of neighboring samples is not
 independent."""
-_VAGUE_M: Final = 80.0
-"""No owner is confirmed for a phone whose place, by received powers, has a greater standard deviation than this."""
 _NEAR_M: Final = 400.0
 """A person does not carry a phone if the middle of its filter's grid, near the strongest power, is farther away."""
 _BESIDE_M: Final = 150.0
 """A confirmed survivor can only have been mistaken for people within this distance."""
-_SIGHTINGS: Final = 2
-"""A person is not confirmed before this number of sightings from close by."""
-_SURE_M: Final = 3.5
-"""The greatest standard deviation of a confirmed place."""
-_SAMPLES: Final = 6
-"""The least number of received powers of a phone for confirming its owner, if `_REPORTERS` nodes have received it."""
-_REPORTERS: Final = 2
-"""With fewer nodes than this that have received a phone, `_SAMPLES_ALONE` powers are needed."""
-_SAMPLES_ALONE: Final = 8
-"""The least number of received powers if only one node has received the phone, as may be at the edge of the area."""
-_MARGIN: Final = 9.0
-"""By how much the next best assignment must cost more, at first: it is then 90 times less likely."""
 _IMPOSSIBLE: Final = 1e6
 """The cost of a pair that is excluded."""
-_LEAST_MARGIN: Final = 2.0
-"""By how much the next best assignment must cost more in the end: it is then 2.7 times less likely."""
-_PATIENT_NS: Final = 15 * S
-"""The time since the first sighting up to which the whole margin is required."""
-_IMPATIENT_NS: Final = 50 * S
-"""The time since the first sighting from which only the least margin is required; it decreases linearly in between."""
 _REFUTED_COST: Final = 9.0
 """An additional cost at a place where the same survivor was confirmed by mistake, because other UAVs know better."""
 _SECOND_GATE: Final = 6.0
 """The cost of assigning no phone to a second person, who is then not taken for a second one."""
-_SECOND_SIGMA_M: Final = 30.0
-"""A second person can only carry a phone whose place is known from received powers with this standard deviation."""
 
 
 class Identities:
     """The people whom one UAV has seen, and the phones that they carry."""
 
-    def __init__(self, finds: Finds) -> None:
-        self._finds = finds
+    def __init__(self, survivors: KnownSurvivors) -> None:
+        self._survivors = survivors
         self._people: list[PersonTrack] = []
 
     def on_sighting(self, at: Enu, *, sigma_m: float, close: bool, now_ns: int) -> int | None:
@@ -90,11 +73,11 @@ class Identities:
         for person in self._people:
             confirmed = self._has_confirmed(person.place.at)
             refuted = not confirmed and any(
-                find.was_mistaken_at(person.place.at) for find in self._finds.known.values()
+                known.was_mistaken_at(person.place.at) for known in self._survivors.by_id.values()
             )
             person.on_neighborhood(confirmed=confirmed, refuted=refuted, now_ns=now_ns)
-        for survivor in self._finds.unconfirmed():
-            self._finds.known[survivor].filter.on_sighting(None)
+        for survivor in self._survivors.unconfirmed():
+            self._survivors.by_id[survivor].filter.on_sighting(None)
         people = [person for person in self._people if person.is_believed]
         phones = self._phones(people)
         if not people or not phones:
@@ -108,10 +91,11 @@ class Identities:
             if column is None:
                 continue
             survivor = phones[column]
-            self._finds.known[survivor].filter.on_sighting(person.place)
-            if self._is_confirmable(person, survivor):
+            known = self._survivors.by_id[survivor]
+            known.filter.on_sighting(person.place)
+            if is_confirmable(person, known):
                 margin = self._next_best(costs, nobody, row, column, person) - least
-                if margin >= _required_margin(person, now_ns):
+                if margin >= required_margin(person, now_ns):
                     sure.append(survivor)
         return sorted(sure)
 
@@ -124,13 +108,15 @@ class Identities:
         at = estimate_of(confirmed).at
         named = {
             survivor: place
-            for survivor, find in sorted(self._finds.known.items())
-            if find.confirmed is not None and (place := find.place()) is not None and place.distance_m(at) <= _BESIDE_M
+            for survivor, known in sorted(self._survivors.by_id.items())
+            if known.confirmed is not None
+            and (place := known.place()) is not None
+            and place.distance_m(at) <= _BESIDE_M
         }
         seen = [
             person.place
             for person in self._people
-            if person.close_sightings >= _SIGHTINGS and person.place.distance_m(at) <= _BESIDE_M
+            if is_seen_enough(person) and person.place.distance_m(at) <= _BESIDE_M
             if all(place.distance_m(person.place.at) > SAME_PLACE_M for place in named.values())
         ]
         people = [*named.values(), *seen]
@@ -146,8 +132,10 @@ class Identities:
     def _has_confirmed(self, at: Enu) -> bool:
         """True if a survivor is confirmed at this place."""
         return any(
-            find.confirmed is not None and (place := find.place()) is not None and place.distance_m(at) <= SAME_PLACE_M
-            for find in self._finds.known.values()
+            known.confirmed is not None
+            and (place := known.place()) is not None
+            and place.distance_m(at) <= SAME_PLACE_M
+            for known in self._survivors.by_id.values()
         )
 
     def _next_best(
@@ -155,12 +143,12 @@ class Identities:
     ) -> float:
         """The least total cost if this person carries another phone or none.
 
-        Carrying none is made more expensive by `_MARGIN`, except for a second person at a confirmed place.
+        Carrying none is made more expensive by `GREATEST_MARGIN`, except for a second person at a confirmed place.
         """
         others = [list(one) for one in costs]
         others[row][column] = _IMPOSSIBLE
         bound = list(nobody)
-        bound[row] += _MARGIN if person.confirmed_at is None else 0.0
+        bound[row] += GREATEST_MARGIN if person.confirmed_at is None else 0.0
         return _assigned(others, bound)[0]
 
     def _phones(self, people: Sequence[PersonTrack]) -> list[int]:
@@ -171,9 +159,9 @@ class Identities:
         """The unconfirmed survivors whose phones were received near one of these places."""
         return [
             survivor
-            for survivor in self._finds.unconfirmed()
-            if self._finds.known[survivor].reporters
-            and any(self._finds.known[survivor].filter.near(place.at, within_m=_NEAR_M) for place in places)
+            for survivor in self._survivors.unconfirmed()
+            if self._survivors.by_id[survivor].reporters
+            and any(self._survivors.by_id[survivor].filter.near(place.at, within_m=_NEAR_M) for place in places)
         ]
 
     def _cost_of(self, person: PersonTrack, survivor: int) -> float:
@@ -182,37 +170,15 @@ class Identities:
         At a place where a survivor is confirmed, a second person can only carry a phone whose place is well known,
         because any other phone that was received not far from there would fit, too.
         """
-        if person.confirmed_at is not None and not self._is_heard_within(_SECOND_SIGMA_M, survivor):
+        if person.confirmed_at is not None and not self._survivors.by_id[survivor].is_heard_within(SECOND_SIGMA_M):
             return _IMPOSSIBLE
         return self._cost(person.place, survivor)
 
-    def _is_heard_within(self, sigma_m: float, survivor: int) -> bool:
-        """True if received powers alone give the place of a phone with at most this standard deviation."""
-        heard = self._finds.known[survivor].filter.estimate_by_power()
-        return heard is not None and heard.sigma_m <= sigma_m
-
     def _cost(self, place: Estimate, survivor: int) -> float:
         """The cost of one pair by received powers, and by earlier refutations."""
-        find, at = self._finds.known[survivor], place.at
-        doubt = _REFUTED_COST if find.was_mistaken_at(at) else 0.0
-        return min(_IMPOSSIBLE, find.filter.deficit(at.east, at.north) + doubt)
-
-    def _is_confirmable(self, person: PersonTrack, survivor: int) -> bool:
-        """True if there are enough sightings of a person and enough received powers of a phone."""
-        find = self._finds.known[survivor]
-        enough = _SAMPLES if len(find.reporters) >= _REPORTERS else _SAMPLES_ALONE
-        return (
-            person.close_sightings >= _SIGHTINGS
-            and person.place.sigma_m <= _SURE_M
-            and self._is_heard_within(_VAGUE_M if person.confirmed_at is None else _SECOND_SIGMA_M, survivor)
-            and find.filter.included_powers >= enough
-        )
-
-
-def _required_margin(person: PersonTrack, now_ns: int) -> float:
-    """The margin that is required, which decreases with the time since the first sighting of a person."""
-    share = (now_ns - person.first_ns - _PATIENT_NS) / (_IMPATIENT_NS - _PATIENT_NS)
-    return _MARGIN - (_MARGIN - _LEAST_MARGIN) * min(1.0, max(0.0, share))
+        known, at = self._survivors.by_id[survivor], place.at
+        doubt = _REFUTED_COST if known.was_mistaken_at(at) else 0.0
+        return min(_IMPOSSIBLE, known.filter.deficit(at.east, at.north) + doubt)
 
 
 def _assigned(costs: Sequence[Sequence[float]], nobody: Sequence[float]) -> tuple[float, list[int | None]]:

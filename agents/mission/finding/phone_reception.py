@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from agents.mission.finding.coverage_map import CoverageMap
-from agents.mission.finding.finds import Finds
+from agents.mission.finding.known_survivors import KnownSurvivors
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox, ReportFormat
 from fanet_mw.scenario import Scenario
@@ -27,14 +27,14 @@ class PhoneReception:
         self,
         scenario: Scenario,
         node: NodeId,
-        finds: Finds,
+        survivors: KnownSurvivors,
         own_motion: OwnMotion,
         outbox: Outbox,
         coverage: CoverageMap | None,
     ) -> None:
         """`coverage`: the map of searched cells, for UAVs that share one."""
         self._node = node
-        self._finds, self._own_motion, self._outbox = finds, own_motion, outbox
+        self._survivors, self._own_motion, self._outbox = survivors, own_motion, outbox
         self._format = ReportFormat(scenario, node)
         self._silent_after_ns = MISSED_SCANS * scenario.mission.scan_interval_s * S
         self._report_every_ns = seconds_to_ns(scenario.mission.report_interval_s)
@@ -54,17 +54,17 @@ class PhoneReception:
         self._scan_ns = now_ns
         here = self._own_motion.position
         in_reach = {survivor for survivor, _ in heard}
-        for survivor in self._finds.unconfirmed():
+        for survivor in self._survivors.unconfirmed():
             if survivor not in in_reach:
-                self._finds.known[survivor].filter.on_silence(here)
+                self._survivors.by_id[survivor].filter.on_silence(here)
         for survivor, rssi_dbm in heard:
             report = Survivor(now_ns // US, survivor, self._node, here, rssi_dbm)
-            find = self._finds.known.get(survivor)
-            if find is None or self._node not in find.reporters:
+            known = self._survivors.by_id.get(survivor)
+            if known is None or self._node not in known.reporters:
                 self._outbox.records.append(Detected(now_ns, self._node, survivor, round(rssi_dbm, 2)))
-            find = self._finds.take_report(report, now_ns=now_ns)
+            known = self._survivors.take_report(report, now_ns=now_ns)
             last_ns = self._reported_ns.get(survivor)
-            if find.confirmed is None and (last_ns is None or now_ns - last_ns >= self._report_every_ns):
+            if known.confirmed is None and (last_ns is None or now_ns - last_ns >= self._report_every_ns):
                 self._reported_ns[survivor] = now_ns
                 self._outbox.packets.append(self._format.packet(report))
 

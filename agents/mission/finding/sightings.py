@@ -4,18 +4,18 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
+from agents.mission.finding.confirmation import CLOSE_M
 from agents.mission.finding.contradictions import Contradictions
-from agents.mission.finding.finds import Finds
 from agents.mission.finding.identities import Identities
+from agents.mission.finding.known_survivors import KnownSurvivors
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Sighted
 from fanet_mw.units import Enu, NodeId
 
-_CLOSE_M: Final = 100.0
-"""The greatest slant range of a sighting from close by; only such sightings count for a confirmation. Sightings from
-more than twice this range are ignored."""
+_FARTHEST_M: Final = 2 * CLOSE_M
+"""Sightings from a greater slant range are ignored."""
 _ANGLE_RAD: Final = 0.03
 """The standard deviation of the direction in which a camera shows a person, errors of the UAV's attitude included."""
 _LEAST_DEPRESSION_RAD: Final = 0.05
@@ -27,10 +27,12 @@ class Sightings:
     with phones.
     """
 
-    def __init__(self, scenario: Scenario, node: NodeId, finds: Finds, own_motion: OwnMotion, outbox: Outbox) -> None:
+    def __init__(
+        self, scenario: Scenario, node: NodeId, survivors: KnownSurvivors, own_motion: OwnMotion, outbox: Outbox
+    ) -> None:
         self._node = node
-        self._identities = Identities(finds)
-        self._contradictions = Contradictions(finds, self._identities)
+        self._identities = Identities(survivors)
+        self._contradictions = Contradictions(survivors, self._identities)
         self._own_motion, self._outbox = own_motion, outbox
         self._voice_rad = math.radians(scenario.sensors.voice_sigma_deg)
 
@@ -59,11 +61,11 @@ class Sightings:
         """Take in that a sensor detects a person in a direction, if the place on the ground is not too far away."""
         here = self._own_motion.over_ground(now_ns)
         looked = ground_place(here, bearing_rad=direction[0], elevation_rad=direction[1])
-        if looked is None or looked[2] > 2 * _CLOSE_M:
+        if looked is None or looked[2] > _FARTHEST_M:
             return
         sigma_m = max(1.0, sigma_rad * looked[2] * looked[2] / max(1.0, here.up))
         at = Enu(looked[0], looked[1], 0.0)
-        survivor = self._identities.on_sighting(at, sigma_m=sigma_m, close=looked[2] <= _CLOSE_M, now_ns=now_ns)
+        survivor = self._identities.on_sighting(at, sigma_m=sigma_m, close=looked[2] <= CLOSE_M, now_ns=now_ns)
         self._outbox.records.append(
             Sighted(now_ns, self._node, sensor, survivor or 0, round(at.east, 2), round(at.north, 2))
         )

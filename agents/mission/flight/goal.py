@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from agents.mission.finding.finds import Finds
+from agents.mission.finding.known_survivors import KnownSurvivors
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.search_formation.formation_place import FormationPlace, along
 from agents.mission.search_formation.missed_cells import MissedCells
@@ -20,7 +20,7 @@ class Goal:
 
     def __init__(
         self,
-        finds: Finds,
+        survivors: KnownSurvivors,
         own_motion: OwnMotion,
         formation: FormationPlace,
         approach: Approach,
@@ -30,7 +30,7 @@ class Goal:
         """`missed_cells`: the cells that the formation has left unsearched; None if UAVs do not share what
         they have searched. `listening`: takes a UAV with microphones down; None for a UAV without.
         """
-        self._finds, self._own_motion = finds, own_motion
+        self._survivors, self._own_motion = survivors, own_motion
         self._formation, self._approach = formation, approach
         self._missed_cells, self._listening = missed_cells, listening
 
@@ -40,17 +40,17 @@ class Goal:
         lane, moves = formation.lane(now_ns)
         survivor = task
         if not formation.is_free:
-            place = None if task is None else self._finds.known[task].place()
+            place = None if task is None else self._survivors.by_id[task].place()
             if task is None or not formation.leads_by(place, lane, moves):
                 survivor = self._in_lane(lane, moves, now_ns)
-        place = None if survivor is None else self._finds.known[survivor].place()
+        place = None if survivor is None else self._survivors.by_id[survivor].place()
         if survivor is None or place is None:
             missed = self._missed_place(now_ns)
             return (lane, moves) if missed is None else (Enu(*missed, lane.up), STILL)
         east, north = self._approach.next_point(survivor, place, now_ns, responding=survivor == task)
         if self._listening is None:
             return formation.bounded(east, north, lane, moves)
-        seen = self._finds.known[survivor].filter.is_seen
+        seen = self._survivors.by_id[survivor].filter.is_seen
         look = self._listening.goal(survivor, place, Enu(east, north, lane.up), seen=seen, now_ns=now_ns)
         goal, feed = formation.bounded(look.east, look.north, lane, moves)
         return goal._replace(up=look.up), feed
@@ -71,9 +71,9 @@ class Goal:
         if pattern is None or not formation.searches or not formation.is_taken_up(now_ns):
             return None
         best: tuple[float, int] | None = None
-        for survivor in self._finds.unconfirmed():
-            find = self._finds.known[survivor]
-            estimate = find.place() if find.filter.near(here, within_m=FAR_M) else None
+        for survivor in self._survivors.unconfirmed():
+            known = self._survivors.by_id[survivor]
+            estimate = known.place() if known.filter.near(here, within_m=FAR_M) else None
             if estimate is None or estimate.sigma_m > VAGUE_M:
                 continue
             _, aside_m = along(moves, estimate.east_m - lane.east, estimate.north_m - lane.north)

@@ -1,7 +1,8 @@
 """A UAV's place in the formation: where the plan wants it at each instant, and how far it may go from there.
 
 The swarm is connected by the UAVs of teams and by relays, so these stay near their places. A follower may fly anywhere
-near its team. A UAV that has no place yet waits where it is. (`shape.py` explains place, lane, team, relay, follower.)
+near its team. A UAV that has no place yet waits where it is. `shapes/contract.py` explains place,
+lane, team, relay and follower.
 """
 
 from typing import Final

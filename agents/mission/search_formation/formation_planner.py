@@ -12,7 +12,7 @@
 
 The first assignment minimizes the sum of the squared distances flown. If all UAVs leave and arrive at the same
 instants, their ways then do not cross, and UAVs that were near each other remain so. The words place, team, relay and
-follower are explained in `shape.py`.
+follower are explained in `shapes/contract.py`.
 """
 
 from itertools import zip_longest
@@ -20,7 +20,7 @@ from typing import Final, NamedTuple
 
 from agents.mission.hungarian import assign
 from agents.mission.search_formation.pattern import Pattern
-from agents.mission.search_formation.shape import Dimensions, ShapeName
+from agents.mission.search_formation.shapes.contract import Dimensions, ShapeName
 from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire.search_plan import Search, SearchStatus
 

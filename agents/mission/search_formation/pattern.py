@@ -1,16 +1,16 @@
 """The formation of a search: its shape and its dimensions together, and the formation that fits a number of UAVs.
 
-The words place, team, lane, relay and follower are explained in `shape.py`.
+The words place, team, lane, relay and follower are explained in `shapes/contract.py`.
 """
 
 from collections.abc import Callable, Mapping
 from typing import Final, assert_never
 
-from agents.mission.search_formation import lines, sectors, spiral
-from agents.mission.search_formation.lines import Lines
-from agents.mission.search_formation.sectors import Sectors
-from agents.mission.search_formation.shape import Demands, Dimensions, Shape, ShapeName
-from agents.mission.search_formation.spiral import Spiral
+from agents.mission.search_formation.shapes import lines, sectors, spiral
+from agents.mission.search_formation.shapes.contract import Demands, Dimensions, Shape, ShapeName
+from agents.mission.search_formation.shapes.lines import Lines
+from agents.mission.search_formation.shapes.sectors import Sectors
+from agents.mission.search_formation.shapes.spiral import Spiral
 from fanet_mw.units import STILL, Enu
 from fanet_mw.wire.search_plan import MOST_PLACES
 

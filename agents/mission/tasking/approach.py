@@ -7,7 +7,7 @@ the person. The UAV then flies on a circle around it, until the survivor is conf
 import math
 from typing import Final
 
-from agents.mission.finding.finds import Finds
+from agents.mission.finding.known_survivors import KnownSurvivors
 from agents.mission.finding.phone_localization import Estimate
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
@@ -33,7 +33,7 @@ class Approach:
     def __init__(
         self,
         node: NodeId,
-        finds: Finds,
+        survivors: KnownSurvivors,
         own_motion: OwnMotion,
         outbox: Outbox,
         *,
@@ -42,7 +42,7 @@ class Approach:
     ) -> None:
         """`speed_m_s`: the greatest speed of this UAV."""
         self._node = node
-        self._finds, self._own_motion = finds, own_motion
+        self._survivors, self._own_motion = survivors, own_motion
         self._outbox = outbox
         self._arrival_m = arrival_m
         self._along_m_s = _SPEED_SHARE * speed_m_s
@@ -68,7 +68,7 @@ class Approach:
             arrived_ns = self.arrived_ns[survivor] = now_ns
             if responding:
                 self._outbox.records.append(Arrived(now_ns, self._node, survivor))
-        seen = self._finds.known[survivor].filter.is_seen
+        seen = self._survivors.by_id[survivor].filter.is_seen
         searched_s = (now_ns - arrived_ns) / S
         radius = _FIRST_RADIUS_M + _GROWTH_M_S * searched_s
         turned = _TURN_PER_S * searched_s if seen else self._turned_rad(radius)

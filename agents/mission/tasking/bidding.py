@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable
 from typing import Final
 
-from agents.mission.finding.finds import Find, Finds
+from agents.mission.finding.known_survivors import KnownSurvivor, KnownSurvivors
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
 from agents.mission.search_formation.formation_place import FormationPlace, along
@@ -44,7 +44,7 @@ class Bidding:
         scenario: Scenario,
         node: NodeId,
         *,
-        finds: Finds,
+        survivors: KnownSurvivors,
         own_motion: OwnMotion,
         formation: FormationPlace,
         approach: Approach,
@@ -54,7 +54,7 @@ class Bidding:
         self._node = node
         self._config = scenario.mission
         self._cruise_m_s = max(0.1, scenario.mobility.speed_m_s)
-        self._finds, self._own_motion, self._formation = finds, own_motion, formation
+        self._survivors, self._own_motion, self._formation = survivors, own_motion, formation
         self._approach = approach
         self._outbox = outbox
         self._speed_m_s = speed_m_s
@@ -69,12 +69,12 @@ class Bidding:
 
     def merge(self, bids: Iterable[Bid], *, now_ns: int) -> None:
         """A neighbor has passed on bids."""
-        open_bids = (bid for bid in bids if not self._finds.is_confirmed(bid.survivor))
+        open_bids = (bid for bid in bids if not self._survivors.is_confirmed(bid.survivor))
         self._auction.merge(open_bids, now_ns=now_ns)
 
     def bids_to_tell(self, *, now_ns: int) -> list[Bid]:
         """The bids to put into the next hello."""
-        return self._auction.bids_to_tell(self._finds.unconfirmed(), now_ns=now_ns)
+        return self._auction.bids_to_tell(self._survivors.unconfirmed(), now_ns=now_ns)
 
     def close(self, survivor: int, *, now_ns: int) -> None:
         """Forget the bids for a survivor that needs no UAV any more."""
@@ -89,7 +89,7 @@ class Bidding:
 
     def hand_on(self, now_ns: int) -> None:
         """Withdraw all bids of this UAV, so that the next best bidders fly instead."""
-        for survivor in self._finds.unconfirmed():
+        for survivor in self._survivors.unconfirmed():
             self._auction.withdraw(survivor, now_ns=now_ns)
         self.survivor = None
 
@@ -97,12 +97,12 @@ class Bidding:
         """Bid for each survivor for whom this UAV would be among the winners, if its place in the formation permits."""
         if self._formation.pattern is None:
             return
-        for survivor in self._finds.unconfirmed():
-            find = self._finds.known[survivor]
-            if self._auction.has_bid(survivor) or not find.filter.near(self._own_motion.position, within_m=FAR_M):
+        for survivor in self._survivors.unconfirmed():
+            known = self._survivors.by_id[survivor]
+            if self._auction.has_bid(survivor) or not known.filter.near(self._own_motion.position, within_m=FAR_M):
                 continue
-            if not self._is_reported(find) and (
-                self._node in find.reporters or now_ns - find.first_ns < _SCOUT_AFTER_NS
+            if not self._is_reported(known) and (
+                self._node in known.reporters or now_ns - known.first_ns < _SCOUT_AFTER_NS
             ):
                 continue
             if now_ns - self._taken_back_ns.get(survivor, _LONG_AGO_NS) < _AGAIN_NS:
@@ -110,7 +110,7 @@ class Bidding:
             eta_s = self._eta_s(survivor, now_ns)
             if eta_s is None:
                 continue
-            if self._auction.would_win(survivor, eta_s=eta_s, count=self._wanted(find), now_ns=now_ns):
+            if self._auction.would_win(survivor, eta_s=eta_s, count=self._wanted(known), now_ns=now_ns):
                 self._auction.bid(survivor, eta_s=eta_s, now_ns=now_ns)
 
     def choose(self, now_ns: int) -> None:
@@ -122,8 +122,8 @@ class Bidding:
         if self.survivor is None:
             won = [
                 (self._distance_m(survivor), survivor)
-                for survivor in self._finds.unconfirmed()
-                if self._wins(survivor, self._finds.known[survivor], now_ns)
+                for survivor in self._survivors.unconfirmed()
+                if self._wins(survivor, self._survivors.by_id[survivor], now_ns)
             ]
             if won:
                 self.survivor, self._announced = min(won)[1], False
@@ -134,12 +134,12 @@ class Bidding:
         """Give up the present survivor if this UAV has lost the auction, has searched there in vain for too long, or,
         as a follower, would be out of reach of its team there. In the last two cases its bid is withdrawn.
         """
-        find = self._finds.known[survivor]
-        lost = not self._wins(survivor, find, now_ns)
+        known = self._survivors.by_id[survivor]
+        lost = not self._wins(survivor, known, now_ns)
         arrived_ns = self._approach.arrived_ns.get(survivor)
         late = arrived_ns is not None and now_ns - arrived_ns > self._patience_ns
         if not late and self._formation.is_free:
-            late = not self._formation.holds_together(find.place(), now_ns, within_s=-5.0)
+            late = not self._formation.holds_together(known.place(), now_ns, within_s=-5.0)
         if late:
             self._auction.withdraw(survivor, now_ns=now_ns)
             self._taken_back_ns[survivor] = now_ns
@@ -148,27 +148,27 @@ class Bidding:
 
     def _announce(self, survivor: int, now_ns: int) -> None:
         """Record that this UAV approaches a survivor, once a place is known and enough UAVs have reported it."""
-        find = self._finds.known[survivor]
-        place = find.place()
-        if place is None or not self._is_reported(find):
+        known = self._survivors.by_id[survivor]
+        place = known.place()
+        if place is None or not self._is_reported(known):
             return
         self._announced = True
         east_m, north_m = round(place.east_m, 2), round(place.north_m, 2)
-        self._outbox.records.append(Approaching(now_ns, self._node, survivor, len(find.reporters), east_m, north_m))
+        self._outbox.records.append(Approaching(now_ns, self._node, survivor, len(known.reporters), east_m, north_m))
 
-    def _is_reported(self, find: Find) -> bool:
+    def _is_reported(self, known: KnownSurvivor) -> bool:
         """True if enough different nodes have reported a survivor (`mission.reports_to_approach`)."""
-        return len(find.reporters) >= self._config.reports_to_approach
+        return len(known.reporters) >= self._config.reports_to_approach
 
-    def _wanted(self, find: Find) -> int:
+    def _wanted(self, known: KnownSurvivor) -> int:
         """The number of UAVs that a survivor needs now."""
-        return self._config.responders if self._is_reported(find) else 1
+        return self._config.responders if self._is_reported(known) else 1
 
-    def _wins(self, survivor: int, find: Find, now_ns: int) -> bool:
-        return self._node in self._auction.winners(survivor, count=self._wanted(find), now_ns=now_ns)
+    def _wins(self, survivor: int, known: KnownSurvivor, now_ns: int) -> bool:
+        return self._node in self._auction.winners(survivor, count=self._wanted(known), now_ns=now_ns)
 
     def _distance_m(self, survivor: int) -> float:
-        place = self._finds.known[survivor].place()
+        place = self._survivors.by_id[survivor].place()
         return math.inf if place is None else place.distance_m(self._own_motion.position)
 
     def _eta_s(self, survivor: int, now_ns: int) -> float | None:
@@ -176,7 +176,7 @@ class Bidding:
         does not permit that.
         """
         formation, here = self._formation, self._own_motion.position
-        place = self._finds.known[survivor].place()
+        place = self._survivors.by_id[survivor].place()
         if place is None or (place.sigma_m > VAGUE_M and not formation.is_free):
             return None
         busy_s = 0.0 if self.survivor is None else _HANDOVER_S + self._distance_m(self.survivor) / self._speed_m_s

@@ -57,7 +57,7 @@ from fanet_mw.routing.clustered.tdma.slot_access import SlotAccess
 from fanet_mw.routing.clustered.tdma.slot_release import SlotRelease
 from fanet_mw.routing.clustered.timetable.heard_load import HeardLoads
 from fanet_mw.routing.clustered.timetable.link_quality import LinkQuality
-from fanet_mw.routing.clustered.timetable.promises import Promises
+from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TurnPlans
 from fanet_mw.routing.clustered.timetable.timetabling import FromPlaces, NoTimetable, Timetabling
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
@@ -210,13 +210,13 @@ def _by_timetable(ground: _Ground) -> Clustered:
     lead_ns = scenario.radio.lead_ns
     roots = RootRelease(port.node, ground.queue(), reserved=reserved(scenario), lead_ns=lead_ns)
     calls = CallRelease(TxQueue(capacity=scenario.routing.queue_frames), lead_ns=lead_ns)
-    promises = Promises(port, plans=plans, roots=roots, lease=parts.lease, admission=_admission(port))
+    delays = StatedDelays(port, plans=plans, roots=roots, lease=parts.lease, admission=_admission(port))
     access = TurnAccess(
-        port, plans=plans, roots=roots, calls=calls, slots=_slots(ground, parts.membership), promises=promises,
+        port, plans=plans, roots=roots, calls=calls, slots=_slots(ground, parts.membership), delays=delays,
         floods=ground.floods, contention=ground.contention,
     )  # fmt: skip
     timetabling = FromPlaces(
-        port, lease=parts.lease, membership=parts.membership, refresh=parts.refresh, promises=promises, access=access
+        port, lease=parts.lease, membership=parts.membership, refresh=parts.refresh, delays=delays, access=access
     )
     contending = ContendingRelaying(port, RelayAll(), ground.contention)
     relaying = ScheduledRelaying(port, plans, contending)
@@ -224,7 +224,7 @@ def _by_timetable(ground: _Ground) -> Clustered:
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
         floods=ground.floods, roles=_roles(ground, parts, access, timetabling, heard), access=access, relaying=relaying,
-        contending=contending, two_hops=None, loads=heard, promises=promises,
+        contending=contending, two_hops=None, loads=heard, delays=delays,
     )  # fmt: skip
     return _protocol(ground, whole, parts.refresh, calls)
 

@@ -26,7 +26,7 @@ from fanet_mw.routing.clustered.forwarding.repair import Repair
 from fanet_mw.routing.clustered.forwarding.uplink import MOST_TRIES, Uplink
 from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
 from fanet_mw.routing.clustered.timetable.heard_load import HeardLoads
-from fanet_mw.routing.clustered.timetable.promises import Promises
+from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.units import BROADCAST, US, NodeId
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, HEADER_BYTES, Kind
 from fanet_mw.wire.claims import MESSAGE_BYTES, Claims
@@ -56,7 +56,7 @@ class Parts(NamedTuple):
     """What hellos say of the neighbors' neighbors; None if hellos say nothing of them."""
     loads: HeardLoads | None = None
     """The loads of the nodes, as this node hears them; None if timetables are made for what the scenario says."""
-    promises: Promises | None = None
+    delays: StatedDelays | None = None
     """The delay bounds and likely delays of the node's packets; None if this access states no bound."""
 
 
@@ -110,13 +110,13 @@ class Clustered(RoutingProtocol):
         return ()
 
     def bound_ns(self) -> int | None:
-        return None if self.parts.promises is None else self.parts.promises.bound_ns()
+        return None if self.parts.delays is None else self.parts.delays.bound_ns()
 
     def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
         return self.parts.roles.clusters()
 
     def least_interval_ns(self, deadline_ns: int) -> int | None:
-        return None if self.parts.promises is None else self.parts.promises.least_interval_ns(deadline_ns)
+        return None if self.parts.delays is None else self.parts.delays.least_interval_ns(deadline_ns)
 
     def on_copy(self, key: int, *, now_ns: int) -> None:
         for pending, on_copy in self._hear_copies:

@@ -17,7 +17,7 @@ import numpy as np
 from fanet_mw.bus.messages import VELOCITY_LASTS_NS, Setpoint, SetpointKind
 from fanet_mw.extensions import load
 from fanet_mw.scenario import Scenario
-from fanet_mw.scenario.mobility import MOBILITY_MODELS
+from fanet_mw.scenario.tables.mobility import MOBILITY_MODELS
 from fanet_mw.units import FARTHEST_M, FASTEST_M_S, Enu, S
 from sim.world.engines.contract import Flags, Rows, Values
 from sim.world.mobility.contract import MobilityModel, Track

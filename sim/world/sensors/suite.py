@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from fanet_mw.bus.messages import Message
 from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Scenario
-from fanet_mw.scenario.routing import PROTOCOLS
+from fanet_mw.scenario.tables.routing import PROTOCOLS
 from sim.world.engines.battery_drain import BatteryDrain
 from sim.world.engines.contract import Flags
 from sim.world.environment.obstacles import Obstacles

@@ -63,20 +63,6 @@ def test_broken_toml_names_file_and_line() -> None:
     assert "a.toml: not valid TOML" in refusal("[nodes\ncount=3")
 
 
-@pytest.mark.parametrize("override", ["nodes.count", "=3", "seed.x=1"])
-def test_an_override_that_is_none_is_refused_with_its_text(override: str) -> None:
-    assert repr(override) in refusal("seed = 1", override)
-
-
-def test_overrides_take_toml_values_and_plain_words() -> None:
-    scenario = config.parse(
-        "", source="a", name="a", overrides=["nodes.count=10", "routing.protocol=flooding", "traffic.sources=[1, 2]"]
-    )
-    assert scenario.nodes.count == 10
-    assert scenario.routing.protocol == "flooding"
-    assert scenario.traffic.sources == (1, 2)
-
-
 def test_a_file_that_is_missing_is_named() -> None:
     with pytest.raises(ConfigError, match=r"nowhere\.toml: cannot be read"):
         config.load(Path("nowhere.toml"))

@@ -69,11 +69,3 @@ def test_words_and_plain_text_stay_what_they_are() -> None:
     made = scenario("clusters.guard_ms=auto", "description=5 s", text='name = "a"\n[clusters]\nrelay = "scheduled"')
     assert made.clusters.guard_ms == "auto"
     assert made.description == "5 s"
-
-
-def test_an_entry_of_an_array_is_changed_by_its_number() -> None:
-    text = '[[faults]]\nkind = "cut"\nnode = 2\nat_s = 3\n'
-    assert scenario("faults.0.node=4", text=text).faults[0].node == 4  # type: ignore[union-attr]
-    for wrong in ("faults.1.node=4", "faults.x.node=4"):
-        with pytest.raises(ConfigError, match="must be the number of an entry, 0 to 0"):
-            scenario(wrong, text=text)

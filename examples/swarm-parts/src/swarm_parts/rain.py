@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, Field
 
-from fanet_mw.scenario.radio import Radio
+from fanet_mw.scenario.tables.radio import Radio
 
 Reals = npt.NDArray[np.float64]
 _K_5_GHZ = 0.0002162

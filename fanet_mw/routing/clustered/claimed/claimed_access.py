@@ -27,7 +27,7 @@ from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import NO_HEAD, Gradient
 from fanet_mw.routing.clustered.forwarding.uplink import Uplink
 from fanet_mw.routing.clustered.tdma.contention import Contention
-from fanet_mw.routing.clustered.tdma.turns import clocks_fit
+from fanet_mw.routing.clustered.tdma.turn_timing import clocks_fit
 from fanet_mw.units import MS, US, seconds_to_ns
 from fanet_mw.wire import Kind
 from fanet_mw.wire.claims import Claims

@@ -15,7 +15,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from fanet_mw.rng import priority_hash
-from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.units import NodeId
 
 

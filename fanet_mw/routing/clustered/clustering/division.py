@@ -26,7 +26,7 @@ from fanet_mw.routing.clustered.clustering import (
     by_id,
 )
 from fanet_mw.routing.clustered.clustering.election import Score
-from fanet_mw.scenario.clusters import METHODS
+from fanet_mw.scenario.tables.clusters import METHODS
 from fanet_mw.units import NodeId, S
 
 _WORSE: Final = 1.25

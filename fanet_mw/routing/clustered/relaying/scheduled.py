@@ -14,7 +14,7 @@ from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.clustered.contract import Relaying
-from fanet_mw.routing.clustered.tdma.turns import turn_slack_ns
+from fanet_mw.routing.clustered.tdma.turn_timing import turn_slack_ns
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TurnPlans
 from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan
 from fanet_mw.units import NodeId

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 from fanet_mw import serial_number
 from fanet_mw.routing.clustered.roles.lease import Authority
 from fanet_mw.routing.clustered.roles.states import Event
-from fanet_mw.routing.clustered.tdma.slots import Superframe
+from fanet_mw.routing.clustered.tdma.slot_timing import Superframe
 from fanet_mw.trace import RoleChanged
 from fanet_mw.units import US, NodeId
 from fanet_mw.wire.clusters import Member, Role, Schedule

@@ -9,7 +9,7 @@
 Accepted packets are at least that interval apart, as the bound assumes (`Turns.worst_ns`), so a growing load cannot
 break the deadline of earlier packets. If no interval meets the deadline, that is recorded in the trace, and packets are
 accepted at the rate that the turns can carry, because late packets are better than none. Without a timetable all
-packets are accepted. Packets more urgent than bulk are always accepted (`Promises.admit`).
+packets are accepted. Packets more urgent than bulk are always accepted (`StatedDelays.admit`).
 
 This is about `traffic.deadline_s`, the deadline of the scenario's own traffic. A message for which an application
 states a deadline is accepted or refused earlier, by the messenger (`_admission` in `agents/messenger.py`).

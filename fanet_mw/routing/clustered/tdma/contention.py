@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 
 Random = Callable[[], float]
 

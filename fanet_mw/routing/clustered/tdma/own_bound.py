@@ -10,8 +10,8 @@ that process may wake up too late.
 
 Each class has room of its own in each turn (`root_release.py`), so a class does not wait for another one. There are two
 exceptions. A packet that is larger than the room of its class waits as bulk does. A leader's announcements take the
-room of bulk, so a leader's bulk packets have no bound (`promises.py`). Within a class no later packet delays an earlier
-one.
+room of bulk, so a leader's bulk packets have no bound (`stated_delays.py`). Within a class no later packet delays an
+earlier one.
 
 There are two kinds of bounds. Bulk that comes at regular intervals has the worst case over its busy period
 (`Turns.worst_ns`). For all other classes the bound holds for a packet that finds fewer than `BURST` packets of its
@@ -21,7 +21,7 @@ the rate of the turns. A packet that finds more packets waiting has no bound.
 
 from typing import Final, NamedTuple
 
-from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.wire.loads import AS_EXPECTED
 
 BURST: Final = 3

@@ -6,7 +6,7 @@
 Each class of packets in use (`reserved_room.reserved`) has room of its own in a turn, so the wait of a bulk packet
 depends on nothing that comes later, such as reports or warnings. Only a leader's announcements delay its bulk. A packet
 that is larger than the room of its class waits like bulk. A turn is used only if its flood is over before the next
-timetable comes into force. `turns.py` explains root, turn and span.
+timetable comes into force. `turn_timing.py` explains root, turn and span.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 from fanet_mw.node.packet import Packet
 from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.tdma.turn_release import OwnTurn, TurnRelease
-from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.units import NodeId
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_CONTROL, Kind
 

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 from fanet_mw.node.packet import Packet
 from fanet_mw.node.queue import TxQueue
-from fanet_mw.routing.clustered.tdma.slots import Slot, Superframe
+from fanet_mw.routing.clustered.tdma.slot_timing import Slot, Superframe
 from fanet_mw.scenario import Clusters
 from fanet_mw.units import MS
 

@@ -1,6 +1,6 @@
 """The timetables that a node follows: the one in force, and perhaps others that come into force later."""
 
-from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan
 
 

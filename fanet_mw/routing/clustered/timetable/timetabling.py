@@ -18,7 +18,7 @@ from fanet_mw.routing.clustered.roles.leader import Leader
 from fanet_mw.routing.clustered.roles.lease import Authority, Lease
 from fanet_mw.routing.clustered.roles.membership import Membership, Version
 from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
-from fanet_mw.routing.clustered.timetable.promises import Promises
+from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.routing.clustered.timetable.turn_allocation import fit, fit_measured
 from fanet_mw.routing.clustered.timetable.turn_plan import NO_LOADS, Fitted, TurnPlan
@@ -101,14 +101,14 @@ class FromPlaces:
         lease: Lease,
         membership: Membership,
         refresh: ScheduleRefresh,
-        promises: Promises,
+        delays: StatedDelays,
         access: TurnAccess,
     ) -> None:
         self._port = port
         self._lease = lease
         self._membership = membership
         self._refresh = refresh
-        self._promises = promises
+        self._delays = delays
         self._access = access
         self._schedules: dict[int, tuple[Schedule, PartDetails]] = {}
         self._measured: dict[int, Links] = {}
@@ -139,7 +139,7 @@ class FromPlaces:
         ]
 
     def notice_ns(self, now_ns: int) -> int:
-        return self._promises.notice_ns(now_ns)
+        return self._delays.notice_ns(now_ns)
 
     # --- at every node --------------------------------------------------------------------------------------------
 
@@ -191,7 +191,7 @@ class FromPlaces:
         if due and self._is_complete():
             self._planned = version
             self._plan(now_ns)
-        self._promises.announced_ns = 0 if self._planned is None else self._announced_ns.get(self._planned, 0)
+        self._delays.announced_ns = 0 if self._planned is None else self._announced_ns.get(self._planned, 0)
 
     def _is_complete(self) -> bool:
         first = next(iter(self._schedules.values()))[0]

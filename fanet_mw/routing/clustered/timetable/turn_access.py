@@ -18,7 +18,7 @@ from fanet_mw.routing.clustered.tdma.call_release import CallRelease
 from fanet_mw.routing.clustered.tdma.contention import Contention
 from fanet_mw.routing.clustered.tdma.root_release import RootRelease, TurnsInForce
 from fanet_mw.routing.clustered.tdma.slot_access import SlotAccess
-from fanet_mw.routing.clustered.timetable.promises import Promises
+from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TurnPlans
 from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan
 from fanet_mw.units import US, earliest, seconds_to_ns
@@ -39,7 +39,7 @@ class TurnAccess:
         roots: RootRelease,
         calls: CallRelease,
         slots: SlotAccess,
-        promises: Promises,
+        delays: StatedDelays,
         floods: Floods,
         contention: Contention,
     ) -> None:
@@ -48,14 +48,14 @@ class TurnAccess:
         self._roots = roots
         self._calls = calls
         self._slots = slots
-        self._promises = promises
+        self._delays = delays
         self._floods = floods
         self._contention = contention
         self._lead_ns = port.scenario.radio.lead_ns
         self._lifetime_ns = seconds_to_ns(port.scenario.routing.lifetime_s)
 
     def start(self, now_ns: int) -> None:
-        self._promises.start(now_ns)
+        self._delays.start(now_ns)
 
     # --- timetables and roles -------------------------------------------------------------------------------------
 
@@ -64,9 +64,9 @@ class TurnAccess:
         node changes to the latter only when what it promised under the former one has gone. None: no timetable fits.
         """
         if plan is not None:
-            plan = plan._replace(valid_ns=max(plan.valid_ns, self._promises.kept_until_ns(now_ns)))
+            plan = plan._replace(valid_ns=max(plan.valid_ns, self._delays.kept_until_ns(now_ns)))
         self._plans.follow(plan, now_ns=now_ns)
-        self._promises.follow(now_ns=now_ns)
+        self._delays.follow(now_ns=now_ns)
         self.use_turns(now_ns)
         if plan is None:
             self._calls.drain()  # neighbors will state again what they lack
@@ -85,7 +85,7 @@ class TurnAccess:
         """Drop those of some packets whose stated bound would be broken; returns the others."""
         kept = []
         for packet in packets:
-            if self._promises.keeps(packet, through_ns=through_ns):
+            if self._delays.keeps(packet, through_ns=through_ns):
                 kept.append(packet)
             else:
                 self._port.drop(DropReason.BOUND_LOST, packet, now_ns=now_ns)
@@ -117,13 +117,13 @@ class TurnAccess:
     # --- letting out ----------------------------------------------------------------------------------------------
 
     def admit(self, packet: Packet, *, due_ns: int) -> bool:
-        return self._promises.admit(packet, due_ns=due_ns)
+        return self._delays.admit(packet, due_ns=due_ns)
 
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         self.forward(packet, start_ns=due_ns, now_ns=now_ns)
-        bound_ns = self._promises.greatest_bound_ns(packet, now_ns=now_ns)
+        bound_ns = self._delays.greatest_bound_ns(packet, now_ns=now_ns)
         through_ns = None if bound_ns is None else self._roots.through_ns(packet, now_ns=now_ns)
-        self._promises.state(packet, bound_ns, through_ns=through_ns, now_ns=now_ns)
+        self._delays.state(packet, bound_ns, through_ns=through_ns, now_ns=now_ns)
 
     def forward(self, packet: Packet, *, start_ns: int, now_ns: int, tries: int = 0) -> None:
         if self._roots.has_turn(now_ns=now_ns):
@@ -192,12 +192,12 @@ class TurnAccess:
             self._slots.next_wake_ns(),
             self._roots.next_wake_ns(),
             self._calls.next_wake_ns(),
-            self._promises.next_wake_ns(),
+            self._delays.next_wake_ns(),
         )
 
     def wake(self, now_ns: int) -> None:
         self._slots.wake(now_ns)
-        self._promises.wake(now_ns)
+        self._delays.wake(now_ns)
         for packet in self._roots.expire(before_us=(now_ns - self._lifetime_ns) // US):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         for packets, start_ns in self._roots.due(now_ns=now_ns):
@@ -235,7 +235,7 @@ class TurnAccess:
     def report(self) -> Mapping[str, object]:
         newest = self._plans.newest
         return {
-            **self._promises.report(),
+            **self._delays.report(),
             "planned": newest is not None,
             "turns": None if newest is None else newest.report(),
         }

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import islice
 from typing import Final, NamedTuple, TypeVar
 
-from fanet_mw.routing.clustered.tdma.turns import Turns, turn_ns
+from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_ns
 from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
 from fanet_mw.routing.clustered.timetable.heard_load import packets
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort

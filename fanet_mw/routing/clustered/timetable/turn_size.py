@@ -3,7 +3,7 @@
 from typing import Final
 
 from fanet_mw.routing.clustered.tdma.reserved_room import reserved
-from fanet_mw.routing.clustered.tdma.turns import Turns, turn_ns
+from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_ns
 from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, seconds_to_ns

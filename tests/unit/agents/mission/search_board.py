@@ -3,7 +3,7 @@
 import math
 
 from agents.mission.finding.announcing import Announcing
-from agents.mission.finding.finds import Finds
+from agents.mission.finding.known_survivors import KnownSurvivors
 from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, PhoneModel
 from agents.mission.flight.goal import Goal
 from agents.mission.navigation.known_obstacles import KnownObstacles
@@ -14,7 +14,7 @@ from agents.mission.outbox import Outbox
 from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.formation_planner import plan_of
 from agents.mission.search_formation.pattern import fitted
-from agents.mission.search_formation.shape import Demands
+from agents.mission.search_formation.shapes.contract import Demands
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import Bidding
 from fanet_mw.scenario import config
@@ -48,18 +48,18 @@ class Board:
 
     def __init__(self, node: NodeId, at: Enu, *, planned: bool = True) -> None:
         self.out = Outbox()
-        self.finds = Finds(MODEL)
+        self.survivors = KnownSurvivors(MODEL)
         self.own_motion, self.neighbors = OwnMotion(at, OPEN), NeighborMotions()
         self.place = FormationPlace(node, self.own_motion, reach_m=REACH_M)
         if planned:
             self.place.adopt(PLAN, 0)
-        self.approach = Approach(node, self.finds, self.own_motion, self.out, arrival_m=30, speed_m_s=10.0)
+        self.approach = Approach(node, self.survivors, self.own_motion, self.out, arrival_m=30, speed_m_s=10.0)
         self.tasks = Bidding(
-            SCENARIO, node, finds=self.finds, own_motion=self.own_motion, formation=self.place,
+            SCENARIO, node, survivors=self.survivors, own_motion=self.own_motion, formation=self.place,
             approach=self.approach, outbox=self.out, speed_m_s=10.0,
         )  # fmt: skip
-        self.goal = Goal(self.finds, self.own_motion, self.place, self.approach, None, None)
-        self.announcing = Announcing(node, self.finds, self.out)
+        self.goal = Goal(self.survivors, self.own_motion, self.place, self.approach, None, None)
+        self.announcing = Announcing(node, self.survivors, self.out)
 
     def hear(self, survivor: int, truth: Enu, reporters: range, *, now_ns: int) -> None:
         """Each of these nodes reports a phone from three places on two sides of it."""
@@ -68,7 +68,7 @@ class Board:
                 at = Enu(truth.east + (40 if node % 2 else -60), truth.north + step + node, UP_M)
                 rssi_dbm = MODEL.power_dbm - REFERENCE_LOSS_DB - 30 * math.log10(at.minus(truth).norm())
                 report = Survivor(now_ns // US, survivor, node, at, rssi_dbm)
-                self.finds.take_report(report, now_ns=now_ns)
+                self.survivors.take_report(report, now_ns=now_ns)
 
 
 def lane_of(node: int, at_ns: int) -> Enu:

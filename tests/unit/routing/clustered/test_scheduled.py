@@ -14,7 +14,7 @@ from fanet_mw.node.node import Node
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing import make_protocol
 from fanet_mw.routing.clustered.clustered import Clustered
-from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.delivery_odds import Odds
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
@@ -213,7 +213,7 @@ def test_a_bound_runs_from_application_to_application(make_scenario: MakeScenari
     node = Node(US, make_scenario(**keys), make_protocol, position=Enu(0.0, 0.0, 50.0))
     node.start(0)
     access_of(node)._plans.in_order = [planned(FLOODS)]
-    own = access_of(node)._promises.own()
+    own = access_of(node)._delays.own()
     assert own is not None
     assert own.worst_ns(interval_ns=1000 * MS) == (2 + 100 + 3 * 2 + handover_ms + 2) * MS
 
@@ -222,14 +222,14 @@ def test_who_cannot_reach_everyone_promises_nothing(node: Node) -> None:
     access_of(node)._plans.in_order = [planned(FLOODS, unreached=(AFTER,))]
     node.send(filler(40), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=0, now_ns=0)
     assert not [record for record in node.records if isinstance(record, BoundStated)]
-    assert access_of(node)._promises.own() is None
+    assert access_of(node)._delays.own() is None
 
 
 def informed(node: Node, *, told_ms: int) -> TurnAccess:
     """The node follows a timetable, and heard an announcement of it that was made at an instant."""
     access = access_of(node)
-    access._promises.announced_ns = told_ms * MS
-    access._promises.follow(now_ns=told_ms * MS)
+    access._delays.announced_ns = told_ms * MS
+    access._delays.follow(now_ns=told_ms * MS)
     access.use_turns(told_ms * MS)
     return access
 
@@ -334,7 +334,7 @@ def test_a_packet_that_would_come_after_its_bound_is_dropped_in_its_turn(node: N
     """The node takes office after it stated the bound, and its announcement takes the place of bulk in its turn."""
     access = informed(node, told_ms=10_000)
     assert promised(node, at_ms=11_520, size=200)
-    access._promises._lease.take_office(11_530 * MS)
+    access._delays._lease.take_office(11_530 * MS)
     access.flood_control(Kind.SCHEDULE, filler(900), now_ns=11_530 * MS)
     node.send(
         filler(40), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=11_540 * MS, now_ns=11_540 * MS
@@ -346,7 +346,7 @@ def test_a_packet_that_would_come_after_its_bound_is_dropped_in_its_turn(node: N
 
 
 def test_a_leader_promises_nothing_for_bulk(node: Node) -> None:
-    informed(node, told_ms=0)._promises._lease.take_office(0)
+    informed(node, told_ms=0)._delays._lease.take_office(0)
     assert promised(node, at_ms=0) == []
 
 

@@ -23,8 +23,8 @@ def seen() -> Board:
         for east in (-60, 0, 60):
             at = Enu(east, 20.0 * node, UP_M)
             rssi_dbm = MODEL.power_dbm - REFERENCE_LOSS_DB - 30 * math.log10(at.norm())
-            board.finds.take_report(Survivor(0, 1, node, at, rssi_dbm), now_ns=0)
-    board.finds.known[1].filter.on_sighting(Estimate(1, 2, 4, 0, 4))
+            board.survivors.take_report(Survivor(0, 1, node, at, rssi_dbm), now_ns=0)
+    board.survivors.by_id[1].filter.on_sighting(Estimate(1, 2, 4, 0, 4))
     return board
 
 
@@ -51,7 +51,7 @@ def test_who_still_reports_a_confirmed_survivor_is_told_by_one_in_four() -> None
 def test_a_refutation_is_told_as_a_confirmation_is_and_answers_who_tells_the_confirmation_again() -> None:
     board = seen()
     board.announcing.confirm(1, 0)
-    mistaken = board.finds.known[1].confirmed
+    mistaken = board.survivors.by_id[1].confirmed
     assert mistaken is not None
     board.announcing.refute(1, S)
     board.out.packets.clear()

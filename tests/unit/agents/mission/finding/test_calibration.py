@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agents.mission.finding.calibration import common_offset, likelihood
-from agents.mission.finding.finds import Finds
+from agents.mission.finding.known_survivors import KnownSurvivors
 from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, Estimate, PhoneModel
 from fanet_mw.units import Enu
 from fanet_mw.wire.survivors import MOST_DBM, Found, Standing, Survivor
@@ -43,34 +43,36 @@ def somewhere(drawn: random.Random) -> Enu:
     return Enu(drawn.uniform(-40, 40), drawn.uniform(30, 90), 0.0)
 
 
-def confirm(finds: Finds, survivor: int, at: Enu, *, standing: Standing = Standing.CONFIRMED, t_us: int = 0) -> None:
-    finds.on_found(Found(t_us, survivor, at.east, at.north, 4.0, 0.0, 4.0, 9, standing), now_ns=0)
+def confirm(
+    survivors: KnownSurvivors, survivor: int, at: Enu, *, standing: Standing = Standing.CONFIRMED, t_us: int = 0
+) -> None:
+    survivors.on_found(Found(t_us, survivor, at.east, at.north, 4.0, 0.0, 4.0, 9, standing), now_ns=0)
 
 
-def swarm(confirmed: int, *, offset_db: float, drawn: random.Random) -> Finds:
+def swarm(confirmed: int, *, offset_db: float, drawn: random.Random) -> KnownSurvivors:
     """What a UAV knows after so many survivors were confirmed, whose phones differ from each other by 1 dB."""
-    finds = Finds(MODEL)
+    survivors = KnownSurvivors(MODEL)
     for survivor in range(1, confirmed + 1):
         phone, own_db = somewhere(drawn), drawn.gauss(0, MODEL.offset_db)
         for node, at, rssi_dbm in heard(phone, [*PASS, *circle(phone)], offset_db + own_db, drawn):
-            finds.take_report(Survivor(0, survivor, node, at, rssi_dbm), now_ns=0)
-        confirm(finds, survivor, phone)
-    return finds
+            survivors.take_report(Survivor(0, survivor, node, at, rssi_dbm), now_ns=0)
+        confirm(survivors, survivor, phone)
+    return survivors
 
 
-def error_m(finds: Finds, *, offset_db: float, draw: int) -> float | None:
+def error_m(survivors: KnownSurvivors, *, offset_db: float, draw: int) -> float | None:
     """How far from the truth the next phone is placed, which the same two UAVs hear; None: they do not."""
     drawn = random.Random(f"next/{draw}")
     phone = somewhere(drawn)
     powers = list(heard(phone, PASS, offset_db, drawn))
     for node, at, rssi_dbm in powers:
-        finds.take_report(Survivor(0, 99, node, at, rssi_dbm), now_ns=0)
+        survivors.take_report(Survivor(0, 99, node, at, rssi_dbm), now_ns=0)
     if not powers:
         return None
     for _, at in PASS:
         if all(at != place for _, place, _ in powers):
-            finds.known[99].filter.on_silence(at)
-    place = finds.known[99].filter.estimate()
+            survivors.by_id[99].filter.on_silence(at)
+    place = survivors.by_id[99].filter.estimate()
     assert place is not None
     return place.distance_m(phone)
 
@@ -78,8 +80,8 @@ def error_m(finds: Finds, *, offset_db: float, draw: int) -> float | None:
 def median_error_m(confirmed: int, *, offset_db: float) -> float:
     errors = []
     for draw in range(24):
-        finds = swarm(confirmed, offset_db=offset_db, drawn=random.Random(f"confirmed/{draw}"))
-        error = error_m(finds, offset_db=offset_db, draw=draw)
+        survivors = swarm(confirmed, offset_db=offset_db, drawn=random.Random(f"confirmed/{draw}"))
+        error = error_m(survivors, offset_db=offset_db, draw=draw)
         errors += [] if error is None else [error]
     return statistics.median(errors)
 
@@ -97,19 +99,19 @@ def test_phones_that_are_as_assumed_are_placed_as_before(confirmed: int) -> None
 
 def test_a_refutation_takes_back_what_its_confirmation_told() -> None:
     drawn = random.Random(5)
-    finds = swarm(3, offset_db=-6, drawn=drawn)
-    error_m(finds, offset_db=-6, draw=1)
-    place, offset = finds.known[99].filter.estimate(), finds.offset
-    confirm(finds, 4, Enu(0, 60, 0), t_us=5)  # nobody has heard that phone
-    assert finds.offset == offset
+    survivors = swarm(3, offset_db=-6, drawn=drawn)
+    error_m(survivors, offset_db=-6, draw=1)
+    place, offset = survivors.by_id[99].filter.estimate(), survivors.offset
+    confirm(survivors, 4, Enu(0, 60, 0), t_us=5)  # nobody has heard that phone
+    assert survivors.offset == offset
     for survivor in (1, 2, 3):
-        found = finds.known[survivor].confirmed
+        found = survivors.by_id[survivor].confirmed
         assert found is not None
-        confirm(finds, survivor, Enu(found.east_m, found.north_m, 0), standing=Standing.REFUTED, t_us=9)
-    assert finds.offset == (0, 0)
-    fresh = Finds(MODEL)
+        confirm(survivors, survivor, Enu(found.east_m, found.north_m, 0), standing=Standing.REFUTED, t_us=9)
+    assert survivors.offset == (0, 0)
+    fresh = KnownSurvivors(MODEL)
     error_m(fresh, offset_db=-6, draw=1)
-    assert finds.known[99].filter.estimate() == fresh.known[99].filter.estimate() != place
+    assert survivors.by_id[99].filter.estimate() == fresh.by_id[99].filter.estimate() != place
 
 
 def test_many_powers_of_one_phone_are_one_draw_of_the_population() -> None:
@@ -131,14 +133,14 @@ def test_many_powers_of_one_phone_are_one_draw_of_the_population() -> None:
 def test_the_order_in_which_survivors_are_confirmed_does_not_matter(order: list[int]) -> None:
     offsets = set()
     for told in (range(1, 5), order):
-        finds, drawn = Finds(MODEL), random.Random(8)
+        survivors, drawn = KnownSurvivors(MODEL), random.Random(8)
         phones = {survivor: somewhere(drawn) for survivor in range(1, 5)}
         for survivor, phone in phones.items():
             for node, at, rssi_dbm in heard(phone, circle(phone), -4, drawn):
-                finds.take_report(Survivor(0, survivor, node, at, rssi_dbm), now_ns=0)
+                survivors.take_report(Survivor(0, survivor, node, at, rssi_dbm), now_ns=0)
         for survivor in told:
-            confirm(finds, survivor, phones[survivor])
-        offsets.add(finds.offset)
+            confirm(survivors, survivor, phones[survivor])
+        offsets.add(survivors.offset)
     assert len(offsets) == 1
     assert offsets.pop().mean_db < -2
 
@@ -159,13 +161,13 @@ forged = st.lists(st.tuples(st.integers(1, 3), positions, powers_dbm), max_size=
 @given(st.lists(forged, max_size=5))
 @settings(max_examples=20)
 def test_no_powers_at_all_drive_it_beyond_its_bound(phones: list[list[tuple[int, Enu, float]]]) -> None:
-    finds = Finds(MODEL)
+    survivors = KnownSurvivors(MODEL)
     for survivor, powers in enumerate(phones, start=1):
         for node, at, rssi_dbm in powers:
-            finds.take_report(Survivor(0, survivor, node, at, rssi_dbm), now_ns=0)
-        confirm(finds, survivor, Enu(0, 0, 0))
-    assert abs(finds.offset.mean_db) <= 12
-    assert 0 <= finds.offset.sigma_db <= 12
+            survivors.take_report(Survivor(0, survivor, node, at, rssi_dbm), now_ns=0)
+        confirm(survivors, survivor, Enu(0, 0, 0))
+    assert abs(survivors.offset.mean_db) <= 12
+    assert 0 <= survivors.offset.sigma_db <= 12
 
 
 @given(forged, st.floats(-MOST_DBM, MOST_DBM))
@@ -173,9 +175,9 @@ def test_no_powers_at_all_drive_it_beyond_its_bound(phones: list[list[tuple[int,
 def test_one_phone_whose_powers_are_forged_does_not_outweigh_four_that_are_true(
     powers: list[tuple[int, Enu, float]], near_dbm: float
 ) -> None:
-    finds = swarm(4, offset_db=0, drawn=random.Random(2))
-    before = finds.offset.mean_db
+    survivors = swarm(4, offset_db=0, drawn=random.Random(2))
+    before = survivors.offset.mean_db
     for node, at, rssi_dbm in [*powers, *((4, at, near_dbm) for _, at in circle(Enu(0, 0, 0)))]:
-        finds.take_report(Survivor(0, 50, node, at, rssi_dbm), now_ns=0)
-    confirm(finds, 50, Enu(0, 0, 0))
-    assert abs(finds.offset.mean_db - before) <= 1.0
+        survivors.take_report(Survivor(0, 50, node, at, rssi_dbm), now_ns=0)
+    confirm(survivors, 50, Enu(0, 0, 0))
+    assert abs(survivors.offset.mean_db - before) <= 1.0

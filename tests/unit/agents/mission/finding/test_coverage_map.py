@@ -14,7 +14,7 @@ from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.formation_planner import plan_of
 from agents.mission.search_formation.missed_cells import MissedCells
 from agents.mission.search_formation.pattern import Pattern, fitted
-from agents.mission.search_formation.shape import Demands, ShapeName
+from agents.mission.search_formation.shapes.contract import Demands, ShapeName
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire import COVERED, HEADER_BYTES

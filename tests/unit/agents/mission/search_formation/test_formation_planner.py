@@ -8,7 +8,7 @@ import pytest
 
 from agents.mission.search_formation.formation_planner import FormationPlanner, plan_of
 from agents.mission.search_formation.pattern import Pattern, fitted
-from agents.mission.search_formation.shape import Demands, ShapeName
+from agents.mission.search_formation.shapes.contract import Demands, ShapeName
 from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire.search_plan import Search, SearchStatus
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from agents.mission.search_formation.formation_planner import pattern_of, plan_of
 from agents.mission.search_formation.pattern import Pattern, fitted
-from agents.mission.search_formation.sectors import rows_of
-from agents.mission.search_formation.shape import Demands, ShapeName
+from agents.mission.search_formation.shapes.contract import Demands, ShapeName
+from agents.mission.search_formation.shapes.sectors import rows_of
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.units import Enu
 from fanet_mw.wire import HEADER_BYTES

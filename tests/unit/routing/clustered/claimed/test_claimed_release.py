@@ -6,7 +6,7 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.claimed.claimed_release import ClaimedRelease
 from fanet_mw.routing.clustered.claimed.own_turns import OwnTurns, Share
-from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.units import MS
 from fanet_mw.wire import Header
 

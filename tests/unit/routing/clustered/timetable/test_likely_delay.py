@@ -3,7 +3,7 @@
 import pytest
 
 from fanet_mw.routing.clustered.forwarding.repair import RIPE_NS
-from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.delivery_odds import Odds
 from fanet_mw.routing.clustered.timetable.likely_delay import likely_delay_ns
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn

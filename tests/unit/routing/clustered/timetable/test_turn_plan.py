@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from fanet_mw.routing.clustered.tdma.turns import Turns, clocks_fit, turn_ns
+from fanet_mw.routing.clustered.tdma.turn_timing import Turns, clocks_fit, turn_ns
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, TurnPlan
 from fanet_mw.routing.clustered.timetable.turn_size import links, superframe

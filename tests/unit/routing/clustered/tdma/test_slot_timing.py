@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fanet_mw.errors import LocalProtocolError
-from fanet_mw.routing.clustered.tdma.slots import Superframe
+from fanet_mw.routing.clustered.tdma.slot_timing import Superframe
 from fanet_mw.units import MS
 
 FRAME = Superframe(origin_ns=0, period_ns=100 * MS, slot_ns=25 * MS, guard_ns=2 * MS)

@@ -19,7 +19,7 @@ from fanet_mw.planner.demand import demands
 from fanet_mw.planner.feasibility import Plan, Site, evaluate, heads_of
 from fanet_mw.planner.goodput_bound import in_turns
 from fanet_mw.planner.variant import Value, Variant, vary
-from fanet_mw.routing.clustered.tdma.turns import turn_slack_ns
+from fanet_mw.routing.clustered.tdma.turn_timing import turn_slack_ns
 from fanet_mw.routing.clustered.timetable.turn_allocation import least_interval_ns
 from fanet_mw.routing.clustered.timetable.turn_size import most_together, superframe
 from fanet_mw.scenario import Scenario

@@ -6,7 +6,8 @@
                               |  chain          the relays of the chain spread as the lines part
             line 1   o--o--o--o--o--o--o
 
-The words place, lane, team, relay and follower are explained in `shape.py`; the teams of this formation are its lines.
+The words place, lane, team, relay and follower are explained in `contract.py`; the teams of this formation are its
+lines.
 
 Between two turns each place of a line moves straight at constant speed. A relay does so, too, but changes its velocity
 once, when the lines have flown `_STRAIGHT_M`. The distance of two such places is therefore a convex function of time
@@ -18,7 +19,7 @@ single place.
 import math
 from typing import Final
 
-from agents.mission.search_formation.shape import (
+from agents.mission.search_formation.shapes.contract import (
     EDGE_M,
     FIRST_M,
     FOLLOW_M,

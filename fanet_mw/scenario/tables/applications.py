@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from fanet_mw.extensions import OptionsOf, PartName
-from fanet_mw.scenario.sections import Id, Section
+from fanet_mw.scenario.tables.sections import Id, Section
 
 
 class ForeignApplication(Section):

@@ -11,8 +11,8 @@
 UAVs that are too few for one full arm form a shorter one, which winds outward: it flies a first turn around the middle,
 is farther out after each further turn, flies the last turn along the edge, and returns on the same way. This is the
 expanding square search of IAMSAR, volume II, flown by several UAVs abreast. It searches the middle of the area first,
-and needs no least number of UAVs. The words place, lane, team and follower are explained in `shape.py`; the teams of a
-spiral are its arms.
+and needs no least number of UAVs. The words place, lane, team and follower are explained in `contract.py`; the teams of
+a spiral are its arms.
 
 The outermost lane flies at the speed of the sweep, or a little slower while the arm winds outward; inner lanes are
 slower.
@@ -21,7 +21,7 @@ slower.
 import math
 from typing import Final
 
-from agents.mission.search_formation.shape import FOLLOWER_HIGHER_M, Demands, Dimensions, ShapeName, nearest_m
+from agents.mission.search_formation.shapes.contract import FOLLOWER_HIGHER_M, Demands, Dimensions, ShapeName, nearest_m
 from fanet_mw.units import Enu
 
 _BEHIND_S: Final = 15.0

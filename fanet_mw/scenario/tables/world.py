@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from fanet_mw.scenario.sections import (
+from fanet_mw.scenario.tables.sections import (
     Coordinate,
     Section,
     SomeLength,

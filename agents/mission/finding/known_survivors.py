@@ -11,7 +11,7 @@ refutation has removed that one, a worse but younger one does not come back.
 
 The powers of the phones of confirmed survivors tell by how much all phones are stronger or weaker than assumed
 (`calibration.py`). The filters of the unconfirmed survivors' phones are calibrated by that. When sightings suffice for
-a confirmation, and whose phone it was, is decided in `identities.py`.
+a confirmation is decided in `confirmation.py`, whose phone it was in `identities.py`.
 """
 
 from dataclasses import dataclass, field
@@ -33,7 +33,7 @@ _MOST_REFUTED: Final = 4
 
 
 @dataclass
-class Find:
+class KnownSurvivor:
     """What one UAV knows of one survivor."""
 
     filter: PhoneFilter
@@ -63,6 +63,11 @@ class Find:
         """True if the survivor was confirmed by mistake at this place."""
         return any(estimate_of(refuted).distance_m(at) <= SAME_PLACE_M for refuted in self.refuted)
 
+    def is_heard_within(self, sigma_m: float) -> bool:
+        """True if received powers alone give the place of the phone with at most this standard deviation."""
+        heard = self.filter.estimate_by_power()
+        return heard is not None and heard.sigma_m <= sigma_m
+
     def place(self) -> Estimate | None:
         """The confirmed place; before the confirmation, the more exact one of the filter's estimate and the announced
         one. None if there is neither.
@@ -86,112 +91,112 @@ class PhoneLikelihood(NamedTuple):
     values: tuple[float, ...]
 
 
-class Finds:
+class KnownSurvivors:
     """All survivors that one UAV has heard of, by id."""
 
     def __init__(self, model: PhoneModel) -> None:
         self._model = model
-        self.known: dict[int, Find] = {}
+        self.by_id: dict[int, KnownSurvivor] = {}
         self._likelihoods: dict[int, PhoneLikelihood] = {}
         """The likelihood of the common offset by each confirmed survivor's phone."""
         self.offset: PhoneOffset = AS_ASSUMED
         """The offset common to all phones, as estimated from the phones of all confirmed survivors."""
 
-    def take_report(self, report: Survivor, *, now_ns: int) -> Find:
+    def take_report(self, report: Survivor, *, now_ns: int) -> KnownSurvivor:
         """Take in a report, which holds the power with which this UAV or another node has received a phone."""
-        find = self.known.get(report.survivor)
-        if find is None:
-            find = self._new_find(report.survivor, now_ns)
-        before = find.latest.get(report.reporter)
+        known = self.by_id.get(report.survivor)
+        if known is None:
+            known = self._first_heard(report.survivor, now_ns)
+        before = known.latest.get(report.reporter)
         if before == report:
-            return find  # several neighbors pass the same report on
+            return known  # several neighbors pass the same report on
         if before is None or report.t_us > before.t_us:
-            find.latest[report.reporter] = report
-        find.reporters.add(report.reporter)
-        find.filter.on_rssi(report.reporter, report.position, report.rssi_dbm)
-        return find
+            known.latest[report.reporter] = report
+        known.reporters.add(report.reporter)
+        known.filter.on_rssi(report.reporter, report.position, report.rssi_dbm)
+        return known
 
     def on_found(self, found: Found, *, now_ns: int) -> bool:
         """Take in an announced estimate, confirmation or refutation; True if it confirms a survivor who was not
         confirmed, or takes the present confirmation back.
         """
-        find = self.known.get(found.survivor)
-        if find is None:
-            find = self._new_find(found.survivor, now_ns)
+        known = self.by_id.get(found.survivor)
+        if known is None:
+            known = self._first_heard(found.survivor, now_ns)
         match found.standing:
             case Standing.CONFIRMED:
-                fresh = find.confirmed is None and not find.is_refuted(found)
+                fresh = known.confirmed is None and not known.is_refuted(found)
                 if fresh:
-                    find.confirmed = found
+                    known.confirmed = found
                     self._calibrate()
                 return fresh
             case Standing.REFUTED:
-                reopened = _refute(find, found)
+                reopened = _refute(known, found)
                 if reopened:
                     self._calibrate()
                 return reopened
             case Standing.ESTIMATED:
-                outdated = any(found.t_us <= refuted.t_us for refuted in find.refuted)
-                best = find.announced
+                outdated = any(found.t_us <= refuted.t_us for refuted in known.refuted)
+                best = known.announced
                 if not outdated and (best is None or estimate_of(found).sigma_m < estimate_of(best).sigma_m):
-                    find.announced = found
+                    known.announced = found
                 return False
             case _:
                 assert_never(found.standing)
 
     def unconfirmed(self) -> list[int]:
         """The survivors without a confirmation that holds, in order of id."""
-        return sorted([survivor for survivor, find in self.known.items() if find.confirmed is None])
+        return sorted([survivor for survivor, known in self.by_id.items() if known.confirmed is None])
 
     def is_confirmed(self, survivor: int) -> bool:
         """True if the survivor has a confirmation that holds."""
-        find = self.known.get(survivor)
-        return find is not None and find.confirmed is not None
+        known = self.by_id.get(survivor)
+        return known is not None and known.confirmed is not None
 
     def recent_reports(self, *, now_ns: int) -> list[Survivor]:
         """The reports of unconfirmed survivors to pass on with the next hello, newest first."""
         fresh = [
             report
             for survivor in self.unconfirmed()
-            for report in self.known[survivor].latest.values()
+            for report in self.by_id[survivor].latest.values()
             if now_ns - report.t_us * US <= _FRESH_NS
         ]
         fresh.sort(key=lambda report: (-report.t_us, report.survivor, report.reporter))
         return fresh[:_PASSED_ON]
 
-    def _new_find(self, survivor: int, now_ns: int) -> Find:
-        find = self.known[survivor] = Find(PhoneFilter(self._model, self.offset), first_ns=now_ns)
-        return find
+    def _first_heard(self, survivor: int, now_ns: int) -> KnownSurvivor:
+        known = self.by_id[survivor] = KnownSurvivor(PhoneFilter(self._model, self.offset), first_ns=now_ns)
+        return known
 
     def _calibrate(self) -> None:
         """Estimate the common offset from the phones of the confirmed survivors, and calibrate the filters of all
         other phones by it.
         """
         before, self._likelihoods = self._likelihoods, {}
-        for survivor, find in sorted(self.known.items()):
-            if find.confirmed is None:
+        for survivor, known in sorted(self.by_id.items()):
+            if known.confirmed is None:
                 continue
-            readings = find.filter.readings
-            known = before.get(survivor)
-            if known is None or known.found != find.confirmed or known.readings != len(readings):
-                values = likelihood(estimate_of(find.confirmed), readings, self._model)
-                known = PhoneLikelihood(find.confirmed, len(readings), values)
-            self._likelihoods[survivor] = known
+            readings = known.filter.readings
+            phone = before.get(survivor)
+            if phone is None or phone.found != known.confirmed or phone.readings != len(readings):
+                values = likelihood(estimate_of(known.confirmed), readings, self._model)
+                phone = PhoneLikelihood(known.confirmed, len(readings), values)
+            self._likelihoods[survivor] = phone
         self.offset = common_offset(phone.values for phone in self._likelihoods.values())
         for survivor in self.unconfirmed():
-            self.known[survivor].filter.calibrate(self.offset)
+            self.by_id[survivor].filter.calibrate(self.offset)
 
 
-def _refute(find: Find, refuted: Found) -> bool:
+def _refute(known: KnownSurvivor, refuted: Found) -> bool:
     """Take in a refutation; True if it takes the present confirmation back."""
-    if not any(_refutes(known, refuted) for known in find.refuted):
-        find.refuted = sorted([*find.refuted, refuted], key=lambda one: (one.t_us, one.node))[-_MOST_REFUTED:]
-    if find.announced is not None and find.announced.t_us <= refuted.t_us:
-        find.announced = None
-    if find.confirmed is None or not _refutes(refuted, find.confirmed):
+    if not any(_refutes(one, refuted) for one in known.refuted):
+        known.refuted = sorted([*known.refuted, refuted], key=lambda one: (one.t_us, one.node))[-_MOST_REFUTED:]
+    if known.announced is not None and known.announced.t_us <= refuted.t_us:
+        known.announced = None
+    if known.confirmed is None or not _refutes(refuted, known.confirmed):
         return False
-    find.confirmed = None
-    find.filter.on_sighting(None)
+    known.confirmed = None
+    known.filter.on_sighting(None)
     return True
 
 

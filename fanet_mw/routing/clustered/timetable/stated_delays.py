@@ -20,7 +20,7 @@ from fanet_mw.routing.clustered.roles.lease import Lease
 from fanet_mw.routing.clustered.tdma.admission import Admission, least_interval_ns
 from fanet_mw.routing.clustered.tdma.own_bound import RootTurns
 from fanet_mw.routing.clustered.tdma.root_release import RootRelease
-from fanet_mw.routing.clustered.tdma.turns import clocks_fit, receipt_ns
+from fanet_mw.routing.clustered.tdma.turn_timing import clocks_fit, receipt_ns
 from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE, likely_delay_ns
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TurnPlans
 from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan
@@ -35,7 +35,7 @@ intervals nothing is known."""
 _CLASSES: Final = {PRIORITY_SAFETY: "warning", PRIORITY_REPORT: "report", PRIORITY_BULK: "bulk"}
 
 
-class Promises:
+class StatedDelays:
     """The bounds and likely delays of one node's packets, by its timetables."""
 
     def __init__(

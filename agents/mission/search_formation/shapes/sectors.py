@@ -11,12 +11,12 @@
 Rows in the south of the area are swept southward, rows in the north northward. Of an odd number of rows the middle one,
 or the only one, is swept northward. So two rows begin beside each other, lose contact as they part, and regain it on
 the way back; of more rows only the pair that begins beside each other does so, all other neighboring rows stay the
-depth of a sector apart. The words place, lane, team and follower are explained in `shape.py`.
+depth of a sector apart. The words place, lane, team and follower are explained in `contract.py`.
 """
 
 import math
 
-from agents.mission.search_formation.shape import (
+from agents.mission.search_formation.shapes.contract import (
     EDGE_M,
     FIRST_M,
     FOLLOW_M,

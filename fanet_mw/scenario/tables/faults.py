@@ -20,7 +20,7 @@ from fanet_mw.bus.radio_control import (
     link_label,
     node_label,
 )
-from fanet_mw.scenario.sections import Coordinate, Duration, Id, Section
+from fanet_mw.scenario.tables.sections import Coordinate, Duration, Id, Section
 from fanet_mw.units import Enu, NodeId, seconds_to_ns
 
 

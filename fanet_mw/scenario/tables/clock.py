@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from fanet_mw.scenario.sections import Milliseconds, Section, SomeTime
+from fanet_mw.scenario.tables.sections import Milliseconds, Section, SomeTime
 from fanet_mw.units import MS, US, seconds_to_ns
 
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Literal, Self, get_args
 from pydantic import Field, model_validator
 
 from fanet_mw.extensions import Options, OptionsOf, PartName
-from fanet_mw.scenario.sections import Decibels, Length, Level, Section, SomeLength
+from fanet_mw.scenario.tables.sections import Decibels, Length, Level, Section, SomeLength
 from fanet_mw.units import MS
 
 DSSS_RATES_MBPS: Final = (1.0, 2.0, 5.5, 11.0)

@@ -1,0 +1,1 @@
+"""The shapes in which a search is flown: the contract of a shape, and a file for each."""

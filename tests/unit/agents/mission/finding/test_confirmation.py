@@ -1,0 +1,57 @@
+"""When a survivor may be confirmed: enough sightings, enough received powers, and nobody else whose phone it may be."""
+
+import pytest
+from seeing_uav import UP_M, Uav, mean_dbm
+
+from agents.mission.finding.confirmation import required_margin
+from agents.mission.finding.person_track import PersonTrack
+from agents.mission.finding.phone_localization import Estimate
+from fanet_mw.units import Enu, S
+
+
+def test_few_powers_by_one_node_do_not_tell_whose_phone_it_is() -> None:
+    uav = Uav()
+    for count in range(8):
+        assert uav.see(Enu(0, 0, 0), now_ns=count * S) == [], f"{count} powers by one node"
+        at = Enu(13, -100 + 30 * count, UP_M)
+        uav.hear(1, 9, at, mean_dbm(Enu(0, 0, 0), at))
+    assert uav.see(Enu(0, 0, 0), now_ns=9 * S) == [1]
+
+
+def test_the_powers_of_several_nodes_tell_sooner() -> None:
+    uav = Uav()
+    for node, east in ((1, 40), (2, -60)):
+        for north in (-60, 0, 60):
+            assert uav.see(Enu(2, 3, 0), now_ns=0) == []
+            at = Enu(east, north, UP_M)
+            uav.hear(1, node, at, mean_dbm(Enu(0, 0, 0), at))
+    assert uav.see(Enu(2, 3, 0), now_ns=S) == [1]
+
+
+def test_while_two_phones_fit_one_person_nobody_is_named_until_waiting_longer_is_of_no_use() -> None:
+    uav = Uav()
+    for survivor, east in ((1, 0.0), (2, 4.0)):
+        for node in range(1, 5):
+            for north in (-60, 0, 60):
+                at = Enu(40.0 * node - 100, north, UP_M)
+                uav.hear(survivor, node, at, mean_dbm(Enu(east, 0, 0), at))
+    assert not any(uav.see(Enu(0, 0, 0), now_ns=second * S) for second in range(50))
+
+
+@pytest.mark.parametrize(("second", "margin"), [(0, 9.0), (15, 9.0), (32.5, 5.5), (50, 2.0), (500, 2.0)])
+def test_a_uav_is_content_with_less_certainty_the_longer_it_waits(second: float, margin: float) -> None:
+    person = PersonTrack(Estimate(0, 0, 1, 0, 1), first_ns=0, last_ns=0)
+    assert required_margin(person, round(second * S)) == margin
+
+
+def test_only_a_person_seen_from_close_by_is_confirmed() -> None:
+    uav = Uav()
+    for node, east in ((1, 40), (2, -60)):
+        for north in (-60, 0, 60):
+            at = Enu(east, north, UP_M)
+            uav.hear(1, node, at, mean_dbm(Enu(0, 0, 0), at))
+    for second in range(10):
+        uav.identities.on_sighting(Enu(0, 0, 0), sigma_m=2, close=False, now_ns=second * S)
+        assert uav.identities.review(second * S) == []
+    assert uav.see(Enu(0, 0, 0), now_ns=11 * S) == [], "once is not enough"
+    assert uav.see(Enu(0, 0, 0), now_ns=12 * S) == [1]

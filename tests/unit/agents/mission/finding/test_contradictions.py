@@ -1,0 +1,63 @@
+"""A confirmation that was mistaken is contradicted by what is heard and seen later; a right one is not."""
+
+from collections.abc import Iterable
+
+from seeing_uav import UP_M, Uav, mean_dbm
+
+from agents.mission.finding.contradictions import Contradictions
+from fanet_mw.units import US, Enu, S
+from fanet_mw.wire.survivors import Found, Standing
+
+
+def mistaken() -> tuple[Uav, Contradictions]:
+    """One UAV that was told that survivor 1 lies where in truth survivor 2 lies; survivor 1 lies 57 m to the east."""
+    uav = Uav()
+    for survivor in (1, 2):
+        for node, east in ((8, 120.0), (9, -60.0)):
+            uav.hear(
+                survivor, node, Enu(east, 200, UP_M), mean_dbm(Enu(57.0 * (survivor == 1), 0, 0), Enu(east, 200, UP_M))
+            )
+    uav.survivors.on_found(Found(S // US, 1, 0.0, 0.0, 4.0, 0.0, 4.0, 9, Standing.CONFIRMED), now_ns=S)
+    return uav, Contradictions(uav.survivors, uav.identities)
+
+
+def pass_by(uav: Uav, survivors: Iterable[int], *, second: int, sees: Iterable[Enu] = ()) -> None:
+    """The UAV hears both phones while it flies over them."""
+    for step in range(10):
+        at = Enu(4.0 * second - 10, -135 + 30 * step, UP_M)
+        for survivor in survivors:
+            uav.hear(survivor, 1, at, mean_dbm(Enu(57.0 * (survivor == 1), 0, 0), at), now_ns=second * S)
+            uav.hear(
+                survivor,
+                2,
+                at._replace(east=at.east + 120),
+                mean_dbm(Enu(57.0 * (survivor == 1), 0, 0), at._replace(east=at.east + 120)),
+            )
+        uav.see(*sees, now_ns=second * S)
+
+
+def test_a_confirmation_is_contradicted_by_what_is_heard_and_seen_later() -> None:
+    uav, contradictions = mistaken()
+    assert contradictions.review() == [], "what was heard before it does not tell"
+    refuted = []
+    for second in (10, 20, 30):
+        pass_by(uav, (1, 2), second=second, sees=(Enu(0, 0, 0), Enu(57, 0, 0)))
+        for survivor in contradictions.review():
+            found = uav.survivors.by_id[survivor].confirmed
+            assert found is not None
+            uav.survivors.on_found(found._replace(t_us=second * S // US, standing=Standing.REFUTED), now_ns=second * S)
+            refuted.append(survivor)
+    assert set(refuted) == {1, 2}, "the second had been taken for the first in turn"
+    for second in range(30, 40):
+        uav.see(Enu(0, 0, 0), Enu(57, 0, 0), now_ns=second * S)
+    assert {survivor: round(place.east) for survivor, place in uav.named.items()} == {1: 57, 2: 0}
+
+
+def test_a_right_confirmation_is_not_contradicted() -> None:
+    uav, contradictions = mistaken()
+    uav.survivors.by_id[1].confirmed = None
+    contradictions.review()
+    uav.survivors.on_found(Found(2 * S // US, 1, 57.0, 0.0, 4.0, 0.0, 4.0, 9, Standing.CONFIRMED), now_ns=S)
+    contradictions.review()
+    pass_by(uav, (1, 2), second=10, sees=(Enu(0, 0, 0), Enu(57, 0, 0)))
+    assert contradictions.review() == []

@@ -32,6 +32,8 @@ class Setpoints:
             setpoint = setpoint._replace(kind=SetpointKind.LAND)
         elif course.take_off:
             setpoint = setpoint._replace(kind=SetpointKind.TAKEOFF)
+        elif course.go_home:
+            setpoint = setpoint._replace(kind=SetpointKind.RETURN)
         self._last = setpoint
         return setpoint
 

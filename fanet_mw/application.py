@@ -37,14 +37,15 @@ class Course(NamedTuple):
     position: Enu
     """The place to fly to [m]."""
     speed_m_s: float
-    """The speed on the way there."""
+    """The speed on the way."""
     velocity: Enu | None = None
     """If given, the UAV flies at this velocity until the next command; `position` is then a point on that way."""
     land: bool = False
-    """True: the UAV sinks straight down from where it is, at the speed of the course, and stops its motors on the
-    ground."""
+    """True: the UAV lands where it is, at the speed of the course."""
     take_off: bool = False
-    """True: the UAV climbs straight up to the height of `position`, at the speed of the course, and stays there."""
+    """True: the UAV climbs straight up to the height of `position` and stays there."""
+    go_home: bool = False
+    """True: the UAV flies to its start, and lands there (`SetpointKind.RETURN`)."""
 
 
 class Received(NamedTuple):

@@ -98,6 +98,9 @@ class SetpointKind(IntEnum):
     """Climb straight up to the height of `position` at `speed_m_s` and hold there."""
     LAND = 4
     """Sink straight down at `speed_m_s`, and stop the motors on the ground."""
+    RETURN = 5
+    """Climb to the height of its return, fly to where it started at `speed_m_s` (0 or less: the cruising speed), and
+    land there; a UAV that stands on the ground stays there."""
 
 
 VELOCITY_LASTS_NS: Final = 1 * S

@@ -1,4 +1,4 @@
-"""A flight controller brings a UAV home whose computer has died; the others search on: a run in virtual time."""
+"""Flight controllers bring UAVs home whose computers have died; the others search on: runs in virtual time."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -13,7 +13,7 @@ from fanet_mw.trace import Collided, FlightModeChanged, Planned, Posed
 from fanet_mw.units import S
 from sim.run.virtual import simulate
 
-DIES, DIES_S = 2, 45
+DIES_S = 45
 KEYS = {
     "nodes.count": 6, "nodes.on_ground": True, "nodes.spacing_m": 15, "nodes.altitude_m": 40, "duration_s": 135,
     "warmup_s": 1, "drain_s": 1, "mission.survivors": 1, "mission.search": "spiral", "mobility.model": "onboard",
@@ -48,28 +48,31 @@ class Mortal(Actor):
         return self._actor.report()
 
 
+@pytest.mark.parametrize("die", [(2,), (2, 3)])
 def test_who_loses_its_computer_flies_home_by_itself_and_the_others_search_on(
-    make_scenario: Callable[..., Scenario], monkeypatch: pytest.MonkeyPatch
+    make_scenario: Callable[..., Scenario], monkeypatch: pytest.MonkeyPatch, die: tuple[int, ...]
 ) -> None:
     healthy = sim.run.virtual.actors_of
 
     def actors_of(*args: Any, **named: Any) -> list[Actor]:
         of_swarm = healthy(*args, **named)
-        return [Mortal(a, dies_ns=DIES_S * S) if a.name == f"agent-{DIES}" else a for a in of_swarm]
+        mortals = {f"agent-{node}" for node in die}
+        return [Mortal(a, dies_ns=DIES_S * S) if a.name in mortals else a for a in of_swarm]
 
     monkeypatch.setattr(sim.run.virtual, "actors_of", actors_of)
     records = simulate(make_scenario(**KEYS)).records
 
     modes = [(r.node, r.mode, r.t_ns / S) for r in records if isinstance(r, FlightModeChanged)]
-    (_, failsafe, _), (_, last, returns_s) = [mode for mode in modes if mode[0] == DIES][-2:]
-    assert (failsafe, last) == ("failsafe", "return")
-    assert returns_s == pytest.approx(DIES_S + 5, abs=1.2), "5 s after its last setpoint"
-    assert [node for node, mode, _ in modes if mode == "return"] == [DIES], "who hovers until the plan is not silent"
-    posed = [r for r in records if isinstance(r, Posed) and r.node == DIES]
-    pad, end = posed[0], posed[-1]
-    assert (end.east_m, end.north_m, end.up_m) == pytest.approx((pad.east_m, pad.north_m, 0.0), abs=2.0)
-    dies_at = next(r for r in posed if r.t_ns >= DIES_S * S)
-    assert abs(dies_at.east_m - pad.east_m) > 50, "it was on its way"
-    assert max(r.up_m for r in posed) == pytest.approx(70, abs=2)
+    assert {node for node, mode, _ in modes if mode == "return"} == {*die}, "who hovers until the plan is not silent"
+    for node in die:
+        (_, failsafe, _), (_, last, returns_s) = [mode for mode in modes if mode[0] == node][-2:]
+        assert (failsafe, last) == ("failsafe", "return")
+        assert returns_s == pytest.approx(DIES_S + 5, abs=1.2), "5 s after its last setpoint"
+        posed = [r for r in records if isinstance(r, Posed) and r.node == node]
+        pad, end = posed[0], posed[-1]
+        assert (end.east_m, end.north_m, end.up_m) == pytest.approx((pad.east_m, pad.north_m, 0.0), abs=2.0)
+        dies_at = next(r for r in posed if r.t_ns >= DIES_S * S)
+        assert abs(dies_at.east_m - pad.east_m) > 50, "it was on its way"
+        assert max(r.up_m for r in posed) == pytest.approx(70 + 3 * (node - 1), abs=1), "a height of its own"
     assert not [r for r in records if isinstance(r, Collided)]
-    assert {r.revision for r in records if isinstance(r, Planned)} >= {1, 2}, "the others plan without it"
+    assert {r.revision for r in records if isinstance(r, Planned)} >= {1, 2}, "the others plan without them"

@@ -35,8 +35,11 @@ class Mobility(Section):
     `speed_m_s`, and lands; the next setpoint takes over from it. Computers repeat their last setpoint three times as
     often. 0: it holds its position."""
     return_height_m: Annotated[float, Field(ge=5, le=1000)] = 100.0
-    """The height above the ground at its start at which a UAV returns; one that is higher stays as high. It should
-    clear every obstacle."""
+    """The least height at which a UAV returns, above the ground at the highest start of all UAVs; none sinks on its
+    way. It should clear every obstacle."""
+    return_step_m: Annotated[float, Field(ge=0, le=100)] = 3.0
+    """UAV 1 returns at `return_height_m`, and each other one this much higher than the one with the next lower id, so
+    that UAVs that return at once do not meet on their ways. 0: all return at the same height."""
     geofence: Literal["brake", "return"] = "brake"
     """`onboard`: what becomes of a UAV whose velocity setpoints take it to the geofence, 50 m outside the area: it
     brakes before it, or it returns as soon as it is beyond, and obeys no setpoint until it has landed."""

@@ -16,7 +16,7 @@ FENCE_M: Final = 50.0
 """The distance of the geofence from the area; a UAV with a velocity setpoint brakes before it reaches the geofence."""
 FLOOR_M: Final = 5.0
 """A position or take-off setpoint below this height is raised to it."""
-_CEILING_M: Final = 1000.0
+CEILING_M: Final = 1000.0
 """A position above this height is lowered to it."""
 BRAKE_M_S2: Final = 2.5
 """The deceleration with which braking is planned: half of what a UAV can do, because it reacts with a lag."""
@@ -35,7 +35,7 @@ class Geofence:
         return Enu(
             max(-self._half_east_m, min(self._half_east_m, place.east)),
             max(-self._half_north_m, min(self._half_north_m, place.north)),
-            max(FLOOR_M, min(_CEILING_M, place.up)),
+            max(FLOOR_M, min(CEILING_M, place.up)),
         )
 
     def beyond(self, at: Rows) -> Flags:

@@ -4,8 +4,8 @@ A UAV follows a moving place by a proportional controller, to which the velocity
 If the scenario says so, the world keeps UAVs apart (`separation_keeping.py`).
 
 Whatever a flight controller is asked to do, it holds its position when velocity setpoints are no longer renewed, brakes
-before the geofence or returns from it (`geofence.py`), and lands at once when its battery is nearly empty. If the
-scenario says so, it also returns when its computer falls silent (`return_mode.py`).
+before the geofence or returns from it (`geofence.py`), and lands at once when its battery is nearly empty. It returns
+when it is asked to, and if the scenario says so also when its computer falls silent (`return_mode.py`).
 """
 
 from collections.abc import Callable, Mapping
@@ -53,7 +53,8 @@ class FlightMode(StrEnum):
     TAKEOFF = "takeoff"
     LAND = "land"
     RETURN = "return"
-    """The UAV flies home and lands, because its computer has fallen silent or because it was beyond the geofence."""
+    """The UAV flies home and lands: its computer has commanded it or has fallen silent, or it was beyond the
+    geofence."""
     FAILSAFE = "failsafe"
     """The UAV holds its position because velocity setpoints are no longer renewed, or lands because its battery is
     nearly empty."""
@@ -143,6 +144,8 @@ class Guidance:
             return
         self._returns.on_setpoint(row, t_s)
         kind, place, speed_m_s = setpoint.kind, setpoint.position, setpoint.speed_m_s
+        if kind is SetpointKind.RETURN and self._stands(row, here):
+            return
         if kind is not SetpointKind.LAND and isinstance(self._commands.get(row), _Land):
             self._grounded.add(row)  # a UAV that was landing may stand on the ground until it has climbed
         if kind is SetpointKind.POSITION:
@@ -165,6 +168,9 @@ class Guidance:
         elif kind is SetpointKind.LAND:
             self._command(row, _Land(max(_TOUCHDOWN_M_S, speed_m_s)))
             self._enter(row, FlightMode.LAND)
+        elif kind is SetpointKind.RETURN:
+            self._command(row, self._returns.way(row, here, speed_m_s))
+            self._enter(row, FlightMode.RETURN)
         else:
             assert_never(kind)
 
@@ -211,6 +217,11 @@ class Guidance:
         landing = [row for row, command in self._commands.items() if isinstance(command, _Land)]
         off[[*landing, *self._waiting()]] = True
         return np.asarray(off & (at[:, 2] - self._ground_m(at) <= _ON_GROUND_M))
+
+    def _stands(self, row: int, here: Enu) -> bool:
+        """True if the UAV of a row, which is at a place, stands on the ground with its motors off."""
+        off = isinstance(self._commands.get(row), _Land) or row in self._waiting()
+        return off and here.up - float(self._ground_m(np.array([here]))[0]) <= _ON_GROUND_M
 
     def _waiting(self) -> list[int]:
         """The rows that stand on the ground and have no command to take off."""

@@ -1,13 +1,15 @@
 """The return mode of the flight controllers, which needs no computer on board: when a UAV returns, and its way home.
 
-    lower than the height of return    it climbs straight up where it is
-    high enough                        it flies straight to its home, as high as it is
-    above its home                     it lands
+    lower than the height of its return    it climbs straight up where it is
+    high enough                            it flies straight to its home, as high as it is
+    above its home                         it lands
 
-A UAV returns when its last setpoint is older than `mobility.return_after_s` while it flies, and is steered again by the
-next setpoint; with `mobility.geofence = "return"` also when it is beyond the geofence, and then it obeys nothing before
-it stands on the ground. A flight controller does not know where other UAVs are: returns are not kept clear of each
-other.
+A UAV returns when its computer commands it. It also returns when its last setpoint is older than
+`mobility.return_after_s` while it flies; in both cases the next setpoint takes over. With `mobility.geofence =
+"return"` it returns when it is beyond the geofence, and then it obeys nothing before it stands on the ground.
+
+A flight controller does not know where other UAVs are. Therefore each has heights of its own, `mobility.return_step_m`
+apart (`_Heights`), so that UAVs that return at once fly above each other. Those that climb or land are not kept clear.
 """
 
 import math
@@ -17,18 +19,19 @@ from typing import Final, NamedTuple
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu
 from sim.world.engines.contract import Flags, Rows, Values
+from sim.world.mobility.geofence import CEILING_M
 
 _HOME_M: Final = 2.0
 """A UAV lands once it is within this horizontal distance of its home."""
-_BELOW_M: Final = 2.0
-"""A UAV that is no farther than this below the height of return flies on its way; it climbs the rest there."""
+_BELOW_M: Final = 0.5
+"""A UAV that is no farther than this below the height of its return flies on its way; it climbs the rest there."""
 
 
 class Homeward(NamedTuple):
     """The command to return."""
 
     home: Enu
-    """The place above the home of the UAV, at the height of return or that from which the UAV returns."""
+    """The place above the home of the UAV, at the height of its return."""
     speed_m_s: float
 
     def goal(self, here: Enu) -> Enu | None:
@@ -38,8 +41,31 @@ class Homeward(NamedTuple):
         return here._replace(up=self.home.up) if here.up < self.home.up - _BELOW_M else self.home
 
 
+class _Heights:
+    """The heights above the highest home at which the UAVs of a swarm return, such that no two share one.
+
+    Row k has the height k steps above `mobility.return_height_m`. A UAV that is higher takes the next height of its
+    own, which is higher by as many steps as there are UAVs, because it never sinks before it is home. If a swarm is too
+    large for steps below the ceiling, UAVs share heights.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        mobility = scenario.mobility
+        self._least_m, self._step_m = mobility.return_height_m, mobility.return_step_m
+        fitting = 1 + int((CEILING_M - self._least_m) / self._step_m) if self._step_m else 1
+        self._levels = min(scenario.nodes.count, fitting)
+
+    def of(self, row: int, height_m: float) -> float:
+        """The height at which a UAV returns that is this high now."""
+        own_m = self._least_m + self._step_m * (row % self._levels)
+        every_m = self._step_m * self._levels
+        if height_m <= own_m + _BELOW_M:
+            return own_m
+        return own_m + math.ceil((height_m - _BELOW_M - own_m) / every_m) * every_m if every_m else height_m
+
+
 class ReturnMode:
-    """Which UAVs of a swarm have to return."""
+    """Which UAVs of a swarm have to return, and how."""
 
     def __init__(self, starts: Rows, scenario: Scenario, *, ground_m: Callable[[Rows], Values]) -> None:
         """`starts`: the homes of the UAVs, at any height. `ground_m`: the height of the ground below places."""
@@ -48,7 +74,9 @@ class ReturnMode:
         self._speed_m_s = mobility.speed_m_s
         self.at_fence: Final = mobility.geofence == "return"
         self._homes = starts.copy()
-        self._homes[:, 2] = ground_m(starts) + mobility.return_height_m
+        self._homes[:, 2] = ground_m(starts).max()
+        """The homes of the UAVs, each as high as the ground at the highest of them."""
+        self._heights = _Heights(scenario)
         self._told_s: dict[int, float] = {}
         """The instant of the last setpoint of each row that has had one, or at which it last stood on the ground."""
         self.from_fence: set[int] = set()
@@ -63,6 +91,12 @@ class ReturnMode:
         """The computer of a UAV has commanded something."""
         self._told_s[row] = t_s
 
+    def way(self, row: int, here: Enu, speed_m_s: float = 0.0) -> Homeward:
+        """The way home of a UAV that is at a place; a speed of 0 or less means that of the scenario."""
+        east, north, ground_m = self._homes[row].tolist()
+        height_m = self._heights.of(row, here.up - ground_m)
+        return Homeward(Enu(east, north, ground_m + height_m), speed_m_s if speed_m_s > 0 else self._speed_m_s)
+
     def due(self, able: Collection[int], at: Rows, beyond: Flags, t_s: float) -> Iterator[tuple[int, Homeward]]:
         """Those UAVs of the rows `able` that have to return now, each with its way. The silence of a UAV that is not
         able to, because it stands on the ground, begins when it is.
@@ -74,5 +108,4 @@ class ReturnMode:
             if fenced:
                 self.from_fence.add(row)
             if silent or fenced:
-                home = Enu(*self._homes[row].tolist())
-                yield row, Homeward(home._replace(up=max(home.up, float(at[row, 2]))), self._speed_m_s)
+                yield row, self.way(row, Enu(*at[row].tolist()))

@@ -35,3 +35,15 @@ def test_a_velocity_is_not_repeated_and_without_the_key_nothing_is(make_scenario
     silent = made(make_scenario, return_after_s=0)
     silent.of(Course(PLACE, 2.0), 0)
     assert silent.repeated(60 * S) is None
+
+
+def test_each_course_is_a_setpoint_of_its_kind(make_scenario: MakeScenario) -> None:
+    setpoints = made(make_scenario, return_after_s=0)
+    courses = {
+        SetpointKind.POSITION: Course(PLACE, 2.0),
+        SetpointKind.VELOCITY: Course(PLACE, 2.0, Enu(1.0, 0.0, 0.0)),
+        SetpointKind.TAKEOFF: Course(PLACE, 2.0, take_off=True),
+        SetpointKind.LAND: Course(PLACE, 2.0, land=True),
+        SetpointKind.RETURN: Course(PLACE, 2.0, go_home=True),
+    }
+    assert [setpoints.of(course, 0).kind for course in courses.values()] == [*courses]

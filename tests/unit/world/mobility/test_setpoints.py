@@ -254,12 +254,71 @@ def test_a_uav_whose_computer_falls_silent_climbs_flies_home_and_lands(
     assert flying.collisions == []
 
 
-def test_who_flies_above_the_height_of_return_stays_as_high_on_its_way(make_scenario: MakeScenario) -> None:
-    flying = Flying(make_scenario, **RETURN)
-    flying.ask(1, SetpointKind.POSITION, Enu(-50.0, 60.0, 90.0), speed_m_s=20.0)
-    flying.fly(15)
-    assert 85 < flying.at(1)[2] < 93
+@pytest.mark.parametrize(("step_m", "height_m"), [(0.0, 90), (3.0, 94)])
+def test_who_flies_above_the_height_of_its_return_does_not_sink_on_its_way(
+    make_scenario: MakeScenario, step_m: float, height_m: float
+) -> None:
+    """The heights of the first of two UAVs are 70, 76, 82, ..., and those of the second one lie between them."""
+    flying = Flying(make_scenario, **RETURN, **{"mobility.return_step_m": step_m})
+    for _ in range(4):
+        flying.ask(1, SetpointKind.POSITION, Enu(-50.0, 100.0, 90.0), speed_m_s=20.0)
+        flying.fly(4)
+    flying.fly(9)
+    assert flying.at(1)[2] == pytest.approx(height_m, abs=1)
+    assert 2 < flying.at(1)[1] < 90, "it is on its way"
     assert (1, "return") in flying.modes
+
+
+def test_a_setpoint_commands_the_return_and_another_one_ends_it(make_scenario: MakeScenario) -> None:
+    flying = Flying(make_scenario, **{"mobility.return_height_m": 70.0})
+    flying.ask(1, SetpointKind.POSITION, Enu(-50.0, 100.0, 50.0), speed_m_s=20.0)
+    flying.fly(10)
+    flying.ask(1, SetpointKind.RETURN, speed_m_s=10.0)
+    flying.fly(9)
+    assert flying.at(1)[2] == pytest.approx(70, abs=1)
+    assert flying.velocity(1)[1] == pytest.approx(-10, abs=0.2), "the speed of the setpoint"
+    flying.ask(1, SetpointKind.HOLD)
+    flying.fly(5)
+    flying.ask(1, SetpointKind.RETURN, speed_m_s=0.0)
+    flying.fly(3)
+    assert flying.velocity(1)[1] == pytest.approx(-7.5, abs=0.2), "the cruising speed"
+    for _ in range(30):  # a computer repeats it, also when the UAV lands and has landed
+        flying.ask(1, SetpointKind.RETURN, speed_m_s=0.0)
+        flying.fly(2)
+    assert flying.at(1) == pytest.approx([-50, 0, 0.1], abs=2.0)
+    assert flying.modes == [(1, "goto"), (1, "return"), (1, "hold"), (1, "return")]
+    assert flying.collisions == []
+
+
+def test_who_stands_on_its_pad_ignores_the_command_to_return(make_scenario: MakeScenario) -> None:
+    flying = Flying(make_scenario, **{"nodes.on_ground": True})
+    flying.ask(1, SetpointKind.RETURN)
+    flying.fly(10)
+    assert flying.at(1)[2] < 0.35
+    assert flying.modes == []
+
+
+@pytest.mark.parametrize("engine", ["kinematic", pytest.param("rotors", marks=pytest.mark.slow)])
+def test_uavs_whose_computers_fall_silent_at_once_fly_home_across_each_other_without_a_contact(
+    make_scenario: MakeScenario, engine: str
+) -> None:
+    """Nine UAVs are each where the home of the opposite one is, so that all ways home meet in the middle at once."""
+    flying = Flying(make_scenario, **RETURN, **{"nodes.count": 9, "world.engine": engine})
+    flying.fly(1)
+    homes = {node: flying.at(node) for node in range(1, 10)}
+    for side, height_m, seconds in ((1, 15.0, 12), (-1, 15.0, 30), (-1, 0.0, 24)):  # up, across, and down again
+        for _ in range(seconds // 3):
+            for node, home in homes.items():
+                place = Enu(side * float(home[0]), side * float(home[1]), 30 + height_m * node)
+                flying.ask(node, SetpointKind.POSITION, place, speed_m_s=20.0)
+            flying.fly(3)
+    assert not flying.collisions
+    flying.fly(150)
+    assert flying.collisions == []
+    returns = [node for node, mode in flying.modes if mode == "return"]
+    assert sorted(returns) == list(homes)
+    for node, home in homes.items():
+        assert flying.at(node) == pytest.approx([home[0], home[1], 0.1], abs=2.0)
 
 
 def test_a_computer_that_speaks_again_takes_over_from_a_return(make_scenario: MakeScenario) -> None:

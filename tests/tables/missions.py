@@ -221,14 +221,20 @@ CLEAR_HEAD: Final = [
 
 
 def clear_row(name: str, runs: Sequence[Run]) -> list[str]:
-    """One line of the table of distances."""
+    """One line of the table of distances.
+
+    Where the world watches no distances (`mission.collision_distance_m`), the least one is that at whole seconds, and
+    nobody counts how often UAVs were nearer than that.
+    """
+    watched = all(found["losses"] is not None for found in runs)
+    least_m = [found["least_m"] if watched else found["nearest_m"]["least"] for found in runs]
     near = np.mean([found["near"] for found in runs], axis=0)
     return [
         name,
         str(len(runs)),
         f"{sum(found['collisions'] - found['solid'] for found in runs)} / {sum(found['solid'] for found in runs)}",
-        f"{sum(found['losses'] for found in runs)}",
-        f"{min(found['least_m'] for found in runs):.1f}",
+        f"{sum(found['losses'] for found in runs)}" if watched else "-",
+        f"{min(least_m):.1f}",
         f"{statistics.fmean(found['nearest_m']['p1'] for found in runs):.0f} / "
         f"{statistics.fmean(found['nearest_m']['p50'] for found in runs):.0f}",
         *(f"{100 * share:.2f}" for share in near),

@@ -91,7 +91,10 @@ TABLES: Final[Mapping[str, Table]] = {
         "results/small-rescues.md", small_rescues.engines, Tolerance(absolute=0.05, relative=0.05), ("times real time",)
     ),
     "senses": Table("results/small-rescues.md", small_rescues.senses, Tolerance(absolute=0.05, relative=0.05)),
-    "keeping-clear": Table("results/missions.md", missions.keeping_clear, Tolerance(absolute=0.05, relative=0.02)),
+    "keeping-clear": Table("results/keeping-clear.md", missions.keeping_clear, Tolerance(absolute=0.05, relative=0.02)),
+    "keeping-clear-rescue": Table(
+        "results/keeping-clear.md", missions.keeping_clear_rescue, Tolerance(absolute=0.05, relative=0.02)
+    ),
     "rescue-paper": Table(
         "results/rescue-paper.md", paper_rescue.paper_rescues, Tolerance(absolute=0.05, relative=0.02)
     ),

@@ -1,6 +1,6 @@
 """Reports to the applications of a node what has become of their messages.
 
-    a packet is released, or dropped in this node    ->  `Node.fates`, for packets that are watched
+    a packet is announced, transmitted or dropped    ->  `Node.watch`, for packets that are watched
     a message is acknowledged, or has expired        ->  `Sender.told`
 
 Each application is told of the fates that it names in `follows`. It is told after the input that caused them was
@@ -15,12 +15,18 @@ from fanet_mw.delivery.sender import EXPIRED, Told
 from fanet_mw.errors import DropReason
 from fanet_mw.node.header_check import CONTROL
 from fanet_mw.node.node import Node
+from fanet_mw.node.packet_watch import PacketNews, RadioStage
 from fanet_mw.units import seconds_to_ns
 from fanet_mw.wire.message import DELIVERED, NO_LISTENER
 
 _MOST_WATCHED: Final = 8192
 """The greatest number of packets whose application is remembered."""
 _OUTCOMES: Final = {EXPIRED: Fate.EXPIRED, DELIVERED: Fate.ACKNOWLEDGED, NO_LISTENER: Fate.UNWANTED}
+_STAGES: Final = {
+    RadioStage.ANNOUNCED: Fate.LET_OUT,
+    RadioStage.SENT: Fate.SENT,
+    RadioStage.NOT_TRIED: Fate.TURNED_AWAY,
+}
 _REASONS: Final = {DropReason.ADMISSION: Fate.REFUSED, DropReason.EXPIRED: Fate.EXPIRED}
 """The fates of packets that are dropped for these reasons; for all other reasons it is DROPPED."""
 
@@ -72,14 +78,14 @@ class Statuses:
 
     def _unwatch(self, seq: int) -> None:
         del self._watched[seq]
-        self._node.watched.discard(seq)
+        self._node.watch.end(seq)
 
     def take(self, told: list[Told], now_ns: int) -> list[tuple[Application, Status]]:
         """The statuses to report now. `told` is the news of the sender; both lists of news are emptied."""
-        if self._node.fates:
-            for seq, t_ns, reason in self._node.fates:
-                self._packet_fate(seq, t_ns, reason)
-            self._node.fates.clear()
+        if self._node.watch.news:
+            for news in self._node.watch.news:
+                self._packet_fate(news)
+            self._node.watch.news.clear()
         for number, outcome, targets, last in told:
             owner = self._owners.get(number)
             if owner is None:
@@ -93,16 +99,17 @@ class Statuses:
         self.waiting.clear()
         return found
 
-    def _packet_fate(self, seq: int, t_ns: int, reason: DropReason | None) -> None:
-        """The node has released a packet, or dropped it."""
+    def _packet_fate(self, news: PacketNews) -> None:
+        """The radio has come further with a packet, or the node has dropped it."""
+        seq, t_ns, reason = news
         watched = self._watched.get(seq)
         if watched is None:
             return
         application, handle, first, confirmed = watched
-        if reason is None:
+        if isinstance(reason, RadioStage):
             # a confirmed message without an owner is finished, and no application waits for its status
             if first and (not confirmed or handle in self._owners):
-                self.tell(application, Status(handle, Fate.LET_OUT, t_ns))
+                self.tell(application, Status(handle, _STAGES[reason], t_ns))
             return
         self._unwatch(seq)
         if confirmed:

@@ -34,6 +34,12 @@ from fanet_mw.wire.message import (
 )
 
 _RECEIPT_APP: Final = "receipt"
+_RADIO_FATES: Final = frozenset((Fate.SENT, Fate.TURNED_AWAY))
+
+
+def _follows_radio(application: Application) -> bool:
+    """True if the radio must report on the application's packets; each report costs a message on the bus."""
+    return not _RADIO_FATES.isdisjoint(application.follows)
 
 
 class Messenger:
@@ -131,7 +137,7 @@ class Messenger:
     ) -> int:
         seq = self._node.send(
             frames, destination=to, priority=priority, app=application.name, born_ns=born_ns, now_ns=now_ns,
-            watch=bool(application.follows),
+            watch=bool(application.follows), watch_radio=_follows_radio(application),
         )  # fmt: skip
         if application.follows:
             self._statuses.tell(application, Status(seq, Fate.ADMITTED, now_ns))
@@ -144,7 +150,7 @@ class Messenger:
         watched = packet.first or not confirmed
         seq = self._node.send(
             packet.inner, destination=packet.destination, priority=packet.priority, app=application.name,
-            born_ns=born_ns, now_ns=now_ns, watch=watched,
+            born_ns=born_ns, now_ns=now_ns, watch=watched, watch_radio=packet.first and _follows_radio(application),
         )  # fmt: skip
         if watched:
             self._statuses.watch(seq, application, packet.number, first=packet.first, confirmed=confirmed)
@@ -176,7 +182,7 @@ class Messenger:
 
     def has_news(self) -> bool:
         """True if there is a message to hand over, or news of a message that was sent."""
-        return bool(self._receiver.arrived or self._sender.told or self._statuses.waiting or self._node.fates)
+        return bool(self._receiver.arrived or self._sender.told or self._statuses.waiting or self._node.watch.news)
 
     def arrived(self) -> list[tuple[Application, Received]]:
         """The messages to hand over now, each with an application that listens to it."""
@@ -204,7 +210,7 @@ class Messenger:
                 )
 
     def next_wake_ns(self) -> int | None:
-        if self._sender.told or self._statuses.waiting or self._node.fates:
+        if self._sender.told or self._statuses.waiting or self._node.watch.news:
             return 0  # at once
         send_ns, receive_ns = self._sender.next_wake_ns(), self._receiver.next_wake_ns()
         return send_ns if receive_ns is None or (send_ns is not None and send_ns < receive_ns) else receive_ns

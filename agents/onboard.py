@@ -15,8 +15,8 @@ from agents.listeners import Callbacks, Listeners
 from agents.messenger import Messenger
 from agents.submission import Sending, Submission, positive, priority_of
 from fanet_mw import wire
-from fanet_mw.application import Application, Course, Destination, Fate, Received, Status
-from fanet_mw.bus.messages import Gps, SensorReading, TxStatus
+from fanet_mw.application import Application, Course, Destination, Received
+from fanet_mw.bus.messages import Gps, SensorReading
 from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
 from fanet_mw.node.node import Node
 from fanet_mw.node.packet import Packet
@@ -25,7 +25,6 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record
 from fanet_mw.units import BROADCAST, US, Enu, NodeId
 
-_RADIO_FATES: Final = frozenset((Fate.SENT, Fate.TURNED_AWAY))
 _OF_MESSENGER: Final = {
     wire.MESSAGE.msgid: lambda messenger: messenger.piece,
     wire.TARGETS.msgid: lambda messenger: messenger.piece,
@@ -63,9 +62,6 @@ class Onboard:
         node.listened = self._listeners.wanted(also=_OF_MESSENGER)
         self._messenger = Messenger(node, self._listeners)
         self.arbitration = CourseArbitration(applications, self._callbacks.permits, fly)
-        self._with_radio: dict[int, tuple[Application, int]] = {}
-        """The application that has sent a packet, and its handle, by the transmit request of the
-        packet's first frame."""
 
     @property
     def hears_hellos(self) -> bool:
@@ -134,17 +130,6 @@ class Onboard:
         for application in self._callbacks.on_sensor:
             application.on_sensor(reading, now_ns)
 
-    def radio_done(self, status: TxStatus, now_ns: int) -> None:
-        """The radio has finished with the first frame of a packet: tell the application that has sent it."""
-        found = self._with_radio.pop(status.seq, None)
-        if found is None:
-            return
-        self._call(now_ns)
-        application, handle = found
-        fate = Fate.SENT if status.attempts else Fate.TURNED_AWAY
-        if fate in application.follows:
-            application.on_status(Status(handle, fate, now_ns), now_ns)
-
     def hello_frames(self, now_ns: int) -> bytes:
         """The inner frames that applications add to the next hello."""
         return b"".join(application.hello_frames(now_ns) for application in self._callbacks.hello_frames)
@@ -173,14 +158,11 @@ class Onboard:
     # --- output ---------------------------------------------------------------------------------------------------
 
     def send(self, application: Application, submission: Submission) -> int:
-        requests = self.node.frames_sent
-        handle = self._messenger.send(application, submission, now_ns=self.now_ns)
-        if self.node.frames_sent > requests and not _RADIO_FATES.isdisjoint(application.follows):
-            self._with_radio[requests] = application, handle
-        return handle
+        return self._messenger.send(application, submission, now_ns=self.now_ns)
 
     def settle(self, now_ns: int) -> None:
         """Hand over complete messages, report on sent ones, and fly the commanded course."""
+        self._call(now_ns)  # news of the node alone may have led here, and an application that hears them may send
         if self._messenger.has_news():  # most inputs bring none
             for application, message in self._messenger.arrived():
                 self._guard(application.on_message, message, now_ns)

@@ -128,7 +128,6 @@ class Uav(Actor):
             return not self._settle(now_ns) and node.timeless
         if isinstance(message, TxStatus):
             self._node.on_status(message, now_ns=now_ns)
-            self._onboard.radio_done(message, now_ns)
         elif isinstance(message, Gps):
             self._reckoning.fix(message)
             self._fix(message, now_ns)
@@ -215,7 +214,7 @@ class Uav(Actor):
             for packet in deliveries:
                 onboard.deliver(packet, now_ns)
         called = onboard.called
-        if called or node.fates:
+        if called or node.watch.news:
             called = True
             onboard.settle(now_ns)
             onboard.called = False

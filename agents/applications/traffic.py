@@ -17,7 +17,9 @@ from fanet_mw.units import BROADCAST, MS, US, NodeId, S, seconds_to_ns
 from fanet_mw.wire import PRIORITIES
 
 _REFUSED_NS: Final = MS
-"""A saturated source whose packet the radio has refused waits this long before it offers the next one."""
+"""A saturated source whose packet was not sent waits this long before it offers the next one."""
+_ENDS: Final = frozenset((Fate.SENT, Fate.TURNED_AWAY, Fate.REFUSED, Fate.EXPIRED, Fate.DROPPED))
+"""The fates after which a saturated source offers its next packet."""
 
 
 def sources_of(scenario: Scenario, name: str | None = None) -> Sequence[int]:
@@ -165,7 +167,7 @@ class TrafficGenerator:
     def on_ended(self, *, refused: bool, now_ns: int) -> bool:
         """A packet of a saturated source was transmitted or given up; returns True if the next one follows at once.
 
-        If the radio has refused it, the next one follows a moment later, at `next_ns`.
+        If it was not transmitted, the next one follows a moment later, at `next_ns`.
         """
         if now_ns >= self._end_ns:
             return False
@@ -190,7 +192,9 @@ class Load(Application):
         self._deadline_ns = None if traffic.deadline_s is None or first else seconds_to_ns(traffic.deadline_s)
         """The deadline of each packet. For the first class it is None, because the protocol's admission control
         enforces it."""
-        self.follows = (Fate.SENT, Fate.TURNED_AWAY) if self._traffic.saturated else ()
+        self.follows = _ENDS if self._traffic.saturated else ()
+        self._queued: set[int] = set()
+        """The packets of a saturated source that have not ended yet, by handle."""
         self._generated = 0
 
     def start(self, port: AppPort, now_ns: int) -> None:
@@ -209,8 +213,11 @@ class Load(Application):
         return self._traffic.next_ns()
 
     def on_status(self, status: Status, now_ns: int) -> None:
-        """A packet of a saturated source was transmitted or given up."""
-        if self._traffic.on_ended(refused=status.fate is Fate.TURNED_AWAY, now_ns=now_ns):
+        """A packet of a saturated source was transmitted or given up; what comes of it later does not count again."""
+        if status.handle not in self._queued:
+            return
+        self._queued.discard(status.handle)
+        if self._traffic.on_ended(refused=status.fate is not Fate.SENT, now_ns=now_ns):
             self._send(now_ns)
 
     def report(self) -> Mapping[str, Any]:
@@ -219,10 +226,12 @@ class Load(Application):
     def _send(self, born_ns: int) -> None:
         self._generated += 1
         filler = wire.filler(self._traffic.next_bytes - wire.HEADER_BYTES, node=self._node)
-        self.port.send(
+        handle = self.port.send(
             filler,
             destination=self._destination,
             priority=self._priority,
             deadline_ns=self._deadline_ns,
             born_ns=born_ns,
         )
+        if self._traffic.saturated:
+            self._queued.add(handle)

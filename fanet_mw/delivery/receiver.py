@@ -1,8 +1,8 @@
 """The receiving side of delivery: it puts pieces together, hands each message over once, and answers with receipts.
 
-A confirmed message waits for the message before it in its flow. The memory for incomplete and waiting messages is
-bounded, per sender and in all. What does not fit is not accepted; its sender gets no receipt, and sends it again. The
-caller counts pieces that contradict each other as malformed.
+A confirmed message waits for the message before it in its flow, even if nobody listens to that one. The memory for
+incomplete and waiting messages is bounded, per sender and in all. What does not fit is not accepted; its sender gets no
+receipt, and sends it again. The caller counts pieces that contradict each other as malformed.
 """
 
 from collections.abc import Callable
@@ -47,6 +47,8 @@ class _Incoming:
 
     head: Head
     until_ns: int
+    wanted: bool = True
+    """False for a message to which nobody listens: it is passed over when its turn in its flow has come."""
     pieces: dict[int, bytes] = field(default_factory=dict)
     frame: bytes = b""
 
@@ -60,7 +62,7 @@ class _Incoming:
 
     @property
     def whole(self) -> bool:
-        return len(self.pieces) == self.head.pieces
+        return not self.wanted or len(self.pieces) == self.head.pieces
 
 
 class Receiver:
@@ -108,7 +110,7 @@ class Receiver:
         if head.confirm:
             self._confirm(name, outcome, priority, now_ns)
             for number in followers:
-                self._confirm((origin, number), DELIVERED, priority, now_ns)
+                self._confirm((origin, number), self._done[origin, number], priority, now_ns)
 
     def _take(self, name: tuple[NodeId, int], piece: Piece, frame: bytes, now_ns: int, followers: list[int]) -> int:
         """Keep a new piece; returns the result to put into the receipt.
@@ -121,10 +123,10 @@ class Receiver:
         if until_ns <= now_ns or late:
             return GIVEN_UP
         if not self._listens(piece):
-            return self._over(name, NO_LISTENER)
+            return self._pass_over(name, head, until_ns, followers)
         message = self._incoming.get(name)
         if message is None:
-            if len(self._incoming) >= MOST_MESSAGES or self._counts.get(origin, 0) >= MOST_MESSAGES_EACH:
+            if not self._has_room(origin):
                 self.not_taken += 1
                 return MISSING
             message = _Incoming(head, until_ns)
@@ -141,22 +143,42 @@ class Receiver:
             message.pieces[head.piece] = piece.data
             message.frame = frame
         if name not in self._incoming:
-            self._incoming[name] = message
-            self._counts[origin] = self._counts.get(origin, 0) + 1
-            self._sweep_ns = earliest(self._sweep_ns, until_ns)
+            self._keep(name, message)
         followers += self._hand_over(name, message)[1:]
         return self._done.get(name, MISSING)
+
+    def _pass_over(self, name: tuple[NodeId, int], head: Head, until_ns: int, followers: list[int]) -> int:
+        """Answer a message to which nobody listens; those that wait for it in its flow wait only for those before it.
+
+        The numbers of waiting messages that are handed over as a consequence are added to `followers`.
+        """
+        self._over(name, NO_LISTENER)
+        if head.confirm and self._has_room(name[0]):
+            message = _Incoming(head, until_ns, wanted=False)
+            self._keep(name, message)
+            followers += self._hand_over(name, message)[1:]
+        return NO_LISTENER
+
+    def _has_room(self, origin: NodeId) -> bool:
+        """True if one more message of this sender may be incomplete or wait."""
+        return len(self._incoming) < MOST_MESSAGES and self._counts.get(origin, 0) < MOST_MESSAGES_EACH
+
+    def _keep(self, name: tuple[NodeId, int], message: _Incoming) -> None:
+        self._incoming[name] = message
+        self._counts[name[0]] = self._counts.get(name[0], 0) + 1
+        self._sweep_ns = earliest(self._sweep_ns, message.until_ns)
 
     def _hand_over(self, name: tuple[NodeId, int], message: _Incoming) -> list[int]:
         """Hand over a complete message whose turn it is, and then those that waited for it; returns their numbers."""
         numbers: list[int] = []
         origin, flow = name[0], message.head.flow
         while message.whole and self._is_next(origin, message.head):
-            data = b"".join(message.pieces[piece] for piece in range(message.head.pieces))
-            self.arrived.append(Whole(origin, message.head, data, message.frame))
+            if message.wanted:
+                data = b"".join(message.pieces[piece] for piece in range(message.head.pieces))
+                self.arrived.append(Whole(origin, message.head, data, message.frame))
             confirm = message.head.confirm
             self._forget(name, message)
-            self._over(name, DELIVERED)
+            self._over(name, DELIVERED if message.wanted else NO_LISTENER)
             numbers.append(name[1])
             if not confirm:
                 break
@@ -227,7 +249,7 @@ class Receiver:
         for name, message in list(self._incoming.items()):
             if message.until_ns <= now_ns:
                 self._forget(name, message)
-                self.expired += 1
+                self.expired += message.wanted
         self._sweep_ns = min((message.until_ns for message in self._incoming.values()), default=None)
 
     def next_wake_ns(self) -> int | None:

@@ -80,9 +80,8 @@ class Node:
         self.port = NodePort(node, scenario, self._duplicates, self._own, position=position)
         self.requests = self.port.requests
         """The transmissions that the actor is to take to the radio."""
-        self.fates = self.port.fates
-        """What became of watched packets: sequence number, instant, and the reason why the packet was dropped, or None
-        if it was released for transmission."""
+        self.watch = self.port.watch
+        """What becomes of the own packets that an application wants to know of."""
         protocol = self._protocol = make_protocol(self.port)
         self.next_wake_ns = protocol.next_wake_ns
         """The protocol's own method, because every wake-up is followed by this question."""
@@ -113,11 +112,6 @@ class Node:
         """The number of packets that have ended in this node, by reason."""
         return self.port.dropped
 
-    @property
-    def watched(self) -> set[int]:
-        """The sequence numbers of own packets whose fate is of interest."""
-        return self.port.watched
-
     def moved(self, position: Enu, velocity: Enu) -> None:
         """Set the node's own position and velocity, as its navigation knows them."""
         self.port.position, self.port.velocity = position, velocity
@@ -143,12 +137,14 @@ class Node:
         born_ns: int,
         now_ns: int,
         watch: bool = False,
+        watch_radio: bool = False,
     ) -> int:
         """Send an application payload (whole MAVLink frames); returns the packet's sequence number.
 
         `born_ns` is the instant at which the application meant to send it, at most `now_ns`. Delay counts from there,
         and the first frame may go `radio.lead_ms` later: a process that was woken late has less time to announce the
-        frame, but the delay is not measured too short. With `watch`, `fates` will say what became of the packet.
+        frame, but the delay is not measured too short. With `watch`, `Node.watch` will say what became of the packet,
+        with `watch_radio` also when the radio has finished with its first frame.
         Raises LocalProtocolError when the frame would exceed `radio.max_frame_bytes`.
         """
         born_ns = born_ns // US * US  # what the header can say
@@ -166,7 +162,7 @@ class Node:
         self.port.records.append(_new(Generated, (born_ns, self.node, seq, app, len(packet.frame))))
         self._own.held.add(packet.frame[wire.NAME])
         if watch:
-            self.port.watched.add(seq)
+            self.watch.begin(seq, radio=watch_radio)
         due_ns = max(born_ns + scenario.radio.lead_ns, now_ns)
         self._protocol.originate(packet, due_ns=due_ns, now_ns=now_ns)
         return seq
@@ -301,6 +297,7 @@ class Node:
             self._protocol.on_impersonation(packet, now_ns=now_ns)
 
     def on_status(self, status: TxStatus, *, now_ns: int) -> None:
+        self.watch.radio_done(status.seq, tried=status.attempts > 0, now_ns=now_ns)
         self._protocol.on_status(status, now_ns=now_ns)
 
     def wake(self, now_ns: int) -> None:

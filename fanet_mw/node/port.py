@@ -7,6 +7,7 @@ The port calls neither the node nor the protocol. Transmissions wait in `request
 
 from collections import Counter
 from collections.abc import Sequence
+from itertools import islice
 from random import Random
 from typing import Final
 
@@ -16,6 +17,7 @@ from fanet_mw.errors import DropReason
 from fanet_mw.node.duplicates import PHASES, DuplicateSet, hash_of
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.node.packet_numbering import PacketNumbering
+from fanet_mw.node.packet_watch import PacketWatch
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Dropped, LetOut, Record
@@ -41,11 +43,7 @@ class NodePort:
         self.records: list[Record] = []
         self.frames_sent = 0
         self.dropped: Counter[str] = Counter()
-        self.watched: set[int] = set()
-        """The sequence numbers of own packets whose fate an application wants to know."""
-        self.fates: list[tuple[int, int, DropReason | None]] = []
-        """The fates of these: sequence number, instant, and the reason of the drop, or None if the
-        packet was released."""
+        self.watch = PacketWatch()
         self._duplicates = duplicate_set
         self._own = own
         self._held = own.held
@@ -53,9 +51,9 @@ class NodePort:
     # --- frames ---------------------------------------------------------------------------------------------------
 
     def transmit(self, frame: bytes, dst: NodeId, *, start_ns: int, wants_status: bool = False) -> int:
-        if self._held:
-            self._let_out(frame, start_ns)
         seq = self.frames_sent
+        if self._held and self._let_out(frame, seq, start_ns):
+            wants_status = True
         self.frames_sent = seq + 1
         self.requests.append(_new(TxRequest, (seq, start_ns, frame, dst, wants_status)))
         return seq
@@ -97,23 +95,25 @@ class NodePort:
 
     def _share(self, packets: Sequence[tuple[int, bytes]]) -> None:
         """Broadcast packets in as few frames as possible."""
-        if self._held:
-            for start_ns, packet in packets:
-                self._let_out(packet, start_ns)
-        for start_ns, frame in aggregated(packets, most_bytes=self.scenario.radio.max_frame_bytes):
+        rest = iter(packets)
+        for start_ns, frame, count in aggregated(packets, most_bytes=self.scenario.radio.max_frame_bytes):
             seq = self.frames_sent
+            wants_status = False
+            if self._held:
+                for packet_ns, packet in islice(rest, count):
+                    wants_status |= self._let_out(packet, seq, packet_ns)
             self.frames_sent = seq + 1
-            self.requests.append(_new(TxRequest, (seq, start_ns, frame, BROADCAST, False)))
+            self.requests.append(_new(TxRequest, (seq, start_ns, frame, BROADCAST, wants_status)))
 
-    def _let_out(self, frame: bytes, start_ns: int) -> None:
-        """Record when the first frame of an own application's packet is sent."""
+    def _let_out(self, frame: bytes, request: int, start_ns: int) -> bool:
+        """Record when the first frame of an own application's packet is announced; True if its status is wanted."""
         name = frame[wire.NAME]
-        if name in self._held:
-            self._held.remove(name)
-            own = int.from_bytes(frame[wire.SEQ], "little")
-            self.records.append(LetOut(start_ns, self.node, own))
-            if own in self.watched:
-                self.fates.append((own, start_ns, None))
+        if name not in self._held:
+            return False
+        self._held.remove(name)
+        own = int.from_bytes(frame[wire.SEQ], "little")
+        self.records.append(LetOut(start_ns, self.node, own))
+        return self.watch.announced(own, request, start_ns)
 
     # --- packets --------------------------------------------------------------------------------------------------
 
@@ -133,8 +133,8 @@ class NodePort:
     def drop(self, reason: DropReason, packet: Packet, *, now_ns: int) -> None:
         self.dropped[reason] += 1
         self._held.discard(packet.frame[wire.NAME])
-        if packet.header.origin == self.node and packet.header.seq in self.watched:
-            self.fates.append((packet.header.seq, now_ns, reason))
+        if packet.header.origin == self.node:
+            self.watch.dropped(packet.header.seq, reason, now_ns)
         self.records.append(Dropped(now_ns, self.node, reason, packet.header.origin, packet.header.seq))
 
     def forget(self, packet: Packet) -> None:

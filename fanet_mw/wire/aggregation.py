@@ -10,23 +10,23 @@ from fanet_mw.errors import MalformedFrameError
 from fanet_mw.wire.frame import ROUTE, frames, message_id, with_more
 
 
-def aggregated(packets: Iterable[tuple[int, bytes]], *, most_bytes: int) -> Iterator[tuple[int, bytes]]:
+def aggregated(packets: Iterable[tuple[int, bytes]], *, most_bytes: int) -> Iterator[tuple[int, bytes, int]]:
     """As few radio frames as possible for packets in their order, each at most `most_bytes` long.
 
     With each packet, and with each frame, comes the instant at which it starts; a frame starts at the earliest instant
-    of the packets in it.
+    of the packets in it. With a frame comes the number of the packets in it, too.
     """
     chunk: list[bytes] = []
     first_ns = size = 0
     for start_ns, packet in packets:
         if chunk and size + len(packet) > most_bytes:
-            yield first_ns, bundle(chunk)
+            yield first_ns, bundle(chunk), len(chunk)
             chunk, size = [], 0
         first_ns = min(first_ns, start_ns) if chunk else start_ns
         chunk.append(packet)
         size += len(packet)
     if chunk:
-        yield first_ns, bundle(chunk)
+        yield first_ns, bundle(chunk), len(chunk)
 
 
 def bundle(packets: Sequence[bytes]) -> bytes:

@@ -15,6 +15,9 @@ from hypothesis import strategies as st
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.scenario.commented import commented
+from fanet_mw.trace import Generated
+from fanet_mw.units import S
+from sim.run.virtual import simulate
 from sim.scenarios import catalog
 
 
@@ -66,6 +69,17 @@ def test_a_saturated_source_whose_radio_refuses_everything_does_not_offer_withou
     summary = scenario_draws.run(found, limit_s=60)
     assert summary["frames"]["closes"], summary["frames"]
     assert summary["generated"] < 40_000
+
+
+@pytest.mark.parametrize("destination", ["all", "1"])
+@pytest.mark.parametrize("protocol", ["direct", "clustered", "flooding", "aodv", "geographic"])
+def test_a_saturated_source_offers_packets_until_the_end(protocol: str, destination: str) -> None:
+    end_s = 6 if protocol == "clustered" else 3  # its first turn is at 3 s
+    keys = (f"routing.protocol={protocol}", f"traffic.destination={destination}", f"duration_s={end_s}")
+    outcome = simulate(catalog.find("quick", [*SATURATED, *keys, "traffic.sources=1", "warmup_s=1"]))
+    born_ns = [record.t_ns for record in outcome.records if isinstance(record, Generated) and record.app == "traffic"]
+    assert min(born_ns) < 1.2 * S
+    assert max(born_ns) > (end_s - 0.5) * S
 
 
 def test_the_densest_traffic_that_a_scenario_may_ask_for_is_carried_or_counted() -> None:

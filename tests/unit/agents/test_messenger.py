@@ -10,6 +10,7 @@ from fanet_mw import mavlink
 from fanet_mw.application import Application, Data, Destination, Fate, Status
 from fanet_mw.errors import DropReason
 from fanet_mw.node.node import Node
+from fanet_mw.node.packet_watch import PacketNews
 from fanet_mw.routing.direct import Direct
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
@@ -105,33 +106,33 @@ def test_a_dropped_piece_of_a_confirmed_message_is_no_end_of_it(make_scenario: M
     desk = Desk(make_scenario)
     handle = desk.send(LONG, confirm=True)
     assert [status.fate for status in desk.told()] == [Fate.ADMITTED, Fate.LET_OUT]
-    (watched,) = desk.node.watched
-    desk.node.fates.append((watched, S, DropReason.QUEUE_FULL))
+    (watched,) = desk.node.watch.watched
+    desk.node.watch.news.append(PacketNews(watched, S, DropReason.QUEUE_FULL))
     assert desk.told() == [], "it is sent again"
     until_ns = desk.messenger.next_wake_ns()
     assert until_ns is not None
     sent = len(desk.node.requests)
     desk.messenger.wake(until_ns)
     assert len(desk.node.requests) == 2 * sent
-    assert handle not in desk.node.watched
+    assert handle not in desk.node.watch.watched
 
 
 def test_a_dropped_piece_of_an_unconfirmed_message_is_the_end_of_it(make_scenario: MakeScenario) -> None:
     desk = Desk(make_scenario)
     handle = desk.send(LONG, to=BROADCAST)
     desk.told()
-    assert len(desk.node.watched) == 2, "each of its packets may be the one that ends it"
+    assert len(desk.node.watch.watched) == 2, "each of its packets may be the one that ends it"
     for reason, fate in (
         (DropReason.QUEUE_FULL, Fate.DROPPED), (DropReason.EXPIRED, Fate.EXPIRED), (DropReason.ADMISSION, Fate.REFUSED)
     ):  # fmt: skip
         desk = Desk(make_scenario)
         handle = desk.send(LONG, to=BROADCAST)
         desk.told()
-        last = max(desk.node.watched)
-        desk.node.fates.append((last, S + MS, reason))
+        last = max(desk.node.watch.watched)
+        desk.node.watch.news.append(PacketNews(last, S + MS, reason))
         assert desk.told() == [Status(handle, fate, S + MS, reason, last=True)]
-        assert last not in desk.node.watched
-        desk.node.fates.append((last, S + MS, reason))
+        assert last not in desk.node.watch.watched
+        desk.node.watch.news.append(PacketNews(last, S + MS, reason))
         assert desk.told() == [], "once"
 
 
@@ -142,5 +143,5 @@ def test_what_nobody_asks_about_is_not_told(make_scenario: MakeScenario) -> None
     assert desk.messenger.statuses(S) == []
     desk.application.follows = ()
     desk.send(HEARTBEAT)
-    assert len(desk.node.watched) == 1, "of the plain packet nobody wants to know anything"
+    assert len(desk.node.watch.watched) == 1, "of the plain packet nobody wants to know anything"
     assert desk.messenger.report()["admitted"] == 1, "pieces are counted all the same"

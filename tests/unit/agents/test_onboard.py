@@ -9,7 +9,17 @@ from pymavlink.dialects.v20 import common
 from agents.uav import Uav
 from fanet_mw import mavlink, wire
 from fanet_mw.application import Application, AppPort, Course, Data, Fate, Received, Status
-from fanet_mw.bus.messages import Gps, MavlinkTap, Reception, SensorReading, Setpoint, TxRequest, WifiScan
+from fanet_mw.bus.messages import (
+    Gps,
+    MavlinkTap,
+    Reception,
+    SensorReading,
+    Setpoint,
+    TxOutcome,
+    TxRequest,
+    TxStatus,
+    WifiScan,
+)
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
 from fanet_mw.scenario import Scenario
@@ -265,6 +275,61 @@ def test_what_is_not_to_be_confirmed_is_sent_once(make_scenario: MakeScenario) -
     frames = live(uav(make_scenario, post), 10 * S)
     assert len(frames) == 1
     assert [status.fate for status in post.told] == [Fate.ADMITTED, Fate.LET_OUT]
+
+
+@pytest.mark.parametrize("protocol", ["flooding", "direct"])
+@pytest.mark.parametrize(("outcome", "attempts", "fate"), [
+    (TxOutcome.SENT, 1, Fate.SENT), (TxOutcome.RETRY_LIMIT, 7, Fate.SENT), (TxOutcome.QUEUE_FULL, 0, Fate.TURNED_AWAY),
+])  # fmt: skip
+@pytest.mark.parametrize("content", [HELLO, mavlink.Encoder(OWN).heartbeat()], ids=["bytes", "mavlink"])
+def test_what_the_radio_has_done_with_a_message_is_told(
+    make_scenario: MakeScenario, protocol: str, outcome: TxOutcome, attempts: int, fate: Fate, content: object
+) -> None:
+    post = Post(content, destination=BROADCAST)
+    made = uav(make_scenario, post, **{"routing.protocol": protocol})
+    (request,) = live(made, 2 * S)
+    assert request.wants_status
+    status = TxStatus(request.seq, outcome, 2 * S, attempts)
+    for _ in range(2):  # the second time for a request of which everything is said
+        made.receive(NAMES.radio_rx(OWN), status, 3 * S)
+    assert [(one.fate, one.t_ns) for one in post.told if one.fate in (Fate.SENT, Fate.TURNED_AWAY)] == [(fate, 3 * S)]
+
+
+def test_of_a_message_in_pieces_the_first_frame_counts(make_scenario: MakeScenario) -> None:
+    post = Post(Data(5, bytes(5000)), destination=BROADCAST)
+    requests = live(made := uav(make_scenario, post), 2 * S)
+    assert [request.wants_status for request in requests] == [True] + [False] * (len(requests) - 1)
+    assert len(requests) > 2
+    for request in requests:
+        made.receive(NAMES.radio_rx(OWN), TxStatus(request.seq, TxOutcome.SENT, 2 * S, 1), 3 * S)
+    assert [one.fate for one in post.told] == [Fate.ADMITTED, Fate.LET_OUT, Fate.SENT]
+
+
+def test_the_radio_need_not_report_to_an_application_that_does_not_ask(make_scenario: MakeScenario) -> None:
+    post = Post(destination=BROADCAST)
+    post.follows = (Fate.LET_OUT, Fate.DROPPED)
+    (request,) = live(uav(make_scenario, post), 2 * S)
+    assert not request.wants_status
+
+
+class Insists(Post):
+    """Sends again when a message was dropped."""
+
+    def on_status(self, status: Status, now_ns: int) -> None:
+        super().on_status(status, now_ns)
+        if status.fate in (Fate.DROPPED, Fate.EXPIRED) and len(self.told) < 4:
+            self.handle = self.port.send(self._content, **self._options)
+
+
+def test_what_is_sent_in_answer_to_a_drop_is_born_at_that_instant(make_scenario: MakeScenario) -> None:
+    """Nothing but the node's own timer led to it, so that no application had been called for a while."""
+    post = Insists(destination=OTHER)
+    made = uav(make_scenario, post, **{"routing.protocol": "dsdv", "routing.lifetime_s": 5})
+    live(made, 10 * S)
+    dropped_ns = next(status.t_ns for status in post.told if status.last)
+    born_ns = [record.t_ns for record in made.records if isinstance(record, Generated) and record.app == "post"]
+    assert dropped_ns > 2 * S
+    assert born_ns[:2] == [S, dropped_ns]
 
 
 def test_what_the_node_drops_is_told_with_the_reason(make_scenario: MakeScenario) -> None:

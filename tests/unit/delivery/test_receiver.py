@@ -97,6 +97,38 @@ def test_a_message_waits_for_the_one_before_it_until_its_sender_has_given_that_u
     }  # fmt: skip
 
 
+def test_a_message_does_not_wait_for_one_to_which_nobody_listens() -> None:
+    receiver = made()
+    hear(receiver, head(7, port=DEAF_PORT), BORN_NS)
+    hear(receiver, head(8, previous=7), BORN_NS)
+    assert numbers(receiver) == [8]
+    assert said(receiver, BORN_NS + LATEST_RECEIPT_NS) == {7: (NO_LISTENER, 0), 8: (DELIVERED, 0)}
+    assert receiver._incoming == {}
+
+
+def test_a_message_to_which_nobody_listens_keeps_the_place_of_those_before_it() -> None:
+    """7 is still on its way: 9 may not overtake it because nobody listens to 8."""
+    receiver = made()
+    hear(receiver, head(8, previous=7, port=DEAF_PORT), BORN_NS)
+    hear(receiver, head(9, previous=8), BORN_NS)
+    assert numbers(receiver) == []
+    assert said(receiver, BORN_NS + LATEST_RECEIPT_NS) == {8: (NO_LISTENER, 0), 9: (MISSING, 1)}
+    hear(receiver, head(7), BORN_NS + 200 * MS)
+    assert numbers(receiver) == [7, 9]
+    assert said(receiver, BORN_NS + 200 * MS + LATEST_RECEIPT_NS)[9] == (DELIVERED, 0)
+
+
+def test_a_message_to_which_nobody_listens_and_whose_turn_never_comes_is_not_counted_as_expired() -> None:
+    receiver = made()
+    hear(receiver, head(8, previous=7, port=DEAF_PORT), BORN_NS)
+    receiver.due(BORN_NS + LIFETIME_NS)
+    assert (receiver.expired, receiver.kept_bytes) == (0, 0)
+    for number in range(20, 20 + 2 * MOST_MESSAGES_EACH):
+        hear(receiver, head(number, previous=number - 1, port=DEAF_PORT), BORN_NS)
+    assert len(receiver._incoming) == MOST_MESSAGES_EACH
+    assert receiver.not_taken == 0, "all are answered"
+
+
 def test_what_is_not_confirmed_waits_for_nobody_and_is_answered_by_nobody() -> None:
     receiver = made()
     hear(receiver, head(8, confirm=0), BORN_NS)

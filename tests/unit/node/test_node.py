@@ -3,11 +3,12 @@
 import pytest
 
 from fanet_mw import wire
-from fanet_mw.bus.messages import Reception
+from fanet_mw.bus.messages import Reception, TxOutcome, TxStatus
 from fanet_mw.errors import DropReason, LocalProtocolError
 from fanet_mw.node.duplicates import DuplicateSet
 from fanet_mw.node.node import Node
 from fanet_mw.node.packet import Packet
+from fanet_mw.node.packet_watch import RadioStage
 from fanet_mw.routing import make_protocol
 from fanet_mw.trace import Delivered, Dropped
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
@@ -47,6 +48,24 @@ def delivered(node: Node) -> list[Delivered]:
 def send(node: Node, **change: int) -> int:
     given = {"destination": BROADCAST, "priority": PRIORITY_BULK, "born_ns": 0, "now_ns": 0} | change
     return node.send(filler(40), app="test", **given)  # type: ignore[arg-type]
+
+
+def test_packets_that_share_a_frame_share_its_status(node: Node) -> None:
+    """Two packets of 76 bytes fit into a frame of 160; the third goes in one of its own, and nobody asks about it."""
+    node.port.scenario = node.scenario.model_copy(
+        update={"radio": node.scenario.radio.model_copy(update={"max_frame_bytes": 160})}
+    )
+    own = [node._own.make(Kind.DATA, filler(40), destination=BROADCAST, priority=0, flags=0, hop_limit=3, born_ns=0)
+           for _ in range(3)]  # fmt: skip
+    for one, wanted in zip(own, (False, True, False), strict=True):
+        node._own.held.add(one.frame[wire.NAME])
+        if wanted:
+            node.watch.begin(one.header.seq, radio=True)
+    node.port.transmit_together(own, flags=FLAG_FLOOD, at_ns=[5, 9])
+    assert [(r.start_ns, r.wants_status) for r in node.requests] == [(5, True), (5, False), (9, False), (9, False)]
+    node.watch.news.clear()
+    node.on_status(TxStatus(node.requests[0].seq, TxOutcome.SENT, 5, 1), now_ns=6)
+    assert [(news.seq, news.what) for news in node.watch.news] == [(own[1].header.seq, RadioStage.SENT)]
 
 
 # --- known before -------------------------------------------------------------------------------------------------

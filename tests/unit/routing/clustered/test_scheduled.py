@@ -326,7 +326,7 @@ def test_a_packet_whose_turns_are_gone_is_dropped_if_a_bound_was_stated_for_it(n
     assert [record.seq for record in node.records if isinstance(record, BoundStated)] == [0]
     access.follow(None, now_ns=11_530 * MS)
     assert node.dropped == {DropReason.BOUND_LOST: 1}
-    assert node.fates == [(0, 11_530 * MS, DropReason.BOUND_LOST)], "its application is told"
+    assert node.watch.news == [(0, 11_530 * MS, DropReason.BOUND_LOST)], "its application is told"
     assert node.report()["waiting"] == 1
 
 

@@ -2,28 +2,29 @@
 
 import os
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import Phase, settings
+from kit import DEFAULT_EXAMPLES, MakeScenario
 
 from fanet_mw.scenario import Scenario, config
 
 pytest_plugins = ["fanet_mw.testing.plugin"]
 """The fixtures that we ship: found by itself only where the package is installed anew."""
 
-settings.register_profile("default", deadline=None, max_examples=60, derandomize=True)
+settings.register_profile("default", deadline=None, max_examples=DEFAULT_EXAMPLES, derandomize=True)
 """The same examples in every run: what is refused is refused for everybody, and again after the same command. There is
 no deadline, because first calls compile."""
 settings.register_profile("explore", deadline=None, max_examples=300)
 """New examples in each run, and more of them: for `scripts/test --all`."""
 settings.load_profile("default")
 settings.register_profile(
-    "mutants", deadline=None, derandomize=True, database=None, phases=(Phase.explicit, Phase.generate)
-)
-"""For `scripts/mutants`: the same examples each time, and none made smaller: that a test fails is enough."""
+    "mutants", deadline=None, max_examples=DEFAULT_EXAMPLES, derandomize=True, database=None,
+    phases=(Phase.explicit, Phase.generate),
+)  # fmt: skip
+"""For `scripts/mutants`: as many as in a default run, and none made smaller: that a test fails is enough."""
 
 _REALTIME = (
     "test_realtime", "test_host_realtime", "test_hosts", "test_radios", "test_real_radio", "test_time_scale",
@@ -56,9 +57,6 @@ def pytest_collection_finish() -> None:
     """
     sys.dont_write_bytecode = True
     os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
-
-
-MakeScenario = Callable[..., Scenario]
 
 
 @pytest.fixture

@@ -4,8 +4,9 @@ from array import array
 from collections.abc import Callable
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
+from kit import examples
 
 from agents.clock.clocked_uav import ClockedUav
 from agents.uav import Uav
@@ -115,7 +116,7 @@ topics = st.sampled_from(
 
 
 @pytest.mark.parametrize("make", MAKERS, ids=["leader", "member", "beacons", "gps", "medium", "world"])
-@settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
+@examples(20, suppress_health_check=[HealthCheck.too_slow])
 @given(script=st.lists(st.tuples(topics, hostile, st.integers(0, 300 * MS)), max_size=25))
 def test_any_messages_on_any_topics_never_raise_and_the_actor_lives_on(
     make: Callable[[Scenario], Actor], script: list[tuple[str, Message, int]]

@@ -5,8 +5,9 @@ from functools import lru_cache
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from kit import examples
 from rival_bench import Bench
 
 from fanet_mw import wire
@@ -155,7 +156,7 @@ hostile = st.builds(
 )  # fmt: skip
 
 
-@settings(max_examples=60)
+@examples(20)
 @given(frames=st.lists(hostile, max_size=25), pause_ms=st.integers(0, 3000))
 @pytest.mark.parametrize("protocol", sorted(PROTOCOLS))
 def test_hostile_garbage_never_raises_and_never_stops_a_node(

@@ -4,6 +4,7 @@ from functools import lru_cache
 from typing import Any
 
 import pytest
+from kit import MakeScenario
 
 from agents.applications.traffic import sources_of
 from agents.clock.clocked_uav import ClockedUav, make_uav
@@ -22,7 +23,6 @@ from sim.run.outcome import Outcome
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 from sim.world.mobility.layout import positions
-from tests.conftest import MakeScenario
 
 GRID = [
     "nodes.count=15", "traffic.sources=14", "clusters.count=14", "clusters.turn_slack_us=400", "duration_s=60",

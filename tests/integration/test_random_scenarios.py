@@ -9,8 +9,9 @@ from collections.abc import Sequence
 import pytest
 import scenario_draws
 import tomli_w
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
+from kit import examples
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario, config
@@ -32,7 +33,7 @@ def test_a_thousand_random_valid_scenarios_end() -> None:
     assert [text for seed in range(1000) if (text := scenario_draws.check(seed))] == []
 
 
-@settings(max_examples=6, deadline=None)
+@examples(4)
 @example(24)  # a rate that is the default, but not that of its standard
 @given(st.integers(0, 10**6))
 def test_a_scenario_that_is_shown_whole_or_by_its_departures_or_commented_is_read_back_as_itself(seed: int) -> None:

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 from claims_radio import GraphRadio
-from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+from kit import examples
 from test_slots_with_reuse import longest_chain
 
 from fanet_mw import wire
@@ -148,9 +148,9 @@ class AggregatingSwarm(Swarm):
 
 
 TestAggregatingSwarm = AggregatingSwarm.TestCase
-TestAggregatingSwarm.settings = settings(max_examples=20, stateful_step_count=15, deadline=None)
+TestAggregatingSwarm.settings = examples(10, stateful_step_count=15)
 TestSwarm = Swarm.TestCase
-TestSwarm.settings = settings(max_examples=50, stateful_step_count=20, deadline=None)
+TestSwarm.settings = examples(15, stateful_step_count=20)
 
 
 @pytest.fixture

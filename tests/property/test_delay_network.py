@@ -4,8 +4,9 @@ from fractions import Fraction
 from itertools import islice
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from kit import examples
 from slot_simulator import Slot, delays, earliest_start, network
 from tandem_bounds import Flow, Hop, Limited, least_span_ns, ordered_tandem, path_bounds
 
@@ -87,7 +88,7 @@ def test_a_slot_s_output_is_never_denser_than_least_span(server, data) -> None:
         assert min(ends[i + n - 1] - ends[i] for i in range(len(ends) - n + 1)) >= least_span_ns(server, n)
 
 
-@settings(max_examples=250)
+@examples(80)
 @given(servers(), st.lists(periodics(6), min_size=1, max_size=4), st.integers(0, 10**6))
 def test_one_slot_fed_by_bursts_never_exceeds_delay_and_backlog(server, flows, seed) -> None:
     total = Total(tuple(flows))
@@ -102,7 +103,6 @@ def test_one_slot_fed_by_bursts_never_exceeds_delay_and_backlog(server, flows, s
     assert seen.backlog[0] <= frames
 
 
-@settings(max_examples=100)
 @given(servers(), st.lists(periodics(6), min_size=1, max_size=3))
 def test_the_critical_trace_reaches_the_delay_to_one_tick(server, flows) -> None:
     """All flows burst together just after the last start: FIFO delay and backlog are no looser than that."""
@@ -116,7 +116,6 @@ def test_the_critical_trace_reaches_the_delay_to_one_tick(server, flows) -> None
     assert seen.backlog[0] in (frames, frames - 1)
 
 
-@settings(max_examples=100)
 @given(servers(), periodics(10), periodics(10), st.integers(0, 10**6))
 def test_a_flow_that_always_comes_last_stays_within_any_order(server, flow, cross, seed) -> None:
     bound = delay_any_order(flow, cross, server)
@@ -129,7 +128,6 @@ def test_a_flow_that_always_comes_last_stays_within_any_order(server, flow, cros
     assert worst_by_priority(slot, ours, others)[0] <= bound.delay_ns
 
 
-@settings(max_examples=100)
 @given(servers(), periodics(10), periodics(3), st.integers(0, 10**6))
 def test_an_urgent_flow_keeps_its_bound_when_others_overload_the_slot(server, flow, bulk, seed) -> None:
     bound = delay_any_order(flow, Total(()), server, blocking=1)
@@ -168,7 +166,7 @@ def tandems(draw):
     return {h: Hop(s, *relay) for h, s in servers_of.items()}, flows
 
 
-@settings(max_examples=150)
+@examples(50)
 @given(tandems(), st.integers(0, 10**6))
 def test_tandem_slots_in_any_phase_and_direction_never_exceed_the_path_bounds(case, seed) -> None:
     """Paths cross in both directions, so the dependencies have cycles."""
@@ -207,7 +205,6 @@ def test_a_burst_makes_the_second_head_s_delay_longer_than_equation_1_says() -> 
     assert second.delay_ns > alone.delay_ns
 
 
-@settings(max_examples=100)
 @given(st.data(), st.integers(1, 4), st.integers(0, 10**6))
 def test_slots_in_known_order_never_exceed_the_ordered_tandem(data, hops, seed) -> None:
     airtime, frames = data.draw(st.integers(1, 4)), data.draw(st.integers(1, 3))

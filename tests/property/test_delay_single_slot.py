@@ -3,8 +3,9 @@
 from fractions import Fraction
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
+from kit import examples
 from single_slot_bound import single_slot_bound
 from slot_simulator import Slot, delays
 
@@ -60,7 +61,7 @@ def worst_of_all_phases(server: SlotServer, interval: int, packets: int) -> int:
     return max(max(delays(slot, [phase + n * interval for n in range(packets)])) for phase in range(server.period_ns))
 
 
-@settings(max_examples=250)
+@examples(80)
 @given(slots())
 @example((SlotServer(1, 1, 1), 1))
 def test_no_phase_is_worse_and_the_worst_is_one_tick_below(case) -> None:
@@ -71,7 +72,6 @@ def test_no_phase_is_worse_and_the_worst_is_one_tick_below(case) -> None:
     assert worst == bound.delay_ns - 1, "the worst phase is one tick after the last start that fits"
 
 
-@settings(max_examples=100)
 @given(slots())
 def test_examining_all_q_as_davis_does_gives_the_same(case) -> None:
     server, interval = case
@@ -84,7 +84,7 @@ def test_examining_all_q_as_davis_does_gives_the_same(case) -> None:
     assert delay_fifo(Periodic(interval), server) == Bounded(letter)
 
 
-@settings(max_examples=80)
+@examples(25)
 @given(slots(feasible=False))
 def test_what_is_refused_does_grow_without_limit(case) -> None:
     server, interval = case
@@ -119,7 +119,7 @@ def q_by_q(c: int, s: int, period: int, p: int) -> int:
             return worst
 
 
-@settings(max_examples=150)
+@examples(50)
 @given(st.integers(1, 30), st.integers(1, 60), st.integers(1, 100), st.integers(1, 200))
 def test_the_paper_s_q_rule_is_followed_to_the_letter(c, s, period, p) -> None:
     found = paper.cluster_estimate(airtime_ns=c, slot_ns=s, period_ns=period, interval_ns=p)
@@ -140,7 +140,7 @@ def test_with_the_paper_s_own_slot_the_estimate_is_one_period_whatever_the_load(
     assert found == Bounded(period * p)
 
 
-@settings(max_examples=150)
+@examples(50)
 @given(st.integers(1, 30), st.integers(1, 60), st.integers(1, 60))
 def test_with_the_paper_s_own_slot_the_equations_are_followed_to_the_letter_for_any_periods(c, period, p) -> None:
     slot = paper.paper_slot(airtime_ns=c, interval_ns=p, period_ns=period)

@@ -1,8 +1,9 @@
 """A head with turns at known places: no trace is worse than the bounds, and the worst trace comes within one tick."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from kit import examples
 from test_delay_network import periodics, spread, trace
 
 from fanet_mw.bounds import Bounded, Periodic, Refused, Total, TurnServer, backlog, delay_any_order, delay_fifo
@@ -33,7 +34,7 @@ def serve(server: TurnServer, bulk, urgent=(), *, start: int = 0):
     return worst[1], worst[0], most
 
 
-@settings(max_examples=150)
+@examples(50)
 @given(turn_servers(), st.lists(periodics(15), min_size=1, max_size=3), st.integers(0, 10**6))
 def test_no_trace_exceeds_delay_or_backlog_of_turns(server, flows, seed) -> None:
     total = Total(tuple(flows))
@@ -48,7 +49,6 @@ def test_no_trace_exceeds_delay_or_backlog_of_turns(server, flows, seed) -> None
     assert most <= frames
 
 
-@settings(max_examples=100)
 @given(turn_servers(), periodics(15))
 def test_the_worst_phase_of_a_burst_comes_within_one_tick(server, flow) -> None:
     bound = delay_fifo(flow, server)
@@ -58,7 +58,6 @@ def test_the_worst_phase_of_a_burst_comes_within_one_tick(server, flow) -> None:
     assert worst == bound.delay_ns - 1
 
 
-@settings(max_examples=100)
 @given(turn_servers(), periodics(15), periodics(4), st.integers(0, 10**6))
 def test_urgent_packets_keep_their_bound_among_bulk_that_overloads_the_turns(server, flow, bulk, seed) -> None:
     bound = delay_any_order(flow, Total(()), server)

@@ -3,8 +3,9 @@
 from itertools import product
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from kit import examples
 
 from fanet_mw.graph.topology import components, within_range
 from fanet_mw.planner.loss import loss
@@ -34,7 +35,7 @@ def test_on_a_line_it_is_the_product_of_the_hops() -> None:
 points = st.lists(st.tuples(st.integers(0, 500), st.integers(0, 300)), min_size=3, max_size=5, unique=True)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(20)
 @given(points, st.floats(0.3, 0.99))
 def test_no_node_is_missed_more_often_than_stated(at, p) -> None:
     """Every pattern of lost copies, weighted by its probability."""

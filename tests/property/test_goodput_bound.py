@@ -4,8 +4,9 @@ from itertools import product
 
 import pytest
 from dominating_sets import guha_khuller
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from kit import examples
 
 from fanet_mw.graph.topology import components, within_range
 from fanet_mw.planner.goodput_bound import fewest_transmissions, goodput_bound
@@ -21,7 +22,7 @@ def swarm(points):
 points = st.lists(st.tuples(st.integers(0, 900), st.integers(0, 600)), min_size=3, max_size=14, unique=True)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(20)
 @given(points, st.integers(1, 3))
 def test_no_timetable_exceeds_the_bound(at, packets) -> None:
     places = swarm(at)
@@ -36,7 +37,7 @@ def test_no_timetable_exceeds_the_bound(at, packets) -> None:
     assert len(roots) / (table.used * turns.turn_ns) * S <= most.per_second * (1 + 1e-9)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(20)
 @given(points)
 def test_no_connected_dominating_set_is_smaller_than_the_fewest_transmissions(at) -> None:
     adjacency = within_range(swarm(at), range_m=250)

@@ -5,8 +5,9 @@ from collections import defaultdict
 from typing import Final
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from kit import examples
 
 from fanet_mw import wire
 from fanet_mw.delivery import receiver as receiving
@@ -93,7 +94,7 @@ whom = st.one_of(st.none(), st.sets(st.sampled_from(NODES), min_size=1))
 drawn = st.tuples(st.sampled_from(NODES), whom, sizes, st.sampled_from([5, 6, DEAF_PORT]), st.integers(1, 3))
 
 
-@settings(max_examples=25)
+@examples(12)
 @given(st.lists(drawn, max_size=12), st.integers(0, 2**32), st.sampled_from([0.0, 0.2, 0.5]))
 def test_every_confirmed_message_arrives_once_whole_and_in_order_or_its_sender_is_told(
     plan: list[tuple[NodeId, set[NodeId] | None, int, int, int]], seed: int, loss: float

@@ -1,8 +1,9 @@
 """The planner: no simulated head exceeds its delays, problems are named, and the change it proposes does help."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from kit import examples
 
 from agents.applications.traffic import sources_of
 from fanet_mw import wire
@@ -62,7 +63,7 @@ def cost(spacing: int, duration: int | None = None) -> FloodCost:
     return FloodCost(duration or spacing, spacing, 1, proven=True)
 
 
-@settings(max_examples=150)
+@examples(50)
 @given(heads(), st.integers(0, 10**6))
 def test_no_head_takes_longer_or_holds_more_than_its_plan(head, seed) -> None:
     shares, usable, period, jitter = head

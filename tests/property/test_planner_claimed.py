@@ -3,8 +3,9 @@
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from kit import examples
 
 from fanet_mw.bounds import Refused
 from fanet_mw.graph.topology import two_hop, within_range
@@ -34,7 +35,7 @@ def swarms(draw) -> dict[NodeId, Enu]:
 
 
 @given(swarms())
-@settings(max_examples=25)
+@examples(12)
 def test_the_slots_of_a_plan_never_meet_within_two_hops_and_their_length_follows_the_law(at) -> None:
     adjacency = within_range(at, range_m=250)
     turns = Turns(0, 500_000_000, 40_000_000, 1_200_000, 380)

@@ -5,8 +5,9 @@ The queue is driven as its host drives it, with random timetables of which one r
 
 from typing import NamedTuple
 
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
+from kit import examples
 
 from fanet_mw.node.packet import Packet
 from fanet_mw.node.queue import TxQueue
@@ -93,7 +94,7 @@ def drive(case: Case) -> Run:
     return run
 
 
-@settings(max_examples=60)
+@examples(20)
 @given(cases())
 @example(
     Case(
@@ -112,7 +113,7 @@ def test_no_packet_is_through_later_than_was_said_when_it_was_taken(case: Case) 
         assert run.through_ns[seq] <= said_ns
 
 
-@settings(max_examples=40)
+@examples(12)
 @given(cases())
 def test_who_finds_fewer_than_a_burst_of_its_class_waiting_keeps_the_bound_of_a_burst(case: Case) -> None:
     """One timetable, and at most so many reports within any superframe that fewer than `BURST` wait."""

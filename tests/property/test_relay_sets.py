@@ -3,8 +3,9 @@
 import pytest
 from broadcast_schedule import broadcast_schedule, pipeline_spacing, shortest_relays
 from dominating_sets import guha_khuller, wu_li
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from kit import examples
 from test_slots_with_reuse import graphs
 
 from fanet_mw.errors import LocalProtocolError
@@ -24,7 +25,6 @@ def induced(adjacency, nodes):
 
 
 @pytest.mark.parametrize("build", [wu_li, by_parity, guha_khuller])
-@settings(max_examples=100)
 @given(adjacency=graphs())
 def test_each_part_s_relays_are_connected_and_heard_by_all(build, adjacency) -> None:
     relays = frozenset(build(adjacency))
@@ -62,7 +62,6 @@ def beyond(node, adjacency, willing):
     return {m for n in adjacency[node] if n in willing for m in adjacency[n]} - {node, *adjacency[node]}
 
 
-@settings(max_examples=100)
 @given(graphs(), st.data())
 def test_every_two_hop_neighbor_hears_a_multipoint_relay(adjacency, data) -> None:
     will = {n: data.draw(st.sampled_from([0, 1, 3, 3, 3, 7])) for n in adjacency}
@@ -90,7 +89,7 @@ def test_a_node_needs_to_know_no_more_than_its_neighbors_hellos(adjacency) -> No
     assert multipoint_relays(node, known) == multipoint_relays(node, adjacency)
 
 
-@settings(max_examples=80)
+@examples(25)
 @given(graphs())
 def test_a_flood_over_multipoint_relays_reaches_the_whole_part(adjacency) -> None:
     """A node relays if the first it heard the packet from chose it (RFC 3626, 3.4.1)."""
@@ -130,7 +129,7 @@ def fly(schedule, adjacency):
 
 @pytest.mark.parametrize("prune", [False, True])
 @pytest.mark.parametrize("build", [lambda a, root: wu_li(a), lambda a, root: guha_khuller(a), shortest_relays])
-@settings(max_examples=60)
+@examples(20)
 @given(adjacency=graphs(), data=st.data())
 def test_a_schedule_reaches_all_of_the_root_s_part_without_collision(build, prune, adjacency, data) -> None:
     root = data.draw(st.sampled_from(sorted(adjacency)))
@@ -162,7 +161,7 @@ def same_subslot(schedule):
     ]
 
 
-@settings(max_examples=60)
+@examples(20)
 @given(graphs(), st.data())
 def test_floods_at_the_pipeline_spacing_never_meet_and_closer_ones_do(adjacency, data) -> None:
     root = data.draw(st.sampled_from(sorted(adjacency)))
@@ -231,7 +230,6 @@ def reached(adjacency, source, relays):
     return heard
 
 
-@settings(max_examples=100)
 @given(graphs(), st.booleans())
 def test_a_flood_reaches_everyone_over_those_who_find_that_they_dominate(adjacency, some_first) -> None:
     priority = {n: float(n % 3) for n in adjacency} if some_first else {}

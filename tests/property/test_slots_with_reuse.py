@@ -2,8 +2,9 @@
 
 import pytest
 from coloring import clashes, dsatur, welsh_powell
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from kit import examples
 
 from fanet_mw.errors import LocalProtocolError
 from fanet_mw.graph.topology import components, levels, symmetric, two_hop, within_range
@@ -129,7 +130,6 @@ def longest_chain(adjacency) -> int:
     return max(depth.values())
 
 
-@settings(max_examples=100)
 @given(graphs(), st.integers(0, 10**6))
 def test_claims_are_free_of_clashes_within_the_stated_superframes_and_then_stay(adjacency, seed) -> None:
     air = Air(adjacency, seed)
@@ -140,7 +140,7 @@ def test_claims_are_free_of_clashes_within_the_stated_superframes_and_then_stay(
     assert air.slots == before
 
 
-@settings(max_examples=60)
+@examples(20)
 @given(graphs(), graphs(most=10), st.integers(0, 10**6))
 def test_after_leaves_joins_and_moves_they_are_again(adjacency, others, seed) -> None:
     """The second graph has other nodes, some the same, with other links. What died stays known for its lifetime."""
@@ -151,7 +151,7 @@ def test_after_leaves_joins_and_moves_they_are_again(adjacency, others, seed) ->
     assert air.settled
 
 
-@settings(max_examples=60)
+@examples(20)
 @given(graphs(), st.integers(0, 10**6))
 def test_a_joiner_between_two_owners_of_one_slot_makes_one_of_them_yield(adjacency, seed) -> None:
     rng = stream(seed, "joiner")
@@ -183,7 +183,7 @@ def test_with_losses_claims_still_settle(loss: float) -> None:
 # --- superframes as long as the neighborhood is crowded ---
 
 
-@settings(max_examples=80)
+@examples(25)
 @given(graphs(), st.integers(0, 10**6))
 def test_sized_superframes_are_free_of_clashes_within_the_stated_superframes(adjacency, seed) -> None:
     air = Air(adjacency, seed, sized_to=128)
@@ -198,7 +198,7 @@ def test_sized_superframes_are_free_of_clashes_within_the_stated_superframes(adj
         assert least <= claims.own.length < 2 * least, "the next power of two, no longer"
 
 
-@settings(max_examples=60)
+@examples(20)
 @given(graphs(), graphs(most=10), st.integers(0, 10**6))
 def test_sized_superframes_follow_leaves_joins_and_moves(adjacency, others, seed) -> None:
     air = Air(adjacency, seed, sized_to=128)

@@ -1,7 +1,8 @@
 """Time synchronization: all nodes that hear the reference get its time, with an error within what they state."""
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from kit import examples
 
 from fanet_mw.scenario import Clock
 from fanet_mw.units import MS
@@ -16,7 +17,7 @@ clocks = st.builds(
 )
 
 
-@settings(max_examples=60)
+@examples(20)
 @given(clocks, st.integers(2, 14), st.integers(0, 10), st.integers(0, 10**6), st.sampled_from([0.0, 0.1, 0.3]))
 def test_on_any_connected_graph_all_are_within_the_bound_they_state(
     clock: Clock, count: int, extra: int, seed: int, loss: float
@@ -34,7 +35,7 @@ def test_on_any_connected_graph_all_are_within_the_bound_they_state(
             assert error_ns <= bound_ns < 50 * MS
 
 
-@settings(max_examples=20)
+@examples(10)
 @given(clocks, st.integers(0, 10**6))
 def test_the_same_seed_gives_the_same_times(clock: Clock, seed: int) -> None:
     links = connected(6, 3, seed)

@@ -3,7 +3,7 @@
 import math
 from itertools import pairwise
 
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
@@ -41,7 +41,6 @@ def senders_of(table: Timetable, turns: int) -> dict[int, list[NodeId]]:
     return found
 
 
-@settings(max_examples=100, deadline=None)
 @given(PLACES, GEOMETRIES, st.integers(1, 2), st.sampled_from([Effort(), Effort(pace=0.8, tries=3)]))
 @example(GRID, Geometry(250, 250, 150, 1), 1, Effort())  # turns are scarce: as many as can share each
 def test_of_those_who_share_a_turn_none_hears_another_and_who_was_deaf_is_silent_in_the_next(
@@ -61,7 +60,6 @@ def test_of_those_who_share_a_turn_none_hears_another_and_who_was_deaf_is_silent
             assert heard <= 1, "it would still wait for EIFS"
 
 
-@settings(max_examples=100, deadline=None)
 @given(PLACES, GEOMETRIES, st.sampled_from([Effort(), Effort(pace=0.8, tries=3)]), st.booleans())
 @example(places=GRID, geometry=Geometry(250, 250, 150, 1), effort=Effort(), by_heads=False)
 @example(places=GRID, geometry=Geometry(250, 400, 260, 2), effort=Effort(), by_heads=False)

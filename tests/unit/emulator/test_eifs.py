@@ -5,9 +5,9 @@ The timelines are those that `tests/ns3/eifs_timelines.py` puts before a live ns
 
 import pytest
 from hand_driven import Air, statuses
+from kit import MakeScenario
 
 from fanet_mw.units import US
-from tests.conftest import MakeScenario
 from tests.ns3.eifs_timelines import DIFS_US, LISTENER, PLACES_M, TIMELINES, Timeline, asked_of
 
 Access = str | list[str]

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
+from kit import examples
 
 from emulator.channel.error_rate import log_success_per_bit
 from emulator.channel.spatial import neighbors
@@ -105,7 +106,7 @@ LOADS = st.tuples(
 )  # fmt: skip
 
 
-@settings(max_examples=300)
+@examples(100)
 @given(LOADS)
 @example((3830, 9, "range", "ns3"))  # a remaining backoff shorter than the DIFS that a fresh frame waits
 @example((191, 3, "log_distance", "standard"))  # the last frame ends at a station that cannot hear it
@@ -130,7 +131,7 @@ def test_all_books_close_and_the_air_falls_silent(load: tuple[int, int, str, str
         assert (rows[row] == -1).all(), "nobody waits for anything"
 
 
-@settings(max_examples=15)
+@examples(8)
 @given(LOADS)
 def test_waking_more_often_than_asked_changes_nothing(load: tuple[int, int, str, str]) -> None:
     seed, count, channel, access = load
@@ -148,12 +149,12 @@ def test_the_same_source_uncompiled_gives_the_same_air() -> None:
     if not jit.COMPILED:
         pytest.skip("numba is not installed")
     program = (
-        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "import sys; sys.path[:0] = sys.argv[1:]\n"
         "import test_emulator_kernel as t\n"
         "print(t.fingerprint(), t.jit.COMPILED)"
     )
     environment = {**os.environ, "FANET_NO_NUMBA": "1"}
-    command = [sys.executable, "-c", program, str(Path(__file__).parent)]
+    command = [sys.executable, "-c", program, str(Path(__file__).parent), str(Path(__file__).parents[2])]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True, timeout=60)
     assert done.stdout.split() == [fingerprint(), "False"]
 
@@ -182,7 +183,7 @@ def test_a_change_in_any_compiled_source_changes_where_its_machine_code_is_kept(
     assert jit._fingerprint(tmp_path) != before
 
 
-@settings(max_examples=60)
+@examples(20)
 @given(st.integers(0, 10_000), st.integers(1, 60), st.floats(10, 2000))
 def test_neighbors_are_all_pairs_within_reach_in_order_of_ids(seed: int, count: int, reach: float) -> None:
     rng = stream(seed, "places")

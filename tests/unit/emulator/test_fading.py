@@ -6,8 +6,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from hand_driven import Air, receptions
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from kit import examples
 from test_emulator_kernel import Output, medium, run
 
 from emulator.channel.fading import RICIAN, law_of
@@ -75,7 +76,7 @@ FULL = {
 }  # fmt: skip
 
 
-@settings(max_examples=40)
+@examples(12)
 @given(st.integers(0, 10_000), st.integers(2, 12), st.sampled_from(["rician", "nakagami"]), st.booleans())
 def test_all_books_close_with_everything_on(seed: int, count: int, fading: str, ofdm: bool) -> None:
     keys = {**FULL, "fading": fading}
@@ -106,7 +107,7 @@ def test_fading_without_powers_is_refused(make_scenario: MakeScenario) -> None:
         make_scenario(**{"radio.fading": "rician"})
 
 
-@settings(max_examples=20)
+@examples(10)
 @given(st.integers(0, 10_000), st.booleans())
 def test_books_close_when_faults_lie_on_links_that_fade(seed: int, capture: bool) -> None:
     count = 6

@@ -7,9 +7,9 @@ for its preamble, far too little for its 8,704 bits.
 
 import pytest
 from hand_driven import Air, receptions, statuses
+from kit import MakeScenario
 
 from fanet_mw.units import MS, US
-from tests.conftest import MakeScenario
 
 FRAME_NS, DIFS_NS, SLOT_NS = 984 * US, 50 * US, 20 * US
 WEAK_NS = 944

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from kit import examples
 
 from emulator.channel.path_loss import (
     ENVIRONMENTS,
@@ -110,7 +111,7 @@ def test_two_uavs_are_air_to_air_and_a_station_on_the_ground_is_not() -> None:
     assert found[0, 2] == pytest.approx(30 - at_1_m - 20 * math.log10(49) - 1.0, abs=0.01), "overhead: seen"
 
 
-@settings(max_examples=60)
+@examples(20)
 @given(st.integers(0, 10_000), st.sampled_from(CHANNELS), st.sampled_from([0.0, 6.0]))
 def test_every_link_is_symmetric_above_the_floor_and_none_above_it_is_missing(
     seed: int, channel: str, shadowing_db: float

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from kit import MakeScenario
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
@@ -15,7 +16,6 @@ from sim.report import mission_pictures, run_pictures, run_rows
 from sim.report.run_records import RunRecords, agents
 from sim.results.mission import mission
 from sim.run.virtual import simulate
-from tests.conftest import MakeScenario
 
 SEARCH = {
     "nodes.count": 2, "world.area_m": 400, "mission.survivors": 2, "mission.survivor_positions_m": [[0, 100], [50, 0]],

@@ -1,13 +1,13 @@
 """Checks of routing headers: each statement that cannot be true, at its bound and one beyond."""
 
 import pytest
+from kit import MakeScenario
 
 from fanet_mw import wire
 from fanet_mw.errors import DropReason
 from fanet_mw.node.header_check import CONTROL, HeaderCheck
 from fanet_mw.units import BROADCAST, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Header, Kind
-from tests.conftest import MakeScenario
 
 OURS, NEIGHBOR, FAR = NodeId(2), NodeId(3), NodeId(4)
 NOW_NS = 50 * S

@@ -1,6 +1,7 @@
 """How a node treats a frame before its protocol sees it: duplicate, expired, for this node, several packets in one."""
 
 import pytest
+from kit import MakeScenario
 
 from fanet_mw import wire
 from fanet_mw.bus.messages import Reception, TxOutcome, TxStatus
@@ -13,7 +14,6 @@ from fanet_mw.routing import make_protocol
 from fanet_mw.trace import Delivered, Dropped
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, PRIORITY_BULK, PRIORITY_REPORT, Header, Kind, filler
-from tests.conftest import MakeScenario
 
 OURS, THEIRS, ANOTHER = NodeId(2), NodeId(3), NodeId(4)
 PLAIN = Header(0, 7, THEIRS, BROADCAST, THEIRS, Kind.DATA, 8, 0, PRIORITY_BULK, FLAG_FLOOD)

@@ -7,8 +7,9 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from kit import examples
 
 from agents.mission.finding.calibration import common_offset, likelihood
 from agents.mission.finding.known_survivors import KnownSurvivors
@@ -129,7 +130,7 @@ def test_many_powers_of_one_phone_are_one_draw_of_the_population() -> None:
 
 
 @given(st.permutations(range(1, 5)))
-@settings(max_examples=10)
+@examples(6)
 def test_the_order_in_which_survivors_are_confirmed_does_not_matter(order: list[int]) -> None:
     offsets = set()
     for told in (range(1, 5), order):
@@ -146,7 +147,7 @@ def test_the_order_in_which_survivors_are_confirmed_does_not_matter(order: list[
 
 
 @given(st.floats(-8, 8), st.integers(0, 10**6))
-@settings(max_examples=15)
+@examples(8)
 def test_the_estimate_converges_to_what_is_common_to_all_phones(offset_db: float, seed: int) -> None:
     offset = swarm(10, offset_db=offset_db, drawn=random.Random(seed)).offset
     assert abs(offset.mean_db - offset_db) < 2.0
@@ -159,7 +160,7 @@ forged = st.lists(st.tuples(st.integers(1, 3), positions, powers_dbm), max_size=
 
 
 @given(st.lists(forged, max_size=5))
-@settings(max_examples=20)
+@examples(10)
 def test_no_powers_at_all_drive_it_beyond_its_bound(phones: list[list[tuple[int, Enu, float]]]) -> None:
     survivors = KnownSurvivors(MODEL)
     for survivor, powers in enumerate(phones, start=1):
@@ -171,7 +172,7 @@ def test_no_powers_at_all_drive_it_beyond_its_bound(phones: list[list[tuple[int,
 
 
 @given(forged, st.floats(-MOST_DBM, MOST_DBM))
-@settings(max_examples=20)
+@examples(10)
 def test_one_phone_whose_powers_are_forged_does_not_outweigh_four_that_are_true(
     powers: list[tuple[int, Enu, float]], near_dbm: float
 ) -> None:

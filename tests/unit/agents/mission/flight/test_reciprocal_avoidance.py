@@ -2,8 +2,9 @@
 
 import math
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from kit import examples
 from search_board import OPEN, UP_M
 
 from agents.mission.flight.reciprocal_avoidance import ReciprocalAvoidance, avoidance_plane
@@ -31,7 +32,7 @@ def test_a_velocity_that_obeys_every_constraint_is_found_where_standing_still_ob
     assert all(east * plane.east + north * plane.north >= plane.least - 1e-6 for plane in constraints)
 
 
-@settings(max_examples=30)
+@examples(10)
 @given(st.floats(-30, 30), st.floats(0, 6.28), st.floats(4, 10))
 def test_two_that_both_avoid_never_come_nearer_than_the_clearance(aside_m: float, angle: float, speed: float) -> None:
     at = [

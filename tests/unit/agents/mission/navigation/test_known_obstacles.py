@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from kit import examples
 
 from agents.mission.navigation.half_planes import nearest
 from agents.mission.navigation.known_obstacles import KnownObstacles
@@ -109,7 +110,7 @@ boxes = st.builds(
 )
 
 
-@settings(max_examples=20, deadline=None)
+@examples(10)
 @given(st.lists(boxes, min_size=1, max_size=5))
 def test_whatever_stands_there_nobody_hits_it(buildings: list[Building]) -> None:
     start, goal = Enu(-120, 0, 60), Enu(120, 0, 60)

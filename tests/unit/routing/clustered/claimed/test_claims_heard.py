@@ -1,6 +1,7 @@
 """How a node treats claims in hellos: impossible ones, claims about third nodes, and how many lots a rival has."""
 
 import pytest
+from kit import MakeScenario
 
 from fanet_mw import wire
 from fanet_mw.bus.messages import Reception
@@ -15,7 +16,6 @@ from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 from fanet_mw.wire import Header, Kind
 from fanet_mw.wire.claims import Claims, SlotStatus
 from fanet_mw.wire.clusters import Beacon, Role
-from tests.conftest import MakeScenario
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
 """A packet that waits for a way to a head, and its lifetime."""
 
 import pytest
+from kit import MakeScenario
 
 from fanet_mw import wire
 from fanet_mw.bus.messages import Reception, TxOutcome, TxStatus
@@ -11,7 +12,6 @@ from fanet_mw.trace import Dropped
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
 from fanet_mw.wire import FLAG_TO_HEAD, PRIORITY_BULK, PRIORITY_REPORT, Header, Kind, filler
 from fanet_mw.wire.clusters import Beacon, Role
-from tests.conftest import MakeScenario
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
 """When a node sends a position update: range 250 m, so 25 m off; at least 5 s apart; after 20 s at the latest."""
 
 import pytest
+from kit import MakeScenario
 
 from fanet_mw.motion import Motion
 from fanet_mw.node.node import Node
@@ -8,7 +9,6 @@ from fanet_mw.routing import make_protocol
 from fanet_mw.routing.clustered.roles.joining import Joining
 from fanet_mw.routing.clustered.roles.position_updates import PositionUpdates, lost_ns
 from fanet_mw.units import MS, Enu, NodeId, S
-from tests.conftest import MakeScenario
 
 HERE, STILL = Enu(0.0, 0.0, 50.0), Enu(0.0, 0.0, 0.0)
 

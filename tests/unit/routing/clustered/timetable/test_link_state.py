@@ -3,8 +3,9 @@
 import math
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
+from kit import examples
 
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.routing.clustered.timetable.delivery_odds import odds
@@ -180,7 +181,7 @@ def planned(links: tuple[Link, ...], *, epsilon: float = 0.05) -> Timetable | No
     return None if found is None else found[0]
 
 
-@settings(max_examples=25, deadline=None)
+@examples(12)
 @given(measured())
 def test_every_node_gets_its_dose_from_holders_undisturbed(links: tuple[Link, ...]) -> None:
     table = planned(links)
@@ -217,7 +218,7 @@ def test_every_node_gets_its_dose_from_holders_undisturbed(links: tuple[Link, ..
         assert len(ready) == len(GRID)
 
 
-@settings(max_examples=25, deadline=None)
+@examples(12)
 @st.composite
 def any_network(draw: st.DrawFn) -> tuple[int, tuple[Link, ...], int]:
     """A few nodes, links of any quality between any of them, and so many turns."""
@@ -231,7 +232,6 @@ def any_network(draw: st.DrawFn) -> tuple[int, tuple[Link, ...], int]:
     )
 
 
-@settings(max_examples=100, deadline=None)
 @example(
     (4, tuple(Link(NodeId(a), NodeId(b), grade, power) for a, b, grade, power in [
         (1, 2, 10, -75), (1, 3, 120, -60), (1, 4, 30, -95), (2, 3, 60, -95), (2, 4, 120, -85), (3, 4, 30, -85),

@@ -6,6 +6,7 @@ The reference page, the comments that `fanet init` writes, and the completion of
 import json
 import re
 from collections.abc import Iterator, Mapping
+from functools import cache
 from typing import Any, Final, NamedTuple
 
 from fanet_mw.scenario.model import Scenario
@@ -61,10 +62,11 @@ def json_schema() -> dict[str, Any]:
     }
 
 
-def tables() -> list[KeyTable]:
+@cache
+def tables() -> tuple[KeyTable, ...]:
     """All tables of a scenario file; the keys before all tables come first."""
     schema = json_schema()
-    return list(_tables("", schema, schema["$defs"], meaning="One file is one scenario.", repeated=False))
+    return tuple(_tables("", schema, schema["$defs"], meaning="One file is one scenario.", repeated=False))
 
 
 def dotted_keys() -> list[str]:

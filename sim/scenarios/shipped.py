@@ -2,6 +2,7 @@
 
 import difflib
 import tomllib
+from functools import cache
 from importlib.resources import files
 from typing import NamedTuple
 
@@ -16,14 +17,15 @@ class Entry(NamedTuple):
     text: str
 
 
-def shipped() -> list[Entry]:
-    """All shipped scenarios, by name."""
+@cache
+def shipped() -> tuple[Entry, ...]:
+    """All shipped scenarios, by name. They are read once: reading them takes longer than all else about finding one."""
     entries = []
     for item in sorted(files("sim.scenarios").iterdir(), key=lambda item: item.name):
         if item.name.endswith(".toml"):
             text = item.read_text(encoding="utf-8")
             entries.append(Entry(item.name.removesuffix(".toml"), tomllib.loads(text).get("description", ""), text))
-    return entries
+    return tuple(entries)
 
 
 def entry(name: str) -> Entry:

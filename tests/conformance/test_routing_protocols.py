@@ -35,9 +35,10 @@ heads collide there: 0.90 to 1.00 over ten seeds, 0.96 on average, without repai
 
 def scenario_of(protocol: str, *, destination: int | str, moving: bool = False) -> Scenario:
     """Nine nodes, 3 x 3, 200 m apart: everyone sends once a second."""
+    times = {"duration_s": 30, "warmup_s": 18, "drain_s": 4} if moving else {}
     return config.build(
         {
-            "name": "small", "duration_s": 45, "warmup_s": 25, "drain_s": 8,
+            "name": "small", "duration_s": 45, "warmup_s": 25, "drain_s": 8, **times,
             "nodes": {"count": 9, "layout": "grid", "columns": 3, "telemetry_hz": 0},
             "traffic": {"destination": destination, "payload_bytes": 300},
             "routing": {"protocol": protocol},
@@ -59,14 +60,22 @@ def run(protocol: str, destination: int | str, *, moving: bool = False) -> tuple
     return outcome, finish(outcome, out=None)
 
 
-@pytest.mark.parametrize("moving", [False, True], ids=["still", "moving"])
-@pytest.mark.parametrize("destination", [1, "all"])
-@pytest.mark.parametrize("protocol", sorted(PROTOCOLS))
+RUNS = [
+    pytest.param(
+        protocol, destination, moving,
+        marks=[pytest.mark.slow] if protocol in ROUTED and destination == "all" and moving else [],
+    )
+    for protocol in sorted(PROTOCOLS) for destination in (1, "all") for moving in (False, True)
+]  # fmt: skip
+"""The routed ones flood what is for all as `flooding` does: moving, too, in the long run alone."""
+
+
+@pytest.mark.parametrize(("protocol", "destination", "moving"), RUNS)
 def test_the_ledger_closes(protocol: str, destination: int | str, moving: bool) -> None:
     _, summary = run(protocol, destination, moving=moving)
     assert summary["frames"]["closes"]
     assert summary["frames"]["sent"] > 0
-    assert summary["generated"] > 90
+    assert summary["generated"] > 60
 
 
 @pytest.mark.parametrize("destination", [1, "all"])
@@ -76,17 +85,15 @@ def test_a_connected_swarm_at_rest_gets_nearly_all(protocol: str, destination: i
     assert summary["pdr"] > LEAST.get(protocol, 0.93)
 
 
-@pytest.mark.parametrize("destination", [1, "all"])
-@pytest.mark.parametrize("protocol", sorted(PROTOCOLS))
+@pytest.mark.parametrize(("protocol", "destination", "moving"), RUNS)
 def test_nothing_is_delivered_twice_to_its_origin_or_to_whom_it_is_not_for(
-    protocol: str, destination: int | str
+    protocol: str, destination: int | str, moving: bool
 ) -> None:
-    for moving in (False, True):
-        outcome, _ = run(protocol, destination, moving=moving)
-        delivered = [record for record in outcome.records if isinstance(record, Delivered)]
-        assert len({(r.node, r.origin, r.seq) for r in delivered}) == len(delivered)
-        assert all(r.node != r.origin for r in delivered)
-        assert destination == "all" or {r.node for r in delivered} <= {destination}
+    outcome, _ = run(protocol, destination, moving=moving)
+    delivered = [record for record in outcome.records if isinstance(record, Delivered)]
+    assert len({(r.node, r.origin, r.seq) for r in delivered}) == len(delivered)
+    assert all(r.node != r.origin for r in delivered)
+    assert destination == "all" or {r.node for r in delivered} <= {destination}
 
 
 @pytest.mark.parametrize("protocol", ROUTED)
@@ -125,14 +132,18 @@ def transmissions(scenario: Scenario) -> Counter[tuple[int, int, int]]:
 @pytest.mark.parametrize("protocol", [name for name in ROUTED if name != "geographic"])
 def test_no_packet_passes_a_node_twice(protocol: str) -> None:
     sent = transmissions(scenario_of(protocol, destination=1, moving=True))
-    assert len(sent) > 60
+    assert len(sent) > 40
     assert max(sent.values()) == 1
 
 
 @pytest.mark.parametrize("protocol", sorted(PROTOCOLS))
 def test_the_same_seed_gives_the_same_trace(protocol: str) -> None:
-    again = finish(simulate(scenario_of(protocol, destination=1, moving=True)), out=None)
-    assert again["trace_sha256"] == run(protocol, 1, moving=True)[1]["trace_sha256"]
+    short = scenario_of(protocol, destination=1, moving=True).model_copy(
+        update={"duration_s": 9.0, "warmup_s": 3.0, "drain_s": 1.0}
+    )
+    first, again = (finish(simulate(short), out=None) for _ in range(2))
+    assert first["generated"] > 20
+    assert first["trace_sha256"] == again["trace_sha256"]
 
 
 # --- hostile input --------------------------------------------------------------------------------------------------

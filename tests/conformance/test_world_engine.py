@@ -20,7 +20,15 @@ from sim.world.sensors.phone import PhoneSensor
 FAR_AWAY = Obstacles(hills=None, boxes=(Box(400, 400, 30, 30, 60),))
 
 
-@pytest.fixture(params=["kinematic", "pybullet", "pybullet with a building", "rotors", "crazyflies"])
+@pytest.fixture(
+    params=[
+        "kinematic",
+        "pybullet",
+        "pybullet with a building",
+        "rotors",
+        pytest.param("crazyflies", marks=pytest.mark.slow),
+    ]
+)
 def engine(request: pytest.FixtureRequest) -> Iterator[Engine]:
     made: Engine
     if request.param == "kinematic":

@@ -150,7 +150,7 @@ def test_who_transmits_in_another_s_name_is_refused() -> None:
 # --- time ----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", [2, 3, 5])
+@pytest.mark.parametrize("seed", [2, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (3, 5))])
 def test_time_beacons_from_the_start_do_not_pull_the_swarm_s_time_apart(seed: int) -> None:
     summary, _ = attacked(scenario(*CLOCKS, f"seed={seed}"), false_time())
     assert summary["clock"]["error_us"]["max"] < 40

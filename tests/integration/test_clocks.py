@@ -25,8 +25,8 @@ from sim.scenarios import catalog
 from sim.world.mobility.layout import positions
 
 GRID = [
-    "nodes.count=15", "traffic.sources=14", "clusters.count=14", "clusters.turn_slack_us=400", "duration_s=60",
-    "warmup_s=45", "clock.drift_ppm=20",
+    "nodes.count=15", "traffic.sources=14", "clusters.count=14", "clusters.turn_slack_us=400", "duration_s=44",
+    "warmup_s=34", "clock.drift_ppm=20",
 ]  # fmt: skip
 
 IN_STEP = ("clock.drift_ppm=0", "clock.offset_ms=1", "clusters.turn_slack_us=2020", "duration_s=25", "warmup_s=10")

@@ -41,7 +41,7 @@ def test_over_lossy_links_a_plan_promises_a_likely_delay_and_no_bound(loss: str)
     assert feasible
     assert "at most" not in text
     assert "0.99 of the nodes have a packet within" in text
-    flown = simulate(catalog.find("clusters", [*SMALL, loss, "duration_s=45", "warmup_s=24", "drain_s=8"]))
+    flown = simulate(catalog.find("clusters", [*SMALL, loss, "duration_s=40", "warmup_s=24", "drain_s=8"]))
     born = {(r.node, r.seq): r.t_ns for r in flown.records if isinstance(r, Generated)}
     delays = [r.t_ns - born[r.origin, r.seq] for r in flown.records if isinstance(r, Delivered)]
     assert sum(delay_ns <= plan["likely_ms"] * MS for delay_ns in delays) >= 0.99 * 11 * len(born)

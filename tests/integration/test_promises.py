@@ -8,7 +8,7 @@ from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 
-GRID = ["nodes.count=15", "clusters.count=14", "traffic.sources=14", "traffic.interval_s=0.5", "duration_s=30"]
+GRID = ["nodes.count=15", "clusters.count=14", "traffic.sources=14", "traffic.interval_s=0.5", "duration_s=24"]
 
 
 def summary_of(*settings: str) -> dict[str, Any]:
@@ -51,7 +51,7 @@ def test_bounds_hold_the_lead_and_the_handover(handover_ms: int) -> None:
 
 def test_new_timetables_break_no_promise() -> None:
     """A swarm that moves gets another timetable every few seconds, while packets are promised all the time."""
-    keys = ('mobility.model="random_waypoint"', "mobility.speed_m_s=5", "clusters.reassign_s=2", "duration_s=50")
+    keys = ('mobility.model="random_waypoint"', "mobility.speed_m_s=5", "clusters.reassign_s=2", "duration_s=36")
     bound = summary_of(*keys)["bound"]
     assert bound["violations"] == 0
     assert bound["deliveries"] > 1000

@@ -22,7 +22,7 @@ from sim.run.virtual import simulate
 from sim.scenarios import catalog
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", [0, *range(2, 8)])  # 1 takes ten times as long as another, and is in the long run
 def test_a_random_valid_scenario_ends_wakes_within_bounds_and_its_ledger_closes(seed: int) -> None:
     assert scenario_draws.check(seed, limit_s=60) == ""
 
@@ -48,9 +48,10 @@ SATURATED = (
     "nodes.count=5",
     "clusters.count=1",
     "traffic.arrivals=saturated",
+    "world.engine=kinematic",
     "warmup_s=0",
     "drain_s=0",
-    "duration_s=3",
+    "duration_s=1.5",
 )
 
 
@@ -69,7 +70,7 @@ def test_a_saturated_source_whose_radio_refuses_everything_does_not_offer_withou
     found = catalog.find("quick", [*SATURATED, f"routing.protocol={protocol}", *keys])
     summary = scenario_draws.run(found, limit_s=60)
     assert summary["frames"]["closes"], summary["frames"]
-    assert summary["generated"] < 40_000
+    assert summary["generated"] < 20_000
 
 
 @pytest.mark.parametrize("destination", ["all", "1"])
@@ -104,7 +105,8 @@ def test_the_densest_traffic_that_a_scenario_may_ask_for_is_carried_or_counted()
 ])  # fmt: skip
 def test_a_swarm_whose_largest_messages_just_fit_a_frame_works(keys: Sequence[str]) -> None:
     size = (
-        "nodes.count=30", "nodes.spacing_m=50", "traffic.payload_bytes=128", "duration_s=5", "warmup_s=2", "drain_s=1",
+        "nodes.count=30", "nodes.spacing_m=50", "traffic.payload_bytes=128", "traffic.interval_s=2", "duration_s=5",
+        "warmup_s=2", "drain_s=1", "world.engine=kinematic", "mission.survivors=0",
     )  # fmt: skip
     summary = scenario_draws.run(catalog.find("quick", [*size, *keys]), limit_s=60)
     assert summary["frames"]["closes"]

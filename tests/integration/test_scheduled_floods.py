@@ -8,7 +8,7 @@ from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 
-SHORT = ["duration_s=19", "warmup_s=11"]
+SHORT = ["duration_s=13", "warmup_s=9.5"]
 
 
 def summary_of(*settings: str) -> dict[str, Any]:
@@ -21,14 +21,14 @@ def test_on_the_grid_every_packet_reaches_everyone_within_the_bound(period_s: fl
     assert summary["pdr"] >= 0.999
     bound = summary["bound"]
     assert bound["violations"] == 0
-    assert bound["classes"]["traffic"]["deliveries"] > 7_000
+    assert bound["classes"]["traffic"]["deliveries"] > 2_500
     assert 0.8 < bound["observed_max_ms"] / bound["worst_ms"] <= 1
     assert summary["frames"]["closes"]
 
 
 def test_a_swarm_that_was_silent_for_a_minute_has_lost_nobody() -> None:
     """All 45 nodes must tell at once that they live; in seed 2 the first words of three of them got lost."""
-    summary = summary_of("duration_s=54", "warmup_s=50", "seed=2")
+    summary = summary_of("duration_s=52.5", "warmup_s=49", "seed=2")
     assert summary["pdr"] >= 0.999
     assert summary["bound"]["within_share"] >= 0.999
     assert summary["bound"]["violations"] == 0
@@ -56,7 +56,12 @@ def test_floods_that_reach_into_the_next_superframe_keep_their_bound() -> None:
 
 def test_more_than_fits_is_carried_as_far_as_it_fits_and_has_no_bound() -> None:
     summary = summary_of(
-        "nodes.count=9", "clusters.count=8", "traffic.sources=8", "traffic.interval_s=0.01", "duration_s=16"
+        "nodes.count=9",
+        "clusters.count=8",
+        "traffic.sources=8",
+        "traffic.interval_s=0.01",
+        "duration_s=12",
+        "drain_s=0.3",
     )
     assert summary["bound"] == {}
     assert 0.2 < summary["pdr"] < 0.95
@@ -68,11 +73,11 @@ def test_members_of_a_cluster_keep_a_bound_too(clusters: int) -> None:
     summary = summary_of(f"clusters.count={clusters}")
     assert summary["pdr"] >= 0.999
     assert summary["bound"]["violations"] == 0
-    assert summary["bound"]["classes"]["traffic"]["deliveries"] > 7_000, "every member states one"
+    assert summary["bound"]["classes"]["traffic"]["deliveries"] > 2_500, "every member states one"
 
 
 def test_packets_share_frames_when_turns_are_scarce_and_keep_their_bound() -> None:
-    few = ("nodes.count=9", "clusters.count=8", "traffic.sources=8", "duration_s=16")
+    few = ("nodes.count=9", "clusters.count=8", "traffic.sources=8", "duration_s=15")
     summary = summary_of(*few, "traffic.interval_s=0.025")
     assert summary["pdr"] >= 0.999
     assert summary["bound"]["violations"] == 0

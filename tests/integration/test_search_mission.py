@@ -24,6 +24,9 @@ KEYS: Final = (
     "traffic.arrivals=none", "clusters.count=2", "clusters.flooding_period_s=1", "seed=1",
 )  # fmt: skip
 
+FEW: Final = ("nodes.count=3", "clusters.count=1", "traffic.sources=2", "world.area_m=300", "mission.search=spiral")
+"""The same with three UAVs over less ground."""
+
 
 class Around(Actor):
     """One UAV, and something between it and the bus; its output is its own."""
@@ -105,12 +108,15 @@ class Told(Around):
         return self._inner.receive(topic, message, now_ns)
 
 
-def test_a_whole_mission_goes_as_it_does_when_the_worlds_truth_is_poisoned_for_every_uav() -> None:
+@pytest.mark.parametrize(("keys", "seconds"), [(FEW, 60), pytest.param((), 40, marks=pytest.mark.slow)])
+def test_a_whole_mission_goes_as_it_does_when_the_worlds_truth_is_poisoned_for_every_uav(
+    keys: Sequence[str], seconds: int
+) -> None:
     clean, poisoned = (
-        flown(lambda uav, names, lie=lie: Told(uav, names, poisoned=lie), seconds=40)  # type: ignore[misc]
+        flown(lambda uav, names, lie=lie: Told(uav, names, poisoned=lie), seconds=seconds, keys=keys)  # type: ignore[misc]
         for lie in (False, True)
     )
-    assert sum(isinstance(record, Confirmed) for record in poisoned.records) >= 2
+    assert sum(isinstance(record, Confirmed) for record in poisoned.records) >= 1
     assert list(poisoned.records) == list(clean.records)
     refused = [report["bus_malformed"] for name, report in poisoned.reports.items() if name.startswith("agent-")]
     assert min(refused) > 100, "every UAV was told, and took in nothing"  # type: ignore[type-var]
@@ -137,17 +143,15 @@ def test_a_shipped_flight_goes_as_it_does_when_the_worlds_truth_is_poisoned(name
 
 
 def test_three_uavs_confirm_by_a_spiral_what_lines_would_need_twelve_for() -> None:
-    few = ["nodes.count=3", "clusters.count=1", "traffic.sources=2", "world.area_m=300", "mission.search=spiral"]
-    found = mission_of(simulate(find("rescue", [*KEYS, *few, "duration_s=110"])))
+    found = mission_of(simulate(find("rescue", [*KEYS, *FEW, "duration_s=110"])))
     assert found["coverage"] == found["connected"] == 1.0
     assert found["confirmed"] == found["survivors"]
     assert not found["mistaken"] + found["collisions"]
 
 
 def test_a_survivor_in_the_open_is_confirmed_by_voice_alone_from_a_uav_that_goes_down_to_listen() -> None:
-    few = ["nodes.count=3", "clusters.count=1", "traffic.sources=2", "world.area_m=300", "mission.search=spiral"]
     by_ear = ["sensors.camera_hz=0", "sensors.voice_hz=2", "duration_s=140"]
-    outcome = simulate(find("rescue", [*KEYS, *few, *by_ear]))
+    outcome = simulate(find("rescue", [*KEYS, *FEW, *by_ear]))
     found = mission_of(outcome)
     assert found["confirmed"] >= 1
     assert not found["mistaken"] + found["collisions"]

@@ -15,6 +15,7 @@ from fanet_mw import wire
 from fanet_mw.bus.messages import TxRequest
 from fanet_mw.errors import DropReason
 from fanet_mw.node.duplicates import PHASES, DuplicateSet, hash_of
+from fanet_mw.node.hop_limit import after_hop
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.node.packet_numbering import PacketNumbering
 from fanet_mw.node.packet_watch import PacketWatch
@@ -80,11 +81,8 @@ class NodePort:
         self._share([(start_ns, self.forwarded(packet, flags=wire.FLAG_FLOOD)) for packet, start_ns in relays])
 
     def forwarded(self, packet: Packet, *, flags: int) -> bytes:
-        header = packet.header
-        hops = header.hops
-        if hops < wire.MOST_HOPS:  # a hostile frame may come with the greatest hop count
-            hops += 1
-        return wire.rewrite(packet.frame, self.node, header.hop_limit - 1, hops, flags)
+        hop_limit, hops = after_hop(packet.header)
+        return wire.rewrite(packet.frame, self.node, hop_limit, hops, flags)
 
     def _begun(self, packet: Packet, flags: int) -> bytes:
         """The bytes of a packet whose phase begins here: an own packet as it is, another node's with one more hop."""

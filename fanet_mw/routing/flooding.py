@@ -11,6 +11,7 @@ from typing import ClassVar
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port, RoutingProtocol
+from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.units import BROADCAST
 from fanet_mw.wire import FLAG_FLOOD
@@ -35,7 +36,7 @@ class FloodingProtocol(RoutingProtocol):
         header = packet.header
         if header.destination == self._port.node:
             return ()  # the packet has reached its destination
-        if header.hop_limit <= 1:
+        if is_used_up(header):
             self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
             return ()
         return self._consider(packet, now_ns=now_ns)

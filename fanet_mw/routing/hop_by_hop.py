@@ -16,6 +16,7 @@ from typing import ClassVar, Final
 from fanet_mw.bus.messages import Reception, TxOutcome, TxStatus
 from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.node.contract import Port, RoutingProtocol
+from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.routing.address_resolution import Knowledge, Outgoing, Resolver
@@ -128,7 +129,7 @@ class HopByHop(RoutingProtocol):
             self._on_arrival(packet, reception, now_ns=now_ns)
         elif header.destination == BROADCAST:
             self._flood(packet, reception, now_ns=now_ns)
-        elif header.hop_limit <= 1:
+        elif is_used_up(header):
             self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
         else:
             self._route_transit(packet, reception, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
@@ -221,7 +222,7 @@ class HopByHop(RoutingProtocol):
     def _flood(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         if not self._relays(packet, reception, now_ns=now_ns):
             return
-        if packet.header.hop_limit <= 1:
+        if is_used_up(packet.header):
             self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
             return
         frame = self._port.forwarded(packet, flags=0)

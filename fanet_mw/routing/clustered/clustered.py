@@ -16,6 +16,7 @@ from typing import Final, NamedTuple
 from fanet_mw.bus.messages import Reception, TxOutcome, TxStatus
 from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.node.contract import Port, RoutingProtocol
+from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.neighbors import Neighbor, Neighbors
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.node.reader import decoded
@@ -94,7 +95,7 @@ class Clustered(RoutingProtocol):
 
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> Sequence[Relay]:
         parts, header = self.parts, packet.header
-        origin_us, seq, origin, _, _, kind, hop_limit, _, _, flags = header
+        origin_us, seq, origin, _, _, kind, _, _, _, flags = header
         parts.roles.on_sign_of_life(origin, born_ns=origin_us * US, now_ns=now_ns)
         if parts.loads is not None and kind == _DATA:
             parts.loads.on_packet(origin, seq, born_ns=origin_us * US, now_ns=now_ns)
@@ -103,7 +104,7 @@ class Clustered(RoutingProtocol):
             at_once = kind != _DATA and parts.roles.on_control(packet, reception.src, now_ns=now_ns)
             return parts.relaying.on_flood(packet, reception, at_once=at_once, now_ns=now_ns)
         if flags & FLAG_TO_HEAD:
-            if hop_limit <= 1:
+            if is_used_up(header):
                 self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
             else:
                 parts.access.forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)

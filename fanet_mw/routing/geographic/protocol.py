@@ -19,6 +19,7 @@ from typing import ClassVar, Final
 from fanet_mw.bus.messages import Reception, TxOutcome
 from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.node.contract import Port
+from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.address_resolution import Outgoing
 from fanet_mw.routing.geographic.locations import HELLO_INTERVAL_NS, LocationTable
@@ -151,7 +152,7 @@ class Geographic(HopByHop):
                 return
         else:
             raise MalformedFrameError(f"geographic message {number}")
-        if packet.header.hop_limit > 1 and packet.origin != self._port.node:
+        if packet.origin != self._port.node and not is_used_up(packet.header):
             self.control_sent += 1
             frame = self._port.forwarded(packet, flags=0)
             self._port.transmit(frame, BROADCAST, start_ns=self._jittered(now_ns, self._jitter_ns))

@@ -18,6 +18,7 @@ from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.graph.multipoint_relays import multipoint_relays
 from fanet_mw.node.contract import Port
+from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.routing.hop_by_hop import HopByHop
@@ -117,7 +118,7 @@ class Olsr(HopByHop):
             self._port.forget(packet)  # this copy does not count as received: a symmetric neighbor may still bring one
             return
         self._state.on_tc(packet.origin, tc, now_ns=now_ns)
-        if packet.header.hop_limit > 1 and self._state.is_selector(sender, now_ns=now_ns):
+        if not is_used_up(packet.header) and self._state.is_selector(sender, now_ns=now_ns):
             self.control_sent += 1
             frame = self._port.forwarded(packet, flags=0)
             self._port.transmit(frame, BROADCAST, start_ns=self._jittered(now_ns, p.MAXJITTER_NS))

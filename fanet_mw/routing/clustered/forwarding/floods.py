@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from fanet_mw.node.contract import Port
+from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.forwarding.repair import Repair
 from fanet_mw.routing.clustered.tdma.contention import Contention
@@ -68,7 +69,7 @@ class Floods:
 
     def _goes_on(self, packet: Packet) -> bool:
         """True if a packet may travel farther hops; if not, this node still counts it as flooded."""
-        if packet.header.origin == self._port.node or packet.header.hop_limit > 1:
+        if packet.header.origin == self._port.node or not is_used_up(packet.header):
             return True
         self._port.mark(packet, flags=FLAG_FLOOD)
         return False

@@ -6,6 +6,7 @@ from typing import Final
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port
+from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.clustered.claimed.claimed_access import ClaimedAccess
 from fanet_mw.routing.clustered.claimed.claiming import Claiming
@@ -32,7 +33,7 @@ class ClaimedRelaying:
         if header.kind != Kind.DATA:
             return self._otherwise.on_flood(packet, reception, at_once=at_once, now_ns=now_ns)
         if header.destination != self._port.node and self._claiming.relays(now_ns):
-            if header.hop_limit <= 1:
+            if is_used_up(header):
                 self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
             else:
                 self._access.let_out(packet, now_ns=now_ns)

@@ -6,6 +6,7 @@ from typing import Final
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port
+from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.clustered.relaying.rules import Rule
 from fanet_mw.routing.clustered.tdma.contention import Contention
@@ -34,7 +35,7 @@ class ContendingRelaying:
         header = packet.header
         if header.destination == self._port.node:
             return ()
-        if header.hop_limit <= 1:
+        if is_used_up(header):
             self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
             return ()
         if at_once:

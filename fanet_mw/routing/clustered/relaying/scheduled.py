@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port
+from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.clustered.contract import Relaying
 from fanet_mw.routing.clustered.tdma.turn_timing import turn_slack_ns
@@ -62,7 +63,7 @@ class ScheduledRelaying:
         """
         offset, root, instance = heard
         own = plan.mine.get((root, instance), ())
-        if not own or packet.header.hop_limit <= 1:
+        if not own or is_used_up(packet.header):
             return ()
         superframe_ns = (
             plan.turns.superframe_start_ns(heard_ns) - offset // plan.turns.per_superframe * plan.turns.period_ns

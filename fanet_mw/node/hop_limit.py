@@ -1,0 +1,21 @@
+"""The hop limit: how many more hops a packet may travel, so that none travels forever.
+
+    hop_limit    the hops that are left, as the frame states; the origin begins with `routing.hop_limit`
+    hops         the hops that the packet has made
+
+A packet that is heard with a hop limit of 1 has made its last hop: the node may deliver it, but passes it on to no one.
+The part that would have passed it on drops it by the reason `hop_limit`.
+"""
+
+from fanet_mw.wire import MOST_HOPS, Header
+
+
+def is_used_up(header: Header) -> bool:
+    """True if a packet that was heard with this header may not be passed on."""
+    return header.hop_limit <= 1
+
+
+def after_hop(header: Header) -> tuple[int, int]:
+    """The hops left, and the hops made, that the next frame of a packet states."""
+    hops = header.hops
+    return header.hop_limit - 1, hops + 1 if hops < MOST_HOPS else hops  # a hostile frame may state the greatest number

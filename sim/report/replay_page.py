@@ -8,7 +8,6 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 from importlib.resources import files
-from itertools import groupby
 from pathlib import Path
 from typing import Any, Final
 
@@ -33,7 +32,6 @@ from fanet_mw.trace import (
 )
 from fanet_mw.units import NodeId, S
 from sim.figures import colors
-from sim.results.mission import OverflownCells
 from sim.results.replay import Replay
 from sim.world.environment.obstacles import Box, obstacles
 from sim.world.mobility.layout import positions
@@ -85,7 +83,7 @@ def content(replay: Replay) -> dict[str, Any]:
         "role": _modes(replay.records, RoleChanged, nodes),
         "ended": {one.node: one.t_ns / S for one in replay.records if isinstance(one, ProcessEnded) and one.node},
         **_people(replay),
-        "covered": _covered(scenario, posed),
+        "covered": [t_ns / S if t_ns >= 0 else -1 for t_ns in replay.covered_ns.ravel().tolist()],
         "solids": _solids(scenario),
         "no_fly": scenario.world.no_fly_m,
         "events": list(_events(replay.records)),
@@ -120,16 +118,6 @@ def _people(replay: Replay) -> dict[str, Any]:
         [[round(state.t_ns / S, 2), state.status, state.node] for state in states] for states in replay.finds.values()
     ]
     return {"survivors": places, "finds": finds, "unplaced": ""}
-
-
-def _covered(scenario: Scenario, posed: Sequence[Posed]) -> list[int]:
-    """The second in which each cell was covered, -1: never; cells by rows from south to north."""
-    cells = OverflownCells(scenario)
-    first = np.full(cells.seen.shape, -1)
-    for t_ns, together in groupby(posed, key=lambda one: one.t_ns):
-        cells.add([(one.east_m, one.north_m, one.up_m) for one in together])
-        first[cells.seen & (first < 0)] = round(t_ns / S)
-    return [int(value) for value in first.ravel()]
 
 
 def _solids(scenario: Scenario) -> list[list[list[int]]]:

@@ -13,8 +13,12 @@ from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from itertools import groupby
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Self, TypeVar
+
+import numpy as np
+import numpy.typing as npt
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
@@ -80,21 +84,13 @@ class Replay:
         """`records`: the trace records, in the order of the trace."""
         self.scenario, self.records = scenario, records
         self._posed: dict[int, list[Posed]] = defaultdict(list)
-        self._flight: dict[int, list[FlightModeChanged]] = defaultdict(list)
-        self._mission: dict[int, list[MissionModeChanged]] = defaultdict(list)
-        self._planned: dict[int, list[Planned]] = defaultdict(list)
-        self._roles: dict[int, list[RoleChanged]] = defaultdict(list)
+        self._changes: dict[tuple[type[Any], int], list[Any]] = defaultdict(list)
+        """The records of each kind that change the state of a UAV, by kind and UAV."""
         for record in records:
             if isinstance(record, Posed):
                 self._posed[record.node].append(record)
-            elif isinstance(record, FlightModeChanged):
-                self._flight[record.node].append(record)
-            elif isinstance(record, MissionModeChanged):
-                self._mission[record.node].append(record)
-            elif isinstance(record, Planned):
-                self._planned[record.node].append(record)
-            elif isinstance(record, RoleChanged):
-                self._roles[record.node].append(record)
+            elif isinstance(record, FlightModeChanged | MissionModeChanged | Planned | RoleChanged):
+                self._changes[type(record), record.node].append(record)
 
     @classmethod
     def read(cls, folder: Path, *kinds: type[Any]) -> Self:
@@ -112,10 +108,10 @@ class Replay:
         t_ns = round(t_s * S)
         found = {}
         for node, position in self.positions(t_s).items():
-            flight = _last(self._flight[node], t_ns)
-            decided = _last(self._mission[node], t_ns)
-            planned = _last(self._planned[node], t_ns)
-            role = _last(self._roles[node], t_ns)
+            flight = self._latest(FlightModeChanged, node, t_ns)
+            decided = self._latest(MissionModeChanged, node, t_ns)
+            planned = self._latest(Planned, node, t_ns)
+            role = self._latest(RoleChanged, node, t_ns)
             found[node] = UavState(
                 position,
                 flight.mode if flight else "",
@@ -158,17 +154,33 @@ class Replay:
             for survivor, states in self.finds.items()
         }
 
+    @cached_property
+    def covered_ns(self) -> npt.NDArray[np.int64]:
+        """The instant at which each cell of the area was covered first, -1: never; the cells by rows from south to
+        north, each row from west to east.
+        """
+        cells = OverflownCells(self.scenario)
+        first = np.full(cells.seen.shape, -1, np.int64)
+        posed = sorted((one for track in self._posed.values() for one in track), key=lambda one: one.t_ns)
+        for t_ns, together in groupby(posed, key=lambda one: one.t_ns):
+            cells.add([(one.east_m, one.north_m, one.up_m) for one in together])
+            first[cells.seen & (first < 0)] = t_ns
+        return first
+
     def coverage(self, t_s: float) -> float:
         """The share of the area that was covered by an instant."""
-        covered = OverflownCells(self.scenario)
-        for record in self.records:
-            if isinstance(record, Posed) and record.t_ns <= t_s * S:
-                covered.add([(record.east_m, record.north_m, record.up_m)])
-        return covered.share
+        first = self.covered_ns
+        return float(((first >= 0) & (first <= round(t_s * S))).mean())
 
     def mission(self) -> Mapping[str, Any]:
         """The table `mission` of the summary, computed anew."""
         return mission(self.scenario, self.records)
+
+    def _latest(self, kind: type[R], node: NodeId, t_ns: int) -> R | None:
+        """The latest record of a kind of one UAV up to an instant."""
+        records: Sequence[R] = self._changes.get((kind, node), ())
+        index = bisect_right(records, t_ns, key=lambda record: record.t_ns)
+        return records[index - 1] if index else None
 
 
 def _status(record: Record, before: str, held: Confirmations) -> str:
@@ -181,12 +193,6 @@ def _status(record: Record, before: str, held: Confirmations) -> str:
         return "reopened" if before in ("confirmed", "mistaken") else before
     stage = _STAGES[type(record)]
     return stage if before in _ORDER and _ORDER.index(stage) > _ORDER.index(before) else before
-
-
-def _last(records: Sequence[R], t_ns: int) -> R | None:
-    """The latest of some records of one UAV up to an instant."""
-    index = bisect_right(records, t_ns, key=lambda record: record.t_ns)
-    return records[index - 1] if index else None
 
 
 def _between(posed: Sequence[Posed], t_ns: int) -> Enu:

@@ -89,9 +89,21 @@ def test_the_page_has_all_that_is_shown_and_asks_for_nothing(replay: Replay, tmp
     assert content["mission"] == {"1": [], "2": [[5, "respond", 1]]}
     assert content["role"]["2"] == [[3, "member", 0, 1]]
     assert content["ended"] == {"2": 15}
-    covered = content["covered"]
-    assert sum(0 <= first <= 7 for first in covered) / len(covered) == pytest.approx(replay.coverage(7))
     assert [13, 1, "collides with the ground or something solid"] in content["events"]
+
+
+def test_the_page_and_the_replay_have_the_same_area_covered_at_every_instant(
+    make_scenario: Callable[..., Scenario],
+) -> None:
+    records = [Posed(round(0.37 * step * S), 1, 9.0 * step - 90, 0.0, 60.0) for step in range(20)]
+    replay = Replay(make_scenario(**KEYS), records)
+    covered = replay_page.content(replay)["covered"]
+    shares = [replay.coverage(tenth / 10) for tenth in range(75)]
+    assert shares == [
+        pytest.approx(sum(0 <= first <= tenth / 10 for first in covered) / len(covered)) for tenth in range(75)
+    ]
+    assert 0 < shares[0] < shares[30] < shares[-1]
+    assert replay.mission()["coverage"] == pytest.approx(shares[-1], abs=1e-6)
 
 
 def test_a_long_run_is_thinned_and_ends_where_it_ended(replay: Replay, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -51,7 +51,9 @@ class Goal:
         if self._listening is None:
             return formation.bounded(east, north, lane, moves)
         seen = self._survivors.by_id[survivor].filter.is_seen
-        look = self._listening.goal(survivor, place, Enu(east, north, lane.up), seen=seen, now_ns=now_ns)
+        around = Enu(east, north, lane.up)
+        misses_m = formation.misses_m(place, lane, moves)
+        look = self._listening.goal(survivor, place, around, seen=seen, misses_m=misses_m, now_ns=now_ns)
         goal, feed = formation.bounded(look.east, look.north, lane, moves)
         return goal._replace(up=look.up), feed
 

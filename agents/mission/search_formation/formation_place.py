@@ -5,6 +5,7 @@ near its team. A UAV that has no place yet waits where it is. `shapes/contract.p
 lane, team, relay and follower.
 """
 
+import math
 from typing import Final
 
 from agents.mission.finding.phone_localization import Estimate
@@ -108,6 +109,18 @@ class FormationPlace:
             return False
         ahead_m, aside_m = along(moves, estimate.east_m - lane.east, estimate.north_m - lane.north)
         return abs(aside_m) <= _LEASH_M + _ASIDE_M and -_LAG_M <= ahead_m <= _AHEAD_M
+
+    def misses_m(self, estimate: Estimate, lane: Enu, moves: Enu) -> float:
+        """How far from an estimated place this UAV has to stay, wherever its moving place takes it; 0 if it can get
+        there.
+        """
+        if self.is_free:
+            return 0.0
+        ahead_m, aside_m = along(moves, estimate.east_m - lane.east, estimate.north_m - lane.north)
+        beyond_m = max(0.0, -_LAG_M - ahead_m)
+        if ahead_m > 0.0 and moves == STILL and not self.searches:  # a relay in the middle, which nothing brings there
+            beyond_m = ahead_m
+        return math.hypot(beyond_m, max(0.0, abs(aside_m) - _LEASH_M))
 
     def bounded(self, east: float, north: float, lane: Enu, moves: Enu) -> tuple[Enu, Enu]:
         """The permitted position nearest to a wanted one, and its velocity."""

@@ -6,7 +6,8 @@
     confirmed, or given up                   up again, as high as the UAV's place in the formation
 
 Below half of the height of the search there is one UAV at a time near a survivor. The others wait above it, and receive
-the phone from other sides. Roofs, hillsides, walls and other UAVs are kept clear of as everywhere else in the flight.
+the phone from other sides. A UAV whose place in the formation keeps it from getting near stays up, out of their way.
+Roofs, hillsides, walls and other UAVs are kept clear of as everywhere else in the flight.
 """
 
 import math
@@ -98,16 +99,18 @@ class Listening:
         self._low_ns: int | None = None
         """The instant at which this UAV reached the listening height."""
 
-    def goal(self, survivor: int, place: Estimate, goal: Enu, *, seen: bool, now_ns: int) -> Enu:
+    def goal(self, survivor: int, place: Estimate, goal: Enu, *, seen: bool, misses_m: float, now_ns: int) -> Enu:
         """The place to fly to, its height above ground, instead of `goal`, which looks around the place from above.
 
-        `seen`: a camera or a call has shown a person who seems to own the survivor's phone.
+        `seen`: a camera or a call has shown a person who seems to own the survivor's phone. `misses_m`: how far from
+        the estimated place this UAV's place in the formation keeps it; it goes down only if it could hear a call there.
         """
         if self._height_m is None:
             return goal
         if survivor != self._survivor:
             self._survivor, self._near_ns, self._low_ns, self._step_m = survivor, None, None, goal.up
-        if place.distance_m(self._own_motion.position) > _NEAR_M:
+        kept_off = misses_m > self._aside_m  # it would hear no call from the estimated place
+        if kept_off or place.distance_m(self._own_motion.position) > _NEAR_M:
             self._near_ns = self._low_ns = None
             self._step_m = goal.up
             return goal

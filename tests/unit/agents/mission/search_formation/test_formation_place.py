@@ -3,7 +3,8 @@
 import pytest
 from search_board import FOLLOWER, LINE, TAKEN_UP_NS, UP_M, Board
 
-from fanet_mw.units import Enu, S
+from agents.mission.finding.phone_localization import Estimate
+from fanet_mw.units import STILL, Enu, NodeId, S
 
 
 def test_who_has_no_plan_waits_where_it_is_and_may_go_nowhere_for_the_swarm() -> None:
@@ -30,3 +31,16 @@ def test_a_uav_of_a_line_stays_near_its_lane_and_a_follower_goes_anywhere() -> N
     assert line.bounded(300, 450, lane, moves)[0] == Enu(58, 450, UP_M), "aside by the leash"
     assert line.bounded(0, 100, lane, moves)[0] == Enu(0, 360, UP_M), "behind by the lag"
     assert line.bounded(20, 700, lane, moves) == (Enu(20, 500, UP_M), moves), "ahead: the line brings it there"
+
+
+def test_a_uav_knows_how_far_its_place_keeps_it_from_a_survivor_for_good() -> None:
+    lane, moves, middle_relay = Enu(0, 500, UP_M), Enu(0, 7.5, 0), NodeId(35)
+
+    def misses_m(node: NodeId, east_m: float, north_m: float, velocity: Enu = moves) -> float:
+        return Board(node, lane).place.misses_m(Estimate(east_m, north_m, 1.0, 0.0, 1.0), lane, velocity)
+
+    assert misses_m(LINE, 58, 900) == misses_m(LINE, -58, 360) == 0.0
+    assert misses_m(LINE, 88, 320) == pytest.approx(50), "30 m beyond the leash, 40 m beyond the lag"
+    assert misses_m(FOLLOWER, 300, 0) == 0.0
+    assert misses_m(LINE, 0, 520, STILL) == 0.0, "a line that waits for its turn comes back"
+    assert misses_m(middle_relay, 0, 520, STILL) == pytest.approx(20), "a relay that stands stays"

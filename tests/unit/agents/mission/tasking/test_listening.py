@@ -31,13 +31,21 @@ class Descent:
             make_scenario(**wanted), NodeId(node), self.own_motion, self.neighbors, speed_m_s=10.0
         )
 
-    def fly(self, seconds: int, *, seen: bool = False, survivor: int = 1, place: Estimate = PLACE) -> list[float]:
+    def fly(
+        self,
+        seconds: int,
+        *,
+        seen: bool = False,
+        misses_m: float = 0.0,
+        survivor: int = 1,
+        place: Estimate = PLACE,
+    ) -> list[float]:
         """The heights at which it is, second by second."""
         heights = []
         for _ in range(seconds):
             self.now_ns += S
             around = Enu(place.east_m + 14, place.north_m, UP_M)
-            goal = self.listening.goal(survivor, place, around, seen=seen, now_ns=self.now_ns)
+            goal = self.listening.goal(survivor, place, around, seen=seen, misses_m=misses_m, now_ns=self.now_ns)
             up_m = self.at.up + max(-2.5, min(2.5, goal.up - self.at.up))
             near = place.distance_m(self.at) < 100
             self.at = goal._replace(up=up_m) if near else self.at._replace(up=up_m)
@@ -82,6 +90,13 @@ def test_two_at_one_place_take_turns_below_half_of_the_height(make_scenario: Mak
         assert min(reached) == pytest.approx(lowest_m, abs=1.0), f"node {other} is at {height_m:g} m"
         uav.fly(20)
         assert uav.at.up == pytest.approx(HEARD_M / math.sqrt(2)), "the other one has not been heard of for a while"
+
+
+def test_whose_place_keeps_it_too_far_away_to_hear_stays_up_and_comes_up(make_scenario: MakeScenario) -> None:
+    uav = Descent(make_scenario)
+    assert uav.fly(40, misses_m=1.1 * HEARD_M / math.sqrt(2)) == [UP_M] * 40
+    assert uav.fly(60, misses_m=0.9 * HEARD_M / math.sqrt(2))[-1] < 11
+    assert uav.fly(40, misses_m=1.1 * HEARD_M / math.sqrt(2))[-1] == UP_M
 
 
 def test_a_uav_that_stands_beside_the_place_keeps_nobody_from_going_down(

@@ -225,7 +225,7 @@ class Encoder:
 
     def gps_raw(self, position: Enu, velocity: Enu, *, has_fix: bool, fix_ns: int) -> bytes:
         """GPS_RAW_INT: the last reading of the receiver."""
-        ground_m_s = math.hypot(velocity.east, velocity.north)
+        ground_m_s = velocity.horizontal()
         course = math.atan2(velocity.east, velocity.north) if ground_m_s else None
         return self._pack(
             common.MAVLink_gps_raw_int_message(

@@ -41,6 +41,10 @@ class Enu(NamedTuple):
         """Euclidean length [m or m/s]."""
         return math.hypot(self.east, self.north, self.up)
 
+    def horizontal(self) -> float:
+        """Length without the component upwards [m or m/s]."""
+        return math.hypot(self.east, self.north)
+
     def is_within(self, most: float) -> bool:
         """True if no component is greater than this, of either sign; false for what is not a number."""
         return abs(self.east) <= most and abs(self.north) <= most and abs(self.up) <= most

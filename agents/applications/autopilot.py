@@ -99,7 +99,7 @@ class Autopilot:
             change = gps.velocity.minus(self.velocity)
             self._acceleration = Enu(change.east * per_s, change.north * per_s, change.up * per_s)
         self.position, self.velocity, self._fix_ns = gps.position, gps.velocity, gps.t_ns
-        if math.hypot(gps.velocity.east, gps.velocity.north) >= TURNING_M_S:
+        if gps.velocity.horizontal() >= TURNING_M_S:
             self._yaw = math.atan2(gps.velocity.east, gps.velocity.north)
 
     def on_battery(self, reading: Battery) -> None:

@@ -4,7 +4,6 @@ While the UAV avoids another one, by climbing or descending, the application obj
 The UAVs of a planned search avoid each other by their velocities instead (`agents/mission/flight/`).
 """
 
-import math
 from collections.abc import Mapping
 from typing import Any, Final
 
@@ -68,7 +67,7 @@ class CollisionAvoidance(Application):
                 other,
                 closest_s=approach.closest_s,
                 altitude_m=abs(approach.apart.up),
-                horizontal_m=math.hypot(approach.apart.east, approach.apart.north),
+                horizontal_m=approach.apart.horizontal(),
             )
             handle = port.send(inner, priority=wire.PRIORITY_SAFETY)
             port.record(Warned(now_ns, port.node, other, handle))

@@ -94,8 +94,7 @@ class PaperRule:
         if self._target is None:
             return
         if self._dwell_until_ns is None:
-            east, north = position.east - self._target_at.east, position.north - self._target_at.north
-            if math.hypot(east, north) <= self._config.arrival_m + _RING_M:
+            if position.minus(self._target_at).horizontal() <= self._config.arrival_m + _RING_M:
                 self._dwell_until_ns = now_ns + round(self._config.dwell_s * S)
                 self._outbox.records.append(Arrived(now_ns, self._node, self._target))
         elif now_ns >= self._dwell_until_ns:
@@ -116,9 +115,7 @@ class PaperRule:
         ]
         if not candidates:
             return
-        self._target_at, self._target = min(
-            candidates, key=lambda c: (math.hypot(c[0].east - position.east, c[0].north - position.north), c[1])
-        )
+        self._target_at, self._target = min(candidates, key=lambda c: (c[0].minus(position).horizontal(), c[1]))
         reporters = len(self._sightings[self._target])
         self._outbox.records.append(
             Approaching(now_ns, self._node, self._target, reporters, *_rounded(self._target_at))

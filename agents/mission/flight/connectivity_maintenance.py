@@ -2,7 +2,6 @@
 that the swarm stays one network while it searches.
 """
 
-import math
 from typing import Final
 
 from agents.mission.navigation.half_planes import HalfPlane, Velocity
@@ -67,7 +66,7 @@ def tether_plane(offset: Enu, other_velocity: Velocity, *, tether_m: float, with
     Both UAVs may fly apart, so each of them may use half of the distance that is left. If none is left, this UAV alone
     makes up for what is missing.
     """
-    distance = math.hypot(offset.east, offset.north)
+    distance = offset.horizontal()
     if distance < 0.3 * tether_m:
         return None
     nx, ny = offset.east / distance, offset.north / distance

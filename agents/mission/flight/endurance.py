@@ -5,7 +5,6 @@ needed    rate x (way home / speed + height / sinking speed) x `_DETOUR`
 margin    charge - reserve - needed; at 0 the UAV flies home, whatever it is doing
 """
 
-import math
 from collections import deque
 from typing import Final
 
@@ -51,5 +50,5 @@ class Endurance:
         return max(0.0, first - last) * S / (last_ns - first_ns)
 
     def _home_s(self, here: Enu) -> float:
-        away_m = math.hypot(here.east - self._home.east, here.north - self._home.north)
+        away_m = here.minus(self._home).horizontal()
         return _DETOUR * (away_m / self._speed_m_s + max(0.0, here.up) / _SINK_M_S)

@@ -3,7 +3,6 @@ then lands straight down. Its task and its place in the formation are handed on 
 `FormationPlanner`).
 """
 
-import math
 from enum import StrEnum
 from typing import Final
 
@@ -107,7 +106,7 @@ class ReturnHome:
         Each call commands it again, because a setpoint may get lost on its way to the flight controller.
         """
         here = self._own_motion.position
-        if math.hypot(here.east - self._home.east, here.north - self._home.north) <= _HOME_M:
+        if here.minus(self._home).horizontal() <= _HOME_M:
             self.lands = True
         if self.lands:
             self._outbox.course = Course(here, _LAND_M_S, land=True)

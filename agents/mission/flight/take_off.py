@@ -1,6 +1,5 @@
 """The take-off of a UAV that stands on its pad: straight up to the height of the lanes, clear of those beside it."""
 
-import math
 from typing import Final
 
 from agents.mission.flight.reciprocal_avoidance import CLEARANCE_M
@@ -84,7 +83,7 @@ class TakeOff:
 
     def _is_beside(self, other: Enu) -> bool:
         off = other.minus(self._pad)
-        return math.hypot(off.east, off.north) < CLEARANCE_M and off.up < min(_LEAD_M, _UP * self._height_m)
+        return off.horizontal() < CLEARANCE_M and off.up < min(_LEAD_M, _UP * self._height_m)
 
     def _is_up(self, climb_m_s: float) -> bool:
         """True once the UAV has climbed far enough, or no farther than its altitude is measured wrongly."""

@@ -72,6 +72,6 @@ class VelocityChoice:
         requires.
         """
         off = corner.minus(self._own_motion.position)
-        distance = math.hypot(off.east, off.north)
+        distance = off.horizontal()
         speed = min(self._most_m_s, max(speed_m_s, 0.5 * self._most_m_s), max(_LEAST_M_S, distance))
         return off.east / max(distance, 1e-6) * speed, off.north / max(distance, 1e-6) * speed

@@ -5,6 +5,7 @@ Row i is node i + 1. The same calls give the same results. Engines know nothing 
 """
 
 from abc import ABC, abstractmethod
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,9 @@ Rows = npt.NDArray[np.float64]
 Values = npt.NDArray[np.float64]
 """float64 of any shape."""
 Flags = npt.NDArray[np.bool_]
+
+
+GRAVITY_M_S2: Final = 9.81
 
 
 class Engine(ABC):

@@ -9,11 +9,10 @@ from typing import Final
 import numpy as np
 
 from sim.world.engines.contacts import Contacts
-from sim.world.engines.contract import Engine, Flags, Rows
+from sim.world.engines.contract import GRAVITY_M_S2, Engine, Flags, Rows
 from sim.world.environment.solids import Solids
 
 ACCELERATION_M_S2: Final = 5.0
-GRAVITY_M_S2: Final = 9.81
 RADIUS_M: Final = 0.25
 
 

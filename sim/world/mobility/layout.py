@@ -32,7 +32,7 @@ def _with_leader(places: list[Enu], scenario: Scenario) -> list[Enu]:
     """The places with that of node 1 first, which may be the one in the middle."""
     if scenario.nodes.leader_at == "first" or scenario.nodes.layout not in ("grid", "line"):
         return places
-    middle = min(range(len(places)), key=lambda i: (math.hypot(places[i].east, places[i].north), i))
+    middle = min(range(len(places)), key=lambda i: (places[i].horizontal(), i))
     return [places[middle], *places[:middle], *places[middle + 1 :]]
 
 

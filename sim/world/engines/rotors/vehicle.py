@@ -10,7 +10,8 @@ the frame.
 
 from typing import Final, NamedTuple
 
-GRAVITY_M_S2: Final = 9.81
+from sim.world.engines.contract import GRAVITY_M_S2
+
 AIR_KG_M3: Final = 1.225
 
 

@@ -11,7 +11,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import S
 from sim.world.engines.battery_drain import BatteryDrain
-from sim.world.engines.contract import Rows
+from sim.world.engines.contract import GRAVITY_M_S2, Rows
 from sim.world.engines.kinematic import Kinematic
 from sim.world.engines.rotors.battery import Batteries
 from sim.world.engines.rotors.engine import Rotors
@@ -20,7 +20,6 @@ from sim.world.engines.rotors.power import induced_m_s, trimmed_w
 from sim.world.engines.rotors.vehicle import (
     AIR_KG_M3,
     CRAZYFLIE,
-    GRAVITY_M_S2,
     IRIS,
     VEHICLES,
     Cell,

@@ -1,6 +1,6 @@
 """A histogram of durations with logarithmic bins: constant memory, and percentiles with an error of at most a tenth.
 
-Real-time hosts keep their lateness in one (`host_figures.py`).
+Real-time hosts keep their lateness in one (`wake_lateness.py`).
 """
 
 import math

@@ -73,6 +73,8 @@ class Inbox:
         self.inbox_full = 0
         self.share_full = 0
         self.taken = 0
+        self.unread = 0
+        """The number of receptions that came only after the end of the run."""
         self.malformed = 0
 
     def offer(self, topic: str, payload: bytes) -> None:
@@ -168,6 +170,7 @@ class Inbox:
         return {
             "samples": self.samples,
             "taken": self.taken,
+            "unread_receptions": self.unread,
             "malformed": self.malformed,
             "oversized": self.oversized,
             "overflowed": self.overflowed,

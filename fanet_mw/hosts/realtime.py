@@ -25,10 +25,11 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
 from fanet_mw.hosts.bus import JOIN_PATIENCE_S, Bus, HostBus, config_of
 from fanet_mw.hosts.clock import START_PATIENCE_S, ClockListener, SwarmClock
-from fanet_mw.hosts.host_figures import HostFigures
 from fanet_mw.hosts.inbox import Inbox
 from fanet_mw.hosts.presence import few
+from fanet_mw.hosts.process_cost import ProcessCost
 from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
+from fanet_mw.hosts.wake_lateness import WakeLateness
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.fingerprint import as_json, differences, fingerprint
 from fanet_mw.trace import Record
@@ -72,7 +73,8 @@ class RealtimeHost:
         self._call_ns = 0
         """The instant that the actor was given at its last call."""
         self._records: list[Record] = []
-        self._figures = HostFigures()
+        self._lateness = WakeLateness()
+        self._cost = ProcessCost()
 
     async def run(
         self,
@@ -162,7 +164,7 @@ class RealtimeHost:
             while (left_s := self._clock.wait_s(until_ns)) > 0:
                 wait_s, began_s = min(left_s, _LOOK_EVERY_S), self._loop.time()
                 await asyncio.wait((stopped, self._failure), timeout=wait_s, return_when=asyncio.FIRST_COMPLETED)
-                self._figures.stalled(round((self._loop.time() - began_s - wait_s) * S))
+                self._lateness.stalled(round((self._loop.time() - began_s - wait_s) * S))
                 if self._failure.done():
                     break
                 if stopped.done():
@@ -197,7 +199,7 @@ class RealtimeHost:
 
     def _receive_last(self, topic: str, message: Message, now_ns: int) -> None:
         """Count what was on its way at the end; an actor that accounts for it (`hears_out`) still receives it."""
-        self._figures.unread += isinstance(message, Reception)
+        self._inbox.unread += isinstance(message, Reception)
         if self._actor.hears_out:
             self._actor.receive(topic, message, now_ns)
 
@@ -255,7 +257,7 @@ class RealtimeHost:
         if wake_ns is None:
             return
         assert self._clock is not None, "the clock is running"
-        self._figures.asked(wake_ns, call_ns=self._call_ns)
+        self._lateness.asked(wake_ns, call_ns=self._call_ns)
         due_ns = max(wake_ns + self._actor.slack_ns, self._call_ns)
         timer = self._loop.call_later(self._clock.wait_s(due_ns), self._wake)
         self._wake_up = _WakeUp(wake_ns, due_ns, timer)
@@ -269,7 +271,7 @@ class RealtimeHost:
             wake_up.timer.cancel()
         self._wake_up = None
         if wake_up is not None and now_ns >= wake_up.asked_ns:  # else the loop's clock is a little fast: arm again
-            self._figures.woken(max(0, now_ns - wake_up.due_ns))
+            self._lateness.woken(max(0, now_ns - wake_up.due_ns))
             self._call_ns = now_ns
             self._actor.wake(now_ns)
         self._publish_and_arm()
@@ -286,7 +288,7 @@ class RealtimeHost:
             actor.outbox.clear()
             for topic, messages in by_topic.items():
                 self._bus.put(topic, codecs.encode(messages))
-            self._figures.puts += len(by_topic)
+            self._cost.puts += len(by_topic)
         if actor.records:
             self._records += actor.records
             actor.records.clear()
@@ -303,7 +305,11 @@ class RealtimeHost:
         content = {
             **self._actor.report(),
             "final": final,
-            "host": {**self._figures.summary(final=final), **self._inbox.figures()},
+            "host": {
+                **self._lateness.summary(),
+                **self._cost.summary(final=final),
+                **self._inbox.figures(),
+            },
         }
         report = Report(self._actor.name, self.now_ns(), json.dumps(content))
         self._bus.put(self._names.report(self._actor.name), codecs.encode([report]), reliable=True)

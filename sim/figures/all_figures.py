@@ -4,7 +4,20 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from fanet_mw.errors import ConfigError
-from sim.figures import beyond, figure8, figure9, figure10, figure11, figure12, realtime, rescue
+from sim.figures import (
+    ablation,
+    age,
+    clocks,
+    figure8,
+    figure9,
+    figure10,
+    figure11,
+    figure12,
+    load,
+    realtime,
+    rescue,
+    size,
+)
 from sim.figures.recipe import Recipe
 
 FIGURES: Final[Mapping[str, Recipe]] = {
@@ -13,11 +26,11 @@ FIGURES: Final[Mapping[str, Recipe]] = {
     "10": figure10.FIGURE,
     "11": figure11.FIGURE,
     "12": figure12.FIGURE,
-    "load": beyond.LOAD,
-    "size": beyond.SIZE,
-    "clocks": beyond.CLOCKS,
-    "age": beyond.AGE,
-    "ablation": beyond.ABLATION,
+    "load": load.FIGURE,
+    "size": size.FIGURE,
+    "clocks": clocks.FIGURE,
+    "age": age.FIGURE,
+    "ablation": ablation.FIGURE,
     "reports": rescue.REPORTS,
     "mission": rescue.MISSION,
     "realtime": realtime.REALTIME,

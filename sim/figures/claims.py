@@ -18,6 +18,8 @@ from sim.figures.statistics import ANY, Interval, Possible, interval
 
 BEYOND: Final = "(Beyond the paper) "
 """The text before a claim that is not the paper's."""
+NEARLY_ALL: Final = 0.99
+"""The packet delivery ratio from which on a claim says that all packets arrive."""
 Values = Sequence[float] | Mapping[int, float]
 """One value per seed, or the value of each seed."""
 

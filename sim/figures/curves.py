@@ -42,6 +42,12 @@ class Panel(NamedTuple):
     """Whether a run ended before what is measured did, so that its value is too small."""
 
 
+PDR: Final = Panel("pdr", "packet delivery ratio", share=True)
+P95: Final = Panel("delay_ms.p95", "95th percentile of the delay [s]", log=True, factor=1e-3)
+PAPERS: Final = "the paper's method, 8 clusters, 0.5 s"
+"""The variant of the paper's method that stands beside others over load and age."""
+
+
 def curves(
     setting: str,
     label: str,

@@ -41,7 +41,7 @@ def summary_of(*settings: str) -> dict[str, Any]:
     return finish(outcome_of(*settings), out=None)
 
 
-@pytest.mark.parametrize("offset_ms", [50, 1000])
+@pytest.mark.parametrize("offset_ms", [pytest.param(50, marks=pytest.mark.slow), 1000])
 def test_with_time_beacons_every_packet_arrives_within_the_bound(offset_ms: int) -> None:
     summary = summary_of("clock.sync=beacons", f"clock.offset_ms={offset_ms}")
     assert summary["pdr"] >= 0.999

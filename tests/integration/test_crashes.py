@@ -15,7 +15,7 @@ from sim.run.virtual import simulate
 def crossing(**world: Any) -> Outcome:
     """Five UAVs, all within range; 4 and 5 fly towards each other and meet in the middle after some 13 s."""
     tree = {
-        "duration_s": 60, "warmup_s": 5, "drain_s": 3,
+        "duration_s": 36, "warmup_s": 5, "drain_s": 3,
         "nodes": {
             "count": 5, "layout": "explicit", "telemetry_hz": 0,
             "positions_m": [[0, 0, 90], [150, 0, 40], [-180, 0, 60], [0, 100, 50], [0, -100, 50]],

@@ -43,7 +43,9 @@ def test_a_protocol_that_breaks_the_contract_is_told(installed: Installed, tmp_p
 
 def test_five_parts_of_another_package_serve_a_run(installed: Installed, tmp_path: Path) -> None:
     scenario = str(EXAMPLE / "scenario.toml")
-    ended = installed.run(installed.fanet, "simulate", scenario, "--out", "out", "--json", cwd=tmp_path)
+    ended = installed.run(
+        installed.fanet, "simulate", scenario, "--duration", "14", "--out", "out", "--json", cwd=tmp_path
+    )
     assert ended.returncode == 0, ended.stderr
     summary = json.loads(ended.stdout)
     assert summary["pdr"] > 0.9

@@ -18,7 +18,7 @@ from sim.run.collecting.record_kinds import lines
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 
-LONG = ("simulate", "quick", "--duration", "100000")
+LONG = ("simulate", "quick", "--duration", "100000", "--set", "world.engine=kinematic")
 
 
 def interrupt(out: Path, *arguments: str, number: int = signal.SIGINT) -> tuple[int, str, str]:
@@ -72,7 +72,7 @@ def its_pace_is_that_of_what_was_simulated(out: str) -> None:
 
 
 def test_a_signal_ends_a_run_at_its_next_tenth_of_a_second_and_before_the_first_there_is_nothing() -> None:
-    chosen = catalog.find("quick", ["duration_s=10"])
+    chosen = catalog.find("quick", ["duration_s=10", "world.engine=kinematic"])
     signals: list[int] = []
 
     def progress(seconds: float) -> None:

@@ -8,7 +8,7 @@ from fanet_mw.units import S
 from sim.run.virtual import simulate
 from sim.scenarios.catalog import find
 
-SMALL = ("nodes.count=12", "clusters.count=11", "traffic.sources=11", "duration_s=45", "warmup_s=24", "drain_s=8")
+SMALL = ("nodes.count=12", "clusters.count=11", "traffic.sources=11", "duration_s=40", "warmup_s=24", "drain_s=8")
 LOSSY = ('radio.channel="log_distance"', 'radio.fading="rician"')
 
 

@@ -164,7 +164,7 @@ KEYS: Final = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("protocol", ["flooding", "clustered", "aodv"])
+@pytest.mark.parametrize("protocol", [pytest.param("flooding", marks=pytest.mark.slow), "clustered", "aodv"])
 def test_every_message_arrives_once_whole_and_in_order_or_its_sender_is_told_who_lacks_it(
     make_scenario: MakeScenario, protocol: str
 ) -> None:

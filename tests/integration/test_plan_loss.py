@@ -12,7 +12,7 @@ from sim.scenarios import catalog
 LINE = ['nodes.layout="line"', "nodes.count=8", "clusters.count=7", "traffic.sources=7", "radio.channel=log_distance"]
 
 
-@pytest.mark.parametrize("spacing_m", [235, 245])
+@pytest.mark.parametrize("spacing_m", [pytest.param(235, marks=pytest.mark.slow), 245])
 def test_no_more_is_lost_than_stated(spacing_m: float) -> None:
     settings = [*LINE, f"nodes.spacing_m={spacing_m}", "radio.noise_figure_db=10.5", "radio.sensitivity_dbm=-84"]
     scenario = catalog.find("clusters", [*settings, "duration_s=60", "traffic.interval_s=0.5"])
@@ -35,7 +35,7 @@ def test_where_no_probability_can_be_given_it_says_so() -> None:
 SMALL = ["nodes.count=12", "clusters.count=11", "traffic.sources=11", "radio.channel=log_distance"]
 
 
-@pytest.mark.parametrize("loss", ["radio.fading=rician", "radio.shadowing_db=4"])
+@pytest.mark.parametrize("loss", ["radio.fading=rician", pytest.param("radio.shadowing_db=4", marks=pytest.mark.slow)])
 def test_over_lossy_links_a_plan_promises_a_likely_delay_and_no_bound(loss: str) -> None:
     text, plan, feasible = judge(catalog.find("clusters", [*SMALL, loss]))
     assert feasible

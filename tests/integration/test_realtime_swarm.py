@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from undisturbed import LIMIT_S, undisturbed
+from undisturbed import LIMIT_S, undisturbed, with_time_enough
 
 from agents.__main__ import run as run_agent
 from emulator.kernel.compile import must_compile, warm_up
@@ -134,8 +134,12 @@ def test_a_killed_agent_is_named_and_the_others_carry_on() -> None:
     assert outcome.reports["agent-5"]["final"]
 
 
+@pytest.mark.timeout(LIMIT_S)
 def test_a_killed_agent_is_started_again_with_respawn_and_takes_part() -> None:
-    outcome, events = run(scenario("duration_s=6.5"), at_s=2, act=kill("agent-4"), respawn=True)
+    outcome, events = with_time_enough(
+        lambda slower: run(scenario("duration_s=6.5", slower), at_s=2, act=kill("agent-4"), respawn=True),
+        lambda found: found[0].reports["agent-4"]["role"] != "isolated",
+    )
     assert outcome.aborted is None
     assert any("agent-4" in event and "started again" in event for event in events)
     report = outcome.reports["agent-4"]

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from undisturbed import LIMIT_S, with_time_enough
 
 from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import Poses
@@ -74,8 +75,12 @@ def test_a_run_whose_agents_were_all_killed_is_not_valid() -> None:
     assert summary["frames"]["closes"], "what they had asked for is accounted for all the same"
 
 
+@pytest.mark.timeout(LIMIT_S)
 def test_a_run_whose_emulator_was_killed_and_started_again_is_not_valid_and_says_what_is_missing() -> None:
-    outcome, summary = run(scenario("duration_s=6"), (1.5, send(signal.SIGKILL, "emulator")), respawn=True)
+    outcome, summary = with_time_enough(
+        lambda slower: run(scenario("duration_s=6", slower), (1.5, send(signal.SIGKILL, "emulator")), respawn=True),
+        lambda found: found[0].reports["emulator"]["frames"]["delivered"] > 20 > found[1]["frames"]["in_flight"],
+    )
     assert about(summary, "emulator ended")
     missing = summary["frames"]["unaccounted"]
     assert missing > 20

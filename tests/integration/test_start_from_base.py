@@ -19,7 +19,7 @@ KEYS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("spacing_m", "terrain_m"), [(15, 0), (15, 30), (6, 0)])
+@pytest.mark.parametrize(("spacing_m", "terrain_m"), [pytest.param(15, 0, marks=pytest.mark.slow), (15, 30), (6, 0)])
 def test_who_stands_at_the_base_climbs_straight_up_and_only_then_flies_to_its_place(
     make_scenario: Callable[..., Scenario], spacing_m: float, terrain_m: float
 ) -> None:

@@ -30,9 +30,10 @@ def quick() -> Outcome:
     return simulate(catalog.find("quick"))
 
 
+@pytest.mark.parametrize("duration_s", [2.5, pytest.param(8, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", [entry.name for entry in catalog.shipped()])
-def test_the_ledger_closes_and_copies_add_up_in_every_shipped_scenario(name: str) -> None:
-    summary = summary_of(catalog.find(name, ["duration_s=4", "warmup_s=0", "drain_s=1"]))
+def test_the_ledger_closes_and_copies_add_up_in_every_shipped_scenario(name: str, duration_s: float) -> None:
+    summary = summary_of(catalog.find(name, [f"duration_s={duration_s}", "warmup_s=0", "drain_s=0.5"]))
     frames, copies = summary["frames"], summary["copies"]
     assert frames["sent"] > 0
     assert frames["closes"]
@@ -173,7 +174,7 @@ def _moving_pdr(make_scenario: MakeScenario, *, repair_s: float) -> float:
             "nodes.count": 15, "nodes.layout": "grid", "nodes.telemetry_hz": 0, "mobility.model": "random_waypoint",
             "mobility.speed_m_s": 40, "world.area_m": 900, "clusters.count": 3, "clusters.flooding_period_s": 1,
             "clusters.repair_s": repair_s, "traffic.interval_s": 2, "traffic.payload_bytes": 200,
-            "duration_s": 60, "warmup_s": 5, "drain_s": 25,
+            "duration_s": 46, "warmup_s": 5, "drain_s": 25,
         }
     )  # fmt: skip
     return float(summary_of(scenario)["pdr"])

@@ -9,7 +9,7 @@ of the last run as of any other.
 """
 
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from sim.results.files import finish
 from sim.run.outcome import Outcome
@@ -17,6 +17,8 @@ from sim.run.outcome import Outcome
 SPEEDS: Final = (1.0, 0.5, 0.25)
 LIMIT_S: Final = 300
 """For a test that may need all three runs."""
+
+Run = TypeVar("Run")
 
 
 def undisturbed(run: Callable[[str], Outcome]) -> tuple[Outcome, dict[str, Any]]:
@@ -28,3 +30,12 @@ def undisturbed(run: Callable[[str], Outcome]) -> tuple[Outcome, dict[str, Any]]
             break
         print(f"at {speed} of the wall's time:", *summary["invalid_because"], sep="\n  ")  # shown if the test fails
     return outcome, summary
+
+
+def with_time_enough(run: Callable[[str], Run], enough: Callable[[Run], bool]) -> Run:
+    """The first run in which there was time enough, or else the last: for runs with a fault, which are never valid."""
+    for speed in SPEEDS:
+        found = run(f"time_scale={speed}")
+        if enough(found):
+            break
+    return found

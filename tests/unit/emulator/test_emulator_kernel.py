@@ -106,7 +106,7 @@ LOADS = st.tuples(
 )  # fmt: skip
 
 
-@examples(100)
+@examples(60)
 @given(LOADS)
 @example((3830, 9, "range", "ns3"))  # a remaining backoff shorter than the DIFS that a fresh frame waits
 @example((191, 3, "log_distance", "standard"))  # the last frame ends at a station that cannot hear it

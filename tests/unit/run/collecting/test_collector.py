@@ -354,6 +354,18 @@ def test_a_full_disk_under_the_spool_ends_the_trace_and_not_the_run(ear: Ear) ->
     assert ear.collector.disk_failure() == "no space left for the whole of an item"
 
 
+def test_a_disk_that_takes_nothing_at_all_is_named(ear: Ear) -> None:
+    def write(*_: object) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    ear.collector._records._others._write = write
+    for i in range(3):
+        ear.say(NAMES.trace("agent-3"), TraceBatch((Generated(S, 3, i, "traffic", 5),)))
+    assert list(ear.collector.records()) == []
+    assert ear.why["trace: disk"] == 3
+    assert ear.collector.disk_failure() == "No space left on device"
+
+
 def test_deaths_for_which_the_disk_has_no_room_are_counted_as_lost(ear: Ear) -> None:
     ear.say(NAMES.trace("agent-3"), TraceBatch((Generated(S, 3, 1, "traffic", 5),)))
     ear.collector._records._others._write = lambda *_: 0

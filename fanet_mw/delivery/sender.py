@@ -17,7 +17,7 @@ from typing import Final, NamedTuple
 from fanet_mw.delivery.retransmission_timeout import RetransmissionTimeout
 from fanet_mw.units import BROADCAST, MS, US, NodeId
 from fanet_mw.wire import message as wire_message
-from fanet_mw.wire.message import MAVLINK_PORT, MOST_PIECES, Head, Receipt
+from fanet_mw.wire.message import DELIVERED, MAVLINK_PORT, MOST_PIECES, Head, Receipt
 
 MOST_BYTES: Final = 4 << 20
 """The greatest number of bytes that are kept, of all messages together."""
@@ -159,9 +159,12 @@ class Sender:
         self, data: bytes, *, port: int, targets: tuple[NodeId, ...] | None, priority: int, born_us: int,
         lifetime_ms: int,
     ) -> int:  # fmt: skip
-        """Accept a message that its targets are to confirm (None: all nodes); returns its number."""
+        """Accept a message that its targets are to confirm (None: all other nodes); returns its number."""
         whom = self._everyone if targets is None else targets
         number = self.take_number()
+        if not whom:  # the swarm has one node
+            self.told.append(Told(number, DELIVERED, (), last=True))
+            return number
         flow = self._flow(whom, port, priority)
         flow.open.append(number)
         named = min(len(whom), _NAMED) if targets is None else len(whom)

@@ -1,6 +1,8 @@
 """The datagram of the UDP radio: a 12-byte header names sender and receiver, so that the frame can be acknowledged.
 
-"FN" | version | kind (frame, ack) | source | destination | sequence number of the request | frame
+"FN" | version | kind (frame, ack) | source | destination | sequence number | frame
+
+The sequence number grows by one with each request, from a random number at the start of the radio.
 """
 
 import struct

@@ -9,6 +9,7 @@ Nor is the true end of a frame: `end_ns` is the instant at which it was read fro
 """
 
 import asyncio
+import secrets
 import socket
 from collections import Counter
 from collections.abc import Callable
@@ -68,15 +69,18 @@ class UdpRadio:
         """The unicasts that wait for their acknowledgement, by destination and sequence number."""
         self._tasks: set[asyncio.Task[None]] = set()
         self._seen = DuplicateSet(capacity=8192)
-        self._transport: asyncio.DatagramTransport | None = None
-        self._listener: asyncio.DatagramTransport | None = None
+        self._first_seq = secrets.randbits(32)
+        """The number of the datagram of request 0. A process that starts again counts its requests from 0 again, and
+        its datagrams must not be taken for copies of earlier ones."""
+        self._transports: list[asyncio.DatagramTransport] = []
+        """The socket of the own address, by which everything is sent, and that of the broadcast address."""
         self.counts: Counter[str] = Counter()
 
     async def open(self) -> None:
         """Bind to the own address, for unicasts, and to the broadcast address; raises BusError."""
         try:
-            self._transport = await self._bind(self._address)
-            self._listener = await self._bind(self._broadcast)
+            for address in (self._address, self._broadcast):
+                self._transports.append(await self._bind(address))
         except OSError as error:
             self.close()
             raise BusError(f"cannot use {self._address[0]} and {self._broadcast[0]}: {error.strerror}") from error
@@ -98,10 +102,9 @@ class UdpRadio:
         """Stop sending and receiving."""
         for task in self._tasks:
             task.cancel()
-        for transport in (self._transport, self._listener):
-            if transport is not None:
-                transport.close()
-        self._transport = self._listener = None
+        for transport in self._transports:
+            transport.close()
+        self._transports.clear()
 
     # --- transmit -------------------------------------------------------------------------------------------------
 
@@ -123,7 +126,7 @@ class UdpRadio:
 
     def _transmit(self, request: TxRequest) -> None:
         if request.dst == BROADCAST:
-            self._put(Datagram(DatagramKind.FRAME, self._node, BROADCAST, request.seq, request.frame), self._broadcast)
+            self._put(self._datagram(request), self._broadcast)
             if request.wants_status:
                 self._on_message(TxStatus(request.seq, TxOutcome.SENT, self._now_ns(), 1))
             return
@@ -133,8 +136,8 @@ class UdpRadio:
 
     async def _unicast(self, request: TxRequest) -> None:
         """Send a frame until it is acknowledged; to the broadcast address if the other node was never heard."""
-        datagram = Datagram(DatagramKind.FRAME, self._node, request.dst, request.seq, request.frame)
-        name = request.dst, request.seq & SEQ_MASK
+        datagram = self._datagram(request)
+        name = request.dst, datagram.seq
         acknowledged = self._waiting[name] = asyncio.Event()
         outcome, attempts = TxOutcome.RETRY_LIMIT, 0
         try:
@@ -155,9 +158,13 @@ class UdpRadio:
         if request.wants_status:
             self._on_message(TxStatus(request.seq, outcome, self._now_ns(), attempts))
 
+    def _datagram(self, request: TxRequest) -> Datagram:
+        seq = (self._first_seq + request.seq) & SEQ_MASK
+        return Datagram(DatagramKind.FRAME, self._node, request.dst, seq, request.frame)
+
     def _put(self, datagram: Datagram, to: Address) -> None:
-        if self._transport is not None:
-            self._transport.sendto(datagram.encode(), to)
+        if self._transports:
+            self._transports[0].sendto(datagram.encode(), to)
             self.counts["datagrams"] += 1
 
     # --- receive --------------------------------------------------------------------------------------------------

@@ -7,7 +7,9 @@ Because the time stamp of a hello is sent in the next one, it does not matter ho
 The reference is the node with the lowest id. A node that has had no news of a reference for a while becomes the
 reference, and a node that learns of a reference with a lower id follows that one (root election by time-out, Maroti et
 al. 2004). A node that becomes reference later continues the time that the swarm has. Pairs are taken from the neighbors
-nearest to the reference; other neighbors can only contradict. A beacon is news if the reference's `round` has advanced.
+nearest to the reference; other neighbors can only contradict. A beacon is news if the reference's `round` has advanced:
+beyond that of the last news, or, when there has been none for a while, beyond that of the neighbor's last beacon,
+because a reference that starts again counts its rounds anew.
 
 Sans-IO: instants of the own clock and beacons go in; the line to swarm time, its error and the next beacon come out.
 Not provided: secrecy and proof of origin. A plausible forged beacon counts as one neighbor's statement, even as the
@@ -85,6 +87,9 @@ class _LastBeacon:
     heard_ns: int
     reference: int = 0
     round: int = 0
+    """The round of its last news."""
+    said: int = 0
+    """The round of its last beacon."""
     hops: int = 0
     advanced_ns: int = 0
     trusted: bool = True
@@ -243,7 +248,9 @@ class TimeSync:
         if beacon.node != src:
             self.counts["foreign"] += 1
             return None
-        if beacon.reference != neighbor.reference or newer(beacon.round, neighbor.round, bits=16):
+        began_anew = newer(beacon.round, neighbor.said, bits=16) and self._is_stale(neighbor.advanced_ns, local_ns)
+        neighbor.said = beacon.round
+        if beacon.reference != neighbor.reference or newer(beacon.round, neighbor.round, bits=16) or began_anew:
             neighbor.reference, neighbor.round, neighbor.advanced_ns = beacon.reference, beacon.round, local_ns
             neighbor.hops = beacon.hops
             self._note_news(neighbor, local_ns)

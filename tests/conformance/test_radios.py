@@ -210,12 +210,12 @@ async def test_a_unicast_that_nobody_acknowledges_is_given_up_and_hostile_datagr
 
 
 async def test_one_datagram_does_not_redirect_a_node_s_unicasts_and_only_its_own_address_acknowledges() -> None:
-    now_ns, told, put = 0, list[Reception | TxStatus](), list[tuple[bytes, tuple[str, int]]]()
+    now_ns, told, put = 0, list[Reception | TxStatus](), list[tuple[Datagram, tuple[str, int]]]()
     radio = UdpRadio(
         NodeId(1), address="127.7.0.9", broadcast="127.255.255.255", port=24562, max_frame_bytes=300,
         now_ns=lambda: now_ns, on_message=told.append,
     )  # fmt: skip
-    radio._put = lambda datagram, to: put.append((datagram.frame, to))  # type: ignore[method-assign]
+    radio._put = lambda datagram, to: put.append((datagram, to))  # type: ignore[method-assign]
     home, elsewhere = ("127.7.0.2", 24562), ("127.7.0.66", 24562)
 
     def hear(seq: int, address: tuple[str, int]) -> None:
@@ -226,7 +226,7 @@ async def test_one_datagram_does_not_redirect_a_node_s_unicasts_and_only_its_own
         put.clear()
         radio._transmit(request_of(7, at_ms=0, dst=NodeId(2), status=True))
         await asyncio.sleep(0.01)
-        radio._on_datagram(Datagram(DatagramKind.ACK, NodeId(2), NodeId(1), 7).encode(), elsewhere)
+        radio._on_datagram(Datagram(DatagramKind.ACK, NodeId(2), NodeId(1), put[0][0].seq).encode(), elsewhere)
         await asyncio.sleep(0.2)
         return [to for _, to in put]
 
@@ -246,6 +246,21 @@ def silent_radio(now_ns: Callable[[], int]) -> UdpRadio:
         NodeId(1), address="127.7.0.9", broadcast="127.255.255.255", port=24563, max_frame_bytes=300, now_ns=now_ns,
         on_message=lambda _: None,
     )  # fmt: skip
+
+
+async def test_a_node_that_starts_again_is_heard_from_its_first_frame_on() -> None:
+    """Its requests are numbered from 0 again."""
+    heard = silent_radio(lambda: 0)
+    for _ in range(2):
+        sender = UdpRadio(
+            NodeId(2), address="127.7.0.2", broadcast="127.255.255.255", port=24563, max_frame_bytes=300,
+            now_ns=lambda: 0, on_message=lambda _: None,
+        )  # fmt: skip
+        sender._put = lambda datagram, to: heard._on_datagram(datagram.encode(), to)  # type: ignore[method-assign]
+        for seq in range(20):
+            sender._transmit(request_of(seq, at_ms=0))
+            sender._transmit(request_of(seq, at_ms=0))
+    assert (heard.counts["received"], heard.counts["duplicate"]) == (40, 40)
 
 
 async def test_a_request_whose_instant_has_passed_goes_at_once_and_counts_as_late() -> None:

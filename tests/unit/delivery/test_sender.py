@@ -41,6 +41,15 @@ def delivered(sender: Sender, number: int, node: NodeId, at_ns: int) -> None:
     sender.receipt(node, Receipt(0, number, DELIVERED), at_ns)
 
 
+def test_alone_in_its_swarm_a_node_has_told_everyone() -> None:
+    sender = Sender(OWN, (OWN,), most_bytes=400, wait_ns=WAIT_NS)
+    sender.start(1)
+    number = send(sender, to=None)
+    assert sender.told == [Told(number, DELIVERED, (), last=True)]
+    assert sender.due(BORN_NS) == []
+    assert sender.next_wake_ns() is None
+
+
 def test_without_a_receipt_a_message_is_sent_again_and_patience_doubles_up_to_eight_times() -> None:
     sender, at_ns = made(), BORN_NS
     send(sender)

@@ -123,6 +123,22 @@ def test_a_reference_that_restarts_learns_the_time_and_leads_on() -> None:
     assert network.worst_us() < 30
 
 
+def test_a_reference_that_comes_back_with_a_time_and_rounds_of_its_own_is_followed_at_once() -> None:
+    """It has led for 300 s; away from the others it starts again, by a clock that is 30 ms off, and counts from 0."""
+    sync = follower()
+    follow(sync, ahead_ns=25 * MS, hellos=300)
+    for now_s in range(301, 341):
+        sync.hello_sent(now_s, ended_ns=now_s * S)
+        sync.beacon(now_s * S)
+    assert sync.is_reference, "nobody else was left"
+    for number in range(1, 9):
+        now_ns = (340 + number) * S
+        earlier = said(now_ns - S + 55 * MS, number - 1)._replace(round=number)
+        hear(sync, 1, number, now_ns, earlier if number > 1 else None)
+    assert (sync.reference, sync.is_reference) == (1, False)
+    assert abs(sync.line.swarm_ns(348 * S) - (348 * S + 55 * MS)) < 100 * US
+
+
 def test_two_swarms_that_meet_take_the_time_of_the_lower_reference() -> None:
     links = {1: [2], 2: [1], 3: [4], 4: [3]}
     network = Network(links, CRYSTAL, seed=8)

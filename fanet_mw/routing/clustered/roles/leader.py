@@ -10,9 +10,9 @@ An *epoch* is one assignment of nodes to clusters. The leader begins a new one w
     the clusters or links have become too bad  `clusters.reassign_s` after the present epoch began; never if that is 0
     the load of nodes has changed              likewise, with `clusters.load = "heard"`; after `_RELOAD_NS` if that is 0
 
-Joins come in bursts, so the leader waits until none has come for a moment. An elected leader knows no nodes at first:
-it calls all nodes to join, and divides them into clusters when all have had time to answer. Between joins, positions
-are extrapolated by dead reckoning.
+Joins come in bursts, so the leader waits until none has come for a moment, but not so long that its lease would end.
+An elected leader knows no nodes at first: it calls all nodes to join, and divides them into clusters when all have had
+time to answer. Between joins, positions are extrapolated by dead reckoning.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,7 +23,7 @@ from fanet_mw.graph.topology import Adjacency, within_range
 from fanet_mw.motion import Motion
 from fanet_mw.routing.clustered.clustering import Cluster, Swarm, succession
 from fanet_mw.routing.clustered.clustering.division import Division, drift
-from fanet_mw.routing.clustered.roles.lease import Authority
+from fanet_mw.routing.clustered.roles.lease import Authority, silence_ns
 from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import EPOCH_BITS
 from fanet_mw.routing.clustered.roles.position_updates import lost_ns
@@ -40,6 +40,8 @@ from fanet_mw.wire.loads import AS_EXPECTED
 
 SETTLE_NS: Final = 700 * MS
 """The time without a join after which the clusters are computed."""
+_LONGEST_SETTLING_NS: Final = 10 * S
+"""The longest time that the leader waits for joins to end before it divides the nodes for the first time."""
 OBJECTION_NS: Final = 2 * S
 """The time that a node has to object when it is reported silent; meanwhile a stand-in serves its cluster."""
 _OBJECTION_PERIODS: Final = 4
@@ -142,11 +144,17 @@ class Leader:
         if not self._roster.is_news(node, born_ns):
             return
         if node not in self._roster:
-            self._due_ns = max(now_ns + SETTLE_NS, self._not_before_ns)
+            self._due_ns = min(max(now_ns + SETTLE_NS, self._not_before_ns), max(now_ns, self._settled_ns()))
         motion = Motion(join.position, join.velocity, born_ns)
         self._roster.on_join(node, motion)
         if silent != node:
             self.on_suspicion(silent, node, motion, now_ns=now_ns)
+
+    def _settled_ns(self) -> int:
+        """The instant at which joins are waited for no longer."""
+        if self._assigned.parts:
+            return self._announced_ns + silence_ns(self._period_ns) // 2
+        return max(self._announced_ns, self._not_before_ns) + _LONGEST_SETTLING_NS
 
     def on_links(self, node: NodeId, links: Sequence[Link]) -> None:
         """A node, perhaps the leader itself, has reported how well it hears its neighbors."""

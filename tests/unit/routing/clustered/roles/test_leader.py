@@ -1,12 +1,13 @@
 """The leader, by hand: superframes of 1 s, joins in, schedules out."""
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import pytest
 
 from fanet_mw.motion import Motion
 from fanet_mw.routing.clustered.roles.leader import OBJECTION_NS, SETTLE_NS, Leader
-from fanet_mw.routing.clustered.roles.lease import Authority
+from fanet_mw.routing.clustered.roles.lease import Authority, silence_ns
 from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.position_updates import lost_ns
 from fanet_mw.scenario import Scenario
@@ -61,6 +62,31 @@ def test_clusters_are_made_when_no_join_has_come_for_a_moment(scenario: Scenario
     assert {member.node for member in schedule.members} == {2, 3}
     assert schedule.start_us % 1_000_000 == 0
     assert schedule.start_us * 1000 > now_ns, "its superframes begin when all have heard of it"
+
+
+@pytest.mark.parametrize("placed_before", [False, True])
+def test_nodes_that_join_one_after_the_other_without_end_do_not_keep_the_leader_silent(
+    make_scenario: MakeScenario, *, placed_before: bool
+) -> None:
+    scenario = make_scenario(**{"nodes.count": 60, "clusters.count": 1, "clusters.flooding_period_s": 1})
+    desk, announced = Desk(scenario), [0]
+    if placed_before:
+        desk.join(2, 100, born_ns=1 * S)
+        assert desk.announced_at(9 * S) == {2}
+        announced = [9 * S]
+    begin_ns = 10 * S if placed_before else 1 * S
+    members: set[int] = set()
+    for number in range(50):
+        now_ns = begin_ns + number * 600 * MS
+        while desk.leader.next_wake_ns() <= now_ns:
+            at_ns, parts = desk.announce()
+            announced.append(at_ns)
+            members = {member.node for part in parts for member in part.members} or members
+        desk.join(3 + number, 100 + number, born_ns=now_ns)
+    gaps_ns = [later - earlier for earlier, later in pairwise(announced)]
+    patience_ns = silence_ns(scenario.clusters.period_ns) if placed_before else 12 * S
+    assert max(gaps_ns) < patience_ns
+    assert len(members) >= 40, "they are placed while others still come"
 
 
 def test_the_leader_itself_is_a_member_of_no_cluster(scenario: Scenario) -> None:

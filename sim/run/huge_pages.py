@@ -4,9 +4,14 @@ A run in virtual time goes through the state of all nodes again and again, which
 4 kB: far more pages than the processor keeps the addresses of. In pages of 2 MB the same run takes a tenth less CPU
 time. The kernel moves memory into such pages on request (`MADV_COLLAPSE`, Linux 6.1). Where it cannot, because it is
 older or another system, nothing changes but the speed. The results of a run do not depend on it.
+
+The kernel copies a page when it moves it, which takes from some tenths of a millisecond to 13 ms on a busy machine. So
+requests take a small share of the run's CPU time at most: a run of a few seconds is not made slower by them, and a long
+one gets all its pages in time.
 """
 
 import ctypes
+import math
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -17,7 +22,9 @@ _HUGE_BYTES: Final = 2 << 20
 _COLLAPSE: Final = 25  # MADV_COLLAPSE, include/uapi/asm-generic/mman-common.h
 _MAPS: Final = Path("/proc/self/maps")
 _EVERY_S: Final = 2.0
-"""The least time between two requests. A shorter run makes none."""
+"""The least CPU time between two rounds of requests [s]. A shorter run makes none."""
+_MOST_SHARE: Final = 0.02
+"""The greatest share of a run's CPU time that requests may take."""
 Request = Callable[[int], bool]
 """Asks for the huge page that begins at an address; False if the kernel refuses."""
 
@@ -25,24 +32,44 @@ Request = Callable[[int], bool]
 class HugePages:
     """The huge pages of this process, for which a run asks while its memory grows."""
 
-    def __init__(self, request: Request | None = None) -> None:
-        """`request`: how to ask for a page; None for the request to the kernel of this system, if it has one."""
+    def __init__(self, request: Request | None = None, *, cpu_s: Callable[[], float] = time.process_time) -> None:
+        """`request`: how to ask for a page; None for the request to the kernel of this system, if it has one.
+        `cpu_s`: reads the CPU time of this process.
+        """
         self._request = request or _to_kernel()
+        self._cpu_s = cpu_s
         self._asked: set[int] = set()
         """The addresses for which a page was asked for already."""
-        self._next_s = time.perf_counter() + _EVERY_S
+        self._began_s = cpu_s()
+        self._next_s = self._began_s + _EVERY_S
+        self._spent_s = 0.0
+        """The CPU time that requests have taken."""
 
     def keep_up(self) -> None:
-        """Ask for huge pages for the memory that has been added, unless that was done a moment ago."""
-        if self._request is not None and time.perf_counter() >= self._next_s:
-            self.ask(self._request)
-            self._next_s = time.perf_counter() + _EVERY_S
+        """Ask for huge pages for the memory that has been added, as far as the share of CPU time for it allows, unless
+        that was done a moment ago.
+        """
+        now_s = self._cpu_s()
+        if self._request is not None and now_s >= self._next_s:
+            left_s = _MOST_SHARE * (now_s - self._began_s) - self._spent_s
+            self.ask(self._request, until_s=now_s + left_s)
+            after_s = self._cpu_s()
+            self._spent_s += after_s - now_s
+            self._next_s = after_s + _EVERY_S
 
-    def ask(self, request: Request) -> int:
-        """Ask for every page once; returns for how many the kernel does as it is asked."""
-        new = [address for address in huge_pages(_MAPS.read_text()) if address not in self._asked]
-        self._asked.update(new)
-        return sum(map(request, new))
+    def ask(self, request: Request, *, until_s: float = math.inf) -> int:
+        """Ask for every page once, until the process has taken this much CPU time; returns for how many the kernel
+        does as it is asked.
+        """
+        done = 0
+        for address in huge_pages(_MAPS.read_text()):
+            if address in self._asked:
+                continue
+            if self._cpu_s() >= until_s:
+                break
+            self._asked.add(address)
+            done += request(address)
+        return done
 
 
 def huge_pages(maps: str) -> Iterator[int]:

@@ -40,3 +40,22 @@ def test_a_page_is_asked_for_once_however_often_a_run_asks() -> None:
     assert before > 0
     assert added > 0
     assert len(asked) == len(set(asked)) == before + added
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the list of a process's memory is Linux's")
+def test_requests_take_a_small_share_of_the_cpu_time_however_dear_a_page_is() -> None:
+    page_s, step_s, run_s = 0.013, 0.05, 20.0
+    spent_s: list[float] = []
+    own_s = 0.0
+
+    def request(_: int) -> bool:
+        spent_s.append(page_s)
+        return True
+
+    with mmap.mmap(-1, 512 * _HUGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS):  # more than there is time for
+        pages = HugePages(request, cpu_s=lambda: own_s + sum(spent_s))
+        while own_s < run_s:
+            own_s += step_s
+            pages.keep_up()
+            assert sum(spent_s) <= 0.02 * (own_s + sum(spent_s)) + page_s  # the last request may end too late
+    assert sum(spent_s) > 0.015 * run_s

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from time import perf_counter
 
-sys.path.append(str(Path(__file__).parents[1] / "property"))
+sys.path += [str(Path(__file__).parents[1] / "property"), str(Path(__file__).parents[1])]  # with its kit.py
 
 from coloring import clashes, dsatur, welsh_powell
 from test_slots_with_reuse import LISTEN, Air

@@ -74,7 +74,7 @@ COUNTRY: Final[Mapping[str, Case]] = {
     "`night`": Case("night", (), _TWENTY),
 }
 FROM_THE_GROUND: Final[Mapping[str, Case]] = {
-    "`rescue-base`": Case("rescue-base", (), (1, 2, 3)),
+    "`rescue-base`": Case("rescue-base", (), (1, 2, 3, 4, 5, 6)),
 }
 _SMALL: Final = (
     "nodes.count=20", "nodes.spacing_m=100", "nodes.telemetry_hz=0", "clusters.count=4", "traffic.interval_s=4",

@@ -2,6 +2,7 @@
 verdict on each claim.
 """
 
+from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +12,7 @@ from rich.table import Table
 
 from fanet_mw.errors import ConfigError
 from sim.cli.console import Console
-from sim.cli.sweep import carry_out
+from sim.cli.sweep import carry_out, runs_of_other_code
 
 
 def add_to(app: App) -> None:
@@ -28,6 +29,7 @@ def figures(
     jobs: Annotated[int | None, Parameter(validator=Number(gte=1))] = None,
     scheduler: str | None = None,
     retry: Annotated[bool, Parameter(negative="")] = False,
+    rerun_older: Annotated[bool, Parameter(negative="")] = False,
     draw_only: Annotated[bool, Parameter(negative="")] = False,
     kept: Path | None = None,
 ) -> int:
@@ -51,6 +53,8 @@ def figures(
         A Dask scheduler whose workers carry out the runs.
     retry
         Repeat runs that failed, among them those in real time for which the machine was too busy.
+    rerun_older
+        Repeat runs that code other than the present one has finished, so that each figure is of one code.
     draw_only
         Draw from the runs that are finished, and run nothing.
     kept
@@ -66,21 +70,29 @@ def figures(
 
     if quick and full:
         raise ConfigError("--quick and --full exclude each other")
+    if rerun_older and draw_only:
+        raise ConfigError("--rerun-older and --draw-only exclude each other: --draw-only runs nothing")
     if kept is not None and not draw_only:
         raise ConfigError("--kept is for --draw-only: kept tables are drawn, and never added to")
     variant = "full" if full else "quick"
     verdicts = []
     missing: list[str] = []
+    notices: list[str] = []
     code = 0
     for recipe in chosen(which):
         runs = out / "sweeps" / f"{recipe.sweep}-{variant}"
         if not draw_only:
             found = spec.find(recipe.sweep).variant(variant)
-            code |= carry_out(recipe.sweep, found, out=runs, jobs=jobs, scheduler=scheduler, retry=retry)
+            code |= carry_out(
+                recipe.sweep, found, out=runs, jobs=jobs, scheduler=scheduler, retry=retry,
+                rerun_older=rerun_older,
+            )  # fmt: skip
         table = read(runs) if kept is None else read_kept(kept, recipe.sweep, variant)
         if table is None:
             missing.append(recipe.sweep)
             continue
+        if draw_only and (others := runs_of_other_code(Counter(table.column("code").to_pylist()))):
+            notices.append(f"{recipe.name}: {others}")
         verdicts += [(recipe.name, claim) for claim in render(recipe, table, out, variant=variant)]
     console = Console()
     table = Table("figure", "claim", "verdict", box=None, header_style="bold", padding=(0, 2, 0, 0))
@@ -89,6 +101,8 @@ def figures(
         for statement in claim.statements:
             table.add_row("", f"[dim]{statement.text()}[/]", "")
     console.print(table)
+    for notice in notices:
+        console.print(notice, highlight=False, soft_wrap=True)
     if missing:
         console.print(f"not drawn, because {kept} has no table of it: {', '.join(missing)}", highlight=False)
         code = 1

@@ -6,7 +6,7 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from sim.sweep.remaining_runs import RemainingRuns
     from sim.sweep.run import Progress, Workers
     from sim.sweep.spec import Sweep
-    from sim.sweep.store import Store
 
 _err = Console(stderr=True)
 _SAY_S: Final = 20.0
 """The interval at which progress is printed if there is no terminal for a progress bar."""
+_KEPT_NOTICE: Final = "they are kept, and the column `code` tells; --rerun-older runs exactly these again"
 
 
 def add_to(app: App) -> None:
@@ -44,6 +44,7 @@ def sweep(
     jobs: Annotated[int | None, Parameter(validator=Number(gte=1))] = None,
     scheduler: str | None = None,
     retry: Annotated[bool, Parameter(negative="")] = False,
+    rerun_older: Annotated[bool, Parameter(negative="")] = False,
     dry_run: Annotated[bool, Parameter(negative="")] = False,
     json: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
@@ -69,6 +70,8 @@ def sweep(
         A Dask scheduler, for example tcp://10.0.0.1:8786, whose workers carry out the runs.
     retry
         Repeat runs that failed.
+    rerun_older
+        Repeat runs that code other than the present one has finished, so that all rows are of one code.
     dry_run
         Validate, count, estimate, and stop.
     json
@@ -77,8 +80,8 @@ def sweep(
     """
     name, wanted = asked(what, set, seeds, variant)
     return carry_out(
-        name, wanted, out=out or Path("sweeps") / name, jobs=jobs, scheduler=scheduler, retry=retry, dry_run=dry_run,
-        json=json,
+        name, wanted, out=out or Path("sweeps") / name, jobs=jobs, scheduler=scheduler, retry=retry,
+        rerun_older=rerun_older, dry_run=dry_run, json=json,
     )  # fmt: skip
 
 
@@ -90,10 +93,12 @@ def carry_out(
     jobs: int | None,
     scheduler: str | None,
     retry: bool = False,
+    rerun_older: bool = False,
     dry_run: bool = False,
     json: bool = False,
 ) -> int:
     """Plan a sweep, print how long it will take, and carry it out."""
+    from sim.sweep.provenance import code
     from sim.sweep.remaining_runs import RemainingRuns
     from sim.sweep.run import run
     from sim.sweep.store import TABLE, Store
@@ -103,10 +108,10 @@ def carry_out(
     store = Store(out)
     with store.alone():
         store.read()
-        plan = RemainingRuns(tasks, store, retry=retry)
+        plan = RemainingRuns(tasks, store, retry=retry, only_code=code() if rerun_older else None)
         workers = _workers(jobs, scheduler, plan, dry_run=dry_run)
         _say(_announcement(name, wanted, plan, workers.workers))
-        _warn_of_codes(store, plan)
+        _warn_of_codes(plan.codes, "they are run again" if rerun_older else _KEPT_NOTICE)
         if dry_run:
             return 0
         if plan.todo:
@@ -178,15 +183,22 @@ def _announcement(name: str, wanted: "Sweep", plan: "RemainingRuns", workers: in
     return f"{text}; about {spoken(plan.seconds(workers))} with {workers} process{'' if workers == 1 else 'es'}"
 
 
-def _warn_of_codes(store: "Store", plan: "RemainingRuns") -> None:
+def _warn_of_codes(codes: Mapping[str, int], what_follows: str) -> None:
+    if others := runs_of_other_code(codes):
+        _say(f"[bold]{others}: {what_follows}[/]")
+
+
+def runs_of_other_code(codes: Mapping[str, int]) -> str:
+    """How many of the runs, counted by code, are of code other than the present one; empty if none is."""
     from sim.sweep.provenance import code
 
-    others = {done.code for task in plan.tasks if (done := store.get(task.key)) is not None} - {code()}
-    if others:
-        _say(
-            f"[bold]finished runs are of other code ({', '.join(sorted(others))}; this is {code()}): "
-            "the column `code` tells; choose another --out to have all anew[/]"
-        )
+    others = {name: codes[name] for name in sorted(codes) if name != code()}
+    if not others:
+        return ""
+    by_code = ", ".join(f"{count} of {name}" for name, count in others.items())
+    return (
+        f"{sum(others.values())} of {sum(codes.values())} finished runs are of other code ({by_code}; this is {code()})"
+    )
 
 
 def _compile() -> None:

@@ -1,6 +1,7 @@
 """Makes the files of a figure from the table of a sweep: PNG, SVG, the numbers, and the verdicts."""
 
 import json
+from collections import Counter
 from pathlib import Path
 
 from pyarrow import Table
@@ -34,6 +35,7 @@ def render(recipe: Recipe, table: Table, folder: Path, *, variant: str = "quick"
             "failed": runs.failed,
             "seeds": len({row["seed"] for row in runs.rows}),
             "code": sorted({row["code"] for row in runs.rows}),
+            "runs_by_code": dict(sorted(Counter(row["code"] for row in runs.rows).items())),
             "claims": [claim.plain() for claim in claims],
         }
         (folder / f"{recipe.name}.json").write_text(f"{json.dumps(about, indent=2)}\n", encoding="utf-8")

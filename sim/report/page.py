@@ -236,11 +236,23 @@ def _figure(folder: Path, about: dict[str, Any]) -> list[Block]:
     made = f"Variant {about['variant']}: {about['runs']} runs, {about['seeds']} seeds{failed}"
     blocks: list[Block] = [
         Picture(folder / f"{about['name']}.png", about["caption"]),
-        Text(f"{made}; code {', '.join(about['code'])}."),
+        Text(f"{made}; {_made_by(about)}"),
     ]
     if rows:
         blocks.append(Rows(_COLUMNS[:columns], [row[:columns] for row in rows]))
     return blocks
+
+
+def _made_by(about: Mapping[str, Any]) -> str:
+    """The code of the runs; where it is not one, how many runs each has made, and how to have all of one."""
+    codes: Sequence[str] = about["code"]
+    if len(codes) == 1:
+        return f"code {codes[0]}."
+    counts: Mapping[str, int] = about.get("runs_by_code", {})  # figures drawn by earlier versions have none
+    named = ", ".join(f"{code} ({counts[code]} runs)" if code in counts else code for code in codes)
+    which = about["name"].removeprefix("figure-")
+    again = f"fanet figures {which} --{about['variant']} --rerun-older"
+    return f"the runs are of {len(codes)} codes: {named}. `{again}` makes them of one."
 
 
 def _title(about: Mapping[str, Any]) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from fanet_mw.errors import ConfigError
+from sim.cli.app import app
 from sim.figures.all_figures import FIGURES, chosen
 from sim.figures.claims import Claim, Finding, Reason, Statement, Verdict, above, below
 from sim.figures.kept_tables import keep, read_kept
@@ -247,6 +248,28 @@ def test_a_kept_table_gives_the_same_figure_and_verdicts(nine, tmp_path) -> None
     (tmp_path / "fig9-quick.parquet").write_bytes(b"PAR1, and no more")
     with pytest.raises(ConfigError, match=r"fig9-quick\.parquet: cannot be read"):
         read_kept(tmp_path, "fig9", "quick")
+
+
+def test_kept_tables_are_drawn_by_the_command_and_missing_ones_are_named(
+    nine, tmp_path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table, folder, _ = nine
+    older = table.set_column(table.column_names.index("code"), "code", [["0.0.9+0ld"] * 3 + [code()] * 5])
+    keep(older, tmp_path / "kept", "fig9", "quick")
+    words = ["figures", "9", "--out", str(tmp_path / "drawn"), "--kept", str(tmp_path / "kept")]
+    with pytest.raises(ConfigError, match="--kept is for --draw-only"):
+        app(words, result_action="return_value", exit_on_error=False)
+    assert app([*words, "--draw-only"], result_action="return_value") == 0
+    said = capsys.readouterr().out
+    assert "figure-9: 3 of 8 finished runs are of other code (3 of 0.0.9+0ld; this is" in said
+    assert (tmp_path / "drawn" / "figure-9.png").read_bytes() == (folder / "figure-9.png").read_bytes()
+    about = json.loads((tmp_path / "drawn" / "figure-9.json").read_text())
+    assert about["runs_by_code"] == {"0.0.9+0ld": 3, code(): 5}
+    _, markdown = (path.read_text() for path in write([tmp_path / "drawn"], tmp_path / "drawn"))
+    assert f"the runs are of 2 codes: 0.0.9+0ld (3 runs), {code()} (5 runs)." in markdown
+    assert "`fanet figures 9 --quick --rerun-older` makes them of one." in markdown
+    assert app([*words, "10", "--draw-only"], result_action="return_value") == 1
+    assert "has no table of it: fig10" in " ".join(capsys.readouterr().out.split())
 
 
 def test_failed_runs_are_in_no_figure(nine) -> None:

@@ -145,6 +145,29 @@ def test_packets_are_held_against_the_slots_of_their_heads(make_scenario: MakeSc
     assert legend(drawing.figure) == ["packets of heads", "packets of members", "the owner's slot"]
 
 
+def test_claimed_turns_are_shaded_behind_the_contention_window_each_on_the_line_of_its_owner(
+    make_scenario: MakeScenario,
+) -> None:
+    """Turns of 50 ms behind a window of 100 ms in a period of 400 ms; the one with offset 7 passes its end."""
+    frame = {"start_ms": 1000.0, "period_ms": 400.0, "turn_ms": 50.0, "contention_ms": 100.0}
+    reports = {1: {"turns": {**frame, "own": [0, 3]}}, 2: {"turns": {**frame, "own": [7]}}, 3: {"turns": None}}
+    run = run_of(
+        make_scenario(**{"nodes.count": 3}),
+        *(Generated(S, node, 1, "traffic", 9) for node in (1, 2)),
+        LetOut(1120 * MS, 1, 1),
+        LetOut(1220 * MS, 2, 1),
+    )
+    drawing = run_pictures.slots(run, reports)
+    assert drawing is not None
+    bars = [
+        (bar.get_x(), bar.get_width(), bar.get_y() + bar.get_height() / 2)
+        for bar in drawing.figure.axes[0].patches
+        if isinstance(bar, Rectangle) and bar.get_label() != "contention window"
+    ]
+    assert bars == [(50, 50, 2), (100, 50, 1), (250, 50, 1)]
+    assert "Of 2 packets of nodes with turns, 1 were let out in a turn of the origin." in drawing.caption
+
+
 def test_turns_that_nodes_claim_are_those_in_which_they_let_packets_out(make_scenario: MakeScenario) -> None:
     """Four nodes in reach of each other; nobody has more to send than its claim carries, so nobody draws lots."""
     scenario = make_scenario(**{

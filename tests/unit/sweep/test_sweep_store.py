@@ -2,7 +2,9 @@
 
 import json
 import os
+import shutil
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pyarrow as pa
@@ -13,6 +15,7 @@ from fanet_mw.results import read
 from sim.results.flat_summary import flat
 from sim.sweep import spec
 from sim.sweep.one_run import Finished, carry_out
+from sim.sweep.provenance import code
 from sim.sweep.remaining_runs import RemainingRuns
 from sim.sweep.run import Progress, run
 from sim.sweep.store import TABLE, Store, write_whole
@@ -50,11 +53,13 @@ def sweep() -> spec.Sweep:
     return spec.parse(FILE, source="test")
 
 
-def go(folder: Path, sweep: spec.Sweep, workers: OneByOne, *, retry: bool = False) -> list[Progress]:
+def go(
+    folder: Path, sweep: spec.Sweep, workers: OneByOne, *, retry: bool = False, only_code: str | None = None
+) -> list[Progress]:
     store, told = Store(folder), []
     with store.alone():
         store.read()
-        plan = RemainingRuns(tasks_of(sweep), store, retry=retry)
+        plan = RemainingRuns(tasks_of(sweep), store, retry=retry, only_code=only_code)
         run(plan, store, workers, sweep.varied(), on_progress=told.append)
     return told
 
@@ -156,9 +161,30 @@ def test_a_run_that_fails_is_a_row_with_its_error_and_is_repeated_only_when_aske
     assert set(read(tmp_path).column("status").to_pylist()) == {"ok"}
 
 
-def test_a_sweep_that_has_grown_runs_only_what_is_new(sweep, whole, tmp_path) -> None:
-    import shutil
+def test_exactly_the_runs_of_other_code_are_run_again_when_that_is_asked_for(whole, sweep, tmp_path) -> None:
+    shutil.copytree(whole, tmp_path / "mixed")
+    store = Store(tmp_path / "mixed")
+    store.read()
+    older = [task.key for task in tasks_of(sweep)][1:3]
+    for key in older:
+        store.add(replace(found(store, key), code="0.0.9+0ld"))
+    assert RemainingRuns(tasks_of(sweep), store).codes == {"0.0.9+0ld": 2, code(): 2}
+    kept, again = OneByOne(), OneByOne()
+    go(tmp_path / "mixed", sweep, kept)
+    assert kept.ran == []
+    assert read(tmp_path / "mixed").column("code").to_pylist() == [code(), "0.0.9+0ld", "0.0.9+0ld", code()]
+    go(tmp_path / "mixed", sweep, again, only_code=code())
+    assert sorted(again.ran) == sorted(older)
+    assert (tmp_path / "mixed" / TABLE).read_bytes() == (whole / TABLE).read_bytes()
 
+
+def found(store: Store, key: str) -> Finished:
+    done = store.get(key)
+    assert done is not None
+    return done
+
+
+def test_a_sweep_that_has_grown_runs_only_what_is_new(sweep, whole, tmp_path) -> None:
     shutil.copytree(whole, tmp_path / "grown")
     workers = OneByOne()
     go(tmp_path / "grown", sweep.model_copy(update={"seeds": 3}), workers)

@@ -157,7 +157,9 @@ class ClockedUav(Actor):
             "withheld": self._withheld,
             **self._time.report(),
         }
-        return {**self._uav.report(), "clock": clock}
+        report = self._uav.report()
+        # the UAV has not seen what was withheld from it, but this node has received it
+        return {**report, "receptions": report["receptions"] + self._withheld, "clock": clock}
 
     # --- instants -------------------------------------------------------------------------------------------------
 

@@ -5,8 +5,8 @@
          -> its lifetime is over -> expired: the application is told which nodes have not confirmed it
 
 The wait for a receipt follows from earlier round trips (RFC 6298). The pieces under way of all messages together are
-bounded by a window: it is halved when something must be sent again, and grows by one with each confirmed message.
-Memory is bounded, too: the caller asks `full` first, and refuses a message that does not fit.
+bounded by a window (`send_window.py`), in which repetitions hold up no message that was not sent yet. Memory is
+bounded, too: the caller asks `full` first, and refuses a message that does not fit.
 """
 
 import heapq
@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 from fanet_mw.delivery.retransmission_timeout import RetransmissionTimeout
+from fanet_mw.delivery.send_window import SendWindow
 from fanet_mw.units import BROADCAST, MS, US, NodeId
 from fanet_mw.wire import message as wire_message
 from fanet_mw.wire.message import DELIVERED, MAVLINK_PORT, MOST_PIECES, Head, Receipt
@@ -24,9 +25,6 @@ MOST_BYTES: Final = 4 << 20
 MOST_MESSAGES: Final = 4096
 EXPIRED: Final = -1
 """The outcome of a message whose lifetime is over; all other outcomes are those of receipts."""
-_WINDOW: Final = 32
-"""The greatest number of pieces under way: ten kilobytes and more, but no burst that fills all queues."""
-_LEAST_WINDOW: Final = 2
 _MOST_DOUBLINGS: Final = 3
 _MOST_FLOWS: Final = 1024
 _FEW: Final = 2
@@ -109,13 +107,10 @@ class Sender:
         self._flows: dict[tuple[tuple[NodeId, ...], int, int], _Flow] = {}
         self._next_flow = 0
         self._next_number = 1
-        self._ready: list[tuple[int, int]] = []
-        """A heap of (priority, number) of messages of which something is to be sent as soon as the window has room."""
         self._timers: list[tuple[int, int]] = []
         """A heap of (instant, number) at which a message is sent again or expires; outdated entries are skipped."""
         self._kept_bytes = 0
-        self._under_way = 0
-        self._window = _WINDOW
+        self._window = SendWindow()
         self.told: list[Told] = []
         """The outcomes of messages; the caller empties this list."""
         self.repeated = 0
@@ -175,7 +170,7 @@ class Sender:
         )  # fmt: skip
         self._kept_bytes += len(data)
         self._messages[number] = message
-        heapq.heappush(self._ready, (priority, number))
+        self._window.wait(number, priority=priority, rounds=0)
         heapq.heappush(self._timers, (message.until_ns, number))
         return number
 
@@ -212,9 +207,9 @@ class Sender:
             message.lacking[origin] |= receipt.held & ((1 << message.pieces) - 1)
             return
         del message.lacking[origin]
+        self._window.widen()
         self.told.append(Told(message.number, receipt.outcome, (origin,), last=not message.lacking))
         if not message.lacking:
-            self._window = min(_WINDOW, self._window + 1)
             self._close(message)
 
     def _close(self, message: _OutgoingMessage) -> None:
@@ -222,7 +217,7 @@ class Sender:
         message.flow.open.remove(message.number)
         self._kept_bytes -= len(message.data)
         if message.again_ns:
-            self._under_way -= message.pieces
+            self._window.over(message.pieces, rounds=message.rounds)
 
     # --- out ------------------------------------------------------------------------------------------------------
 
@@ -237,13 +232,13 @@ class Sender:
                 self.told.append(Told(number, EXPIRED, tuple(message.lacking), last=True))
                 self._close(message)
             elif 0 < message.again_ns <= now_ns:
-                self._under_way -= message.pieces
+                self._window.over(message.pieces, rounds=message.rounds)
                 message.again_ns = 0
-                self._window = max(_LEAST_WINDOW, self._window // 2)
-                heapq.heappush(self._ready, (message.priority, number))
+                self._window.halve()
+                self._window.wait(number, priority=message.priority, rounds=message.rounds)
         packets: list[PieceToSend] = []
-        while self._ready and self._under_way < self._window:
-            message = self._messages.get(heapq.heappop(self._ready)[1])
+        while (ready := self._window.next()) is not None:
+            message = self._messages.get(ready)
             if message is not None:
                 packets += self._round(message, now_ns)
         return packets
@@ -272,7 +267,7 @@ class Sender:
         message.rounds += 1
         message.sent_ns = now_ns
         message.again_ns = now_ns + self._patience_ns(message)
-        self._under_way += message.pieces
+        self._window.sent(message.pieces, rounds=message.rounds)
         heapq.heappush(self._timers, (message.again_ns, message.number))
         return packets
 

@@ -168,15 +168,58 @@ def test_a_message_names_the_one_before_it_in_its_flow_as_long_as_that_is_open()
     assert again == {other_port: 0, second: 0}, "it is passed over"
 
 
-def test_a_repetition_halves_the_window_and_a_confirmed_message_widens_it_by_one() -> None:
+def test_a_target_that_is_gone_holds_up_no_message_to_another() -> None:
+    """A message of three packets to A, which never answers, is repeated for ten minutes; B answers at once."""
+    sender = made()
+    send(sender, bytes(700), to=(A,), lifetime_ms=600_000)
+    for second in range(1, 600):
+        now_ns = second * S
+        sender.due(now_ns)
+        if second % 60 == 0:
+            number = sender.confirmed(b"x", port=6, targets=(B,), priority=3, born_us=now_ns // US, lifetime_ms=30_000)
+            assert [packet.number for packet in sender.due(now_ns)] == [number]
+            delivered(sender, number, B, now_ns)
+
+
+def test_with_one_target_gone_messages_to_all_go_out_as_soon_as_they_are_sent() -> None:
+    sender = made()
+    for second in range(1, 200):
+        now_ns = second * S
+        numbers = {packet.number for packet in sender.due(now_ns)}
+        if second % 5 == 0:
+            number = sender.confirmed(
+                bytes(700), port=5, targets=None, priority=3, born_us=now_ns // US, lifetime_ms=30_000
+            )
+            numbers |= {packet.number for packet in sender.due(now_ns)}
+            assert number in numbers
+        for number in numbers:
+            for node in (B, C):
+                delivered(sender, number, node, now_ns)
+
+
+def test_of_repetitions_those_go_first_that_were_repeated_least() -> None:
+    sender, at_ns = made(), BORN_NS
+    old = send(sender, bytes(700), to=(A,))
+    for _ in range(6):
+        sender.due(at_ns)
+        at_ns = sender.next_wake_ns() or 0
+    young = sender.confirmed(b"x", port=6, targets=(B,), priority=3, born_us=at_ns // US, lifetime_ms=60_000)
+    at_ns += 10 * S  # both are due; the window is at its least
+    first = [packet.number for packet in sender.due(at_ns)]
+    assert first[0] == young
+    again = [packet.number for packet in sender.due(at_ns + 17 * S)]
+    assert again.index(young) < again.index(old) if old in again else young in again
+
+
+def test_a_repetition_halves_the_window_and_a_target_that_has_all_widens_it_by_one() -> None:
     sender = made()
     numbers = [send(sender) for _ in range(100)]
     assert len(sender.due(BORN_NS)) == 32
     after_timeout = sender.due(BORN_NS + WAIT_NS)
-    assert len(after_timeout) == 2, "every one of the 32 has halved it, down to the least"
+    assert len(after_timeout) == 2 + 2, "every one of the 32 has halved it, to two pieces of either kind"
     for number in numbers[:2]:
         delivered(sender, number, A, BORN_NS + WAIT_NS + MS)
-    assert len(sender.due(BORN_NS + WAIT_NS + MS)) == 4
+    assert len(sender.due(BORN_NS + WAIT_NS + MS)) == 2 + 4, "two new ones were under way already"
 
 
 def test_who_has_nobody_that_listens_is_told_apart_and_is_not_asked_again() -> None:

@@ -20,10 +20,15 @@ from fanet_mw.bus.radio_control import (
 )
 from fanet_mw.errors import ConfigError
 from fanet_mw.units import MAX_NODES, Enu, NodeId, S, seconds_to_ns
+from sim.cli.command_groups import RUNNING
 from sim.cli.console import Console
 from sim.cli.options import SwarmFlags
 
-app = App(name="air", help="Change the air of a swarm that runs: degrade a link, jam an area, cut a node off, restore.")
+app = App(
+    name="air",
+    group=RUNNING,
+    help="Change the air of a swarm that runs: degrade a link, jam an area, cut a node off, restore.",
+)
 
 
 @Parameter(name="*")

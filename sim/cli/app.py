@@ -14,6 +14,7 @@ from fanet_mw.errors import FanetError
 from fanet_mw.hosts import interrupts
 from sim.cli import figures, replay, runs, scenario_files, single_services, swarms, sweep, tool_files
 from sim.cli.air import app as air_app
+from sim.cli.command_groups import OPTIONS
 from sim.cli.console import Console, nobody_reads
 
 app = App(
@@ -28,6 +29,8 @@ app.command(air_app)
 for commands in (scenario_files, sweep, figures, runs, replay, single_services, swarms, tool_files):
     commands.add_to(app)
 app.register_install_completion_command()
+for option in ("--help", "--version", "--install-completion"):
+    app[option].group = (OPTIONS,)
 
 
 def changes_last(words: Sequence[str]) -> list[str]:

@@ -11,14 +11,15 @@ from cyclopts.validators import Number
 from rich.table import Table
 
 from fanet_mw.errors import ConfigError
+from sim.cli.command_groups import STUDY
 from sim.cli.console import Console
 from sim.cli.sweep import carry_out, runs_of_other_code
 
 
 def add_to(app: App) -> None:
     """Register the commands."""
-    app.command(figures)
-    app.command(report)
+    app.command(figures, group=STUDY)
+    app.command(report, group=STUDY)
 
 
 def figures(

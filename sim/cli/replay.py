@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
+from sim.cli.command_groups import RUN
 from sim.cli.console import Console
 
 if TYPE_CHECKING:
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 def add_to(app: App) -> None:
     """Register the command."""
-    app.command(replay)
+    app.command(replay, group=RUN)
 
 
 def replay(folder: Path, *, out: Path | None = None, at: Annotated[float | None, Parameter(name="--at")] = None) -> int:

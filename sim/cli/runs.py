@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 from cyclopts.validators import Number
 
+from sim.cli.command_groups import RUN
 from sim.cli.completion import ScenarioName
 from sim.cli.console import Console
 from sim.cli.options import OutputFlags, ScenarioFlags, warn_of, with_engine
@@ -28,7 +29,7 @@ _err = Console(stderr=True)
 def add_to(app: "App") -> None:
     """Register the commands."""
     for command in (simulate, launch, plan):
-        app.command(command)
+        app.command(command, group=RUN)
 
 
 def simulate(
@@ -141,7 +142,7 @@ def plan(
     search: Annotated[bool, Parameter(negative="")] = False,
     json: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
-    """Say before take-off whether a clustered scenario is feasible, what it guarantees, and what would make it so.
+    """Say before take-off whether a clustered scenario is feasible and what it guarantees, or else what to change.
 
     Exit code 0: feasible; 1: not feasible; 2: the scenario or a flag is wrong.
 

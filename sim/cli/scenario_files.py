@@ -9,6 +9,7 @@ from cyclopts import App, Parameter
 from rich.table import Table
 
 from fanet_mw.errors import ConfigError
+from sim.cli.command_groups import SCENARIO
 from sim.cli.completion import ScenarioName
 from sim.cli.console import Console
 from sim.cli.options import ScenarioFlags
@@ -23,7 +24,7 @@ Switch = Annotated[bool, Parameter(negative="")]
 def add_to(app: App) -> None:
     """Register the commands."""
     for command in (scenarios, init, show, check, schema):
-        app.command(command)
+        app.command(command, group=SCENARIO)
 
 
 def scenarios(*, json_: Annotated[bool, Parameter(name="--json", negative="")] = False) -> int:

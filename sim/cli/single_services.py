@@ -6,6 +6,7 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from fanet_mw.errors import FanetError
+from sim.cli.command_groups import SERVICE
 from sim.cli.completion import ScenarioName
 from sim.cli.console import Console
 from sim.cli.options import OutputFlags, ScenarioFlags, ServiceFlags, warn_of, with_engine
@@ -17,7 +18,7 @@ _err = Console(stderr=True)
 def add_to(app: App) -> None:
     """Register the commands."""
     for command in (router, emulator, world, agent):
-        app.command(command)
+        app.command(command, group=SERVICE)
 
 
 def router(
@@ -30,7 +31,7 @@ def router(
     force: Annotated[bool, Parameter(negative="")] = False,
     zenoh_config: Path | None = None,
 ) -> int:
-    """Serve the bus and keep the swarm clock, for services that are started one by one.
+    """Serve the bus (Zenoh) and keep the time of a swarm whose services are started one by one.
 
     It says every five seconds which services are missing, there twice, or run another scenario.
 
@@ -84,7 +85,7 @@ def emulator(
     pcap: Path | None = None,
     pcap_receptions: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
-    """Run the link emulator alone, against a router.
+    """Run the link emulator alone; it joins a swarm that fanet router serves.
 
     Parameters
     ----------
@@ -108,7 +109,7 @@ def emulator(
 def world(
     scenario: ScenarioName, *, choice: ScenarioFlags = ScenarioFlags(), join: ServiceFlags = ServiceFlags()
 ) -> int:
-    """Run the world alone, against a router.
+    """Run the world alone; it joins a swarm that fanet router serves.
 
     Parameters
     ----------
@@ -129,7 +130,7 @@ def agent(
     choice: ScenarioFlags = ScenarioFlags(),
     join: ServiceFlags = ServiceFlags(),
 ) -> int:
-    """Run one UAV alone, against a router.
+    """Run one UAV alone; it joins a swarm that fanet router serves.
 
     Parameters
     ----------

@@ -8,6 +8,7 @@ from cyclopts import App, Parameter
 from cyclopts.validators import Number
 from rich.table import Table
 
+from sim.cli.command_groups import RUNNING
 from sim.cli.console import Console
 from sim.cli.options import SwarmFlags
 from sim.run.bus.running_swarms import running
@@ -16,7 +17,7 @@ from sim.run.bus.running_swarms import running
 def add_to(app: App) -> None:
     """Register the commands."""
     for command in (links, swarms):
-        app.command(command)
+        app.command(command, group=RUNNING)
 
 
 def links(

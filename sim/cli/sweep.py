@@ -14,6 +14,7 @@ from cyclopts import App, Parameter
 from cyclopts.validators import Number
 
 from fanet_mw.errors import ConfigError
+from sim.cli.command_groups import STUDY
 from sim.cli.console import Console
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ _KEPT_NOTICE: Final = "they are kept, and the column `code` tells; --rerun-older
 
 def add_to(app: App) -> None:
     """Register the command."""
-    app.command(sweep)
+    app.command(sweep, group=STUDY)
 
 
 def sweep(

@@ -8,6 +8,7 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from fanet_mw.errors import ConfigError
+from sim.cli.command_groups import TOOLS
 from sim.cli.completion import ScenarioName
 from sim.cli.console import Console
 from sim.cli.options import ScenarioFlags
@@ -16,7 +17,7 @@ from sim.cli.options import ScenarioFlags
 def add_to(app: App) -> None:
     """Register the commands."""
     for command in (keys, dialect, dissector):
-        app.command(command)
+        app.command(command, group=TOOLS)
 
 
 def keys(
@@ -28,7 +29,8 @@ def keys(
     host: Annotated[tuple[str, ...], Parameter(negative="")] = (),
     days: int = 365,
 ) -> int:
-    """Make certificates and access lists for a swarm: one file per participant, for --zenoh-config. Needs openssl.
+    """Make certificates and access lists for a swarm: one file per participant, for --zenoh-config of
+    fanet launch. Needs openssl.
 
     Parameters
     ----------

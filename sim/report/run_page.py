@@ -4,7 +4,7 @@ the mission achieved.
 
 import json
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,7 @@ def blocks_of_run(folder: Path, out: Path) -> list[Block]:
         Heading(f"{summary['scenario']}, seed {summary['seed']}, {summary['nodes']} nodes"),
         Text(tree.get("description", "")),
         Text("The result may be used." if summary["valid"] else f"NOT VALID: {'; '.join(summary['invalid_because'])}."),
+        *_slowed(summary),
         Heading("Network", 3),
         run_rows.network(summary),
     ]
@@ -83,6 +84,14 @@ def _drawings(
 
 def _nothing() -> None:
     """No picture."""
+
+
+def _slowed(summary: Mapping[str, Any]) -> list[Block]:
+    """How slow the swarm's clock became where the machine could not keep up; nothing if it kept up."""
+    if not summary.get("slowed"):
+        return []
+    scale = summary["time_scale"]
+    return [Text(f"The machine could not keep up: the swarm's clock slowed to {scale:.3g} of real time.")]
 
 
 def _content(path: Path, missing: Any) -> Any:  # noqa: ANN401 JSON of a run

@@ -99,7 +99,8 @@ def delivery(run: RunRecords) -> RunPicture | None:
     return RunPicture(
         figure,
         f"Left: the delivery ratio of the packets generated in each {step_ns / S:.3g} s. Right: that of each receiver "
-        "over the whole run.",
+        "over the whole run. Packets of the end had less time to arrive: the run ends "
+        f"{run.scenario.drain_s:g} s after the last one.",
     )
 
 

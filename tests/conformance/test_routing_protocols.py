@@ -38,7 +38,7 @@ def scenario_of(protocol: str, *, destination: int | str, moving: bool = False) 
     times = {"duration_s": 30, "warmup_s": 18, "drain_s": 4} if moving else {}
     return config.build(
         {
-            "name": "small", "duration_s": 41, "warmup_s": 25, "drain_s": 6, **times,
+            "name": "small", "duration_s": 45, "warmup_s": 25, "drain_s": 8, **times,
             "nodes": {"count": 9, "layout": "grid", "columns": 3, "telemetry_hz": 0},
             "traffic": {"destination": destination, "payload_bytes": 300},
             "routing": {"protocol": protocol},

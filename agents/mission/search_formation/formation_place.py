@@ -112,9 +112,9 @@ class FormationPlace:
 
     def misses_m(self, estimate: Estimate, lane: Enu, moves: Enu) -> float:
         """How far from an estimated place this UAV has to stay, wherever its moving place takes it; 0 if it can get
-        there.
+        there, or if its lane turns and may come nearer again.
         """
-        if self.is_free:
+        if self.is_free or self.pattern is None or self.pattern.dimensions.turns:
             return 0.0
         ahead_m, aside_m = along(moves, estimate.east_m - lane.east, estimate.north_m - lane.north)
         beyond_m = max(0.0, -_LAG_M - ahead_m)

@@ -101,6 +101,11 @@ class Dimensions(NamedTuple):
         return self.teams * self.lanes + self.relays
 
     @property
+    def turns(self) -> bool:
+        """True if lanes change their direction in the middle of a sweep, as those of a spiral do at its corners."""
+        return self.shape is ShapeName.SPIRAL
+
+    @property
     def places(self) -> int:
         return self.fixed + self.followers
 

@@ -153,7 +153,7 @@ class Leader:
     def _settled_ns(self) -> int:
         """The instant at which joins are waited for no longer."""
         if self._assigned.parts:
-            return self._announced_ns + silence_ns(self._period_ns) // 2
+            return self._announced_ns + silence_ns(self._period_ns) * 3 // 4
         return max(self._announced_ns, self._not_before_ns) + _LONGEST_SETTLING_NS
 
     def on_links(self, node: NodeId, links: Sequence[Link]) -> None:

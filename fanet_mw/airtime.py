@@ -89,3 +89,12 @@ def airtime_ns(size: int, radio: Radio, *, rate_mbps: float) -> int:
         extension_ns = SIGNAL_EXTENSION_NS if radio.standard == "g" else 0
         return ofdm_frame_ns(size, rate_mbps=rate_mbps, extension_ns=extension_ns)
     return frame_ns(size, rate_mbps=rate_mbps, short=radio.preamble == "short")
+
+
+def longest_access_ns(size: int, radio: Radio) -> int:
+    """The longest time that a frame of this project, of `size` bytes, takes at an idle medium: DIFS, the longest
+    backoff that an earlier frame may have left behind, and its airtime.
+    """
+    timing = Timing.of(radio)
+    longest_ns = airtime_ns(size + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
+    return longest_ns + timing.difs_ns + radio.cw_min * timing.slot_ns

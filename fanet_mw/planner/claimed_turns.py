@@ -20,7 +20,7 @@ from fanet_mw.bounds import TurnServer
 from fanet_mw.graph.connected_dominating_set import dominates
 from fanet_mw.graph.topology import Adjacency, two_hop
 from fanet_mw.planner.demand import TrafficClass
-from fanet_mw.routing.clustered.claimed.claiming import IDLE, LISTEN_HELLOS, geometry, longest_superframe, turn_bytes
+from fanet_mw.routing.clustered.claimed.claiming import IDLE, LISTEN_HELLOS, geometry, longest_superframe
 from fanet_mw.routing.clustered.claimed.own_turns import Share
 from fanet_mw.routing.clustered.claimed.slot_claims import SlotClaims
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
@@ -87,7 +87,7 @@ class Claimants:
     """The slots, relays and routes of claimed slots, which follow from positions alone."""
 
     def __init__(self, scenario: Scenario, adjacency: Adjacency) -> None:
-        self.turns = geometry(scenario, turn_bytes(scenario))
+        self.turns = geometry(scenario)
         self._near = two_hop(adjacency)
         self._shares = converged_slots(scenario, adjacency, self.turns)
         self.relays = {node: dominates(node, adjacency) for node in adjacency}
@@ -129,7 +129,7 @@ class Claimants:
         packets share a turn.
         """
         period_ns = self.turns.period_ns
-        most = turn_bytes(scenario)
+        most = scenario.claimed_turn_bytes
         each = [
             period_ns / c.interval_ns / (max(1, most // c.payload_bytes) if scenario.routing.aggregate else 1)
             for c in classes

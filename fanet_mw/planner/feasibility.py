@@ -25,7 +25,7 @@ from fanet_mw.planner.goodput_bound import Goodput, any_protocol
 from fanet_mw.planner.head_slot import ClassLoad, ClusterPlan, slot_delays, work_ns
 from fanet_mw.planner.timetable_plan import Candidate, TimetablePlan, judge, table_for
 from fanet_mw.planner.uplink_delay import Ways, access_outcome, ways
-from fanet_mw.routing.clustered.claimed.claiming import geometry, turn_bytes
+from fanet_mw.routing.clustered.claimed.claiming import geometry
 from fanet_mw.routing.clustered.clustering import Cluster, balanced
 from fanet_mw.routing.clustered.tdma.turn_timing import receipt_ns
 from fanet_mw.routing.clustered.timetable.turn_plan import Fitted
@@ -116,7 +116,7 @@ class Site:
     def claimants(self) -> Claimants:
         """The slots and relays of claimed slots, which follow from the positions and the geometry of turns."""
         scenario = self.scenario
-        key = geometry(scenario, turn_bytes(scenario)), scenario.clusters.slots, scenario.radio
+        key = geometry(scenario), scenario.clusters.slots, scenario.radio
         if key not in self._claimants:
             self._claimants[key] = Claimants(scenario, self.adjacency)
         return self._claimants[key]

@@ -8,8 +8,9 @@ from __future__ import annotations  # `Scenario` imports this module: to it, the
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
+from fanet_mw import airtime  # whole: it imports this package, and may be the first to be imported
 from fanet_mw.bus.radio_control import EVERY, Degrade, Restore, nodes_of
-from fanet_mw.units import MS
+from fanet_mw.units import MS, US
 
 if TYPE_CHECKING:
     from fanet_mw.scenario import Scenario, Traffic
@@ -89,7 +90,23 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
                 f"clusters.guard_ms = {clusters.guard_ms:g} must be < the slot, flooding_period_s / count = "
                 f"{clusters.slot_ns / MS:g} ms"
             )
+        found += _no_claimed_turns(scenario)
     return found
+
+
+def _no_claimed_turns(scenario: Scenario) -> Iterator[str]:
+    """Periods of claimed turns in which no turn is left beside the contention window."""
+    clusters, radio = scenario.clusters, scenario.radio
+    if clusters.relay != "claimed" or not scenario.routing.hello_interval_s:
+        return
+    turn_ns = airtime.longest_access_ns(scenario.claimed_turn_bytes, radio) + round(clusters.turn_slack_us * US)
+    most_ms = (scenario.claimed_period_ns - turn_ns) // US * US / MS
+    if clusters.contention_ms > most_ms:
+        yield (
+            f"clusters.contention_ms = {clusters.contention_ms:g} must be <= {most_ms:g}, the period less one turn of "
+            f"{turn_ns / MS:g} ms: the period is the lesser of clusters.flooding_period_s = "
+            f"{clusters.flooding_period_s:g} and routing.hello_interval_s / 2 = {scenario.routing.hello_interval_s / 2:g}"
+        )
 
 
 def _impossible_traffic(scenario: Scenario, traffic: Traffic) -> Iterator[str]:

@@ -16,7 +16,7 @@ from fanet_mw.node.neighbors import LIFETIME_HELLOS, Neighbors
 from fanet_mw.node.queue import TxQueue, sooner_us
 from fanet_mw.routing.clustered.claimed.claimed_access import ClaimedAccess
 from fanet_mw.routing.clustered.claimed.claimed_release import ClaimedRelease
-from fanet_mw.routing.clustered.claimed.claiming import Claiming, geometry, turn_bytes
+from fanet_mw.routing.clustered.claimed.claiming import Claiming, geometry
 from fanet_mw.routing.clustered.claimed.own_turns import OwnTurns
 from fanet_mw.routing.clustered.clustered import Clustered, Parts
 from fanet_mw.routing.clustered.contract import HearsCopies, ScheduledAccess
@@ -296,13 +296,12 @@ def _roles(
 
 def _by_claims(ground: _Ground) -> Clustered:
     port, scenario = ground.port, ground.port.scenario
-    size = turn_bytes(scenario)
-    own = OwnTurns(geometry(scenario, size))
+    own = OwnTurns(geometry(scenario))
     ground.contention.turns_at = lambda _: own.turns
     claiming = Claiming(port, own)
     frame_bytes = scenario.radio.max_frame_bytes if scenario.routing.aggregate else 0
     access = ClaimedAccess(
-        port, claiming=claiming, turn_bytes=size, gradient=ground.gradient, uplink=ground.uplink,
+        port, claiming=claiming, turn_bytes=scenario.claimed_turn_bytes, gradient=ground.gradient, uplink=ground.uplink,
         queue=ClaimedRelease(ground.queue(), own, lead_ns=scenario.radio.lead_ns, frame_bytes=frame_bytes),
         floods=ground.floods, contention=ground.contention,
     )  # fmt: skip

@@ -9,6 +9,7 @@ from agents.applications.autopilot import Autopilot
 from fanet_mw import wire
 from fanet_mw.errors import ConfigError
 from fanet_mw.mavlink import Encoder
+from fanet_mw.routing.clustered.claimed.claiming import geometry
 from fanet_mw.scenario import Scenario, config, grid_columns
 from fanet_mw.scenario.checks import MESSAGE_BYTES
 from fanet_mw.units import Enu, NodeId
@@ -129,3 +130,26 @@ def test_formation_flight_needs_clusters_and_uavs_that_fly_themselves() -> None:
     ):
         with pytest.raises(ConfigError, match=wanted):
             catalog.find("convoy", [override])
+
+
+CLAIMED = '[nodes]\ncount = 5\n[routing]\nprotocol = "clustered"\n[clusters]\ncount = 1\nrelay = "claimed"\n'
+
+
+@pytest.mark.parametrize(
+    ("keys", "bound"),
+    [
+        ("contention_ms = 600\nflooding_period_s = 0.5\n", "contention_ms = 600 must be <= 49"),
+        ("flooding_period_s = 0.04\n", "contention_ms = 40 must be <= 3"),
+        ("contention_ms = 39.5\nflooding_period_s = 0.04\n", "contention_ms = 39.5 must be <= 3"),
+    ],
+)
+def test_a_contention_window_that_leaves_no_claimed_turn_is_refused(keys: str, bound: str) -> None:
+    assert bound in refusal(CLAIMED + keys)
+    config.parse(CLAIMED.replace("claimed", "all") + keys, source="a.toml", name="a")
+
+
+def test_a_contention_window_that_leaves_one_claimed_turn_is_accepted() -> None:
+    message = refusal(CLAIMED + "contention_ms = 600\nflooding_period_s = 0.5\n")
+    most = float(message.split("must be <= ")[1].split(",")[0])
+    found = config.parse(CLAIMED + f"contention_ms = {most}\nflooding_period_s = 0.5\n", source="a.toml", name="a")
+    assert geometry(found).per_superframe == 1

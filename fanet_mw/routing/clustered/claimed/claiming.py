@@ -30,7 +30,6 @@ _HELLOS_UNTIL_KNOWN: Final = 3
 """The number of hellos after which all nodes within two hops know how many lots a node draws."""
 IDLE: Final = 0.25
 """A node that uses less than this share of the turns of its claim draws no lots for further turns."""
-_LEAST_FRAME: Final = 256
 
 
 class Change(Enum):
@@ -195,20 +194,14 @@ def _rank(slot: int | None) -> float:
     return 0.0 if slot is None else 1.0
 
 
-def turn_bytes(scenario: Scenario) -> int:
-    """The largest frame that a turn must hold."""
-    least = max(scenario.traffic.payload_bytes, _LEAST_FRAME)
-    return max(least, scenario.radio.max_frame_bytes) if scenario.routing.aggregate else least
-
-
 def longest_superframe(turns: Turns) -> int:
     """The number of slots of the longest superframe: a power of two that fits a period."""
     return 1 << (min(_LONGEST, max(1, turns.per_superframe)).bit_length() - 1)
 
 
-def geometry(scenario: Scenario, frame_bytes: int) -> Turns:
-    """The geometry of periods and turns, such that each hello interval has a contention window."""
-    period_ns = min(scenario.clusters.period_ns, seconds_to_ns(scenario.routing.hello_interval_s) // 2)
+def geometry(scenario: Scenario) -> Turns:
+    """The geometry of periods and turns."""
+    period_ns = scenario.claimed_period_ns
     contention_ns = round(scenario.clusters.contention_ms * MS)
-    turn = turn_ns(scenario, payload_bytes=frame_bytes)
+    turn = turn_ns(scenario, payload_bytes=scenario.claimed_turn_bytes)
     return Turns(0, period_ns, contention_ns, turn, max(0, period_ns - contention_ns) // turn)

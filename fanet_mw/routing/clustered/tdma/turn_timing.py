@@ -17,7 +17,7 @@ of turns from that turn until all nodes have the packet, the first and the last 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final, NamedTuple
 
-from fanet_mw.airtime import OVERHEAD_BYTES, Timing, airtime_ns
+from fanet_mw.airtime import longest_access_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.timesync.ftsp import MOST_STATED_NS
 from fanet_mw.units import MS, US
@@ -140,10 +140,7 @@ def turn_ns(scenario: Scenario, *, payload_bytes: int) -> int:
     """The length of a turn whose largest frame has this size. The slack is for propagation, detection and errors of
     clocks.
     """
-    radio = scenario.radio
-    timing = Timing.of(radio)
-    longest_ns = airtime_ns(payload_bytes + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
-    return longest_ns + timing.difs_ns + radio.cw_min * timing.slot_ns + turn_slack_ns(scenario)
+    return longest_access_ns(payload_bytes, scenario.radio) + turn_slack_ns(scenario)
 
 
 def receipt_ns(scenario: Scenario) -> int:

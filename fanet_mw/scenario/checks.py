@@ -96,8 +96,8 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
 
 def _no_claimed_turns(scenario: Scenario) -> Iterator[str]:
     """Periods of claimed turns in which no turn is left beside the contention window."""
-    clusters, radio = scenario.clusters, scenario.radio
-    if clusters.relay != "claimed" or not scenario.routing.hello_interval_s:
+    clusters, radio, hello_s = scenario.clusters, scenario.radio, scenario.routing.hello_interval_s
+    if clusters.relay != "claimed" or not hello_s:
         return
     turn_ns = airtime.longest_access_ns(scenario.claimed_turn_bytes, radio) + round(clusters.turn_slack_us * US)
     most_ms = (scenario.claimed_period_ns - turn_ns) // US * US / MS
@@ -105,7 +105,7 @@ def _no_claimed_turns(scenario: Scenario) -> Iterator[str]:
         yield (
             f"clusters.contention_ms = {clusters.contention_ms:g} must be <= {most_ms:g}, the period less one turn of "
             f"{turn_ns / MS:g} ms: the period is the lesser of clusters.flooding_period_s = "
-            f"{clusters.flooding_period_s:g} and routing.hello_interval_s / 2 = {scenario.routing.hello_interval_s / 2:g}"
+            f"{clusters.flooding_period_s:g} and routing.hello_interval_s / 2 = {hello_s / 2:g}"
         )
 
 
@@ -119,7 +119,7 @@ def _impossible_traffic(scenario: Scenario, traffic: Traffic) -> Iterator[str]:
     for key, ids in (("sources", traffic.sources), ("targets", traffic.targets)):
         if isinstance(ids, tuple) and any(i > count for i in ids):
             yield f"traffic.{key} = {list(ids)} must be node ids <= nodes.count = {count}"
-    longest = max((size for _, size in traffic.packets), default=traffic.payload_bytes)
+    longest = traffic.longest_bytes
     if longest > most:
         yield f"traffic.payload_bytes = {longest} must be <= radio.max_frame_bytes = {most}"
     if (scenario.routing.protocol, scenario.clusters.relay) == ("clustered", "scheduled"):

@@ -121,8 +121,9 @@ class Scenario(Section):
 
     @property
     def claimed_turn_bytes(self) -> int:
-        """The largest frame that a claimed turn holds."""
-        least = max(self.traffic.payload_bytes, _LEAST_TURN_BYTES)
+        """The largest frame that a claimed turn holds: no packet of traffic or of the mission is longer."""
+        longest = max(traffic.longest_bytes for traffic in self.traffic_classes.values())
+        least = max(longest, self.mission.report_bytes if self.mission.survivors else 0, _LEAST_TURN_BYTES)
         return max(least, self.radio.max_frame_bytes) if self.routing.aggregate else least
 
     @property

@@ -53,6 +53,11 @@ class Traffic(Section):
     targets: tuple[Id, ...] = ()
     """The nodes at which deliveries count if the destination is `all`; empty: all other nodes."""
 
+    @property
+    def longest_bytes(self) -> int:
+        """The size of the longest packet."""
+        return max((size for _, size in self.packets), default=self.payload_bytes)
+
     @model_validator(mode="after")
     def _trace_has_packets(self) -> Self:
         if self.packets_csv:

@@ -28,14 +28,15 @@ class InitialSync:
         self._memory_ns = memory_ns
         """How long a statement counts."""
         self._stated: dict[NodeId, tuple[int, Pair]] = {}
-        self._since_ns: int | None = None
+        self._since_ns = 0
+        """The instant since which there has always been a statement that counts."""
 
     def on_statement(self, src: NodeId, reference: int, pair: Pair, *, local_ns: int) -> bool:
         """A neighbor has stated the time; returns True if the node should follow this reference from now on."""
-        if self._since_ns is None:
-            self._since_ns = local_ns
         horizon_ns = pair.local_ns - self._memory_ns
         self._stated = {node: stated for node, stated in self._stated.items() if stated[1].local_ns >= horizon_ns}
+        if not self._stated:
+            self._since_ns = local_ns
         self._stated[src] = reference, pair
         if src == reference == self._leader:
             return True

@@ -81,3 +81,11 @@ def test_what_was_said_long_ago_counts_no_longer() -> None:
     assert not says(first, 6, 5000, 5 * S)
     assert not says(first, 5, 6400, LIE_NS)
     assert says(first, 3, 9001), "one of two, since node 6 has been silent"
+
+
+def test_a_statement_that_was_forgotten_has_not_waited_for_a_later_one() -> None:
+    first = nobody_believed()
+    assert not says(first, 3, 5000, LIE_NS)
+    assert not says(first, 4, 100_000), "the wait begins again, because nobody's statement counts any more"
+    assert not says(first, 4, 101_000)
+    assert says(first, 4, 101_500)

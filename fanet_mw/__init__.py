@@ -38,8 +38,9 @@ if TYPE_CHECKING:
     from fanet_mw.errors import BusError, ConfigError, DropReason, FanetError, LocalProtocolError, MalformedFrameError
     from fanet_mw.scenario import Scenario
     from fanet_mw.units import BROADCAST, Enu, NodeId
-    from sim.run.api import Launched, VirtualSwarm, launch, simulate
+    from sim.run.api import Launched, launch, simulate
     from sim.run.result import Result
+    from sim.run.virtual_swarm import VirtualSwarm
     from sim.scenarios.catalog import find as load_scenario
 
 __version__ = "0.1.0"
@@ -60,8 +61,9 @@ _HOMES: Final = {
     ),
     "fanet_mw.scenario": ("Scenario",),
     "fanet_mw.units": ("BROADCAST", "Enu", "NodeId"),
-    "sim.run.api": ("Launched", "VirtualSwarm", "launch", "simulate"),
+    "sim.run.api": ("Launched", "launch", "simulate"),
     "sim.run.result": ("Result",),
+    "sim.run.virtual_swarm": ("VirtualSwarm",),
 }  # fmt: skip
 """The module of each public name. The packages above this one are named here and imported by nothing else in it."""
 _HOME_OF: Final = {name: module for module, names in _HOMES.items() for name in names}

@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from sim.run.api import Launched, VirtualSwarm
+    from sim.run.api import Launched
+    from sim.run.virtual_swarm import VirtualSwarm
 
 __all__ = ["LaunchSwarm", "MakeSwarm", "real_swarm", "swarm"]
 
@@ -28,10 +29,10 @@ LaunchSwarm = Callable[..., contextlib.AbstractAsyncContextManager["Launched"]]
 """What the fixture `real_swarm` is."""
 
 
-def _api() -> Any:  # noqa: ANN401  (a module)
-    """What runs swarms; a test that asks for it is skipped where the emulator is not installed."""
+def _emulator(module: str) -> Any:  # noqa: ANN401  (a module)
+    """A module that runs swarms; a test that asks for it is skipped where the emulator is not installed."""
     try:
-        return importlib.import_module("sim.run.api")
+        return importlib.import_module(module)
     except ModuleNotFoundError as error:
         pytest.skip(f"needs fanet-mw[emulator]: {error}")
 
@@ -39,11 +40,11 @@ def _api() -> Any:  # noqa: ANN401  (a module)
 @pytest.fixture
 def swarm() -> MakeSwarm:
     """`swarm(scenario, applications=..., seed=..., overrides=[...])`: a swarm in virtual time, as a context manager."""
-    api = _api()
+    module = _emulator("sim.run.virtual_swarm")
 
     @contextlib.asynccontextmanager
     async def make(scenario: object, **more: object) -> AsyncIterator["VirtualSwarm"]:
-        made = api.VirtualSwarm(scenario, **more)
+        made = module.VirtualSwarm(scenario, **more)
         yield made
         made.result()  # whatever the test looked at, the run ends in order
 
@@ -53,5 +54,5 @@ def swarm() -> MakeSwarm:
 @pytest.fixture
 def real_swarm() -> LaunchSwarm:
     """`real_swarm(scenario, leave_out=[3], overrides=[...])`: a swarm of processes, as a context manager."""
-    found: LaunchSwarm = _api().launch
+    found: LaunchSwarm = _emulator("sim.run.api").launch
     return found

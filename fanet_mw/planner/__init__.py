@@ -7,11 +7,13 @@ into text.
 
 from fanet_mw.planner.cheapest_change import ScenarioChange, cheapest_change, plan, with_capacity
 from fanet_mw.planner.demand import ClassPlan, TrafficClass, demands
-from fanet_mw.planner.feasibility import Plan, Site, evaluate
+from fanet_mw.planner.feasibility import evaluate
 from fanet_mw.planner.head_slot import ClusterPlan
 from fanet_mw.planner.loss import Loss, loss
 from fanet_mw.planner.lossy_plan import LossyPlan, plan_lossy
 from fanet_mw.planner.optimum import Optimum, optimum
+from fanet_mw.planner.plan import Plan
+from fanet_mw.planner.site import Site
 from fanet_mw.planner.text import describe, describe_change, describe_loss, describe_lossy, describe_optimum
 from fanet_mw.planner.variant import Variant, vary
 

@@ -16,8 +16,10 @@ from fanet_mw.graph.topology import Adjacency
 from fanet_mw.planner import verdict
 from fanet_mw.planner.claimed_verdict import evaluate_claims
 from fanet_mw.planner.demand import demands
-from fanet_mw.planner.feasibility import Plan, Site, evaluate, heads_of
+from fanet_mw.planner.feasibility import evaluate, heads_of
 from fanet_mw.planner.goodput_bound import in_turns
+from fanet_mw.planner.plan import Plan
+from fanet_mw.planner.site import Site
 from fanet_mw.planner.variant import Value, Variant, vary
 from fanet_mw.routing.clustered.tdma.turn_timing import turn_slack_ns
 from fanet_mw.routing.clustered.timetable.turn_allocation import least_interval_ns

@@ -6,9 +6,11 @@ from fanet_mw.bounds import Bounded, Refused
 from fanet_mw.planner import reachability, verdict
 from fanet_mw.planner.claimed_turns import ClaimedPlan, NodeTurns
 from fanet_mw.planner.demand import ClassPlan, TrafficClass
-from fanet_mw.planner.feasibility import Plan, Site, goodput
+from fanet_mw.planner.feasibility import goodput
 from fanet_mw.planner.flood_cost import FloodCost
 from fanet_mw.planner.head_slot import ClusterPlan
+from fanet_mw.planner.plan import Plan
+from fanet_mw.planner.site import Site
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS
 

@@ -15,17 +15,15 @@ from typing import Final, NamedTuple
 
 from fanet_mw import wire
 from fanet_mw.bounds import Bounded, DelayBound, Refused, paper
-from fanet_mw.bounds.guard_time import PLANNED_ERROR_NS, slot_guard_ns
-from fanet_mw.graph.topology import Adjacency, within_range
 from fanet_mw.planner import contention_window, reachability, verdict
-from fanet_mw.planner.claimed_turns import Claimants, ClaimedPlan
 from fanet_mw.planner.demand import ClassPlan, TrafficClass
-from fanet_mw.planner.flood_cost import FloodCost, flood_cost
+from fanet_mw.planner.flood_cost import FloodCost
 from fanet_mw.planner.goodput_bound import Goodput, any_protocol
 from fanet_mw.planner.head_slot import ClassLoad, ClusterPlan, slot_delays, work_ns
+from fanet_mw.planner.plan import Plan
+from fanet_mw.planner.site import Site
 from fanet_mw.planner.timetable_plan import Candidate, TimetablePlan, judge, table_for
 from fanet_mw.planner.uplink_delay import Ways, access_outcome, ways
-from fanet_mw.routing.clustered.claimed.claiming import geometry
 from fanet_mw.routing.clustered.clustering import Cluster, balanced
 from fanet_mw.routing.clustered.tdma.turn_timing import receipt_ns
 from fanet_mw.routing.clustered.timetable.turn_plan import Fitted
@@ -34,109 +32,6 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S
 
 _ASSUMED_UPLINK_NS: Final = 1 * S
-
-
-class Plan(NamedTuple):
-    """The verdict on a scenario."""
-
-    scenario: Scenario
-    clusters: tuple[ClusterPlan, ...]
-    classes: tuple[ClassPlan, ...]
-    access: DelayBound
-    uplink_ns: int
-    paper: DelayBound
-    """The estimate of the paper's equations (1)-(4) for the cluster with the greatest load, for comparison only."""
-    superframe: TimetablePlan | None
-    """The timetable; None if relays are not scheduled."""
-    claims: ClaimedPlan | None
-    """The plan of claimed slots, if slots are claimed; `clusters` then has one entry for each node."""
-    cut_off: tuple[NodeId, ...]
-    """The nodes that floods from the leader's part of the swarm do not reach."""
-    goodput: Goodput | None
-    """The goodput that no protocol can exceed; None if traffic is not for all nodes, or if the swarm is separated."""
-    deadline_ns: int | None
-    problems: tuple[str, ...]
-    """The reasons why the scenario is not feasible; empty if it is."""
-    notes: tuple[str, ...]
-    """The assumptions of the bounds, and what they do not include."""
-
-    @property
-    def feasible(self) -> bool:
-        return not self.problems
-
-    @property
-    def proven(self) -> bool:
-        """True if the bounds hold; False if some are estimates of contention."""
-        return isinstance(self.access, Bounded) and all(cluster.flood.proven for cluster in self.clusters)
-
-    @property
-    def carried_per_second(self) -> float | None:
-        """The application packets per second, of all sources together, that this configuration can carry; None if
-        unknown.
-
-        With a timetable whose capacity was computed, it is exact. If relays contend, it is the load that would fill the
-        fullest slot; with claimed slots, the load that fills the busiest node on average.
-        """
-        application = next((c for c in self.classes if c.name == "application"), None)
-        if application is None or not application.sources:
-            return None
-        exact = self.superframe or self.claims
-        if exact is not None:
-            least_ns = exact.least_interval_ns
-            return None if least_ns is None else application.sources * S / least_ns
-        used = self.bottleneck.utilization if self.bottleneck else 0.0
-        return application.sources * S / application.interval_ns / used if used else None
-
-    @property
-    def bottleneck(self) -> ClusterPlan | None:
-        """The cluster with the fullest slot."""
-        return max(self.clusters, key=lambda c: (c.utilization, -c.head), default=None)
-
-
-class Site:
-    """A scenario and the positions of its nodes. What depends on positions alone is computed once for all variants."""
-
-    def __init__(self, scenario: Scenario, positions: Mapping[NodeId, Enu], adjacency: Adjacency | None = None) -> None:
-        self.scenario = scenario
-        self.positions = positions
-        self.adjacency = within_range(positions, range_m=scenario.radio.range_m) if adjacency is None else adjacency
-        self._floods: dict[tuple[NodeId, int], FloodCost] = {}
-        self._claimants: dict[object, Claimants] = {}
-
-    def of(self, scenario: Scenario) -> "Site":
-        """The same nodes with another scenario; the costs of floods are shared if the rules of
-        relaying are the same.
-        """
-        other = Site(scenario, self.positions, self.adjacency)
-        if scenario.clusters.relay == self.scenario.clusters.relay and scenario.radio == self.scenario.radio:
-            other._floods = self._floods
-        other._claimants = self._claimants
-        return other
-
-    def claimants(self) -> Claimants:
-        """The slots and relays of claimed slots, which follow from the positions and the geometry of turns."""
-        scenario = self.scenario
-        key = geometry(scenario), scenario.clusters.slots, scenario.radio
-        if key not in self._claimants:
-            self._claimants[key] = Claimants(scenario, self.adjacency)
-        return self._claimants[key]
-
-    @property
-    def timetable(self) -> bool:
-        return self.scenario.clusters.relay == "scheduled"
-
-    @property
-    def guard_ns(self) -> int:
-        clock = self.scenario.clock
-        alone_ns = clock.unsynchronized_error_ns(self.scenario.duration_ns)
-        error_ns = alone_ns if clock.sync == "none" else PLANNED_ERROR_NS
-        return slot_guard_ns(self.scenario, clock_error_ns=error_ns)
-
-    def flood(self, head: NodeId, payload_bytes: int) -> FloodCost:
-        key = head, payload_bytes
-        if key not in self._floods:
-            self._floods[key] = flood_cost(self.scenario, self.adjacency, head, payload_bytes=payload_bytes)
-        return self._floods[key]
 
 
 class _Judged(NamedTuple):

@@ -17,8 +17,10 @@ from fanet_mw.airtime import Timing
 from fanet_mw.bounds import Refused
 from fanet_mw.planner.cheapest_change import WINDOWS, hopeless
 from fanet_mw.planner.demand import TrafficClass, demands
-from fanet_mw.planner.feasibility import Plan, Site, evaluate, members_of
+from fanet_mw.planner.feasibility import evaluate, members_of
 from fanet_mw.planner.flood_cost import frame_ns
+from fanet_mw.planner.plan import Plan
+from fanet_mw.planner.site import Site
 from fanet_mw.planner.uplink_delay import ways
 from fanet_mw.planner.variant import Variant, vary
 from fanet_mw.routing.clustered.timetable.turn_size import schedule_bytes

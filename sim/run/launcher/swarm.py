@@ -86,6 +86,7 @@ class SwarmRun:
             scenario.time_scale,
             least=scenario.time_scale if slow_down_to is None else slow_down_to,
             late_limit=scenario.radio.late_limit,
+            end_ns=scenario.duration_ns,
         )
         protocol = module_of(scenario.routing.protocol)
         self.processes = Processes(self._process_ended, title=f"fanet {names.swarm}", preload=[protocol])

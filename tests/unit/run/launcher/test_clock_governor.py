@@ -14,9 +14,9 @@ FRAMES, RECEPTIONS = 1000, 4000
 class Swarm:
     """An emulator and two UAVs that report once a second; and the clock's scale by the governor."""
 
-    def __init__(self, *, scale: float = 1.0, least: float = 0.1) -> None:
+    def __init__(self, *, scale: float = 1.0, least: float = 0.1, end_s: int = 1000) -> None:
         self.scale = scale
-        self._governor = ClockGovernor(scale, least=least, late_limit=0.01)
+        self._governor = ClockGovernor(scale, least=least, late_limit=0.01, end_ns=end_s * S)
         self._late_frames = self._late_receptions = self._seconds = 0
 
     def second(self, *, late: float = 0.0, heard_late: float = 0.0) -> float:
@@ -84,6 +84,13 @@ def test_a_clock_that_may_not_slow_down_never_does() -> None:
 
 
 def test_without_a_report_of_the_emulator_nothing_is_decided() -> None:
-    governor = ClockGovernor(1.0, least=0.1, late_limit=0.01)
+    governor = ClockGovernor(1.0, least=0.1, late_limit=0.01, end_ns=9 * S)
     assert governor.slower({}, 0) is None
     assert governor.slower({"world": {"kind": "world"}}, S) is None
+
+
+@pytest.mark.parametrize(("scale", "left_s"), [(1.0, 1), (4.0, 4)])
+def test_a_run_is_left_alone_in_its_last_second_of_real_time(scale: float, left_s: int) -> None:
+    """A process that hears late of a slower clock would end before the others do."""
+    assert Swarm(scale=scale, end_s=1 + left_s).second(late=0.5) == scale / 2
+    assert Swarm(scale=scale, end_s=left_s).second(late=0.5) == scale

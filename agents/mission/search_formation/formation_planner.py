@@ -9,6 +9,8 @@
     leavers:    a node whose status says that its battery is only enough for the way home is replaced at once
     alone:      a node that has received nobody takes the place with its own number, and keeps it; others that are
                 alone then search other lanes
+    restarts:   a node without a plan that hears of others' waits to be told it, even if it has the lowest id; of those
+                that follow the newest plan, the one with the lowest id stands in as the planner until then
 
 The first assignment minimizes the sum of the squared distances flown. If all UAVs leave and arrive at the same
 instants, their ways then do not cross, and UAVs that were near each other remain so. The words place, team, relay and
@@ -21,6 +23,7 @@ from typing import Final, NamedTuple
 from agents.mission.hungarian import assign
 from agents.mission.search_formation.pattern import Pattern
 from agents.mission.search_formation.shapes.contract import Dimensions, ShapeName
+from fanet_mw.serial_number import following, newer
 from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire.search_plan import Search, SearchStatus
 
@@ -37,14 +40,22 @@ _REPEAT_NS: Final = 6 * S
 """The interval at which a new plan is flooded again."""
 _REPEATS: Final = 3
 """The number of times that a new plan is flooded again."""
+_BEHIND_NS: Final = 15 * S
+"""A node whose status names an older plan this long after this node began to follow its own cannot be the planner."""
+_ASKS_NS: Final = 60 * S
+"""How long a node without a plan waits to be told that of the others before it makes one that replaces theirs."""
+_REVISION_BITS: Final = 16
 
 
 class _HeardUav(NamedTuple):
     position: Enu
     heard_ns: int
     revision: int
+    """The plan that the node follows, by its latest status; 0 if it has none."""
     leaves: bool
     """True for a node that flies home: it has no place any more, and does not plan any more."""
+    stated_ns: int | None = None
+    """The instant of the latest status; None for a node of which only hellos were received."""
 
 
 class FormationPlanner:
@@ -62,7 +73,12 @@ class FormationPlanner:
         self.to_tell: list[Search] = []
         """The plans to be flooded, until the caller takes them."""
         self._told_ns: int | None = None
+        """The instant at which this node last flooded a plan; None if it never did."""
         self._tellings_left = 0
+        self._followed: Search | None = None
+        """The plan in force at the last review."""
+        self._followed_ns = 0
+        """The instant of the first review with this plan."""
 
     # --- input ----------------------------------------------------------------------------------------------------
 
@@ -70,20 +86,24 @@ class FormationPlanner:
         """The status of a UAV, this one or another."""
         before = self._members.get(status.node)
         if before is None or status.t_us * US >= before.heard_ns - S:
+            stated_ns = min(now_ns, status.t_us * US)
             self._members[status.node] = _HeardUav(
-                status.position, min(now_ns, status.t_us * US), status.revision, leaves=status.charge == 0
+                status.position, stated_ns, status.revision, leaves=status.charge == 0, stated_ns=stated_ns
             )
 
     def on_neighbor(self, node: int, position: Enu, *, now_ns: int) -> None:
         """A neighbor was received, and states its position."""
         before = self._members.get(node)
-        revision, leaves = (before.revision, before.leaves) if before else (0, False)
-        self._members[node] = _HeardUav(position, now_ns, revision, leaves=leaves)
+        self._members[node] = (
+            before._replace(position=position, heard_ns=now_ns)
+            if before
+            else _HeardUav(position, now_ns, revision=0, leaves=False)
+        )
 
     def on_plan(self, plan: Search) -> bool:
         """A plan was received; returns True if it replaces the plan in force."""
         mine = self.plan
-        if mine is not None and (plan.revision, -plan.planner) <= (mine.revision, -mine.planner):
+        if mine is not None and not _replaces(plan, mine):
             return False
         self.plan = plan
         return True
@@ -96,10 +116,11 @@ class FormationPlanner:
         """
         if self._began_ns is None:
             self._began_ns = now_ns
+        if self._followed is not self.plan:
+            self._followed, self._followed_ns = self.plan, now_ns
         if self._leads(now_ns):
             if self.plan is None:
-                everyone = len(self._members) >= self._expected
-                if pattern is not None and (everyone or now_ns - self._began_ns >= _PATIENCE_NS):
+                if pattern is not None and self._may_plan(now_ns - self._began_ns):
                     self._adopt(self._first(pattern, now_ns), now_ns)
                     return True
             elif now_ns > self.plan.start_us * US:
@@ -111,12 +132,35 @@ class FormationPlanner:
         return False
 
     def _leads(self, now_ns: int) -> bool:
-        """True if this node is the planner: of the nodes that stay, none with a lower id was received recently."""
+        """True if this node is the planner: of the nodes that stay and know the plan, none with a lower id was received
+        recently.
+        """
         me = self._members.get(self._node)
         return not (me is not None and me.leaves) and all(
-            node >= self._node or member.leaves or now_ns - member.heard_ns > _LOST_NS
+            node >= self._node or member.leaves or now_ns - member.heard_ns > _LOST_NS or self._lacks_plan(member)
             for node, member in self._members.items()
         )
+
+    def _may_plan(self, waited_ns: int) -> bool:
+        """True if this node knows all that can be known for a first plan. A node that has just started again knows that
+        the others have a plan only once it has received a status.
+        """
+        members = self._members.values()
+        if waited_ns < _ASKS_NS and any(member.revision for member in members):
+            return False
+        stated = sum(member.stated_ns is not None for member in members)
+        everyone = len(members) >= self._expected and stated >= min(2, self._expected)
+        return everyone or waited_ns >= _PATIENCE_NS
+
+    def _lacks_plan(self, member: _HeardUav) -> bool:
+        """True for a node that has said that it does not follow the plan, long after it could have been told."""
+        stated_ns = member.stated_ns
+        return stated_ns is not None and stated_ns - self._followed_ns > _BEHIND_NS and self._is_behind(member)
+
+    def _is_behind(self, member: _HeardUav) -> bool:
+        """True for a node whose status names no plan, or an older one than that of this node."""
+        plan = self.plan
+        return plan is not None and (member.revision == 0 or newer(plan.revision, member.revision, bits=_REVISION_BITS))
 
     def _adopt(self, plan: Search, now_ns: int) -> None:
         self.plan = plan
@@ -125,14 +169,15 @@ class FormationPlanner:
 
     def _tell_again(self, now_ns: int) -> None:
         """Flood a plan several times, and later again for any node whose status names an older one."""
-        if self.plan is None or self._told_ns is None or now_ns - self._told_ns < _REPEAT_NS:
+        since_ns = 3 * _REPEAT_NS if self._told_ns is None else now_ns - self._told_ns
+        if self.plan is None or since_ns < _REPEAT_NS:
             return
         behind = any(
-            member.revision < self.plan.revision and now_ns - member.heard_ns < _REPEAT_NS
+            self._is_behind(member) and now_ns - member.heard_ns < _REPEAT_NS
             for node, member in self._members.items()
             if node != self._node
         )
-        if self._tellings_left or (behind and now_ns - self._told_ns > 2 * _REPEAT_NS):
+        if self._tellings_left or (behind and since_ns > 2 * _REPEAT_NS):
             self._tellings_left = max(0, self._tellings_left - 1)
             self._told_ns = now_ns
             self.to_tell.append(self.plan)
@@ -158,7 +203,7 @@ class FormationPlanner:
             planner=self._node,
             start_us=start_ns // US,
             deploy_ds=round(10 * max(1.0, farthest_m / self._deploy_speed)),
-        )
+        )._replace(revision=_next(self._newest_revision()))
 
     def _mended(self, plan: Search, now_ns: int) -> Search | None:
         """The plan without lost UAVs and with new ones; None if nothing has changed."""
@@ -177,7 +222,27 @@ class FormationPlanner:
         holders = _filled(holders, pattern)
         if tuple(holders) == plan.nodes:
             return None
-        return plan._replace(revision=plan.revision + 1, planner=self._node, nodes=tuple(holders))
+        return plan._replace(revision=_next(plan.revision), planner=self._node, nodes=tuple(holders))
+
+    def _newest_revision(self) -> int:
+        """The number of the newest plan that a status has named; 0 if none has named any."""
+        newest = 0
+        for member in self._members.values():
+            if member.revision and (not newest or newer(member.revision, newest, bits=_REVISION_BITS)):
+                newest = member.revision
+        return newest
+
+
+def _replaces(plan: Search, mine: Search) -> bool:
+    """True if a plan is newer than that in force; of two with the same number the planner with the lower id counts."""
+    if plan.revision == mine.revision:
+        return plan.planner < mine.planner
+    return newer(plan.revision, mine.revision, bits=_REVISION_BITS)
+
+
+def _next(revision: int) -> int:
+    """The number of the plan after this one; numbers wrap, and 0 stands for no plan."""
+    return following(revision, bits=_REVISION_BITS) or 1
 
 
 def plan_of(pattern: Pattern, nodes: tuple[int, ...], *, planner: int, start_us: int, deploy_ds: int) -> Search:

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import pytest
 
@@ -10,6 +10,7 @@ from agents.mission.search_formation.formation_planner import FormationPlanner, 
 from agents.mission.search_formation.pattern import Pattern, fitted
 from agents.mission.search_formation.shapes.contract import Demands, ShapeName
 from fanet_mw.units import US, Enu, NodeId, S
+from fanet_mw.wire import HEADER_BYTES
 from fanet_mw.wire.search_plan import Search, SearchStatus
 
 REACH_M = 250.0
@@ -209,3 +210,94 @@ def test_of_two_plans_the_newer_one_counts_and_of_equal_ones_that_of_the_lower_i
     assert [listener.on_plan(plan(*which)) for which in ((1, 4), (1, 5), (1, 3), (2, 8), (1, 1), (2, 8))] == [
         True, False, True, True, False, False,
     ]  # fmt: skip
+
+
+def test_the_number_of_a_plan_wraps_as_a_forged_one_may_be_the_greatest() -> None:
+    planner, pattern = planner_with(45), formation()
+    planner.on_plan(plan_of(pattern, tuple(range(1, 46)), planner=1, start_us=0, deploy_ds=10)._replace(revision=65535))
+    later_ns = 90 * S
+    for node in range(1, 45):
+        planner.status(SearchStatus(later_ns // US, Enu(0, 0, 50), node, 65535, 100), now_ns=later_ns)
+    assert planner.review(pattern, now_ns=later_ns)
+    assert planner.plan is not None
+    told = Search.decode_frame(bytes(HEADER_BYTES) + planner.plan.encode_frame(1))
+    assert told.revision == 1, "0 stands for no plan"
+    other = planner_with(45, node=2)
+    other.on_plan(told._replace(revision=65535))
+    assert other.on_plan(told)
+
+
+class Swarm:
+    """Planners that hear each other's hellos, statuses and plans."""
+
+    def __init__(self, count: int) -> None:
+        self.pattern = fitted(count, DEMANDS, shape=ShapeName.SPIRAL)
+        self.planners = {node: self.fresh(node, count) for node in range(1, count + 1)}
+        self.second = 0
+
+    def fresh(self, node: int, count: int) -> FormationPlanner:
+        return FormationPlanner(NodeId(node), expected=count, deploy_speed_m_s=9)
+
+    def fly(self, seconds: int, *, deaf: Collection[int] = ()) -> None:
+        """Let time pass; those who are `deaf` receive no plan."""
+        for _ in range(seconds):
+            self.second += 1
+            now_ns = self.second * S
+            for node, sender in self.planners.items():
+                plan, place = sender.plan, Enu(20.0 * node, 0.0, 50.0)
+                status = SearchStatus(now_ns // US, place, node, plan.revision if plan else 0, 100)
+                for receiver in self.planners.values():
+                    if self.second % 12 == node % 12:
+                        receiver.status(status, now_ns=now_ns)
+                    elif receiver is not sender:
+                        receiver.on_neighbor(node, place, now_ns=now_ns)
+                sender.review(self.pattern, now_ns=now_ns)
+                told, sender.to_tell = sender.to_tell, []
+                for plan in told:
+                    for receiver in (self.planners[other] for other in self.planners if other not in deaf):
+                        receiver.on_plan(plan)
+
+    @property
+    def plans(self) -> set[Search | None]:
+        return {planner.plan for planner in self.planners.values()}
+
+
+def test_a_planner_that_restarts_follows_the_plan_of_the_others() -> None:
+    swarm = Swarm(5)
+    swarm.fly(60)
+    (plan,) = swarm.plans
+    assert plan is not None
+    assert plan.planner == 1
+    swarm.planners[1] = swarm.fresh(1, 5)
+    swarm.fly(60)
+    assert swarm.plans == {plan}
+    del swarm.planners[4]
+    swarm.fly(90)
+    (mended,) = swarm.plans
+    assert mended is not None
+    assert mended.planner == 1, "it plans again"
+    assert 4 not in mended.nodes
+
+
+def test_a_new_planner_tells_the_plan_to_whom_the_lost_one_could_not_reach() -> None:
+    swarm = Swarm(7)
+    swarm.fly(60, deaf=[7])
+    plan = swarm.planners[2].plan
+    assert plan is not None
+    assert swarm.planners[7].plan is None
+    for lost in (1, 4, 5, 6):
+        del swarm.planners[lost]
+    swarm.fly(150)
+    assert swarm.plans == {plan}, "they are the smaller part, which makes no new plan"
+
+
+def test_a_restarted_planner_whom_nobody_tells_the_plan_makes_one_that_replaces_it() -> None:
+    swarm = Swarm(3)
+    swarm.fly(40)
+    swarm.planners[1] = swarm.fresh(1, 3)
+    swarm.fly(55, deaf=[1])
+    assert swarm.planners[1].plan is None
+    swarm.fly(30, deaf=[1])
+    (plan,) = swarm.plans
+    assert plan is not None
+    assert (plan.planner, plan.revision) == (1, 2)

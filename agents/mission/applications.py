@@ -8,10 +8,11 @@ Each application passes its inputs to the mission, and empties the mission's out
 from typing import Final
 
 from agents.mission.courses import course_at
+from agents.mission.finding.plausibility import Plausibility
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.mission.outbox import Outbox
 from agents.mission.paper_rule import PaperRule
-from agents.mission.searcher import Searcher
+from agents.mission.searcher import Searcher, phone_model
 from agents.positioning.received_motion import motion_in
 from fanet_mw.application import Application, AppPort, Received
 from fanet_mw.bus.messages import Altimeter, Battery, Camera, Gps, Radar, SensorReading, Voice, WifiScan
@@ -70,6 +71,7 @@ class PlannedSearch(Application):
         """`onboard_map`: the map that the UAV carries."""
         self._outbox = Outbox()
         self._searcher = Searcher(scenario, node, position=position, outbox=self._outbox, onboard_map=onboard_map)
+        self._plausibility = Plausibility(phone_model(scenario))
         self._bad_positions = 0
         """The number of hellos without a credible position."""
 
@@ -81,6 +83,8 @@ class PlannedSearch(Application):
         for told in told_in(message.frame):
             if _sole_origin(told) not in (None, message.origin):
                 raise MalformedFrameError(f"{type(told).__name__} of {_sole_origin(told)} by {message.origin}")
+            if not self._plausibility.holds(told, now_ns=now_ns):
+                raise MalformedFrameError(f"{told} at {now_ns} ns")
             self._searcher.on_message(told, now_ns=now_ns)
         self.port.tap(message.frame)
         self._settle()
@@ -94,7 +98,8 @@ class PlannedSearch(Application):
         origin, motion = heard
         self._searcher.hello(origin, motion, now_ns=now_ns)
         for told in messages:
-            self._searcher.on_message(told, now_ns=now_ns)
+            if self._plausibility.holds(told, now_ns=now_ns):  # else the sender passes on what another one has made up
+                self._searcher.on_message(told, now_ns=now_ns)
         self._settle()
 
     def hello_frames(self, now_ns: int) -> bytes:

@@ -11,8 +11,8 @@ from fanet_mw.motion import Motion
 from fanet_mw.node.reader import decoded, packet_of
 from fanet_mw.units import MS, NodeId, S
 
-_FUTURE_NS: Final = S
-"""A position whose instant is further in the future than this is rejected: the clocks of a swarm differ by less."""
+FUTURE_NS: Final = S
+"""What was sent by an instant further in the future than this is rejected: the clocks of a swarm differ by less."""
 
 
 def motion_in(frame: bytes, *, own: NodeId, now_ns: int) -> tuple[NodeId, Motion] | None:
@@ -26,6 +26,6 @@ def motion_in(frame: bytes, *, own: NodeId, now_ns: int) -> tuple[NodeId, Motion
     except MalformedFrameError:
         return None
     motion = Motion(heard.position, heard.velocity, heard.t_ms * MS)
-    if origin == own or motion.at_ns > now_ns + _FUTURE_NS:
+    if origin == own or motion.at_ns > now_ns + FUTURE_NS:
         return None
     return origin, motion

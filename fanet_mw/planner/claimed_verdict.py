@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from fanet_mw.bounds import Bounded, Refused
-from fanet_mw.planner import reachability, verdict
+from fanet_mw.planner import flood_hops, reachability, verdict
 from fanet_mw.planner.claimed_turns import ClaimedPlan, NodeTurns
 from fanet_mw.planner.demand import ClassPlan, TrafficClass
 from fanet_mw.planner.feasibility import goodput
@@ -40,6 +40,7 @@ def evaluate_claims(site: Site, classes: Sequence[TrafficClass], *, deadline_ns:
         deadline_ns=deadline_ns,
         problems=(
             *reachability.problems(cut_off),
+            *flood_hops.too_many(scenario, claims.hops),
             *_problems(scenario, claims, planned, deadline_ns),
             *verdict.clocks_apart(scenario),
         ),

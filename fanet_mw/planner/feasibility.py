@@ -7,15 +7,16 @@ In the slot of a head, floods follow each other at a spacing; in a timetable, ea
 the head late by up to `uplink_ns`. If that has no bound, one second (or a period) is assumed, and a note says so.
 
 A scenario is feasible if each slot is stable, each packet arrives before its lifetime and any deadline end, no queue
-overflows, and a flood reaches all nodes.
+overflows, and a flood reaches all nodes within the hop limit.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from fanet_mw import wire
 from fanet_mw.bounds import Bounded, DelayBound, Refused, paper
-from fanet_mw.planner import contention_window, reachability, verdict
+from fanet_mw.graph.topology import levels, within_range
+from fanet_mw.planner import contention_window, flood_hops, reachability, verdict
 from fanet_mw.planner.demand import ClassPlan, TrafficClass
 from fanet_mw.planner.flood_cost import FloodCost
 from fanet_mw.planner.goodput_bound import Goodput, any_protocol
@@ -27,7 +28,7 @@ from fanet_mw.planner.uplink_delay import Ways, access_outcome, ways
 from fanet_mw.routing.clustered.clustering import Cluster, balanced
 from fanet_mw.routing.clustered.tdma.turn_timing import receipt_ns
 from fanet_mw.routing.clustered.timetable.turn_plan import Fitted
-from fanet_mw.routing.clustered.timetable.turn_size import schedule_parts, superframe
+from fanet_mw.routing.clustered.timetable.turn_size import links, schedule_parts, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S
 
@@ -86,6 +87,7 @@ def evaluate(
     cut_off = tuple(reachability.problems(judged.cut_off))
     crowded = tuple(contention_window.too_short(scenario, site.adjacency)) if site.timetable else ()
     apart = tuple(verdict.clocks_apart(scenario)) if site.timetable else ()
+    out_of_hops = () if judged.unfit or judged.cut_off else tuple(_out_of_hops(site, fitted, judged.clusters))
     return Plan(
         scenario=scenario,
         clusters=judged.clusters,
@@ -101,6 +103,7 @@ def evaluate(
         problems=judged.unfit
         or (
             *cut_off,
+            *out_of_hops,
             *verdict.problems(scenario, judged.clusters, summed, cut_off),
             *crowded,
             *apart,
@@ -111,6 +114,22 @@ def evaluate(
             *verdict.left_out(scenario),
         ),
     )
+
+
+def _out_of_hops(site: Site, fitted: Fitted | Refused | None, clusters: Sequence[ClusterPlan]) -> Iterator[str]:
+    """Sentences about floods that do not reach all nodes, because of the hop limit or of links that do not exist."""
+    scenario = site.scenario
+    if not isinstance(fitted, Fitted):
+        hops = max((c.hops + max(levels(site.adjacency, NodeId(c.head)).values()) for c in clusters), default=0)
+        yield from flood_hops.too_many(scenario, hops)
+        return
+    geometry = links(scenario, fitted.turns)
+    by_range = scenario.radio.channel == "range"
+    adjacency = site.adjacency if by_range else within_range(site.positions, range_m=geometry.link_m)
+    found = flood_hops.flood_hops(fitted.table, adjacency, geometry)
+    yield from flood_hops.incomplete(scenario, geometry, found)
+    most = max((c.hops + found[NodeId(c.head)].most for c in clusters if c.head in found), default=0)
+    yield from flood_hops.too_many(scenario, most)
 
 
 def goodput(site: Site, classes: Sequence[TrafficClass]) -> Goodput | None:

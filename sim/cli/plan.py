@@ -70,8 +70,9 @@ def judge(
         return describe(found), {"feasible": False, "problems": [found.reason]}, False
     found = with_capacity(found, at)
     text, content = [describe(found)], _json(found)
-    if found.superframe is not None and found.superframe.table is not None and not found.cut_off:
-        missed = _loss(found.scenario, found.superframe, found.superframe.table, at)
+    table = None if found.superframe is None else found.superframe.table
+    if found.superframe is not None and table is not None and len(at) > 1 and not found.cut_off:
+        missed = _loss(found.scenario, found.superframe, table, at)
         text.append(describe_loss(missed))
         content["loss"] = None if missed is None else missed._asdict()
     if change and not found.feasible:

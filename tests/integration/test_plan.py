@@ -108,3 +108,11 @@ def test_the_command_prints_its_verdict_and_ends_with_it(
     assert said in out
     if "--json" in arguments and code != 2:
         assert json.loads(out)["superframe"]["turns"] == 375
+
+
+@pytest.mark.parametrize("sources", ["0", '"all"'])
+def test_a_lone_node_has_a_plan_though_it_is_heard_by_nobody(sources: str) -> None:
+    text, plan, feasible = planned("nodes.count=1", "clusters.count=1", f"traffic.sources={sources}")
+    assert feasible
+    assert "FEASIBLE" in text
+    assert "loss" not in plan, "there is no link on which anything could be lost"

@@ -57,3 +57,10 @@ def test_new_timetables_break_no_promise() -> None:
     assert bound["deliveries"] > 1000
     assert bound["stated_share"] > 0.5
     assert bound["within_share"] < 1, "nodes out of reach are no violation, and no success"
+
+
+def test_reports_that_are_sent_as_bulk_and_longer_than_the_traffic_are_carried() -> None:
+    keys = ['mission.report_priority="bulk"', "mission.report_bytes=1500", "traffic.payload_bytes=128"]
+    reports = summary_of("mission.survivors=30", "mission.report_interval_s=2", *keys)["reports"]
+    assert reports["generated"] >= 20
+    assert reports["pdr"] > 0.9

@@ -63,7 +63,10 @@ class ScheduledRelaying:
         """
         offset, root, instance = heard
         own = plan.mine.get((root, instance), ())
-        if not own or is_used_up(packet.header):
+        if not own:
+            return ()
+        if is_used_up(packet.header):
+            self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
             return ()
         superframe_ns = (
             plan.turns.superframe_start_ns(heard_ns) - offset // plan.turns.per_superframe * plan.turns.period_ns

@@ -18,6 +18,12 @@ def report_bytes(scenario: Scenario) -> int:
     return scenario.mission.report_bytes or _REPORT_BYTES
 
 
+def bulk_report_bytes(scenario: Scenario) -> int:
+    """The length of a survivor report that has no room of its own, because it is sent as bulk; 0 if there is none."""
+    mission = scenario.mission
+    return report_bytes(scenario) if mission.survivors and mission.report_priority == "bulk" else 0
+
+
 def reserved(scenario: Scenario) -> Mapping[int, int]:
     """The number of bytes of each turn that bulk must leave free, by priority: one packet of each urgent class
     in use.

@@ -276,7 +276,7 @@ def _blocks(packets: int, senders: int) -> int:
     as many turns in one block as in any other.
     """
     each, more = divmod(packets, max(1, senders))
-    if more:
+    if more or not senders:
         return max(1, packets // _BLOCK)
     return max(n for n in range(1, each + 1) if n == 1 or (each % n == 0 and packets // n >= _BLOCK))
 

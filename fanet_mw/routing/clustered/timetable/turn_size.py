@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from fanet_mw.routing.clustered.tdma.reserved_room import reserved
+from fanet_mw.routing.clustered.tdma.reserved_room import bulk_report_bytes, reserved
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_ns
 from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
 from fanet_mw.scenario import Scenario
@@ -25,9 +25,13 @@ LOAD: Final = 0.9
 
 
 def largest_frame(scenario: Scenario, *, together: int = 1) -> int:
-    """The largest frame of a turn: bulk packets and the reserved room, or a leader's announcement."""
+    """The largest frame of a turn: bulk packets and the reserved room, or a leader's announcement.
+
+    Survivor reports that are sent as bulk may be longer than the packets of the application.
+    """
     links_bytes = HEADER_BYTES + MESSAGES * (LINKS.layout.size + OVERHEAD) if scenario.measures_links else 0
-    longest = max(together * scenario.traffic.payload_bytes, schedule_bytes(scenario), links_bytes)
+    bulk_bytes = max(together * scenario.traffic.payload_bytes, bulk_report_bytes(scenario))
+    longest = max(bulk_bytes, schedule_bytes(scenario), links_bytes)
     return longest + sum(reserved(scenario).values())
 
 

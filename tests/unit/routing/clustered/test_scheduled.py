@@ -164,10 +164,11 @@ def test_a_turn_that_has_begun_is_missed_counted_and_not_relayed_late(
     assert node.dropped[DropReason.MISSED_TURN] == 1 - is_relayed, "it ends here, with its reason"
 
 
-def test_a_hop_limit_holds_in_turns(node: Node) -> None:
+def test_a_hop_limit_holds_in_turns_and_what_it_ends_is_counted(node: Node) -> None:
     hear_in_turn(node, ROOT, 5, hop_limit=1)
     assert len(node.deliveries) == 1
     assert relays(node) == []
+    assert node.dropped == {DropReason.HOP_LIMIT: 1}
 
 
 def test_what_is_heard_in_no_turn_of_its_flood_is_not_relayed_and_counted(node: Node) -> None:

@@ -1,0 +1,82 @@
+"""Floods that the hop limit ends, or that rely on links that do not exist: no such plan is feasible."""
+
+from typing import Any
+
+import pytest
+
+from fanet_mw.graph.topology import within_range
+from fanet_mw.planner.flood_hops import flood_hops
+from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
+from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
+from fanet_mw.units import Enu, NodeId
+from sim.cli.plan import judge
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
+
+LINE = ('nodes.layout="line"', "nodes.count=6", "clusters.count=5", "traffic.sources=5", "clusters.contention_ms=60")
+TIMES = ("duration_s=18", "warmup_s=12")
+ONE, TWO, THREE = NodeId(1), NodeId(2), NodeId(3)
+
+
+def planned(*settings: str) -> tuple[bool, str]:
+    _, plan, feasible = judge(catalog.find("clusters", [*LINE, *settings]), change=False)
+    return feasible, " ".join(plan["problems"])
+
+
+def run(*settings: str) -> dict[str, Any]:
+    return finish(simulate(catalog.find("clusters", [*LINE, *TIMES, *settings])), out=None)
+
+
+@pytest.mark.parametrize("relay", ["scheduled", "claimed", "all"])
+def test_as_many_hops_as_a_flood_needs_are_enough_and_one_less_is_not(relay: str) -> None:
+    keys = (f'clusters.relay="{relay}"', "traffic.interval_s=5", "clusters.flooding_period_s=1")
+    assert planned(*keys, "routing.hop_limit=5") == (True, "")
+    problem = "packets need up to 5 hops, and end after routing.hop_limit = 4"
+    assert planned(*keys, "routing.hop_limit=4") == (False, problem)
+
+
+def test_the_hops_to_a_head_count_too() -> None:
+    """The only head is in the middle: three hops to the farthest node, two on the way from the last one."""
+    keys = ('clusters.relay="all"', "clusters.count=1", "traffic.interval_s=5", "clusters.flooding_period_s=1")
+    assert planned(*keys, "routing.hop_limit=5")[0]
+    assert planned(*keys, "routing.hop_limit=4")[1].startswith("packets need up to 5 hops")
+
+
+def test_a_swarm_whose_hop_limit_is_just_enough_misses_nothing_and_with_one_less_does() -> None:
+    assert run("routing.hop_limit=5")["pdr"] == 1.0
+    assert run("routing.hop_limit=4")["pdr"] < 1.0
+
+
+@pytest.mark.parametrize(
+    ("settings", "named"),
+    [
+        (("clusters.link_m=450",), "clusters.link_m = 450"),
+        (("nodes.spacing_m=120", "clusters.link_m=130", "clusters.interference_m=130"), "interference_m = 130"),
+    ],
+)
+def test_a_timetable_for_links_or_interference_that_are_other_than_the_radio_s_is_not_feasible(
+    settings: tuple[str, ...], named: str
+) -> None:
+    more = ("nodes.count=16", "clusters.count=15", "traffic.sources=15", "traffic.interval_s=0.25")
+    feasible, problem = planned(*more, *settings)
+    assert not feasible
+    assert named in problem
+    assert "radio.range_m = 250" in problem
+    assert run(*more, *settings)["pdr"] < 0.9
+
+
+def test_links_longer_than_the_range_that_no_flood_uses_are_fine() -> None:
+    assert planned("clusters.link_m=300")[0]
+
+
+def test_two_frames_in_one_turn_that_meet_at_a_node_are_not_received() -> None:
+    places = {node: Enu(200.0 * index, 0.0, 0.0) for index, node in enumerate((ONE, TWO, THREE))}
+    geometry = Geometry(250, 250, turns=10, hop_turns=1)
+    adjacency = within_range(places, range_m=250)
+    alone = Timetable((Turn(0, ONE, ONE, 0), Turn(1, TWO, ONE, 0)), {}, {}, 2)
+    assert flood_hops(alone, adjacency, geometry)[ONE] == (2, ())
+    meeting = Timetable((*alone.turns, Turn(10, THREE, THREE, 0)), {}, {}, 2)
+    assert flood_hops(meeting, adjacency, geometry)[ONE] == (0, (TWO, THREE)), "turn 10 is turn 0 of the next one"
+    late = Timetable((Turn(0, ONE, ONE, 0), Turn(1, TWO, ONE, 0)), {}, {}, 2)
+    assert flood_hops(late, adjacency, geometry._replace(hop_turns=2))[ONE].missed == (THREE,), "too soon to relay"

@@ -2,6 +2,7 @@
 
 from typing import Final, Protocol
 
+from fanet_mw.node.neighbors import LIFETIME_HELLOS
 from fanet_mw.node.node import AnnouncedHello, Node
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
@@ -10,8 +11,6 @@ from fanet_mw.units import NodeId, seconds_to_ns
 _JITTER: Final = 0.1
 """Hello intervals vary by this share, so that neighbors that send at the same time do not continue to do so (RFC 3626,
 3.4)."""
-_LIFETIME_HELLOS: Final = 4
-"""The number of hello intervals without a hello after which a node is no longer a neighbor."""
 
 
 class HelloTime(Protocol):
@@ -66,6 +65,6 @@ class HelloSchedule:
 
     def neighbors(self, now_ns: int) -> tuple[NodeId, ...]:
         """The nodes whose hellos were received recently, by id."""
-        lifetime_ns = _LIFETIME_HELLOS * self._interval_ns
+        lifetime_ns = round(LIFETIME_HELLOS * self._interval_ns)
         self._heard_ns = {node: t_ns for node, t_ns in self._heard_ns.items() if now_ns - t_ns <= lifetime_ns}
         return tuple(sorted(self._heard_ns))

@@ -7,9 +7,9 @@ The parts make all decisions; this file only passes inputs and outputs to their 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from agents.applications.autopilot import Autopilot
 from agents.applications.collision_avoidance import CollisionAvoidance
 from agents.applications.telemetry import Telemetry
+from agents.applications.telemetry_streams import TelemetryStreams
 from agents.applications.traffic import Load
 from agents.hello_schedule import HelloSchedule, HelloTime
 from agents.mission.applications import PlannedSearch, Rescue
@@ -83,17 +83,17 @@ class Uav(Actor):
         """The greatest delay of a reception after the end of its frame: a relay must still be
         announced one lead ahead."""
         self._node = Node(node, scenario, make_protocol, position=position, reader=reader)
-        self._autopilot = Autopilot(node, position=position, telemetry_hz=scenario.nodes.telemetry_hz)
+        self._streams = TelemetryStreams(node, position=position, telemetry_hz=scenario.nodes.telemetry_hz)
         self._reckoning = DeadReckoning()
         self._fixes = SteadyFix(sigma_m=scenario.world.gps_sigma_m, range_m=scenario.radio.range_m)
-        asked_for = _asked_for(scenario, node, self._autopilot, position, onboard_map)
+        asked_for = _asked_for(scenario, node, self._streams, position, onboard_map)
         self._built_in = tuple(application.name for application in asked_for)
         """The applications whose counters are among those of the UAV itself in its report."""
         carried = (*_foreign(scenario, node), *applications)
         self._own = tuple(application.name for application in carried)
         self._onboard = Onboard(
             self._node,
-            lambda: (self._autopilot.position, self._autopilot.velocity),
+            lambda: (self._streams.position, self._streams.velocity),
             [*asked_for, *carried],
             fly=self._steer,
             tap=self._tap,
@@ -143,7 +143,7 @@ class Uav(Actor):
 
     def _fix(self, fix: Gps, now_ns: int) -> None:
         """A position of this UAV, from GPS or from dead reckoning."""
-        self._autopilot.fix(fix)
+        self._streams.fix(fix)
         self._node.moved(self._fixes.position(fix), fix.velocity)
         self._onboard.fix(fix, now_ns)
         again = self._setpoints.repeated(now_ns)
@@ -202,7 +202,7 @@ class Uav(Actor):
     def _say_hello(self, now_ns: int) -> None:
         due_ns = self._hellos.due_ns()
         if due_ns is not None and due_ns <= now_ns:
-            self._hellos.say(self._autopilot.beacon_frames(now_ns) + self._onboard.hello_frames(now_ns), now_ns)
+            self._hellos.say(self._streams.beacon_frames(now_ns) + self._onboard.hello_frames(now_ns), now_ns)
 
     # --- after every input ----------------------------------------------------------------------------------------
 
@@ -237,7 +237,7 @@ class Uav(Actor):
 
 
 def _asked_for(
-    scenario: Scenario, node: NodeId, autopilot: Autopilot, position: Enu, onboard_map: OnboardMap
+    scenario: Scenario, node: NodeId, streams: TelemetryStreams, position: Enu, onboard_map: OnboardMap
 ) -> Sequence[Application]:
     """The applications that a scenario asks for, in the order in which they are called."""
     mission = scenario.mission
@@ -248,7 +248,7 @@ def _asked_for(
         if mission.search != "none"
         else Rescue(scenario, node)
     )
-    applications = [Telemetry(autopilot), *loads, rescue]
+    applications = [Telemetry(streams), *loads, rescue]
     if mission.formation != "none":
         applications.append(FormationFlight(scenario, node, position=position, onboard_map=onboard_map))
     if mission.collision_horizon_s:

@@ -1,4 +1,5 @@
-"""The application that avoids collisions: it feeds a conflict monitor, and floods the warnings that the monitor gives.
+"""The application that avoids collisions: it feeds a conflict monitor, which decides (`conflict_monitor.py`), and
+floods its warnings.
 
 While the UAV avoids another one, by climbing or descending, the application objects to courses of other applications.
 The UAVs of a planned search avoid each other by their velocities instead (`agents/mission/flight/`).
@@ -7,7 +8,7 @@ The UAVs of a planned search avoid each other by their velocities instead (`agen
 from collections.abc import Mapping
 from typing import Any, Final
 
-from agents.applications.conflicts import ConflictMonitor
+from agents.applications.conflict_monitor import ConflictMonitor
 from agents.positioning.received_motion import motion_in
 from fanet_mw import mavlink, wire
 from fanet_mw.application import Application, AppPort, Course, Received

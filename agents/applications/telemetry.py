@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from agents.applications.autopilot import Autopilot
+from agents.applications.telemetry_streams import TelemetryStreams
 from fanet_mw.application import Application, AppPort
 from fanet_mw.bus.messages import Battery, SensorReading
 
@@ -12,21 +12,21 @@ class Telemetry(Application):
 
     name: Final = "telemetry"
 
-    def __init__(self, autopilot: Autopilot) -> None:
-        self._autopilot = autopilot
+    def __init__(self, streams: TelemetryStreams) -> None:
+        self._streams = streams
 
     def start(self, port: AppPort, now_ns: int) -> None:
         super().start(port, now_ns)
-        self._autopilot.start(now_ns)
+        self._streams.start(now_ns)
 
     def on_sensor(self, reading: SensorReading, now_ns: int) -> None:
         if isinstance(reading, Battery):
-            self._autopilot.on_battery(reading)
+            self._streams.on_battery(reading)
 
     def wake(self, now_ns: int) -> None:
-        frames = self._autopilot.telemetry(now_ns)
+        frames = self._streams.telemetry(now_ns)
         if frames:
             self.port.tap(frames)
 
     def next_wake_ns(self) -> int | None:
-        return self._autopilot.next_due_ns()
+        return self._streams.next_due_ns()

@@ -21,7 +21,7 @@ from fanet_mw.node.reader import decoded
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId
 from fanet_mw.wire import BIDS, COVERED, FOUND, SEARCH, STATUS, SURVIVOR
-from fanet_mw.wire.search import Told, told_in
+from fanet_mw.wire.search_messages import Told, told_in
 from fanet_mw.wire.search_plan import Search, SearchStatus
 from fanet_mw.wire.survivors import Found, Standing, Survivor
 

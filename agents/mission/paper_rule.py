@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from agents.mission.finding.least_squares import Sighting, estimate
+from agents.mission.finding.least_squares import PowerReading, estimate
 from agents.mission.finding.phone_reception import MISSED_SCANS
 from agents.mission.flight.approach_speed import approach_speed_m_s
 from agents.mission.outbox import Outbox, ReportFormat
@@ -42,7 +42,7 @@ class PaperRule:
         """The latest received power of each phone that the receiver detects."""
         self._due_ns: dict[int, int] = {}
         """The instant at which each of these phones must be reported next."""
-        self._sightings: dict[int, dict[int, Sighting]] = {}
+        self._readings: dict[int, dict[int, PowerReading]] = {}
         self._visited: set[int] = set()
         self._target: int | None = None
         self._target_at = Enu(0, 0, 0)
@@ -79,11 +79,11 @@ class PaperRule:
 
     def reported(self, report: Survivor, *, position: Enu, now_ns: int) -> None:
         """Another node has reported a survivor."""
-        sightings = self._sightings.setdefault(report.survivor, {})
-        known = sightings.get(report.reporter)
+        readings = self._readings.setdefault(report.survivor, {})
+        known = readings.get(report.reporter)
         if known is not None and report.rssi_dbm <= known.rssi_dbm:
             return  # the strongest one is the nearest and the least shadowed
-        sightings[report.reporter] = Sighting(report.position, report.rssi_dbm)
+        readings[report.reporter] = PowerReading(report.position, report.rssi_dbm)
         if self._target is None:
             self._choose(position, now_ns)
         elif self._target == report.survivor:
@@ -110,13 +110,13 @@ class PaperRule:
         """Choose the nearest survivor that enough different nodes have reported and that this UAV has not visited."""
         candidates = [
             (self._place(survivor), survivor)
-            for survivor in sorted(self._sightings)
-            if survivor not in self._visited and len(self._sightings[survivor]) >= self._config.reports_to_approach
+            for survivor in sorted(self._readings)
+            if survivor not in self._visited and len(self._readings[survivor]) >= self._config.reports_to_approach
         ]
         if not candidates:
             return
         self._target_at, self._target = min(candidates, key=lambda c: (c[0].minus(position).horizontal(), c[1]))
-        reporters = len(self._sightings[self._target])
+        reporters = len(self._readings[self._target])
         self._outbox.records.append(
             Approaching(now_ns, self._node, self._target, reporters, *_rounded(self._target_at))
         )
@@ -132,9 +132,9 @@ class PaperRule:
             self._outbox.course = Course(self._hold_point(), self._speed_m_s)
 
     def _place(self, survivor: int) -> Enu:
-        sightings = self._sightings[survivor]
+        readings = self._readings[survivor]
         return estimate(
-            [sightings[reporter] for reporter in sorted(sightings)],
+            [readings[reporter] for reporter in sorted(readings)],
             phone_power_dbm=self._config.phone_power_dbm,
             exponent=self._config.phone_exponent,
         )

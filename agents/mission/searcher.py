@@ -5,7 +5,7 @@ others.
     phones in reach     -> reports: flooded, and passed from neighbor to neighbor in hellos     finding.phone_reception
     enough reporters    -> an auction; winners leave their lanes as far as the formation allows tasking
     too few reporters   -> the auction sends a UAV that has not reported, for another bearing   tasking
-    nobody seen, ears   -> a UAV with microphones goes down to listen                           tasking.listening
+    nobody seen, ears   -> a UAV with microphones goes down to listen                           tasking.voice_descent
     seen at close range -> confirmed, announced; responders return to their lanes               finding.announcing
     contradicted later  -> refuted, announced; reported and bid for as before the confirmation  finding.contradictions
 
@@ -45,14 +45,14 @@ from agents.mission.search_formation.plan_exchange import PlanExchange
 from agents.mission.search_formation.shapes.contract import Demands, ShapeName
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import Bidding
-from agents.mission.tasking.listening import Listening
+from agents.mission.tasking.voice_descent import VoiceDescent
 from fanet_mw.bus.messages import Echo
 from fanet_mw.motion import Motion
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.bids import Bids, encode_bids
-from fanet_mw.wire.search import Told
+from fanet_mw.wire.search_messages import Told
 from fanet_mw.wire.search_plan import MOST_PLACES, Search, SearchStatus
 from fanet_mw.wire.searched_cells import Covered
 from fanet_mw.wire.survivors import Found, Standing, Survivor
@@ -75,7 +75,7 @@ class Searcher:
         self._survivors = survivors = KnownSurvivors(phone_model(scenario))
         obstacles = KnownObstacles(onboard_map, scenario.world.no_fly_m)
         own_motion = OwnMotion(position, obstacles)
-        self._neighbors = neighbors = NeighborMotions()
+        self._neighbors = neighbors = NeighborMotions(hello_interval_s=scenario.routing.hello_interval_s)
         self._radar = RadarWatch(own_motion, obstacles, neighbors, mission.avoid_by)
         self._place = place = FormationPlace(node, own_motion, reach_m=reach_m)
         least_m_s, _ = mission.approach_speeds_m_s
@@ -111,7 +111,7 @@ class Searcher:
         )
         missed_cells = None if coverage is None else MissedCells(coverage, place)
         heard = scenario.sensors.voice_hz > 0
-        listening = Listening(scenario, node, own_motion, neighbors, speed_m_s=speed_m_s) if heard else None
+        listening = VoiceDescent(scenario, node, own_motion, neighbors, speed_m_s=speed_m_s) if heard else None
         goal = Goal(survivors, own_motion, place, approach, missed_cells, listening)
         take_off = TakeOff(
             node, position,

@@ -22,9 +22,9 @@ from fanet_mw.bounds import (
 from fanet_mw.planner.flood_cost import FloodCost
 from fanet_mw.planner.head_slot import ClassLoad, ClusterPlan
 from fanet_mw.planner.variant import vary
-from fanet_mw.routing.clustered.tdma.own_bound import RootTurns
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_slack_ns
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort
+from fanet_mw.routing.clustered.timetable.own_bound import RootTurns
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, timetable
 from fanet_mw.routing.clustered.timetable.turn_allocation import Places, fit
 from fanet_mw.routing.clustered.timetable.turn_plan import Fitted

@@ -1,4 +1,5 @@
-"""Checks that span several tables of a scenario; each table checks itself.
+"""Checks that span several tables of a scenario; each table checks itself, and refuses keys it does not know
+(`tables/sections.py`).
 
 Each problem is a sentence with the keys, their values and the bound. All problems are found, not only the first.
 """

@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 from agents.applications.traffic import Load, sources_of
 from agents.clock.clocked_uav import make_uav
 from agents.mission.finding.calibration import common_offset, likelihood
-from agents.mission.finding.least_squares import Sighting, estimate
+from agents.mission.finding.least_squares import PowerReading, estimate
 from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, Estimate, PhoneFilter, PhoneModel, PhoneOffset
 from fanet_mw.scenario import Traffic
 from fanet_mw.trace import BoundStated
@@ -184,7 +184,7 @@ def phone_errors_m(offset_db: float, draw: int) -> list[float] | None:
     for lane, here in _LANES:
         rssi_dbm = received_dbm(phone, here, offset_db, drawn)
         if rssi_dbm >= _PHONE.threshold_dbm:
-            heard.append(Sighting(here, rssi_dbm))
+            heard.append(PowerReading(here, rssi_dbm))
         for search in filters:
             if rssi_dbm < _PHONE.threshold_dbm:
                 search.on_silence(here)

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from attacker import Plan, packet
 
-from agents.applications.autopilot import Autopilot
+from agents.applications.telemetry_streams import TelemetryStreams
 from fanet_mw import wire
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
@@ -39,7 +39,7 @@ def scenario(*more: str) -> Scenario:
 
 
 def hello(t_ns: int, seq: int, *inner: bytes, node: int = EVIL) -> bytes:
-    positions = Autopilot(NodeId(node), position=Enu(0, 0, 50), telemetry_hz=0).beacon_frames(t_ns)
+    positions = TelemetryStreams(NodeId(node), position=Enu(0, 0, 50), telemetry_hz=0).beacon_frames(t_ns)
     return packet(
         positions + b"".join(inner), by=node, t_ns=t_ns, seq=_CONTROL + seq, kind=Kind.HELLO, flags=0, hop_limit=1,
         priority=wire.PRIORITY_CONTROL,

@@ -10,7 +10,7 @@ from pathlib import Path
 import pymavlink
 import pytest
 
-from agents.applications.autopilot import Autopilot
+from agents.applications.telemetry_streams import TelemetryStreams
 from fanet_mw import tlog
 from fanet_mw.dialect import definitions
 from fanet_mw.errors import ConfigError
@@ -25,9 +25,9 @@ SURVIVOR = Survivor(t_us=1_500_000, survivor=3, reporter=1, position=Enu(1.0, 2.
 @pytest.fixture
 def log(tmp_path: Path) -> Path:
     """A second of telemetry, and a survivor report."""
-    autopilot = Autopilot(NodeId(1), position=Enu(0.0, 0.0, 50.0), telemetry_hz=4)
+    streams = TelemetryStreams(NodeId(1), position=Enu(0.0, 0.0, 50.0), telemetry_hz=4)
     path = tmp_path / "mavlink.tlog"
-    tlog.write(path, [(S, autopilot.telemetry(S)), (2 * S, SURVIVOR.encode_frame(NodeId(1)))])
+    tlog.write(path, [(S, streams.telemetry(S)), (2 * S, SURVIVOR.encode_frame(NodeId(1)))])
     return path
 
 

@@ -18,24 +18,24 @@ _STEPS: Final = 12
 _MAX_STEP_M: Final = 80.0
 
 
-class Sighting(NamedTuple):
+class PowerReading(NamedTuple):
     """A reception of the phone by one node at a position."""
 
     position: Enu
     rssi_dbm: float
 
 
-def estimate(sightings: Sequence[Sighting], *, phone_power_dbm: float, exponent: float) -> Enu:
-    """The most likely place of a phone on the ground (up = 0); at least one sighting is needed."""
-    assert sightings, "nobody heard the phone"
-    east, north = _centroid(sightings)
-    if len(sightings) < 3:
+def estimate(readings: Sequence[PowerReading], *, phone_power_dbm: float, exponent: float) -> Enu:
+    """The most likely place of a phone on the ground (up = 0); at least one reading is needed."""
+    assert readings, "nobody heard the phone"
+    east, north = _centroid(readings)
+    if len(readings) < 3:
         return Enu(east, north, 0.0)
     slope = 10 * exponent / math.log(10)
     damping = 1e-3
     for _ in range(_STEPS):
         a = b = c = p = q = 0.0
-        for position, rssi_dbm in sightings:
+        for position, rssi_dbm in readings:
             dx, dy = east - position.east, north - position.north
             d2 = max(1.0, dx * dx + dy * dy + position.up * position.up)
             residual = rssi_dbm - (phone_power_dbm - REFERENCE_LOSS_DB - 0.5 * slope * math.log(d2))
@@ -55,10 +55,10 @@ def estimate(sightings: Sequence[Sighting], *, phone_power_dbm: float, exponent:
     return Enu(east, north, 0.0)
 
 
-def _centroid(sightings: Sequence[Sighting]) -> tuple[float, float]:
+def _centroid(readings: Sequence[PowerReading]) -> tuple[float, float]:
     """The mean of the places, weighted by received power."""
-    weights = [math.pow(10.0, rssi_dbm / 20) for _, rssi_dbm in sightings]
+    weights = [math.pow(10.0, rssi_dbm / 20) for _, rssi_dbm in readings]
     total = math.fsum(weights)
-    east = math.fsum(w * s.position.east for w, s in zip(weights, sightings, strict=True)) / total
-    north = math.fsum(w * s.position.north for w, s in zip(weights, sightings, strict=True)) / total
+    east = math.fsum(w * s.position.east for w, s in zip(weights, readings, strict=True)) / total
+    north = math.fsum(w * s.position.north for w, s in zip(weights, readings, strict=True)) / total
     return east, north

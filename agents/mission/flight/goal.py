@@ -8,7 +8,7 @@ from agents.mission.search_formation.formation_place import FormationPlace, alon
 from agents.mission.search_formation.missed_cells import MissedCells
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import FAR_M, VAGUE_M
-from agents.mission.tasking.listening import Listening
+from agents.mission.tasking.voice_descent import VoiceDescent
 from fanet_mw.units import STILL, Enu
 
 _SHARED_M: Final = 35.0
@@ -25,7 +25,7 @@ class Goal:
         formation: FormationPlace,
         approach: Approach,
         missed_cells: MissedCells | None,
-        listening: Listening | None,
+        listening: VoiceDescent | None,
     ) -> None:
         """`missed_cells`: the cells that the formation has left unsearched; None if UAVs do not share what
         they have searched. `listening`: takes a UAV with microphones down; None for a UAV without.

@@ -34,7 +34,7 @@ class FormationFlight(Application):
         """`onboard_map`: the map that the UAV carries."""
         obstacles = KnownObstacles(onboard_map, scenario.world.no_fly_m)
         self._own_motion = own_motion = OwnMotion(position, obstacles)
-        self._motions = motions = NeighborMotions()
+        self._motions = motions = NeighborMotions(hello_interval_s=scenario.routing.hello_interval_s)
         self._height_m = scenario.nodes.altitude_m
         self._velocity_choice = VelocityChoice(
             own_motion,

@@ -3,16 +3,19 @@
 from typing import Final
 
 from fanet_mw.motion import Motion
+from fanet_mw.node.neighbors import LIFETIME_HELLOS
 from fanet_mw.units import seconds_to_ns
 
-_HEARD_FOR_NS: Final = seconds_to_ns(6.0)
-"""How long after a neighbor's last hello its motion counts as known."""
+_LEAST_LIFETIME_NS: Final = seconds_to_ns(6.0)
+"""How long after a neighbor's last hello its motion counts as known, at least: a UAV that is near and not heard is
+still there. Where hellos are rare it is as long as a neighbor lasts (`fanet_mw/node/neighbors.py`)."""
 
 
 class NeighborMotions:
     """The motion of each neighbor by its latest hello."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, hello_interval_s: float = 1.0) -> None:
+        self._lifetime_ns = max(_LEAST_LIFETIME_NS, seconds_to_ns(LIFETIME_HELLOS * hello_interval_s))
         self._motions: dict[int, Motion] = {}
 
     def on_hello(self, node: int, motion: Motion) -> None:
@@ -22,7 +25,7 @@ class NeighborMotions:
     def motion(self, node: int, *, now_ns: int) -> Motion | None:
         """The last known motion of a neighbor; None if its last hello is too old."""
         motion = self._motions.get(node)
-        return None if motion is None or now_ns - motion.at_ns > _HEARD_FOR_NS else motion
+        return None if motion is None or now_ns - motion.at_ns > self._lifetime_ns else motion
 
     def all(self, *, now_ns: int) -> list[Motion]:
         """The motions of the neighbors that were received recently, by id."""
@@ -30,4 +33,4 @@ class NeighborMotions:
 
     def by_node(self, *, now_ns: int) -> list[tuple[int, Motion]]:
         """The neighbors that were received recently, each with its motion."""
-        return [item for item in sorted(self._motions.items()) if now_ns - item[1].at_ns <= _HEARD_FOR_NS]
+        return [item for item in sorted(self._motions.items()) if now_ns - item[1].at_ns <= self._lifetime_ns]

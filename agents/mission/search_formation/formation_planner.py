@@ -14,7 +14,7 @@
 
 The first assignment minimizes the sum of the squared distances flown. If all UAVs leave and arrive at the same
 instants, their ways then do not cross, and UAVs that were near each other remain so. The words place, team, relay and
-follower are explained in `shapes/contract.py`.
+follower are explained in `shapes/contract.py`; how the area is split into lanes is in `shapes/`.
 """
 
 from itertools import zip_longest

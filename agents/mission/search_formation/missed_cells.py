@@ -1,5 +1,5 @@
 """The missed cells: cells of the coverage map that the formation has passed, by its plan, but that no UAV is known to
-have searched.
+have searched. The lane of a lost UAV goes to another one by the plan (`formation_planner.py`).
 """
 
 import math

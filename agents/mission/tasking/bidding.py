@@ -15,7 +15,7 @@ from agents.mission.outbox import Outbox
 from agents.mission.search_formation.formation_place import FormationPlace, along
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.auction import Auction
-from agents.mission.tasking.listening import descent_ns
+from agents.mission.tasking.voice_descent import descent_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Approaching
 from fanet_mw.units import NodeId, S

@@ -22,7 +22,7 @@ from fanet_mw.routing.clustered.clustered import Clustered, Parts
 from fanet_mw.routing.clustered.contract import HearsCopies, ScheduledAccess
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
-from fanet_mw.routing.clustered.forwarding.repair import Repair
+from fanet_mw.routing.clustered.forwarding.packet_repair import Repair
 from fanet_mw.routing.clustered.forwarding.uplink import Uplink
 from fanet_mw.routing.clustered.relaying.claimed import ClaimedRelaying
 from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
@@ -48,15 +48,15 @@ from fanet_mw.routing.clustered.roles.no_roles import NoRoles
 from fanet_mw.routing.clustered.roles.position_updates import PositionUpdates
 from fanet_mw.routing.clustered.roles.schedule_check import ScheduleCheck
 from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
-from fanet_mw.routing.clustered.tdma.admission import Admission
-from fanet_mw.routing.clustered.tdma.call_release import CallRelease
 from fanet_mw.routing.clustered.tdma.contention import Contention
-from fanet_mw.routing.clustered.tdma.reserved_room import reserved
-from fanet_mw.routing.clustered.tdma.root_release import RootRelease
 from fanet_mw.routing.clustered.tdma.slot_access import SlotAccess
 from fanet_mw.routing.clustered.tdma.slot_release import SlotRelease
+from fanet_mw.routing.clustered.timetable.admission import Admission
+from fanet_mw.routing.clustered.timetable.call_release import CallRelease
 from fanet_mw.routing.clustered.timetable.heard_load import HeardLoads
 from fanet_mw.routing.clustered.timetable.link_quality import LinkQuality
+from fanet_mw.routing.clustered.timetable.reserved_room import reserved
+from fanet_mw.routing.clustered.timetable.root_release import RootRelease
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TurnPlans
 from fanet_mw.routing.clustered.timetable.timetabling import FromPlaces, NoTimetable, Timetabling

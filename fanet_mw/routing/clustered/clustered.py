@@ -23,7 +23,7 @@ from fanet_mw.node.reader import decoded
 from fanet_mw.routing.clustered.contract import Access, HearsCopies, Relaying, Roles, TwoHops
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
-from fanet_mw.routing.clustered.forwarding.repair import Repair
+from fanet_mw.routing.clustered.forwarding.packet_repair import Repair
 from fanet_mw.routing.clustered.forwarding.uplink import MOST_TRIES, Uplink
 from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
 from fanet_mw.routing.clustered.timetable.heard_load import HeardLoads

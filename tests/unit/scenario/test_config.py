@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from agents.applications.autopilot import Autopilot
+from agents.applications.telemetry_streams import TelemetryStreams
 from fanet_mw import wire
 from fanet_mw.errors import ConfigError
 from fanet_mw.mavlink import Encoder
@@ -93,7 +93,7 @@ def test_the_default_grid_is_near_nine_by_five(count: int, columns: int) -> None
 
 def test_the_sizes_of_messages_that_a_scenario_is_checked_with_are_those_of_the_air() -> None:
     node = NodeId(5)
-    positions = Autopilot(node, position=Enu(1, 2, 3), telemetry_hz=0).beacon_frames(0)
+    positions = TelemetryStreams(node, position=Enu(1, 2, 3), telemetry_hz=0).beacon_frames(0)
     warning = Encoder(node).collision(NodeId(3), closest_s=1, altitude_m=1, horizontal_m=1)
     specs = (wire.ROUTE, wire.BEACON, wire.SCHEDULE, wire.SURVIVOR, wire.DIGEST, wire.PLACES, wire.CLAIMS,
              wire.LINKS, wire.LOADS)  # fmt: skip

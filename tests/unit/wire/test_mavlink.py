@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.applications.autopilot import Autopilot
+from agents.applications.telemetry_streams import TelemetryStreams
 from fanet_mw import mavlink, tlog, wire
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.mavlink import Attitude, BatteryState, Encoder, Geodetic, Ned
@@ -237,12 +237,12 @@ def test_a_signed_frame_keeps_its_number() -> None:
 
 def test_the_numbers_of_each_component_run_without_a_gap(tmp_path: Path) -> None:
     """Frames of many nodes in one log, the same report from each that received it: a reader takes a gap for a loss."""
-    autopilots = [Autopilot(NodeId(node), position=Enu(0.0, 0.0, 50.0), telemetry_hz=4) for node in (1, 2)]
+    swarm = [TelemetryStreams(NodeId(node), position=Enu(0.0, 0.0, 50.0), telemetry_hz=4) for node in (1, 2)]
     taps = []
     for t_ns in range(0, 40 * S, 100 * MS):
-        for autopilot in autopilots:
-            autopilot.beacon_frames(t_ns)  # sent over the air, never logged
-            taps.append((t_ns, autopilot.telemetry(t_ns) + wire.filler(64, node=2)))
+        for streams in swarm:
+            streams.beacon_frames(t_ns)  # sent over the air, never logged
+            taps.append((t_ns, streams.telemetry(t_ns) + wire.filler(64, node=2)))
     path = tmp_path / "a.tlog"
     tlog.write(path, taps)
     seen: dict[tuple[int, int], list[int]] = {}
@@ -259,11 +259,11 @@ def test_the_numbers_of_each_component_run_without_a_gap(tmp_path: Path) -> None
 
 
 def test_telemetry_on_its_topic_has_no_gaps_where_hellos_were_sent() -> None:
-    autopilot = Autopilot(NodeId(1), position=Enu(0.0, 0.0, 50.0), telemetry_hz=4)
+    streams = TelemetryStreams(NodeId(1), position=Enu(0.0, 0.0, 50.0), telemetry_hz=4)
     numbers = []
     for t_ns in range(0, 5 * S, 100 * MS):
-        autopilot.beacon_frames(t_ns)
-        numbers += [frame[4] for frame in wire.frames(autopilot.telemetry(t_ns))]
+        streams.beacon_frames(t_ns)
+        numbers += [frame[4] for frame in wire.frames(streams.telemetry(t_ns))]
     assert numbers == list(range(len(numbers)))
 
 

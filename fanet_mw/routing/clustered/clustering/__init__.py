@@ -16,10 +16,10 @@ from fanet_mw.routing.clustered.clustering.election import (
     Weights,
     by_degree,
     by_id,
-    succession,
 )
 from fanet_mw.routing.clustered.clustering.maintenance import Maintenance
 from fanet_mw.routing.clustered.clustering.mobility import link_lifetime_s
+from fanet_mw.routing.clustered.clustering.succession import succession
 
 __all__ = [
     "HIGHEST_DEGREE",

@@ -11,8 +11,8 @@ which nodes are ranked (lower is better; of equal scores the lower id):
 
 Hysteresis: the score of a standing head is improved by `keep`. If `keep` is infinite, a head is deposed only by a
 better head in range (least cluster change, Chiang et al. 1997); pairs of heads under `truce` may hear each other for
-the time being. A member keeps its head as long as it hears it. What happens when a head falls silent is in
-`roles/failover.py`.
+the time being. A member keeps its head as long as it hears it. The method `balanced`, the default, chooses heads in the
+middle of equal parts instead (`bisection.py`). What happens when a head falls silent is in `roles/failover.py`.
 """
 
 import math
@@ -126,16 +126,3 @@ def _gather(swarm: Swarm, heads: list[NodeId]) -> list[Cluster]:
         mine = before.get(node)
         members[mine if mine in heard else min(heard, key=place.__getitem__)].append(node)
     return [Cluster(head, tuple(sorted(members[head]))) for head in sorted(heads)]
-
-
-def succession(cluster: Cluster, swarm: Swarm) -> tuple[NodeId, ...]:
-    """The head, and then the members in the order in which they stand in for it.
-
-    Members that hear the head come first, because they notice when it is gone.
-    """
-    near, inside = frozenset(swarm.adjacency[cluster.head]), frozenset(cluster.members)
-
-    def rank(node: NodeId) -> tuple[bool, int, NodeId]:
-        return node not in near, -sum(1 for n in swarm.adjacency[node] if n in inside), node
-
-    return (cluster.head, *sorted((node for node in cluster.members if node != cluster.head), key=rank))

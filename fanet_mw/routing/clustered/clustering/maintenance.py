@@ -4,6 +4,7 @@ Each step divides the swarm anew, with the standing heads kept (least cluster ch
 each other have a truce for a time, because often they only pass each other (cluster contention interval, Basu et al.
 2001). If they still hear each other when it ends, the one with the worse score steps down. With `patient`, such a head
 stays as long as it has a member that hears no other head, because that member would become a head itself (new here).
+When the swarm is divided anew, because clusters are too large or nodes have moved, is decided in `division.py`.
 """
 
 from fanet_mw.routing.clustered.clustering.contract import Cluster, Swarm

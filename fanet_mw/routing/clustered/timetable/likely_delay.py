@@ -6,7 +6,7 @@ delay = longest wait for a turn + flood + one turn + time until repair begins
 
 from typing import Final
 
-from fanet_mw.routing.clustered.forwarding.repair import RIPE_NS
+from fanet_mw.routing.clustered.forwarding.packet_repair import RIPE_NS
 from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan
 from fanet_mw.units import NodeId
 

@@ -17,11 +17,11 @@ from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.roles.leader import HEARD_NS
 from fanet_mw.routing.clustered.roles.lease import Lease
-from fanet_mw.routing.clustered.tdma.admission import Admission, least_interval_ns
-from fanet_mw.routing.clustered.tdma.own_bound import RootTurns
-from fanet_mw.routing.clustered.tdma.root_release import RootRelease
 from fanet_mw.routing.clustered.tdma.turn_timing import clocks_fit, receipt_ns
+from fanet_mw.routing.clustered.timetable.admission import Admission, least_interval_ns
 from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE, likely_delay_ns
+from fanet_mw.routing.clustered.timetable.own_bound import RootTurns
+from fanet_mw.routing.clustered.timetable.root_release import RootRelease
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TurnPlans
 from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan
 from fanet_mw.trace import BoundStated, LikelyStated

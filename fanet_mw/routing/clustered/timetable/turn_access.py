@@ -14,10 +14,10 @@ from fanet_mw.node.contract import Port
 from fanet_mw.node.duplicates import key_of_packet
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.forwarding.floods import Floods
-from fanet_mw.routing.clustered.tdma.call_release import CallRelease
 from fanet_mw.routing.clustered.tdma.contention import Contention
-from fanet_mw.routing.clustered.tdma.root_release import RootRelease, TurnsInForce
 from fanet_mw.routing.clustered.tdma.slot_access import SlotAccess
+from fanet_mw.routing.clustered.timetable.call_release import CallRelease
+from fanet_mw.routing.clustered.timetable.root_release import RootRelease, TurnsInForce
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TurnPlans
 from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan

@@ -10,7 +10,7 @@ These uses are tried one after the other until a timetable is found:
 
 In 1 to 3 the packet of a member has turns of its own on a shortest way to its head, and the head relays it in the next
 turn, so the packet never waits there. A *root* is the node at which a flood begins. All nodes compute the same
-timetable from the same schedule and positions.
+timetable from the same schedule and positions. Which turn of the superframe each packet gets: `list_scheduling.py`.
 """
 
 import math

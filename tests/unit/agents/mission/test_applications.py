@@ -13,7 +13,7 @@ from fanet_mw.mavlink import Encoder
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
 from fanet_mw.wire import HEADER_BYTES, PRIORITY_CONTROL, PRIORITY_REPORT, Header, Kind
-from fanet_mw.wire.search import told_in
+from fanet_mw.wire.search_messages import told_in
 from fanet_mw.wire.survivors import Found, Standing, Survivor
 
 OURS, THEIRS = NodeId(1), NodeId(2)

@@ -16,7 +16,7 @@ from fanet_mw.trace import Confirmed, MissionModeChanged, Sighted
 from fanet_mw.units import MS, US, Enu, NodeId, S
 from fanet_mw.wire import HEADER_BYTES
 from fanet_mw.wire.bids import Bid, Bids
-from fanet_mw.wire.search import Told, told_in
+from fanet_mw.wire.search_messages import Told, told_in
 from fanet_mw.wire.search_plan import SearchStatus
 from fanet_mw.wire.survivors import Found, Standing, Survivor
 

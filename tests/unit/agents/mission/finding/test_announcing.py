@@ -7,7 +7,7 @@ from search_board import FOLLOWER, MODEL, UP_M, Board
 from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, Estimate
 from fanet_mw.trace import Confirmed, Refuted
 from fanet_mw.units import Enu, S
-from fanet_mw.wire.search import told_in
+from fanet_mw.wire.search_messages import told_in
 from fanet_mw.wire.survivors import Found, Standing, Survivor
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from fanet_mw.routing.clustered.forwarding.repair import RIPE_NS
+from fanet_mw.routing.clustered.forwarding.packet_repair import RIPE_NS
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.delivery_odds import Odds
 from fanet_mw.routing.clustered.timetable.likely_delay import likely_delay_ns

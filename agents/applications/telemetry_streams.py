@@ -1,5 +1,4 @@
-"""The flight controller of a UAV as MAVLink shows it: the last position fix, and telemetry frames at their rates.
-Sans-IO.
+"""MAVLink telemetry of one UAV: the streams of messages that its flight controller would send, at their rates. Sans-IO.
 
 Position and velocity are those of the receiver. The attitude is inferred: a multirotor tilts so that thrust and gravity
 add up to its acceleration, and it faces where it flies. The battery is as its sensor reads it; without a sensor nothing
@@ -39,7 +38,7 @@ class _Stream:
     due_ns: int
 
 
-class Autopilot:
+class TelemetryStreams:
     """The telemetry of one UAV."""
 
     def __init__(self, node: NodeId, *, position: Enu, telemetry_hz: float) -> None:

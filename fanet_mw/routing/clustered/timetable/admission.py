@@ -17,7 +17,7 @@ states a deadline is accepted or refused earlier, by the messenger (`_admission`
 
 from typing import Final
 
-from fanet_mw.routing.clustered.tdma.own_bound import RootTurns
+from fanet_mw.routing.clustered.timetable.own_bound import RootTurns
 from fanet_mw.trace import DeadlineLost, DeadlineMet
 from fanet_mw.units import US, NodeId
 

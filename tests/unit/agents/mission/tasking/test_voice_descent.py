@@ -9,7 +9,7 @@ from search_board import OPEN, UP_M
 from agents.mission.finding.phone_localization import Estimate
 from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.own_motion import OwnMotion
-from agents.mission.tasking.listening import Listening, descent_ns, listening_height_m
+from agents.mission.tasking.voice_descent import VoiceDescent, descent_ns, listening_height_m
 from fanet_mw.motion import Motion
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import STILL, Enu, NodeId, S
@@ -27,7 +27,7 @@ class Descent:
         wanted = {"nodes.altitude_m": UP_M, "sensors.voice_hz": 2, **keys}
         self.at, self.now_ns = Enu(PLACE.east_m, PLACE.north_m, UP_M), 0
         self.own_motion, self.neighbors = OwnMotion(self.at, OPEN), NeighborMotions()
-        self.listening = Listening(
+        self.listening = VoiceDescent(
             make_scenario(**wanted), NodeId(node), self.own_motion, self.neighbors, speed_m_s=10.0
         )
 

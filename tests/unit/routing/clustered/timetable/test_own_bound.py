@@ -2,8 +2,8 @@
 
 import pytest
 
-from fanet_mw.routing.clustered.tdma.own_bound import BURST, RootTurns
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
+from fanet_mw.routing.clustered.timetable.own_bound import BURST, RootTurns
 from fanet_mw.units import MS
 
 TURNS = Turns(origin_ns=0, period_ns=100 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_superframe=29)

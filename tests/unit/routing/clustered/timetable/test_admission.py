@@ -3,9 +3,9 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fanet_mw.routing.clustered.tdma.admission import Admission, least_interval_ns
-from fanet_mw.routing.clustered.tdma.own_bound import RootTurns
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
+from fanet_mw.routing.clustered.timetable.admission import Admission, least_interval_ns
+from fanet_mw.routing.clustered.timetable.own_bound import RootTurns
 from fanet_mw.trace import DeadlineLost, DeadlineMet
 from fanet_mw.units import MS, NodeId, S
 

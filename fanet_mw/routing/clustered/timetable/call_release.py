@@ -8,8 +8,8 @@ timetables have none.
 from collections.abc import Sequence
 
 from fanet_mw.node.queue import TxQueue
-from fanet_mw.routing.clustered.tdma.root_release import TurnsInForce
 from fanet_mw.routing.clustered.tdma.turn_release import OwnTurn, TurnRelease
+from fanet_mw.routing.clustered.timetable.root_release import TurnsInForce
 
 
 class CallRelease(TurnRelease):

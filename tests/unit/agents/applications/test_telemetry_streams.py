@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.applications.autopilot import GRAVITY_M_S2, MAX_TILT, Autopilot
+from agents.applications.telemetry_streams import GRAVITY_M_S2, MAX_TILT, TelemetryStreams
 from fanet_mw import mavlink
 from fanet_mw.bus.messages import Battery, Gps
 from fanet_mw.mavlink import Attitude
@@ -19,26 +19,26 @@ START = Enu(100.0, 200.0, 50.0)
 STILL = Enu(0.0, 0.0, 0.0)
 
 
-def make(*, telemetry_hz: float = 1.0, node: int = NODE) -> Autopilot:
-    return Autopilot(NodeId(node), position=START, telemetry_hz=telemetry_hz)
+def make(*, telemetry_hz: float = 1.0, node: int = NODE) -> TelemetryStreams:
+    return TelemetryStreams(NodeId(node), position=START, telemetry_hz=telemetry_hz)
 
 
-def run(autopilot: Autopilot, *, until_ns: int) -> list[tuple[int, Any]]:
+def run(streams: TelemetryStreams, *, until_ns: int) -> list[tuple[int, Any]]:
     """Every message with its instant, woken exactly when due."""
     heard = []
-    while (due_ns := autopilot.next_due_ns()) is not None and due_ns < until_ns:
-        heard += [(due_ns, message) for message in mavlink.decode(autopilot.telemetry(due_ns))]
+    while (due_ns := streams.next_due_ns()) is not None and due_ns < until_ns:
+        heard += [(due_ns, message) for message in mavlink.decode(streams.telemetry(due_ns))]
     return heard
 
 
-def fly(autopilot: Autopilot, *velocities: Enu, interval_ns: int = 200 * MS) -> None:
+def fly(streams: TelemetryStreams, *velocities: Enu, interval_ns: int = 200 * MS) -> None:
     for count, velocity in enumerate(velocities):
-        autopilot.fix(Gps(count * interval_ns, START, velocity))
+        streams.fix(Gps(count * interval_ns, START, velocity))
 
 
-def latest(autopilot: Autopilot, name: str, *, now_ns: int = 0) -> Any:
+def latest(streams: TelemetryStreams, name: str, *, now_ns: int = 0) -> Any:
     """The message of that name in telemetry of a moment when everything is due."""
-    found = [m for m in mavlink.decode(autopilot.telemetry(now_ns + 60 * S)) if m.get_type() == name]
+    found = [m for m in mavlink.decode(streams.telemetry(now_ns + 60 * S)) if m.get_type() == name]
     (message,) = found
     return message
 
@@ -67,30 +67,30 @@ def test_no_rate_is_no_telemetry() -> None:
 
 
 def test_before_the_first_instant_nothing_is_due() -> None:
-    autopilot = make()
-    due_ns = autopilot.next_due_ns()
+    streams = make()
+    due_ns = streams.next_due_ns()
     assert due_ns is not None
-    assert autopilot.telemetry(due_ns - 1) == b""
-    assert autopilot.telemetry(due_ns) != b""
+    assert streams.telemetry(due_ns - 1) == b""
+    assert streams.telemetry(due_ns) != b""
 
 
 @given(st.integers(0, 100 * S), st.sampled_from([0.5, 1.0, 3.0, 5.0]))
 def test_after_telemetry_the_next_is_due_later_however_late_it_was(now_ns: int, telemetry_hz: float) -> None:
-    autopilot = make(telemetry_hz=telemetry_hz)
-    counts = Counter(message.get_type() for message in mavlink.decode(autopilot.telemetry(now_ns)))
+    streams = make(telemetry_hz=telemetry_hz)
+    counts = Counter(message.get_type() for message in mavlink.decode(streams.telemetry(now_ns)))
     assert max(counts.values(), default=1) == 1
-    due_ns = autopilot.next_due_ns()
+    due_ns = streams.next_due_ns()
     assert due_ns is not None
     assert now_ns < due_ns <= now_ns + S / telemetry_hz
 
 
 @pytest.mark.parametrize("late_ms", [0, 30, 499, 1730])
 def test_telemetry_that_was_late_keeps_its_phase(late_ms: int) -> None:
-    autopilot = make(telemetry_hz=2.0)
-    first_ns = autopilot.next_due_ns()
+    streams = make(telemetry_hz=2.0)
+    first_ns = streams.next_due_ns()
     assert first_ns is not None
-    autopilot.telemetry(first_ns + late_ms * MS)
-    assert autopilot.next_due_ns() == first_ns + (late_ms // 500 + 1) * 500 * MS
+    streams.telemetry(first_ns + late_ms * MS)
+    assert streams.next_due_ns() == first_ns + (late_ms // 500 + 1) * 500 * MS
 
 
 def test_nodes_do_not_all_speak_at_once() -> None:
@@ -107,9 +107,9 @@ def test_telemetry_comes_from_the_nodes_system_and_its_flight_controller() -> No
 
 
 def test_a_beacon_is_a_heartbeat_and_where_we_are() -> None:
-    autopilot = make()
-    autopilot.fix(Gps(1 * S, Enu(-5.0, 6.0, 70.0), Enu(1.0, 2.0, -0.5)))
-    heartbeat, position = mavlink.decode(autopilot.beacon_frames(2 * S))
+    streams = make()
+    streams.fix(Gps(1 * S, Enu(-5.0, 6.0, 70.0), Enu(1.0, 2.0, -0.5)))
+    heartbeat, position = mavlink.decode(streams.beacon_frames(2 * S))
     assert heartbeat.get_type() == "HEARTBEAT"
     heard = mavlink.kinematics(position)
     assert heard.position == pytest.approx((-5.0, 6.0, 70.0), abs=0.01)
@@ -118,67 +118,67 @@ def test_a_beacon_is_a_heartbeat_and_where_we_are() -> None:
 
 
 def test_until_a_fix_comes_it_stands_where_it_started_and_says_that_it_has_none() -> None:
-    autopilot = make()
-    assert latest(autopilot, "GPS_RAW_INT").fix_type == 1
-    assert mavlink.kinematics(mavlink.decode(autopilot.beacon_frames(0))[1]).position == pytest.approx(START, abs=0.01)
-    autopilot.fix(Gps(1 * S, START, STILL))
-    assert latest(autopilot, "GPS_RAW_INT", now_ns=60 * S).fix_type == 3
+    streams = make()
+    assert latest(streams, "GPS_RAW_INT").fix_type == 1
+    assert mavlink.kinematics(mavlink.decode(streams.beacon_frames(0))[1]).position == pytest.approx(START, abs=0.01)
+    streams.fix(Gps(1 * S, START, STILL))
+    assert latest(streams, "GPS_RAW_INT", now_ns=60 * S).fix_type == 3
 
 
 def test_a_heading_is_unknown_until_it_flies_and_a_beacon_is_as_long_as_later() -> None:
-    autopilot = make()
-    at_rest = autopilot.beacon_frames(1 * S)
+    streams = make()
+    at_rest = streams.beacon_frames(1 * S)
     assert mavlink.kinematics(mavlink.decode(at_rest)[1]).yaw is None
-    fly(autopilot, Enu(0.0, -5.0, 0.0))
-    southbound = autopilot.beacon_frames(1 * S)
+    fly(streams, Enu(0.0, -5.0, 0.0))
+    southbound = streams.beacon_frames(1 * S)
     assert mavlink.kinematics(mavlink.decode(southbound)[1]).yaw == pytest.approx(math.pi)
     assert len(at_rest) == len(southbound) == 61
 
 
 def test_home_stays_where_it_started() -> None:
-    autopilot = make()
-    autopilot.fix(Gps(1 * S, Enu(900.0, 0.0, 80.0), STILL))
-    home = latest(autopilot, "HOME_POSITION")
+    streams = make()
+    streams.fix(Gps(1 * S, Enu(900.0, 0.0, 80.0), STILL))
+    home = latest(streams, "HOME_POSITION")
     assert (home.x, home.y, home.z) == (200.0, 100.0, -50.0)
 
 
 def test_a_fix_that_comes_again_or_late_changes_nothing() -> None:
-    autopilot = make()
-    autopilot.fix(Gps(2 * S, START, Enu(1.0, 0.0, 0.0)))
-    before = (autopilot.position, autopilot.velocity, autopilot.attitude)
-    autopilot.fix(Gps(2 * S, STILL, Enu(9.0, 9.0, 9.0)))
-    autopilot.fix(Gps(1 * S, STILL, Enu(9.0, 9.0, 9.0)))
-    assert (autopilot.position, autopilot.velocity, autopilot.attitude) == before
+    streams = make()
+    streams.fix(Gps(2 * S, START, Enu(1.0, 0.0, 0.0)))
+    before = (streams.position, streams.velocity, streams.attitude)
+    streams.fix(Gps(2 * S, STILL, Enu(9.0, 9.0, 9.0)))
+    streams.fix(Gps(1 * S, STILL, Enu(9.0, 9.0, 9.0)))
+    assert (streams.position, streams.velocity, streams.attitude) == before
 
 
 # --- attitude -----------------------------------------------------------------------------------------------------
 
 
 def test_level_flight_is_level_and_faces_where_it_goes() -> None:
-    autopilot = make()
-    fly(autopilot, Enu(5.0, 0.0, 0.0), Enu(5.0, 0.0, 0.0))
-    assert autopilot.attitude == pytest.approx((0.0, 0.0, math.pi / 2))
+    streams = make()
+    fly(streams, Enu(5.0, 0.0, 0.0), Enu(5.0, 0.0, 0.0))
+    assert streams.attitude == pytest.approx((0.0, 0.0, math.pi / 2))
 
 
 @pytest.mark.parametrize("course", [0.0, 1.0, 2.5, -2.0])
 def test_speeding_up_puts_the_nose_down_whatever_the_course(course: float) -> None:
-    autopilot = make()
+    streams = make()
     east, north = math.sin(course), math.cos(course)
-    fly(autopilot, Enu(5.0 * east, 5.0 * north, 0.0), Enu(5.4 * east, 5.4 * north, 0.0))  # 2 m/s^2
-    assert autopilot.attitude == pytest.approx((0.0, -math.atan(2.0 / GRAVITY_M_S2), course))
+    fly(streams, Enu(5.0 * east, 5.0 * north, 0.0), Enu(5.4 * east, 5.4 * north, 0.0))  # 2 m/s^2
+    assert streams.attitude == pytest.approx((0.0, -math.atan(2.0 / GRAVITY_M_S2), course))
 
 
 def test_a_right_turn_banks_right() -> None:
-    autopilot = make()
-    fly(autopilot, Enu(0.0, 5.0, 0.0), Enu(0.4, 5.0, 0.0))
-    assert autopilot.attitude.roll > 0.1
-    assert autopilot.attitude.yaw > 0
+    streams = make()
+    fly(streams, Enu(0.0, 5.0, 0.0), Enu(0.4, 5.0, 0.0))
+    assert streams.attitude.roll > 0.1
+    assert streams.attitude.yaw > 0
 
 
 def test_hovering_keeps_the_heading() -> None:
-    autopilot = make()
-    fly(autopilot, Enu(5.0, 0.0, 0.0), Enu(0.1, -0.1, 0.0), Enu(0.0, 0.0, 0.0))
-    assert autopilot.attitude.yaw == pytest.approx(math.pi / 2)
+    streams = make()
+    fly(streams, Enu(5.0, 0.0, 0.0), Enu(0.1, -0.1, 0.0), Enu(0.0, 0.0, 0.0))
+    assert streams.attitude.yaw == pytest.approx(math.pi / 2)
 
 
 def thrust(attitude: Attitude) -> Enu:
@@ -197,24 +197,24 @@ gentle = st.floats(-0.4, 0.4)
 
 @given(st.floats(-10, 10), st.floats(-10, 10), st.builds(Enu, gentle, gentle, gentle))
 def test_thrust_points_where_acceleration_and_gravity_want_it(east: float, north: float, change: Enu) -> None:
-    autopilot = make()
-    fly(autopilot, Enu(east, north, 0.0), Enu(east + change.east, north + change.north, change.up))
+    streams = make()
+    fly(streams, Enu(east, north, 0.0), Enu(east + change.east, north + change.north, change.up))
     wanted = Enu(5 * change.east, 5 * change.north, 5 * change.up + GRAVITY_M_S2)
-    assert thrust(autopilot.attitude) == pytest.approx(tuple(part / wanted.norm() for part in wanted), abs=1e-9)
+    assert thrust(streams.attitude) == pytest.approx(tuple(part / wanted.norm() for part in wanted), abs=1e-9)
 
 
 @given(st.builds(Enu, *(st.floats(-50, 50),) * 3), st.builds(Enu, *(st.floats(-50, 50),) * 3))
 def test_it_never_leans_more_than_a_multirotor_does(before: Enu, after: Enu) -> None:
-    autopilot = make()
-    fly(autopilot, before, after)
-    assert thrust(autopilot.attitude).up >= math.cos(MAX_TILT) - 1e-9
+    streams = make()
+    fly(streams, before, after)
+    assert thrust(streams.attitude).up >= math.cos(MAX_TILT) - 1e-9
 
 
 # --- battery ------------------------------------------------------------------------------------------------------
 
 
-def told_of_the_battery(autopilot: Autopilot, now_ns: int) -> dict[str, Any]:
-    found = {m.get_type(): m.to_dict() for m in mavlink.decode(autopilot.telemetry(now_ns))}
+def told_of_the_battery(streams: TelemetryStreams, now_ns: int) -> dict[str, Any]:
+    found = {m.get_type(): m.to_dict() for m in mavlink.decode(streams.telemetry(now_ns))}
     return {**found["SYS_STATUS"], **found["BATTERY_STATUS"]}
 
 
@@ -225,17 +225,17 @@ def test_nothing_is_told_of_a_battery_that_nothing_measures() -> None:
 
 
 def test_a_battery_is_told_as_its_sensor_reads_it_and_what_was_drawn_from_it_adds_up() -> None:
-    autopilot = make(telemetry_hz=1.0)
+    streams = make(telemetry_hz=1.0)
     for second, charge in ((0, 0.8), (1800, 0.504), (3600, 0.2)):
-        autopilot.on_battery(Battery(second * S, voltage_v=14.8, current_a=3.0, charge=charge))
-    told = told_of_the_battery(autopilot, 3600 * S)
+        streams.on_battery(Battery(second * S, voltage_v=14.8, current_a=3.0, charge=charge))
+    told = told_of_the_battery(streams, 3600 * S)
     assert (told["voltage_battery"], told["voltages"][0], told["voltages"][1]) == (14800, 14800, 65535)
     assert (told["current_battery"], told["battery_remaining"], told["current_consumed"]) == (300, 20, 3000)
 
 
 @pytest.mark.parametrize(("charge", "percent"), [(1.2, 100), (0.001, 1), (0.0, 0), (-0.1, 0)])
 def test_a_battery_is_empty_only_when_nothing_is_left(charge: float, percent: int) -> None:
-    autopilot = make(telemetry_hz=1.0)
-    autopilot.on_battery(Battery(0, voltage_v=70.0, current_a=400.0, charge=charge))
-    told = told_of_the_battery(autopilot, S)
+    streams = make(telemetry_hz=1.0)
+    streams.on_battery(Battery(0, voltage_v=70.0, current_a=400.0, charge=charge))
+    told = told_of_the_battery(streams, S)
     assert (told["battery_remaining"], told["voltage_battery"], told["current_battery"]) == (percent, 65534, 32767)

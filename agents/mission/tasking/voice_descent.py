@@ -75,7 +75,7 @@ def descent_ns(scenario: Scenario) -> int:
     return looks_ns + round((scenario.nodes.altitude_m - height_m) / _SINK_M_S * S)
 
 
-class Listening:
+class VoiceDescent:
     """The descent of one UAV to the survivor whom it examines, and its way around the place down there."""
 
     def __init__(

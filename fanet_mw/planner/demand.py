@@ -73,9 +73,12 @@ def _all(scenario: Scenario) -> tuple[NodeId, ...]:
 
 def _eligible(scenario: Scenario, traffic: Traffic) -> tuple[NodeId, ...]:
     """The nodes that may be sources. If a scenario gives only their number, a run draws them by its seed; a plan takes
-    the nodes with the lowest ids.
+    the nodes with the lowest ids. Both take the leader only if the others are too few.
     """
     if isinstance(traffic.sources, tuple):
         return tuple(NodeId(n) for n in sorted(set(traffic.sources)))
     candidates = tuple(n for n in _all(scenario) if n != traffic.destination)
-    return candidates if traffic.sources == "all" else candidates[: traffic.sources]
+    if traffic.sources == "all":
+        return candidates
+    members = tuple(n for n in candidates if n != scenario.leader)
+    return (members if traffic.sources <= len(members) else candidates)[: traffic.sources]

@@ -13,7 +13,6 @@ overflows, and a flood reaches all nodes within the hop limit.
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
-from fanet_mw import wire
 from fanet_mw.bounds import Bounded, DelayBound, Refused, paper
 from fanet_mw.graph.topology import levels, within_range
 from fanet_mw.planner import contention_window, flood_hops, reachability, verdict
@@ -27,6 +26,7 @@ from fanet_mw.planner.timetable_plan import Candidate, TimetablePlan, judge, tab
 from fanet_mw.planner.uplink_delay import Ways, access_outcome, ways
 from fanet_mw.routing.clustered.clustering import Cluster, balanced
 from fanet_mw.routing.clustered.tdma.turn_timing import receipt_ns
+from fanet_mw.routing.clustered.timetable.reserved_room import reserved
 from fanet_mw.routing.clustered.timetable.turn_plan import Fitted
 from fanet_mw.routing.clustered.timetable.turn_size import links, schedule_parts, superframe
 from fanet_mw.scenario import Scenario
@@ -159,8 +159,7 @@ def _shares(site: Site, head: NodeId, load: Sequence[int], classes: Sequence[Tra
         turn_ns = superframe(site.scenario).turn_ns
         turn = FloodCost(turn_ns, turn_ns, 1, proven=True)
         return [
-            ClassLoad(n, c.interval_ns, turn, c.priority < wire.PRIORITY_BULK)
-            for n, c in zip(load, classes, strict=True)
+            ClassLoad(n, c.interval_ns, turn, c.priority, c.payload_bytes) for n, c in zip(load, classes, strict=True)
         ]
     return [ClassLoad(n, c.interval_ns, site.flood(head, c.payload_bytes)) for n, c in zip(load, classes, strict=True)]
 
@@ -214,6 +213,7 @@ def _in_turns(site: Site, found: Fitted | Refused, candidates: Sequence[Candidat
         refused = tuple(_refused(candidate, found, scenario.clusters.period_ns) for candidate in candidates)
         return _Judged(refused, (), TimetablePlan(superframe(scenario), 0, 0, None), (found.reason,))
     lead_ns, control = scenario.radio.lead_ns, {scenario.leader: schedule_parts(scenario)}
+    bulk_bytes = found.frame_bytes - sum(reserved(scenario).values())
     judged = tuple(
         judge(
             found,
@@ -222,6 +222,7 @@ def _in_turns(site: Site, found: Fitted | Refused, candidates: Sequence[Candidat
             receipt_ns=receipt_ns(scenario),
             jitter_ns=jitter_ns,
             control=control.get(c.head, 0),
+            bulk_bytes=bulk_bytes,
         )
         for c in candidates
     )

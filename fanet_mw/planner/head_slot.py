@@ -11,6 +11,7 @@ from itertools import chain
 from math import ceil, inf
 from typing import Final, NamedTuple
 
+from fanet_mw import wire
 from fanet_mw.bounds import (
     Bounded,
     DelayBound,
@@ -34,8 +35,13 @@ class ClassLoad(NamedTuple):
     sources: int
     interval_ns: int
     flood: FloodCost
-    urgent: bool = False
-    """True if the class is more urgent than bulk; in a timetable it has room of its own in each turn."""
+    priority: int = wire.PRIORITY_BULK
+    """In a timetable, classes of one priority share the room that each turn has for this priority."""
+    payload_bytes: int = 0
+
+    @property
+    def urgent(self) -> bool:
+        return self.priority < wire.PRIORITY_BULK
 
 
 class ClusterPlan(NamedTuple):

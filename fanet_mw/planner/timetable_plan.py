@@ -101,103 +101,156 @@ def _most_slack_us(scenario: Scenario, places: Places, head_of: Mapping[NodeId, 
 
 
 def judge(
-    found: Fitted, candidate: Candidate, *, lead_ns: int, receipt_ns: int, jitter_ns: int, control: int = 0
+    found: Fitted,
+    candidate: Candidate,
+    *,
+    lead_ns: int,
+    receipt_ns: int,
+    jitter_ns: int,
+    control: int = 0,
+    bulk_bytes: int,
 ) -> ClusterPlan:
     """Judge one root: the wait for its turns, the duration of the flood, and `receipt_ns` until the applications have
     it.
 
-    `control` is the number of announcements per period, which go before everything else.
+    `control` is the number of announcements per period, which go before all bulk; `bulk_bytes` the room that a turn has
+    for bulk.
     """
     table, turns = found.table, found.turns
     offsets = tuple(table.offsets_of(NodeId(candidate.head)))
     span = table.spans.get(candidate.head, 1)
-    root = _Root(RootTurns(turns, offsets, span, found.together, lead_ns + receipt_ns), lead_ns, jitter_ns, control)
+    own = RootTurns(turns, offsets, span, found.together, lead_ns + receipt_ns)
+    part_bytes = bulk_bytes // found.together
+    rooms = [
+        _Room(own, lead_ns, jitter_ns, control, _of(priority, candidate.shares), part_bytes)
+        for priority in sorted({share.priority for share in candidate.shares})
+    ]
     relays = sum(1 for turn in table.turns if turn.root == candidate.head and turn.instance == 0)
-    packets = sum(s.sources * turns.period_ns / s.interval_ns for s in candidate.shares)
-    packets += control if packets else 0
+    fullest = max(rooms, key=lambda room: room.turns_needed, default=None)
+    waiting = [room.backlog() for room in rooms if room.packets]
     return ClusterPlan(
         head=candidate.head,
         members=candidate.members,
         hops=candidate.hops,
         slot_ns=len(offsets) * turns.turn_ns,
         usable_ns=len(offsets) * turns.turn_ns,
-        work_ns=round(packets * (turns.turn_ns // found.together)),
-        packets=packets,
-        flood=FloodCost(root.flood_ns, turns.turn_ns, relays, proven=True),
-        delays=tuple(root.delay(share) for share in candidate.shares),
-        backlog=root.backlog(candidate.shares),
+        work_ns=round(fullest.turns_needed * turns.turn_ns) if fullest else 0,
+        packets=fullest.packets if fullest else 0,
+        flood=FloodCost(_flood_ns(own), turns.turn_ns, relays, proven=True),
+        delays=tuple(next(room.delay(share) for room in rooms if share in room.shares) for share in candidate.shares),
+        backlog=sum(n for n in waiting if n is not None) if waiting and None not in waiting else None,
     )
 
 
-class _Root(NamedTuple):
-    """One root of a timetable, and the arrivals at its queue."""
+def _of(priority: int, shares: Sequence[ClassLoad]) -> tuple[ClassLoad, ...]:
+    return tuple(share for share in shares if share.priority == priority)
+
+
+def _flood_ns(own: RootTurns) -> int:
+    return max((own.turns.flood_ns(offset, span=own.span) for offset in own.roots), default=own.turns.turn_ns)
+
+
+class _Room(NamedTuple):
+    """The room in the turns of one root that all classes of one priority share, and the arrivals there."""
 
     own: RootTurns
     lead_ns: int
     jitter_ns: int
     """The time by which a packet may reach the root late."""
     control: int
+    """The number of announcements per superframe, which go in the room for bulk."""
+    shares: tuple[ClassLoad, ...]
+    part_bytes: int
+    """The room for one bulk packet of those for which the timetable is made."""
 
     @property
-    def flood_ns(self) -> int:
-        turns = self.own.turns
-        longest = (turns.flood_ns(offset, span=self.own.span) for offset in self.own.roots)
-        return max(longest, default=turns.turn_ns)
+    def urgent(self) -> bool:
+        return self.shares[0].urgent
+
+    @property
+    def per_turn(self) -> int:
+        """The number of packets that each turn carries: one urgent packet, or bulk as the timetable is made for."""
+        return 1 if self.urgent else self.own.together
+
+    def parts(self, share: ClassLoad) -> int:
+        """The number of packets as which one packet of a class counts.
+
+        A bulk packet that is longer than others may find too little room behind them, and take the next turn alone.
+        """
+        longer = not self.urgent and share.payload_bytes > self.part_bytes
+        return 2 * self.per_turn - 1 if longer else 1
+
+    @property
+    def announced(self) -> int:
+        """The number of announcements per superframe that take the room of a whole turn."""
+        return 0 if self.urgent else self.control
+
+    @property
+    def packets(self) -> float:
+        """The packets and announcements per superframe; none if there are only announcements."""
+        sent = math.fsum(share.sources * self.own.turns.period_ns / share.interval_ns for share in self.shares)
+        return sent + self.announced if sent else 0.0
+
+    @property
+    def turns_needed(self) -> float:
+        """The turns per superframe that the packets and announcements fill."""
+        period_ns = self.own.turns.period_ns
+        parts = math.fsum(s.sources * self.parts(s) * period_ns / s.interval_ns for s in self.shares)
+        return parts / self.per_turn + self.announced if parts else 0.0
 
     def delay(self, share: ClassLoad) -> DelayBound:
-        """The bound of a class at this root.
+        """The bound of one of the classes.
 
-        A class has room of its own in each turn, so a packet waits only for packets of its class; bulk also waits for
-        announcements. If the class has only one source, the bound that this source states in flight (`RootTurns`) is
-        tighter.
+        A packet waits for packets of its priority only; bulk also waits for announcements. If there is only one source,
+        the bound that this source states in flight (`RootTurns`) is tighter.
         """
         if not share.sources:
             return Bounded(0)
-        if share.sources > 1 or self.jitter_ns or (self.control and not share.urgent):
+        sources = sum(other.sources for other in self.shares)
+        if sources > 1 or self.jitter_ns or self.announced:
             return self._queued(share)
-        per_turn = self._per_turn(share)
-        if len(self.own.roots) * per_turn * share.interval_ns < self.own.turns.period_ns:
-            return Refused(f"{len(self.own.roots) * per_turn} packets are let out per superframe, more come")
+        if len(self.own.roots) * self.per_turn * share.interval_ns < self.own.turns.period_ns:
+            return Refused(f"{len(self.own.roots) * self.per_turn} packets are let out per superframe, more come")
         if share.urgent:
-            return Bounded(self.own.burst_ns(per_turn=per_turn))
+            return Bounded(self.own.burst_ns(per_turn=self.per_turn))
         worst_ns = self.own.worst_ns(interval_ns=share.interval_ns)
         assert worst_ns is not None, "as many are let out as come"
         return Bounded(worst_ns)
 
     def _queued(self, share: ClassLoad) -> DelayBound:
-        server = self._server(self._per_turn(share))
+        server = self._server()
         server.check()
-        flow = Periodic(share.interval_ns, self.jitter_ns)
-        others = [flow] * (share.sources - 1)
-        before = [] if share.urgent else self._announcements(self._per_turn(share))
+        flow, *others = sorted(self._flows(), key=lambda flow: flow.interval_ns != share.interval_ns)
+        before = self._announcements()
         alone = delay_fifo(Total((flow, *others)), server)
         queue = delay_any_order(flow, Total((*before, *others)), server) if before else alone
         if isinstance(queue, Refused):
             return queue
-        return Bounded(queue.delay_ns + self.flood_ns - server.airtime_ns + self.own.around_ns - self.lead_ns)
+        return Bounded(queue.delay_ns + _flood_ns(self.own) - server.airtime_ns + self.own.around_ns - self.lead_ns)
 
-    def backlog(self, shares: Sequence[ClassLoad]) -> int | None:
-        """The greatest number of packets that wait at the same time, of all classes together."""
-        flows = [Periodic(s.interval_ns, self.jitter_ns) for s in shares for _ in range(s.sources)]
-        if not flows:
-            return None
-        waiting = backlog(Total((*self._announcements(1), *flows)), self._server(self.own.together))
+    def backlog(self) -> int | None:
+        """The greatest number of packets that wait at the same time; None if it has no limit."""
+        waiting = backlog(Total((*self._announcements(), *self._flows())), self._server())
         return None if isinstance(waiting, Refused) else waiting
 
-    def _per_turn(self, share: ClassLoad) -> int:
-        return 1 if share.urgent else self.own.together
+    def _flows(self) -> list[Periodic]:
+        return [
+            Periodic(share.interval_ns, self.jitter_ns)
+            for share in self.shares
+            for _ in range(share.sources * self.parts(share))
+        ]
 
-    def _announcements(self, parts: int) -> list[Periodic]:
-        """The leader's announcements as arrivals: each takes a whole turn, which counts as `parts`."""
-        return [Periodic(self.own.turns.period_ns, 0)] * (self.control * parts)
+    def _announcements(self) -> list[Periodic]:
+        """The announcements as arrivals: each takes a whole turn, which counts as `per_turn` packets."""
+        return [Periodic(self.own.turns.period_ns, 0)] * (self.announced * self.per_turn)
 
-    def _server(self, parts: int) -> TurnServer:
+    def _server(self) -> TurnServer:
         """The service of turns in which k packets are sent: such a turn counts as k parts with one packet each.
 
         A packet must be announced before the whole turn, so its lead counts as longer, and all packets of a turn are
         completed at its end.
         """
-        turns = self.own.turns
+        turns, parts = self.own.turns, self.per_turn
         part_ns = turns.turn_ns // parts
         starts = (turns.start_ns(offset, superframe_start_ns=0) for offset in self.own.roots)
         parts_ns = tuple(start_ns + part * part_ns for start_ns in starts for part in range(parts))

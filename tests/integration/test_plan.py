@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from fanet_mw.scenario import Scenario, config
 from sim.cli.app import app
 from sim.cli.plan import judge
 from sim.results.files import finish
@@ -116,3 +117,49 @@ def test_a_lone_node_has_a_plan_though_it_is_heard_by_nobody(sources: str) -> No
     assert feasible
     assert "FEASIBLE" in text
     assert "loss" not in plan, "there is no link on which anything could be lost"
+
+
+NINE = ("nodes.count=9", "clusters.count=8", "traffic.sources=8", "duration_s=30", "warmup_s=12", "seed=2")
+
+
+def with_classes(*classes: dict[str, Any]) -> Scenario:
+    """Nine nodes with these classes of traffic."""
+    tree = catalog.find("clusters", NINE).model_dump(exclude_none=True)
+    return config.build({**tree, "traffic": [{"payload_bytes": 1024, "sources": 8, **keys} for keys in classes]})
+
+
+def test_classes_of_one_priority_wait_for_each_other_and_the_plan_counts_both() -> None:
+    """Each class alone would take at most 289 ms; in the run packets of both come at once, and one takes 481 ms."""
+    _, alone, feasible = judge(with_classes({"name": "a", "interval_s": 0.5}))
+    assert feasible
+    scenario = with_classes({"name": "a", "interval_s": 0.5}, {"name": "b", "interval_s": 0.5})
+    _, plan, feasible = judge(scenario)
+    assert feasible
+    bounds_ms = [each["bound_ms"] for each in plan["classes"]]
+    slowest_ms = finish(simulate(scenario), out=None)["delay_ms"]["max"]
+    assert alone["classes"][0]["bound_ms"] < slowest_ms <= min(bounds_ms)
+    assert max(bounds_ms) < 1.1 * slowest_ms
+
+
+def test_reports_fill_nothing_of_the_room_that_turns_have_for_bulk() -> None:
+    keys = ("mission.survivors=9", "mission.report_interval_s=0.5", "traffic.interval_s=0.5")
+    _, plan, feasible = planned(*NINE, *keys)
+    assert feasible, plan["problems"]
+    assert max(slot["used"] for slot in plan["slots"]) <= 1
+    assert not planned(*NINE, *keys, 'mission.report_priority="bulk"')[2], "there they share a room that they overfill"
+
+
+def test_a_bulk_report_that_is_longer_than_the_traffic_takes_a_turn_for_itself() -> None:
+    load = ("traffic.interval_s=0.02", "traffic.payload_bytes=200", "traffic.sources=9", "clusters.flooding_period_s=1")
+    keys = (*load, "mission.survivors=1", 'mission.report_priority="bulk"', "mission.report_bytes=1000")
+    used = {
+        interval_s: [s["used"] for s in planned(*NINE, *keys, f"mission.report_interval_s={interval_s}")[1]["slots"]]
+        for interval_s in (2, 1)
+    }
+    _, plan, _ = planned(*NINE, *keys)
+    together, turns = plan["superframe"]["together"], 25
+    assert together > 1
+    more = used[1][-1] - used[2][-1]
+    assert more == pytest.approx(0.5 * (2 - 1 / together) / turns), (
+        "half a report a second, of up to two turns less one"
+    )

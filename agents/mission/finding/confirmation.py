@@ -54,7 +54,7 @@ def is_confirmable(person: PersonTrack, phone: KnownSurvivor) -> bool:
     return (
         is_seen_enough(person)
         and person.place.sigma_m <= _SURE_M
-        and phone.is_heard_within(_VAGUE_M if person.confirmed_at is None else SECOND_SIGMA_M)
+        and phone.is_heard_within(SECOND_SIGMA_M if person.confirmed else _VAGUE_M)
         and phone.filter.included_powers >= enough
     )
 

@@ -37,6 +37,8 @@ _NEAR_M: Final = 400.0
 """A person does not carry a phone if the middle of its filter's grid, near the strongest power, is farther away."""
 _BESIDE_M: Final = 150.0
 """A confirmed survivor can only have been mistaken for people within this distance."""
+_BY_SIDE_M: Final = 15.0
+"""People at no more than this distance are found together, so it makes no difference which of their phones is whose."""
 _IMPOSSIBLE: Final = 1e6
 """The cost of a pair that is excluded."""
 _REFUTED_COST: Final = 9.0
@@ -52,18 +54,20 @@ class Identities:
         self._survivors = survivors
         self._people: list[PersonTrack] = []
 
-    def on_sighting(self, at: Enu, *, sigma_m: float, close: bool, now_ns: int) -> int | None:
-        """A sensor has shown a person; `close`: from so near that it certainly is one.
+    def on_sighting(self, at: Enu, *, sigma_m: float, close: bool, now_ns: int, sensor: str = "camera") -> int | None:
+        """A sensor has shown a person; `close`: from so near that it certainly is one. All that one reading of a sensor
+        shows has the same instant.
 
         Returns the survivor whose phone was last assigned to that person.
         """
         near = min(self._people, key=lambda person: person.place.distance_m(at), default=None)
         variance = sigma_m * sigma_m
         if near is None or near.place.distance_m(at) > max(SAME_PLACE_M, _SAME_SIGMAS * sigma_m):
-            near = PersonTrack(Estimate(at.east, at.north, variance, 0.0, variance), now_ns, now_ns)
+            place = Estimate(at.east, at.north, variance, 0.0, variance)
+            near = PersonTrack(place, now_ns, now_ns, shown_by=(sensor, now_ns))
             self._people.append(near)
         else:
-            near.on_sighting(at, variance, now_ns)
+            near.on_sighting(at, variance, (sensor, now_ns))
         near.close_sightings += close
         return near.survivor
 
@@ -71,30 +75,26 @@ class Identities:
         """Assign phones to people anew; returns the survivors who may be confirmed now, in the order of ids."""
         self._people = [person for person in self._people if person.is_remembered(now_ns)]
         for person in self._people:
-            confirmed = self._has_confirmed(person.place.at)
-            refuted = not confirmed and any(
-                known.was_mistaken_at(person.place.at) for known in self._survivors.by_id.values()
-            )
-            person.on_neighborhood(confirmed=confirmed, refuted=refuted, now_ns=now_ns)
+            person.on_neighborhood(confirmed=self._confirmed_at(person.place.at), now_ns=now_ns)
+            person.survivor = None if person.unnamed else person.survivor
         for survivor in self._survivors.unconfirmed():
             self._survivors.by_id[survivor].filter.on_sighting(None)
-        people = [person for person in self._people if person.is_believed]
+        people = [person for person in self._people for _ in range(person.unnamed)]
         phones = self._phones(people)
         if not people or not phones:
             return []
         costs = [[self._cost_of(person, phone) for phone in phones] for person in people]
-        nobody = [_GATE if person.confirmed_at is None else _SECOND_GATE for person in people]
+        nobody = [_SECOND_GATE if person.confirmed else _GATE for person in people]
         least, chosen = _assigned(costs, nobody)
         sure = []
-        for row, (person, column) in enumerate(zip(people, chosen, strict=True)):
-            person.survivor = None if column is None else phones[column]
+        for person, column in zip(people, chosen, strict=True):
             if column is None:
                 continue
-            survivor = phones[column]
+            person.survivor = survivor = phones[column]
             known = self._survivors.by_id[survivor]
             known.filter.on_sighting(person.place)
             if is_confirmable(person, known):
-                margin = self._next_best(costs, nobody, row, column, person) - least
+                margin = self._next_best(costs, nobody, people, column, person) - least
                 if margin >= required_margin(person, now_ns):
                     sure.append(survivor)
         return sorted(sure)
@@ -129,9 +129,9 @@ class Identities:
         only = [_IMPOSSIBLE if at_row == row else cost for at_row, cost in enumerate(nobody)]
         return _assigned([*costs[:row], *kept, *costs[row + 1 :]], only)[0] - least
 
-    def _has_confirmed(self, at: Enu) -> bool:
-        """True if a survivor is confirmed at this place."""
-        return any(
+    def _confirmed_at(self, at: Enu) -> int:
+        """The number of survivors who are confirmed at this place."""
+        return sum(
             known.confirmed is not None
             and (place := known.place()) is not None
             and place.distance_m(at) <= SAME_PLACE_M
@@ -139,16 +139,25 @@ class Identities:
         )
 
     def _next_best(
-        self, costs: Sequence[Sequence[float]], nobody: Sequence[float], row: int, column: int, person: PersonTrack
+        self,
+        costs: Sequence[Sequence[float]],
+        nobody: Sequence[float],
+        people: Sequence[PersonTrack],
+        column: int,
+        person: PersonTrack,
     ) -> float:
-        """The least total cost if this person carries another phone or none.
+        """The least total cost if neither this person nor anybody beside carries this phone: whoever finds one of them
+        finds the others.
 
         Carrying none is made more expensive by `GREATEST_MARGIN`, except for a second person at a confirmed place.
         """
         others = [list(one) for one in costs]
-        others[row][column] = _IMPOSSIBLE
         bound = list(nobody)
-        bound[row] += GREATEST_MARGIN if person.confirmed_at is None else 0.0
+        for row, other in enumerate(people):
+            if other.place.distance_m(person.place.at) <= _BY_SIDE_M:
+                others[row][column] = _IMPOSSIBLE
+            if other is person:
+                bound[row] += 0.0 if person.confirmed else GREATEST_MARGIN
         return _assigned(others, bound)[0]
 
     def _phones(self, people: Sequence[PersonTrack]) -> list[int]:
@@ -170,7 +179,7 @@ class Identities:
         At a place where a survivor is confirmed, a second person can only carry a phone whose place is well known,
         because any other phone that was received not far from there would fit, too.
         """
-        if person.confirmed_at is not None and not self._survivors.by_id[survivor].is_heard_within(SECOND_SIGMA_M):
+        if person.confirmed and not self._survivors.by_id[survivor].is_heard_within(SECOND_SIGMA_M):
             return _IMPOSSIBLE
         return self._cost(person.place, survivor)
 

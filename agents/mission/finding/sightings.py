@@ -65,7 +65,9 @@ class Sightings:
             return
         sigma_m = max(1.0, sigma_rad * looked[2] * looked[2] / max(1.0, here.up))
         at = Enu(looked[0], looked[1], 0.0)
-        survivor = self._identities.on_sighting(at, sigma_m=sigma_m, close=looked[2] <= CLOSE_M, now_ns=now_ns)
+        survivor = self._identities.on_sighting(
+            at, sigma_m=sigma_m, close=looked[2] <= CLOSE_M, now_ns=now_ns, sensor=sensor
+        )
         self._outbox.records.append(
             Sighted(now_ns, self._node, sensor, survivor or 0, round(at.east, 2), round(at.north, 2))
         )

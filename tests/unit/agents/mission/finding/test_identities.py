@@ -2,9 +2,10 @@
 
 import math
 import random
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
+import pytest
 from seeing_uav import MODEL, UP_M, Uav, mean_dbm
 
 from fanet_mw.units import Enu, S
@@ -82,6 +83,17 @@ def test_two_who_lie_60_m_apart_are_not_taken_for_each_other() -> None:
     assert right >= 36
 
 
+@pytest.mark.parametrize("apart_m", [5, 15])
+def test_two_who_lie_side_by_side_are_both_found(apart_m: float) -> None:
+    found = []
+    for seed in range(6):
+        passed = Pass(seed, apart_m=apart_m)
+        passed.fly()
+        found += [place.minus(passed.truth[survivor]).norm() for survivor, place in passed.uav.named.items()]
+    assert len(found) >= 8, "of twelve; if all sightings of a place were of one person, it would be two"
+    assert max(found) < 25
+
+
 def test_somebody_seen_is_the_owner_of_the_phone_that_was_heard_there() -> None:
     uav, truth = Uav(), {1: Enu(0, 0, 0), 2: Enu(160, 0, 0)}
     for survivor, at in truth.items():
@@ -107,7 +119,8 @@ def test_a_sighting_that_was_not_repeated_is_forgotten_and_names_nobody() -> Non
     assert not uav.survivors.by_id[1].filter.is_seen
 
 
-def test_where_somebody_is_confirmed_a_second_person_is_named_only_after_many_more_sightings() -> None:
+def two_phones_at_one_place() -> Uav:
+    """A UAV that has received two phones of the same place well, where the owner of the first one is confirmed."""
     uav = Uav()
     for survivor in (1, 2):
         for node in range(1, 5):
@@ -115,9 +128,25 @@ def test_where_somebody_is_confirmed_a_second_person_is_named_only_after_many_mo
                 at = Enu(40.0 * node - 100, north, UP_M)
                 uav.hear(survivor, node, at, mean_dbm(Enu(0, 0, 0), at))
     uav.survivors.on_found(Found(0, 1, 1.0, 1.0, 4.0, 0.0, 4.0, 9, Standing.CONFIRMED), now_ns=0)
-    named = [second for second in range(90) if uav.see(Enu(0, 0, 0), now_ns=second * S)]
-    assert uav.named.keys() == {2}
-    assert named[0] >= 20
+    return uav
+
+
+@pytest.mark.parametrize(("both", "named"), [((), set()), ((2,), set()), ((2, 5), {2})])
+def test_where_somebody_is_confirmed_a_second_person_is_named_if_two_images_have_shown_two_people(
+    both: Sequence[int], named: set[int]
+) -> None:
+    """`both`: the images that show two people; in a single one of them the second might be a false alarm."""
+    uav = two_phones_at_one_place()
+    for second in range(60):
+        uav.see(Enu(0, 0, 0), *([Enu(4, 3, 0)] if second in both else []), now_ns=second * S)
+    assert uav.named.keys() == named
+
+
+def test_however_often_a_confirmed_person_is_seen_that_is_one_person() -> None:
+    uav = two_phones_at_one_place()
+    for second in range(90):
+        uav.identities.on_sighting(Enu(1, 0, 0), sigma_m=4, close=True, now_ns=second * S, sensor="voice")
+        assert uav.see(Enu(0, 0, 0), now_ns=second * S) == [], "seen and heard at the same instant"
 
 
 def test_somebody_who_is_confirmed_is_not_taken_for_the_owner_of_a_phone_that_was_hardly_heard() -> None:

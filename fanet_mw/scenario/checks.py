@@ -120,6 +120,11 @@ def _impossible_traffic(scenario: Scenario, traffic: Traffic) -> Iterator[str]:
     for key, ids in (("sources", traffic.sources), ("targets", traffic.targets)):
         if isinstance(ids, tuple) and any(i > count for i in ids):
             yield f"traffic.{key} = {list(ids)} must be node ids <= nodes.count = {count}"
+    if isinstance(traffic.sources, tuple) and traffic.destination in traffic.sources:
+        yield (
+            f"traffic.sources = {list(traffic.sources)} must not name traffic.destination = {traffic.destination}: "
+            "no node sends to itself"
+        )
     longest = traffic.longest_bytes
     if longest > most:
         yield f"traffic.payload_bytes = {longest} must be <= radio.max_frame_bytes = {most}"

@@ -39,6 +39,11 @@ def test_what_tables_disagree_about_is_reported_with_both_keys() -> None:
     assert "traffic.destination = 7 must be <= nodes.count = 5" in message
 
 
+def test_a_source_that_is_the_destination_is_refused_because_its_first_packet_would_end_the_run() -> None:
+    message = refusal("[traffic]\nsources = [2, 3]\ndestination = 3\n")
+    assert "traffic.sources = [2, 3] must not name traffic.destination = 3" in message
+
+
 @pytest.mark.parametrize("keys", ["return_after_s = 5", 'geofence = "return"'])
 def test_a_return_of_uavs_that_need_no_setpoints_is_refused(keys: str) -> None:
     message = refusal(f'[mobility]\nmodel = "formation"\n{keys}\n')

@@ -1,9 +1,7 @@
 """One scenario in virtual time: the same actors as in real time, in one process, deterministic."""
 
-import gc
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from signal import Signals
 from typing import Final
@@ -24,6 +22,7 @@ from sim.results.clocks import true_delays
 from sim.results.links import LinkTotals
 from sim.run.collecting.taps import TapLog
 from sim.run.collecting.trace_log import TraceLog
+from sim.run.garbage import GARBAGE
 from sim.run.huge_pages import HugePages
 from sim.run.outcome import Outcome
 from sim.world.environment.map_on_board import map_on_board
@@ -89,7 +88,7 @@ def simulate(
     """
     observed = Observed(scenario, capture=capture, applications=applications, folder=spool_folder)
     began = time.perf_counter()
-    with _no_collector():
+    with GARBAGE.not_collected():
         _run(observed.host, scenario, on_progress, signals)
     interrupted = f"interrupted by {Signals(signals[0]).name}" if signals else ""
     return observed.outcome(wall_s=time.perf_counter() - began, cut_short=interrupted)
@@ -163,19 +162,3 @@ def _run(host: VirtualHost, scenario: Scenario, on_progress: Callable[[float], N
         if signals:
             break
     host.stop()
-
-
-@contextmanager
-def _no_collector() -> Iterator[None]:
-    """Switch the garbage collector off: a run makes millions of small tuples and no cycles, so this saves a tenth of
-    the time.
-    """
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.freeze()
-            gc.enable()
-            gc.unfreeze()  # all that the run has left counts as old, so that the collector does not examine it at once

@@ -1,0 +1,55 @@
+"""The garbage collector and runs in virtual time.
+
+A run makes millions of small tuples and no cycles, so the collector is off in it, which saves a tenth of the time. The
+actors of a swarm refer to each other, however, so only the collector frees those of an ended run (3 to 40 MB of 45
+UAVs). A program that makes many runs, such as a sweep, would keep them all: nothing that is alive at the end of a run
+is young, and the collector by itself hardly ever examines what is old. So it is asked to, before a run, as soon as the
+runs since it last did have taken much more time than it takes.
+"""
+
+import gc
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Final
+
+_EVERY_S: Final = 5.0
+"""The CPU time of runs after which the garbage of them is collected [s]; that takes a tenth of a second."""
+
+
+class GarbageOfRuns:
+    """Collects what runs of this process leave behind, between them."""
+
+    def __init__(
+        self,
+        *,
+        every_s: float = _EVERY_S,
+        collect: Callable[[], object] = gc.collect,
+        cpu_s: Callable[[], float] = time.process_time,
+    ) -> None:
+        self._every_s = every_s
+        self._collect = collect
+        self._cpu_s = cpu_s
+        self._uncollected_s = 0.0
+        """The CPU time of the runs since the last collection."""
+
+    @contextmanager
+    def not_collected(self) -> Iterator[None]:
+        """Collect the garbage of ended runs if it is time to; then switch the collector off, for one run."""
+        if self._uncollected_s >= self._every_s:
+            self._uncollected_s = 0.0
+            self._collect()
+        began_s, was_on = self._cpu_s(), gc.isenabled()
+        gc.disable()
+        try:
+            yield
+        finally:
+            self._uncollected_s += self._cpu_s() - began_s
+            if was_on:
+                gc.freeze()
+                gc.enable()
+                gc.unfreeze()  # all that is alive counts as old, so that the collector does not examine it at once
+
+
+GARBAGE: Final = GarbageOfRuns()
+"""That of this process: the collector is one for all runs in it."""

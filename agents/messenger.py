@@ -51,8 +51,7 @@ class Messenger:
         wait_ns = S + (2 * seconds_to_ns(scenario.clusters.flooding_period_s) if clustered else 0)
         self._node = node
         self._listeners = listeners
-        self._room = scenario.radio.max_frame_bytes - wire.HEADER_BYTES
-        self._sender = Sender(node.node, scenario.node_ids, most_bytes=self._room, wait_ns=wait_ns)
+        self._sender = Sender(node.node, scenario.node_ids, room=self._room, wait_ns=wait_ns)
         self._receiver = Receiver(node.node, self._has_listener, random=stream(scenario.seed, "receipts", node.node))
         self._in_time_ns: int | None = None
         """The instant at which the last message with a deadline was accepted."""
@@ -69,8 +68,7 @@ class Messenger:
         """Send what an application has submitted; returns the handle of the message, which statuses will name."""
         port, data, to, targets, priority, confirm, lifetime_ns, deadline_ns, born_ns = submission
         plain = port == MAVLINK_PORT and not confirm and not targets and lifetime_ns is None
-        if not plain:
-            self._check(port, data, len(targets))
+        self._check(submission, plain=plain)
         if confirm and self._sender.full:
             return self._refused(application, DropReason.QUEUE_FULL, now_ns)
         if deadline_ns is not None:
@@ -84,9 +82,8 @@ class Messenger:
         lifetime_ms, born_us = max(1, min(MOST_LIFETIME_MS, own_ns // MS)), born_ns // US
         packets: Sequence[PieceToSend] = ()
         if confirm:
-            everyone = to == BROADCAST and not targets
             handle = self._sender.confirmed(
-                data, port=port, targets=None if everyone else targets or (to,), priority=priority, born_us=born_us,
+                data, port=port, targets=_targets(to, targets), priority=priority, born_us=born_us,
                 lifetime_ms=lifetime_ms,
             )  # fmt: skip
             self._statuses.own(handle, application)
@@ -102,12 +99,22 @@ class Messenger:
             self._send_due(now_ns)
         return handle
 
-    def _check(self, port: int, data: bytes, named: int) -> None:
-        """Raise LocalProtocolError for more bytes than a message can carry."""
-        one_piece = self._room - wire.OVERHEAD - wire.MESSAGE.layout.size - named * 3
-        most = one_piece if port == MAVLINK_PORT else self._sender.most_bytes(named)
+    def _room(self, priority: int) -> int:
+        """The room for inner frames in one packet of a priority."""
+        return self._node.most_packet_bytes(priority) - wire.HEADER_BYTES
+
+    def _check(self, submission: Submission, *, plain: bool) -> None:
+        """Raise LocalProtocolError for a message that is longer than the network can ever carry."""
+        port, data, to, targets, priority, confirm = submission[:6]
+        if plain:
+            most = self._room(priority)
+        else:
+            most = self._sender.most_bytes(port=port, targets=_targets(to, targets), confirm=confirm, priority=priority)
         if len(data) > most:
-            raise LocalProtocolError(f"message of {len(data)} bytes must be <= {most} (radio.max_frame_bytes)")
+            packet = self._node.most_packet_bytes(priority)
+            raise LocalProtocolError(
+                f"message of {len(data)} bytes must be <= {most}: packets of this priority have {packet} bytes"
+            )
 
     def _admission(self, deadline_ns: int, born_ns: int) -> tuple[bool, int | None]:
         """Whether a message can arrive in time, and the least interval between such messages if that is known.
@@ -202,7 +209,7 @@ class Messenger:
     def wake(self, now_ns: int) -> None:
         self._send_due(now_ns)
         for origin, receipts, priority in self._receiver.due(now_ns):
-            most = self._room // RECEIPT_BYTES
+            most = self._room(priority) // RECEIPT_BYTES
             for at in range(0, len(receipts), most):
                 inner = encode_receipts(receipts[at : at + most], node=self._node.node)
                 self._node.send(
@@ -226,6 +233,11 @@ class Messenger:
             "given_up_here": self._receiver.expired,
         }
         return {**dict(sorted(counts.items())), **more}
+
+
+def _targets(to: NodeId, named: tuple[NodeId, ...]) -> tuple[NodeId, ...] | None:
+    """The nodes that a message is for; None if it is for all."""
+    return None if to == BROADCAST and not named else named or (to,)
 
 
 def _message_id(frames: bytes) -> int:

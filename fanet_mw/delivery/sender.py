@@ -10,7 +10,7 @@ bounded, too: the caller asks `full` first, and refuses a message that does not 
 """
 
 import heapq
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
@@ -95,13 +95,13 @@ class _OutgoingMessage:
 class Sender:
     """The confirmed messages of one node that are under way."""
 
-    def __init__(self, node: NodeId, everyone: Collection[int], *, most_bytes: int, wait_ns: int) -> None:
-        """`most_bytes`: the room for inner frames in one packet. `wait_ns`: how long to wait for a target of which no
-        receipt has come.
+    def __init__(self, node: NodeId, everyone: Collection[int], *, room: Callable[[int], int], wait_ns: int) -> None:
+        """`room` tells the room for inner frames in one packet of a priority. `wait_ns`: how long to wait for a target
+        of which no receipt has come.
         """
         self._node = node
         self._everyone = tuple(NodeId(other) for other in everyone if other != node)
-        self._most_bytes = most_bytes
+        self._room = room
         self._round_trips = RetransmissionTimeout(wait_ns)
         self._messages: dict[int, _OutgoingMessage] = {}
         self._flows: dict[tuple[tuple[NodeId, ...], int, int], _Flow] = {}
@@ -127,13 +127,22 @@ class Sender:
     def full(self) -> bool:
         return self._kept_bytes >= MOST_BYTES or len(self._messages) >= MOST_MESSAGES
 
-    def most_bytes(self, targets: int) -> int:
-        """The length of the longest message to a port, if `targets` nodes must be named."""
-        return MOST_PIECES * self._stride(targets)
+    def most_bytes(self, *, port: int, targets: tuple[NodeId, ...] | None, confirm: bool, priority: int) -> int:
+        """The length of the longest message to these targets (None: all nodes); below 0 if not even an empty one fits
+        a packet.
+        """
+        room = self._room_beside_head(self._most_named(targets, confirm=confirm), priority)
+        return room if port == MAVLINK_PORT or room < 0 else MOST_PIECES * wire_message.room_for_data(room)
 
-    def _stride(self, targets: int) -> int:
-        named = wire_message.targets_bytes(targets)
-        return wire_message.room_for_data(self._most_bytes - wire_message.HEAD_BYTES - named)
+    def _most_named(self, targets: tuple[NodeId, ...] | None, *, confirm: bool) -> int:
+        """The greatest number of targets that any packet of a message names; a repetition to all nodes names some."""
+        if targets is not None:
+            return len(targets) if len(targets) > 1 else 0
+        return min(len(self._everyone), _NAMED) if confirm and len(self._everyone) > _FEW else 0
+
+    def _room_beside_head(self, named: int, priority: int) -> int:
+        """The room of a packet for data, and for what stands around it."""
+        return self._room(priority) - wire_message.HEAD_BYTES - wire_message.targets_bytes(named)
 
     def unconfirmed(
         self, data: bytes, *, port: int, destination: NodeId, targets: tuple[NodeId, ...], priority: int,
@@ -141,7 +150,7 @@ class Sender:
     ) -> tuple[int, Sequence[PieceToSend]]:  # fmt: skip
         """The number and all packets of a message that is not confirmed."""
         number = self.take_number()
-        stride, pieces = self._division(data, port, len(targets))
+        stride, pieces = self._division(data, port, self._most_named(targets or None, confirm=False), priority)
         packets = []
         for piece in range(pieces):
             head = Head(born_us, number, 0, len(data), lifetime_ms, port, 0, stride, piece, pieces, 0)
@@ -162,8 +171,7 @@ class Sender:
             return number
         flow = self._flow(whom, port, priority)
         flow.open.append(number)
-        named = min(len(whom), _NAMED) if targets is None else len(whom)
-        stride, pieces = self._division(data, port, named if len(whom) > 1 else 0)
+        stride, pieces = self._division(data, port, self._most_named(targets, confirm=True), priority)
         message = _OutgoingMessage(
             number, flow, data, port, priority, stride, pieces, born_us, lifetime_ms, targets is None,
             dict.fromkeys(whom, 0),
@@ -178,11 +186,11 @@ class Sender:
         self._next_number += 1
         return self._next_number - 1
 
-    def _division(self, data: bytes, port: int, named: int) -> tuple[int, int]:
+    def _division(self, data: bytes, port: int, named: int, priority: int) -> tuple[int, int]:
         """The number of bytes of each piece but the last, and the number of pieces."""
         if port == MAVLINK_PORT or not data:
             return len(data), 1
-        stride = min(len(data), self._stride(named))
+        stride = min(len(data), wire_message.room_for_data(self._room_beside_head(named, priority)))
         return stride, -(-len(data) // stride)
 
     def _flow(self, whom: tuple[NodeId, ...], port: int, priority: int) -> _Flow:

@@ -136,6 +136,12 @@ class RoutingProtocol(ABC):
     def next_wake_ns(self) -> int | None:
         return None
 
+    def most_packet_bytes(self, priority: int) -> int:
+        """The length, header included, of the longest packet of an application that this protocol carries at a
+        priority, whatever the state of the network. Nothing longer is handed to it; it stays the same for ever.
+        """
+        return self._port.scenario.radio.max_frame_bytes
+
     def waiting(self) -> int:
         """The number of packets that wait in the protocol."""
         return 0

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 from fanet_mw import wire
 from fanet_mw.bus.messages import Reception, TxStatus
-from fanet_mw.errors import DropReason, MalformedFrameError
+from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
 from fanet_mw.node import duplicates
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.header_check import HeaderCheck
@@ -145,8 +145,11 @@ class Node:
         and the first frame may go `radio.lead_ms` later: a process that was woken late has less time to announce the
         frame, but the delay is not measured too short. With `watch`, `Node.watch` will say what became of the packet,
         with `watch_radio` also when the radio has finished with its first frame.
-        Raises LocalProtocolError when the frame would exceed `radio.max_frame_bytes`.
+        Raises LocalProtocolError for a packet that is longer than `most_packet_bytes`.
         """
+        size, most = wire.HEADER_BYTES + len(inner), self.most_packet_bytes(priority)
+        if size > most:
+            raise LocalProtocolError(f"packet of {size} bytes must be <= {most}, the most that this routing carries")
         born_ns = born_ns // US * US  # what the header can say
         scenario = self.scenario
         packet = self._own.make(
@@ -302,6 +305,10 @@ class Node:
 
     def wake(self, now_ns: int) -> None:
         self._protocol.wake(now_ns)
+
+    def most_packet_bytes(self, priority: int) -> int:
+        """The length, header included, of the longest packet that `send` takes at a priority."""
+        return min(self._protocol.most_packet_bytes(priority), self.scenario.radio.max_frame_bytes)
 
     def bound_ns(self) -> int | None:
         """The delay within which all nodes have the next packet of this node; None: the protocol states none."""

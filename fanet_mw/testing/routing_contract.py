@@ -12,7 +12,7 @@ driven by hand with frames that no protocol would send. Needs `pip install 'fane
 """
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from importlib import import_module
 from random import Random
@@ -21,15 +21,19 @@ from typing import Any, ClassVar, Final, Literal, NamedTuple
 import pytest
 
 from fanet_mw import wire
+from fanet_mw.application import Application
 from fanet_mw.bus.messages import Reception, TxOutcome, TxRequest, TxStatus
+from fanet_mw.errors import DropReason, LocalProtocolError
 from fanet_mw.node.node import Node
 from fanet_mw.routing import make_protocol
 from fanet_mw.scenario import Scenario, config
-from fanet_mw.trace import Delivered
+from fanet_mw.trace import Delivered, Dropped, Generated
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 
 Destination = int | Literal["all"]
 _AIRTIME_NS: Final = 1 * MS
+_REPEATED: Final = 3
+"""The number of packets of the greatest length at each priority: the air may take one."""
 
 
 class ContractRun(NamedTuple):
@@ -97,6 +101,28 @@ class RoutingContract:
         again = _fresh_run(scenario)
         assert again.summary["trace_sha256"] == self.run(1, moving=True).summary["trace_sha256"]
 
+    def test_a_packet_of_the_greatest_stated_length_leaves_its_node(self) -> None:
+        """`most_packet_bytes` is what messages of applications are cut to: what is longer must be refused at once, and
+        nothing that it allows may be dropped on its way for its length.
+        """
+        scenario = self.scenario("all", moving=False)
+        node = _Bench(scenario).node
+        lengths = {priority: node.most_packet_bytes(priority) for priority in wire.PRIORITIES.values()}
+        assert all(wire.HEADER_BYTES < most <= scenario.radio.max_frame_bytes for most in lengths.values()), lengths
+        for priority, most in lengths.items():
+            with pytest.raises(LocalProtocolError):
+                node.send(
+                    bytes(most + 1 - wire.HEADER_BYTES), destination=BROADCAST, priority=priority, app=_Longest.name,
+                    born_ns=0, now_ns=0,
+                )  # fmt: skip
+        outcome = _fresh_run(scenario, lambda node: [_Longest(lengths)] if node == 5 else []).outcome
+        made = [r.seq for r in outcome.records if isinstance(r, Generated) and r.app == _Longest.name]
+        heard = {r.seq for r in outcome.records if isinstance(r, Delivered) and r.origin == 5}
+        assert len(made) == _REPEATED * len(lengths)
+        for index, (priority, most) in enumerate(lengths.items()):
+            assert heard.intersection(made[index :: len(lengths)]), f"packets of {most} bytes, priority {priority}"
+        assert DropReason.TOO_LARGE not in {r.reason for r in outcome.records if isinstance(r, Dropped)}
+
     # --- one node, driven by hand ---------------------------------------------------------------------------------
 
     def test_what_the_air_brings_never_raises(self) -> None:
@@ -143,10 +169,28 @@ def _run(scenario_json: str) -> ContractRun:
     return _fresh_run(config.build(json.loads(scenario_json)))
 
 
-def _fresh_run(scenario: Scenario) -> ContractRun:
+def _fresh_run(scenario: Scenario, applications: Callable[[int], Sequence[Application]] = lambda _: ()) -> ContractRun:
     """A run by the simulation layers, which are imported by name because this layer must not depend on them."""
-    outcome = import_module("sim.run.virtual").simulate(scenario)
+    outcome = import_module("sim.run.virtual").simulate(scenario, applications=applications)
     return ContractRun(outcome, import_module("sim.results.files").finish(outcome, out=None))
+
+
+class _Longest(Application):
+    """Sends packets of the given length at each priority in turn, when the swarm has been up for 8 s."""
+
+    name = "longest"
+
+    def __init__(self, lengths: Mapping[int, int]) -> None:
+        self._to_send = list(lengths.items()) * _REPEATED
+        self._due_ns = 8 * S
+
+    def next_wake_ns(self) -> int | None:
+        return self._due_ns if self._to_send else None
+
+    def wake(self, now_ns: int) -> None:
+        priority, most = self._to_send.pop(0)
+        self._due_ns = now_ns + S
+        self.port.send(wire.filler(most - wire.HEADER_BYTES), priority=priority)
 
 
 class _Bench:

@@ -18,6 +18,7 @@ from fanet_mw.routing import MAKERS
 from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.scenario.tables.routing import PROTOCOLS
+from fanet_mw.testing.routing_contract import RoutingContract
 from fanet_mw.trace import Delivered, Dropped, Generated, Record
 from fanet_mw.units import MS, US
 from sim.results.files import finish
@@ -107,6 +108,12 @@ def test_no_unicast_packet_vanishes_without_a_name(protocol: str) -> None:
         held = sum(report["waiting"] for report in agents)
         looped = sum(report["dropped"].get("duplicate", 0) for report in agents)
         assert len(made - ended) <= held + looped
+
+
+@pytest.mark.parametrize("protocol", sorted(PROTOCOLS))
+def test_each_carries_packets_of_the_length_that_it_states(protocol: str) -> None:
+    of_protocol = type("OfProtocol", (RoutingContract,), {"protocol": protocol})
+    of_protocol().test_a_packet_of_the_greatest_stated_length_leaves_its_node()
 
 
 def transmissions(scenario: Scenario) -> Counter[tuple[int, int, int]]:

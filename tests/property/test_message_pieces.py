@@ -41,7 +41,7 @@ class Network:
         self.random = random.Random(seed)
         self.loss = loss
         self.now_ns = 0
-        self.senders = {n: Sender(n, NODES, most_bytes=ROOM, wait_ns=S) for n in NODES}
+        self.senders = {n: Sender(n, NODES, room=lambda _: ROOM, wait_ns=S) for n in NODES}
         self.receivers = {
             n: Receiver(n, lambda piece: piece.head.port != DEAF_PORT, random=random.Random(seed)) for n in NODES
         }
@@ -157,8 +157,8 @@ def test_an_unconfirmed_message_needs_all_its_pieces_and_is_handed_over_once(siz
 
 
 def test_what_a_sender_cannot_get_rid_of_fills_it_up_to_a_bound() -> None:
-    sender = Sender(NodeId(1), NODES, most_bytes=1000, wait_ns=S)
-    data = bytes(sender.most_bytes(0))
+    sender = Sender(NodeId(1), NODES, room=lambda _: 1000, wait_ns=S)
+    data = bytes(sender.most_bytes(port=5, targets=(NodeId(2),), confirm=False, priority=3))
     count = 0
     while not sender.full:
         sender.confirmed(data, port=5, targets=(NodeId(2),), priority=3, born_us=0, lifetime_ms=5000)

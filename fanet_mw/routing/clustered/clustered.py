@@ -110,6 +110,9 @@ class Clustered(RoutingProtocol):
                 parts.access.forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
         return ()
 
+    def most_packet_bytes(self, priority: int) -> int:
+        return self.parts.access.most_packet_bytes(priority)
+
     def bound_ns(self) -> int | None:
         return None if self.parts.delays is None else self.parts.delays.bound_ns()
 

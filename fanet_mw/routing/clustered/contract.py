@@ -80,6 +80,9 @@ class Access(Protocol):
     def admit(self, packet: Packet, *, due_ns: int) -> bool:
         """Admission control of an own application's packet, due at `due_ns`; False if the packet is refused."""
 
+    def most_packet_bytes(self, priority: int) -> int:
+        """The length of the longest packet of an application for which every slot or turn has room, at a priority."""
+
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         """Flood an own application's packet from here, or send it towards a node that will."""
 

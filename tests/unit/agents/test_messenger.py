@@ -1,20 +1,25 @@
 """What becomes of messages inside one node: deadlines that a network can or cannot keep, and packets that end there."""
 
+import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
+
+import pytest
 
 from agents.listeners import Listeners
 from agents.messenger import Messenger
 from agents.submission import Sending, Submission
 from fanet_mw import mavlink
 from fanet_mw.application import Application, Data, Destination, Fate, Status
-from fanet_mw.errors import DropReason
+from fanet_mw.errors import DropReason, LocalProtocolError
 from fanet_mw.node.node import Node
 from fanet_mw.node.packet_watch import PacketNews
 from fanet_mw.routing.direct import Direct
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
-from fanet_mw.wire import PRIORITY_BULK
+from fanet_mw.wire import HEADER_BYTES, PRIORITY_BULK, PRIORITY_REPORT, filler
+from fanet_mw.wire.message import DELIVERED, MOST_PIECES, Receipt, decode_piece
 
 OWN, OTHER = NodeId(1), NodeId(2)
 BYTES = Data(5, b"hello")
@@ -32,6 +37,13 @@ class Promising(Direct):
 
     def least_interval_ns(self, deadline_ns: int) -> int | None:
         return 50 * MS if deadline_ns >= 200 * MS else None
+
+
+class Narrow(Direct):
+    """Carries packets of 300 bytes, and longer ones only of reports."""
+
+    def most_packet_bytes(self, priority: int) -> int:
+        return 420 if priority == PRIORITY_REPORT else 300
 
 
 class Watcher(Application):
@@ -60,10 +72,12 @@ class Desk:
         to: Destination = OTHER,
         confirm: bool = False,
         deadline_ns: int | None = None,
+        priority: int = PRIORITY_BULK,
+        lifetime_ns: int | None = None,
     ) -> int:
         sending = Sending(OWN, self.node.scenario.nodes.count)
         submission = Submission(
-            *sending.content(content), *sending.whom(to), PRIORITY_BULK, confirm, None, deadline_ns, at_ns
+            *sending.content(content), *sending.whom(to), priority, confirm, lifetime_ns, deadline_ns, at_ns
         )
         return self.messenger.send(self.application, submission, now_ns=at_ns)
 
@@ -145,3 +159,108 @@ def test_what_nobody_asks_about_is_not_told(make_scenario: MakeScenario) -> None
     desk.send(HEARTBEAT)
     assert len(desk.node.watch.watched) == 1, "of the plain packet nobody wants to know anything"
     assert desk.messenger.report()["admitted"] == 1, "pieces are counted all the same"
+
+
+# --- lengths ----------------------------------------------------------------------------------------------------------
+
+TO = [OTHER, (2, 3), (2, 3, 4), BROADCAST]
+
+
+def refused_from(desk: Desk, make: Callable[[int], bytes | Data], **how: Any) -> int:
+    """The greatest length of a message that is taken, as the error states that refuses a longer one."""
+    with pytest.raises(LocalProtocolError) as error:
+        desk.send(make(40_000) if make is filler else make(140_000), **how)
+    most = re.fullmatch(
+        r"message of \d+ bytes must be <= (-?\d+): packets of this priority have \d+ bytes", str(error.value)
+    )
+    assert most is not None, error.value
+    with pytest.raises(LocalProtocolError):
+        desk.send(make(int(most[1]) + 1), **how)
+    return int(most[1])
+
+
+def as_data(size: int) -> Data:
+    return Data(5, bytes(size))
+
+
+@pytest.mark.parametrize("confirm", [False, True])
+@pytest.mark.parametrize("to", TO)
+def test_the_longest_message_has_the_pieces_that_a_receipt_can_tell_of_and_all_fit(
+    make_scenario: MakeScenario, to: Destination, confirm: bool
+) -> None:
+    desk = Desk(make_scenario, Narrow, **{"nodes.count": 5})
+    most = refused_from(desk, as_data, to=to, confirm=confirm)
+    desk.send(as_data(most), to=to, confirm=confirm)
+    frames = [request.frame for request in desk.node.requests]
+    assert all(len(frame) <= 300 for frame in frames)
+    assert {decode_piece(frame).head.pieces for frame in frames} == {MOST_PIECES}
+
+
+@pytest.mark.parametrize("to", TO)
+def test_the_longest_confirmed_frames_are_repeated_to_a_part_of_the_swarm(
+    make_scenario: MakeScenario, to: Destination
+) -> None:
+    """A repetition names the nodes that still lack the message, and there is room for them."""
+    desk = Desk(make_scenario, Narrow, **{"nodes.count": 5})
+    most = refused_from(desk, filler, to=to, confirm=True)
+    number = desk.send(filler(most), to=to, confirm=True)
+    desk.messenger._sender.receipt(OTHER, Receipt(0, number, DELIVERED), S)
+    desk.messenger.statuses(S)
+    for _ in range(3):
+        due_ns = desk.messenger.next_wake_ns()
+        if due_ns is not None:
+            desk.messenger.wake(due_ns)
+    assert len(desk.node.requests) == {OTHER: 1, (2, 3): 2 + 3 * 1, (2, 3, 4): 1 + 3 * 2, BROADCAST: 1 + 3}[to]
+    assert all(len(request.frame) <= 300 for request in desk.node.requests)
+
+
+def test_the_longest_packet_is_that_of_its_priority(make_scenario: MakeScenario) -> None:
+    for priority, most in ((PRIORITY_BULK, 300), (PRIORITY_REPORT, 420)):
+        desk = Desk(make_scenario, Narrow)
+        assert refused_from(desk, filler, priority=priority) == most - HEADER_BYTES
+        desk.send(filler(most - HEADER_BYTES), priority=priority)
+        desk.send(as_data(3000), priority=priority)
+        frames = [request.frame for request in desk.node.requests]
+        assert max(map(len, frames)) == most
+
+
+def test_a_message_that_no_packet_can_carry_is_refused_though_it_is_empty(make_scenario: MakeScenario) -> None:
+    keys = {"radio.max_frame_bytes": 150, "nodes.count": 5, "traffic.payload_bytes": 100, "routing.hello_interval_s": 0}
+    desk = Desk(make_scenario, **keys)
+    desk.send(as_data(0))
+    with pytest.raises(
+        LocalProtocolError, match=r"message of 0 bytes must be <= -\d+: packets of this priority have 150"
+    ):
+        desk.send(as_data(0), to=(2, 3, 4))
+    assert len(desk.node.requests) == 1
+
+
+def test_what_is_refused_for_its_length_leaves_no_trace(make_scenario: MakeScenario) -> None:
+    desk = Desk(make_scenario, Promising)
+    with pytest.raises(LocalProtocolError):
+        desk.send(filler(2290), deadline_ns=200 * MS)
+    with pytest.raises(LocalProtocolError):
+        desk.send(as_data(200_000), confirm=True)
+    desk.send(HEARTBEAT, deadline_ns=200 * MS)
+    assert desk.told()[0].fate is Fate.ADMITTED, "what was not sent keeps nothing else from being sent"
+    assert desk.messenger.report() == {}
+
+
+@pytest.mark.parametrize(
+    ("packet", "to_one", "confirmed_to_all"),
+    [(256, 10_112, 5_120), (512, 25_472, 20_480), (1024, 56_192, 51_200), (2304, 132_992, 128_000)],
+)
+def test_the_page_about_messages_states_how_long_they_may_be(
+    make_scenario: MakeScenario, packet: int, to_one: int, confirmed_to_all: int
+) -> None:
+    """docs/how-to/send-messages.md"""
+    keys = {"nodes.count": 33, "radio.max_frame_bytes": packet, "traffic.payload_bytes": 100}
+    desk = Desk(make_scenario, **keys)
+    some = tuple(range(2, 34))
+    assert [refused_from(desk, as_data, to=to) for to in (OTHER, BROADCAST)] == [to_one, to_one]
+    assert [refused_from(desk, as_data, to=to, confirm=True) for to in (OTHER, BROADCAST)] == [to_one, confirmed_to_all]
+    assert [refused_from(desk, as_data, to=to, confirm=c) for to in ((2, 3), some) for c in (False, True)] == [
+        confirmed_to_all
+    ] * 4
+    row = f"| {packet:,} | {to_one:,} | {confirmed_to_all:,} |"
+    assert row in (Path(__file__).parents[3] / "docs/how-to/send-messages.md").read_text()

@@ -13,7 +13,7 @@ BORN_NS = S
 
 
 def made() -> Sender:
-    sender = Sender(OWN, (OWN, A, B, C), most_bytes=400, wait_ns=WAIT_NS)
+    sender = Sender(OWN, (OWN, A, B, C), room=lambda _: 400, wait_ns=WAIT_NS)
     sender.start(1)
     return sender
 
@@ -42,7 +42,7 @@ def delivered(sender: Sender, number: int, node: NodeId, at_ns: int) -> None:
 
 
 def test_alone_in_its_swarm_a_node_has_told_everyone() -> None:
-    sender = Sender(OWN, (OWN,), most_bytes=400, wait_ns=WAIT_NS)
+    sender = Sender(OWN, (OWN,), room=lambda _: 400, wait_ns=WAIT_NS)
     sender.start(1)
     number = send(sender, to=None)
     assert sender.told == [Told(number, DELIVERED, (), last=True)]
@@ -152,7 +152,7 @@ def test_two_targets_are_sent_to_one_by_one_and_three_together() -> None:
 
 
 def test_a_part_of_the_swarm_is_named_in_each_packet() -> None:
-    sender = Sender(OWN, [NodeId(n) for n in range(1, 9)], most_bytes=400, wait_ns=WAIT_NS)
+    sender = Sender(OWN, [NodeId(n) for n in range(1, 9)], room=lambda _: 400, wait_ns=WAIT_NS)
     send(sender, to=(A, B, C))
     assert [(p.destination, piece(p).targets) for p in sender.due(BORN_NS)] == [(BROADCAST, frozenset((A, B, C)))]
 
@@ -239,7 +239,7 @@ def test_the_most_urgent_message_goes_first() -> None:
 
 
 def test_numbers_go_on_from_the_first_and_flows_are_told_apart() -> None:
-    sender = Sender(OWN, (OWN, A, B, C), most_bytes=400, wait_ns=WAIT_NS)
+    sender = Sender(OWN, (OWN, A, B, C), room=lambda _: 400, wait_ns=WAIT_NS)
     sender.start(70_000)
     assert [send(sender), send(sender, to=(B,)), send(sender)] == [70_000, 70_001, 70_002]
     flows = {packet.number: piece(packet).head.flow for packet in sender.due(BORN_NS)}
@@ -256,7 +256,7 @@ def test_receipts_that_overtake_each_other_add_up() -> None:
 
 
 def test_together_go_the_pieces_that_any_target_lacks_and_who_lacks_some_is_named() -> None:
-    sender = Sender(OWN, [NodeId(n) for n in range(1, 9)], most_bytes=400, wait_ns=WAIT_NS)
+    sender = Sender(OWN, [NodeId(n) for n in range(1, 9)], room=lambda _: 400, wait_ns=WAIT_NS)
     number = send(sender, bytes(900), to=None)
     first = sender.due(BORN_NS)
     assert {piece(packet).targets for packet in first} == {None}

@@ -186,7 +186,7 @@ def test_a_node_that_starts_again_does_not_reuse_the_names_of_its_packets(node: 
 
 
 def test_a_packet_longer_than_frames_may_be_is_a_mistake_of_the_caller(node: Node) -> None:
-    with pytest.raises(LocalProtocolError, match=r"must be <= radio\.max_frame_bytes = 400"):
+    with pytest.raises(LocalProtocolError, match=r"packet of 426 bytes must be <= 400"):
         node.send(filler(390), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=0, now_ns=0)
 
 

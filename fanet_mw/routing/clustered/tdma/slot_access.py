@@ -44,6 +44,9 @@ class SlotAccess:
     def admit(self, packet: Packet, *, due_ns: int) -> bool:
         return True
 
+    def most_packet_bytes(self, priority: int) -> int:
+        return self._port.scenario.radio.max_frame_bytes
+
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         self.forward(packet, start_ns=due_ns, now_ns=now_ns)
 

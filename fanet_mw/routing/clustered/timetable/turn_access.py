@@ -21,6 +21,7 @@ from fanet_mw.routing.clustered.timetable.root_release import RootRelease, Turns
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TurnPlans
 from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan
+from fanet_mw.routing.clustered.timetable.turn_size import most_packet_bytes
 from fanet_mw.units import US, earliest, seconds_to_ns
 from fanet_mw.wire import Kind
 
@@ -119,6 +120,9 @@ class TurnAccess:
     def admit(self, packet: Packet, *, due_ns: int) -> bool:
         return self._delays.admit(packet, due_ns=due_ns)
 
+    def most_packet_bytes(self, priority: int) -> int:
+        return most_packet_bytes(self._port.scenario, priority)
+
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         self.forward(packet, start_ns=due_ns, now_ns=now_ns)
         bound_ns = self._delays.greatest_bound_ns(packet, now_ns=now_ns)
@@ -137,8 +141,10 @@ class TurnAccess:
         newest = self._plans.newest
         assert newest is not None, "a node without a timetable has no turn"
         size = newest.frame_bytes
-        room = size - sum(self._roots.reserved.values())
-        if len(packet.frame) > (room if packet.header.kind == Kind.DATA else size):
+        if packet.header.kind == Kind.DATA:
+            reserved = self._roots.reserved
+            size = max(size - sum(reserved.values()), reserved.get(packet.header.priority, 0))
+        if len(packet.frame) > size:
             self._port.drop(DropReason.TOO_LARGE, packet, now_ns=now_ns)
             return
         evicted = self._roots.push(packet, last=last, now_ns=now_ns)

@@ -35,6 +35,14 @@ def largest_frame(scenario: Scenario, *, together: int = 1) -> int:
     return longest + sum(reserved(scenario).values())
 
 
+def most_packet_bytes(scenario: Scenario, priority: int) -> int:
+    """The longest packet of an application for which each turn has room, whatever its timetable: in the room of bulk,
+    or in that of its own class.
+    """
+    urgent = reserved(scenario)
+    return max(largest_frame(scenario) - sum(urgent.values()), urgent.get(priority, 0))
+
+
 def schedule_bytes(scenario: Scenario) -> int:
     """The size of a part of a schedule with its positions."""
     members = min(scenario.nodes.count, CAPACITY)

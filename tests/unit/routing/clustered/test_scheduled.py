@@ -22,7 +22,16 @@ from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, TurnPlan
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import BoundStated, Dropped
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId
-from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Header, Kind, filler
+from fanet_mw.wire import (
+    FLAG_FLOOD,
+    FLAG_TO_HEAD,
+    PRIORITY_BULK,
+    PRIORITY_REPORT,
+    PRIORITY_SAFETY,
+    Header,
+    Kind,
+    filler,
+)
 
 US, ROOT, BEFORE, AFTER = NodeId(2), NodeId(3), NodeId(4), NodeId(5)
 TURNS = Turns(origin_ns=0, period_ns=100 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_superframe=29)
@@ -200,10 +209,24 @@ def test_the_newest_timetable_in_force_counts(node: Node) -> None:
     assert relays(node) == [1056, 2040 + 20 * 2]
 
 
-def test_a_packet_that_fits_no_turn_is_dropped_with_its_reason(node: Node) -> None:
+@pytest.mark.parametrize(
+    ("priority", "size", "fits"),
+    [
+        (PRIORITY_BULK, 224, True), (PRIORITY_BULK, 225, False), (PRIORITY_SAFETY, 225, False),
+        (PRIORITY_REPORT, 225, True), (PRIORITY_REPORT, 800, True), (PRIORITY_REPORT, 801, False),
+    ],
+)  # fmt: skip
+def test_a_packet_that_fits_no_turn_is_dropped_with_its_reason(
+    node: Node, priority: int, size: int, *, fits: bool
+) -> None:
+    """A turn of 1,024 bytes keeps 800 of them free for a report; the packet is on its way to a head."""
     informed(node, told_ms=0)
-    node.send(filler(1100), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=0, now_ns=0)
-    assert node.report()["dropped"] == {DropReason.TOO_LARGE: 1}
+    access_of(node)._roots.reserved = {PRIORITY_REPORT: 800}
+    header = Header(5000, 9, BEFORE, BROADCAST, BEFORE, Kind.DATA, 9, 0, priority, FLAG_TO_HEAD)
+    frame = header.encode() + filler(size - len(header.encode()))
+    node.hear(Reception(frame, BEFORE, 6 * MS, -60.0), 6 * MS)
+    assert node.dropped[DropReason.TOO_LARGE] == (not fits)
+    assert node.report()["waiting"] == fits
 
 
 @pytest.mark.parametrize("handover_ms", [0, 20])

@@ -5,7 +5,8 @@ mW.
 
 The channel `range` is not physics: every frame within `range_m` is received at the transmit power, nothing farther away
 (ns-3's range model), and nothing through an obstruction. Fading is drawn for each frame in the kernel (`fading.py`).
-Not modeled: antenna patterns, Doppler shift, and interference over links below `interference_floor_dbm`.
+Not modeled: antenna patterns, Doppler shift, interference over links below `interference_floor_dbm`, and delays of DIFS
+or more (`longest_delay_ns`).
 """
 
 import math
@@ -38,6 +39,7 @@ from emulator.kernel.state import (
     Ints,
     Reals,
 )
+from fanet_mw.airtime import Timing
 from fanet_mw.extensions import load
 from fanet_mw.scenario.tables.radio import CHANNELS, Radio, is_ofdm
 
@@ -134,6 +136,15 @@ def _foreign(radio: Radio) -> Channel:
     return channel
 
 
+def longest_delay_ns(radio: Radio) -> int:
+    """The greatest delay of a link: less than DIFS, the least time between two frames of a station.
+
+    So a frame has ended at every receiver before its transmitter begins the next one, and a link carries one frame at a
+    time. This is exact up to 8 km (`g` with short slots), 10 km (`a`) or 15 km; 802.11 is not made for more.
+    """
+    return Timing.of(radio).difs_ns - 1
+
+
 class LinkTable:
     """All links of one set of positions, as the kernel's arrays, with room for `spare` more."""
 
@@ -166,7 +177,8 @@ class LinkTable:
         self.reals = np.zeros((LINK_REALS, count + spare + 1), np.float64)
         self.ints[LINK_SRC, :count] = found[:, 0]
         self.ints[LINK_DST, :count] = found[:, 1]
-        self.ints[DELAY, :count] = np.rint(distance / SPEED_OF_LIGHT_M_S * 1e9)
+        delay_ns = np.rint(distance / SPEED_OF_LIGHT_M_S * 1e9)
+        self.ints[DELAY, :count] = np.minimum(delay_ns, longest_delay_ns(radio))
         audible = power_dbm >= radio.sensitivity_dbm if radio.channel != "range" else np.ones(count, bool)
         self.ints[AUDIBLE, :count] = audible
         only_audible = radio.fading == "none" and "sums" not in radio.as_ns3

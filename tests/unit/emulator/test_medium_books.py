@@ -5,6 +5,8 @@ from collections.abc import Callable
 import pytest
 from hand_driven import NAMES, Air, receptions, statuses
 
+from emulator.channel.path_loss import SPEED_OF_LIGHT_M_S
+from fanet_mw.airtime import Timing
 from fanet_mw.bus.messages import Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, US, S
@@ -132,3 +134,28 @@ def test_a_unicast_that_always_collided_was_given_up(make_scenario: MakeScenario
     assert receptions(heard) == []
     assert (1, TxOutcome.RETRY_LIMIT) in [(node, outcome) for node, outcome, _, _ in statuses(heard)]
     assert air.medium.report()["frames"]["dropped"] == {"collision": 1, "retry_limit": 1}
+
+
+@pytest.mark.parametrize("standard", ["b", "g", "a"])
+@pytest.mark.parametrize("apart_m", [8_000.0, 40_000.0, 600_000.0])
+def test_every_frame_to_a_far_station_ends_before_the_next_one_begins(
+    make_scenario: MakeScenario, standard: str, apart_m: float
+) -> None:
+    """A link carries one frame at a time, so delays of DIFS or more are shortened to less than that."""
+    keys = {"radio.standard": standard, "radio.range_m": 1e6, "radio.cw_min": 1}
+    if standard == "g":
+        keys["radio.slot"] = "short"
+    scenario = make_scenario(**{"nodes.count": 2, "duration_s": 10, **keys})
+    timing = Timing.of(scenario.radio)
+    air = Air(scenario, [0, apart_m])
+    for _ in range(50):
+        air.send(1, 1 * MS, payload=bytes(16))
+    heard = air.run(until_ns=1 * S)
+    said = air.medium.report()
+    assert said["frames"] == {"sent": 50, "delivered": 50, "in_flight": 0, "dropped": {}}
+    assert said["copies"] == {"on_air": 50, "received": 50, "lost": {}, "in_flight": 0}
+    sent_ns = [end_ns for _, _, end_ns, _ in statuses(heard)]
+    true_ns = round(apart_m / SPEED_OF_LIGHT_M_S * 1e9)
+    assert {end_ns - at_ns for (_, _, end_ns), at_ns in zip(receptions(heard), sent_ns, strict=True)} == {
+        min(true_ns, timing.difs_ns - 1)
+    }

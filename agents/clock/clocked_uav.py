@@ -13,6 +13,7 @@ it has no slot, and contends for the channel.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, Final
 
 from agents.clock.local_clock import LocalClock
@@ -35,7 +36,7 @@ from fanet_mw.bus.messages import (
 from fanet_mw.node.node import AnnouncedHello
 from fanet_mw.node.reader import Reader
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import ClockSampled, Record
+from fanet_mw.trace import ClockSampled, Delivered, Record
 from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire import Kind
 
@@ -113,8 +114,10 @@ class ClockedUav(Actor):
         translated = self._translated(message, now_ns)
         if translated is not None:
             self._uav.receive(topic, translated, self._advance_to(now_ns))
-        known = {translated.end_ns: message.end_ns} if isinstance(translated, Reception) else {}  # type: ignore[union-attr]
-        self._hand_over(now_ns, known)
+        if isinstance(message, Reception) and isinstance(translated, Reception):
+            self._hand_over(now_ns, known={translated.end_ns: message.end_ns}, ended_ns=message.end_ns)
+        else:
+            self._hand_over(now_ns)
 
     def wake(self, now_ns: int) -> None:
         self._begin(now_ns)
@@ -212,8 +215,10 @@ class ClockedUav(Actor):
 
     # --- out ------------------------------------------------------------------------------------------------------
 
-    def _hand_over(self, now_ns: int, known: Mapping[int, int] | None = None) -> None:
-        """Pass on the output of the UAV; `known` maps instants given to the UAV to their true instants."""
+    def _hand_over(self, now_ns: int, *, known: Mapping[int, int] = MappingProxyType({}), ended_ns: int = 0) -> None:
+        """Pass on the output of the UAV. `known` maps instants given to the UAV to their true instants; `ended_ns` is
+        the true end of the frame that it was given, if any.
+        """
         uav = self._uav
         for topic, message in uav.outbox:
             if type(message) is TxRequest:
@@ -224,13 +229,17 @@ class ClockedUav(Actor):
                 self.outbox.append((topic, message))
         uav.outbox.clear()
         if uav.records:
-            at = {self._shown_ns: now_ns, **(known or {})}
-            self.records += [self._recorded(record, at) for record in uav.records]
+            at = {self._shown_ns: now_ns, **known}
+            self.records += [self._recorded(record, at, ended_ns=ended_ns) for record in uav.records]
             uav.records.clear()
 
-    def _recorded(self, record: Record, at: Mapping[int, int]) -> Record:
-        true_ns = at.get(record.t_ns)
-        return record._replace(t_ns=self._true_ns(record.t_ns) if true_ns is None else true_ns)
+    def _recorded(self, record: Record, at: Mapping[int, int], *, ended_ns: int) -> Record:
+        """A record in true time; a delivery's last part, too: the time that the UAV is given may stand still in it."""
+        known_ns = at.get(record.t_ns)
+        true_ns = self._true_ns(record.t_ns) if known_ns is None else known_ns
+        if isinstance(record, Delivered):
+            return record._replace(t_ns=true_ns, handover_ns=true_ns - ended_ns)
+        return record._replace(t_ns=true_ns)
 
     def _request(self, request: TxRequest, now_ns: int) -> TxRequest:
         start_ns = self._true_ns(request.start_ns)

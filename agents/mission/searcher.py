@@ -57,6 +57,8 @@ from fanet_mw.wire.search_plan import MOST_PLACES, Search, SearchStatus
 from fanet_mw.wire.searched_cells import Covered
 from fanet_mw.wire.survivors import Found, Standing, Survivor
 
+_MOST_DECADES: Final = 12.0
+"""The greatest range of a phone's receiver is 10^12 m, farther than anything is apart; its square is a number."""
 _OFFSET_DB: Final = 1.0
 """The standard deviation that is assumed for the difference between one phone's power and the mean of all phones."""
 _REVIEW_NS: Final = 1 * S
@@ -314,5 +316,5 @@ def _ground_range_m(scenario: Scenario) -> float:
     """
     mission, height_m = scenario.mission, scenario.nodes.altitude_m
     budget_db = mission.phone_power_dbm - mission.rubble_db - REFERENCE_LOSS_DB - mission.detection_dbm
-    slant = 10 ** (budget_db / (10 * mission.phone_exponent))
+    slant = math.pow(10.0, min(_MOST_DECADES, budget_db / (10 * mission.phone_exponent)))
     return math.sqrt(max(1.0, slant * slant - height_m * height_m))

@@ -3,7 +3,8 @@
     within_share = deliveries within the bound of their packet / (all packets x the nodes for which each was meant)
 
 The share is lowered by packets that never arrive, that arrive too late, or for which no bound was stated. Only a packet
-that arrives too late is a violation. The result is empty if no origin has stated any bound.
+that arrives too late is a violation. Packets of users' applications, whose targets the trace does not tell, are judged
+but are in no share. The result is empty if no origin has stated any bound.
 """
 
 from collections.abc import Mapping
@@ -46,12 +47,12 @@ def likely(applications: Mapping[str, AppPackets]) -> dict[str, Any]:
     within = 0
     for app in applications.values():
         delays_ns, limits_ns = _beside(app, [sent.likely[0] if sent.likely else -1 for sent in app.sent.values()])
-        within += int((delays_ns <= limits_ns).sum())
+        within += int((delays_ns <= limits_ns).sum()) if app.wanted else 0
     wanted = sum(app.wanted / len(app.sent) for app, _, _ in stated)
     packets = sum(len(app.sent) for app in applications.values())
     return {
         "share": min(share for _, _, (_, share) in stated),
-        "within_share": round(within / wanted, 6),
+        "within_share": round(within / wanted, 6) if wanted else None,
         "stated_share": round(len(stated) / packets, 6),
         "worst_ms": round(max(delays.values()) / MS, 3),
     }
@@ -65,14 +66,16 @@ def _judged(apps: list[AppPackets]) -> dict[str, Any]:
     bounds = [sent.bound_ns for app in apps for sent in app.sent.values()]
     stated = [bound_ns for bound_ns in bounds if bound_ns is not None]
     wanted = sum(app.wanted for app in apps)
-    deliveries = within = longest_ns = 0
+    deliveries = within = within_wanted = longest_ns = 0
     for app in apps:
         delays_ns, bounds_ns = delays_under_bound(app)
         deliveries += len(delays_ns)
-        within += int((delays_ns <= bounds_ns).sum())
+        in_time = int((delays_ns <= bounds_ns).sum())
+        within += in_time
+        within_wanted += in_time if app.wanted else 0
         longest_ns = max(longest_ns, int(delays_ns.max(initial=0)))
     return {
-        "within_share": round(within / wanted, 6) if wanted else None,
+        "within_share": round(within_wanted / wanted, 6) if wanted else None,
         "violations": deliveries - within,
         "deliveries": deliveries,
         "stated_share": round(len(stated) / len(bounds), 6),

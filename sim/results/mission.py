@@ -46,6 +46,8 @@ _WRECKED: Final = "fallen"
 _RETURNING: Final = "return"
 """The flight mode of a UAV that its flight controller brings home."""
 _CELL_M: Final = 25.0
+_MOST_DECADES: Final = 12.0
+"""The greatest range of a phone's receiver is 10^12 m, farther than anything is apart; its square is a number."""
 _NEARLY_ALL: Final = 0.95
 MISTAKEN_M: Final = 25.0
 """A UAV that announces a survivor farther than this from the true place has mistaken another person
@@ -216,7 +218,7 @@ class OverflownCells:
     def __init__(self, scenario: Scenario) -> None:
         mission, half = scenario.mission, scenario.world.area_m / 2
         budget_db = mission.phone_power_dbm - mission.rubble_db - REFERENCE_LOSS_DB - mission.detection_dbm
-        self._range_m = 10 ** (budget_db / (10 * mission.phone_exponent))
+        self._range_m = 10 ** min(_MOST_DECADES, budget_db / (10 * mission.phone_exponent))
         count = max(1, round(2 * half / _CELL_M))
         self._axis = (np.arange(count) + 0.5) * (2 * half / count) - half
         self._seen = np.zeros((count, count), bool)

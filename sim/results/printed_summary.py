@@ -75,9 +75,10 @@ def _network_rows(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         )
     stated = summary["likely"]
     if stated:
+        share = "-" if stated["within_share"] is None else f"{stated['within_share']:.2%}"
         yield (
             "likely",
-            f"{stated['within_share']:.2%} of the copies within what was stated for {stated['share']:.0%} of them: "
+            f"{share} of the copies within what was stated for {stated['share']:.0%} of them: "
             f"at most {stated['worst_ms']:.0f} ms, for {stated['stated_share']:.1%} of the packets",
         )
     yield from _clock_rows(summary["clock"])

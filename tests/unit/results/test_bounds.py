@@ -1,13 +1,16 @@
 """Bounds that are broken are counted, one by one, and what never comes is no proof of a bound: traces by hand."""
 
+import io
 from typing import Any
 
 import pytest
+from rich.console import Console
 
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import BoundStated, Delivered, Generated, LikelyStated, Record
 from fanet_mw.units import MS, S
 from sim.results.metrics import summarize
+from sim.results.printed_summary import show
 from sim.run.outcome import Outcome
 
 
@@ -94,3 +97,31 @@ def test_a_stated_share_is_held_against_the_copies_of_the_packets_it_is_about(sc
 def test_without_a_statement_there_is_nothing_to_hold(scenario: Scenario) -> None:
     outcome = Outcome(scenario, "virtual", 1.0, packet(1, bound_ms=100, delays_ms={2: 1}), {})
     assert summarize(outcome, trace_sha256="")["likely"] == {}
+
+
+def test_packets_of_users_whose_targets_nobody_knows_are_in_no_share(scenario: Scenario) -> None:
+    """Their delays are judged, but they fill no share: without targets there is nothing to divide by."""
+    of_user = [Generated(5 * S, 1, 5, "mine", 100), Delivered(5 * S + 200 * MS, 2, 1, 5, 200 * MS, 1)]
+    promised = [*of_user, BoundStated(5 * S, 1, 5, 100 * MS)]
+    bound = bound_of(scenario, packet(1, bound_ms=100, delays_ms={2: 50, 3: 50}), promised)
+    assert (bound["within_share"], bound["violations"], bound["deliveries"]) == (1.0, 1, 3)
+    in_time = [*of_user, BoundStated(5 * S, 1, 5, 300 * MS)]
+    bound = bound_of(scenario, packet(1, bound_ms=100, delays_ms={2: 50}), in_time)
+    assert bound["within_share"] == 0.5
+    assert bound["classes"]["mine"]["within_share"] is None
+
+
+def test_a_likely_delay_of_users_packets_alone_has_no_share(scenario: Scenario) -> None:
+    stated = [
+        Generated(5 * S, 1, 5, "mine", 100),
+        LikelyStated(5 * S, 1, 5, 300 * MS, 0.99),
+        Delivered(5 * S + 200 * MS, 2, 1, 5, 200 * MS, 1),
+    ]
+    summary = summarize(Outcome(scenario, "virtual", 1.0, stated, {}), trace_sha256="")
+    assert summary["likely"] == {"share": 0.99, "within_share": None, "stated_share": 1.0, "worst_ms": 300}
+    console = Console(width=200, record=True, file=io.StringIO())
+    show(summary, console)
+    assert "- of the copies within what was stated" in console.export_text()
+    both = [*stated, *packet(1, bound_ms=None, delays_ms={2: 10}), LikelyStated(1 * S, 1, 1, 100 * MS, 0.99)]
+    summary = summarize(Outcome(scenario, "virtual", 1.0, both, {}), trace_sha256="")
+    assert summary["likely"]["within_share"] == 0.5

@@ -10,6 +10,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Confirmed, FlightModeChanged, MissionModeChanged, Posed, ProcessEnded, Record, Refuted
 from fanet_mw.units import S
 from sim.results.mission import mission
+from sim.scenarios import catalog
 
 KEYS: dict[str, Any] = {
     "nodes": {"count": 3}, "clusters": {"count": 1}, "world": {"area_m": 500.0}, "radio": {"range_m": 250.0},
@@ -96,3 +97,13 @@ def test_the_nearest_other_uav_is_looked_for_once_a_second_among_the_living() ->
     found = measured([*records, *at(100, 0, 6, 160), ProcessEnded(100 * S, 2, "agent-2", 1), *at(101, 0, 1, 160)])
     assert found["nearest_m"] == {"least": 6.0, "p1": 60.0, "p50": 60.0}
     assert measured(at(1, 0))["nearest_m"] is None
+
+
+def test_a_phone_that_is_received_everywhere_covers_everything() -> None:
+    found = measured(at(1, 0, 100, 200), phone_power_dbm=300.0, detection_dbm=-300.0, phone_exponent=0.1)
+    assert found["coverage"] == 1.0
+
+
+def test_a_search_for_phones_that_are_received_everywhere_can_be_planned() -> None:
+    loud = ("mission.phone_power_dbm=300", "mission.detection_dbm=-300", "mission.phone_exponent=0.1")
+    assert catalog.find("rescue", loud).mission.phone_exponent == 0.1

@@ -3,12 +3,15 @@
 from collections.abc import Callable
 from typing import Any
 
+import pytest
+
 from agents.clock.clocked_uav import ClockedUav
 from fanet_mw.bus.messages import Reception, TxRequest
 from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Delivered
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
-from fanet_mw.wire import FLAG_FLOOD, PRIORITY_CONTROL, Header, Kind
+from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, PRIORITY_CONTROL, Header, Kind, filler
 from fanet_mw.wire.clusters import Member, Schedule
 
 NAMES = Topics("c")
@@ -68,3 +71,16 @@ def test_what_it_announces_leaves_in_true_time(make_scenario: MakeScenario) -> N
         leads += [message.start_ns - wake_ns for _, message in made.outbox if isinstance(message, TxRequest)]
         made.outbox.clear()
     assert all(abs(lead_ns - 20 * MS) <= 3 * US for lead_ns in leads), "whatever its own clock shows"
+
+
+@pytest.mark.parametrize("ahead_ms", [0, 5000])
+def test_the_time_from_the_frame_to_the_application_is_true_time_while_swarm_time_stands_still(
+    make_scenario: MakeScenario, ahead_ms: int
+) -> None:
+    made = clocked(make_scenario, **{"radio.handover_ms": 10})
+    made._shown_ns = 1 * S + ahead_ms * MS  # as if its clock had been found to be ahead
+    header = Header(0, 9, 1, BROADCAST, 1, Kind.DATA, 8, 0, PRIORITY_BULK, FLAG_FLOOD)
+    frame = header.encode() + filler(100)
+    made.receive(NAMES.radio_rx(NodeId(2)), Reception(frame, NodeId(1), 1 * S, -60.0), 1 * S + 7 * MS)
+    (delivered,) = (record for record in made.records if isinstance(record, Delivered))
+    assert (delivered.t_ns, delivered.handover_ns) == (1 * S + 7 * MS, 7 * MS)

@@ -189,7 +189,8 @@ class Receiver:
             following = [
                 number
                 for (other, number), m in self._incoming.items()
-                if other == origin and m.head.confirm and m.head.flow == flow and m.head.previous == name[1]
+                if other == origin and m.head.confirm and m.head.flow == flow and m.head.previous <= name[1] < number
+                if m.whole
             ]
             if not following:
                 break

@@ -260,14 +260,14 @@ class Sender:
         packets: list[PieceToSend] = []
         if len(wanted) <= _FEW:
             for target, bits in wanted.items():
-                packets += self._packets(message, bits, target, ())
+                packets += self._packets(message, bits, target, (), (target,))
         else:
             union = 0
             for bits in wanted.values():
                 union |= bits
             all_lack = len(wanted) == len(self._everyone)
             named = () if all_lack or (message.everyone and len(wanted) > _NAMED) else tuple(wanted)
-            packets += self._packets(message, union, BROADCAST, named)
+            packets += self._packets(message, union, BROADCAST, named, tuple(wanted))
         if message.rounds:
             self.repeated += len(packets)
         else:
@@ -283,11 +283,20 @@ class Sender:
         most_ns = max(map(self._round_trips.wait_ns, message.lacking), default=0)
         return most_ns << min(message.rounds - 1, _MOST_DOUBLINGS)
 
+    def _previous(self, message: _OutgoingMessage, readers: tuple[NodeId, ...]) -> int:
+        """The youngest open message before this one in its flow that any of the readers lacks; 0 if there is none.
+
+        A reader that has confirmed a message may have started again since, and would wait for it in vain.
+        """
+        older = (number for number in reversed(message.flow.open) if number < message.number)
+        return next((n for n in older if not self._messages[n].lacking.keys().isdisjoint(readers)), 0)
+
     def _packets(
-        self, message: _OutgoingMessage, bits: int, destination: NodeId, named: tuple[NodeId, ...]
-    ) -> list[PieceToSend]:
-        open_before = [number for number in message.flow.open if number < message.number]
-        previous = open_before[-1] if open_before else 0
+        self, message: _OutgoingMessage, bits: int, destination: NodeId, named: tuple[NodeId, ...],
+        readers: tuple[NodeId, ...],
+    ) -> list[PieceToSend]:  # fmt: skip
+        """The pieces of `bits`, in packets to the destination; `readers` are the targets that lack any of them."""
+        previous = self._previous(message, readers)
         packets: list[PieceToSend] = []
         for piece in range(message.pieces):
             if not bits >> piece & 1:

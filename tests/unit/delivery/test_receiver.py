@@ -118,6 +118,19 @@ def test_a_message_to_which_nobody_listens_keeps_the_place_of_those_before_it() 
     assert said(receiver, BORN_NS + 200 * MS + LATEST_RECEIPT_NS)[9] == (DELIVERED, 0)
 
 
+def test_all_messages_that_wait_for_the_same_one_are_handed_over_with_it() -> None:
+    """Each names the youngest before it that this node lacks; an incomplete one that was given up is passed over."""
+    receiver = made()
+    hear(receiver, head(8, previous=7, port=DEAF_PORT), BORN_NS)
+    hear(receiver, head(9, previous=7), BORN_NS)
+    hear(receiver, head(10, previous=9, pieces=2), BORN_NS)
+    hear(receiver, head(11, previous=9), BORN_NS)
+    hear(receiver, head(7), BORN_NS)
+    assert numbers(receiver) == [7, 9, 11]
+    hear(receiver, head(10, previous=9, piece=1, pieces=2), BORN_NS)
+    assert numbers(receiver) == [], "it comes too late for its place"
+
+
 def test_a_message_to_which_nobody_listens_and_whose_turn_never_comes_is_not_counted_as_expired() -> None:
     receiver = made()
     hear(receiver, head(8, previous=7, port=DEAF_PORT), BORN_NS)

@@ -168,6 +168,35 @@ def test_a_message_names_the_one_before_it_in_its_flow_as_long_as_that_is_open()
     assert again == {other_port: 0, second: 0}, "it is passed over"
 
 
+def test_a_target_waits_only_for_messages_that_it_lacks() -> None:
+    """A has confirmed the first message and starts again, with no memory of it; B, which is gone, keeps it open."""
+    sender = made()
+    first = send(sender, to=(A, B))
+    sender.due(BORN_NS)
+    delivered(sender, first, A, BORN_NS)
+    send(sender, to=(A, B))
+    before = {packet.destination: piece(packet).head.previous for packet in sender.due(BORN_NS)}
+    assert before == {A: 0, B: first}
+
+
+def test_a_message_to_all_names_one_before_it_that_any_of_them_lacks() -> None:
+    sender = made()
+    first, second = send(sender, to=None), send(sender, to=None)
+    sender.due(BORN_NS)
+    for node in (A, B):
+        delivered(sender, first, node, BORN_NS)
+        delivered(sender, second, node, BORN_NS)
+    third = send(sender, to=None)
+    before = {packet.number: piece(packet).head.previous for packet in sender.due(BORN_NS)}
+    assert before == {third: second}
+    delivered(sender, second, C, BORN_NS)
+    (again,) = {piece(p).head.previous for p in sender.due(BORN_NS + WAIT_NS) if p.number == third}
+    assert again == first
+    delivered(sender, third, B, BORN_NS + WAIT_NS)
+    packets = sender.due(BORN_NS + 10 * WAIT_NS)
+    assert {p.destination: piece(p).head.previous for p in packets if p.number == third} == {A: 0, C: first}
+
+
 def test_a_target_that_is_gone_holds_up_no_message_to_another() -> None:
     """A message of three packets to A, which never answers, is repeated for ten minutes; B answers at once."""
     sender = made()

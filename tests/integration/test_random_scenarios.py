@@ -126,6 +126,8 @@ def test_a_swarm_whose_largest_messages_just_fit_a_frame_works(keys: Sequence[st
     (("traffic.interval_s=1e-10",), "traffic.interval_s = 1e-10: input should be greater than or equal to 0.0001"),
     (("radio.tx_power_dbm=1e308",), "radio.tx_power_dbm = 1e+308: input should be less than or equal to 300"),
     (("radio.tx_power_dbm=nan",), "radio.tx_power_dbm = nan: input should be a finite number"),
+    (("sensors.radar_hz=1", "sensors.radar_resolution_m=0.001", "sensors.radar_false_alarm=0.01"),
+     "radar_false_alarm = 0.01 makes 43200 false echoes in a scan of 4320000 cells; there must be at most 1000"),
 ])  # fmt: skip
 def test_what_no_run_could_keep_is_refused_with_key_value_and_bound(keys: Sequence[str], said: str) -> None:
     with pytest.raises(ConfigError, match=said.replace("+", r"\+")):

@@ -3,7 +3,8 @@
 A sensor with a rate of 0 is not on board. The models, their units and sources are in docs/reference/sensors.md.
 """
 
-from typing import Annotated, Self
+import math
+from typing import Annotated, Final, Self
 
 from pydantic import Field, model_validator
 
@@ -23,6 +24,9 @@ from fanet_mw.scenario.tables.sections import (
 Angle = Annotated[float, Field(ge=0, le=180)]
 """Degrees."""
 Outage = tuple[Coordinate, Coordinate, SomeLength, Duration, Duration]
+
+MOST_FALSE_ECHOES: Final = 1000
+"""The greatest mean number of false echoes in a scan of the radar: more would fill the memory."""
 
 
 class Sensors(Section):
@@ -111,6 +115,21 @@ class Sensors(Section):
     """Loss through rubble of the phone signal of a buried survivor."""
     burial_voice_db: Decibels = 20.0
     """Loss through rubble of the voice of a buried survivor."""
+
+    @model_validator(mode="after")
+    def _false_echoes_can_be_counted(self) -> Self:
+        false_echoes = self.radar_cells * self.radar_false_alarm
+        if self.radar_hz > 0 and false_echoes > MOST_FALSE_ECHOES:
+            raise ValueError(
+                f"sensors.radar_false_alarm = {self.radar_false_alarm:g} makes {false_echoes:.0f} false echoes in a "
+                f"scan of {self.radar_cells} cells; there must be at most {MOST_FALSE_ECHOES}"
+            )
+        return self
+
+    @property
+    def radar_cells(self) -> int:
+        """The number of cells of a scan of the radar: range cells in each beam."""
+        return math.ceil(360 / self.radar_beam_deg - 1e-9) * math.ceil(self.radar_range_m / self.radar_resolution_m)
 
     @model_validator(mode="after")
     def _outages_begin_before_they_end(self) -> Self:

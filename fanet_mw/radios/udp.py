@@ -4,7 +4,9 @@
 
 The interface is an ad hoc (IBSS or mesh) Wi-Fi interface with an address of its own, whose driver does CSMA/CA. The
 other radio acknowledges each unicast, and it is sent up to `ATTEMPTS` times, because drivers do not tell whether the
-MAC's own ACK came. Received datagrams never raise; bad ones are counted. The RSSI is not known, so receptions state 0.
+MAC's own ACK came. A frame that is far behind its instant is dropped, as by the emulated radio, and so is one for which
+the socket has no room: it would go out in the turn of another node. Received datagrams never raise; bad ones are
+counted. The RSSI is not known, so receptions state 0.
 Nor is the true end of a frame: `end_ns` is the instant at which it was read from the socket.
 """
 
@@ -19,11 +21,13 @@ from fanet_mw.bus.messages import Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.errors import BusError, DropReason, MalformedFrameError
 from fanet_mw.node.duplicates import DuplicateSet, key_of
 from fanet_mw.radios.datagram import SEQ_MASK, Datagram, DatagramKind
-from fanet_mw.units import BROADCAST, NodeId, S
+from fanet_mw.units import BROADCAST, MS, NodeId, S
 
 PORT: Final = 14560
 ATTEMPTS: Final = 4
 _ACK_WAIT_S: Final = 0.03
+TOO_LATE_NS: Final = 50 * MS
+"""A frame that is later than this is dropped, because its slot belongs to another node by then."""
 _RSSI_UNKNOWN_DBM: Final = 0.0
 _RECEIVED: Final = 1
 MOVED_NS: Final = 10 * S
@@ -109,7 +113,9 @@ class UdpRadio:
     # --- transmit -------------------------------------------------------------------------------------------------
 
     def request(self, request: TxRequest) -> None:
-        """Send a frame at its instant; if that has passed, send it at once, and count it as late."""
+        """Send a frame at its instant; if that has passed, send it at once, and count it as late. One that is later
+        than TOO_LATE_NS, because of its sender or because this process was stopped in between, is dropped.
+        """
         self.counts["sent"] += 1
         if not 0 < len(request.frame) <= self._max_frame_bytes:
             self._refuse(DropReason.TOO_LARGE if request.frame else DropReason.MALFORMED, request)
@@ -121,13 +127,21 @@ class UdpRadio:
 
     def _refuse(self, reason: DropReason, request: TxRequest) -> None:
         self.counts[reason] += 1
+        self._not_sent(request, TxOutcome.REFUSED)
+
+    def _not_sent(self, request: TxRequest, outcome: TxOutcome) -> None:
         if request.wants_status:
-            self._on_message(TxStatus(request.seq, TxOutcome.REFUSED, self._now_ns(), 0))
+            self._on_message(TxStatus(request.seq, outcome, self._now_ns(), 0))
 
     def _transmit(self, request: TxRequest) -> None:
+        if self._now_ns() - request.start_ns > TOO_LATE_NS:
+            self.counts["too_late"] += 1
+            self._not_sent(request, TxOutcome.LATE)
+            return
         if request.dst == BROADCAST:
-            self._put(self._datagram(request), self._broadcast)
-            if request.wants_status:
+            if not self._put(self._datagram(request), self._broadcast):
+                self._not_sent(request, TxOutcome.QUEUE_FULL)
+            elif request.wants_status:
                 self._on_message(TxStatus(request.seq, TxOutcome.SENT, self._now_ns(), 1))
             return
         task = self._loop.create_task(self._unicast(request))
@@ -162,10 +176,19 @@ class UdpRadio:
         seq = (self._first_seq + request.seq) & SEQ_MASK
         return Datagram(DatagramKind.FRAME, self._node, request.dst, seq, request.frame)
 
-    def _put(self, datagram: Datagram, to: Address) -> None:
-        if self._transports:
-            self._transports[0].sendto(datagram.encode(), to)
-            self.counts["datagrams"] += 1
+    def _put(self, datagram: Datagram, to: Address) -> bool:
+        """Send a datagram; False if it is dropped, because an earlier one still waits for room in the socket.
+
+        Asyncio would keep any number of datagrams, and send them whenever the interface takes them.
+        """
+        if not self._transports:
+            return False
+        if self._transports[0].get_write_buffer_size():  # type: ignore[attr-defined]  # typeshed lacks it
+            self.counts[DropReason.MAC_QUEUE_FULL] += 1
+            return False
+        self._transports[0].sendto(datagram.encode(), to)
+        self.counts["datagrams"] += 1
+        return True
 
     # --- receive --------------------------------------------------------------------------------------------------
 

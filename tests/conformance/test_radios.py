@@ -7,16 +7,18 @@ import asyncio
 import socket
 import time
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import pytest
 
+from emulator import late_requests
 from emulator.medium import Medium
 from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import Message, Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.bus.topics import Topics, node_of
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.radios.datagram import Datagram, DatagramKind
-from fanet_mw.radios.udp import MOST_ADDRESSES, MOVED_NS, UdpRadio
+from fanet_mw.radios.udp import MOST_ADDRESSES, MOVED_NS, TOO_LATE_NS, UdpRadio
 from fanet_mw.scenario import config
 from fanet_mw.units import BROADCAST, MS, NodeId
 from sim.world.world import WorldActor
@@ -215,7 +217,7 @@ async def test_one_datagram_does_not_redirect_a_node_s_unicasts_and_only_its_own
         NodeId(1), address="127.7.0.9", broadcast="127.255.255.255", port=24562, max_frame_bytes=300,
         now_ns=lambda: now_ns, on_message=told.append,
     )  # fmt: skip
-    radio._put = lambda datagram, to: put.append((datagram, to))  # type: ignore[method-assign]
+    radio._put = lambda datagram, to: not put.append((datagram, to))  # type: ignore[func-returns-value, method-assign]
     home, elsewhere = ("127.7.0.2", 24562), ("127.7.0.66", 24562)
 
     def hear(seq: int, address: tuple[str, int]) -> None:
@@ -224,7 +226,7 @@ async def test_one_datagram_does_not_redirect_a_node_s_unicasts_and_only_its_own
     async def addresses() -> list[tuple[str, int]]:
         """Where a unicast to node 2 goes that somebody else acknowledges, attempt by attempt."""
         put.clear()
-        radio._transmit(request_of(7, at_ms=0, dst=NodeId(2), status=True))
+        radio._transmit(request_of(7, at_ms=now_ns // MS, dst=NodeId(2), status=True))
         await asyncio.sleep(0.01)
         radio._on_datagram(Datagram(DatagramKind.ACK, NodeId(2), NodeId(1), put[0][0].seq).encode(), elsewhere)
         await asyncio.sleep(0.2)
@@ -256,7 +258,12 @@ async def test_a_node_that_starts_again_is_heard_from_its_first_frame_on() -> No
             NodeId(2), address="127.7.0.2", broadcast="127.255.255.255", port=24563, max_frame_bytes=300,
             now_ns=lambda: 0, on_message=lambda _: None,
         )  # fmt: skip
-        sender._put = lambda datagram, to: heard._on_datagram(datagram.encode(), to)  # type: ignore[method-assign]
+
+        def put(datagram: Datagram, to: tuple[str, int]) -> bool:
+            heard._on_datagram(datagram.encode(), to)
+            return True
+
+        sender._put = put  # type: ignore[method-assign]
         for seq in range(20):
             sender._transmit(request_of(seq, at_ms=0))
             sender._transmit(request_of(seq, at_ms=0))
@@ -269,6 +276,58 @@ async def test_a_request_whose_instant_has_passed_goes_at_once_and_counts_as_lat
     assert radio.counts["late"] == 0
     radio.request(request_of(2, at_ms=9, dst=BROADCAST))
     assert radio.counts["late"] == 1
+
+
+@pytest.mark.parametrize("dst", [BROADCAST, NodeId(2)])
+async def test_a_frame_far_behind_its_instant_is_told_and_not_sent(dst: NodeId) -> None:
+    """The sender was slow, or this process was stopped between the request and its instant."""
+    assert late_requests.TOO_LATE_NS == TOO_LATE_NS
+    now_ns, told, put = 0, list[Reception | TxStatus](), list[Datagram]()
+    radio = UdpRadio(
+        NodeId(1), address="127.7.0.9", broadcast="127.255.255.255", port=24563, max_frame_bytes=300,
+        now_ns=lambda: now_ns, on_message=told.append,
+    )  # fmt: skip
+    radio._put = lambda datagram, to: not put.append(datagram)  # type: ignore[func-returns-value, method-assign]
+    for seq, late_ns in enumerate((0, TOO_LATE_NS, TOO_LATE_NS + 1)):
+        radio.request(request_of(seq, at_ms=1, dst=dst, status=True))
+        now_ns = MS + late_ns  # the loop comes to it only at this instant
+        await asyncio.sleep(0.01)
+        now_ns = 0
+    assert {datagram.frame[0] for datagram in put} == {0, 1}
+    assert [(m.seq, m.outcome) for m in told if isinstance(m, TxStatus) and m.attempts == 0] == [(2, TxOutcome.LATE)]
+    assert radio.counts["too_late"] == 1
+    radio.close()
+
+
+async def test_an_interface_that_takes_nothing_fills_no_memory_and_sends_nothing_later(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Clogged(socket.socket):
+        open = False
+
+        def sendto(self, *what: Any) -> int:
+            if not Clogged.open:
+                raise BlockingIOError
+            return super().sendto(*what)
+
+    monkeypatch.setattr(socket, "socket", Clogged)
+    told: list[Reception | TxStatus] = []
+    radio = UdpRadio(
+        NodeId(1), address="127.7.0.9", broadcast="127.255.255.255", port=free_port(), max_frame_bytes=300,
+        now_ns=lambda: 0, on_message=told.append,
+    )  # fmt: skip
+    await radio.open()
+    try:
+        for seq in range(50):
+            radio._transmit(request_of(seq, at_ms=0, status=True))
+        assert [m.outcome for m in told if isinstance(m, TxStatus)] == [TxOutcome.SENT] + 49 * [TxOutcome.QUEUE_FULL]
+        assert radio.counts == {"datagrams": 1, "mac_queue_full": 49}
+        Clogged.open = True
+        await asyncio.sleep(0.01)
+        radio._transmit(request_of(50, at_ms=0, status=True))
+        assert radio.counts["datagrams"] == 2, "there is room again"
+    finally:
+        radio.close()
 
 
 async def test_what_comes_before_the_node_has_a_time_is_counted_and_not_taken_in() -> None:

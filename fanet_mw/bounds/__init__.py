@@ -1,9 +1,11 @@
 """Worst-case delays: the paper's estimate, and bounds that hold. Pure functions of integer nanoseconds.
 
 `paper` has the paper's equations (2)-(4) exactly as published, for comparison. `slot` is the service of one slot per
-superframe, `turn_gaps` that of single turns. `arrivals` and `network` have the parts of network calculus that bound the
-delay of a queue into which packets come in bursts. `mac` has the constants of the MAC, and `guard` the guard time of a
-slot.
+superframe, `turn_gaps` that of single turns. `arrivals` and `network_calculus` have the parts of network calculus that
+bound the delay of a queue into which packets come in bursts. `mac` has the constants of the MAC, and `guard_time` the
+guard time of a slot. How long a flood of a timetable takes at worst is known to the timetable itself:
+`routing/clustered/tdma/turn_timing.py` has the wait for turns, `routing/clustered/timetable/own_bound.py` the bound
+that a node states.
 """
 
 from fanet_mw.bounds.arrivals import Arrivals, Periodic, Total

@@ -1,4 +1,4 @@
-"""The garbage collector and runs in virtual time.
+"""Switches the garbage collector off in runs in virtual time, and has it collect what they leave behind.
 
 A run makes millions of small tuples and no cycles, so the collector is off in it, which saves a tenth of the time. The
 actors of a swarm refer to each other, however, so only the collector frees those of an ended run (3 to 40 MB of 45

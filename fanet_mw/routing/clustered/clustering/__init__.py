@@ -2,7 +2,8 @@
 
 `bisection` needs positions only. `election` ranks nodes (lowest-ID, highest degree, WCA, lasting degree) and keeps
 heads that are good enough. In `affinity`, neighbors vote for each other. `maintenance` adapts standing clusters step by
-step.
+step. `division` is what a leader uses: it asks one of these for clusters when they are due. `succession` is the order
+in which the members of a cluster stand in for their head, `mobility` how long a link between two nodes will last.
 """
 
 from fanet_mw.routing.clustered.clustering.affinity import AffinityPropagation

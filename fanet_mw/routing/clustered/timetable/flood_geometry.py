@@ -1,4 +1,4 @@
-"""Parts that both schedulers of floods share: the geometry, the order in which floods begin, and their reach.
+"""Parts that both schedulers of floods share: the geometry, how many floods may begin at a time, and their reach.
 
     list_scheduling.py         for links without losses: every node sends a packet at most once
     redundant_scheduling.py    for lossy links: a frame is repeated until it has likely arrived

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
+from fanet_mw.units import MS, S
 from sim.results import printed_summary
 from sim.results.files import finish
 from sim.run.collecting.record_kinds import lines
@@ -52,12 +53,12 @@ def test_an_interrupted_simulation_keeps_its_partial_result(tmp_path: Path, numb
     assert summary["invalid_because"][0] == f"partial result: interrupted by {number.name}"
     assert 1 < summary["simulated_s"] < summary["duration_s"] == 100_000
     assert summary["frames"]["closes"]
-    lead_s = catalog.find("quick", []).radio.lead_ms / 1e3
+    until_ns, lead_ns = round(summary["simulated_s"] * S), round(catalog.find("quick", []).radio.lead_ms * MS)
     records = [json.loads(line) for line in (tmp_path / "trace.jsonl").read_text().splitlines()]
-    announced = [record[1] / 1e9 for record in records if record[0] == "let_out"]
-    happened = [record[1] / 1e9 for record in records if record[0] != "let_out"]
-    assert summary["simulated_s"] - 2 < max(happened) <= summary["simulated_s"]
-    assert max(announced) <= summary["simulated_s"] + lead_s, "a frame is handed over one lead before it is on the air"
+    announced_ns = max(record[1] for record in records if record[0] == "let_out")
+    happened_ns = max(record[1] for record in records if record[0] != "let_out")
+    assert until_ns - 2 * S < happened_ns <= until_ns
+    assert announced_ns <= until_ns + lead_ns, "a frame is handed over one lead before it is on the air"
 
 
 def its_pace_is_that_of_what_was_simulated(out: str) -> None:

@@ -3,6 +3,7 @@
 enough UAVs have reported the survivor   an auction for as many responders as the scenario wants
 too few have                             an auction for one more UAV that has not, to get another bearing
 a responder does not find the survivor   it withdraws its bid after a while
+a responder does not come to the place   it withdraws its bid, a while after it should have been there
 """
 
 import math
@@ -66,6 +67,8 @@ class Bidding:
         """True if the trace contains that this UAV approaches the present survivor."""
         self.survivor: int | None = None
         """The survivor to whom this UAV flies; None if it flies to none."""
+        self._due_ns = _LONG_AGO_NS
+        """The instant at which this UAV should be at the present survivor."""
 
     def merge(self, bids: Iterable[Bid], *, now_ns: int) -> None:
         """A neighbor has passed on bids."""
@@ -126,18 +129,21 @@ class Bidding:
                 if self._wins(survivor, self._survivors.by_id[survivor], now_ns)
             ]
             if won:
-                self.survivor, self._announced = min(won)[1], False
+                distance_m, self.survivor = min(won)
+                self._announced = False
+                self._due_ns = now_ns + (round(distance_m / self._cruise_m_s * S) if math.isfinite(distance_m) else 0)
         if self.survivor is not None and not self._announced:
             self._announce(self.survivor, now_ns)
 
     def _reconsider(self, survivor: int, now_ns: int) -> None:
-        """Give up the present survivor if this UAV has lost the auction, has searched there in vain for too long, or,
-        as a follower, would be out of reach of its team there. In the last two cases its bid is withdrawn.
+        """Give up the present survivor if this UAV has lost the auction, has searched there in vain for too long,
+        has not come there in time (a building or a closed area may lie between), or, as a follower, would be out of
+        reach of its team there. In all cases but the first its bid is withdrawn.
         """
         known = self._survivors.by_id[survivor]
         lost = not self._wins(survivor, known, now_ns)
-        arrived_ns = self._approach.arrived_ns.get(survivor)
-        late = arrived_ns is not None and now_ns - arrived_ns > self._patience_ns
+        there_ns = self._approach.arrived_ns.get(survivor, self._due_ns)
+        late = now_ns - there_ns > self._patience_ns
         if not late and self._formation.is_free:
             late = not self._formation.holds_together(known.place(), now_ns, within_s=-5.0)
         if late:

@@ -1,6 +1,6 @@
 """Tasks: a UAV bids for survivors that were reported, wins, and gives up."""
 
-from search_board import FOLLOWER, TAKEN_UP_NS, Board, lane_of
+from search_board import FOLLOWER, LINE, TAKEN_UP_NS, Board, lane_of
 
 from fanet_mw.trace import Approaching, Arrived
 from fanet_mw.units import Enu, S
@@ -59,3 +59,33 @@ def test_a_responder_that_finds_nobody_takes_its_bid_back_and_does_not_bid_again
     assert [bid.eta_ds for bid in board.tasks.bids_to_tell(now_ns=later_ns)] == [0xFFFF]
     board.tasks.reopen(1)
     assert board.approach.arrived_ns == {}, "what it came to was not the place"
+
+
+def test_a_responder_that_does_not_come_in_time_takes_its_bid_back() -> None:
+    at = lane_of(LINE, NOW_NS)
+    board = Board(LINE, at)
+    board.hear(1, Enu(at.east + 60, at.north, 0), range(1, 5), now_ns=NOW_NS)
+    board.tasks.bid(NOW_NS)
+    board.tasks.choose(NOW_NS)
+    assert board.tasks.survivor == 1
+    board.tasks.choose(NOW_NS + 46 * S)
+    assert board.tasks.survivor == 1, "it has the time of the flight, too"
+    later_ns = NOW_NS + 90 * S
+    board.tasks.choose(later_ns)
+    board.tasks.bid(later_ns)
+    assert board.tasks.survivor is None
+    assert [bid.eta_ds for bid in board.tasks.bids_to_tell(now_ns=later_ns)] == [0xFFFF]
+
+
+def test_a_responder_that_took_its_bid_back_waits_before_it_bids_again() -> None:
+    at = lane_of(FOLLOWER, NOW_NS + 20 * S)
+    board = Board(FOLLOWER, at)
+    board.hear(1, at, range(1, 5), now_ns=NOW_NS)
+    board.goal.at(1, NOW_NS - 50 * S)
+    board.tasks.bid(NOW_NS)
+    board.tasks.choose(NOW_NS)
+    board.tasks.choose(NOW_NS)
+    assert board.tasks.survivor is None, "it has searched there for more than 45 s"
+    for after_s, bids in ((0, False), (19, False), (20, True)):
+        board.tasks.bid(NOW_NS + after_s * S)
+        assert (board.tasks.bids_to_tell(now_ns=NOW_NS)[0].eta_ds != 0xFFFF) is bids

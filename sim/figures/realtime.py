@@ -90,7 +90,9 @@ REALTIME: Final = Recipe(
     "12 UAVs, 11 sources of 512 B every 0.25 s to everyone. Delays include the lead of 60 ms with which frames are "
     "announced and the handover every 20 ms, in both. radio.cw_min is 31 for flooding and 7 for the "
     "timetable. Real time: 14 processes over the bus, one run at a time; their clock slows down, at most to a tenth, "
-    "while the machine cannot keep up. Bands: 95 % of the mean.",
+    "while the machine cannot keep up. A process that hands a packet over some milliseconds late may miss its turn: "
+    "in a run compared with virtual time delivery by delivery, 9 of 100 came one turn (140 to 210 ms) later and "
+    "the others within 20 ms. Bands: 95 % of the mean.",
     draw,
     claims,
 )

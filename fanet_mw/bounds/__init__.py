@@ -2,10 +2,9 @@
 
 `paper` has the paper's equations (2)-(4) exactly as published, for comparison. `slot` is the service of one slot per
 superframe, `turn_gaps` that of single turns. `arrivals` and `network_calculus` have the parts of network calculus that
-bound the delay of a queue into which packets come in bursts. `mac` has the constants of the MAC, and `guard_time` the
-guard time of a slot. How long a flood of a timetable takes at worst is known to the timetable itself:
-`routing/clustered/tdma/turn_timing.py` has the wait for turns, `routing/clustered/timetable/own_bound.py` the bound
-that a node states.
+bound the delay of a queue into which packets come in bursts. `timetable_flood` bounds the delay of floods in a
+timetable; the bound that a node states from it is in `fanet_mw/routing/clustered/timetable/own_bound.py`. `mac` has the
+constants of the MAC, and `guard_time` the guard time of a slot.
 """
 
 from fanet_mw.bounds.arrivals import Arrivals, Periodic, Total

@@ -1,5 +1,4 @@
-"""Plans a scenario, and finds the cheapest change that makes it feasible: the fewest keys, then the least change of
-values.
+"""Finds the cheapest change that makes a scenario feasible: the fewest keys, then the least change of values.
 
 The search varies the number of clusters and the flooding period. With a timetable it also varies the backoff that a
 turn must allow for (`radio.cw_min`), makes every node a head, and at last combines everything that makes turns short.
@@ -13,16 +12,14 @@ from typing import Final, NamedTuple
 
 from fanet_mw.bounds import Refused
 from fanet_mw.graph.topology import Adjacency
-from fanet_mw.planner import verdict
-from fanet_mw.planner.claimed_verdict import evaluate_claims
+from fanet_mw.planner import problems_and_notes
 from fanet_mw.planner.demand import demands
-from fanet_mw.planner.feasibility import evaluate, heads_of
 from fanet_mw.planner.goodput_bound import in_turns
-from fanet_mw.planner.plan import Plan
+from fanet_mw.planner.plan import judge
+from fanet_mw.planner.scenario_plan import ScenarioPlan
 from fanet_mw.planner.site import Site
 from fanet_mw.planner.variant import Value, Variant, vary
 from fanet_mw.routing.clustered.tdma.turn_timing import turn_slack_ns
-from fanet_mw.routing.clustered.timetable.turn_allocation import least_interval_ns
 from fanet_mw.routing.clustered.timetable.turn_size import most_together, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import US, Enu, NodeId
@@ -41,42 +38,7 @@ class ScenarioChange(NamedTuple):
     """The cheapest change that makes a plan feasible, and the plan with that change."""
 
     variant: Variant
-    plan: Plan
-
-
-def plan(
-    scenario: Scenario,
-    positions: Mapping[NodeId, Enu],
-    *,
-    adjacency: Adjacency | None = None,
-    sources: Sequence[NodeId] | None = None,
-    deadline_ns: int | None = None,
-) -> Plan | Refused:
-    """Judge the scenario as it stands; refused if its traffic cannot be planned at all.
-
-    `adjacency` says which nodes hear each other, by default those within `radio.range_m`; a timetable uses only
-    positions. `sources` are the nodes that send the application's traffic. Each class has to meet the deadline.
-    """
-    return _judge(Site(scenario, positions, adjacency), sources, deadline_ns)
-
-
-def _judge(
-    site: Site, sources: Sequence[NodeId] | None, deadline_ns: int | None, *, quick: bool = False
-) -> Plan | Refused:
-    classes = demands(site.scenario, sources)
-    if isinstance(classes, Refused):
-        return classes
-    if site.scenario.clusters.relay == "claimed":
-        return evaluate_claims(site, classes, deadline_ns=deadline_ns)
-    return evaluate(site, classes, deadline_ns=deadline_ns, quick=quick)
-
-
-def with_capacity(found: Plan, positions: Mapping[NodeId, Enu]) -> Plan:
-    """The same plan with the least traffic interval at which its slots carry everything; this takes a second."""
-    if found.superframe is None or not found.superframe.used or found.cut_off:
-        return found
-    least = least_interval_ns(found.scenario, tuple(sorted(positions.items())), heads_of(found.scenario, positions))
-    return found._replace(superframe=found.superframe._replace(least_interval_ns=least))
+    plan: ScenarioPlan
 
 
 def cheapest_change(
@@ -92,15 +54,15 @@ def cheapest_change(
     Nothing is searched for a separated swarm, which is helped only if nodes come nearer to each other.
     """
     site = Site(scenario, positions, adjacency)
-    found = _judge(site, sources, deadline_ns)
-    if isinstance(found, Plan) and found.cut_off:
+    found = judge(site, sources, deadline_ns)
+    if isinstance(found, ScenarioPlan) and found.cut_off:
         return None
     for group, quick in ((_changes(scenario), True), (_tightest(scenario), False), (_lighter(scenario), True)):
         for variant in sorted(group, key=lambda v: v.size):
             if hopeless(site.of(variant.scenario), sources):
                 continue
-            found = _judge(site.of(variant.scenario), sources, deadline_ns, quick=quick)
-            if isinstance(found, Plan) and found.feasible:
+            found = judge(site.of(variant.scenario), sources, deadline_ns, quick=quick)
+            if isinstance(found, ScenarioPlan) and found.feasible:
                 return ScenarioChange(variant, found)
     return None
 
@@ -135,7 +97,7 @@ def _turn_options(scenario: Scenario) -> Iterator[dict[str, Value]]:
 
 def _clock_options(scenario: Scenario) -> list[dict[str, Value]]:
     """Changes that help when clocks differ by more than the slack of turns: time beacons in hellos, or more slack."""
-    needed_ns = verdict.unsynchronized_slack_ns(scenario)
+    needed_ns = problems_and_notes.unsynchronized_slack_ns(scenario)
     if needed_ns <= turn_slack_ns(scenario):
         return [{}]
     return [{"clock.sync": "beacons"}, {"clusters.turn_slack_us": needed_ns / US}]

@@ -15,12 +15,12 @@ from typing import Final, NamedTuple
 
 from fanet_mw.bounds import Bounded, DelayBound, Refused, paper
 from fanet_mw.graph.topology import levels, within_range
-from fanet_mw.planner import contention_window, flood_hops, reachability, verdict
+from fanet_mw.planner import contention_window, flood_hops, problems_and_notes, reachability
 from fanet_mw.planner.demand import ClassPlan, TrafficClass
 from fanet_mw.planner.flood_cost import FloodCost
 from fanet_mw.planner.goodput_bound import Goodput, any_protocol
 from fanet_mw.planner.head_slot import ClassLoad, ClusterPlan, slot_delays, work_ns
-from fanet_mw.planner.plan import Plan
+from fanet_mw.planner.scenario_plan import ScenarioPlan
 from fanet_mw.planner.site import Site
 from fanet_mw.planner.timetable_plan import Candidate, TimetablePlan, judge, table_for
 from fanet_mw.planner.uplink_delay import Ways, access_outcome, ways
@@ -57,7 +57,7 @@ def members_of(scenario: Scenario, positions: Mapping[NodeId, Enu]) -> list[Clus
 
 def evaluate(
     site: Site, classes: Sequence[TrafficClass], *, deadline_ns: int | None = None, quick: bool = False
-) -> Plan:
+) -> ScenarioPlan:
     """Judge one scenario. With `quick`, no timetable is computed that carries less than the load, or that takes
     seconds.
     """
@@ -83,12 +83,16 @@ def evaluate(
         _in_slots(site, candidates, uplink_ns) if fitted is None else _in_turns(site, fitted, candidates, uplink_ns)
     )
     summed = tuple(_class(index, c, judged, uplink_ns) for index, c in enumerate(classes))
-    late = () if judged.unfit or judged.cut_off or deadline_ns is None else tuple(verdict.late(summed, deadline_ns))
+    late = (
+        ()
+        if judged.unfit or judged.cut_off or deadline_ns is None
+        else tuple(problems_and_notes.late(summed, deadline_ns))
+    )
     cut_off = tuple(reachability.problems(judged.cut_off))
     crowded = tuple(contention_window.too_short(scenario, site.adjacency)) if site.timetable else ()
-    apart = tuple(verdict.clocks_apart(scenario)) if site.timetable else ()
+    apart = tuple(problems_and_notes.clocks_apart(scenario)) if site.timetable else ()
     out_of_hops = () if judged.unfit or judged.cut_off else tuple(_out_of_hops(site, fitted, judged.clusters))
-    return Plan(
+    return ScenarioPlan(
         scenario=scenario,
         clusters=judged.clusters,
         classes=summed,
@@ -104,14 +108,14 @@ def evaluate(
         or (
             *cut_off,
             *out_of_hops,
-            *verdict.problems(scenario, judged.clusters, summed, cut_off),
+            *problems_and_notes.problems(scenario, judged.clusters, summed, cut_off),
             *crowded,
             *apart,
             *late,
         ),
         notes=(
-            *verdict.notes(access, judged.clusters, guard_ns=site.guard_ns, uplink_ns=uplink_ns),
-            *verdict.left_out(scenario),
+            *problems_and_notes.notes(access, judged.clusters, guard_ns=site.guard_ns, uplink_ns=uplink_ns),
+            *problems_and_notes.left_out(scenario),
         ),
     )
 

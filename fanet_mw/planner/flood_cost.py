@@ -3,7 +3,7 @@
 Around the busiest node all relays within two hops transmit one after another on one channel, each for airtime + DIFS +
 the mean backoff. Floods that are closer together pile up. The duration is that time for each hop, plus jitter, handover
 and lead. This is an estimate, because CSMA/CA bounds neither. With a timetable both are exact
-(`routing/clustered/tdma/turn_timing.py`).
+(`fanet_mw/bounds/timetable_flood.py`).
 """
 
 from typing import NamedTuple

@@ -19,7 +19,7 @@ from fanet_mw.planner.cheapest_change import WINDOWS, hopeless
 from fanet_mw.planner.demand import TrafficClass, demands
 from fanet_mw.planner.feasibility import evaluate, members_of
 from fanet_mw.planner.flood_cost import frame_ns
-from fanet_mw.planner.plan import Plan
+from fanet_mw.planner.scenario_plan import ScenarioPlan
 from fanet_mw.planner.site import Site
 from fanet_mw.planner.uplink_delay import ways
 from fanet_mw.planner.variant import Variant, vary
@@ -39,7 +39,7 @@ class Optimum(NamedTuple):
     """The best configuration found: its settings, its plan, and its airtime."""
 
     variant: Variant
-    plan: Plan
+    plan: ScenarioPlan
     airtime_ns: int
     """The airtime per application packet: all frames of all nodes, including control."""
     floods_ns: int
@@ -81,7 +81,7 @@ def optimum(
 
 def _judge(
     site: Site, sources: Sequence[NodeId] | None, deadline_ns: int | None
-) -> tuple[Plan, list[TrafficClass]] | None:
+) -> tuple[ScenarioPlan, list[TrafficClass]] | None:
     classes = demands(site.scenario, sources)
     if isinstance(classes, Refused):
         return None
@@ -105,7 +105,7 @@ def _periods(scenario: Scenario, deadline_ns: int | None) -> Iterator[float]:
     yield from dict.fromkeys(round(longest_s * step, 3) for step in _PERIOD_STEPS if round(longest_s * step, 3) > 0)
 
 
-def _airtime_ns(plan: Plan, classes: Sequence[TrafficClass], site: Site) -> tuple[int, int]:
+def _airtime_ns(plan: ScenarioPlan, classes: Sequence[TrafficClass], site: Site) -> tuple[int, int]:
     """The mean airtime per packet over one second, in all and for floods."""
     scenario = plan.scenario
     radio, timing = scenario.radio, Timing.of(scenario.radio)

@@ -1,69 +1,55 @@
-"""The verdict on a scenario: what its clusters and traffic classes are promised; or why not."""
+"""Plans one scenario with given positions: its traffic classes first, then whether they are feasible.
 
-from typing import NamedTuple
+plan -> demand.py                  the traffic classes
+-> feasibility.py             if heads have slots, or turns of a timetable
+-> claimed_feasibility.py     if nodes claim slots
+"""
 
-from fanet_mw.bounds import Bounded, DelayBound
-from fanet_mw.planner.claimed_turns import ClaimedPlan
-from fanet_mw.planner.demand import ClassPlan
-from fanet_mw.planner.goodput_bound import Goodput
-from fanet_mw.planner.head_slot import ClusterPlan
-from fanet_mw.planner.timetable_plan import TimetablePlan
+from collections.abc import Mapping, Sequence
+
+from fanet_mw.bounds import Refused
+from fanet_mw.graph.topology import Adjacency
+from fanet_mw.planner.claimed_feasibility import evaluate_claims
+from fanet_mw.planner.demand import demands
+from fanet_mw.planner.feasibility import evaluate, heads_of
+from fanet_mw.planner.scenario_plan import ScenarioPlan
+from fanet_mw.planner.site import Site
+from fanet_mw.routing.clustered.timetable.turn_allocation import least_interval_ns
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import NodeId, S
+from fanet_mw.units import Enu, NodeId
 
 
-class Plan(NamedTuple):
-    """The verdict on a scenario."""
+def plan(
+    scenario: Scenario,
+    positions: Mapping[NodeId, Enu],
+    *,
+    adjacency: Adjacency | None = None,
+    sources: Sequence[NodeId] | None = None,
+    deadline_ns: int | None = None,
+) -> ScenarioPlan | Refused:
+    """Judge the scenario as it stands; refused if its traffic cannot be planned at all.
 
-    scenario: Scenario
-    clusters: tuple[ClusterPlan, ...]
-    classes: tuple[ClassPlan, ...]
-    access: DelayBound
-    uplink_ns: int
-    paper: DelayBound
-    """The estimate of the paper's equations (1)-(4) for the cluster with the greatest load, for comparison only."""
-    superframe: TimetablePlan | None
-    """The timetable; None if relays are not scheduled."""
-    claims: ClaimedPlan | None
-    """The plan of claimed slots, if slots are claimed; `clusters` then has one entry for each node."""
-    cut_off: tuple[NodeId, ...]
-    """The nodes that floods from the leader's part of the swarm do not reach."""
-    goodput: Goodput | None
-    """The goodput that no protocol can exceed; None if traffic is not for all nodes, or if the swarm is separated."""
-    deadline_ns: int | None
-    problems: tuple[str, ...]
-    """The reasons why the scenario is not feasible; empty if it is."""
-    notes: tuple[str, ...]
-    """The assumptions of the bounds, and what they do not include."""
+    `adjacency` says which nodes hear each other, by default those within `radio.range_m`; a timetable uses only
+    positions. `sources` are the nodes that send the application's traffic. Each class has to meet the deadline.
+    """
+    return judge(Site(scenario, positions, adjacency), sources, deadline_ns)
 
-    @property
-    def feasible(self) -> bool:
-        return not self.problems
 
-    @property
-    def proven(self) -> bool:
-        """True if the bounds hold; False if some are estimates of contention."""
-        return isinstance(self.access, Bounded) and all(cluster.flood.proven for cluster in self.clusters)
+def judge(
+    site: Site, sources: Sequence[NodeId] | None, deadline_ns: int | None, *, quick: bool = False
+) -> ScenarioPlan | Refused:
+    """Judge a scenario at its site; with `quick`, a timetable that carries too little is not computed (`evaluate`)."""
+    classes = demands(site.scenario, sources)
+    if isinstance(classes, Refused):
+        return classes
+    if site.scenario.clusters.relay == "claimed":
+        return evaluate_claims(site, classes, deadline_ns=deadline_ns)
+    return evaluate(site, classes, deadline_ns=deadline_ns, quick=quick)
 
-    @property
-    def carried_per_second(self) -> float | None:
-        """The application packets per second, of all sources together, that this configuration can carry; None if
-        unknown.
 
-        With a timetable whose capacity was computed, it is exact. If relays contend, it is the load that would fill the
-        fullest slot; with claimed slots, the load that fills the busiest node on average.
-        """
-        application = next((c for c in self.classes if c.name == "application"), None)
-        if application is None or not application.sources:
-            return None
-        exact = self.superframe or self.claims
-        if exact is not None:
-            least_ns = exact.least_interval_ns
-            return None if least_ns is None else application.sources * S / least_ns
-        used = self.bottleneck.utilization if self.bottleneck else 0.0
-        return application.sources * S / application.interval_ns / used if used else None
-
-    @property
-    def bottleneck(self) -> ClusterPlan | None:
-        """The cluster with the fullest slot."""
-        return max(self.clusters, key=lambda c: (c.utilization, -c.head), default=None)
+def with_capacity(found: ScenarioPlan, positions: Mapping[NodeId, Enu]) -> ScenarioPlan:
+    """The same plan with the least traffic interval at which its slots carry everything; this takes a second."""
+    if found.superframe is None or not found.superframe.used or found.cut_off:
+        return found
+    least = least_interval_ns(found.scenario, tuple(sorted(positions.items())), heads_of(found.scenario, positions))
+    return found._replace(superframe=found.superframe._replace(least_interval_ns=least))

@@ -12,7 +12,7 @@ from fanet_mw.planner.head_slot import ClusterPlan
 from fanet_mw.planner.loss import Loss
 from fanet_mw.planner.lossy_plan import Drawn, LossyPlan
 from fanet_mw.planner.optimum import Optimum
-from fanet_mw.planner.plan import Plan
+from fanet_mw.planner.scenario_plan import ScenarioPlan
 from fanet_mw.planner.timetable_plan import TimetablePlan
 from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE
 from fanet_mw.units import MS, S
@@ -23,7 +23,7 @@ _WIDTH: Final = 100
 _LABEL: Final = 14
 
 
-def describe(found: Plan | Refused) -> str:
+def describe(found: ScenarioPlan | Refused) -> str:
     """The plan as text, without a final newline."""
     return f"cannot be planned: {found.reason}" if isinstance(found, Refused) else "\n".join(_lines(found))
 
@@ -70,7 +70,7 @@ def _likely(drawn: Drawn) -> str:
     return f"{share} within {delays}, {drawn.links} links"
 
 
-def describe_change(change: ScenarioChange | None, found: Plan) -> str:
+def describe_change(change: ScenarioChange | None, found: ScenarioPlan) -> str:
     """What would make the plan feasible, as text."""
     if found.cut_off:
         return item("change", "nodes have to come nearer: nothing that can be set joins the parts of a swarm")
@@ -108,7 +108,7 @@ def item(label: str, text: str) -> str:
     return textwrap.fill(text, _WIDTH, initial_indent=first, subsequent_indent=" " * len(first), break_on_hyphens=False)
 
 
-def _lines(found: Plan) -> Iterator[str]:
+def _lines(found: ScenarioPlan) -> Iterator[str]:
     yield f"{'FEASIBLE' if found.feasible else 'NOT FEASIBLE'}  {found.scenario.name}: {_shape(found)}"
     yield from (item("problem", problem) for problem in found.problems)
     yield from (item("class" if index == 0 else "", _class(c, found)) for index, c in enumerate(found.classes))
@@ -130,12 +130,12 @@ def _lines(found: Plan) -> Iterator[str]:
     yield from (item("note", note) for note in found.notes)
 
 
-def _details(found: Plan) -> Iterator[str]:
+def _details(found: ScenarioPlan) -> Iterator[str]:
     yield item("equation (4)", f"says {_bound_text(found.paper)} per cluster: the paper's estimate, to compare with")
     yield from _slots(found)
 
 
-def _shape(found: Plan) -> str:
+def _shape(found: ScenarioPlan) -> str:
     scenario = found.scenario
     if found.claims is not None:
         return f"{scenario.nodes.count} nodes, floods in claimed slots"
@@ -186,7 +186,7 @@ def _nodes(claims: ClaimedPlan) -> Iterator[str]:
     yield ""
 
 
-def _capacity(found: Plan) -> Iterator[str]:
+def _capacity(found: ScenarioPlan) -> Iterator[str]:
     """What this configuration can carry, and what no protocol can exceed."""
     carried, most = found.carried_per_second, found.goodput
     application = next((c for c in found.classes if c.name == "application"), None)
@@ -205,7 +205,7 @@ def _capacity(found: Plan) -> Iterator[str]:
         )
 
 
-def _class(c: ClassPlan, found: Plan) -> str:
+def _class(c: ClassPlan, found: ScenarioPlan) -> str:
     line = f"{c.name}, {c.sources} sources every {c.interval_ns / S:g} s: {_bound_text(c.bound)}"
     if isinstance(c.bound, Bounded) and isinstance(c.from_head, Bounded) and c.bound != c.from_head:
         line += f" ({c.from_head.delay_ns / S:.3f} s from the head on)"
@@ -219,7 +219,7 @@ def _class(c: ClassPlan, found: Plan) -> str:
     return line
 
 
-def _slots(found: Plan) -> Iterator[str]:
+def _slots(found: ScenarioPlan) -> Iterator[str]:
     yield "\n    head  members  hops  slot ms  flood ms  packets/period  used %  waiting"
     fullest = sorted(found.clusters, key=lambda c: (-c.utilization, c.head))
     yield from (_cluster(cluster) for cluster in fullest[:_SHOWN])

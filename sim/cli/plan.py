@@ -16,8 +16,8 @@ from fanet_mw.planner import (
     Loss,
     LossyPlan,
     Optimum,
-    Plan,
     ScenarioChange,
+    ScenarioPlan,
     cheapest_change,
     demands,
     describe,
@@ -141,7 +141,7 @@ def _loss(scenario: Scenario, superframe: TimetablePlan, table: Timetable, at: d
     return loss(table, adjacency, per_superframe=turns.per_superframe, hop_turns=geometry.hop_turns, chance=chance)
 
 
-def _json(found: Plan) -> dict[str, Any]:
+def _json(found: ScenarioPlan) -> dict[str, Any]:
     superframe, bottleneck = found.superframe, found.bottleneck
     return {
         "scenario": found.scenario.name,

@@ -31,7 +31,7 @@ from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import Message
 from fanet_mw.errors import DropReason
 from fanet_mw.graph.topology import components, within_range
-from fanet_mw.planner import Plan, plan
+from fanet_mw.planner import ScenarioPlan, plan
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.trace import Dropped
 from fanet_mw.units import Enu, NodeId, S
@@ -179,7 +179,7 @@ def feasible(tree: dict[str, Any], interval_s: float) -> bool:
     if len(components(within_range(rounded, range_m=240))) > 1:
         return False
     found = plan(scenario, rounded, sources=[NodeId(n) for n in sources_of(scenario)])
-    return isinstance(found, Plan) and found.feasible
+    return isinstance(found, ScenarioPlan) and found.feasible
 
 
 def flown(scenario: Scenario, restarts: Sequence[tuple[int, int]]) -> Outcome:

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator
 
 from agents.applications.traffic import sources_of
-from fanet_mw.planner import Plan, plan
+from fanet_mw.planner import ScenarioPlan, plan
 from fanet_mw.units import NodeId
 from sim.results.files import finish
 from sim.run.virtual import simulate
@@ -39,7 +39,7 @@ def _compared(settings: tuple[str, ...], interval_s: float, seconds: float) -> t
     scenario = catalog.find("clusters", ["clusters.relay=claimed", *settings, *times])
     at = {NodeId(i + 1): place for i, place in enumerate(positions(scenario))}
     found = plan(scenario, at, sources=[NodeId(node) for node in sources_of(scenario)])
-    assert isinstance(found, Plan)
+    assert isinstance(found, ScenarioPlan)
     assert found.claims is not None
     outcome = simulate(scenario)
     summary = finish(outcome, out=None)

@@ -8,7 +8,7 @@ import sys
 from typing import NamedTuple
 
 from fanet_mw.bounds import Bounded
-from fanet_mw.planner import Plan, plan
+from fanet_mw.planner import ScenarioPlan, plan
 from fanet_mw.scenario import config
 from fanet_mw.trace import Delivered
 from fanet_mw.units import NodeId, S
@@ -45,7 +45,7 @@ def compared(interval_s: float, clusters: int, period_s: float, *, seconds: floa
         }
     )
     found = plan(scenario, {NodeId(i + 1): at for i, at in enumerate(positions(scenario))})
-    assert isinstance(found, Plan)
+    assert isinstance(found, ScenarioPlan)
     outcome = simulate(scenario)
     bound = found.classes[0].bound
     return Compared(

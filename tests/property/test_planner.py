@@ -10,7 +10,7 @@ from fanet_mw import wire
 from fanet_mw.bounds import Bounded, Refused
 from fanet_mw.graph.topology import within_range
 from fanet_mw.mavlink import Encoder
-from fanet_mw.planner import Plan, cheapest_change, describe, describe_change, plan
+from fanet_mw.planner import ScenarioPlan, cheapest_change, describe, describe_change, plan
 from fanet_mw.planner.cheapest_change import _changes
 from fanet_mw.planner.demand import TrafficClass, demands
 from fanet_mw.planner.flood_cost import FloodCost
@@ -179,7 +179,7 @@ def test_nodes_out_of_reach_are_named_and_make_it_infeasible(make_scenario) -> N
     places = placed(scenario)
     places[NodeId(5)] = Enu(9000.0, 0.0, 50.0)
     found = plan(scenario, places)
-    assert isinstance(found, Plan)
+    assert isinstance(found, ScenarioPlan)
     assert not found.feasible
     assert found.cut_off == (5,)
     assert "reaches node 5" in describe(found)
@@ -328,7 +328,7 @@ def test_every_packet_goes_through_all_nodes_between_it_and_its_head() -> None:
 
 @pytest.mark.parametrize("rule", ["heads", "cds", "mpr"])
 def test_relays_that_are_not_estimated_are_planned_as_if_all_relayed(rule: str) -> None:
-    def planned(relay: str) -> Plan:
+    def planned(relay: str) -> ScenarioPlan:
         scenario = catalog.find("clusters", [f"clusters.relay={relay}", "traffic.interval_s=2", "clusters.count=8"])
         at = {NodeId(n): place for n, place in zip(scenario.node_ids, positions(scenario), strict=True)}
         return plan(scenario, at)

@@ -9,7 +9,7 @@ from kit import examples
 
 from fanet_mw.bounds import Refused
 from fanet_mw.graph.topology import two_hop, within_range
-from fanet_mw.planner import Plan, cheapest_change, describe, plan
+from fanet_mw.planner import ScenarioPlan, cheapest_change, describe, plan
 from fanet_mw.planner.claimed_turns import converged_slots
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.scenario import config
@@ -51,7 +51,7 @@ def test_the_slots_of_a_plan_never_meet_within_two_hops_and_their_length_follows
 
 
 def test_a_claimed_swarm_carries_what_its_plan_says_and_no_more(make_scenario) -> None:
-    def judged(interval_s: float) -> Plan:
+    def judged(interval_s: float) -> ScenarioPlan:
         scenario = make_scenario(**{**CLAIMED, "traffic.interval_s": interval_s})
         return plan(scenario, placed(scenario))
 

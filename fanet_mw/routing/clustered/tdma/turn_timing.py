@@ -18,6 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from fanet_mw.airtime import longest_access_ns
+from fanet_mw.bounds import timetable_flood
 from fanet_mw.scenario import Scenario
 from fanet_mw.timesync.ftsp import MOST_STATED_NS
 from fanet_mw.units import MS, US
@@ -82,24 +83,12 @@ class Turns(NamedTuple):
         """A bound of the delay of one node's packets, from their generation until all nodes have them.
 
         `roots` are the turns in which the node transmits its own packets, up to `together` of them in each; its packets
-        are generated at least `interval_ns` apart. None if more packets are generated than the turns can carry.
-
-        A busy period is a time in which packets wait. It is longest if it begins just after a turn, and lasts until a
-        turn carries fewer than `together` packets. Up to then the n-th turn carries the packets from number
-        (n - 1) x `together` + 1 on. The first of these has waited longest: it was generated at least
-        (n - 1) x `together` intervals after the beginning of the period, and all nodes have it `done_ns` after that
-        beginning. The bound is the maximum of the difference over all turns after which the busy period may begin, and
-        over all n of one superframe: after a whole superframe the difference repeats or has become smaller. This is
-        the method of Davis, Burns, Bril, Lukkien: Controller Area Network (CAN) schedulability analysis: Refuted,
-        revisited and revised, Real-Time Systems 35, 2007.
-
-        The bound holds while the swarm stays as it was when the timetable was made, no frame is lost, and nothing of
-        higher priority takes the room of these packets in the turns.
+        are generated at least `interval_ns` apart. None if more packets are generated than the turns can carry. The
+        bound and what it assumes are in `fanet_mw/bounds/timetable_flood.py`.
         """
-        if together * len(roots) * interval_ns < self.period_ns:
-            return None
-        done_ns = self.done_ns(roots, span=span)
-        return max(done - later * together * interval_ns for later, done in enumerate(done_ns))
+        return timetable_flood.worst_ns(
+            self.done_ns(roots, span=span), period_ns=self.period_ns, interval_ns=interval_ns, together=together
+        )
 
     def done_ns(self, roots: Sequence[int], *, span: int) -> list[int]:
         """For n = 1 up to the number of `roots`: the longest time from just after any of these turns until all nodes
@@ -107,12 +96,7 @@ class Turns(NamedTuple):
         """
         starts = [self.start_ns(offset, superframe_start_ns=0) for offset in roots]
         floods = [self.flood_ns(offset, span=span) for offset in roots]
-        horizon = [later * self.period_ns + start for later in range(3) for start in starts]
-        count = len(starts)
-        return [
-            max(horizon[begin + q] - horizon[begin] + floods[(begin + q) % count] for begin in range(count))
-            for q in range(1, count + 1)
-        ]
+        return timetable_flood.done_ns(starts, floods, period_ns=self.period_ns)
 
     def flood_ns(self, offset: int, *, span: int) -> int:
         """The duration of a flood of `span` turns from turn `offset` on, including contention windows in between."""

@@ -1,15 +1,15 @@
-"""The verdict on a swarm with claimed slots. It judges rates; the only delay that it states is that without queues."""
+"""Judges a scenario with claimed slots. Rates are judged; the only delay that is stated is that without queues."""
 
 from collections.abc import Iterator, Sequence
 
 from fanet_mw.bounds import Bounded, Refused
-from fanet_mw.planner import flood_hops, reachability, verdict
+from fanet_mw.planner import flood_hops, problems_and_notes, reachability
 from fanet_mw.planner.claimed_turns import ClaimedPlan, NodeTurns
 from fanet_mw.planner.demand import ClassPlan, TrafficClass
 from fanet_mw.planner.feasibility import goodput
 from fanet_mw.planner.flood_cost import FloodCost
 from fanet_mw.planner.head_slot import ClusterPlan
-from fanet_mw.planner.plan import Plan
+from fanet_mw.planner.scenario_plan import ScenarioPlan
 from fanet_mw.planner.site import Site
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS
@@ -17,7 +17,7 @@ from fanet_mw.units import MS
 _NO_BOUND = Refused("nothing bounds how many packets queue at a relay")
 
 
-def evaluate_claims(site: Site, classes: Sequence[TrafficClass], *, deadline_ns: int | None = None) -> Plan:
+def evaluate_claims(site: Site, classes: Sequence[TrafficClass], *, deadline_ns: int | None = None) -> ScenarioPlan:
     """Judge a scenario with `clusters.relay = "claimed"`."""
     scenario = site.scenario
     claimants = site.claimants()
@@ -26,7 +26,7 @@ def evaluate_claims(site: Site, classes: Sequence[TrafficClass], *, deadline_ns:
     cut_off = reachability.split(site.adjacency, leader=scenario.leader)
     refused = Refused(f"{len(cut_off)} nodes are out of reach") if cut_off else _NO_BOUND
     planned = tuple(ClassPlan(c.name, len(c.sources), c.interval_ns, refused, refused, c.priority) for c in classes)
-    return Plan(
+    return ScenarioPlan(
         scenario=scenario,
         clusters=tuple(_row(node, claims) for node in claims.nodes),
         classes=planned,
@@ -42,9 +42,9 @@ def evaluate_claims(site: Site, classes: Sequence[TrafficClass], *, deadline_ns:
             *reachability.problems(cut_off),
             *flood_hops.too_many(scenario, claims.hops),
             *_problems(scenario, claims, planned, deadline_ns),
-            *verdict.clocks_apart(scenario),
+            *problems_and_notes.clocks_apart(scenario),
         ),
-        notes=(*_notes(claims), *verdict.left_out(scenario)),
+        notes=(*_notes(claims), *problems_and_notes.left_out(scenario)),
     )
 
 
@@ -88,7 +88,7 @@ def _problems(
         )
     lone_ns = claims.lone_ns
     for c in classes:
-        problem = None if lone_ns is None else verdict.expired(scenario, c, lone_ns)
+        problem = None if lone_ns is None else problems_and_notes.expired(scenario, c, lone_ns)
         if problem is not None:
             yield f"{problem}, even without queues"
         if deadline_ns is not None:

@@ -1,4 +1,4 @@
-"""The sentences of a plan: why it is not feasible, what its bounds assume, and what they do not include."""
+"""The sentences of a plan: its problems say why it is not feasible, its notes what its bounds assume and leave out."""
 
 from collections.abc import Iterator, Sequence
 from typing import Final

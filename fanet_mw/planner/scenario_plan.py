@@ -1,0 +1,69 @@
+"""What `plan` returns for a scenario: what its clusters and traffic classes are promised, or why it is not feasible."""
+
+from typing import NamedTuple
+
+from fanet_mw.bounds import Bounded, DelayBound
+from fanet_mw.planner.claimed_turns import ClaimedPlan
+from fanet_mw.planner.demand import ClassPlan
+from fanet_mw.planner.goodput_bound import Goodput
+from fanet_mw.planner.head_slot import ClusterPlan
+from fanet_mw.planner.timetable_plan import TimetablePlan
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import NodeId, S
+
+
+class ScenarioPlan(NamedTuple):
+    """The plan of a whole scenario, with its problems; feasible if it has none."""
+
+    scenario: Scenario
+    clusters: tuple[ClusterPlan, ...]
+    classes: tuple[ClassPlan, ...]
+    access: DelayBound
+    uplink_ns: int
+    paper: DelayBound
+    """The estimate of the paper's equations (1)-(4) for the cluster with the greatest load, for comparison only."""
+    superframe: TimetablePlan | None
+    """The timetable; None if relays are not scheduled."""
+    claims: ClaimedPlan | None
+    """The plan of claimed slots, if slots are claimed; `clusters` then has one entry for each node."""
+    cut_off: tuple[NodeId, ...]
+    """The nodes that floods from the leader's part of the swarm do not reach."""
+    goodput: Goodput | None
+    """The goodput that no protocol can exceed; None if traffic is not for all nodes, or if the swarm is separated."""
+    deadline_ns: int | None
+    problems: tuple[str, ...]
+    """The reasons why the scenario is not feasible; empty if it is."""
+    notes: tuple[str, ...]
+    """The assumptions of the bounds, and what they do not include."""
+
+    @property
+    def feasible(self) -> bool:
+        return not self.problems
+
+    @property
+    def proven(self) -> bool:
+        """True if the bounds hold; False if some are estimates of contention."""
+        return isinstance(self.access, Bounded) and all(cluster.flood.proven for cluster in self.clusters)
+
+    @property
+    def carried_per_second(self) -> float | None:
+        """The application packets per second, of all sources together, that this configuration can carry; None if
+        unknown.
+
+        With a timetable whose capacity was computed, it is exact. If relays contend, it is the load that would fill the
+        fullest slot; with claimed slots, the load that fills the busiest node on average.
+        """
+        application = next((c for c in self.classes if c.name == "application"), None)
+        if application is None or not application.sources:
+            return None
+        exact = self.superframe or self.claims
+        if exact is not None:
+            least_ns = exact.least_interval_ns
+            return None if least_ns is None else application.sources * S / least_ns
+        used = self.bottleneck.utilization if self.bottleneck else 0.0
+        return application.sources * S / application.interval_ns / used if used else None
+
+    @property
+    def bottleneck(self) -> ClusterPlan | None:
+        """The cluster with the fullest slot."""
+        return max(self.clusters, key=lambda c: (c.utilization, -c.head), default=None)

@@ -17,7 +17,7 @@ from fanet_mw.node.header_check import CONTROL
 from fanet_mw.node.node import Node
 from fanet_mw.node.packet_watch import PacketNews, RadioStage
 from fanet_mw.units import seconds_to_ns
-from fanet_mw.wire.message import DELIVERED, NO_LISTENER
+from fanet_mw.wire.application_message import DELIVERED, NO_LISTENER
 
 _MOST_WATCHED: Final = 8192
 """The greatest number of packets whose application is remembered."""

@@ -23,7 +23,7 @@ from fanet_mw.node.node import Node
 from fanet_mw.node.packet import Packet
 from fanet_mw.rng import stream
 from fanet_mw.units import BROADCAST, MS, US, NodeId, S, seconds_to_ns
-from fanet_mw.wire.message import (
+from fanet_mw.wire.application_message import (
     MAVLINK_PORT,
     MOST_LIFETIME_MS,
     RECEIPT_BYTES,

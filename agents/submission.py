@@ -12,7 +12,7 @@ from fanet_mw import mavlink, wire
 from fanet_mw.application import Data, Destination
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.units import BROADCAST, NodeId
-from fanet_mw.wire.message import MAVLINK_PORT
+from fanet_mw.wire.application_message import MAVLINK_PORT
 
 _MOST_PORT: Final = 0xFFFF
 _PRIORITIES: Final[Mapping[str | int, int]] = {

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.units import MS, US, NodeId, earliest
-from fanet_mw.wire.message import DELIVERED, GIVEN_UP, MISSING, NO_LISTENER, Head, Piece, Receipt
+from fanet_mw.wire.application_message import DELIVERED, GIVEN_UP, MISSING, NO_LISTENER, Head, Piece, Receipt
 
 MOST_BYTES: Final = 4 << 20
 """The greatest number of bytes of pieces that are kept, of all senders together."""

@@ -17,8 +17,8 @@ from typing import Final, NamedTuple
 from fanet_mw.delivery.retransmission_timeout import RetransmissionTimeout
 from fanet_mw.delivery.send_window import SendWindow
 from fanet_mw.units import BROADCAST, MS, US, NodeId
-from fanet_mw.wire import message as wire_message
-from fanet_mw.wire.message import DELIVERED, MAVLINK_PORT, MOST_PIECES, Head, Receipt
+from fanet_mw.wire import application_message
+from fanet_mw.wire.application_message import DELIVERED, MAVLINK_PORT, MOST_PIECES, Head, Receipt
 
 MOST_BYTES: Final = 4 << 20
 """The greatest number of bytes that are kept, of all messages together."""
@@ -132,7 +132,7 @@ class Sender:
         a packet.
         """
         room = self._room_beside_head(self._most_named(targets, confirm=confirm), priority)
-        return room if port == MAVLINK_PORT or room < 0 else MOST_PIECES * wire_message.room_for_data(room)
+        return room if port == MAVLINK_PORT or room < 0 else MOST_PIECES * application_message.room_for_data(room)
 
     def _most_named(self, targets: tuple[NodeId, ...] | None, *, confirm: bool) -> int:
         """The greatest number of targets that any packet of a message names; a repetition to all nodes names some."""
@@ -142,7 +142,7 @@ class Sender:
 
     def _room_beside_head(self, named: int, priority: int) -> int:
         """The room of a packet for data, and for what stands around it."""
-        return self._room(priority) - wire_message.HEAD_BYTES - wire_message.targets_bytes(named)
+        return self._room(priority) - application_message.HEAD_BYTES - application_message.targets_bytes(named)
 
     def unconfirmed(
         self, data: bytes, *, port: int, destination: NodeId, targets: tuple[NodeId, ...], priority: int,
@@ -155,7 +155,7 @@ class Sender:
         for piece in range(pieces):
             head = Head(born_us, number, 0, len(data), lifetime_ms, port, 0, stride, piece, pieces, 0)
             part = data[piece * stride : (piece + 1) * stride]
-            inner = wire_message.encode_piece(head, part, node=self._node, targets=targets)
+            inner = application_message.encode_piece(head, part, node=self._node, targets=targets)
             packets.append(PieceToSend(number, inner, destination, priority, piece == 0))
         return number, packets
 
@@ -190,7 +190,7 @@ class Sender:
         """The number of bytes of each piece but the last, and the number of pieces."""
         if port == MAVLINK_PORT or not data:
             return len(data), 1
-        stride = min(len(data), wire_message.room_for_data(self._room_beside_head(named, priority)))
+        stride = min(len(data), application_message.room_for_data(self._room_beside_head(named, priority)))
         return stride, -(-len(data) // stride)
 
     def _flow(self, whom: tuple[NodeId, ...], port: int, priority: int) -> _Flow:
@@ -211,7 +211,7 @@ class Sender:
             return
         if message.rounds == 1:  # after a repetition it is not known which copy the receipt answers
             self._round_trips.measured(origin, now_ns - message.sent_ns)
-        if receipt.outcome == wire_message.MISSING:
+        if receipt.outcome == application_message.MISSING:
             message.lacking[origin] |= receipt.held & ((1 << message.pieces) - 1)
             return
         del message.lacking[origin]
@@ -306,7 +306,7 @@ class Sender:
                 message.flow.number, message.stride, piece, message.pieces, 1,
             )  # fmt: skip
             part = message.data[piece * message.stride : (piece + 1) * message.stride]
-            inner = wire_message.encode_piece(head, part, node=self._node, targets=named)
+            inner = application_message.encode_piece(head, part, node=self._node, targets=named)
             packets.append(PieceToSend(message.number, inner, destination, message.priority, first=False))
         return packets
 

@@ -3,7 +3,7 @@
 from typing import Final, NamedTuple
 
 from fanet_mw.units import NodeId
-from fanet_mw.wire.clusters import Beacon
+from fanet_mw.wire.hello.beacon import Beacon
 
 LIFETIME_HELLOS: Final = 3.5
 """A neighbor expires after this number of hello intervals without a hello (3 in OLSR: NEIGHB_HOLD_TIME, RFC 3626,

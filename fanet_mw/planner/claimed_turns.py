@@ -26,7 +26,7 @@ from fanet_mw.routing.clustered.claimed.slot_claims import SlotClaims
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, S, seconds_to_ns
-from fanet_mw.wire.claims import MOST_LOTS
+from fanet_mw.wire.hello.claims import MOST_LOTS
 
 _ROUNDS: Final = 60
 """The number of hello intervals in which claims converge; 2 d + 6 are needed, with d the length of the longest chain of

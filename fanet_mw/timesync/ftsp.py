@@ -26,7 +26,7 @@ from fanet_mw.serial_number import following, newer
 from fanet_mw.timesync.clock_fit import EXACT, ClockFit, Line, Oscillator, Pair
 from fanet_mw.timesync.initial_sync import InitialSync
 from fanet_mw.units import MS, NodeId, S
-from fanet_mw.wire.time_beacon import TimeBeacon
+from fanet_mw.wire.hello.time_beacon import TimeBeacon
 
 _LISTEN_HELLOS: Final = 2.5
 """How long the leader listens at its start, because a swarm that already has a time keeps it."""

@@ -1,6 +1,15 @@
 """The air format: one radio frame is a run of MAVLink 2 frames, the first of which is this package's routing header.
 
-The header and the framing are re-exported here; each group of inner messages has a module of its own.
+The header (`frame.py`) and several packets in one frame (`aggregation.py`) are re-exported here. Each inner message has
+a module of its own:
+
+    hello/                              the parts of a hello: `beacon.py`, `digest.py`, `claims.py`, `time_beacon.py`
+    `join.py`, `links.py`               a node asks for a place in a cluster, and reports the quality of its links
+    `schedule.py`, `places.py`, `loads.py`    the leader's division into clusters; positions and loads for a timetable
+    `application_message.py`            messages of applications: pieces, targets, receipts
+    `search_messages.py`                messages of a search: `search_plan.py`, `survivors.py`, `bids.py`,
+                                        `searched_cells.py`
+    `checks.py`                         what several decoders check
 """
 
 from fanet_mw.wire.aggregation import bundle, unbundle

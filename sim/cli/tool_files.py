@@ -65,7 +65,7 @@ def dialect(folder: Path | None = None, *, definitions: Annotated[bool, Paramete
         Print the folder of definitions instead, which pymavlink wants in MDEF.
 
     """
-    from fanet_mw.dialect.definitions import write
+    from fanet_mw.dialect.export_xml import write
 
     data = os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share"
     path = write(folder or Path(data) / "fanet-mw" / "message_definitions")

@@ -23,7 +23,7 @@ from fanet_mw.bus.topics import Topics, node_of
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.scenario import config
 from fanet_mw.units import MS, Enu, NodeId
-from fanet_mw.wire.message import room_for_data
+from fanet_mw.wire.application_message import room_for_data
 
 NAMES: Final = Topics("cost")
 SOURCE, TARGET = NodeId(1), NodeId(2)

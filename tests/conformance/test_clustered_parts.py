@@ -14,9 +14,9 @@ from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, PRIORITY_BULK, Header, Kind, filler
-from fanet_mw.wire.claims import Claims, SlotStatus
-from fanet_mw.wire.clusters import Beacon, Role
-from fanet_mw.wire.digest import Digest
+from fanet_mw.wire.hello.beacon import Beacon, Role
+from fanet_mw.wire.hello.claims import Claims, SlotStatus
+from fanet_mw.wire.hello.digest import Digest
 
 OURS, THEIRS = NodeId(2), NodeId(3)
 NOW_NS = 1 * S

@@ -43,8 +43,8 @@ from fanet_mw.radios.datagram import Datagram, DatagramKind
 from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.trace import Record
 from fanet_mw.units import BROADCAST, Enu, NodeId, S
+from fanet_mw.wire.application_message import DELIVERED, MISSING, Head, Receipt, encode_piece, encode_receipts
 from fanet_mw.wire.bids import Bid, encode_bids
-from fanet_mw.wire.message import DELIVERED, MISSING, Head, Receipt, encode_piece, encode_receipts
 from fanet_mw.wire.search_plan import Search, SearchStatus
 from fanet_mw.wire.searched_cells import Covered
 from fanet_mw.wire.survivors import Found, Standing

@@ -22,8 +22,8 @@ from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.scenario import config
 from fanet_mw.units import MS, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Kind
-from fanet_mw.wire.claims import Claims, HeardNeighbor, SlotStatus
-from fanet_mw.wire.clusters import Beacon
+from fanet_mw.wire.hello.beacon import Beacon
+from fanet_mw.wire.hello.claims import Claims, HeardNeighbor, SlotStatus
 
 
 def scenario_of(*, aggregate: bool = False, **clusters: Any) -> Any:

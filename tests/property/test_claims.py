@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from fanet_mw.dialect import fanet
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.wire import CLAIMS, HEADER_BYTES, encode_inner
-from fanet_mw.wire.claims import CAPACITY, NO_SLOT, Claims, HeardNeighbor, SlotStatus
+from fanet_mw.wire.hello.claims import CAPACITY, NO_SLOT, Claims, HeardNeighbor, SlotStatus
 
 HEADER = b"\x00" * HEADER_BYTES
 IDS = st.integers(1, 65534)

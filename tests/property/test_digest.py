@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from fanet_mw.dialect import fanet
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.wire import DIGEST, HEADER_BYTES, encode_inner
-from fanet_mw.wire.digest import CAPACITY, WINDOW, Digest, Holding
+from fanet_mw.wire.hello.digest import CAPACITY, WINDOW, Digest, Holding
 
 U32 = 0xFFFF_FFFF
 HOLDINGS = st.builds(Holding, st.integers(1, 65534), st.integers(0, U32), st.integers(0, U32))

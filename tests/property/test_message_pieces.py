@@ -15,7 +15,7 @@ from fanet_mw.delivery.receiver import Receiver
 from fanet_mw.delivery.sender import EXPIRED, MOST_BYTES, Sender
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.units import BROADCAST, MS, NodeId, S
-from fanet_mw.wire.message import (
+from fanet_mw.wire.application_message import (
     DELIVERED,
     MOST_PIECES,
     NO_LISTENER,

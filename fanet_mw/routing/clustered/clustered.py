@@ -30,9 +30,9 @@ from fanet_mw.routing.clustered.timetable.heard_load import HeardLoads
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.units import BROADCAST, US, NodeId
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, HEADER_BYTES, Kind
-from fanet_mw.wire.claims import MESSAGE_BYTES, Claims
-from fanet_mw.wire.clusters import Beacon
-from fanet_mw.wire.digest import Digest, capacity
+from fanet_mw.wire.hello.beacon import Beacon
+from fanet_mw.wire.hello.claims import MESSAGE_BYTES, Claims
+from fanet_mw.wire.hello.digest import Digest, capacity
 
 _DATA: Final = int(Kind.DATA)
 _POSITION_BYTES: Final = 61

@@ -19,8 +19,8 @@ from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.clustered.forwarding.gradient import RouteToHead
 from fanet_mw.units import NodeId
 from fanet_mw.wire import Kind
-from fanet_mw.wire.claims import Claims
-from fanet_mw.wire.clusters import Beacon
+from fanet_mw.wire.hello.beacon import Beacon
+from fanet_mw.wire.hello.claims import Claims
 
 
 class Roles(Protocol):

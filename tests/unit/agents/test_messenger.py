@@ -19,7 +19,7 @@ from fanet_mw.routing.direct import Direct
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 from fanet_mw.wire import HEADER_BYTES, PRIORITY_BULK, PRIORITY_REPORT, filler
-from fanet_mw.wire.message import DELIVERED, MOST_PIECES, Receipt, decode_piece
+from fanet_mw.wire.application_message import DELIVERED, MOST_PIECES, Receipt, decode_piece
 
 OWN, OTHER = NodeId(1), NodeId(2)
 BYTES = Data(5, b"hello")

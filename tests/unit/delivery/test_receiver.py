@@ -4,7 +4,7 @@ import random
 
 from fanet_mw.delivery.receiver import MOST_MESSAGES_EACH, RECEIPT_NS, Receiver
 from fanet_mw.units import MS, US, NodeId, S
-from fanet_mw.wire.message import DELIVERED, GIVEN_UP, MISSING, NO_LISTENER, Head, Piece
+from fanet_mw.wire.application_message import DELIVERED, GIVEN_UP, MISSING, NO_LISTENER, Head, Piece
 
 OWN, FROM = NodeId(1), NodeId(2)
 BORN_NS = S

@@ -3,7 +3,7 @@
 from fanet_mw import wire
 from fanet_mw.delivery.sender import EXPIRED, PieceToSend, Sender, Told
 from fanet_mw.units import BROADCAST, MS, US, NodeId, S
-from fanet_mw.wire.message import DELIVERED, MISSING, NO_LISTENER, Piece, Receipt, decode_piece
+from fanet_mw.wire.application_message import DELIVERED, MISSING, NO_LISTENER, Piece, Receipt, decode_piece
 
 OWN, A, B, C = NodeId(1), NodeId(2), NodeId(3), NodeId(4)
 HEADER = wire.Header(5, 1, OWN, BROADCAST, OWN, 0, 32, 0, 3, 0).encode()

@@ -30,8 +30,8 @@ from fanet_mw.routing.clustered.tdma.contention import Contention
 from fanet_mw.routing.clustered.tdma.turn_timing import clocks_fit
 from fanet_mw.units import MS, US, seconds_to_ns
 from fanet_mw.wire import Kind
-from fanet_mw.wire.claims import Claims
-from fanet_mw.wire.clusters import Beacon
+from fanet_mw.wire.hello.beacon import Beacon
+from fanet_mw.wire.hello.claims import Claims
 
 
 class ClaimedAccess:

@@ -19,7 +19,7 @@ from fanet_mw.routing.clustered.relaying.neighborhood import Neighborhood
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, NodeId, S, seconds_to_ns
-from fanet_mw.wire.claims import MOST_LOTS, Claims, SlotStatus
+from fanet_mw.wire.hello.claims import MOST_LOTS, Claims, SlotStatus
 
 LISTEN_HELLOS: Final = 3
 """The number of hello intervals for which a node listens before its first claim. All claims within two hops are known

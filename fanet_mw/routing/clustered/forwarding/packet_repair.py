@@ -19,7 +19,7 @@ from typing import Final, NamedTuple
 from fanet_mw.node.duplicates import key_of, origin_and_seq
 from fanet_mw.node.packet import Packet
 from fanet_mw.units import MS, US
-from fanet_mw.wire.digest import CAPACITY, Digest, Holding
+from fanet_mw.wire.hello.digest import CAPACITY, Digest, Holding
 
 ASSESS_NS: Final = 200 * MS
 """Nodes that could repair the same packet wait for a random time up to this, so that mostly only one of them does."""

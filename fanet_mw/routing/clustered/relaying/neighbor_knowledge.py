@@ -20,8 +20,8 @@ from fanet_mw.routing.clustered.relaying.neighborhood import Neighborhood
 from fanet_mw.routing.clustered.roles.membership import Membership
 from fanet_mw.units import NodeId, seconds_to_ns
 from fanet_mw.wire import Kind
-from fanet_mw.wire.claims import Claims, SlotStatus
-from fanet_mw.wire.clusters import Beacon, Role
+from fanet_mw.wire.hello.beacon import Beacon, Role
+from fanet_mw.wire.hello.claims import Claims, SlotStatus
 
 _LEARN: Final = 4
 """The number of hello intervals after which two hops are known: one for the neighbors, one for theirs, and two may be

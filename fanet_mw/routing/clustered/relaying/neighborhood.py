@@ -11,7 +11,7 @@ from typing import NamedTuple
 from fanet_mw.graph.connected_dominating_set import dominates
 from fanet_mw.graph.multipoint_relays import multipoint_relays
 from fanet_mw.units import NodeId
-from fanet_mw.wire.claims import Claims, HeardNeighbor, SlotStatus
+from fanet_mw.wire.hello.claims import Claims, HeardNeighbor, SlotStatus
 
 
 class _HeardClaims(NamedTuple):

@@ -31,8 +31,10 @@ from fanet_mw.routing.clustered.timetable.link_quality import LinkQuality
 from fanet_mw.routing.clustered.timetable.timetabling import Timetabling
 from fanet_mw.units import US, NodeId
 from fanet_mw.wire import Kind
-from fanet_mw.wire.clusters import Beacon, Join, Schedule
+from fanet_mw.wire.hello.beacon import Beacon
+from fanet_mw.wire.join import Join
 from fanet_mw.wire.links import Links
+from fanet_mw.wire.schedule import Schedule
 
 
 class MakeLeader(Protocol):

@@ -20,7 +20,8 @@ from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import Membership
 from fanet_mw.routing.clustered.roles.states import Action, Event, State, step
 from fanet_mw.units import MS, NodeId
-from fanet_mw.wire.clusters import Join, Schedule
+from fanet_mw.wire.join import Join
+from fanet_mw.wire.schedule import Schedule
 
 _AGAIN_HELLOS: Final = 2.0
 """The number of hello intervals after which a stand-in announces itself again, until a schedule confirms it or the head

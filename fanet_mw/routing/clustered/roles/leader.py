@@ -34,9 +34,10 @@ from fanet_mw.routing.clustered.timetable.turn_size import measured_period_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.serial_number import following, newer
 from fanet_mw.units import MS, US, Enu, NodeId, S, seconds_to_ns
-from fanet_mw.wire.clusters import CAPACITY, Join, Member, Schedule
+from fanet_mw.wire.join import Join
 from fanet_mw.wire.links import Link
 from fanet_mw.wire.loads import AS_EXPECTED
+from fanet_mw.wire.schedule import CAPACITY, Member, Schedule
 
 SETTLE_NS: Final = 700 * MS
 """The time without a join after which the clusters are computed."""

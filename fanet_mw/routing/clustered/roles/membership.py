@@ -13,7 +13,8 @@ from fanet_mw.routing.clustered.roles.states import Event
 from fanet_mw.routing.clustered.tdma.slot_timing import Superframe
 from fanet_mw.trace import RoleChanged
 from fanet_mw.units import US, NodeId
-from fanet_mw.wire.clusters import Member, Role, Schedule
+from fanet_mw.wire.hello.beacon import Role
+from fanet_mw.wire.schedule import Member, Schedule
 
 
 class ClusterPlace(NamedTuple):

@@ -7,7 +7,7 @@ from fanet_mw.node.neighbors import Neighbor
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.forwarding.gradient import UNREACHABLE, RouteToHead
 from fanet_mw.units import NodeId
-from fanet_mw.wire.clusters import Beacon, Role
+from fanet_mw.wire.hello.beacon import Beacon, Role
 
 
 class NoRoles:

@@ -9,7 +9,7 @@ from fanet_mw.routing.clustered.roles.lease import Authority
 from fanet_mw.routing.clustered.roles.membership import EPOCH_BITS, Membership
 from fanet_mw.serial_number import newer
 from fanet_mw.units import US, S
-from fanet_mw.wire.clusters import Schedule
+from fanet_mw.wire.schedule import Schedule
 
 _START_NS: Final = 60 * S
 _START_PERIODS: Final = 100

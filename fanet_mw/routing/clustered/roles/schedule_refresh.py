@@ -14,7 +14,7 @@ from fanet_mw.routing.clustered.forwarding.packet_repair import AGAIN_NS, ASSESS
 from fanet_mw.routing.clustered.roles.lease import Authority
 from fanet_mw.routing.clustered.roles.membership import EPOCH_BITS
 from fanet_mw.serial_number import newer
-from fanet_mw.wire.clusters import Beacon
+from fanet_mw.wire.hello.beacon import Beacon
 
 
 class ScheduleRefresh:

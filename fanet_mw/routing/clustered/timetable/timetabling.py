@@ -23,10 +23,10 @@ from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.routing.clustered.timetable.turn_allocation import fit, fit_measured
 from fanet_mw.routing.clustered.timetable.turn_plan import NO_LOADS, Fitted, TurnPlan
 from fanet_mw.units import US, Enu, NodeId
-from fanet_mw.wire.clusters import Schedule
 from fanet_mw.wire.links import Link, Links, frames_of
 from fanet_mw.wire.loads import AS_EXPECTED, Loads
 from fanet_mw.wire.places import Places, rounded
+from fanet_mw.wire.schedule import Schedule
 
 _LINKS_PART: Final = 1 << 16
 """Added to the number of a part of the links, so that it differs from those of the schedule in the store of parts that

@@ -8,10 +8,10 @@ from fanet_mw.routing.clustered.timetable.reserved_room import bulk_report_bytes
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, seconds_to_ns
 from fanet_mw.wire import DIGEST, HEADER_BYTES, LINKS, LOADS, OVERHEAD, PLACES, SCHEDULE
-from fanet_mw.wire.clusters import CAPACITY
-from fanet_mw.wire.digest import CAPACITY as DIGEST_CAPACITY
+from fanet_mw.wire.hello.digest import CAPACITY as DIGEST_CAPACITY
 from fanet_mw.wire.links import MESSAGES
 from fanet_mw.wire.places import CAPACITY as PLACES_CAPACITY
+from fanet_mw.wire.schedule import CAPACITY
 
 _SCHEDULE_BYTES: Final = SCHEDULE.layout.size + OVERHEAD
 _PLACES_BYTES: Final = PLACES.layout.size + OVERHEAD

@@ -12,7 +12,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Delivered
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, PRIORITY_CONTROL, Header, Kind, filler
-from fanet_mw.wire.clusters import Member, Schedule
+from fanet_mw.wire.schedule import Member, Schedule
 
 NAMES = Topics("c")
 MakeScenario = Callable[..., Scenario]

@@ -14,8 +14,8 @@ from fanet_mw.routing.clustered.claimed.slot_claims import SlotClaim, SlotClaims
 from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 from fanet_mw.wire import Header, Kind
-from fanet_mw.wire.claims import Claims, SlotStatus
-from fanet_mw.wire.clusters import Beacon, Role
+from fanet_mw.wire.hello.beacon import Beacon, Role
+from fanet_mw.wire.hello.claims import Claims, SlotStatus
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 from fanet_mw.node.neighbors import Neighbor, Neighbors
 from fanet_mw.routing.clustered.forwarding.gradient import UNREACHABLE, Gradient
 from fanet_mw.units import NodeId, S
-from fanet_mw.wire.clusters import Beacon
+from fanet_mw.wire.hello.beacon import Beacon
 
 ME, HEAD, OTHER = NodeId(1), NodeId(10), NodeId(20)
 

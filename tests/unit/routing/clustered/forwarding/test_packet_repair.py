@@ -6,7 +6,7 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.forwarding.packet_repair import Repair
 from fanet_mw.units import BROADCAST, MS, NodeId, S
 from fanet_mw.wire import Header, Kind
-from fanet_mw.wire.digest import Digest, Holding
+from fanet_mw.wire.hello.digest import Digest, Holding
 
 NOTHING = Digest((), complete=True)
 LATER = 2 * S

@@ -11,7 +11,7 @@ from fanet_mw.routing import make_protocol
 from fanet_mw.trace import Dropped
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
 from fanet_mw.wire import FLAG_TO_HEAD, PRIORITY_BULK, PRIORITY_REPORT, Header, Kind, filler
-from fanet_mw.wire.clusters import Beacon, Role
+from fanet_mw.wire.hello.beacon import Beacon, Role
 
 
 @pytest.fixture

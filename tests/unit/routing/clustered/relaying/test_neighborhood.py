@@ -4,7 +4,7 @@ import pytest
 
 from fanet_mw.routing.clustered.relaying.neighborhood import Neighborhood
 from fanet_mw.units import NodeId, S
-from fanet_mw.wire.claims import Claims, HeardNeighbor, SlotStatus
+from fanet_mw.wire.hello.claims import Claims, HeardNeighbor, SlotStatus
 
 US, LIFETIME_NS = NodeId(1), 3 * S
 NO_SLOT = SlotStatus()

@@ -12,7 +12,8 @@ from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.position_updates import lost_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
-from fanet_mw.wire.clusters import Join, Schedule
+from fanet_mw.wire.join import Join
+from fanet_mw.wire.schedule import Schedule
 
 STILL = Enu(0.0, 0.0, 0.0)
 HERE = Motion(Enu(0.0, 0.0, 50.0), STILL, 0)

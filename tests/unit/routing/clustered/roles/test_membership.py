@@ -8,7 +8,8 @@ from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import Membership
 from fanet_mw.routing.clustered.roles.states import Action, Event
 from fanet_mw.units import Enu, NodeId, S
-from fanet_mw.wire.clusters import Join, Member, Schedule
+from fanet_mw.wire.join import Join
+from fanet_mw.wire.schedule import Member, Schedule
 
 US = NodeId(2)
 

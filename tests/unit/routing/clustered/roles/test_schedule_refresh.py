@@ -8,7 +8,7 @@ from fanet_mw.routing.clustered.roles.lease import Authority
 from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
 from fanet_mw.units import MS, S
 from fanet_mw.wire import Header, Kind
-from fanet_mw.wire.clusters import Beacon, Role
+from fanet_mw.wire.hello.beacon import Beacon, Role
 
 OURS, EPOCH = Authority(5, 1), 7
 PACKET = Packet(Header(0, 3, 1, 0xFFFF, 1, Kind.SCHEDULE, 32, 0, 0, 1), b"schedule")

@@ -10,7 +10,8 @@ from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import Membership
 from fanet_mw.routing.clustered.roles.states import Action, State
 from fanet_mw.units import MS, NodeId, S
-from fanet_mw.wire.clusters import Beacon, Member, Role, Schedule
+from fanet_mw.wire.hello.beacon import Beacon, Role
+from fanet_mw.wire.schedule import Member, Schedule
 
 LEADER, HEAD = NodeId(1), NodeId(9)
 CLUSTER = (9, 2, 3, 4)

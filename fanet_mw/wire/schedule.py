@@ -1,57 +1,17 @@
-"""The messages by which clusters are formed: beacon, schedule and join.
+"""FANET_SCHEDULE: the leader's division of the swarm into clusters, with their heads and slots.
 
-Like all messages of this dialect (`fanet_mw.wire`) they are coded by struct. Any bytes decode to a message or to
+Like all messages of this dialect (`fanet_mw.wire`) it is coded by struct. Any bytes decode to a message or to
 MalformedFrameError; values that no node of this project would send are malformed.
 """
 
-from enum import IntEnum
 from typing import Final, NamedTuple, Self
 
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
-from fanet_mw.units import FARTHEST_M, FASTEST_M_S, STILL, Enu
-from fanet_mw.wire.checks import place_within, require_sender
-from fanet_mw.wire.frame import ANY_NODE, BEACON, JOIN, SCHEDULE, VERSION, Packed, decode_first, encode_inner
+from fanet_mw.wire.checks import require_sender
+from fanet_mw.wire.frame import ANY_NODE, SCHEDULE, VERSION, Packed, decode_first, encode_inner
 
 CAPACITY: Final = 56
 """The number of entries in one part of a schedule."""
-
-
-class Role(IntEnum):
-    """A node's role in its cluster."""
-
-    ISOLATED = 0
-    MEMBER = 1
-    HEAD = 2
-
-
-class Beacon(NamedTuple):
-    """FANET_BEACON: the routing part of a hello."""
-
-    node: int
-    head: int
-    head_seq: int
-    cluster: int
-    epoch: int
-    slot: int
-    role: int
-    hops_to_head: int
-    term: int = 0
-    leader: int = 0
-    """The leader that the sender follows; 0 if it follows none. `term` states since when that node leads."""
-
-    def encode_frame(self, node: int) -> bytes:
-        return encode_inner(
-            BEACON, BEACON.layout.pack(self.term, *self[:6], self.leader, *self[6:8], VERSION), node=node
-        )
-
-    @classmethod
-    def decode_frame(cls, packed: Packed) -> Self:
-        term, of, head, seq, cluster, epoch, slot, leader, role, hops, version = decode_first(BEACON, packed)
-        beacon = cls(of, head, seq, cluster, epoch, slot, role, hops, term, leader)
-        require_sender(version, beacon.node)
-        if beacon.role > Role.HEAD or ANY_NODE in (beacon.head, beacon.leader):
-            raise MalformedFrameError(f"beacon of role {beacon.role}, head {beacon.head}")
-        return beacon
 
 
 class Member(NamedTuple):
@@ -127,28 +87,3 @@ class Schedule(NamedTuple):
         if len({member.node for member in members}) < count:
             raise MalformedFrameError(f"schedule {epoch}: a node twice")
         return schedule
-
-
-class Join(NamedTuple):
-    """FANET_JOIN: a node asks the leader for a place in the next assignment."""
-
-    node: int
-    position: Enu
-    velocity: Enu = STILL
-    """The velocity [m/s]."""
-    instead_of: int = 0
-    """The silent node that the sender reports; if that is its head, the sender stands in for it. 0 means none, and the
-    sender's own id that the sender objects to a report."""
-
-    def encode_frame(self, node: int) -> bytes:
-        payload = JOIN.layout.pack(*self.position, *self.velocity, self.node, self.instead_of, VERSION)
-        return encode_inner(JOIN, payload, node=node)
-
-    @classmethod
-    def decode_frame(cls, packed: Packed) -> Self:
-        *numbers, node, instead_of, version = decode_first(JOIN, packed)
-        require_sender(version, node)
-        if instead_of == ANY_NODE:
-            raise MalformedFrameError(f"join of {node} instead of {instead_of}")
-        position, velocity = place_within(*numbers[:3], most=FARTHEST_M), place_within(*numbers[3:], most=FASTEST_M_S)
-        return cls(node, position, velocity, instead_of)

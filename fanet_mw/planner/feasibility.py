@@ -26,8 +26,8 @@ from fanet_mw.planner.timetable_plan import Candidate, TimetablePlan, judge, tab
 from fanet_mw.planner.uplink_delay import Ways, access_outcome, ways
 from fanet_mw.routing.clustered.clustering import Cluster, balanced
 from fanet_mw.routing.clustered.tdma.turn_timing import receipt_ns
+from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
 from fanet_mw.routing.clustered.timetable.reserved_room import reserved
-from fanet_mw.routing.clustered.timetable.turn_plan import Fitted
 from fanet_mw.routing.clustered.timetable.turn_size import links, schedule_parts, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S
@@ -64,7 +64,9 @@ def evaluate(
     scenario = site.scenario
     fitted = _fitted(site, quick=quick) if site.timetable else None
     clusters = members_of(scenario, site.positions)
-    if isinstance(fitted, Fitted) and fitted.whole:  # a node with turns of its own does not send its packets to a head
+    if (
+        isinstance(fitted, FittedTimetable) and fitted.whole
+    ):  # a node with turns of its own does not send its packets to a head
         clusters = [Cluster(node, (node,)) for node in sorted(site.positions)]
     head_of = {member: cluster.head for cluster in clusters for member in cluster.members}
     heads = [cluster.head for cluster in clusters]
@@ -120,10 +122,12 @@ def evaluate(
     )
 
 
-def _out_of_hops(site: Site, fitted: Fitted | Refused | None, clusters: Sequence[ClusterPlan]) -> Iterator[str]:
+def _out_of_hops(
+    site: Site, fitted: FittedTimetable | Refused | None, clusters: Sequence[ClusterPlan]
+) -> Iterator[str]:
     """Sentences about floods that do not reach all nodes, because of the hop limit or of links that do not exist."""
     scenario = site.scenario
-    if not isinstance(fitted, Fitted):
+    if not isinstance(fitted, FittedTimetable):
         hops = max((c.hops + max(levels(site.adjacency, NodeId(c.head)).values()) for c in clusters), default=0)
         yield from flood_hops.too_many(scenario, hops)
         return
@@ -205,12 +209,12 @@ def heads_of(scenario: Scenario, positions: Mapping[NodeId, Enu]) -> dict[NodeId
     return {node: head for node, head in found.items() if node != scenario.leader}
 
 
-def _fitted(site: Site, *, quick: bool) -> Fitted | Refused:
+def _fitted(site: Site, *, quick: bool) -> FittedTimetable | Refused:
     places = tuple(sorted(site.positions.items()))
     return table_for(site.scenario, places, heads_of(site.scenario, site.positions), quick=quick)
 
 
-def _in_turns(site: Site, found: Fitted | Refused, candidates: Sequence[Candidate], jitter_ns: int) -> _Judged:
+def _in_turns(site: Site, found: FittedTimetable | Refused, candidates: Sequence[Candidate], jitter_ns: int) -> _Judged:
     """Judge all roots of one timetable; if the turns do not suffice, each root is refused for that reason."""
     scenario = site.scenario
     if isinstance(found, Refused):

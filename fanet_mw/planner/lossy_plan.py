@@ -12,9 +12,10 @@ from typing import Final, NamedTuple
 
 from fanet_mw.planner.demand import TrafficClass
 from fanet_mw.routing.clustered.tdma.turn_timing import receipt_ns
+from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
 from fanet_mw.routing.clustered.timetable.likely_delay import likely_delay_ns
+from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.turn_allocation import Places, fit_measured
-from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, TurnPlan
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.links import Link, frames_of
@@ -32,7 +33,7 @@ class Drawn(NamedTuple):
 
     links: int
     """The number of pairs of nodes that receive each other at all."""
-    fitted: Fitted | None
+    fitted: FittedTimetable | None
     """The timetable with repeated frames; None if none fits. The swarm then flies with one from positions, without
     stated delays."""
     likely_ns: Mapping[NodeId, int | None]
@@ -97,9 +98,9 @@ def _drawn(scenario: Scenario, places: Places, links: tuple[Link, ...], sources:
     )
 
 
-def _likely_ns(scenario: Scenario, fitted: Fitted, node: NodeId) -> int | None:
+def _likely_ns(scenario: Scenario, fitted: FittedTimetable, node: NodeId) -> int | None:
     """The delay that the node will state, from application to application, for a packet that finds its queue empty."""
-    plan = TurnPlan.of(node, 0, fitted)
+    plan = NodeTimetable.of(node, 0, fitted)
     if not plan.roots or fitted.table.uncovered[node]:
         return None
     likely_ns = likely_delay_ns(

@@ -23,11 +23,11 @@ from fanet_mw.planner.flood_cost import FloodCost
 from fanet_mw.planner.head_slot import ClassLoad, ClusterPlan
 from fanet_mw.planner.variant import vary
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_slack_ns
+from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort
 from fanet_mw.routing.clustered.timetable.own_bound import RootTurns
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, timetable
 from fanet_mw.routing.clustered.timetable.turn_allocation import Places, fit
-from fanet_mw.routing.clustered.timetable.turn_plan import Fitted
 from fanet_mw.routing.clustered.timetable.turn_size import links, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import US, NodeId
@@ -65,7 +65,7 @@ class TimetablePlan(NamedTuple):
 
 def table_for(
     scenario: Scenario, places: Places, head_of: Mapping[NodeId, NodeId], *, quick: bool = False
-) -> Fitted | Refused:
+) -> FittedTimetable | Refused:
     """The timetable that nodes with these heads will compute; refused if one packet of each root does not fit.
 
     With `quick` it is also refused if the load does not fit.
@@ -101,7 +101,7 @@ def _most_slack_us(scenario: Scenario, places: Places, head_of: Mapping[NodeId, 
 
 
 def judge(
-    found: Fitted,
+    found: FittedTimetable,
     candidate: Candidate,
     *,
     lead_ns: int,

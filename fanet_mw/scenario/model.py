@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final, Self
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from fanet_mw.bus.radio_control import Control
-from fanet_mw.scenario.checks import disagreements
+from fanet_mw.scenario.cross_checks import disagreements
 from fanet_mw.scenario.tables.applications import ForeignApplication
 from fanet_mw.scenario.tables.clock import Clock
 from fanet_mw.scenario.tables.clusters import Clusters

@@ -39,8 +39,8 @@ from fanet_mw.routing.clustered.timetable.turn_size import links
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.places import rounded
-from sim.planning.expected_links import expected_links
-from sim.planning.reception_probability import chance_of
+from sim.expected_channel.expected_links import expected_links
+from sim.expected_channel.reception_probability import chance_of
 from sim.world.mobility.layout import positions
 
 _DRAWS: Final = 3

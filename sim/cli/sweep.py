@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from pyarrow import Table
 
     from sim.sweep.remaining_runs import RemainingRuns
-    from sim.sweep.run import Progress, Workers
     from sim.sweep.spec import Sweep
+    from sim.sweep.whole_sweep import Progress, Workers
 
 _err = Console(stderr=True)
 _SAY_S: Final = 20.0
@@ -101,9 +101,9 @@ def carry_out(
     """Plan a sweep, print how long it will take, and carry it out."""
     from sim.sweep.provenance import code
     from sim.sweep.remaining_runs import RemainingRuns
-    from sim.sweep.run import run
     from sim.sweep.store import TABLE, Store
     from sim.sweep.tasks import tasks_of
+    from sim.sweep.whole_sweep import run
 
     tasks = tasks_of(wanted)
     store = Store(out)

@@ -4,9 +4,9 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from sim.figures.claims import NEARLY_ALL, Claim, Reason, Statement, above, below
+from sim.figures.finished_runs import Quantity, Runs, differences
+from sim.figures.paper_claims import NEARLY_ALL, Claim, Reason, Statement, above, below
 from sim.figures.recipe import Drawing, Recipe, point
-from sim.figures.runs import Quantity, Runs, differences
 from sim.figures.statistics import SHARE
 from sim.figures.style import SERIES, Look, canvas, legend_above, reaches
 

@@ -2,10 +2,10 @@
 
 from typing import Final
 
-from sim.figures.claims import Claim, above
 from sim.figures.curves import PAPERS, PDR, Panel, curves
+from sim.figures.finished_runs import Runs, differences, max_per_seed
+from sim.figures.paper_claims import Claim, above
 from sim.figures.recipe import Recipe
-from sim.figures.runs import Runs, differences, max_per_seed
 
 
 def claims(runs: Runs) -> list[Claim]:

@@ -2,10 +2,10 @@
 
 from typing import Final
 
-from sim.figures.claims import NEARLY_ALL, Claim, Reason, above, below
 from sim.figures.curves import PDR, Panel, curves
+from sim.figures.finished_runs import Runs, differences
+from sim.figures.paper_claims import NEARLY_ALL, Claim, Reason, above, below
 from sim.figures.recipe import Recipe
-from sim.figures.runs import Runs, differences
 from sim.figures.statistics import SHARE
 
 

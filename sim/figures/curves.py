@@ -6,8 +6,8 @@ from typing import Any, Final, NamedTuple
 
 from matplotlib.axes import Axes
 
+from sim.figures.finished_runs import Quantity, Row, Runs
 from sim.figures.recipe import Drawing, point
-from sim.figures.runs import Quantity, Row, Runs
 from sim.figures.statistics import Interval
 from sim.figures.style import Look, beside, canvas, legend_above, line, look_of, plain_log, spaced, ticks_at
 

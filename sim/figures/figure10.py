@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from sim.figures.claims import Claim, Reason, above
+from sim.figures.finished_runs import Runs, differences, max_per_seed, mean_per_seed
+from sim.figures.paper_claims import Claim, Reason, above
 from sim.figures.recipe import Drawing, Recipe, point
-from sim.figures.runs import Runs, differences, max_per_seed, mean_per_seed
 from sim.figures.style import SERIES, beside, canvas, legend_above, line, ticks_at
 
 _MANY: Final = 22

@@ -10,9 +10,9 @@ from typing import Final
 from fanet_mw.bounds.bounded_or_refused import Bounded
 from fanet_mw.bounds.paper import cluster_estimate
 from fanet_mw.units import S
-from sim.figures.claims import Claim, Reason, above, below
+from sim.figures.finished_runs import Quantity, Row, Runs, arrived, differences
+from sim.figures.paper_claims import Claim, Reason, above, below
 from sim.figures.recipe import Drawing, Recipe, point
-from sim.figures.runs import Quantity, Row, Runs, arrived, differences
 from sim.figures.statistics import SHARE
 from sim.figures.style import CONTROL, LOOKS, band, canvas, legend_above, look_of, plain_log
 from sim.sweep.measures import DELAY_EDGES_S

@@ -6,9 +6,9 @@ from typing import Any, Final, NamedTuple
 
 from matplotlib.axes import Axes
 
-from sim.figures.claims import Claim, Reason, above, below
+from sim.figures.finished_runs import Quantity, Row, Runs, differences, mean_per_seed
+from sim.figures.paper_claims import Claim, Reason, above, below
 from sim.figures.recipe import Drawing, Recipe, point
-from sim.figures.runs import Quantity, Row, Runs, differences, mean_per_seed
 from sim.figures.statistics import SHARE
 from sim.figures.style import LOOKS, Look, beside, canvas, legend_above, line, look_of, plain_log, ticks_at
 

@@ -4,9 +4,9 @@ collide.
 
 from typing import Final
 
-from sim.figures.claims import Claim, Statement
+from sim.figures.finished_runs import Row, Runs, differences
+from sim.figures.paper_claims import Claim, Statement
 from sim.figures.recipe import Drawing, Recipe, point
-from sim.figures.runs import Row, Runs, differences
 from sim.figures.statistics import SHARE
 from sim.figures.style import SERIES, canvas, legend_above, line, spaced, ticks_at
 

@@ -2,9 +2,9 @@
 
 from typing import Final
 
-from sim.figures.claims import Claim, below
+from sim.figures.finished_runs import Quantity, Runs, arrived, differences
+from sim.figures.paper_claims import Claim, below
 from sim.figures.recipe import Drawing, Recipe, point
-from sim.figures.runs import Quantity, Runs, arrived, differences
 from sim.figures.statistics import DISTANCE, SHARE
 from sim.figures.style import SERIES, band, canvas, legend_above, plain_log
 from sim.sweep.measures import DELAY_EDGES_S

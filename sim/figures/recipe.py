@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 from matplotlib.figure import Figure
 
-from sim.figures.claims import Claim
-from sim.figures.runs import Runs
+from sim.figures.finished_runs import Runs
+from sim.figures.paper_claims import Claim
 from sim.figures.statistics import Interval
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 from pyarrow import Table
 
 from fanet_mw.errors import ConfigError
-from sim.figures.claims import Claim
+from sim.figures.finished_runs import Runs
+from sim.figures.paper_claims import Claim
 from sim.figures.recipe import Recipe
-from sim.figures.runs import Runs
 from sim.figures.style import applied, save, save_data
 
 

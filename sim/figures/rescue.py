@@ -4,10 +4,10 @@ import re
 from collections.abc import Callable
 from typing import Final
 
-from sim.figures.claims import Claim, Reason, above, below
 from sim.figures.curves import Panel, curves
+from sim.figures.finished_runs import Quantity, Row, Runs, differences
+from sim.figures.paper_claims import Claim, Reason, above, below
 from sim.figures.recipe import Recipe
-from sim.figures.runs import Quantity, Row, Runs, differences
 from sim.figures.statistics import DISTANCE, interval
 
 _LOSS: Final = re.compile(r"loss_share = ([0-9.e-]+)")

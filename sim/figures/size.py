@@ -2,10 +2,10 @@
 
 from typing import Final
 
-from sim.figures.claims import NEARLY_ALL, Claim, above
 from sim.figures.curves import P95, Panel, curves
+from sim.figures.finished_runs import Row, Runs
+from sim.figures.paper_claims import NEARLY_ALL, Claim, above
 from sim.figures.recipe import Recipe
-from sim.figures.runs import Row, Runs
 from sim.figures.statistics import SHARE
 
 

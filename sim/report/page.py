@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from fanet_mw.errors import ConfigError
-from sim.figures.claims import BEYOND
+from sim.figures.paper_claims import BEYOND
 from sim.report.html import Block, Commands, Heading, Picture, Rows, Text, as_html, as_markdown
 from sim.report.run_page import blocks_of_run, is_run
 

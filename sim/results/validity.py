@@ -15,7 +15,7 @@ purpose: within the limits, their delivery ratio is within 0.015 of that of the 
 from collections.abc import Iterator, Mapping
 from typing import Any, Final, NamedTuple
 
-from sim.run.launcher.processes import describe
+from sim.run.launcher.child_processes import describe
 from sim.run.outcome import Outcome
 
 LOST_LIMIT: Final = 0.0025

@@ -20,7 +20,7 @@ from fanet_mw.hosts.clock import ClockKeeper
 from fanet_mw.hosts.duration_histogram import DurationHistogram
 from fanet_mw.hosts.realtime import SwarmAddress, run_actor
 from fanet_mw.units import S
-from sim.run.launcher.processes import Processes
+from sim.run.launcher.child_processes import Processes
 from sim.run.launcher.swarm import Collector, free_endpoint
 
 NAMES = Topics("bench")

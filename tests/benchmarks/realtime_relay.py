@@ -27,7 +27,7 @@ from fanet_mw.hosts.clock import ClockKeeper, ClockListener
 from fanet_mw.hosts.realtime import SwarmAddress, run_actor
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.units import MS, NodeId, S
-from sim.run.launcher.processes import Processes
+from sim.run.launcher.child_processes import Processes
 from sim.run.launcher.swarm import Collector, free_endpoint
 from sim.world.__main__ import run as run_world
 

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 from agents.applications.traffic import sources_of
 from fanet_mw.planner.timetable_plan import table_for
-from fanet_mw.routing.clustered.timetable.turn_plan import Fitted
+from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.config import build
 from fanet_mw.trace import Delivered, Generated
@@ -31,7 +31,7 @@ def most_used(scenario: Scenario) -> list[NodeId]:
     """Relays by how many floods they pass on, most first; the leader has a lease of its own."""
     at = tuple((NodeId(n), place) for n, place in zip(scenario.node_ids, positions(scenario), strict=True))
     fitted = table_for(scenario, at, dict.fromkeys((node for node, _ in at), NodeId(1)))
-    assert isinstance(fitted, Fitted)
+    assert isinstance(fitted, FittedTimetable)
     used = Counter(turn.node for turn in fitted.table.turns if turn.node not in (turn.root, scenario.leader))
     return [node for node, _ in sorted(used.items(), key=lambda item: (-item[1], item[0]))]
 

@@ -17,7 +17,7 @@ import pytest
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError
 from fanet_mw.hosts.bus import Bus
-from sim.run.launcher.processes import Processes, end_servers
+from sim.run.launcher.child_processes import Processes, end_servers
 from sim.run.launcher.swarm import free_endpoint
 
 MARK = "FANET_TEST_MARK"
@@ -219,7 +219,7 @@ def test_a_launcher_that_is_killed_takes_all_its_processes_with_it(mark: str, tm
 
 LAUNCHER_OF_A_SLEEPER = """
 import asyncio, runpy, sys
-from sim.run.launcher.processes import Processes
+from sim.run.launcher.child_processes import Processes
 
 async def main():
     processes = Processes(lambda *_: None)

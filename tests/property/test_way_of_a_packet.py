@@ -19,9 +19,10 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.routing import make_protocol
 from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
+from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
+from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
-from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, TurnPlan
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Header, Kind, filler
@@ -114,7 +115,8 @@ def scheduled() -> dict[str, Way]:
     access = protocol.parts.access
     assert isinstance(access, TurnAccess)
     access.follow(
-        TurnPlan.of(us, 0, Fitted(turns, table, together=1, frame_bytes=1024, whole=True, enough=True)), now_ns=0
+        NodeTimetable.of(us, 0, FittedTimetable(turns, table, together=1, frame_bytes=1024, whole=True, enough=True)),
+        now_ns=0,
     )
     over = way(lambda: send(node, 0))
     out = way(lambda: node.wake(64 * MS - 2 * MS))

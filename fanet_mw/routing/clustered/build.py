@@ -48,7 +48,7 @@ from fanet_mw.routing.clustered.roles.no_roles import NoRoles
 from fanet_mw.routing.clustered.roles.position_updates import PositionUpdates
 from fanet_mw.routing.clustered.roles.schedule_check import ScheduleCheck
 from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
-from fanet_mw.routing.clustered.tdma.contention import Contention
+from fanet_mw.routing.clustered.tdma.contention_timing import ContentionTiming
 from fanet_mw.routing.clustered.tdma.slot_access import SlotAccess
 from fanet_mw.routing.clustered.tdma.slot_release import SlotRelease
 from fanet_mw.routing.clustered.timetable.admission import Admission
@@ -58,7 +58,7 @@ from fanet_mw.routing.clustered.timetable.link_quality import LinkQuality
 from fanet_mw.routing.clustered.timetable.reserved_room import reserved
 from fanet_mw.routing.clustered.timetable.root_release import RootRelease
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
-from fanet_mw.routing.clustered.timetable.timetables_in_force import TurnPlans
+from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
 from fanet_mw.routing.clustered.timetable.timetabling import FromPlaces, NoTimetable, Timetabling
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.routing.clustered.timetable.turn_allocation import leader_load
@@ -79,7 +79,7 @@ class _Ground(NamedTuple):
 
     port: Port
     random: Callable[[], float]
-    contention: Contention
+    contention: ContentionTiming
     neighbors: Neighbors
     gradient: Gradient
     uplink: Uplink
@@ -112,7 +112,7 @@ def _ground(port: Port) -> _Ground:
     hello_ns = seconds_to_ns(scenario.routing.hello_interval_s)
     neighbors = Neighbors(lifetime_ns=int(LIFETIME_HELLOS * hello_ns))
     gradient = Gradient(node=port.node, neighbors=neighbors, hello_ns=hello_ns)
-    contention = Contention(lead_ns=scenario.radio.lead_ns, jitter=random, window=port.stream("window").random)
+    contention = ContentionTiming(lead_ns=scenario.radio.lead_ns, jitter=random, window=port.stream("window").random)
     repair = None
     if scenario.repair_ns:
         repair = Repair(window_ns=scenario.repair_ns, capacity=_STORE_PACKETS, random=port.stream("repair").random)
@@ -203,7 +203,7 @@ def _slots(ground: _Ground, membership: Membership) -> SlotAccess:
 
 def _by_timetable(ground: _Ground) -> Clustered:
     port, scenario = ground.port, ground.port.scenario
-    plans = TurnPlans()
+    plans = TimetablesInForce()
     ground.contention.turns_at = plans.turns_at
     ground.contention.most_jitter_ns = round(scenario.clusters.contention_ms * MS * _JITTER)
     parts = _role_parts(ground, _membership(ground), takes_slot=False)

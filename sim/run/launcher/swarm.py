@@ -31,9 +31,9 @@ from sim.run.bus.router import ROUTER, expected_names
 from sim.run.bus.running_swarms import registered
 from sim.run.collecting.collector import Collector
 from sim.run.launcher import limits
+from sim.run.launcher.child_processes import Processes, describe
 from sim.run.launcher.clock_governor import ClockGovernor
 from sim.run.launcher.deaths import Deaths
-from sim.run.launcher.processes import Processes, describe
 from sim.run.launcher.services import Services
 from sim.run.outcome import Outcome
 from sim.world.flight_recorder import FlightRecorder

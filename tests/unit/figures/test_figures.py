@@ -14,11 +14,11 @@ import pytest
 from fanet_mw.errors import ConfigError
 from sim.cli.app import app
 from sim.figures.all_figures import FIGURES, chosen
-from sim.figures.claims import Claim, Finding, Reason, Statement, Verdict, above, below
+from sim.figures.finished_runs import Runs, differences, max_per_seed, mean_per_seed
 from sim.figures.kept_tables import keep, read_kept
+from sim.figures.paper_claims import Claim, Finding, Reason, Statement, Verdict, above, below
 from sim.figures.render import render
 from sim.figures.rescue import confirmed_s, loss_share
-from sim.figures.runs import Runs, differences, max_per_seed, mean_per_seed
 from sim.figures.statistics import DISTANCE, SHARE, interval, quantile_975
 from sim.figures.style import beside, canvas, legend_above, reaches, spaced
 from sim.report.page import write

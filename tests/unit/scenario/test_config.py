@@ -11,7 +11,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.mavlink import Encoder
 from fanet_mw.routing.clustered.claimed.claiming import geometry
 from fanet_mw.scenario import Scenario, config, grid_columns
-from fanet_mw.scenario.checks import MESSAGE_BYTES
+from fanet_mw.scenario.cross_checks import MESSAGE_BYTES
 from fanet_mw.units import Enu, NodeId
 from sim.scenarios import catalog
 

@@ -26,7 +26,7 @@ from fanet_mw.routing.clustered.claimed.claiming import Change, Claiming
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import NO_HEAD, Gradient
 from fanet_mw.routing.clustered.forwarding.uplink import Uplink
-from fanet_mw.routing.clustered.tdma.contention import Contention
+from fanet_mw.routing.clustered.tdma.contention_timing import ContentionTiming
 from fanet_mw.routing.clustered.tdma.turn_timing import clocks_fit
 from fanet_mw.units import MS, US, seconds_to_ns
 from fanet_mw.wire import Kind
@@ -47,7 +47,7 @@ class ClaimedAccess:
         gradient: Gradient,
         uplink: Uplink,
         floods: Floods,
-        contention: Contention,
+        contention: ContentionTiming,
     ) -> None:
         self._port = port
         self._claiming = claiming

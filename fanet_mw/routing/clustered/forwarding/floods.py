@@ -12,7 +12,7 @@ from fanet_mw.node.contract import Port
 from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.forwarding.packet_repair import Repair
-from fanet_mw.routing.clustered.tdma.contention import Contention
+from fanet_mw.routing.clustered.tdma.contention_timing import ContentionTiming
 from fanet_mw.units import BROADCAST, S
 from fanet_mw.wire import FLAG_FLOOD, Kind
 
@@ -25,7 +25,7 @@ time after the packet came to it, the packet may be repaired."""
 class Floods:
     """Transmits the floods of one node."""
 
-    def __init__(self, port: Port, repair: Repair | None, contention: Contention) -> None:
+    def __init__(self, port: Port, repair: Repair | None, contention: ContentionTiming) -> None:
         self._port = port
         self._repair = repair
         self._contention = contention

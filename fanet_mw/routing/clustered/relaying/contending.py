@@ -9,7 +9,7 @@ from fanet_mw.node.contract import Port
 from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.clustered.relaying.rules import Rule
-from fanet_mw.routing.clustered.tdma.contention import Contention
+from fanet_mw.routing.clustered.tdma.contention_timing import ContentionTiming
 from fanet_mw.units import MS
 
 _CONTROL_JITTER_NS: Final = 100 * MS
@@ -19,7 +19,7 @@ _NOTHING: Final[Mapping[str, object]] = {}
 class ContendingRelaying:
     """The relays of one node, which go as soon as they may contend."""
 
-    def __init__(self, port: Port, rule: Rule, contention: Contention) -> None:
+    def __init__(self, port: Port, rule: Rule, contention: ContentionTiming) -> None:
         self._port = port
         self._rule = rule
         self._contention = contention

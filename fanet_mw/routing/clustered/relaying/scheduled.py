@@ -16,8 +16,8 @@ from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.clustered.contract import Relaying
 from fanet_mw.routing.clustered.tdma.turn_timing import turn_slack_ns
-from fanet_mw.routing.clustered.timetable.timetables_in_force import TurnPlans
-from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan
+from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
+from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
 from fanet_mw.units import NodeId
 from fanet_mw.wire import Kind
 
@@ -25,7 +25,7 @@ from fanet_mw.wire import Kind
 class ScheduledRelaying:
     """The relays of one node, in the turns of its timetables."""
 
-    def __init__(self, port: Port, plans: TurnPlans, otherwise: Relaying) -> None:
+    def __init__(self, port: Port, plans: TimetablesInForce, otherwise: Relaying) -> None:
         self._port = port
         self._plans = plans
         self._otherwise = otherwise
@@ -56,7 +56,7 @@ class ScheduledRelaying:
         return ()
 
     def _in_turn(
-        self, packet: Packet, plan: TurnPlan, heard: tuple[int, NodeId, int], heard_ns: int, now_ns: int
+        self, packet: Packet, plan: NodeTimetable, heard: tuple[int, NodeId, int], heard_ns: int, now_ns: int
     ) -> Sequence[Relay]:
         """The relays of this flood in those turns of the node that are still to come; `heard_ns` lies in the turn of
         reception.

@@ -7,7 +7,7 @@ delay = longest wait for a turn + flood + one turn + time until repair begins
 from typing import Final
 
 from fanet_mw.routing.clustered.forwarding.packet_repair import RIPE_NS
-from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan
+from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.units import NodeId
 
 LIKELY_SHARE: Final = 0.99
@@ -18,7 +18,7 @@ _BUSY: Final = 2
 """The factor by which a round of repair takes longer because answers to other nodes wait in the same queue."""
 
 
-def likely_delay_ns(plan: TurnPlan, node: NodeId, *, waiting: int, interval_ns: int, hello_ns: int) -> int | None:
+def likely_delay_ns(plan: NodeTimetable, node: NodeId, *, waiting: int, interval_ns: int, hello_ns: int) -> int | None:
     """The time within which `LIKELY_SHARE` of the copies of a node's packets arrive; None if fewer than that ever do.
 
     The wait for a turn is the longest that can occur, or the wait of the last of `waiting` packets if that is longer,

@@ -20,10 +20,10 @@ from fanet_mw.routing.clustered.roles.lease import Lease
 from fanet_mw.routing.clustered.tdma.turn_timing import clocks_fit, receipt_ns
 from fanet_mw.routing.clustered.timetable.admission import Admission, least_interval_ns
 from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE, likely_delay_ns
+from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.own_bound import RootTurns
 from fanet_mw.routing.clustered.timetable.root_release import RootRelease
-from fanet_mw.routing.clustered.timetable.timetables_in_force import TurnPlans
-from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan
+from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
 from fanet_mw.trace import BoundStated, LikelyStated
 from fanet_mw.units import MS, US, NodeId, seconds_to_ns
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY
@@ -39,7 +39,7 @@ class StatedDelays:
     """The bounds and likely delays of one node's packets, by its timetables."""
 
     def __init__(
-        self, port: Port, *, plans: TurnPlans, roots: RootRelease, lease: Lease, admission: Admission | None
+        self, port: Port, *, plans: TimetablesInForce, roots: RootRelease, lease: Lease, admission: Admission | None
     ) -> None:
         self._port = port
         self._plans = plans
@@ -48,13 +48,13 @@ class StatedDelays:
         self._admission = admission
         self._lead_ns = port.scenario.radio.lead_ns
         self._interval_ns = seconds_to_ns(port.scenario.traffic.interval_s)
-        self._bounds_ns: list[tuple[TurnPlan, Mapping[int, int]]] = []
+        self._bounds_ns: list[tuple[NodeTimetable, Mapping[int, int]]] = []
         """The bound of each priority class of the node's packets by each timetable; classes without a bound are
         missing."""
         self._promised: dict[int, tuple[int, int]] = {}
         """The waiting packets for which a bound was stated, by sequence number: the instant at which the flood of each
         is over if the node keeps its turns, and the latest instant that the bound allows."""
-        self._ahead: tuple[TurnPlan, int] | None = None
+        self._ahead: tuple[NodeTimetable, int] | None = None
         """The timetable that was examined last, and how long before its end that end must be announced."""
         self.announced_ns = 0
         """The instant of the latest known announcement of the timetable that the node follows."""
@@ -90,7 +90,7 @@ class StatedDelays:
             return None
         return self._own_of(self._port.node, plan)
 
-    def _own_of(self, node: NodeId, plan: TurnPlan) -> RootTurns:
+    def _own_of(self, node: NodeId, plan: NodeTimetable) -> RootTurns:
         offsets = plan.roots if node == self._port.node else tuple(plan.table.offsets_of(node))
         around_ns = self._lead_ns + receipt_ns(self._port.scenario)
         load = plan.loads.get(node, AS_EXPECTED)
@@ -115,7 +115,7 @@ class StatedDelays:
         in_force = self._plans.in_order[self._plans.superseded(now_ns) :]
         return max((self._ahead_ns(plan) for plan in in_force), default=0)
 
-    def _ahead_ns(self, plan: TurnPlan) -> int:
+    def _ahead_ns(self, plan: NodeTimetable) -> int:
         """How long before the end of this timetable that end must be announced.
 
         All nodes know of it after a superframe and a flood; until then they may promise what must be over by that end.

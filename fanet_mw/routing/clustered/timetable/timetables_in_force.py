@@ -1,20 +1,20 @@
 """The timetables that a node follows: the one in force, and perhaps others that come into force later."""
 
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
-from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan
+from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 
 
-class TurnPlans:
+class TimetablesInForce:
     """The timetables of one node, in the order in which they come into force."""
 
     def __init__(self) -> None:
-        self.in_order: list[TurnPlan] = []
+        self.in_order: list[NodeTimetable] = []
 
     @property
-    def newest(self) -> TurnPlan | None:
+    def newest(self) -> NodeTimetable | None:
         return self.in_order[-1] if self.in_order else None
 
-    def at(self, t_ns: int) -> TurnPlan | None:
+    def at(self, t_ns: int) -> NodeTimetable | None:
         """The newest timetable that is in force at an instant."""
         for plan in reversed(self.in_order):
             if plan.valid_ns <= t_ns:
@@ -30,7 +30,7 @@ class TurnPlans:
         """The number of timetables, the oldest first, that are no longer in force."""
         return sum(plan.valid_ns <= now_ns for plan in self.in_order[1:])
 
-    def follow(self, plan: TurnPlan | None, *, now_ns: int) -> None:
+    def follow(self, plan: NodeTimetable | None, *, now_ns: int) -> None:
         """Follow a newer timetable; None: follow none.
 
         Timetables are forgotten that are no longer in force, or that would come into force after it: they are those of

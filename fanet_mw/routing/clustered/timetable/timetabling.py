@@ -18,10 +18,11 @@ from fanet_mw.routing.clustered.roles.leader import Leader
 from fanet_mw.routing.clustered.roles.lease import Authority, Lease
 from fanet_mw.routing.clustered.roles.membership import Membership, Version
 from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
+from fanet_mw.routing.clustered.timetable.fitted_timetable import NO_LOADS, FittedTimetable
+from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.routing.clustered.timetable.turn_allocation import fit, fit_measured
-from fanet_mw.routing.clustered.timetable.turn_plan import NO_LOADS, Fitted, TurnPlan
 from fanet_mw.units import US, Enu, NodeId
 from fanet_mw.wire.links import Link, Links, frames_of
 from fanet_mw.wire.loads import AS_EXPECTED, Loads
@@ -226,7 +227,7 @@ class FromPlaces:
         head_of = {node: heads[cluster] for node, cluster in sorted(cluster_of.items())}
         found = self._fit(schedule, at, head_of, measured, loads or NO_LOADS)
         # None if not even one packet of each head fits; `fanet plan` tells the user
-        plan = None if found is None else TurnPlan.of(self._port.node, schedule.start_us * US, found)
+        plan = None if found is None else NodeTimetable.of(self._port.node, schedule.start_us * US, found)
         self._access.follow(plan, now_ns=now_ns)
 
     def _fit(
@@ -236,7 +237,7 @@ class FromPlaces:
         head_of: Mapping[NodeId, NodeId],
         measured: tuple[Link, ...],
         loads: Mapping[NodeId, int],
-    ) -> Fitted | None:
+    ) -> FittedTimetable | None:
         """The timetable; it is computed from positions if links are not measured, or if they leave no room for the
         load.
         """

@@ -14,13 +14,13 @@ from fanet_mw.node.contract import Port
 from fanet_mw.node.duplicates import key_of_packet
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.forwarding.floods import Floods
-from fanet_mw.routing.clustered.tdma.contention import Contention
+from fanet_mw.routing.clustered.tdma.contention_timing import ContentionTiming
 from fanet_mw.routing.clustered.tdma.slot_access import SlotAccess
 from fanet_mw.routing.clustered.timetable.call_release import CallRelease
+from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.root_release import RootRelease, TurnsInForce
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
-from fanet_mw.routing.clustered.timetable.timetables_in_force import TurnPlans
-from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan
+from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
 from fanet_mw.routing.clustered.timetable.turn_size import most_packet_bytes
 from fanet_mw.units import US, earliest, seconds_to_ns
 from fanet_mw.wire import Kind
@@ -36,13 +36,13 @@ class TurnAccess:
         self,
         port: Port,
         *,
-        plans: TurnPlans,
+        plans: TimetablesInForce,
         roots: RootRelease,
         calls: CallRelease,
         slots: SlotAccess,
         delays: StatedDelays,
         floods: Floods,
-        contention: Contention,
+        contention: ContentionTiming,
     ) -> None:
         self._port = port
         self._plans = plans
@@ -60,7 +60,7 @@ class TurnAccess:
 
     # --- timetables and roles -------------------------------------------------------------------------------------
 
-    def follow(self, plan: TurnPlan | None, *, now_ns: int) -> None:
+    def follow(self, plan: NodeTimetable | None, *, now_ns: int) -> None:
         """Follow a timetable that comes into force later, or that of another leader, which may be in force already. The
         node changes to the latter only when what it promised under the former one has gone. None: no timetable fits.
         """

@@ -19,11 +19,11 @@ from itertools import islice
 from typing import Final, NamedTuple, TypeVar
 
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_ns
+from fanet_mw.routing.clustered.timetable.fitted_timetable import NO_LOADS, FittedTimetable
 from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
 from fanet_mw.routing.clustered.timetable.heard_load import packets
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, redundant_timetable, timetable
-from fanet_mw.routing.clustered.timetable.turn_plan import NO_LOADS, Fitted
 from fanet_mw.routing.clustered.timetable.turn_size import (
     LOAD,
     hello_bytes,
@@ -85,7 +85,7 @@ def fit(
     period_ns: int | None = None,
     loads: Mapping[NodeId, int] = NO_LOADS,
     quick: bool = False,
-) -> Fitted | None:
+) -> FittedTimetable | None:
     """The timetable of a swarm; None if not even one packet of each head fits. `head_of`: the head of each node but the
     leader; `loads`: of those nodes that do not send as the scenario says.
 
@@ -103,7 +103,7 @@ def fit(
         table = _table(places, wish.roots, geometry, ways, blocks=wish.blocks, hard=wish.hard and not quick)
         if table is not None:
             frame_bytes = largest_frame(scenario, together=wish.together)
-            return Fitted(turns, table, wish.together, frame_bytes, wish.whole, wish.enough, loads=loads)
+            return FittedTimetable(turns, table, wish.together, frame_bytes, wish.whole, wish.enough, loads=loads)
     return None
 
 
@@ -116,7 +116,7 @@ def fit_measured(
     origin_ns: int,
     link_parts: int,
     loads: Mapping[NodeId, int] = NO_LOADS,
-) -> Fitted | None:
+) -> FittedTimetable | None:
     """The timetable of a swarm with measured links: each node transmits its own packets, and frames are repeated as
     often as turns allow. None if the turns do not suffice for the load.
     """
@@ -141,7 +141,7 @@ def fit_measured(
                 places, measured, roots, geometry, calls=calls, epsilon=epsilon, margin_db=margin_db, pace=pace
             )
             if found is not None:
-                return Fitted(turns, found[0], 1, size, whole=True, enough=True, odds=found[1], loads=loads)
+                return FittedTimetable(turns, found[0], 1, size, whole=True, enough=True, odds=found[1], loads=loads)
     return None
 
 

@@ -16,9 +16,10 @@ from fanet_mw.routing import make_protocol
 from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.delivery_odds import Odds
+from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
+from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
-from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, TurnPlan
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import BoundStated, Dropped
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId
@@ -47,9 +48,11 @@ FLOODS = (
 MakeScenario = Callable[..., Scenario]
 
 
-def planned(turns: tuple[Turn, ...], *, valid_ns: int = 0, unreached: tuple[NodeId, ...] = ()) -> TurnPlan:
+def planned(turns: tuple[Turn, ...], *, valid_ns: int = 0, unreached: tuple[NodeId, ...] = ()) -> NodeTimetable:
     table = Timetable(turns, {ROOT: 5, US: 3}, {ROOT: (), US: unreached}, len(turns))
-    return TurnPlan.of(US, valid_ns, Fitted(TURNS, table, together=1, frame_bytes=1024, whole=True, enough=True))
+    return NodeTimetable.of(
+        US, valid_ns, FittedTimetable(TURNS, table, together=1, frame_bytes=1024, whole=True, enough=True)
+    )
 
 
 @pytest.fixture

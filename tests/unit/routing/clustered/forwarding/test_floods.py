@@ -10,7 +10,7 @@ from fanet_mw.node.node import Node
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing import make_protocol
 from fanet_mw.routing.clustered.forwarding.floods import Floods
-from fanet_mw.routing.clustered.tdma.contention import Contention
+from fanet_mw.routing.clustered.tdma.contention_timing import ContentionTiming
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Header, Kind, filler
@@ -26,7 +26,7 @@ def node(make_scenario: MakeScenario) -> Node:
 
 def floods(node: Node) -> Floods:
     stream = node.port.stream("test").random
-    return Floods(node.port, None, Contention(lead_ns=0, jitter=stream, window=stream))
+    return Floods(node.port, None, ContentionTiming(lead_ns=0, jitter=stream, window=stream))
 
 
 def packet(*, origin: int = THEIRS, hop_limit: int = 8) -> Packet:

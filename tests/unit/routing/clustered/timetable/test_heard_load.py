@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fanet_mw.errors import MalformedFrameError
+from fanet_mw.routing.clustered.timetable.fitted_timetable import NO_LOADS, FittedTimetable
 from fanet_mw.routing.clustered.timetable.heard_load import HeardLoads
 from fanet_mw.routing.clustered.timetable.turn_allocation import fit
-from fanet_mw.routing.clustered.timetable.turn_plan import NO_LOADS, Fitted
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S
 from fanet_mw.wire import HEADER_BYTES
@@ -155,7 +155,7 @@ class Line:
         common = {"clusters.relay": "scheduled", "nodes.count": 9, "clusters.flooding_period_s": 0.5}
         self.scenario = make_scenario(**common, **{"clusters.load": "heard", "traffic.interval_s": 0.5} | keys)
 
-    def fitted(self, loads: Mapping[NodeId, int]) -> Fitted:
+    def fitted(self, loads: Mapping[NodeId, int]) -> FittedTimetable:
         places = tuple((NodeId(node), Enu(150.0 * node, 0, 50)) for node in range(1, 10))
         heads = {node: node for node, _ in places[1:]}
         found = fit(self.scenario, places, heads, leader=NodeId(1), loads=loads)

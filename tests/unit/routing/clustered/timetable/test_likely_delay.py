@@ -5,26 +5,29 @@ import pytest
 from fanet_mw.routing.clustered.forwarding.packet_repair import RIPE_NS
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.delivery_odds import Odds
+from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
 from fanet_mw.routing.clustered.timetable.likely_delay import likely_delay_ns
+from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
-from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, TurnPlan
 from fanet_mw.units import MS, NodeId, S
 
 NODE, OTHER = NodeId(1), NodeId(2)
 TURNS = Turns(0, 100 * MS, 40 * MS, 2 * MS, 29)
 
 
-def plan_of(*missed: float, calls: tuple[int, ...] = (20,)) -> TurnPlan:
+def plan_of(*missed: float, calls: tuple[int, ...] = (20,)) -> NodeTimetable:
     """Two turns of the node's own in a superframe of 100 ms, and the shares of copies that are missing after each round
     of repair.
     """
     turns = (Turn(0, NODE, NODE, 0), Turn(1, OTHER, NODE, 0), Turn(10, NODE, NODE, 1), Turn(11, OTHER, NODE, 1))
     table = Timetable(turns, {NODE: 2}, {}, 4, {NODE: calls})
     odds = Odds({NODE: missed})
-    return TurnPlan.of(NODE, 0, Fitted(TURNS, table, together=1, frame_bytes=1024, whole=True, enough=True, odds=odds))
+    return NodeTimetable.of(
+        NODE, 0, FittedTimetable(TURNS, table, together=1, frame_bytes=1024, whole=True, enough=True, odds=odds)
+    )
 
 
-def delay_ns(plan: TurnPlan, *, waiting: int) -> int | None:
+def delay_ns(plan: NodeTimetable, *, waiting: int) -> int | None:
     return likely_delay_ns(plan, NODE, waiting=waiting, interval_ns=S, hello_ns=1 * S)
 
 

@@ -7,7 +7,7 @@ from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 Random = Callable[[], float]
 
 
-class Contention:
+class ContentionTiming:
     """The starts of one node's contending frames."""
 
     def __init__(self, *, lead_ns: int, jitter: Random, window: Random) -> None:

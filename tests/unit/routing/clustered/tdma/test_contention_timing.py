@@ -1,13 +1,13 @@
 """The instants from which frames without a turn may go."""
 
-from fanet_mw.routing.clustered.tdma.contention import Contention
+from fanet_mw.routing.clustered.tdma.contention_timing import ContentionTiming
 from fanet_mw.units import MS
 
 LEAD_NS, DUE_NS = 20 * MS, 1000 * MS
 
 
 def start_ns(*, late_ns: int, jitter: float = 0.0) -> int:
-    contention = Contention(lead_ns=LEAD_NS, jitter=lambda: jitter, window=lambda: 0.0)
+    contention = ContentionTiming(lead_ns=LEAD_NS, jitter=lambda: jitter, window=lambda: 0.0)
     return contention.start_ns(due_ns=DUE_NS, now_ns=DUE_NS + late_ns, jitter_ns=10 * MS)
 
 

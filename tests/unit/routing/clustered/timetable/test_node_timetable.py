@@ -5,8 +5,9 @@ from collections.abc import Callable
 import pytest
 
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns, clocks_fit, turn_ns
+from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
+from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
-from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, TurnPlan
 from fanet_mw.routing.clustered.timetable.turn_size import largest_frame, links, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, US, NodeId
@@ -58,7 +59,9 @@ def test_a_hop_takes_the_turns_of_lead_and_handover(make_scenario: MakeScenario)
 def test_a_turn_beyond_the_superframe_is_heard_in_the_next_one() -> None:
     turns = Turns(0, 100 * MS, 40 * MS, 2 * MS, 29)
     table = Timetable((Turn(28, NodeId(1), NodeId(1), 0), Turn(30, NodeId(2), NodeId(1), 0)), {}, {}, 2)
-    plan = TurnPlan.of(NodeId(3), 0, Fitted(turns, table, together=1, frame_bytes=1024, whole=True, enough=True))
+    plan = NodeTimetable.of(
+        NodeId(3), 0, FittedTimetable(turns, table, together=1, frame_bytes=1024, whole=True, enough=True)
+    )
     assert plan.heard == {(28, 1): (28, 1, 0), (1, 2): (30, 1, 0)}
 
 

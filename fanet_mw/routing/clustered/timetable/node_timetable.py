@@ -1,38 +1,20 @@
-"""A timetable with the uses of its turns: as it is found for a swarm, and as one node follows it."""
+"""A timetable as one node follows it: the turns in which this node begins floods, relays, repeats and calls.
+
+`timetabling.py` makes it from the timetable of the whole swarm (`fitted_timetable.py`) when a schedule is complete.
+`timetables_in_force.py` keeps those that the node follows at present.
+"""
 
 from collections.abc import Mapping
-from types import MappingProxyType
-from typing import Final, NamedTuple, Self
+from typing import NamedTuple, Self
 
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.delivery_odds import Odds
+from fanet_mw.routing.clustered.timetable.fitted_timetable import NO_LOADS, FittedTimetable
 from fanet_mw.routing.clustered.timetable.timetable import Timetable
 from fanet_mw.units import NodeId
 
-NO_LOADS: Final[Mapping[NodeId, int]] = MappingProxyType({})
-"""All nodes send as the scenario states."""
 
-
-class Fitted(NamedTuple):
-    """A timetable, and how its turns are used."""
-
-    turns: Turns
-    table: Timetable
-    together: int
-    """The greatest number of packets that a root transmits in one turn."""
-    frame_bytes: int
-    """The number of bytes that one turn can carry."""
-    whole: bool
-    """True if each node transmits its own packets; otherwise heads transmit those of their members."""
-    enough: bool
-    """True if the turns suffice for the load."""
-    odds: Odds | None = None
-    """The odds of a timetable for lossy links; None for a timetable that assumes no losses."""
-    loads: Mapping[NodeId, int] = NO_LOADS
-    """The loads for which the timetable was made, of the nodes that do not send as the scenario states."""
-
-
-class TurnPlan(NamedTuple):
+class NodeTimetable(NamedTuple):
     """A timetable that is in force from an instant on, as one node needs it."""
 
     valid_ns: int
@@ -55,7 +37,7 @@ class TurnPlan(NamedTuple):
     loads: Mapping[NodeId, int] = NO_LOADS
 
     @classmethod
-    def of(cls, node: NodeId, valid_ns: int, found: Fitted) -> Self:
+    def of(cls, node: NodeId, valid_ns: int, found: FittedTimetable) -> Self:
         turns, table = found.turns, found.table
         sends: dict[tuple[NodeId, int], list[int]] = {}
         for turn in sorted(table.turns):

@@ -2,7 +2,7 @@
 
 from typing import Final, Protocol
 
-from fanet_mw.node.neighbors import LIFETIME_HELLOS
+from fanet_mw.node.neighbors import neighbor_lifetime_ns
 from fanet_mw.node.node import AnnouncedHello, Node
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
@@ -32,6 +32,7 @@ class HelloSchedule:
         self._time = time
         self._lead_ns = scenario.radio.lead_ns
         self._interval_ns = seconds_to_ns(scenario.routing.hello_interval_s)
+        self._lifetime_ns = neighbor_lifetime_ns(scenario.routing.hello_interval_s)
         self._random = stream(scenario.seed, "hello", node.node).random
         self._next_ns: int | None = None
         """The instant of the next hello; None if the UAV sends none."""
@@ -65,6 +66,5 @@ class HelloSchedule:
 
     def neighbors(self, now_ns: int) -> tuple[NodeId, ...]:
         """The nodes whose hellos were received recently, by id."""
-        lifetime_ns = round(LIFETIME_HELLOS * self._interval_ns)
-        self._heard_ns = {node: t_ns for node, t_ns in self._heard_ns.items() if now_ns - t_ns <= lifetime_ns}
+        self._heard_ns = {node: t_ns for node, t_ns in self._heard_ns.items() if now_ns - t_ns <= self._lifetime_ns}
         return tuple(sorted(self._heard_ns))

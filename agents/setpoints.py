@@ -1,7 +1,8 @@
-"""The setpoints of one UAV's computer to its flight controller: courses in its words, and the last one repeated, by
-which the flight controller knows that the computer is alive (`mobility.return_after_s`).
+"""Makes the setpoints that a UAV's onboard computer sends to its flight controller.
 
-A velocity is never repeated: whoever chose it has to choose it again.
+Each course of an application becomes a setpoint. The last setpoint is repeated again and again, so that the flight
+controller knows that the computer is alive: a flight controller that hears none for `mobility.return_after_s` flies
+home. A velocity is never repeated; the application that chose it has to choose one again.
 """
 
 from typing import Final

@@ -1,7 +1,8 @@
-"""Keeps the counters of links when links are computed anew: the kernel counts on its links, which poses replace.
+"""The traffic of each link since the last report: received and lost frames, and the sum of their RSSI.
 
-`take` moves the counters of an array of links here and leaves zeros there; `close` sums what was taken since the last
-report. Both are a few vector operations, whatever the number of frames.
+The kernel counts frames in its array of links. New poses of the stations replace that array, so its counts are moved
+here before (`take`). For a report, `close` adds up all counts that were moved here since the report before. Each of the
+two methods is a few vector operations, whatever the number of frames.
 """
 
 from array import array

@@ -1,4 +1,7 @@
-"""Generate the state diagram in docs/explanation/roles.md from the table in `roles/states.py`; `--check` compares."""
+"""Generate the state diagram in docs/explanation/roles.md; `--check` compares.
+
+The table of states is in `fanet_mw/routing/clustered/roles/states.py`.
+"""
 
 import sys
 from collections.abc import Sequence

@@ -21,7 +21,7 @@ from fanet_mw.application import HOME, Course
 from fanet_mw.closest_approach import ClosestApproach, closest
 from fanet_mw.mavlink import Collision
 from fanet_mw.motion import Motion
-from fanet_mw.node.neighbors import LIFETIME_HELLOS
+from fanet_mw.node.neighbors import neighbor_lifetime_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import ConflictForeseen, ConflictOver, Record
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
@@ -77,7 +77,7 @@ class ConflictMonitor:
         self._distance_m = mission.collision_distance_m
         self._clear_m = _CLEAR * mission.collision_distance_m
         self._repeat_ns = seconds_to_ns(mission.collision_repeat_s)
-        self._lifetime_ns = round(LIFETIME_HELLOS * scenario.routing.hello_interval_s * S)
+        self._lifetime_ns = neighbor_lifetime_ns(scenario.routing.hello_interval_s)
         self.records: list[Record] = []
         self.warnings: list[Alert] = []
         self.course: Course | None = None

@@ -2,12 +2,17 @@
 
 from typing import Final, NamedTuple
 
-from fanet_mw.units import NodeId
+from fanet_mw.units import NodeId, seconds_to_ns
 from fanet_mw.wire.hello.beacon import Beacon
 
-LIFETIME_HELLOS: Final = 3.5
+_LIFETIME_HELLOS: Final = 3.5
 """A neighbor expires after this number of hello intervals without a hello (3 in OLSR: NEIGHB_HOLD_TIME, RFC 3626,
 18.3)."""
+
+
+def neighbor_lifetime_ns(hello_interval_s: float) -> int:
+    """The time after a neighbor's last hello at which the neighbor, and what its hello said, is forgotten."""
+    return int(_LIFETIME_HELLOS * seconds_to_ns(hello_interval_s))
 
 
 class Neighbor(NamedTuple):

@@ -3,7 +3,7 @@
 The header (`frame.py`) and several packets in one frame (`aggregation.py`) are re-exported here. Each inner message has
 a module of its own:
 
-    hello/                              the parts of a hello: `beacon.py`, `digest.py`, `claims.py`, `time_beacon.py`
+    `hello/`                            the parts of a hello: beacon, digest, claims, time beacon
     `join.py`, `links.py`               a node asks for a place in a cluster, and reports the quality of its links
     `schedule.py`, `places.py`, `loads.py`    the leader's division into clusters; positions and loads for a timetable
     `application_message.py`            messages of applications: pieces, targets, receipts

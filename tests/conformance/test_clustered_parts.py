@@ -1,4 +1,7 @@
-"""What every part of the clustered protocol promises, whichever `clusters.relay` chose it (`clustered/contract.py`)."""
+"""What every part of the clustered protocol promises, whichever `clusters.relay` chose it.
+
+The promises are in `fanet_mw/routing/clustered/contract.py`.
+"""
 
 import json
 from collections.abc import Callable

@@ -16,14 +16,14 @@ IDS = st.integers(1, 65534)
 
 
 @st.composite
-def standings(draw: st.DrawFn) -> SlotStatus:
+def slot_statuses(draw: st.DrawFn) -> SlotStatus:
     length = draw(st.integers(0, 255))
     slot = draw(st.none() | st.integers(0, min(length, 255) - 1)) if length else None
     return SlotStatus(slot, length, draw(st.integers(0, 255)), draw(st.integers(0, 3)))
 
 
-HEARD = st.builds(HeardNeighbor, IDS, standings(), st.booleans(), st.booleans())
-CLAIMS_OF = st.builds(Claims, IDS, standings(), st.lists(HEARD, max_size=3 * CAPACITY).map(tuple))
+HEARD = st.builds(HeardNeighbor, IDS, slot_statuses(), st.booleans(), st.booleans())
+CLAIMS_OF = st.builds(Claims, IDS, slot_statuses(), st.lists(HEARD, max_size=3 * CAPACITY).map(tuple))
 
 
 @given(CLAIMS_OF)

@@ -33,7 +33,7 @@ def line(step_m: float = 150.0) -> list[Enu]:
     return [Enu(step_m * k, 0.0, 50.0) for k in range(NODES)]
 
 
-def standing(**clusters: object) -> Swarm:
+def settled_swarm(**clusters: object) -> Swarm:
     """A line of nodes, 300 m between every other, that has settled."""
     swarm = Swarm(scenario(**clusters), line())
     for node in range(1, NODES + 1):
@@ -60,7 +60,7 @@ def calm(swarm: Swarm, most_s: int = SETTLED_S) -> int:
 
 
 def test_a_backup_takes_over_a_dead_head_s_slot_before_the_leader_confirms() -> None:
-    swarm = standing()
+    swarm = settled_swarm()
     head = head_of(swarm, 3)
     epoch = swarm.protocol(NodeId(1)).report()["epoch"]
     cluster = swarm.protocol(head).report()["cluster"]
@@ -76,7 +76,7 @@ def test_a_backup_takes_over_a_dead_head_s_slot_before_the_leader_confirms() -> 
 
 
 def test_unicasts_that_fail_make_the_backup_act_sooner() -> None:
-    swarm = standing()
+    swarm = settled_swarm()
     head = head_of(swarm, 3)
     near = next(n for n in swarm.neighbors(head) if n != 1)
     swarm.kill(head)
@@ -87,7 +87,7 @@ def test_unicasts_that_fail_make_the_backup_act_sooner() -> None:
 
 
 def test_a_new_leader_is_elected_and_a_restarted_one_is_junior() -> None:
-    swarm = standing()
+    swarm = settled_swarm()
     swarm.kill(1)
     swarm.advance(20 * S)
     assert swarm.settled() == []
@@ -99,7 +99,7 @@ def test_a_new_leader_is_elected_and_a_restarted_one_is_junior() -> None:
 
 
 def test_parts_lead_themselves_and_the_senior_leader_keeps_the_whole() -> None:
-    swarm = standing()
+    swarm = settled_swarm()
     swarm.walls = {frozenset((NodeId(a), NodeId(b))) for a in (1, 2, 3) for b in (4, 5, 6, 7)}
     calm(swarm, 30)
     assert {swarm.protocol(NodeId(n)).report()["leader"] for n in (1, 2, 3)} == {1}
@@ -111,7 +111,7 @@ def test_parts_lead_themselves_and_the_senior_leader_keeps_the_whole() -> None:
 
 
 def test_a_head_that_was_only_out_of_reach_objects_and_keeps_its_slot() -> None:
-    swarm = standing()
+    swarm = settled_swarm()
     head = head_of(swarm, 3)
     others = [n for n in sorted(swarm.nodes) if n != head]
     swarm.walls = {frozenset((head, n)) for n in others}
@@ -124,7 +124,7 @@ def test_a_head_that_was_only_out_of_reach_objects_and_keeps_its_slot() -> None:
 
 
 def test_a_swarm_at_rest_keeps_its_epoch_and_floods_only_announcements() -> None:
-    swarm = standing()
+    swarm = settled_swarm()
     before = swarm.protocol(NodeId(1)).report()["epoch"]
     swarm.relayed.clear()
     for _ in range(60):
@@ -136,7 +136,7 @@ def test_a_swarm_at_rest_keeps_its_epoch_and_floods_only_announcements() -> None
 
 
 def test_a_swarm_that_turns_inside_out_gets_other_clusters_at_a_bounded_rate() -> None:
-    swarm = standing(reassign_s=5)
+    swarm = settled_swarm(reassign_s=5)
     before = swarm.protocol(NodeId(1)).report()["epoch"]
     for node, place in zip((2, 5, 3, 6, 4, 7), line()[1:], strict=True):
         swarm.move(node, place)
@@ -147,7 +147,7 @@ def test_a_swarm_that_turns_inside_out_gets_other_clusters_at_a_bounded_rate() -
 
 @pytest.mark.parametrize("method", ["lowest_id", "highest_degree", "wca", "lasting_degree", "affinity"])
 def test_with_the_other_methods_every_member_hears_its_head(method: str) -> None:
-    swarm = standing(method=method)
+    swarm = settled_swarm(method=method)
     for node in range(2, NODES + 1):
         head = head_of(swarm, node)
         assert head == node or swarm.hear_each_other(NodeId(node), head)
@@ -155,7 +155,7 @@ def test_with_the_other_methods_every_member_hears_its_head(method: str) -> None
 
 def timetabled() -> Swarm:
     """Every node a head, the leader in the middle of a line: whoever dies between it and the others is a relay."""
-    return standing(relay="scheduled", count=NODES - 1)
+    return settled_swarm(relay="scheduled", count=NODES - 1)
 
 
 def listed(swarm: Swarm, node: int) -> bool:

@@ -1,6 +1,6 @@
 """The return of a UAV whose battery runs low, or that hears nobody any more: it flies home above all UAVs that search,
-then lands straight down. Its task and its place in the formation are handed on before (`searcher.py`,
-`FormationPlanner`).
+then lands straight down. Its task and its place in the formation are handed on before (`agents/mission/searcher.py`,
+`agents/mission/search_formation/formation_planner.py`).
 """
 
 from enum import StrEnum

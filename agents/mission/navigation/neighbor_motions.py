@@ -3,7 +3,7 @@
 from typing import Final
 
 from fanet_mw.motion import Motion
-from fanet_mw.node.neighbors import LIFETIME_HELLOS
+from fanet_mw.node.neighbors import neighbor_lifetime_ns
 from fanet_mw.units import seconds_to_ns
 
 _LEAST_LIFETIME_NS: Final = seconds_to_ns(6.0)
@@ -15,7 +15,7 @@ class NeighborMotions:
     """The motion of each neighbor by its latest hello."""
 
     def __init__(self, *, hello_interval_s: float = 1.0) -> None:
-        self._lifetime_ns = max(_LEAST_LIFETIME_NS, seconds_to_ns(LIFETIME_HELLOS * hello_interval_s))
+        self._lifetime_ns = max(_LEAST_LIFETIME_NS, neighbor_lifetime_ns(hello_interval_s))
         self._motions: dict[int, Motion] = {}
 
     def on_hello(self, node: int, motion: Motion) -> None:

@@ -12,7 +12,7 @@ from functools import partial
 from typing import Final, NamedTuple
 
 from fanet_mw.node.contract import Port
-from fanet_mw.node.neighbors import LIFETIME_HELLOS, Neighbors
+from fanet_mw.node.neighbors import Neighbors, neighbor_lifetime_ns
 from fanet_mw.node.queue import TxQueue, sooner_us
 from fanet_mw.routing.clustered.claimed.claimed_access import ClaimedAccess
 from fanet_mw.routing.clustered.claimed.claimed_release import ClaimedRelease
@@ -93,7 +93,7 @@ class _Ground(NamedTuple):
     @property
     def lifetime_ns(self) -> int:
         """The time after a neighbor's last hello at which what the hello said is forgotten."""
-        return int(LIFETIME_HELLOS * self.hello_ns)
+        return neighbor_lifetime_ns(self.port.scenario.routing.hello_interval_s)
 
     def queue(self) -> TxQueue:
         """A queue for packets that wait for their first transmission, most urgent first."""
@@ -110,7 +110,7 @@ def _ground(port: Port) -> _Ground:
     scenario = port.scenario
     random = port.stream("clustered").random
     hello_ns = seconds_to_ns(scenario.routing.hello_interval_s)
-    neighbors = Neighbors(lifetime_ns=int(LIFETIME_HELLOS * hello_ns))
+    neighbors = Neighbors(lifetime_ns=neighbor_lifetime_ns(scenario.routing.hello_interval_s))
     gradient = Gradient(node=port.node, neighbors=neighbors, hello_ns=hello_ns)
     contention = ContentionTiming(lead_ns=scenario.radio.lead_ns, jitter=random, window=port.stream("window").random)
     repair = None

@@ -1,7 +1,7 @@
 """The parts of a hello, which each node broadcasts to its neighbors. The order is that in the hello.
 
     MAVLink's position and velocity   `fanet_mw/mavlink.py`; every node says it
-    messages of a search              `survivors.py`, `bids.py`, `searched_cells.py` of `fanet_mw/wire/`
+    messages of a search              `fanet_mw/wire/`: survivors, bids, searched cells
     FANET_BEACON                      `beacon.py`: cluster, role, leader, and the distance from a head
     FANET_DIGEST                      `digest.py`: which recent packets the sender holds, so that others can repair
     FANET_CLAIMS                      `claims.py`: whom the sender hears, and which slots it and they claim

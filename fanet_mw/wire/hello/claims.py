@@ -39,7 +39,7 @@ class HeardNeighbor(NamedTuple):
     """One neighbor, as the sender of a hello knows it."""
 
     node: NodeId
-    standing: SlotStatus
+    status: SlotStatus
     hears_us: bool
     """True if the link works both ways: the neighbor's own hello names the sender of this hello."""
     relay: bool = False
@@ -66,10 +66,10 @@ class Claims(NamedTuple):
         return CLAIMS.layout.pack(
             self.node,
             *(h.node for h in chunk), *unused,
-            *(_slot(h.standing) for h in chunk), *unused,
-            *(h.standing.length for h in chunk), *unused,
-            *(min(h.standing.crowd, _MOST) for h in chunk), *unused,
-            *(h.standing.lots | _HEARS_US * h.hears_us | _RELAY * h.relay for h in chunk), *unused,
+            *(_slot(h.status) for h in chunk), *unused,
+            *(h.status.length for h in chunk), *unused,
+            *(min(h.status.crowd, _MOST) for h in chunk), *unused,
+            *(h.status.lots | _HEARS_US * h.hears_us | _RELAY * h.relay for h in chunk), *unused,
             _slot(self.own), self.own.length, min(self.own.crowd, _MOST), self.own.lots, len(chunk), VERSION,
         )  # fmt: skip
 
@@ -83,17 +83,17 @@ class Claims(NamedTuple):
         for node, *lists, slot, length, crowd, lots, count, version in messages:
             if version != VERSION or count > CAPACITY or lots > MOST_LOTS or not 0 < node <= MAX_NODES:
                 raise MalformedFrameError(f"claims of version {version}, node {node}, {count} entries, {lots} lots")
-            own = _standing(slot, length, crowd, lots)
+            own = _status(slot, length, crowd, lots)
             columns = (lists[at * CAPACITY : at * CAPACITY + count] for at in range(5))
             heard += (_heard(*row) for row in zip(*columns, strict=True))
         return cls(NodeId(node), own, tuple(heard))
 
 
-def _slot(standing: SlotStatus) -> int:
-    return NO_SLOT if standing.slot is None else standing.slot
+def _slot(status: SlotStatus) -> int:
+    return NO_SLOT if status.slot is None else status.slot
 
 
-def _standing(slot: int, length: int, crowd: int, lots: int) -> SlotStatus:
+def _status(slot: int, length: int, crowd: int, lots: int) -> SlotStatus:
     if slot != NO_SLOT and slot >= length:
         raise MalformedFrameError(f"slot {slot} of a superframe of {length}")
     return SlotStatus(None if slot == NO_SLOT else slot, length, crowd, lots)
@@ -102,5 +102,5 @@ def _standing(slot: int, length: int, crowd: int, lots: int) -> SlotStatus:
 def _heard(node: int, slot: int, length: int, crowd: int, facts: int) -> HeardNeighbor:
     if not 0 < node <= MAX_NODES or facts & ~_KNOWN:
         raise MalformedFrameError(f"a claim of node {node}, facts {facts}")
-    standing = _standing(slot, length, crowd, facts & MOST_LOTS)
-    return HeardNeighbor(NodeId(node), standing, bool(facts & _HEARS_US), bool(facts & _RELAY))
+    status = _status(slot, length, crowd, facts & MOST_LOTS)
+    return HeardNeighbor(NodeId(node), status, bool(facts & _HEARS_US), bool(facts & _RELAY))

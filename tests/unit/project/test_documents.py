@@ -12,6 +12,7 @@ PAGES = sorted(
 )
 _LINK = re.compile(r"\]\(([^)#\s]*)(#[^)\s]+)?\)")
 _FILE = re.compile(r"(?<![\w./-])((?:fanet_mw|agents|emulator|sim|tests|scripts|docs|examples)/[\w./-]*\w)(?![\w*{<])")
+_ALONE = re.compile(r"`([a-z]\w*\.py)`")
 
 
 def links(page: Path) -> Iterator[Path]:
@@ -39,6 +40,13 @@ def test_every_file_of_ours_that_source_text_names_exists() -> None:
     assert sources
     missing = {name: str(source) for source in sources for name in names(source) if not (ROOT / name).exists()}
     assert not missing
+
+
+def test_a_file_that_source_text_names_by_itself_lies_beside_it() -> None:
+    sources = [path for folder in ("fanet_mw", "agents", "emulator", "sim") for path in (ROOT / folder).rglob("*.py")]
+    named = ((source, name) for source in sources for name in _ALONE.findall(source.read_text(encoding="utf-8")))
+    astray = [(str(source), name) for source, name in named if not (source.parent / name).exists()]
+    assert not astray, "a file of another folder is named with its path"
 
 
 def anchor(heading: str) -> str:

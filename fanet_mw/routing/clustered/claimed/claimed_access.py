@@ -120,8 +120,8 @@ class ClaimedAccess:
             self._gradient.join(NO_HEAD, now_ns=now_ns)
             for packet in self._queue.drain():
                 self.forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
-        standing = self._claiming.standing(waiting=len(self._queue), now_ns=now_ns)
-        return Claims(self._port.node, standing, self._claiming.near.heard(now_ns=now_ns))
+        status = self._claiming.slot_status(waiting=len(self._queue), now_ns=now_ns)
+        return Claims(self._port.node, status, self._claiming.near.heard(now_ns=now_ns))
 
     def on_claims(self, claims: Claims, beacon: Beacon, *, now_ns: int) -> None:
         self._claiming.on_claims(claims, now_ns=now_ns)

@@ -12,7 +12,7 @@ from math import ceil
 from typing import Final
 
 from fanet_mw.node.contract import Port
-from fanet_mw.node.neighbors import LIFETIME_HELLOS
+from fanet_mw.node.neighbors import neighbor_lifetime_ns
 from fanet_mw.routing.clustered.claimed.own_turns import OwnTurns, Share, draws
 from fanet_mw.routing.clustered.claimed.slot_claims import SlotClaim, SlotClaims, SlotHello
 from fanet_mw.routing.clustered.relaying.neighborhood import Neighborhood
@@ -73,10 +73,9 @@ class Claiming:
     def __init__(self, port: Port, own: OwnTurns) -> None:
         self._port = port
         self._hello_ns = seconds_to_ns(port.scenario.routing.hello_interval_s)
+        self._lifetime_ns = neighbor_lifetime_ns(port.scenario.routing.hello_interval_s)
         self.own = own
-        self.near = Neighborhood(
-            port.node, lifetime_ns=self._lifetime_ns, rank=lambda _, standing: _rank(standing.slot)
-        )
+        self.near = Neighborhood(port.node, lifetime_ns=self._lifetime_ns, rank=lambda _, status: _rank(status.slot))
         self._longest = longest_superframe(own.turns)
         self._load = ClaimedLoad(0)
         self._claims = self._new_claims(0)
@@ -85,11 +84,6 @@ class Claiming:
         """The instant at which the node's claim last changed."""
         self._news = False
         """True if hellos have changed something since the node last drew for unclaimed turns."""
-
-    @property
-    def _lifetime_ns(self) -> int:
-        """The time after a neighbor's last hello at which the neighbor and its claim are forgotten."""
-        return int(LIFETIME_HELLOS * self._hello_ns)
 
     def _new_claims(self, now_ns: int) -> SlotClaims:
         slots = self._port.scenario.clusters.slots
@@ -121,7 +115,7 @@ class Claiming:
             return Change.NONE
         return Change.WON if before is None else Change.LOST
 
-    def standing(self, *, waiting: int, now_ns: int) -> SlotStatus:
+    def slot_status(self, *, waiting: int, now_ns: int) -> SlotStatus:
         """What the node's next hello states about its own slot, while `waiting` packets wait for its turns."""
         claim = self._claims.own
         turns_per_s = len(self.own.claimed()) * S / self.own.turns.period_ns
@@ -132,19 +126,19 @@ class Claiming:
 
     def on_claims(self, claims: Claims, *, now_ns: int) -> None:
         """A neighbor's hello was received, with the claims that it states."""
-        heard = tuple(self.claim_of(h.node, h.standing) for h in claims.heard)
+        heard = tuple(self.claim_of(h.node, h.status) for h in claims.heard)
         self._claims.on_hello(SlotHello(self.claim_of(claims.node, claims.own), heard), now_ns=now_ns)
         self._news |= self.near.on_claims(claims, now_ns=now_ns)
 
-    def claim_of(self, node: NodeId, standing: SlotStatus) -> SlotClaim:
+    def claim_of(self, node: NodeId, status: SlotStatus) -> SlotClaim:
         """The claim that a received statement makes; none if it names a slot that no superframe can hold."""
-        slot, length = standing.slot, standing.length
+        slot, length = status.slot, status.length
         fixed = self._port.scenario.clusters.slots
         if fixed:
             return SlotClaim(node, slot if length == fixed else None)
         if length > self._longest or length & (length - 1):
-            return SlotClaim(node, None, crowd=standing.crowd)
-        return SlotClaim(node, slot, length=length, crowd=standing.crowd)
+            return SlotClaim(node, None, crowd=status.crowd)
+        return SlotClaim(node, slot, length=length, crowd=status.crowd)
 
     # --- in between -----------------------------------------------------------------------------------------------
 
@@ -159,7 +153,7 @@ class Claiming:
             self.own.draws = None
         elif self._news or self.own.draws is None or self.own.draws.lots != lots:
             self._news = False
-            said = self.near.standings(now_ns=now_ns)
+            said = self.near.slot_statuses(now_ns=now_ns)
             shares = ((n, None if s.slot is None or not s.length else Share(s.slot, s.length)) for n, s in said)
             self.own.draws = draws(self._port.node, lots, shares, ((n, s.lots) for n, s in said))
 

@@ -1,7 +1,7 @@
 """Methods that divide nodes into clusters, all behind one contract (`Clustering`); `clusters.method` names one.
 
 `bisection` needs positions only. `election` ranks nodes (lowest-ID, highest degree, WCA, lasting degree) and keeps
-heads that are good enough. In `affinity`, neighbors vote for each other. `maintenance` adapts standing clusters step by
+heads that are good enough. In `affinity`, neighbors vote for each other. `maintenance` adapts present clusters step by
 step. `division` is what a leader uses: it asks one of these for clusters when they are due. `succession` is the order
 in which the members of a cluster stand in for their head, `mobility` how long a link between two nodes will last.
 """

@@ -63,10 +63,10 @@ class Division:
         return self._over_time.step(swarm, now_ns=now_ns)
 
     def renew(
-        self, standing: Sequence[Cluster], swarm: Swarm, stand_ins: Mapping[NodeId, NodeId], *, now_ns: int
+        self, present: Sequence[Cluster], swarm: Swarm, stand_ins: Mapping[NodeId, NodeId], *, now_ns: int
     ) -> list[Cluster]:
-        """The clusters from now on, in the order of their slots; the standing ones if they are good enough."""
-        kept = carried_on(standing, swarm, stand_ins)
+        """The clusters from now on, in the order of their slots; the present ones if they are good enough."""
+        kept = carried_on(present, swarm, stand_ins)
         fresh = self.divide(swarm._replace(previous=kept), now_ns=now_ns)
         if kept and self._keeps_promise(kept, len(fresh), swarm.adjacency):
             fair = math.ceil(len(swarm.adjacency) / len(kept)) if self._count else len(swarm.adjacency)
@@ -101,11 +101,11 @@ def _distance(head: NodeId, members: Sequence[NodeId], adjacency: Adjacency) -> 
     return sum(hops.get(member, len(adjacency)) for member in members)
 
 
-def carried_on(standing: Sequence[Cluster], swarm: Swarm, stand_ins: Mapping[NodeId, NodeId]) -> list[Cluster]:
-    """The standing clusters, without the nodes that are gone and with the new ones."""
+def carried_on(present: Sequence[Cluster], swarm: Swarm, stand_ins: Mapping[NodeId, NodeId]) -> list[Cluster]:
+    """The present clusters, without the nodes that are gone and with the new ones."""
     here = swarm.adjacency
     clusters = []
-    for cluster in standing:
+    for cluster in present:
         members = [node for node in cluster.members if node in here]
         if members:
             stand_in = stand_ins.get(cluster.head, cluster.head)

@@ -9,7 +9,7 @@ which nodes are ranked (lower is better; of equal scores the lower id):
     WCA              Chatterjee, Das & Turgut 2002             w1 |d - d0| + w2 distances + w3 mobility + w4 energy used
     lasting degree   (new here)                                neighbors, by how long they will be in range
 
-Hysteresis: the score of a standing head is improved by `keep`. If `keep` is infinite, a head is deposed only by a
+Hysteresis: the score of a present head is improved by `keep`. If `keep` is infinite, a head is deposed only by a
 better head in range (least cluster change, Chiang et al. 1997); pairs of heads under `truce` may hear each other for
 the time being. A member keeps its head as long as it hears it. The method `balanced`, the default, chooses heads in the
 middle of equal parts instead (`bisection.py`). What happens when a head falls silent is in `roles/failover.py`.
@@ -81,7 +81,7 @@ class LastingDegree(NamedTuple):
 
 
 class Elected(NamedTuple):
-    """A method of this file: a score, and the improvement of a standing head's score."""
+    """A method of this file: a score, and the improvement of a present head's score."""
 
     score: Score
     keep: float = 0.0
@@ -93,8 +93,8 @@ class Elected(NamedTuple):
 
     def divide(self, swarm: Swarm) -> list[Cluster]:
         scores = {node: self.score(node, swarm) for node in sorted(swarm.adjacency)}
-        standing = frozenset(heads_of(swarm.previous))
-        ranks = {node: (score - self.keep if node in standing else score, score) for node, score in scores.items()}
+        present = frozenset(heads_of(swarm.previous))
+        ranks = {node: (score - self.keep if node in present else score, score) for node, score in scores.items()}
         heads = _elect(swarm.adjacency, ranks, self.truce)
         return _gather(swarm, heads)
 

@@ -1,6 +1,6 @@
 """Adapts clusters over time: heads stay as long as they can, and two heads that meet wait before one gives way.
 
-Each step divides the swarm anew, with the standing heads kept (least cluster change). Two heads that come into range of
+Each step divides the swarm anew, with the present heads kept (least cluster change). Two heads that come into range of
 each other have a truce for a time, because often they only pass each other (cluster contention interval, Basu et al.
 2001). If they still hear each other when it ends, the one with the worse score steps down. With `patient`, such a head
 stays as long as it has a member that hears no other head, because that member would become a head itself (new here).

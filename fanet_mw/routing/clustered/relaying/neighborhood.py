@@ -65,7 +65,7 @@ class Neighborhood:
         """True if this node belongs to the relays of all floods."""
         alive = self.alive(now_ns=now_ns)
         if self._belongs is None:
-            rank = {h.node: self._rank(h.node, h.standing) for claims in alive for h in claims.heard}
+            rank = {h.node: self._rank(h.node, h.status) for claims in alive for h in claims.heard}
             rank.update((claims.node, self._rank(claims.node, claims.own)) for claims in alive)
             rank[self._node] = own_rank
             self._belongs = dominates(self._node, self.adjacency(now_ns=now_ns), priority=rank)
@@ -75,13 +75,13 @@ class Neighborhood:
         """Ranks have changed, so whether this node relays must be computed anew."""
         self._belongs = None
 
-    def standings(self, *, now_ns: int) -> list[tuple[NodeId, SlotStatus]]:
+    def slot_statuses(self, *, now_ns: int) -> list[tuple[NodeId, SlotStatus]]:
         """The slot status of every node within two hops: its own statement, or the statements of all neighbors that
         hear it.
         """
         alive = self.alive(now_ns=now_ns)
         known = frozenset(claims.node for claims in alive) | {self._node}
-        others = [(h.node, h.standing) for claims in alive for h in claims.heard if h.node not in known]
+        others = [(h.node, h.status) for claims in alive for h in claims.heard if h.node not in known]
         return [(claims.node, claims.own) for claims in alive] + others
 
     def chosen_by(self, neighbor: NodeId) -> bool:
@@ -108,4 +108,4 @@ class Neighborhood:
 
 def _matters(claims: Claims) -> tuple[object, ...]:
     """Those parts of a neighbor's claims on which it depends whether this node relays."""
-    return claims.own.slot is None, tuple((h.node, h.hears_us, h.standing.slot is None) for h in claims.heard)
+    return claims.own.slot is None, tuple((h.node, h.hears_us, h.status.slot is None) for h in claims.heard)

@@ -79,7 +79,7 @@ class AssignedRoles:
         self._timetabling = timetabling
         self._make_leader = make_leader
         self._leader: Leader | None = None
-        self._standing = parts.membership.standing
+        self._place = parts.membership.place
         """The role of this node, as the access was last told."""
 
     def start(self, now_ns: int) -> None:
@@ -204,13 +204,13 @@ class AssignedRoles:
                 self._join(now_ns, instead_of=silent)
             elif parts.failover.placed:
                 parts.joining.rest()
-        if self._standing != parts.membership.standing:
-            self._standing = parts.membership.standing
+        if self._place != parts.membership.place:
+            self._place = parts.membership.place
             self._change_role(now_ns)
 
     def _change_role(self, now_ns: int) -> None:
-        self._gradient.join(self._standing.head, now_ns=now_ns)
-        self._port.record(self._standing.at(now_ns, self._port.node))
+        self._gradient.join(self._place.head, now_ns=now_ns)
+        self._port.record(self._place.at(now_ns, self._port.node))
         if self.parts.membership.is_head:
             self._access.serve(now_ns)
 

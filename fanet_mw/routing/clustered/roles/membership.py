@@ -1,7 +1,8 @@
 """The cluster of a node by the newest schedule, whose parts may arrive in any order.
 
 A schedule lists the members of each cluster in the order in which they stand in for each other, the head first. A node
-that is in no part of a complete schedule belongs to no cluster.
+that is in no part of a complete schedule belongs to no cluster. `joining.py` decides when a node asks for a place,
+`states.py` how its role changes.
 """
 
 from collections.abc import Mapping
@@ -47,7 +48,7 @@ class Membership:
         self._node = node
         self.version: Version | None = None
         """The schedule of which parts have arrived; None before the first one."""
-        self.standing = _NOWHERE
+        self.place = _NOWHERE
         """The place of the node at present, which a failover may change before the next schedule does."""
         self.superframe: Superframe | None = None
         """The superframe with the slots of all clusters; None until a schedule has told this node's place."""
@@ -66,16 +67,16 @@ class Membership:
 
     @property
     def role(self) -> Role:
-        return self.standing.role
+        return self.place.role
 
     @property
     def cluster(self) -> int:
-        return self.standing.cluster
+        return self.place.cluster
 
     @property
     def head(self) -> NodeId:
         """The node that serves this node's cluster now: the head that the schedule names, or its stand-in."""
-        return self.standing.head
+        return self.place.head
 
     @property
     def assigned(self) -> bool:
@@ -159,15 +160,15 @@ class Membership:
     def obey(self) -> None:
         """Take the place that the schedule gives to this node."""
         assert self._named is not None, "only a node that a schedule names has a role to take"
-        self.standing = self._named
+        self.place = self._named
 
     def follow(self, head: NodeId) -> None:
         """Another member, or this node itself, serves the cluster from now on."""
-        self.standing = self.standing._replace(role=Role.HEAD if head == self._node else Role.MEMBER, head=head)
+        self.place = self.place._replace(role=Role.HEAD if head == self._node else Role.MEMBER, head=head)
 
     def resign(self) -> None:
         """Give up the place in the cluster until another schedule names this node."""
-        self.standing, self.succession, self._named, self._told = _NOWHERE, (), None, False
+        self.place, self.succession, self._named, self._told = _NOWHERE, (), None, False
 
     def forget(self) -> None:
         """Forget the schedule, so that the next one counts as new whatever its version is."""

@@ -1,5 +1,8 @@
-"""A transmit queue that is emptied in turns, one frame in each, announced one lead ahead. Subclasses know whose
-turns.
+"""Releases the queued packets of a node in its turns: one frame in each turn, announced to the radio one lead ahead.
+
+The base class in this file has the queue and the next turn. A subclass knows which turns the node has:
+`timetable/root_release.py` by a timetable, `timetable/call_release.py` for frames to neighbors alone, and
+`claimed/claimed_release.py` by claims.
 """
 
 from abc import ABC, abstractmethod

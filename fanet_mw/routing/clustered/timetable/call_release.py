@@ -1,8 +1,8 @@
-"""The queue of frames for a node's calls.
+"""Releases hellos, and packets that neighbors have missed, in a node's calls.
 
-A *call* is a turn in which a node sends one frame to its neighbors alone: a hello, or packets that neighbors have
-missed. No node relays the frame. Timetables for lossy links give calls to nodes (`redundant_scheduling.py`); other
-timetables have none.
+A timetable for lossy links gives each node *calls* (`redundant_scheduling.py`); other timetables have none. A call is a
+turn in which the node sends one frame that only its neighbors need, so no node relays it. Missed packets wait for a
+call in the queue of this file; a hello reserves the next call when it is due (`claim`).
 """
 
 from collections.abc import Sequence

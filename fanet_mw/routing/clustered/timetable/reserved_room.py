@@ -1,5 +1,7 @@
-"""Packets more urgent than bulk: the length of those that are known in advance, and the room that each turn
-reserves.
+"""The room that each turn of a timetable reserves for packets that are more urgent than bulk.
+
+A turn reserves room for one packet of each urgent class that the scenario uses: a collision warning, a survivor report.
+The lengths of these packets are known before take-off. `root_release.py` fills the room.
 """
 
 from collections.abc import Mapping

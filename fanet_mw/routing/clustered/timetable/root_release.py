@@ -6,7 +6,7 @@
 Each class of packets in use (`reserved_room.reserved`) has room of its own in a turn, so the wait of a bulk packet
 depends on nothing that comes later, such as reports or warnings. Only a leader's announcements delay its bulk. A packet
 that is larger than the room of its class waits like bulk. A turn is used only if its flood is over before the next
-timetable comes into force. `turn_timing.py` explains root, turn and span.
+timetable comes into force. `tdma/turn_timing.py` explains root, turn and span.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

@@ -24,13 +24,13 @@ def names(*nodes: int) -> tuple[NodeId, ...]:
     return tuple(map(NodeId, nodes))
 
 
-STANDING = [Cluster(NodeId(3), names(2, 3, 4)), Cluster(NodeId(6), names(5, 6, 7))]
+PRESENT = [Cluster(NodeId(3), names(2, 3, 4)), Cluster(NodeId(6), names(5, 6, 7))]
 LINE = {node: 200.0 * node for node in range(2, 8)}
 
 
 def test_what_is_good_enough_stays() -> None:
     division = Division("balanced", count=2, range_m=RANGE_M)
-    assert division.renew(STANDING, swarm_of(LINE), {}, now_ns=0) == STANDING
+    assert division.renew(PRESENT, swarm_of(LINE), {}, now_ns=0) == PRESENT
 
 
 def test_clusters_that_are_as_good_as_new_ones_stay_though_new_ones_would_be_others() -> None:
@@ -48,17 +48,17 @@ def test_clusters_that_share_the_load_badly_are_made_anew() -> None:
 
 def test_a_head_that_is_gone_is_followed_by_who_stands_in_for_it() -> None:
     places = {node: east for node, east in LINE.items() if node != 3}
-    assert carried_on(STANDING, swarm_of(places), {NodeId(3): NodeId(4)})[0] == Cluster(NodeId(4), names(2, 4))
+    assert carried_on(PRESENT, swarm_of(places), {NodeId(3): NodeId(4)})[0] == Cluster(NodeId(4), names(2, 4))
 
 
 def test_a_newcomer_goes_to_the_nearest_head() -> None:
-    kept = carried_on(STANDING, swarm_of({**LINE, 8: 1300.0}), {})
+    kept = carried_on(PRESENT, swarm_of({**LINE, 8: 1300.0}), {})
     assert kept[1].members == names(5, 6, 7, 8)
 
 
 def test_clusters_that_have_mixed_are_made_anew_and_heads_keep_their_slots() -> None:
     swarm = swarm_of({**LINE, 2: LINE[7], 7: LINE[2]})
-    clusters = Division("balanced", count=2, range_m=RANGE_M).renew(STANDING, swarm, {}, now_ns=0)
+    clusters = Division("balanced", count=2, range_m=RANGE_M).renew(PRESENT, swarm, {}, now_ns=0)
     assert [cluster.head for cluster in clusters] == [3, 6]
     assert [cluster.members for cluster in clusters] == [names(3, 4, 7), names(2, 5, 6)]
 

@@ -8,14 +8,14 @@ results into text.
 from fanet_mw.planner.cheapest_change import ScenarioChange, cheapest_change
 from fanet_mw.planner.demand import ClassPlan, TrafficClass, demands
 from fanet_mw.planner.feasibility import evaluate
+from fanet_mw.planner.flood_loss import Loss, loss
 from fanet_mw.planner.head_slot import ClusterPlan
-from fanet_mw.planner.loss import Loss, loss
 from fanet_mw.planner.lossy_plan import LossyPlan, plan_lossy
 from fanet_mw.planner.optimum import Optimum, optimum
 from fanet_mw.planner.plan import plan, with_capacity
+from fanet_mw.planner.plan_text import describe, describe_change, describe_loss, describe_lossy, describe_optimum
 from fanet_mw.planner.scenario_plan import ScenarioPlan
 from fanet_mw.planner.site import Site
-from fanet_mw.planner.text import describe, describe_change, describe_loss, describe_lossy, describe_optimum
 from fanet_mw.planner.variant import Variant, vary
 
 __all__ = [

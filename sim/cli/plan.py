@@ -1,4 +1,5 @@
-"""`fanet plan`: is a scenario feasible, before take-off? The planner is `fanet_mw.planner`.
+"""What `fanet plan` does: is a scenario feasible, before take-off? The planner is `fanet_mw.planner`; `runs.py` parses
+the command.
 
 Exit codes: 0 feasible, 1 not feasible, 2 the scenario or a flag is wrong (as with every command).
 """

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from functools import cache
 
 from fanet_mw.airtime import OVERHEAD_BYTES, Timing
-from fanet_mw.planner.loss import Chance
+from fanet_mw.planner.flood_loss import Chance
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId
 

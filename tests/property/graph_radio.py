@@ -16,7 +16,7 @@ from fanet_mw.node.node import Node
 from fanet_mw.rng import stream
 from fanet_mw.routing import make_protocol
 from fanet_mw.routing.clustered.clustered import Clustered
-from fanet_mw.routing.clustered.roles.assigned import AssignedRoles
+from fanet_mw.routing.clustered.roles.assigned_roles import AssignedRoles
 from fanet_mw.routing.clustered.roles.membership import Membership
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S

@@ -20,7 +20,7 @@ from typing import Final, NamedTuple
 from fanet_mw.bounds.arrivals import Arrivals, Periodic, Total
 from fanet_mw.bounds.bounded_or_refused import Bounded, DelayBound, Refused
 from fanet_mw.bounds.network_calculus import backlog, delay_fifo
-from fanet_mw.bounds.slot import SlotServer
+from fanet_mw.bounds.slot_service import SlotServer
 from fanet_mw.errors import LocalProtocolError
 
 _ROUNDS: Final = 500

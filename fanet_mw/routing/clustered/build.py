@@ -36,7 +36,7 @@ from fanet_mw.routing.clustered.relaying.neighbor_knowledge import (
 from fanet_mw.routing.clustered.relaying.neighborhood import Neighborhood
 from fanet_mw.routing.clustered.relaying.rules import CounterRule, GossipRule, RelayAll, Rule
 from fanet_mw.routing.clustered.relaying.scheduled import ScheduledRelaying
-from fanet_mw.routing.clustered.roles.assigned import AssignedRoles, RoleParts
+from fanet_mw.routing.clustered.roles.assigned_roles import AssignedRoles, RoleParts
 from fanet_mw.routing.clustered.roles.failover import Failover
 from fanet_mw.routing.clustered.roles.joining import Joining
 from fanet_mw.routing.clustered.roles.leader import Leader

@@ -1,4 +1,7 @@
-"""The mobility model `formation`: the whole layout moves as one and keeps its shape."""
+"""The mobility model `formation`: the world moves the whole layout as one, and it keeps its shape.
+
+Formations that UAVs fly by themselves are in `agents/mission/`: `formation_flight/` and `search_formation/`.
+"""
 
 import numpy as np
 import numpy.typing as npt

@@ -10,6 +10,7 @@ ROOT = Path(__file__).parents[3]
 PAGES = sorted(
     {*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "examples").rglob("*.md")} - {ROOT / "CHANGELOG.md"}
 )
+SOURCES = ("fanet_mw", "agents", "emulator", "sim")
 _LINK = re.compile(r"\]\(([^)#\s]*)(#[^)\s]+)?\)")
 _FILE = re.compile(r"(?<![\w./-])((?:fanet_mw|agents|emulator|sim|tests|scripts|docs|examples)/[\w./-]*\w)(?![\w*{<])")
 _ALONE = re.compile(r"`([a-z]\w*\.py)`")
@@ -43,10 +44,17 @@ def test_every_file_of_ours_that_source_text_names_exists() -> None:
 
 
 def test_a_file_that_source_text_names_by_itself_lies_beside_it() -> None:
-    sources = [path for folder in ("fanet_mw", "agents", "emulator", "sim") for path in (ROOT / folder).rglob("*.py")]
+    sources = [path for folder in SOURCES for path in (ROOT / folder).rglob("*.py")]
     named = ((source, name) for source in sources for name in _ALONE.findall(source.read_text(encoding="utf-8")))
     astray = [(str(source), name) for source, name in named if not (source.parent / name).exists()]
     assert not astray, "a file of another folder is named with its path"
+
+
+def test_every_file_that_an_explanation_names_by_itself_exists_somewhere() -> None:
+    ours = {path.name for folder in (*SOURCES, "tests", "scripts") for path in (ROOT / folder).rglob("*.py")}
+    pages = [page for page in PAGES if page.parent.name == "explanation"]
+    named = ((str(page), name) for page in pages for name in _ALONE.findall(page.read_text(encoding="utf-8")))
+    assert [(page, name) for page, name in named if name not in ours] == []
 
 
 def anchor(heading: str) -> str:

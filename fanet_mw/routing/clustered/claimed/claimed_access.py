@@ -17,7 +17,7 @@ interference from beyond two hops. No bound is stated if clocks disagree by more
 
 from collections.abc import Mapping
 
-from fanet_mw.bounds.turn_gaps import TurnServer
+from fanet_mw.bounds.turn_service import TurnServer
 from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet

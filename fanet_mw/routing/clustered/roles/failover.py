@@ -1,6 +1,7 @@
 """Failover of cluster heads and leaders: finds the events that change a node's state, and looks them up in the table.
 
-    announcements, stand-ins, signs of life, instants -> events -> `states.TRANSITIONS` -> actions for `assigned.py`
+    announcements, stand-ins, signs of life, instants -> events -> `states.TRANSITIONS`
+                                                                -> actions for `assigned_roles.py`
 
 `head_failure_detector.py` tells a member from when on its head is silent. Then the first member of the succession (the
 order in which a schedule lists the members of a cluster) stands in for the head, or a later member if none before it

@@ -12,7 +12,7 @@ frame remains. All neighbors count for a call. Whether a node disturbs a link de
 (`Network`).
 
 In flight, `turn_access.py` repeats a node's own packets, and `relaying/scheduled.py` its relays. Not modeled: that a
-relay may lack the packet although it has had enough copies (`planner/loss.py` includes that).
+relay may lack the packet although it has had enough copies (`fanet_mw/planner/flood_loss.py` includes that).
 """
 
 import math

@@ -8,8 +8,8 @@ from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.planner.cheapest_change import ScenarioChange
 from fanet_mw.planner.claimed_turns import ClaimedPlan
 from fanet_mw.planner.demand import ClassPlan
+from fanet_mw.planner.flood_loss import Loss
 from fanet_mw.planner.head_slot import ClusterPlan
-from fanet_mw.planner.loss import Loss
 from fanet_mw.planner.lossy_plan import Drawn, LossyPlan
 from fanet_mw.planner.optimum import Optimum
 from fanet_mw.planner.scenario_plan import ScenarioPlan

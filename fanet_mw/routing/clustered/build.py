@@ -203,23 +203,23 @@ def _slots(ground: _Ground, membership: Membership) -> SlotAccess:
 
 def _by_timetable(ground: _Ground) -> Clustered:
     port, scenario = ground.port, ground.port.scenario
-    plans = TimetablesInForce()
-    ground.contention.turns_at = plans.turns_at
+    timetables = TimetablesInForce()
+    ground.contention.turns_at = timetables.turns_at
     ground.contention.most_jitter_ns = round(scenario.clusters.contention_ms * MS * _JITTER)
     parts = _role_parts(ground, _membership(ground), takes_slot=False)
     lead_ns = scenario.radio.lead_ns
     roots = RootRelease(port.node, ground.queue(), reserved=reserved(scenario), lead_ns=lead_ns)
     calls = CallRelease(TxQueue(capacity=scenario.routing.queue_frames), lead_ns=lead_ns)
-    delays = StatedDelays(port, plans=plans, roots=roots, lease=parts.lease, admission=_admission(port))
+    delays = StatedDelays(port, timetables=timetables, roots=roots, lease=parts.lease, admission=_admission(port))
     access = TurnAccess(
-        port, plans=plans, roots=roots, calls=calls, slots=_slots(ground, parts.membership), delays=delays,
+        port, timetables=timetables, roots=roots, calls=calls, slots=_slots(ground, parts.membership), delays=delays,
         floods=ground.floods, contention=ground.contention,
     )  # fmt: skip
     timetabling = FromPlaces(
         port, lease=parts.lease, membership=parts.membership, refresh=parts.refresh, delays=delays, access=access
     )
     contending = ContendingRelaying(port, RelayAll(), ground.contention)
-    relaying = ScheduledRelaying(port, plans, contending)
+    relaying = ScheduledRelaying(port, timetables, contending)
     heard = HeardLoads(interval_s=scenario.traffic.interval_s) if scenario.hears_load else None
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,

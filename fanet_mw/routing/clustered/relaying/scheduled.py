@@ -25,9 +25,9 @@ from fanet_mw.wire import Kind
 class ScheduledRelaying:
     """The relays of one node, in the turns of its timetables."""
 
-    def __init__(self, port: Port, plans: TimetablesInForce, otherwise: Relaying) -> None:
+    def __init__(self, port: Port, timetables: TimetablesInForce, otherwise: Relaying) -> None:
         self._port = port
-        self._plans = plans
+        self._timetables = timetables
         self._otherwise = otherwise
         self._slack_ns = turn_slack_ns(port.scenario)
         self._missed = 0
@@ -37,17 +37,17 @@ class ScheduledRelaying:
         """The node has started; no packet is known yet."""
 
     def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[Relay]:
-        plan = self._plans.at(reception.end_ns)
-        if plan is None:
+        timetable = self._timetables.at(reception.end_ns)
+        if timetable is None:
             return self._otherwise.on_flood(packet, reception, at_once=at_once, now_ns=now_ns)
         foreign = False
         for instant_ns in (reception.end_ns, reception.end_ns + self._slack_ns):
-            turn = plan.turns.turn_at(instant_ns)
-            heard = None if turn is None else plan.heard.get((turn, reception.src))
+            turn = timetable.turns.turn_at(instant_ns)
+            heard = None if turn is None else timetable.heard.get((turn, reception.src))
             if heard is None:
                 continue
-            if not plan.whole or packet.header.origin == heard[1] or not plan.has_turns(packet.origin):
-                return self._in_turn(packet, plan, heard, instant_ns, now_ns)
+            if not timetable.whole or packet.header.origin == heard[1] or not timetable.has_turns(packet.origin):
+                return self._in_turn(packet, timetable, heard, instant_ns, now_ns)
             foreign = True  # the sender follows another timetable
         if not foreign and packet.header.kind != Kind.DATA:
             return self._otherwise.on_flood(packet, reception, at_once=at_once, now_ns=now_ns)
@@ -56,24 +56,25 @@ class ScheduledRelaying:
         return ()
 
     def _in_turn(
-        self, packet: Packet, plan: NodeTimetable, heard: tuple[int, NodeId, int], heard_ns: int, now_ns: int
+        self, packet: Packet, timetable: NodeTimetable, heard: tuple[int, NodeId, int], heard_ns: int, now_ns: int
     ) -> Sequence[Relay]:
         """The relays of this flood in those turns of the node that are still to come; `heard_ns` lies in the turn of
         reception.
         """
         offset, root, instance = heard
-        own = plan.mine.get((root, instance), ())
+        own = timetable.mine.get((root, instance), ())
         if not own:
             return ()
         if is_used_up(packet.header):
             self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
             return ()
         superframe_ns = (
-            plan.turns.superframe_start_ns(heard_ns) - offset // plan.turns.per_superframe * plan.turns.period_ns
+            timetable.turns.superframe_start_ns(heard_ns)
+            - offset // timetable.turns.per_superframe * timetable.turns.period_ns
         )
-        starts_ns = [plan.turns.start_ns(turn, superframe_start_ns=superframe_ns) for turn in own]
+        starts_ns = [timetable.turns.start_ns(turn, superframe_start_ns=superframe_ns) for turn in own]
         ahead_ns = [start_ns for start_ns in starts_ns if start_ns >= now_ns]
-        if not ahead_ns and (plan.odds is None or own[-1] > offset):
+        if not ahead_ns and (timetable.odds is None or own[-1] > offset):
             # A reception that came late has used up some of the lead, or all of it. Over lossy links the first copy
             # that arrives may be one that was sent after the node's own turns.
             self._missed += 1

@@ -15,12 +15,12 @@ from fanet_mw.routing.clustered.timetable.root_release import TurnsInForce
 class CallRelease(TurnRelease):
     """The queue of packets that neighbors have missed, and the node's next call."""
 
-    _plans: Sequence[TurnsInForce] = ()
+    _in_force: Sequence[TurnsInForce] = ()
     """The node's calls by each timetable that is in force or announced."""
 
-    def follow(self, plans: Sequence[TurnsInForce], *, now_ns: int) -> None:
+    def follow(self, in_force: Sequence[TurnsInForce], *, now_ns: int) -> None:
         """Take over the calls of new timetables, in the order in which they come into force."""
-        self._plans = plans
+        self._in_force = in_force
         self._arm(now_ns)
 
     def claim(self, *, not_before_ns: int, now_ns: int) -> int | None:
@@ -45,10 +45,10 @@ class CallRelease(TurnRelease):
 
     def _turn(self, earliest_ns: int) -> OwnTurn | None:
         """The first call from an instant on, by the timetable that is in force then."""
-        for index, plan in enumerate(self._plans):
-            if plan.offsets:
-                not_before_ns = max(earliest_ns, plan.valid_ns)
-                start_ns = plan.turns.next_start_ns(plan.offsets, not_before_ns=not_before_ns)
-                if index + 1 == len(self._plans) or start_ns < self._plans[index + 1].valid_ns:
-                    return OwnTurn(start_ns, plan.frame_bytes)
+        for index, calls in enumerate(self._in_force):
+            if calls.offsets:
+                not_before_ns = max(earliest_ns, calls.valid_ns)
+                start_ns = calls.turns.next_start_ns(calls.offsets, not_before_ns=not_before_ns)
+                if index + 1 == len(self._in_force) or start_ns < self._in_force[index + 1].valid_ns:
+                    return OwnTurn(start_ns, calls.frame_bytes)
         return None

@@ -18,7 +18,9 @@ _BUSY: Final = 2
 """The factor by which a round of repair takes longer because answers to other nodes wait in the same queue."""
 
 
-def likely_delay_ns(plan: NodeTimetable, node: NodeId, *, waiting: int, interval_ns: int, hello_ns: int) -> int | None:
+def likely_delay_ns(
+    timetable: NodeTimetable, node: NodeId, *, waiting: int, interval_ns: int, hello_ns: int
+) -> int | None:
     """The time within which `LIKELY_SHARE` of the copies of a node's packets arrive; None if fewer than that ever do.
 
     The wait for a turn is the longest that can occur, or the wait of the last of `waiting` packets if that is longer,
@@ -27,15 +29,15 @@ def likely_delay_ns(plan: NodeTimetable, node: NodeId, *, waiting: int, interval
     answer may wait for the next turn but one. Since the odds do not include everything, they account for only half of
     the copies that may be missing.
     """
-    turns, span = plan.turns, plan.table.spans[node]
-    assert plan.odds is not None, "whoever asks has a timetable for lossy links"
-    flood_ns = turns.worst_ns(plan.roots, span=span, interval_ns=interval_ns)
-    rounds = plan.odds.rounds(node, missed=(1 - LIKELY_SHARE) / 2)
-    if flood_ns is None or rounds is None or not plan.calls:
+    turns, span = timetable.turns, timetable.table.spans[node]
+    assert timetable.odds is not None, "whoever asks has a timetable for lossy links"
+    flood_ns = turns.worst_ns(timetable.roots, span=span, interval_ns=interval_ns)
+    rounds = timetable.odds.rounds(node, missed=(1 - LIKELY_SHARE) / 2)
+    if flood_ns is None or rounds is None or not timetable.calls:
         return None
-    call_ns = turns.done_ns(plan.calls, span=1)[0]
-    superframes, turn = divmod(max(waiting, 1) - 1, len(plan.roots))
-    queued_ns = superframes * turns.period_ns + turns.done_ns(plan.roots, span=span)[turn]
-    wait_ns = max(flood_ns, queued_ns) + turns.period_ns // len(plan.roots)
+    call_ns = turns.done_ns(timetable.calls, span=1)[0]
+    superframes, turn = divmod(max(waiting, 1) - 1, len(timetable.roots))
+    queued_ns = superframes * turns.period_ns + turns.done_ns(timetable.roots, span=span)[turn]
+    wait_ns = max(flood_ns, queued_ns) + turns.period_ns // len(timetable.roots)
     round_ns = _BUSY * (round(_LATE_HELLO * hello_ns) + 3 * call_ns)
     return wait_ns + (RIPE_NS if rounds else 0) + rounds * round_ns

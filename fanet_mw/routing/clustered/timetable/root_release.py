@@ -44,11 +44,11 @@ class RootRelease(TurnRelease):
         self._node = node
         self.reserved: Mapping[int, int] = dict(sorted(reserved.items()))
         """The number of bytes of each turn that bulk must leave free, by priority."""
-        self._plans: Sequence[TurnsInForce] = ()
+        self._in_force: Sequence[TurnsInForce] = ()
 
-    def follow(self, plans: Sequence[TurnsInForce], *, now_ns: int) -> None:
+    def follow(self, in_force: Sequence[TurnsInForce], *, now_ns: int) -> None:
         """Take over the turns of new timetables, in the order in which they come into force."""
-        self._plans = plans
+        self._in_force = in_force
         self._arm(now_ns)
 
     def has_turn(self, *, now_ns: int) -> bool:
@@ -125,10 +125,10 @@ class RootRelease(TurnRelease):
 
         Each turn is one of the timetable that is in force then. There is no end of them unless there is no timetable.
         """
-        for index, (valid_ns, turns, offsets, size, span) in enumerate(self._plans):
+        for index, (valid_ns, turns, offsets, size, span) in enumerate(self._in_force):
             if not offsets:
                 continue
-            until_ns = self._plans[index + 1].valid_ns if index + 1 < len(self._plans) else None
+            until_ns = self._in_force[index + 1].valid_ns if index + 1 < len(self._in_force) else None
             at_ns = max(earliest_ns, valid_ns)
             while True:
                 start_ns = turns.next_start_ns(offsets, not_before_ns=at_ns)

@@ -39,10 +39,16 @@ class StatedDelays:
     """The bounds and likely delays of one node's packets, by its timetables."""
 
     def __init__(
-        self, port: Port, *, plans: TimetablesInForce, roots: RootRelease, lease: Lease, admission: Admission | None
+        self,
+        port: Port,
+        *,
+        timetables: TimetablesInForce,
+        roots: RootRelease,
+        lease: Lease,
+        admission: Admission | None,
     ) -> None:
         self._port = port
-        self._plans = plans
+        self._timetables = timetables
         self._roots = roots
         self._lease = lease
         self._admission = admission
@@ -68,14 +74,14 @@ class StatedDelays:
 
     def follow(self, *, now_ns: int) -> None:
         """The newest timetable has changed, or there is none any more."""
-        if self._plans.newest is None:
+        if self._timetables.newest is None:
             self._bounds_ns = []
             self._admit(None, now_ns=now_ns)
             return
         own = self.own()
         self._admit(None if self._lease.leads else own, now_ns=now_ns)
-        *before, newest = self._plans.in_order
-        kept = [(plan, bounds_ns) for plan, bounds_ns in self._bounds_ns if any(plan is other for other in before)]
+        *before, newest = self._timetables.in_order
+        kept = [(older, bounds_ns) for older, bounds_ns in self._bounds_ns if any(older is other for other in before)]
         self._bounds_ns = [*kept, (newest, self.class_bounds_ns(own))]
 
     def _admit(self, own: RootTurns | None, *, now_ns: int) -> None:
@@ -85,16 +91,18 @@ class StatedDelays:
 
     def own(self) -> RootTurns | None:
         """The node's share of the newest timetable; None if it states no bounds, as when frames may be lost."""
-        plan = None if self._port.scenario.measures_links else self._plans.newest
-        if plan is None or not plan.roots or not plan.whole or plan.table.uncovered[self._port.node]:
+        timetable = None if self._port.scenario.measures_links else self._timetables.newest
+        if timetable is None or not timetable.roots or not timetable.whole:
             return None
-        return self._own_of(self._port.node, plan)
+        if timetable.table.uncovered[self._port.node]:
+            return None
+        return self._own_of(self._port.node, timetable)
 
-    def _own_of(self, node: NodeId, plan: NodeTimetable) -> RootTurns:
-        offsets = plan.roots if node == self._port.node else tuple(plan.table.offsets_of(node))
+    def _own_of(self, node: NodeId, timetable: NodeTimetable) -> RootTurns:
+        offsets = timetable.roots if node == self._port.node else tuple(timetable.table.offsets_of(node))
         around_ns = self._lead_ns + receipt_ns(self._port.scenario)
-        load = plan.loads.get(node, AS_EXPECTED)
-        return RootTurns(plan.turns, offsets, plan.table.spans[node], plan.together, around_ns, load)
+        load = timetable.loads.get(node, AS_EXPECTED)
+        return RootTurns(timetable.turns, offsets, timetable.table.spans[node], timetable.together, around_ns, load)
 
     def class_bounds_ns(self, own: RootTurns | None) -> Mapping[int, int]:
         """The bounds by priority; a class whose losses are repaired has none."""
@@ -112,21 +120,23 @@ class StatedDelays:
 
     def notice_ns(self, now_ns: int) -> int:
         """How long ahead another timetable must be announced, so that all promises by those in force can be kept."""
-        in_force = self._plans.in_order[self._plans.superseded(now_ns) :]
-        return max((self._ahead_ns(plan) for plan in in_force), default=0)
+        in_force = self._timetables.in_order[self._timetables.superseded(now_ns) :]
+        return max((self._ahead_ns(timetable) for timetable in in_force), default=0)
 
-    def _ahead_ns(self, plan: NodeTimetable) -> int:
+    def _ahead_ns(self, timetable: NodeTimetable) -> int:
         """How long before the end of this timetable that end must be announced.
 
         All nodes know of it after a superframe and a flood; until then they may promise what must be over by that end.
         """
-        if self._ahead is None or self._ahead[0] is not plan:
-            roots = {turn.root for turn in plan.table.roots()} if plan.whole else set()
-            owns = [self._own_of(root, plan) for root in sorted(roots)]
+        if self._ahead is None or self._ahead[0] is not timetable:
+            roots = {turn.root for turn in timetable.table.roots()} if timetable.whole else set()
+            owns = [self._own_of(root, timetable) for root in sorted(roots)]
             bounds = [bound_ns for own in owns for bound_ns in self.class_bounds_ns(own).values()]
             floods = [own.turns.flood_ns(offset, span=own.span) for own in owns for offset in own.roots]
-            learnt_ns = plan.turns.period_ns + max(floods, default=0) + self._lead_ns + receipt_ns(self._port.scenario)
-            self._ahead = plan, max(HEARD_NS, learnt_ns + max(bounds)) if bounds else HEARD_NS
+            learnt_ns = (
+                timetable.turns.period_ns + max(floods, default=0) + self._lead_ns + receipt_ns(self._port.scenario)
+            )
+            self._ahead = timetable, max(HEARD_NS, learnt_ns + max(bounds)) if bounds else HEARD_NS
         return self._ahead[1]
 
     # --- packets --------------------------------------------------------------------------------------------------
@@ -143,7 +153,7 @@ class StatedDelays:
         gives it no bound.
         """
         priority = packet.header.priority
-        bounds = [bounds_ns.get(priority) for _, bounds_ns in self._bounds_ns[self._plans.superseded(now_ns) :]]
+        bounds = [bounds_ns.get(priority) for _, bounds_ns in self._bounds_ns[self._timetables.superseded(now_ns) :]]
         known = [bound_ns for bound_ns in bounds if bound_ns is not None]
         if not known or len(known) < len(bounds) or not self._in_step():
             return None
@@ -153,7 +163,7 @@ class StatedDelays:
 
     def state(self, packet: Packet, bound_ns: int | None, *, through_ns: int | None, now_ns: int) -> None:
         """Record the bound or likely delay of a packet that was just accepted, whose flood is over at `through_ns`."""
-        newest = self._plans.newest
+        newest = self._timetables.newest
         if bound_ns is not None and through_ns is not None and newest is not None:
             had_ns = through_ns + receipt_ns(self._port.scenario)
             # every timetable that comes into force before this instant has been announced already
@@ -216,16 +226,16 @@ class StatedDelays:
         """The time within which `LIKELY_SHARE` of the nodes have this node's newest packet over lossy links; None if it
         is not known.
         """
-        plan = self._plans.newest
-        if plan is None or plan.odds is None or not plan.roots:
+        timetable = self._timetables.newest
+        if timetable is None or timetable.odds is None or not timetable.roots:
             return None
-        if self._lease.leads or plan.table.uncovered[self._port.node] or not self._in_step():
+        if self._lease.leads or timetable.table.uncovered[self._port.node] or not self._in_step():
             return None  # schedules go before the leader's own packets
-        if len(plan.table.spans) < self._port.scenario.nodes.count:
+        if len(timetable.table.spans) < self._port.scenario.nodes.count:
             return None  # the swarm is separated or not complete: some node is in no turn of this timetable
-        load = plan.loads.get(self._port.node, AS_EXPECTED)
+        load = timetable.loads.get(self._port.node, AS_EXPECTED)
         found_ns = likely_delay_ns(
-            plan,
+            timetable,
             self._port.node,
             waiting=len(self._roots),
             interval_ns=interval_ns_of(load, expected_ns=self._interval_ns),

@@ -16,28 +16,28 @@ class TimetablesInForce:
 
     def at(self, t_ns: int) -> NodeTimetable | None:
         """The newest timetable that is in force at an instant."""
-        for plan in reversed(self.in_order):
-            if plan.valid_ns <= t_ns:
-                return plan
+        for timetable in reversed(self.in_order):
+            if timetable.valid_ns <= t_ns:
+                return timetable
         return None
 
     def turns_at(self, t_ns: int) -> Turns | None:
         """The superframe that is in force at an instant."""
-        plan = self.at(t_ns)
-        return None if plan is None else plan.turns
+        timetable = self.at(t_ns)
+        return None if timetable is None else timetable.turns
 
     def superseded(self, now_ns: int) -> int:
         """The number of timetables, the oldest first, that are no longer in force."""
-        return sum(plan.valid_ns <= now_ns for plan in self.in_order[1:])
+        return sum(timetable.valid_ns <= now_ns for timetable in self.in_order[1:])
 
-    def follow(self, plan: NodeTimetable | None, *, now_ns: int) -> None:
+    def follow(self, timetable: NodeTimetable | None, *, now_ns: int) -> None:
         """Follow a newer timetable; None: follow none.
 
         Timetables are forgotten that are no longer in force, or that would come into force after it: they are those of
         a leader over which another one prevails.
         """
-        if plan is None:
+        if timetable is None:
             self.in_order = []
             return
-        before = (older for older in self.in_order[self.superseded(now_ns) :] if older.valid_ns < plan.valid_ns)
-        self.in_order = [*before, plan]
+        before = (older for older in self.in_order[self.superseded(now_ns) :] if older.valid_ns < timetable.valid_ns)
+        self.in_order = [*before, timetable]

@@ -166,7 +166,7 @@ class FromPlaces:
         if self._planned is not None and self._planned != version:
             announced_ns[self._planned] = self._announced_ns.get(self._planned, 0)
         self._announced_ns = announced_ns
-        self._plan_if_complete(now_ns)
+        self._compute_if_complete(now_ns)
 
     def on_links(self, packet: Packet, *, now_ns: int) -> None:
         """A part of the links of an assignment was received, which may arrive before its schedule."""
@@ -183,15 +183,15 @@ class FromPlaces:
         self._measured[told.part] = told
         if version == self._membership.version:
             self._refresh.keep(packet, _LINKS_PART + told.part, version.authority, version.epoch, now_ns=now_ns)
-        self._plan_if_complete(now_ns)
+        self._compute_if_complete(now_ns)
 
-    def _plan_if_complete(self, now_ns: int) -> None:
+    def _compute_if_complete(self, now_ns: int) -> None:
         """Compute the timetable once, when all parts of this version and of its links have arrived."""
         version = self._version
         due = version is not None and version == self._membership.version and version != self._planned
         if due and self._is_complete():
             self._planned = version
-            self._plan(now_ns)
+            self._compute(now_ns)
         self._delays.announced_ns = 0 if self._planned is None else self._announced_ns.get(self._planned, 0)
 
     def _is_complete(self) -> bool:
@@ -205,7 +205,7 @@ class FromPlaces:
         first = next(iter(self._measured.values()), None)
         return first is not None and _version_of(first) == self._version and len(self._measured) >= first.parts
 
-    def _plan(self, now_ns: int) -> None:
+    def _compute(self, now_ns: int) -> None:
         parts = [self._schedules[part] for part in sorted(self._schedules)]
         schedule, details = parts[0]
         at: dict[NodeId, Enu] = {NodeId(schedule.leader): details.places.leader}
@@ -227,8 +227,8 @@ class FromPlaces:
         head_of = {node: heads[cluster] for node, cluster in sorted(cluster_of.items())}
         found = self._fit(schedule, at, head_of, measured, loads or NO_LOADS)
         # None if not even one packet of each head fits; `fanet plan` tells the user
-        plan = None if found is None else NodeTimetable.of(self._port.node, schedule.start_us * US, found)
-        self._access.follow(plan, now_ns=now_ns)
+        timetable = None if found is None else NodeTimetable.of(self._port.node, schedule.start_us * US, found)
+        self._access.follow(timetable, now_ns=now_ns)
 
     def _fit(
         self,

@@ -36,7 +36,7 @@ class TurnAccess:
         self,
         port: Port,
         *,
-        plans: TimetablesInForce,
+        timetables: TimetablesInForce,
         roots: RootRelease,
         calls: CallRelease,
         slots: SlotAccess,
@@ -45,7 +45,7 @@ class TurnAccess:
         contention: ContentionTiming,
     ) -> None:
         self._port = port
-        self._plans = plans
+        self._timetables = timetables
         self._roots = roots
         self._calls = calls
         self._slots = slots
@@ -60,16 +60,16 @@ class TurnAccess:
 
     # --- timetables and roles -------------------------------------------------------------------------------------
 
-    def follow(self, plan: NodeTimetable | None, *, now_ns: int) -> None:
+    def follow(self, timetable: NodeTimetable | None, *, now_ns: int) -> None:
         """Follow a timetable that comes into force later, or that of another leader, which may be in force already. The
         node changes to the latter only when what it promised under the former one has gone. None: no timetable fits.
         """
-        if plan is not None:
-            plan = plan._replace(valid_ns=max(plan.valid_ns, self._delays.kept_until_ns(now_ns)))
-        self._plans.follow(plan, now_ns=now_ns)
+        if timetable is not None:
+            timetable = timetable._replace(valid_ns=max(timetable.valid_ns, self._delays.kept_until_ns(now_ns)))
+        self._timetables.follow(timetable, now_ns=now_ns)
         self._delays.follow(now_ns=now_ns)
         self.use_turns(now_ns)
-        if plan is None:
+        if timetable is None:
             self._calls.drain()  # neighbors will state again what they lack
         stranded = [] if self._roots.has_turn(now_ns=now_ns) else self._stranded(now_ns)
         for packet in [*stranded, *self._slots.drain()]:
@@ -94,14 +94,15 @@ class TurnAccess:
 
     def use_turns(self, now_ns: int) -> None:
         """Use the turns of the timetables that are followed."""
-        plans, node = self._plans.in_order, self._port.node
-        roots = [(plan, plan.table.spans.get(node, 1)) for plan in plans]
+        timetables, node = self._timetables.in_order, self._port.node
+        roots = [(one, one.table.spans.get(node, 1)) for one in timetables]
         self._roots.follow(
-            [TurnsInForce(plan.valid_ns, plan.turns, plan.roots, plan.frame_bytes, span) for plan, span in roots],
+            [TurnsInForce(one.valid_ns, one.turns, one.roots, one.frame_bytes, span) for one, span in roots],
             now_ns=now_ns,
         )
         self._calls.follow(
-            [TurnsInForce(plan.valid_ns, plan.turns, plan.calls, plan.frame_bytes, 1) for plan in plans], now_ns=now_ns
+            [TurnsInForce(one.valid_ns, one.turns, one.calls, one.frame_bytes, 1) for one in timetables],
+            now_ns=now_ns,
         )
 
     def serve(self, now_ns: int) -> None:
@@ -138,7 +139,7 @@ class TurnAccess:
 
     def _let_out(self, packet: Packet, *, last: bool = False, now_ns: int) -> None:
         """Queue a packet for the turns of this node; with `last` it goes behind all others, including later ones."""
-        newest = self._plans.newest
+        newest = self._timetables.newest
         assert newest is not None, "a node without a timetable has no turn"
         size = newest.frame_bytes
         if packet.header.kind == Kind.DATA:
@@ -154,10 +155,10 @@ class TurnAccess:
     def flood_control(
         self, kind: Kind, inner: bytes, *, now_ns: int, urgent: bool = False, patient: bool = False
     ) -> Packet:
-        plan = self._plans.at(now_ns + self._lead_ns)
-        bound = plan is not None and plan.odds is None
+        timetable = self._timetables.at(now_ns + self._lead_ns)
+        bound = timetable is not None and timetable.odds is None
         last = kind is Kind.JOIN and not urgent and bound
-        if plan is None or not plan.roots or (last and (not patient or len(self._roots))):
+        if timetable is None or not timetable.roots or (last and (not patient or len(self._roots))):
             # Turns serve packets with a bound. A join uses a turn that nothing else needs if it can wait for one, and
             # any turn if there is no bound. An announcement does not wait for turns of a timetable yet to come.
             return self._floods.contend_control(kind, inner, now_ns=now_ns)
@@ -176,16 +177,16 @@ class TurnAccess:
         key = key_of_packet(packet)
         if self._roots.holds(key):
             return
-        plan = self._plans.at(now_ns)
+        timetable = self._timetables.at(now_ns)
         crowded = len(self._calls) >= _MOST_ANSWERS
-        if plan is None or not plan.calls or crowded or len(packet.frame) > plan.frame_bytes:
+        if timetable is None or not timetable.calls or crowded or len(packet.frame) > timetable.frame_bytes:
             self._floods.contend_again(packet, due_ns=due_ns, now_ns=now_ns)
         elif not self._calls.holds(key):
             self._calls.push(packet, now_ns=now_ns)
 
     def hello_start_ns(self, start_ns: int, *, size: int) -> int:
-        plan = self._plans.at(start_ns)
-        if plan is not None and plan.calls:
+        timetable = self._timetables.at(start_ns)
+        if timetable is not None and timetable.calls:
             claimed_ns = self._calls.claim(not_before_ns=start_ns, now_ns=start_ns - self._lead_ns)
             if claimed_ns is not None:
                 return claimed_ns
@@ -218,20 +219,23 @@ class TurnAccess:
 
     def _through_ns(self, start_ns: int) -> int | None:
         """The end of the flood that begins in one of the node's turns; None if no timetable is in force."""
-        plan = self._plans.at(start_ns)
-        turn = None if plan is None else plan.turns.turn_at(start_ns)
-        if plan is None or turn is None:
+        timetable = self._timetables.at(start_ns)
+        turn = None if timetable is None else timetable.turns.turn_at(start_ns)
+        if timetable is None or turn is None:
             return None
-        return start_ns + plan.turns.flood_ns(turn, span=plan.table.spans.get(self._port.node, 1))
+        return start_ns + timetable.turns.flood_ns(turn, span=timetable.table.spans.get(self._port.node, 1))
 
     def _repetitions(self, start_ns: int) -> list[int]:
         """The instants at which a frame that is first transmitted at an instant is repeated."""
-        plan = self._plans.at(start_ns)
-        turn = None if plan is None else plan.turns.turn_at(start_ns)
-        if plan is None or turn is None:
+        timetable = self._timetables.at(start_ns)
+        turn = None if timetable is None else timetable.turns.turn_at(start_ns)
+        if timetable is None or turn is None:
             return []
-        superframe_ns = plan.turns.superframe_start_ns(start_ns)
-        return [plan.turns.start_ns(later, superframe_start_ns=superframe_ns) for later in plan.again.get(turn, ())]
+        superframe_ns = timetable.turns.superframe_start_ns(start_ns)
+        return [
+            timetable.turns.start_ns(later, superframe_start_ns=superframe_ns)
+            for later in timetable.again.get(turn, ())
+        ]
 
     # --- for people -----------------------------------------------------------------------------------------------
 
@@ -239,7 +243,7 @@ class TurnAccess:
         return self._slots.waiting() + len(self._roots)
 
     def report(self) -> Mapping[str, object]:
-        newest = self._plans.newest
+        newest = self._timetables.newest
         return {
             **self._delays.report(),
             "planned": newest is not None,

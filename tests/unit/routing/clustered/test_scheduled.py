@@ -61,7 +61,7 @@ def node(make_scenario: MakeScenario) -> Node:
     keys |= {"clusters.contention_ms": 40, "traffic.interval_s": 1}
     made = Node(US, make_scenario(**keys), make_protocol, position=Enu(0.0, 0.0, 50.0))
     made.start(0)
-    access_of(made)._plans.in_order = [planned(FLOODS)]
+    access_of(made)._timetables.in_order = [planned(FLOODS)]
     return made
 
 
@@ -101,13 +101,15 @@ def test_a_flood_that_goes_on_in_the_next_superframe_is_relayed_there(node: Node
 def test_a_flood_of_the_superframe_before_is_relayed_in_this_one(node: Node) -> None:
     """Heard from another in turn 29 + 1: it began at 1000 ms, and so our turn 29 + 2 lies at 1144 ms."""
     late = (*FLOODS[:3], Turn(30, AFTER, ROOT, 1), *FLOODS[4:])
-    access_of(node)._plans.in_order = [planned(late)]
+    access_of(node)._timetables.in_order = [planned(late)]
     hear_in_turn(node, AFTER, 1, superframe=11)
     assert relays(node) == [1100 + 40 + 2 * 2]
 
 
 def test_what_comes_together_goes_on_together_in_each_of_our_turns_of_it(node: Node) -> None:
-    access_of(node)._plans.in_order = [planned((Turn(5, ROOT, ROOT, 0), Turn(8, US, ROOT, 0), Turn(10, US, ROOT, 0)))]
+    access_of(node)._timetables.in_order = [
+        planned((Turn(5, ROOT, ROOT, 0), Turn(8, US, ROOT, 0), Turn(10, US, ROOT, 0)))
+    ]
     end_ns = TURNS.start_ns(5, superframe_start_ns=1000 * MS) + MS
     frames = [
         Header(end_ns // 1000, seq, ROOT, BROADCAST, ROOT, Kind.DATA, 9, 0, 3, FLAG_FLOOD).encode() + filler(40)
@@ -196,7 +198,7 @@ def test_by_a_clock_that_is_behind_a_frame_ends_before_its_turn_and_is_relayed_w
     node: Node, early_us: int, *, is_relayed: bool, turn_before: tuple[Turn, ...]
 ) -> None:
     """The frame of the fifth turn ends in the fourth, empty or with another flood of its sender."""
-    access_of(node)._plans.in_order = [planned((*turn_before, *FLOODS))]
+    access_of(node)._timetables.in_order = [planned((*turn_before, *FLOODS))]
     end_ns = TURNS.start_ns(5, superframe_start_ns=1000 * MS) - early_us * 1000
     header = Header(end_ns // 1000 - 5000, 1, ROOT, BROADCAST, ROOT, Kind.DATA, 9, 0, 3, FLAG_FLOOD)
     node.hear(Reception(header.encode() + filler(40), ROOT, end_ns, -60.0), end_ns)
@@ -206,7 +208,7 @@ def test_by_a_clock_that_is_behind_a_frame_ends_before_its_turn_and_is_relayed_w
 
 def test_the_newest_timetable_in_force_counts(node: Node) -> None:
     other = (Turn(5, ROOT, ROOT, 0), Turn(20, US, ROOT, 0), Turn(12, US, US, 0))
-    access_of(node)._plans.in_order = [planned(FLOODS), planned(other, valid_ns=2000 * MS)]
+    access_of(node)._timetables.in_order = [planned(FLOODS), planned(other, valid_ns=2000 * MS)]
     hear_in_turn(node, ROOT, 5, superframe=10)
     hear_in_turn(node, ROOT, 5, superframe=20)
     assert relays(node) == [1056, 2040 + 20 * 2]
@@ -239,14 +241,14 @@ def test_a_bound_runs_from_application_to_application(make_scenario: MakeScenari
     keys |= {"clusters.contention_ms": 40, "traffic.interval_s": 1, "radio.handover_ms": handover_ms}
     node = Node(US, make_scenario(**keys), make_protocol, position=Enu(0.0, 0.0, 50.0))
     node.start(0)
-    access_of(node)._plans.in_order = [planned(FLOODS)]
+    access_of(node)._timetables.in_order = [planned(FLOODS)]
     own = access_of(node)._delays.own()
     assert own is not None
     assert own.worst_ns(interval_ns=1000 * MS) == (2 + 100 + 3 * 2 + handover_ms + 2) * MS
 
 
 def test_who_cannot_reach_everyone_promises_nothing(node: Node) -> None:
-    access_of(node)._plans.in_order = [planned(FLOODS, unreached=(AFTER,))]
+    access_of(node)._timetables.in_order = [planned(FLOODS, unreached=(AFTER,))]
     node.send(filler(40), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=0, now_ns=0)
     assert not [record for record in node.records if isinstance(record, BoundStated)]
     assert access_of(node)._delays.own() is None
@@ -295,7 +297,7 @@ def test_a_promise_counts_what_waits(node: Node, before: int, is_promised: bool)
 
 def test_turns_are_used_until_a_timetable_without_any_comes_into_force(node: Node) -> None:
     """Our turn is at 64 ms of each superframe, and its flood lasts 6 ms: that at 964 ms is the last before 1 s."""
-    access_of(node)._plans.in_order = [planned(FLOODS), planned(FLOODS[:5], valid_ns=1000 * MS)]
+    access_of(node)._timetables.in_order = [planned(FLOODS), planned(FLOODS[:5], valid_ns=1000 * MS)]
     access = informed(node, told_ms=0)
     for births in ((0, 0, 0), (955, 955), (990,)):
         for at_ms in births:
@@ -333,7 +335,7 @@ def test_a_timetable_of_another_leader_takes_the_place_of_one_that_is_still_to_c
     access = informed(node, told_ms=0)
     access.follow(planned(FLOODS, valid_ns=2000 * MS), now_ns=100 * MS)
     access.follow(planned(FLOODS[:5], valid_ns=50 * MS), now_ns=200 * MS)
-    assert [plan.valid_ns // MS for plan in access._plans.in_order] == [0, 50]
+    assert [plan.valid_ns // MS for plan in access._timetables.in_order] == [0, 50]
     assert not access._roots.has_turn(now_ns=200 * MS)
 
 
@@ -381,7 +383,7 @@ def test_what_is_repaired_after_it_was_lost_has_no_bound(make_scenario: MakeScen
     keys = {"nodes.count": 5, "clusters.relay": "scheduled", "clusters.flooding_period_s": 0.1, "clusters.repair_s": 5}
     node = Node(US, make_scenario(**keys), make_protocol, position=Enu(0.0, 0.0, 50.0))
     node.start(0)
-    access_of(node)._plans.in_order = [planned(FLOODS)]
+    access_of(node)._timetables.in_order = [planned(FLOODS)]
     informed(node, told_ms=0)
     assert promised(node, at_ms=0) == []
 
@@ -411,7 +413,7 @@ def test_hellos_keep_out_of_the_turns(node: Node, due_ms: int, earliest_ms: int,
 def test_a_join_does_not_take_the_place_of_an_announcement_that_waits(node: Node) -> None:
     """Over lossy links a leader says in its turns which neighbor has fallen silent, too."""
     access = access_of(node)
-    access._plans.in_order = [planned(FLOODS)._replace(odds=Odds({US: (0.0,)}), calls=(20,))]
+    access._timetables.in_order = [planned(FLOODS)._replace(odds=Odds({US: (0.0,)}), calls=(20,))]
     access.use_turns(1050 * MS)
     access.flood_control(Kind.SCHEDULE, filler(40), now_ns=1050 * MS)
     access.flood_control(Kind.JOIN, filler(40), now_ns=1051 * MS)
@@ -428,5 +430,5 @@ def test_a_likely_delay_is_stated_only_when_all_of_the_swarm_are_in_the_timetabl
     plan = planned(FLOODS)
     table = plan.table._replace(spans={NodeId(n): 3 for n in range(1, nodes + 1)})
     odds = Odds({US: (0.0,)})
-    access_of(node)._plans.in_order = [plan._replace(table=table, odds=odds, calls=(20,))]
+    access_of(node)._timetables.in_order = [plan._replace(table=table, odds=odds, calls=(20,))]
     assert (access_of(node).report()["likely_ms"] is not None) == states

@@ -26,7 +26,7 @@ from fanet_mw.routing.clustered.clustering import (
     by_id,
     heads_of,
 )
-from fanet_mw.routing.clustered.clustering.election import Score
+from fanet_mw.routing.clustered.clustering.head_election import Score
 from fanet_mw.units import Enu, NodeId, S
 
 NODES = 45

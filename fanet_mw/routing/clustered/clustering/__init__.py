@@ -1,6 +1,6 @@
 """Methods that divide nodes into clusters, all behind one contract (`Clustering`); `clusters.method` names one.
 
-`bisection` needs positions only. `election` ranks nodes (lowest-ID, highest degree, WCA, lasting degree) and keeps
+`bisection` needs positions only. `head_election` ranks nodes (lowest-ID, highest degree, WCA, lasting degree) and keeps
 heads that are good enough. In `affinity`, neighbors vote for each other. `maintenance` adapts present clusters step by
 step. `division` is what a leader uses: it asks one of these for clusters when they are due. `succession` is the order
 in which the members of a cluster stand in for their head, `mobility` how long a link between two nodes will last.
@@ -9,7 +9,7 @@ in which the members of a cluster stand in for their head, `mobility` how long a
 from fanet_mw.routing.clustered.clustering.affinity import AffinityPropagation
 from fanet_mw.routing.clustered.clustering.bisection import Balanced, balanced
 from fanet_mw.routing.clustered.clustering.contract import Cluster, Clustering, Promise, Swarm, heads_of
-from fanet_mw.routing.clustered.clustering.election import (
+from fanet_mw.routing.clustered.clustering.head_election import (
     HIGHEST_DEGREE,
     LOWEST_ID,
     Elected,

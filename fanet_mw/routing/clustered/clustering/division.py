@@ -25,7 +25,7 @@ from fanet_mw.routing.clustered.clustering import (
     by_degree,
     by_id,
 )
-from fanet_mw.routing.clustered.clustering.election import Score
+from fanet_mw.routing.clustered.clustering.head_election import Score
 from fanet_mw.scenario.tables.clusters import METHODS
 from fanet_mw.units import NodeId, S
 

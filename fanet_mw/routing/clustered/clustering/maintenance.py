@@ -8,7 +8,7 @@ When the swarm is divided anew, because clusters are too large or nodes have mov
 """
 
 from fanet_mw.routing.clustered.clustering.contract import Cluster, Swarm
-from fanet_mw.routing.clustered.clustering.election import Elected, Pair, Score
+from fanet_mw.routing.clustered.clustering.head_election import Elected, Pair, Score
 from fanet_mw.units import NodeId
 
 

@@ -20,7 +20,7 @@ from fanet_mw.routing.clustered.forwarding.gradient import UNREACHABLE, Gradient
 from fanet_mw.routing.clustered.roles.failover import Failover
 from fanet_mw.routing.clustered.roles.joining import Joining
 from fanet_mw.routing.clustered.roles.leader import Leader
-from fanet_mw.routing.clustered.roles.lease import Authority, Lease
+from fanet_mw.routing.clustered.roles.leader_election import Authority, Lease
 from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import Membership
 from fanet_mw.routing.clustered.roles.neighbor_failure_detector import NeighborFailureDetector

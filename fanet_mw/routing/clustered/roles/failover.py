@@ -16,7 +16,7 @@ from typing import Final
 
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
 from fanet_mw.routing.clustered.roles.head_failure_detector import HeadFailureDetector
-from fanet_mw.routing.clustered.roles.lease import Authority, Lease
+from fanet_mw.routing.clustered.roles.leader_election import Authority, Lease
 from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import Membership
 from fanet_mw.routing.clustered.roles.states import Action, Event, State, step

@@ -23,7 +23,7 @@ from fanet_mw.graph.topology import Adjacency, within_range
 from fanet_mw.motion import Motion
 from fanet_mw.routing.clustered.clustering import Cluster, Swarm, succession
 from fanet_mw.routing.clustered.clustering.division import Division, drift
-from fanet_mw.routing.clustered.roles.lease import Authority, silence_ns
+from fanet_mw.routing.clustered.roles.leader_election import Authority, silence_ns
 from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import EPOCH_BITS
 from fanet_mw.routing.clustered.roles.position_updates import lost_ns

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 from fanet_mw import serial_number
-from fanet_mw.routing.clustered.roles.lease import Authority
+from fanet_mw.routing.clustered.roles.leader_election import Authority
 from fanet_mw.routing.clustered.roles.states import Event
 from fanet_mw.routing.clustered.tdma.slot_timing import Superframe
 from fanet_mw.trace import RoleChanged

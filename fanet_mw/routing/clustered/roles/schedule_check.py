@@ -5,7 +5,7 @@ from typing import Final
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.node.contract import Port
 from fanet_mw.routing.clustered.roles.leader import SETTLE_NS
-from fanet_mw.routing.clustered.roles.lease import Authority
+from fanet_mw.routing.clustered.roles.leader_election import Authority
 from fanet_mw.routing.clustered.roles.membership import EPOCH_BITS, Membership
 from fanet_mw.serial_number import newer
 from fanet_mw.units import US, S

@@ -16,7 +16,7 @@ from typing import Final
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.roles.leader import HEARD_NS
-from fanet_mw.routing.clustered.roles.lease import Lease
+from fanet_mw.routing.clustered.roles.leader_election import Lease
 from fanet_mw.routing.clustered.tdma.turn_timing import clocks_fit, receipt_ns
 from fanet_mw.routing.clustered.timetable.admission import Admission, least_interval_ns
 from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE, likely_delay_ns

@@ -15,7 +15,7 @@ from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
 from fanet_mw.node.reader import decoded
 from fanet_mw.routing.clustered.roles.leader import Leader
-from fanet_mw.routing.clustered.roles.lease import Authority, Lease
+from fanet_mw.routing.clustered.roles.leader_election import Authority, Lease
 from fanet_mw.routing.clustered.roles.membership import Membership, Version
 from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
 from fanet_mw.routing.clustered.timetable.fitted_timetable import NO_LOADS, FittedTimetable

@@ -7,7 +7,7 @@ import pytest
 
 from fanet_mw.motion import Motion
 from fanet_mw.routing.clustered.roles.leader import OBJECTION_NS, SETTLE_NS, Leader
-from fanet_mw.routing.clustered.roles.lease import Authority, silence_ns
+from fanet_mw.routing.clustered.roles.leader_election import Authority, silence_ns
 from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.position_updates import lost_ns
 from fanet_mw.scenario import Scenario

@@ -1,4 +1,4 @@
-"""The lease of a leader: a node follows a leader as long as its announcements keep coming, and else elects a new one.
+"""Leader election: a node follows a leader as long as its announcements keep coming (its lease), and else elects one.
 
     a leader announces itself -> it is silent for `silence_ns` -> of the nodes that are alive the one with the lowest id
     takes office at once, others up to 3 s later if it does not -> the new leader calls all nodes to join

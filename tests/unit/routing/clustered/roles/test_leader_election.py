@@ -2,7 +2,7 @@
 
 import pytest
 
-from fanet_mw.routing.clustered.roles.lease import Authority, Lease
+from fanet_mw.routing.clustered.roles.leader_election import Authority, Lease
 from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.units import NodeId, S
 

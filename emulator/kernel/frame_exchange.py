@@ -3,7 +3,7 @@
     queue -> access (DIFS or EIFS, backoff with freezing) -> frame -> ACK or timeout -> next attempt or done
 
 When a station may transmit (DIFS or EIFS, contention window, backoff) is in `channel_access.py`; how frames end is
-counted in `ending.py`.
+counted in `frame_ends.py`.
 """
 
 from emulator.channel.fading import gain
@@ -17,7 +17,7 @@ from emulator.kernel.channel_access import (
     slots_left,
     widen_window,
 )
-from emulator.kernel.ending import done, lost, put, release
+from emulator.kernel.frame_ends import done, lost, put, release
 from emulator.kernel.heap import push
 from emulator.kernel.jit import jit
 from emulator.kernel.state import (

@@ -12,7 +12,7 @@ their frames meet at a receiver that hears both.
 import math
 
 from emulator.kernel.carrier_sense import busier, energy_fell, energy_rose, quieter
-from emulator.kernel.ending import lost, put, release
+from emulator.kernel.frame_ends import lost, put, release
 from emulator.kernel.frame_exchange import acknowledged
 from emulator.kernel.heap import push
 from emulator.kernel.jit import jit

@@ -21,7 +21,7 @@ from typing import Final, NamedTuple
 
 from fanet_mw.graph.topology import Adjacency
 from fanet_mw.routing.clustered.clustering.contract import Cluster, Promise, Swarm, heads_of
-from fanet_mw.routing.clustered.clustering.mobility import link_lifetime_s
+from fanet_mw.routing.clustered.clustering.link_lifetime import link_lifetime_s
 from fanet_mw.units import NodeId
 
 Score = Callable[[NodeId, Swarm], float]

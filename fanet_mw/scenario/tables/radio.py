@@ -44,8 +44,8 @@ class Radio(Section):
     rate_mbps: Annotated[float, Field(gt=0, le=54)] = 11.0
     """Bit rate of data frames, one of the standard's; by default 11 (`b`) or 54 (`g`, `a`)."""
     ack_rate_mbps: Annotated[float, Field(gt=0, le=54)] = 11.0
-    """Bit rate of acknowledgments; by default 11 (`b`), else the highest mandatory rate that is not above `rate_mbps`
-    (6, 12, 24; or DSSS)."""
+    """Bit rate of acknowledgments; by default the highest mandatory rate that is not above `rate_mbps` (802.11
+    10.6.6.5): that rate itself for DSSS, else 6, 12 or 24."""
     preamble: Literal["long", "short"] = "long"
     """Preamble of DSSS frames: 192 us (`long`) or 96 us (`short`)."""
     slot: Literal["long", "short"] = "long"
@@ -157,7 +157,7 @@ def _with_standard_defaults(given: Mapping[str, Any]) -> dict[str, Any]:
     if is_ofdm(rate):
         keys.setdefault("ack_rate_mbps", max((r for r in MANDATORY_OFDM_MBPS if r <= rate), default=6.0))
         keys.setdefault("cw_min", 15)  # tables 17-21 and 18-5 (aCWmin)
-    elif standard == "g":
+    elif rate in RATES_MBPS["b"]:
         keys.setdefault("ack_rate_mbps", rate)  # all four DSSS rates are mandatory (16.1)
     return keys
 

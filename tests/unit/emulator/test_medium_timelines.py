@@ -204,3 +204,13 @@ def test_a_node_that_starts_again_is_counted_in_both_its_lives(make_scenario: Ma
     air.send(1, 7 * MS)
     air.run()
     assert air.medium.report()["requests"]["1"] == {"all": 4, "before_restart": 3}
+
+
+@pytest.mark.parametrize(("standard", "reached_m", "missed_m"), [("b", 2900, 3100), ("a", 1300, 1400)])
+def test_an_ack_over_more_than_a_slot_of_way_there_and_back_comes_too_late(
+    make_scenario: MakeScenario, standard: str, reached_m: float, missed_m: float
+) -> None:
+    for metres, attempts in ((reached_m, 1), (missed_m, 7)):
+        air = Air(make_scenario(**{"nodes.count": 2, "radio.standard": standard, "radio.range_m": 5000}), [0, metres])
+        air.send(1, 1 * MS, dst=2)
+        assert [tried for *_, tried in statuses(air.run())] == [attempts]

@@ -112,6 +112,8 @@ def test_defaults_follow_the_standard_and_given_values_stay(make_scenario: MakeS
     assert (radio.rate_mbps, radio.ack_rate_mbps, radio.cw_min) == (18, 12, 7)
     radio = make_scenario(**{"radio.standard": "g", "radio.rate_mbps": 2}).radio
     assert (radio.rate_mbps, radio.ack_rate_mbps, radio.cw_min) == (2, 2, 31)
+    radio = make_scenario(**{"radio.rate_mbps": 5.5}).radio
+    assert (radio.rate_mbps, radio.ack_rate_mbps) == (5.5, 5.5), "10.6.6.5: no faster than what it acknowledges"
     radio = make_scenario().radio
     assert (radio.rate_mbps, radio.ack_rate_mbps, radio.cw_min) == (11, 11, 31)
 

@@ -94,6 +94,9 @@ def evaluate(
     crowded = tuple(contention_window.too_short(scenario, site.adjacency)) if site.timetable else ()
     apart = tuple(problems_and_notes.clocks_apart(scenario)) if site.timetable else ()
     out_of_hops = () if judged.unfit or judged.cut_off else tuple(_out_of_hops(site, fitted, judged.clusters))
+    if out_of_hops:
+        refused = Refused("floods end before all nodes have them")
+        summed = tuple(c._replace(bound=refused, from_head=refused) for c in summed)
     return ScenarioPlan(
         scenario=scenario,
         clusters=judged.clusters,
@@ -110,7 +113,7 @@ def evaluate(
         or (
             *cut_off,
             *out_of_hops,
-            *problems_and_notes.problems(scenario, judged.clusters, summed, cut_off),
+            *problems_and_notes.problems(scenario, judged.clusters, summed, (*cut_off, *out_of_hops)),
             *crowded,
             *apart,
             *late,

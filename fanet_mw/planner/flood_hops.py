@@ -14,6 +14,7 @@ from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId
+from fanet_mw.wire import MOST_HOPS
 
 
 class FloodHops(NamedTuple):
@@ -53,8 +54,10 @@ def flood_hops(table: Timetable, adjacency: Adjacency, geometry: Geometry) -> Ma
 
 def too_many(scenario: Scenario, most_hops: int) -> Iterator[str]:
     """A sentence about packets that end before they are with all nodes; nothing if none do."""
-    if most_hops > scenario.routing.hop_limit:
-        yield f"packets need up to {most_hops} hops, and end after routing.hop_limit = {scenario.routing.hop_limit}"
+    limit = scenario.routing.hop_limit
+    if most_hops > limit:
+        least = f"it has to be at least {most_hops}" if most_hops <= MOST_HOPS else f"its greatest value is {MOST_HOPS}"
+        yield f"packets need up to {most_hops} hops, and end after routing.hop_limit = {limit}: {least}"
 
 
 def incomplete(scenario: Scenario, geometry: Geometry, found: Mapping[NodeId, FloodHops]) -> Iterator[str]:

@@ -10,6 +10,7 @@ one.
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
+from fanet_mw.planner import flood_hops
 from fanet_mw.planner.demand import TrafficClass
 from fanet_mw.routing.clustered.tdma.turn_timing import receipt_ns
 from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
@@ -86,7 +87,7 @@ def plan_lossy(
     places = tuple(sorted(positions.items()))
     sources = [node for node in application.sources if node != scenario.leader]
     found = tuple(_drawn(scenario, places, links, sources) for links in draws)
-    return LossyPlan(scenario, found, deadline_ns, tuple(_problems(found, deadline_ns)))
+    return LossyPlan(scenario, found, deadline_ns, (*_out_of_hops(scenario, found), *_problems(found, deadline_ns)))
 
 
 def _drawn(scenario: Scenario, places: Places, links: tuple[Link, ...], sources: Sequence[NodeId]) -> Drawn:
@@ -101,7 +102,7 @@ def _drawn(scenario: Scenario, places: Places, links: tuple[Link, ...], sources:
 def _likely_ns(scenario: Scenario, fitted: FittedTimetable, node: NodeId) -> int | None:
     """The delay that the node will state, from application to application, for a packet that finds its queue empty."""
     plan = NodeTimetable.of(node, 0, fitted)
-    if not plan.roots or fitted.table.uncovered[node]:
+    if not plan.roots or fitted.table.uncovered[node] or fitted.table.hops[node] > scenario.routing.hop_limit:
         return None
     likely_ns = likely_delay_ns(
         plan,
@@ -111,6 +112,11 @@ def _likely_ns(scenario: Scenario, fitted: FittedTimetable, node: NodeId) -> int
         hello_ns=seconds_to_ns(scenario.routing.hello_interval_s),
     )
     return None if likely_ns is None else likely_ns + scenario.radio.lead_ns + receipt_ns(scenario)
+
+
+def _out_of_hops(scenario: Scenario, draws: Sequence[Drawn]) -> Iterator[str]:
+    hops = [most for drawn in draws if drawn.fitted is not None for most in drawn.fitted.table.hops.values()]
+    yield from flood_hops.too_many(scenario, max(hops, default=0))
 
 
 def _problems(draws: Sequence[Drawn], deadline_ns: int | None) -> Iterator[str]:

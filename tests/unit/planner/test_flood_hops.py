@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from fanet_mw.graph.topology import within_range
-from fanet_mw.planner.flood_hops import flood_hops
+from fanet_mw.planner.flood_hops import flood_hops, too_many
 from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.units import Enu, NodeId
@@ -32,7 +32,7 @@ def run(*settings: str) -> dict[str, Any]:
 def test_as_many_hops_as_a_flood_needs_are_enough_and_one_less_is_not(relay: str) -> None:
     keys = (f'clusters.relay="{relay}"', "traffic.interval_s=5", "clusters.flooding_period_s=1")
     assert planned(*keys, "routing.hop_limit=5") == (True, "")
-    problem = "packets need up to 5 hops, and end after routing.hop_limit = 4"
+    problem = "packets need up to 5 hops, and end after routing.hop_limit = 4: it has to be at least 5"
     assert planned(*keys, "routing.hop_limit=4") == (False, problem)
 
 
@@ -46,6 +46,45 @@ def test_the_hops_to_a_head_count_too() -> None:
 def test_a_swarm_whose_hop_limit_is_just_enough_misses_nothing_and_with_one_less_does() -> None:
     assert run("routing.hop_limit=5")["pdr"] == 1.0
     assert run("routing.hop_limit=4")["pdr"] < 1.0
+
+
+def test_more_hops_than_any_packet_may_make_are_said_to_be_too_many() -> None:
+    limit = catalog.find("clusters", [*LINE, "routing.hop_limit=255"])
+    assert not list(too_many(limit, 255))
+    assert list(too_many(limit, 256)) == [
+        "packets need up to 256 hops, and end after routing.hop_limit = 255: its greatest value is 255"
+    ]
+
+
+@pytest.mark.parametrize("relay", ["scheduled", "all"])
+def test_a_plan_whose_floods_end_early_has_no_bound(relay: str) -> None:
+    keys = (*LINE, f'clusters.relay="{relay}"', "traffic.interval_s=5", "clusters.flooding_period_s=1")
+    _, plan, _ = judge(catalog.find("clusters", [*keys, "routing.hop_limit=4"]), change=False)
+    assert [c["bound_ms"] for c in plan["classes"]] == [None]
+    assert "at most" not in str(plan["classes"])
+
+
+def test_over_lossy_links_the_hop_limit_is_named_too() -> None:
+    lossy = (*LINE, 'radio.channel="log_distance"', 'radio.fading="rician"', "nodes.spacing_m=120")
+    _, plan, _ = judge(catalog.find("clusters", [*lossy, "routing.hop_limit=1"]), change=False)
+    assert any("and end after routing.hop_limit = 1" in problem for problem in plan["problems"])
+    assert set(plan["draws"][0]["likely_ms"].values()) == {None}
+    _, plan, _ = judge(catalog.find("clusters", lossy), change=False)
+    assert not any("hop_limit" in problem for problem in plan["problems"])
+
+
+def test_a_node_states_a_bound_only_if_its_floods_reach_everyone() -> None:
+    """The leader is in the middle. Floods of the two ends need five hops, those of the other sources at most four."""
+    middle = 'nodes.leader_at="middle"'
+    some = run(middle, "routing.hop_limit=4")["bound"]
+    assert some["violations"] == 0
+    assert some["within_share"] == some["stated_share"] == pytest.approx(3 / 5)
+    assert run(middle, "routing.hop_limit=5")["bound"]["within_share"] == 1.0
+
+
+def test_no_node_states_a_bound_if_the_leader_may_not_know_all_nodes() -> None:
+    """The leader is one of the ends, and the joins of the other end do not come so far."""
+    assert run("routing.hop_limit=4")["bound"] == {}
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@ deadline.
 
 A bound is stated when a packet is accepted, because only then are its turn and the queue before it known. It is stated
 only if nothing that comes later can break it: no other timetable may come into force before the packet's flood is over.
+Nothing is stated for floods that `routing.hop_limit` ends before all nodes have them.
 The leader therefore announces each timetable long enough ahead. Each class of packets has room of its own in a turn,
 and so a bound of its own.
 
@@ -96,7 +97,18 @@ class StatedDelays:
             return None
         if timetable.table.uncovered[self._port.node]:
             return None
+        if self._ends_early(timetable):
+            return None
         return self._own_of(self._port.node, timetable)
+
+    def _ends_early(self, timetable: NodeTimetable) -> bool:
+        """True if the hop limit ends the node's floods before they are with all nodes, some of which the leader may not
+        know because their joins end as early.
+        """
+        scenario, hops = self._port.scenario, timetable.table.hops
+        limit = scenario.routing.hop_limit
+        incomplete = len(timetable.table.spans) < scenario.nodes.count
+        return hops.get(self._port.node, 0) > limit or (incomplete and max(hops.values(), default=0) >= limit)
 
     def _own_of(self, node: NodeId, timetable: NodeTimetable) -> RootTurns:
         offsets = timetable.roots if node == self._port.node else tuple(timetable.table.offsets_of(node))
@@ -231,6 +243,8 @@ class StatedDelays:
             return None
         if self._lease.leads or timetable.table.uncovered[self._port.node] or not self._in_step():
             return None  # schedules go before the leader's own packets
+        if self._ends_early(timetable):
+            return None
         if len(timetable.table.spans) < self._port.scenario.nodes.count:
             return None  # the swarm is separated or not complete: some node is in no turn of this timetable
         load = timetable.loads.get(self._port.node, AS_EXPECTED)

@@ -22,7 +22,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from fanet_mw.routing.clustered.timetable.delivery_odds import Odds, odds
-from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry, NodeRows
+from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry, NodeRows, rows
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort, Flood, FloodNetwork, Packing
 from fanet_mw.routing.clustered.timetable.redundant_scheduling import Network, RedundantPacking, Wave, enough_for
 from fanet_mw.units import Enu, NodeId
@@ -55,6 +55,8 @@ class Timetable(NamedTuple):
     calls: Mapping[NodeId, tuple[int, ...]] = MappingProxyType({})
     """For each node, its calls: turns in which it transmits to its neighbors only, a hello or a
     packet that one lacks."""
+    hops: Mapping[NodeId, int] = MappingProxyType({})
+    """For each root, the number of hops to the farthest node, if each relay passes on the first copy that it hears."""
 
     def roots(self) -> list[Turn]:
         """The turns in which roots transmit new packets; repetitions are not among them."""
@@ -99,7 +101,8 @@ def timetable(
     ]
     turns = _repeated(block, Counter(roots), geometry.turns, blocks, whole)
     uncovered = _uncovered(swarm.nodes, ordered, floods)
-    return Timetable(turns, _spans(turns), uncovered, len({turn.offset % whole for turn in turns}))
+    hops = _hops(swarm.nodes, swarm.hears, ordered, floods)
+    return Timetable(turns, _spans(turns), uncovered, len({turn.offset % whole for turn in turns}), hops=hops)
 
 
 @lru_cache(maxsize=16)
@@ -143,9 +146,9 @@ def redundant_timetable(
         own[node].append(wave.sent[0][0])
     uncovered = _uncovered(network.nodes, ordered, waves)
     used = {turn.offset % geometry.turns for turn in turns} | {offset for at in own.values() for offset in at}
-    table = Timetable(
-        turns, _spans(turns), uncovered, len(used), {node: tuple(sorted(offsets)) for node, offsets in own.items()}
-    )
+    calls_of = {node: tuple(sorted(offsets)) for node, offsets in own.items()}
+    hops = _hops(network.nodes, network.hears, ordered, waves)
+    table = Timetable(turns, _spans(turns), uncovered, len(used), calls_of, hops)
     floods = [(root, wave.sent) for wave, (root, _) in zip(waves, ordered, strict=True)]
     return table, odds(network, floods, turns=geometry.turns, hop_turns=geometry.hop_turns)
 
@@ -155,6 +158,24 @@ def _uncovered(
 ) -> dict[NodeId, tuple[NodeId, ...]]:
     """For each root, the nodes that none of its floods can reach."""
     return {root: nodes.of(nodes.everyone & ~flood.goal) for flood, (root, _) in zip(floods, ordered, strict=True)}
+
+
+def _hops(
+    nodes: NodeRows, hears: Sequence[int], ordered: Sequence[tuple[NodeId, int]], floods: Sequence[Flood | Wave]
+) -> dict[NodeId, int]:
+    """The greatest number of hops of the floods of each root. A relay counts on from the first copy that it hears,
+    which need not have come over the fewest hops.
+    """
+    found: dict[NodeId, int] = {}
+    for flood, (root, _) in zip(floods, ordered, strict=True):
+        start = nodes.row[root]
+        hops, known = {start: 0}, 1 << start
+        for _, row in flood.sent:
+            for receiver in rows(hears[row] & ~known):
+                hops[receiver] = hops[row] + 1
+            known |= hears[row]
+        found[root] = max(found.get(root, 0), *hops.values())
+    return found
 
 
 def _interleaved(floods: Sequence[Wave], calls: Sequence[Wave]) -> list[Wave]:

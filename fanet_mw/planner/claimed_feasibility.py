@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from fanet_mw.bounds import Bounded, Refused
-from fanet_mw.planner import flood_hops, problems_and_notes, reachability
+from fanet_mw.planner import contention_window, flood_hops, problems_and_notes, reachability
 from fanet_mw.planner.claimed_turns import ClaimedPlan, NodeTurns
 from fanet_mw.planner.demand import ClassPlan, TrafficClass
 from fanet_mw.planner.feasibility import goodput
@@ -41,6 +41,7 @@ def evaluate_claims(site: Site, classes: Sequence[TrafficClass], *, deadline_ns:
         problems=(
             *reachability.problems(cut_off),
             *flood_hops.too_many(scenario, claims.hops),
+            *contention_window.too_short_for_claims(scenario, site.adjacency),
             *_problems(scenario, claims, planned, deadline_ns),
             *problems_and_notes.clocks_apart(scenario),
         ),

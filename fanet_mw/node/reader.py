@@ -21,6 +21,8 @@ _new: Final = tuple.__new__  # faster than the constructor, for objects that are
 _HELLO: Final = int(Kind.HELLO)
 _KIND: Final = 7
 """The index of the packet's kind among the fields of a header (`wire.Fields`)."""
+_FLAGS: Final = 11
+"""The index of the packet's flags among them."""
 BUNDLE: Final = 1 << 30
 """Stands for the phase of a frame that holds several packets. No duplicate set ever has this bit, so each such frame is
 opened, and its packets are looked up one by one."""
@@ -44,9 +46,6 @@ class Reader:
         self.hash = 0
         """The hash of the frame's packet (`duplicates.hash_of`), by which duplicates are found; 0 if the frame holds
         several packets."""
-        self.key = 0
-        """The packet's origin and sequence number as one number (`duplicates.key_of`), by which queues find a packet
-        that was heard again; 0 if the frame holds no packet, or several."""
         self.phase = 0
         """The bit of the packet's phase (`duplicates.PHASES`); 0 if the phase flags are invalid; BUNDLE if the frame
         holds several packets."""
@@ -59,6 +58,14 @@ class Reader:
         their headers. A packet is looked at once for each node that relays it, and to compare its bytes takes a third
         of the time that hashing them takes."""
 
+    @property
+    def key(self) -> int:
+        """The packet's origin and sequence number as one number (`duplicates.key_of`), by which queues find a packet
+        that was heard again; 0 if the frame holds no packet, or several. Most protocols do not ask for it.
+        """
+        _, _, _, seq, origin, *_ = self.fields
+        return 0 if self.phase == BUNDLE else key_of(origin, seq)
+
     def look(self, frame: bytes, *, alone: bool = False) -> None:
         """Go on to another frame.
 
@@ -67,16 +74,16 @@ class Reader:
         """
         self.frame, self.packet = frame, None
         fields = self.fields = wire.fields_of(frame) or wire.NO_FIELDS
-        _, _, _, seq, origin, _, _, _, _, _, _, flags, _, _ = fields
+        flags = fields[_FLAGS]
         if flags & wire.FLAG_MORE and not alone:
-            self.hash, self.key, self.phase = 0, 0, BUNDLE
+            self.hash, self.phase = 0, BUNDLE
         else:
             name = frame[wire.END_TO_END]
             size, inner, packet_hash = self._hashes.get(name, _UNKNOWN)
             # packets that differ only in their inner frames are told apart by them: no copy is taken for another packet
             same = len(frame) == size and frame.endswith(inner)
             self.hash = packet_hash if same else self._remember(name, frame)
-            self.key, self.phase = key_of(origin, seq), PHASES.get(flags & wire.PHASE_MASK, 0)
+            self.phase = PHASES.get(flags & wire.PHASE_MASK, 0)
 
     def _remember(self, name: bytes, frame: bytes) -> int:
         """Compute the hash of a packet, and keep it for its further copies."""

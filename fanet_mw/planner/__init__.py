@@ -11,9 +11,17 @@ from fanet_mw.planner.feasibility import evaluate
 from fanet_mw.planner.flood_loss import Loss, loss
 from fanet_mw.planner.head_slot import ClusterPlan
 from fanet_mw.planner.lossy_plan import LossyPlan, plan_lossy
+from fanet_mw.planner.not_counted import not_counted
 from fanet_mw.planner.optimum import Optimum, optimum
 from fanet_mw.planner.plan import plan, with_capacity
-from fanet_mw.planner.plan_text import describe, describe_change, describe_loss, describe_lossy, describe_optimum
+from fanet_mw.planner.plan_text import (
+    describe,
+    describe_change,
+    describe_loss,
+    describe_lossy,
+    describe_not_counted,
+    describe_optimum,
+)
 from fanet_mw.planner.scenario_plan import ScenarioPlan
 from fanet_mw.planner.site import Site
 from fanet_mw.planner.variant import Variant, vary
@@ -35,9 +43,11 @@ __all__ = [
     "describe_change",
     "describe_loss",
     "describe_lossy",
+    "describe_not_counted",
     "describe_optimum",
     "evaluate",
     "loss",
+    "not_counted",
     "optimum",
     "plan",
     "plan_lossy",

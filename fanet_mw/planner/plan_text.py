@@ -1,7 +1,7 @@
 """A plan as lines of text. Each figure has its unit, and the text says which figures are not proven."""
 
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from fanet_mw.bounds import Bounded, DelayBound, Refused
@@ -28,17 +28,24 @@ def describe(found: ScenarioPlan | Refused) -> str:
     return f"cannot be planned: {found.reason}" if isinstance(found, Refused) else "\n".join(_lines(found))
 
 
-def describe_loss(found: Loss | None) -> str:
-    """A sentence on the probability that a packet misses a node."""
+def describe_loss(found: Loss | None, *, everyone: bool) -> str:
+    """A sentence on the probability that a packet misses a node. `everyone`: nothing but such a loss keeps packets from
+    any node.
+    """
     if found is None:
         return item("loss", "no probability: shadowing, fading and obstacles spoil links for longer than a frame")
     if not found.worst:
-        return item("loss", "none in this channel: every packet reaches everyone")
+        return item("loss", "none in this channel" + (": every packet reaches everyone" if everyone else ""))
     return item(
         "loss",
         f"a packet misses a node with probability {found.mean:.2g} at most on average, {found.worst:.2g} at worst "
         f"(node {found.root} to node {found.node}), repairs not counted",
     )
+
+
+def describe_not_counted(sentences: Sequence[str]) -> str:
+    """What a scenario has and its plan does not count, as text."""
+    return "\n".join(item("not counted" if index == 0 else "", said) for index, said in enumerate(sentences))
 
 
 def describe_lossy(found: LossyPlan) -> str:

@@ -25,8 +25,10 @@ from fanet_mw.planner import (
     describe_change,
     describe_loss,
     describe_lossy,
+    describe_not_counted,
     describe_optimum,
     loss,
+    not_counted,
     optimum,
     plan,
     plan_lossy,
@@ -70,11 +72,14 @@ def judge(
     if isinstance(found, Refused):
         return describe(found), {"feasible": False, "problems": [found.reason]}, False
     found = with_capacity(found, at)
-    text, content = [describe(found)], _json(found)
+    left = tuple(not_counted(scenario))
+    text, content = [describe(found)], {**_json(found), "not_counted": list(left)}
+    if left:
+        text.append(describe_not_counted(left))
     table = None if found.superframe is None else found.superframe.table
     if found.superframe is not None and table is not None and len(at) > 1 and not found.cut_off:
         missed = _loss(found.scenario, found.superframe, table, at)
-        text.append(describe_loss(missed))
+        text.append(describe_loss(missed, everyone=found.feasible and not left))
         content["loss"] = None if missed is None else missed._asdict()
     if change and not found.feasible:
         cheapest = cheapest_change(scenario, at, sources=sources, deadline_ns=deadline_ns)
@@ -101,7 +106,9 @@ def _judge_lossy(
     count = _DRAWS if scenario.radio.shadowing_db else 1
     draws = [expected_links(scenario, at, draw=draw) for draw in range(count)]
     found = plan_lossy(scenario, at, draws, application, deadline_ns=deadline_ns)
-    return describe_lossy(found), _lossy_json(found), found.feasible
+    left = tuple(not_counted(scenario))
+    text = "\n".join([describe_lossy(found), describe_not_counted(left)]) if left else describe_lossy(found)
+    return text, {**_lossy_json(found), "not_counted": list(left)}, found.feasible
 
 
 def _lossy_json(found: LossyPlan) -> dict[str, Any]:

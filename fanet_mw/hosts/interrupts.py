@@ -6,7 +6,8 @@ signal's number. While `hosts.loop.run` runs, they cancel its coroutine instead,
 half-way.
 
 A KeyboardInterrupt during an import can get lost: some libraries try an import, and go on whatever exception it raises.
-The code that runs after the imports therefore calls `raise_again`.
+The code that runs after the imports therefore calls `raise_again`. Other libraries raise an error of their own in its
+place; the code around the imports is therefore `undisguised`.
 """
 
 import gc
@@ -37,6 +38,16 @@ def raise_again() -> None:
     """Raise KeyboardInterrupt if one was raised since `install` and got lost."""
     if _raised:
         raise KeyboardInterrupt(_raised[0])
+
+
+@contextmanager
+def undisguised() -> Iterator[None]:
+    """Raise KeyboardInterrupt in place of an error that leaves this context, if one was raised since `install`."""
+    try:
+        yield
+    except Exception:
+        raise_again()
+        raise
 
 
 def installed() -> bool:

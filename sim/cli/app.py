@@ -66,7 +66,8 @@ def main() -> None:
     """The console script."""
     interrupts.install()
     try:
-        code = app(changes_last(sys.argv[1:]), result_action="return_value")
+        with interrupts.undisguised():
+            code = app(changes_last(sys.argv[1:]), result_action="return_value")
         sys.stdout.flush()
     except BrokenPipeError:
         nobody_reads()

@@ -1,5 +1,6 @@
 """How a command is interrupted, and how it leaves."""
 
+import contextlib
 import signal
 import subprocess
 import sys
@@ -75,6 +76,29 @@ def test_an_interrupt_that_got_lost_ends_a_simulation_before_it_starts() -> None
             signal.raise_signal(signal.SIGINT)
         with pytest.raises(KeyboardInterrupt), interrupts.handed_to(lambda _: None):
             pytest.fail("nothing is started")
+    finally:
+        interrupts.install()  # which forgets the interrupt: it must not end what a later test of this process runs
+        for one, handler in zip(interrupts.SIGNALS, before, strict=True):
+            signal.signal(one, handler)
+
+
+@pytest.mark.parametrize("interrupted", [True, False])
+def test_an_interrupt_that_a_library_raises_as_an_error_of_its_own_is_an_interrupt_again(interrupted: bool) -> None:
+    """pydantic does, while it builds a model: its SchemaError has the interrupt in its text alone."""
+    before = [signal.getsignal(one) for one in interrupts.SIGNALS]
+    expected = KeyboardInterrupt if interrupted else ValueError
+
+    def library() -> None:
+        with contextlib.suppress(KeyboardInterrupt):
+            if interrupted:
+                signal.raise_signal(signal.SIGTERM)
+        raise ValueError("a schema could not be built")
+
+    try:
+        interrupts.install()
+        with pytest.raises(expected) as raised, interrupts.undisguised():
+            library()
+        assert not interrupted or interrupts.exit_code(raised.value) == 143
     finally:
         interrupts.install()  # which forgets the interrupt: it must not end what a later test of this process runs
         for one, handler in zip(interrupts.SIGNALS, before, strict=True):

@@ -14,6 +14,14 @@ def test_the_commands_of_the_tutorial_print_what_stands_below_them() -> None:
     assert main(["--check"]) == 0
 
 
+def test_the_scenario_file_of_the_tutorial_is_the_one_that_is_written(tmp_path: Path) -> None:
+    """The meanings of the keys change more often than anything else that the pages print."""
+    script = runpy.run_path(str(ROOT / "scripts" / "transcripts.py"))
+    page = (ROOT / "docs" / "tutorial" / "first-swarm.md").read_text(encoding="utf-8")
+    (block,) = [found[0] for found in script["BLOCK"].finditer(page) if "fanet init" in found[0]]
+    assert script["played"](block, tmp_path) == block
+
+
 def test_a_page_is_played_and_a_changed_output_is_noticed(tmp_path: Path) -> None:
     played = runpy.run_path(str(ROOT / "scripts" / "transcripts.py"))["played"]
     page = "```python\n# two.py\nprint(1 + 1)\n```\n\n```console\n$ python two.py\n3\n$ cat two.py | head -1\n```\n"

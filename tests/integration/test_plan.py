@@ -7,16 +7,30 @@ from typing import Any
 
 import pytest
 
+from fanet_mw.planner.plan import plan
+from fanet_mw.planner.scenario_plan import ScenarioPlan
 from fanet_mw.scenario import Scenario, config
+from fanet_mw.units import NodeId
+from fanet_mw.wire.places import rounded
 from sim.cli.app import app
 from sim.cli.plan import judge
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
+from sim.world.mobility.layout import positions
 
 
 def planned(*settings: str, deadline_s: float | None = None, **options: bool) -> tuple[str, dict[str, Any], bool]:
     return judge(catalog.find("clusters", settings), deadline_s=deadline_s, **{"change": False, **options})
+
+
+def without_capacity(*settings: str) -> ScenarioPlan:
+    """The plan alone: the least interval that `judge` searches for takes seconds where packets are many."""
+    scenario = catalog.find("clusters", settings)
+    at = {NodeId(node): rounded(place) for node, place in zip(scenario.node_ids, positions(scenario), strict=True)}
+    found = plan(scenario, at)
+    assert isinstance(found, ScenarioPlan)
+    return found
 
 
 @pytest.mark.parametrize("settings", [(), ("clusters.count=8",), ("radio.lead_ms=10", "clusters.flooding_period_s=1")])
@@ -37,8 +51,8 @@ def test_a_load_that_does_not_fit_is_told_with_the_one_that_does(nodes: int, int
     assert not feasible
     assert f"one packet per source every {interval_s}" in text
     least_s = plan["superframe"]["least_interval_s"]
-    assert planned(*size, f"traffic.interval_s={least_s}")[2]
-    assert not planned(*size, f"traffic.interval_s={0.99 * least_s}")[2]
+    assert without_capacity(*size, f"traffic.interval_s={least_s}").feasible
+    assert not without_capacity(*size, f"traffic.interval_s={0.99 * least_s}").feasible
 
 
 @pytest.mark.parametrize(
@@ -153,12 +167,12 @@ def test_reports_fill_nothing_of_the_room_that_turns_have_for_bulk() -> None:
 def test_a_bulk_report_that_is_longer_than_the_traffic_takes_a_turn_for_itself() -> None:
     load = ("traffic.interval_s=0.02", "traffic.payload_bytes=200", "traffic.sources=9", "clusters.flooding_period_s=1")
     keys = (*load, "mission.survivors=1", 'mission.report_priority="bulk"', "mission.report_bytes=1000")
-    used = {
-        interval_s: [s["used"] for s in planned(*NINE, *keys, f"mission.report_interval_s={interval_s}")[1]["slots"]]
-        for interval_s in (2, 1)
+    plans = {
+        interval_s: without_capacity(*NINE, *keys, f"mission.report_interval_s={interval_s}") for interval_s in (2, 1)
     }
-    _, plan, _ = planned(*NINE, *keys)
-    together, turns = plan["superframe"]["together"], 25
+    used = {interval_s: [slot.utilization for slot in found.clusters] for interval_s, found in plans.items()}
+    assert plans[1].superframe is not None
+    together, turns = plans[1].superframe.together, 25
     assert together > 1
     more = used[1][-1] - used[2][-1]
     assert more == pytest.approx(0.5 * (2 - 1 / together) / turns), (

@@ -345,3 +345,19 @@ def test_a_wrong_request_to_a_service_is_one_message_and_exit_code_2(mark: str, 
     _, err = agent.communicate(timeout=PATIENCE_S)
     assert agent.returncode == 2
     assert err == "--id 9: must be in [1, nodes.count = 2]\n"
+
+
+def test_a_program_that_launches_whenever_it_is_imported_is_told_so_once(tmp_path: Path) -> None:
+    program = tmp_path / "unguarded.py"
+    program.write_text(
+        "import asyncio, fanet_mw\n"
+        "async def main():\n"
+        "    async with fanet_mw.launch('quick'):\n"
+        "        print('inside')\n"
+        "asyncio.run(main())\n",
+        encoding="utf-8",
+    )
+    ended = subprocess.run([sys.executable, str(program)], capture_output=True, text=True, timeout=PATIENCE_S)
+    assert (ended.returncode, ended.stdout) == (1, "")
+    assert ended.stderr.count("Traceback") == 1, "that of the program itself, and none of a child"
+    assert ended.stderr.rstrip().endswith('put the launch below `if __name__ == "__main__":`')

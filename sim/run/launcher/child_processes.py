@@ -25,6 +25,8 @@ _PRELOAD: Final = ["agents.__main__", "emulator.__main__", "sim.world.__main__"]
 _NICENESS: Final = 10
 """The niceness of a child that runs with lower priority, added to that of the launcher."""
 _BLOCKED: Final = (signal.SIGINT, signal.SIGTERM)
+_LAUNCHES_WHEN_IMPORTED: Final = 79
+"""The exit code of a child whose import of the main program starts a swarm."""
 Entry = Callable[..., int]
 
 
@@ -81,6 +83,16 @@ def _give_way() -> None:
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 
+def end_if_imported_by_a_child() -> None:
+    """End this process if it is a child that imports the main program, as each child does before it begins.
+
+    Only a program that does not ask whether it is the main one comes here in a child. Each of its children would start
+    a swarm, and print multiprocessing's traceback; `warm_up` says what is wrong instead.
+    """
+    if getattr(multiprocessing.current_process(), "_inheriting", False):  # as multiprocessing itself asks
+        os._exit(_LAUNCHES_WHEN_IMPORTED)
+
+
 def _nothing() -> None:
     pass
 
@@ -123,18 +135,25 @@ class Processes:
 
     async def warm_up(self) -> None:
         """Wait until the server has imported what children need; otherwise the first `start` would block the event
-        loop.
+        loop. Raises HostError if children cannot import the main program because it starts a swarm of its own then.
         """
         first = self._context.Process(target=_nothing)
 
-        def run() -> None:
+        def run() -> int | None:
             _start_server()
             with contextlib.suppress(OSError, EOFError):  # the next `start` reports the error
                 first.start()
                 first.join()
+                code = first.exitcode
                 first.close()
+                return code
+            return None
 
-        await asyncio.to_thread(run)
+        if await asyncio.to_thread(run) == _LAUNCHES_WHEN_IMPORTED:
+            raise HostError(
+                "the processes of a swarm import the program that launches it, and this program launches a swarm "
+                'whenever it is imported: put the launch below `if __name__ == "__main__":`'
+            )
 
     def start(self, name: str, entry: Entry, arguments: Mapping[str, Any], *, gives_way: bool = False) -> None:
         """Start a child; `entry(**arguments)` must be importable and picklable."""

@@ -31,7 +31,7 @@ from sim.run.bus.router import ROUTER, expected_names
 from sim.run.bus.running_swarms import registered
 from sim.run.collecting.collector import Collector
 from sim.run.launcher import limits
-from sim.run.launcher.child_processes import Processes, describe
+from sim.run.launcher.child_processes import Processes, describe, end_if_imported_by_a_child
 from sim.run.launcher.clock_governor import ClockGovernor
 from sim.run.launcher.deaths import Deaths
 from sim.run.launcher.services import Services
@@ -99,11 +99,17 @@ class SwarmRun:
         """The longest time for which this process could do nothing although it should have."""
         self._signal: int | None = None
 
-    async def run(self, on_progress: Callable[[float], None]) -> Outcome:
-        """Start, run and collect. Whatever happens, no process and no temporary file is left."""
+    async def run(self, on_progress: Callable[[float], None], on_started: Callable[["SwarmRun"], None]) -> Outcome:
+        """Start, run and collect. Whatever happens, no process and no temporary file is left.
+
+        `on_started` receives this run when nothing is left that could keep its processes from starting.
+        """
         with contextlib.closing(self._collector):
             began = time.monotonic()
             try:
+                await self.processes.warm_up()
+                self._check_not_over()
+                on_started(self)
                 await self._start_all()
                 ready_s = await self._start_clock(began)
                 run_began = time.monotonic()
@@ -151,8 +157,6 @@ class SwarmRun:
         self._over.set()
 
     async def _start_all(self) -> None:
-        await self.processes.warm_up()
-        self._check_not_over()
         for name, entry, arguments, gives_way in self._services.each():
             self.processes.start(name, entry, arguments, gives_way=gives_way)
             await asyncio.sleep(0)  # lets signals be handled between the starts of many processes
@@ -298,9 +302,10 @@ async def launch(
     collected waits in temporary files in `spool_folder`, by default where the system keeps such files.
 
     Raises BusError when the bus cannot be used or the swarm does not come up, ConfigError when the world is impossible
-    or a limit of the machine is too low, and KeyboardInterrupt with its number when a signal comes before there is
-    anything to report.
+    or a limit of the machine is too low, HostError when the program launches also when it is imported, and
+    KeyboardInterrupt with its number when a signal comes before there is anything to report.
     """
+    end_if_imported_by_a_child()
     require_possible(scenario)
     limits.prepare(processes=len(expected_names(scenario)))
     if must_compile():
@@ -317,11 +322,10 @@ async def launch(
         signals = interrupts.SIGNALS if heed_signals else ()
         for number in signals:
             loop.add_signal_handler(number, run.interrupt, number)
-        on_started(run)
         try:
             if heed_signals:
                 interrupts.raise_again()
-            return await run.run(on_progress)
+            return await run.run(on_progress, on_started)
         finally:
             for number in signals:
                 loop.remove_signal_handler(number)

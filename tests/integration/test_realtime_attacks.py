@@ -24,10 +24,11 @@ from sim.scenarios import catalog
 
 NAMES = Topics("test")
 SMALL = [
-    "nodes.count=4", "clusters.count=1", "duration_s=4", "warmup_s=1", "drain_s=1", "clusters.flooding_period_s=0.5",
+    "nodes.count=4", "clusters.count=1", "duration_s=7", "warmup_s=4", "drain_s=1", "clusters.flooding_period_s=0.5",
     "radio.lead_ms=150",
 ]  # fmt: skip
-"""The lead is long, because here it is not asked whether a machine that runs other tests besides is on time."""
+"""The lead is long, because here it is not asked whether a machine that runs other tests besides is on time. Traffic begins
+once a schedule has had several hellos in which to reach everyone."""
 
 
 FORGED_CLOCKS: list[tuple[str, list[Message]]] = [
@@ -82,7 +83,7 @@ def test_a_forged_clock_that_is_stopped_stops_nobody() -> None:
     """Without an access list anyone may put on the clock's topic, but only its keeper's answer counts."""
     outcome = attacked(FORGED_CLOCKS)
     assert {report["final"] for report in outcome.reports.values()} == {True}
-    assert max(record.t_ns for record in outcome.records if isinstance(record, Delivered)) > 2.5 * S
+    assert max(record.t_ns for record in outcome.records if isinstance(record, Delivered)) > 5.5 * S
     assert outcome.aborted is None
 
 

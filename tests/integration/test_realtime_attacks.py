@@ -27,8 +27,8 @@ SMALL = [
     "nodes.count=4", "clusters.count=1", "duration_s=7", "warmup_s=4", "drain_s=1", "clusters.flooding_period_s=0.5",
     "radio.lead_ms=150",
 ]  # fmt: skip
-"""The lead is long, because here it is not asked whether a machine that runs other tests besides is on time. Traffic begins
-once a schedule has had several hellos in which to reach everyone."""
+"""The lead is long, because here it is not asked whether a machine that runs other tests besides is on time. Traffic
+begins once a schedule has had several hellos in which to reach everyone."""
 
 
 FORGED_CLOCKS: list[tuple[str, list[Message]]] = [

@@ -35,7 +35,7 @@ def test_a_dense_swarm_needs_few_relays_and_they_win_the_turns_they_need() -> No
     assert summary["frames"]["closes"]
 
 
-@pytest.mark.parametrize("rule", ["heads", "cds", "mpr"])
+@pytest.mark.parametrize("rule", [pytest.param("heads", marks=pytest.mark.slow), "cds", "mpr"])
 def test_chosen_relays_reach_nearly_all_of_a_dense_swarm_by_half_the_frames(rule: str) -> None:
     heads = ["clusters.count=5"] if rule == "heads" else []
     few = summary_of(f"clusters.relay={rule}", "traffic.interval_s=0.5", "duration_s=17", *DENSE, *heads)

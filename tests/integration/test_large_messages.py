@@ -65,7 +65,13 @@ class Courier(Application):
             self.lost.append(status)
 
 
-@pytest.mark.parametrize("relay", sorted(RELAYS))
+_LIKE_MPR = ("cds", "heads")
+"""These relays are chosen as those of `mpr` are, by what neighbors say of their neighbors."""
+
+
+@pytest.mark.parametrize(
+    "relay", [pytest.param(name, marks=pytest.mark.slow) if name in _LIKE_MPR else name for name in sorted(RELAYS)]
+)
 def test_whatever_relays_messages_of_all_lengths_reach_everyone(relay: str) -> None:
     couriers: dict[int, Courier] = {}
 

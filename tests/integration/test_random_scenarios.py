@@ -55,15 +55,25 @@ SATURATED = (
 )
 
 
-@pytest.mark.parametrize(
-    "protocol", ["direct", "clustered", "flooding", "aodv", "olsr", "dsdv", "geographic", "gossip"]
-)
-@pytest.mark.parametrize("keys", [
-    ("radio.lead_ms=0", "radio.queue_frames=1"),
-    ("radio.queue_frames=1", "routing.queue_frames=1"),
-    ("radio.lead_ms=0", "radio.lifetime_ms=0.001", "traffic.destination=1"),
-    ("radio.lead_ms=0", "traffic.destination=2", 'faults=[{kind="cut",at_s=0.5,node=3},{kind="cut",at_s=0.6,node=2}]'),
-], ids=["no-lead", "queue-of-one", "no-lifetime", "cut-off"])  # fmt: skip
+_REFUSING = {
+    "no-lead": ("radio.lead_ms=0", "radio.queue_frames=1"),
+    "queue-of-one": ("radio.queue_frames=1", "routing.queue_frames=1"),
+    "no-lifetime": ("radio.lead_ms=0", "radio.lifetime_ms=0.001", "traffic.destination=1"),
+    "cut-off": (
+        "radio.lead_ms=0", "traffic.destination=2",
+        'faults=[{kind="cut",at_s=0.5,node=3},{kind="cut",at_s=0.6,node=2}]',
+    ),
+}  # fmt: skip
+_PROTOCOLS = ("direct", "clustered", "flooding", "aodv", "olsr", "dsdv", "geographic", "gossip")
+_REFUSED = [
+    pytest.param(protocol, keys, id=f"{name}-{protocol}", marks=[pytest.mark.slow] if (row + column) % 2 else [])
+    for row, (name, keys) in enumerate(_REFUSING.items())
+    for column, protocol in enumerate(_PROTOCOLS)
+]
+"""Each way with each protocol; by default each protocol meets two ways, and each way four protocols."""
+
+
+@pytest.mark.parametrize(("protocol", "keys"), _REFUSED)
 def test_a_saturated_source_whose_radio_refuses_everything_does_not_offer_without_end(
     protocol: str, keys: Sequence[str]
 ) -> None:
@@ -97,7 +107,7 @@ def test_the_densest_traffic_that_a_scenario_may_ask_for_is_carried_or_counted()
 @pytest.mark.parametrize("keys", [
     ("clusters.relay=scheduled", "radio.max_frame_bytes=680", "duration_s=8"),
     ("clusters.relay=scheduled", "clusters.links=measured", "radio.max_frame_bytes=996"),
-    ("clusters.relay=cds", "clusters.repair_s=5", "radio.max_frame_bytes=501"),
+    pytest.param(("clusters.relay=cds", "clusters.repair_s=5", "radio.max_frame_bytes=501"), marks=pytest.mark.slow),
     ("clusters.relay=claimed", "clusters.repair_s=5", "radio.max_frame_bytes=501"),
     ("clusters.repair_s=5", "radio.max_frame_bytes=385"),
     ("radio.max_frame_bytes=302",),

@@ -258,7 +258,11 @@ def last_words(err: str) -> str:
 
 
 @pytest.mark.parametrize(
-    ("number", "deaf"), [(signal.SIGINT, True), (signal.SIGTERM, False)], ids=["SIGINT, ignored before", "SIGTERM"]
+    ("number", "deaf"),
+    [
+        pytest.param(signal.SIGINT, True, id="SIGINT, ignored before"),
+        pytest.param(signal.SIGTERM, False, id="SIGTERM", marks=pytest.mark.slow),
+    ],
 )
 def test_a_router_that_is_interrupted_stops_the_services_it_kept_time_for(
     mark: str, tmp_path: Path, number: int, deaf: bool

@@ -77,7 +77,7 @@ def _nothing_left_behind() -> Iterator[None]:
 
 
 @pytest.mark.timeout(LIMIT_S)
-@pytest.mark.parametrize("relay", ["scheduled", "claimed"])
+@pytest.mark.parametrize("relay", ["scheduled", pytest.param("claimed", marks=pytest.mark.slow)])
 def test_turns_announced_ahead_are_kept_by_real_processes(relay: str) -> None:
     """Collision-free floods leave no time between hops but the lead: what is late is lost."""
     keys = ["nodes.count=9", "nodes.layout=grid", "traffic.sources=8", "clusters.count=8", "radio.lead_ms=150"]

@@ -48,7 +48,7 @@ async def test_a_lead_is_swarm_time_so_that_a_slow_clock_gives_slow_processes_mo
         assert found["late_frames"] == 0
 
 
-@pytest.mark.parametrize("time_scale", [0.5, 2.0])
+@pytest.mark.parametrize("time_scale", [pytest.param(0.5, marks=pytest.mark.slow), 2.0])
 async def test_a_swarm_of_processes_lives_by_its_clock(tmp_path: Path, time_scale: float) -> None:
     changes = [
         "nodes.count=4",

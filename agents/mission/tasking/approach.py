@@ -50,7 +50,9 @@ class Approach:
         """The instant at which this UAV came to the estimated place of each survivor."""
 
     def forget(self, survivor: int) -> None:
-        """Begin the approach to a survivor anew, because the place to which this UAV came has proved wrong."""
+        """Begin the approach to a survivor anew, because the place to which this UAV came has proved wrong, or because
+        it came there in passing or for an earlier task.
+        """
         self.arrived_ns.pop(survivor, None)
 
     def next_point(self, survivor: int, place: Estimate, now_ns: int, *, responding: bool) -> tuple[float, float]:

@@ -131,6 +131,8 @@ class Bidding:
             if won:
                 distance_m, self.survivor = min(won)
                 self._announced = False
+                if now_ns - self._approach.arrived_ns.get(self.survivor, now_ns) > self._patience_ns:
+                    self._approach.forget(self.survivor)
                 self._due_ns = now_ns + (round(distance_m / self._cruise_m_s * S) if math.isfinite(distance_m) else 0)
         if self.survivor is not None and not self._announced:
             self._announce(self.survivor, now_ns)

@@ -77,15 +77,67 @@ def test_a_responder_that_does_not_come_in_time_takes_its_bid_back() -> None:
     assert [bid.eta_ds for bid in board.tasks.bids_to_tell(now_ns=later_ns)] == [0xFFFF]
 
 
+TURNED_NS = TAKEN_UP_NS + 200 * S
+"""The line flies back: a place that it reaches now it passed 70 s ago on its way out."""
+
+
+def board_of_one_that_was_there_before() -> Board:
+    """A follower where it is at `TURNED_NS`, and a survivor below it that was reported when the line passed on its way
+    out.
+    """
+    at = lane_of(FOLLOWER, TURNED_NS)
+    board = Board(FOLLOWER, at)
+    board.hear(1, at, range(1, 5), now_ns=TURNED_NS - 70 * S)
+    return board
+
+
+def board_of_one_that_searched_in_vain() -> Board:
+    """It won the task on the way out, and took its bid back 24 s before `TURNED_NS`."""
+    board = board_of_one_that_was_there_before()
+    board.tasks.bid(TURNED_NS - 70 * S)
+    board.tasks.choose(TURNED_NS - 70 * S)
+    board.goal.at(board.tasks.survivor, TURNED_NS - 70 * S)
+    board.tasks.choose(TURNED_NS - 24 * S)
+    assert board.tasks.survivor is None
+    return board
+
+
+def assert_that_it_searches(board: Board) -> None:
+    for after_s in (0, 1, 30):
+        board.tasks.bid(TURNED_NS + after_s * S)
+        board.tasks.choose(TURNED_NS + after_s * S)
+        assert board.tasks.survivor == 1, after_s
+        board.goal.at(1, TURNED_NS + after_s * S)
+
+
 def test_a_responder_that_took_its_bid_back_waits_before_it_bids_again() -> None:
+    board = board_of_one_that_searched_in_vain()
+    for after_s, bids in ((-24, False), (-5, False), (-4, True)):
+        now_ns = TURNED_NS + after_s * S
+        board.tasks.bid(now_ns)
+        assert (board.tasks.bids_to_tell(now_ns=now_ns)[0].eta_ds != 0xFFFF) is bids, after_s
+
+
+def test_one_that_wins_a_task_once_more_has_its_time_once_more() -> None:
+    assert_that_it_searches(board_of_one_that_searched_in_vain())
+
+
+def test_one_that_came_by_a_minute_before_it_won_the_task_searches_as_any_other() -> None:
+    board = board_of_one_that_was_there_before()
+    place = board.survivors.by_id[1].place()
+    assert place is not None
+    board.approach.next_point(1, place, TURNED_NS - 70 * S, responding=False)
+    assert_that_it_searches(board)
+
+
+def test_one_that_loses_a_task_for_a_moment_gains_no_time_by_that() -> None:
     at = lane_of(FOLLOWER, NOW_NS + 20 * S)
     board = Board(FOLLOWER, at)
-    board.hear(1, at, range(1, 5), now_ns=NOW_NS)
-    board.goal.at(1, NOW_NS - 50 * S)
-    board.tasks.bid(NOW_NS)
-    board.tasks.choose(NOW_NS)
-    board.tasks.choose(NOW_NS)
-    assert board.tasks.survivor is None, "it has searched there for more than 45 s"
-    for after_s, bids in ((0, False), (19, False), (20, True)):
-        board.tasks.bid(NOW_NS + after_s * S)
-        assert (board.tasks.bids_to_tell(now_ns=NOW_NS)[0].eta_ds != 0xFFFF) is bids
+    board.hear(1, at, range(1, 5), now_ns=NOW_NS - 18 * S)
+    board.tasks.bid(NOW_NS - 18 * S)
+    board.tasks.choose(NOW_NS - 18 * S)
+    board.goal.at(1, NOW_NS - 18 * S)
+    board.tasks.survivor = None
+    for after_s, survivor in ((20, 1), (26, 1), (28, None)):
+        board.tasks.choose(NOW_NS + after_s * S)
+        assert board.tasks.survivor == survivor, after_s

@@ -52,3 +52,9 @@ def gain(*, sigma_m: float, range_m: float) -> float:
         return 1.0
     share = _WANTED * range_m / sigma_m
     return 2 * math.pow(share, 2) / (1 + math.pow(share, 2))
+
+
+def error_m(*, sigma_m: float, range_m: float) -> float:
+    """The standard deviation of the estimate along each axis, if the errors of fixes are independent."""
+    k = gain(sigma_m=sigma_m, range_m=range_m)
+    return sigma_m * math.sqrt(k / (2 - k))

@@ -6,13 +6,14 @@ If relays contend, it tries a timetable. With claimed slots it varies the backof
 packets together, or tries a timetable. Its last resort is less application traffic.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import product
+from itertools import combinations, product
 from typing import Final, NamedTuple
 
 from fanet_mw.bounds import Refused
 from fanet_mw.graph.topology import Adjacency
-from fanet_mw.planner import problems_and_notes
+from fanet_mw.planner import contention_window, problems_and_notes
 from fanet_mw.planner.demand import demands
 from fanet_mw.planner.goodput_bound import in_turns
 from fanet_mw.planner.plan import judge
@@ -20,7 +21,7 @@ from fanet_mw.planner.scenario_plan import ScenarioPlan
 from fanet_mw.planner.site import Site
 from fanet_mw.planner.variant import Value, Variant, vary
 from fanet_mw.routing.clustered.tdma.turn_timing import turn_slack_ns
-from fanet_mw.routing.clustered.timetable.turn_size import most_together, superframe
+from fanet_mw.routing.clustered.timetable.turn_size import distance_error_m, most_together, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import US, Enu, NodeId
 
@@ -46,6 +47,7 @@ def cheapest_change(
     positions: Mapping[NodeId, Enu],
     *,
     adjacency: Adjacency | None = None,
+    reported: Sequence[Mapping[NodeId, Enu]] = (),
     sources: Sequence[NodeId] | None = None,
     deadline_ns: int | None = None,
 ) -> ScenarioChange | None:
@@ -53,15 +55,17 @@ def cheapest_change(
 
     Nothing is searched for a separated swarm, which is helped only if nodes come nearer to each other.
     """
-    site = Site(scenario, positions, adjacency)
+    site = Site(scenario, positions, adjacency, reported)
     found = judge(site, sources, deadline_ns)
     if isinstance(found, ScenarioPlan) and found.cut_off:
         return None
-    for group, quick in ((_changes(scenario), True), (_tightest(scenario), False), (_lighter(scenario), True)):
+    for group, quick in ((_changes(site), True), (_tightest(scenario), False), (_lighter(scenario), True)):
         for variant in sorted(group, key=lambda v: v.size):
-            if hopeless(site.of(variant.scenario), sources):
-                continue
+            if variant.scenario.measures_links or hopeless(site.of(variant.scenario), sources):
+                continue  # a timetable over lossy links is planned otherwise (`lossy_plan.py`)
             found = judge(site.of(variant.scenario), sources, deadline_ns, quick=quick)
+            if quick and isinstance(found, ScenarioPlan) and found.feasible:
+                found = judge(site.of(variant.scenario), sources, deadline_ns)
             if isinstance(found, ScenarioPlan) and found.feasible:
                 return ScenarioChange(variant, found)
     return None
@@ -78,21 +82,53 @@ def hopeless(site: Site, sources: Sequence[NodeId] | None) -> bool:
     return any(most is not None and interval_ns < most.least_interval_ns for interval_ns, most in limits)
 
 
-def _changes(scenario: Scenario) -> Iterator[Variant]:
-    options = {"scheduled": _turn_options, "claimed": _claim_options}.get(scenario.clusters.relay, _slot_options)
-    for settings in options(scenario):
-        variant = vary(scenario, settings)
+def _changes(site: Site) -> Iterator[Variant]:
+    options = {"scheduled": _turn_options, "claimed": _claim_options}.get(site.scenario.clusters.relay, _slot_options)
+    for settings in options(site):
+        variant = vary(site.scenario, settings)
         if variant is not None:
             yield variant
 
 
-def _turn_options(scenario: Scenario) -> Iterator[dict[str, Value]]:
+def _turn_options(site: Site) -> Iterator[dict[str, Value]]:
+    scenario = site.scenario
     clusters, radio = scenario.clusters, scenario.radio
     counts = dict.fromkeys((clusters.count, scenario.nodes.count - 1))
     windows = dict.fromkeys((radio.cw_min, *(w for w in WINDOWS if w < radio.cw_min)))
     periods = dict.fromkeys((clusters.flooding_period_s, *_TURN_PERIODS_S))
-    for count, window, period_s, clocks in product(counts, windows, periods, _clock_options(scenario)):
-        yield {"clusters.count": count, "radio.cw_min": window, "clusters.flooding_period_s": period_s, **clocks}
+    others = product(_clock_options(scenario), _hello_options(site), _link_options(site))
+    for count, window, period_s, (clocks, hellos, links) in product(counts, windows, periods, [*others]):
+        yield {
+            "clusters.count": count,
+            "radio.cw_min": window,
+            "clusters.flooding_period_s": period_s,
+            **clocks,
+            **hellos,
+            **links,
+        }
+
+
+def _hello_options(site: Site) -> list[dict[str, Value]]:
+    """Changes that help when the contention window is too short for hellos: a longer one, also for a longer period."""
+    if not any(contention_window.too_short(site.scenario, site.adjacency)):
+        return [{}]
+    least = contention_window.least_ms(contention_window.hellos_ns(site.scenario, site.adjacency))
+    return [{"clusters.contention_ms": float(ms)} for ms in (least, 2 * least)]
+
+
+def _link_options(site: Site) -> list[dict[str, Value]]:
+    """Changes that help when reported positions leave open which nodes hear each other: a greatest distance of links
+    that no two nodes are near, although errors of GPS are twice what they are likely to be.
+    """
+    if not any(site.reported) or site.scenario.radio.channel != "range":
+        return [{}]
+    range_m, clear_m = site.scenario.radio.range_m, distance_error_m(site.scenario)
+    apart = sorted({math.dist(a, b) for a, b in combinations(site.positions.values(), 2)})
+    gaps = [(a, b) for a, b in zip(apart, [*apart[1:], math.inf], strict=True) if a <= range_m and b - a > 2 * clear_m]
+    if not gaps or gaps[-1][0] <= range_m - clear_m < range_m + clear_m <= gaps[-1][1]:
+        return [{}]
+    near, far = gaps[-1]
+    return [{}, {"clusters.link_m": float(round(min((near + far) / 2, near + 2 * clear_m)))}]
 
 
 def _clock_options(scenario: Scenario) -> list[dict[str, Value]]:
@@ -119,16 +155,18 @@ def _tightest(scenario: Scenario) -> Iterator[Variant]:
         yield variant
 
 
-def _claim_options(scenario: Scenario) -> Iterator[dict[str, Value]]:
+def _claim_options(site: Site) -> Iterator[dict[str, Value]]:
+    scenario = site.scenario
     windows = dict.fromkeys((scenario.radio.cw_min, *(w for w in WINDOWS if w < scenario.radio.cw_min)))
     together = dict.fromkeys((scenario.routing.aggregate, True))
     numbers = dict.fromkeys((scenario.clusters.slots, *_SLOTS))
     for window, slots, aggregate, clocks in product(windows, numbers, together, _clock_options(scenario)):
         yield {"radio.cw_min": window, "clusters.slots": slots, "routing.aggregate": aggregate, **clocks}
-    yield from ({"clusters.relay": "scheduled", **turned} for turned in _turn_options(scenario))
+    yield from ({"clusters.relay": "scheduled", **turned} for turned in _turn_options(site))
 
 
-def _slot_options(scenario: Scenario) -> Iterator[dict[str, Value]]:
+def _slot_options(site: Site) -> Iterator[dict[str, Value]]:
+    scenario = site.scenario
     clusters, nodes = scenario.clusters, scenario.nodes.count
     counts = dict.fromkeys((clusters.count, *(n for n in _COUNTS if n < max(2, nodes))))
     periods = dict.fromkeys(round(clusters.flooding_period_s * factor, 6) for factor in _PERIODS)

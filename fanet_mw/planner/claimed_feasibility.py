@@ -1,5 +1,6 @@
 """Judges a scenario with claimed slots. Rates are judged; the only delay that is stated is that without queues."""
 
+import math
 from collections.abc import Iterator, Sequence
 
 from fanet_mw.bounds import Bounded, Refused
@@ -87,6 +88,7 @@ def _problems(
             f"node {worst.node}: its packets need {worst.load:.1f} turns a period, it has {worst.claimed} and wins "
             f"{worst.won:.1f} by lot{others}"
         )
+    yield from _overflowing(scenario, claims)
     lone_ns = claims.lone_ns
     for c in classes:
         problem = None if lone_ns is None else problems_and_notes.expired(scenario, c, lone_ns)
@@ -94,6 +96,22 @@ def _problems(
             yield f"{problem}, even without queues"
         if deadline_ns is not None:
             yield f"{c.name}: no bound in claimed slots, so the deadline of {deadline_ns / MS:g} ms cannot be promised"
+
+
+def _overflowing(scenario: Scenario, claims: ClaimedPlan) -> Iterator[str]:
+    """A sentence about queues that are too short for the packets that come while a node waits for a turn; nothing if
+    they are long enough. Packets of many sources come at random, so five standard deviations are added to their mean.
+    """
+    waiting = {node.node: node.load * (node.hop_ns or 0) / claims.turns.period_ns for node in claims.nodes}
+    node = max(waiting, key=lambda one: (waiting[one], -one), default=None)
+    if node is None:
+        return
+    least = math.ceil(waiting[node] + 5 * math.sqrt(waiting[node]))
+    if scenario.routing.queue_frames < least:
+        yield (
+            f"node {node}: {waiting[node]:.1f} packets come on average while it waits for a turn, "
+            f"routing.queue_frames = {scenario.routing.queue_frames} has to be at least {least}"
+        )
 
 
 def _notes(claims: ClaimedPlan) -> Iterator[str]:

@@ -7,11 +7,13 @@ With claimed slots a hello names all neighbors of its sender, and half of the he
 enough. Until nodes hold slots all hellos go in the window; those that are lost then are repeated, and not counted here.
 """
 
+import math
 from collections.abc import Iterator
 from typing import Final
 
 from fanet_mw.graph.topology import Adjacency, two_hop
 from fanet_mw.planner.flood_cost import contended_ns
+from fanet_mw.routing.clustered.tdma.turn_timing import TAIL_NS
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, S, seconds_to_ns
 from fanet_mw.wire.hello.claims import CAPACITY, MESSAGE_BYTES
@@ -19,8 +21,18 @@ from fanet_mw.wire.hello.claims import CAPACITY, MESSAGE_BYTES
 MOST: Final = 0.75
 """The greatest share of the window that hellos may need. On the 9 x 5 grid, hellos that need all of the window reach
 only 0.58 of the nodes that should receive them."""
+_BACKLOG: Final = 1.5
+"""The greatest airtime of hellos, as a share of that part of the window in which they fall due. 44 nodes 396 m apart,
+with a range of 400 m, keep all neighbors at a share of 1.4, and lose some at 2.8."""
 _HELLO_BYTES: Final = 137
 """The length of a hello: routing header, HEARTBEAT, GLOBAL_POSITION_INT and FANET_BEACON."""
+
+
+def room_ns(window_ns: int) -> int:
+    """The greatest airtime of hellos for which there is room in a contention window. They fall due before its last
+    part, in which those that had to wait are transmitted.
+    """
+    return max(0, min(int(MOST * window_ns), int(_BACKLOG * (window_ns - TAIL_NS))))
 
 
 def hellos_ns(scenario: Scenario, adjacency: Adjacency) -> int:
@@ -46,15 +58,19 @@ def claimed_hellos_ns(scenario: Scenario, adjacency: Adjacency) -> int:
     return most * scenario.claimed_period_ns // (2 * every_ns)
 
 
+def least_ms(needed_ns: int) -> int:
+    """The length of the shortest contention window, in whole milliseconds, that has room for these hellos."""
+    return math.ceil(max(needed_ns / MOST, needed_ns / _BACKLOG + TAIL_NS) / MS)
+
+
 def too_short_for_claims(scenario: Scenario, adjacency: Adjacency) -> Iterator[str]:
     """A sentence about a window that is too short for the hellos of claimed slots; nothing if it is long enough."""
     needed_ns, window_ns = claimed_hellos_ns(scenario, adjacency), round(scenario.clusters.contention_ms * MS)
-    if needed_ns > MOST * window_ns:
-        least_ms = -(-needed_ns // (MOST * MS))
+    if needed_ns > room_ns(window_ns):
         every_s, period_s = scenario.routing.hello_interval_s, scenario.claimed_period_ns / S
         yield (
             f"the hellos that contend take {needed_ns / MS:.1f} ms of each period of {period_s:g} s where nodes are "
-            f"densest: clusters.contention_ms = {window_ns / MS:g} has to be at least {least_ms:g}, "
+            f"densest: clusters.contention_ms = {window_ns / MS:g} has to be at least {least_ms(needed_ns)}, "
             f"or routing.hello_interval_s = {every_s:g} greater; claims of the same turn are noticed late or never"
         )
 
@@ -62,9 +78,10 @@ def too_short_for_claims(scenario: Scenario, adjacency: Adjacency) -> Iterator[s
 def too_short(scenario: Scenario, adjacency: Adjacency) -> Iterator[str]:
     """A sentence about a window that is too short for the hellos; nothing if it is long enough."""
     needed_ns, window_ns = hellos_ns(scenario, adjacency), round(scenario.clusters.contention_ms * MS)
-    if needed_ns > MOST * window_ns:
+    if needed_ns > room_ns(window_ns):
         yield (
             f"the hellos of a superframe take {needed_ns / MS:.1f} ms where nodes are densest, its contention window "
-            f"of {window_ns / MS:g} ms has {MOST * window_ns / MS:g} ms for them: neighbors are missed, taken for dead "
-            "(clusters.contention_ms, routing.hello_interval_s, clusters.flooding_period_s)"
+            f"of {window_ns / MS:g} ms has {room_ns(window_ns) / MS:g} ms for them: neighbors are missed, taken for "
+            f"dead (clusters.contention_ms, which has to be at least {least_ms(needed_ns)}, routing.hello_interval_s, "
+            "clusters.flooding_period_s)"
         )

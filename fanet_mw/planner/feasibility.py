@@ -13,6 +13,7 @@ overflows, and a flood reaches all nodes within the hop limit.
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
+from fanet_mw import wire
 from fanet_mw.bounds import Bounded, DelayBound, Refused, paper
 from fanet_mw.graph.topology import levels, within_range
 from fanet_mw.planner import contention_window, flood_hops, problems_and_notes, reachability
@@ -24,7 +25,8 @@ from fanet_mw.planner.scenario_plan import ScenarioPlan
 from fanet_mw.planner.site import Site
 from fanet_mw.planner.timetable_plan import Candidate, TimetablePlan, judge, table_for
 from fanet_mw.planner.uplink_delay import Ways, access_outcome, ways
-from fanet_mw.routing.clustered.clustering import Cluster, balanced
+from fanet_mw.routing.clustered.clustering import Cluster, Swarm
+from fanet_mw.routing.clustered.clustering.division import Division
 from fanet_mw.routing.clustered.tdma.turn_timing import receipt_ns
 from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
 from fanet_mw.routing.clustered.timetable.reserved_room import reserved
@@ -45,11 +47,14 @@ class _Judged(NamedTuple):
 
 
 def members_of(scenario: Scenario, positions: Mapping[NodeId, Enu]) -> list[Cluster]:
-    """The clusters that the leader will make. The leader belongs to none if there are other nodes; a timetable gives it
-    turns.
+    """The clusters that the leader will make if all nodes have joined before. The leader belongs to none if there are
+    other nodes; a timetable gives it turns.
     """
+    settings, range_m = scenario.clusters, scenario.clusters.link_m or scenario.radio.range_m
     others = {node: at for node, at in positions.items() if node != scenario.leader}
-    clusters = balanced(others or positions, count=scenario.clusters.count)
+    swarm = Swarm(others or positions, within_range(others or positions, range_m=range_m))
+    division = Division(settings.method, count=settings.count, range_m=range_m, options=settings.options)
+    clusters = division.divide(swarm, now_ns=0)
     if scenario.clusters.relay == "scheduled" and others and scenario.leader in positions:
         clusters.append(Cluster(scenario.leader, (scenario.leader,)))
     return clusters
@@ -93,6 +98,7 @@ def evaluate(
     cut_off = tuple(reachability.problems(judged.cut_off))
     crowded = tuple(contention_window.too_short(scenario, site.adjacency)) if site.timetable else ()
     apart = tuple(problems_and_notes.clocks_apart(scenario)) if site.timetable else ()
+    unheard = tuple(_unheard(scenario, fitted)) if isinstance(fitted, FittedTimetable) else ()
     out_of_hops = () if judged.unfit or judged.cut_off else tuple(_out_of_hops(site, fitted, judged.clusters))
     if out_of_hops:
         refused = Refused("floods end before all nodes have them")
@@ -116,6 +122,7 @@ def evaluate(
             *problems_and_notes.problems(scenario, judged.clusters, summed, (*cut_off, *out_of_hops)),
             *crowded,
             *apart,
+            *unheard,
             *late,
         ),
         notes=(
@@ -141,6 +148,23 @@ def _out_of_hops(
     yield from flood_hops.incomplete(scenario, geometry, found)
     most = max((c.hops + found[NodeId(c.head)].most for c in clusters if c.head in found), default=0)
     yield from flood_hops.too_many(scenario, most)
+
+
+def _unheard(scenario: Scenario, fitted: FittedTimetable) -> Iterator[str]:
+    """A sentence about a leader whose announcements expire while they wait for its turns, so that nodes elect
+    another.
+    """
+    roots = fitted.table.offsets_of(scenario.leader)
+    if not roots:
+        return
+    done_ns = fitted.turns.done_ns(roots, span=fitted.table.spans[scenario.leader])
+    worst_ns = scenario.radio.lead_ns + done_ns[min(schedule_parts(scenario), len(done_ns)) - 1]
+    lifetime_ns = scenario.routing.lifetime_ns(wire.PRIORITY_BULK)
+    if worst_ns > lifetime_ns:
+        yield (
+            f"the leader's announcements take up to {worst_ns / S:.1f} s, and expire after routing.lifetime_s = "
+            f"{lifetime_ns / S:g}: nodes would elect another leader"
+        )
 
 
 def goodput(site: Site, classes: Sequence[TrafficClass]) -> Goodput | None:

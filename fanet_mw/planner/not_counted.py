@@ -33,6 +33,8 @@ def not_counted(scenario: Scenario) -> Iterator[str]:
 
 def _losses(scenario: Scenario) -> Iterator[tuple[str, str]]:
     radio = scenario.radio
+    if radio.channel != "range" and scenario.clusters.relay != "scheduled":
+        yield "radio.channel", f'"{radio.channel}"'  # for a timetable the plan states them as a probability
     if radio.fading != "none":
         yield "radio.fading", f'"{radio.fading}"'
     if radio.shadowing_db:

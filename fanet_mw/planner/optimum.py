@@ -11,18 +11,20 @@ the longest period.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from heapq import heappop, heappush
 from typing import Final, NamedTuple
 
 from fanet_mw.airtime import Timing
 from fanet_mw.bounds import Refused
 from fanet_mw.planner.cheapest_change import WINDOWS, hopeless
 from fanet_mw.planner.demand import TrafficClass, demands
-from fanet_mw.planner.feasibility import evaluate, members_of
+from fanet_mw.planner.feasibility import members_of
 from fanet_mw.planner.flood_cost import frame_ns
+from fanet_mw.planner.plan import judge
 from fanet_mw.planner.scenario_plan import ScenarioPlan
 from fanet_mw.planner.site import Site
 from fanet_mw.planner.uplink_delay import ways
-from fanet_mw.planner.variant import Variant, vary
+from fanet_mw.planner.variant import Value, Variant, vary
 from fanet_mw.routing.clustered.timetable.turn_size import schedule_bytes
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S, seconds_to_ns
@@ -51,44 +53,62 @@ def optimum(
     scenario: Scenario,
     positions: Mapping[NodeId, Enu],
     *,
+    reported: Sequence[Mapping[NodeId, Enu]] = (),
     deadline_ns: int | None,
     sources: Sequence[NodeId] | None = None,
 ) -> Optimum | None:
     """The configuration of least airtime whose bounds are proven and within the deadline; None if none was found."""
-    site = Site(scenario, positions)
-    best: Optimum | None = None
+    site = Site(scenario, positions, reported=reported)
+    families = [_candidates(site, settings, sources, deadline_ns) for settings in _families(scenario)]
     tried = 0
-    for settings in _families(scenario):
-        for period_s in _periods(scenario, deadline_ns):
-            variant = vary(scenario, {**settings, "clusters.flooding_period_s": period_s})
-            if variant is None or hopeless(site.of(variant.scenario), sources):
-                continue
-            tried += 1
-            found = _judge(site.of(variant.scenario), sources, deadline_ns)
-            if found is None:
-                continue
-            plan, classes = found
-            if not plan.proven:
-                break  # no period gives the way to the head a bound
-            if not plan.feasible:
-                continue
-            cost = _airtime_ns(plan, classes, site)
-            if best is None or (cost[0], variant.size) < (best.airtime_ns, best.variant.size):
-                best = Optimum(variant, plan, *cost, tried)
-            break  # a shorter period only takes more airtime
-    return best._replace(tried=tried) if best else None
+    cheapest: list[tuple[int, tuple[int, float, tuple[str, ...]], int, Optimum]] = []
+    waiting = list(range(len(families)))
+    while waiting or cheapest:
+        for index in waiting:
+            for candidate in families[index]:
+                tried += 1
+                if candidate is not None:
+                    heappush(cheapest, (candidate.airtime_ns, candidate.variant.size, index, candidate))
+                    break  # a shorter period only takes more airtime
+        if not cheapest:
+            break
+        *_, index, best = heappop(cheapest)
+        whole = judge(site.of(best.variant.scenario), sources, deadline_ns)
+        if not isinstance(whole, Refused) and whole.feasible and whole.proven:
+            return best._replace(plan=whole, tried=tried)
+        waiting = [index]  # not for all reported positions: try the next period
+    return None
+
+
+def _candidates(
+    site: Site, settings: Mapping[str, Value], sources: Sequence[NodeId] | None, deadline_ns: int | None
+) -> Iterator[Optimum | None]:
+    """One family's configurations, the longest period first, judged for the exact positions; None for one that is not
+    feasible.
+    """
+    scenario = site.scenario
+    for period_s in _periods(scenario, deadline_ns):
+        variant = vary(scenario, {**settings, "clusters.flooding_period_s": period_s})
+        if variant is None or hopeless(site.of(variant.scenario), sources):
+            continue
+        found = _judge(site.of(variant.scenario), sources, deadline_ns)
+        if found is not None and not found[0].proven:
+            yield None
+            return  # no period gives the way to the head a bound
+        if found is None or not found[0].feasible:
+            yield None
+        else:
+            yield Optimum(variant, found[0], *_airtime_ns(*found, site), 0)
 
 
 def _judge(
     site: Site, sources: Sequence[NodeId] | None, deadline_ns: int | None
 ) -> tuple[ScenarioPlan, list[TrafficClass]] | None:
-    classes = demands(site.scenario, sources)
-    if isinstance(classes, Refused):
-        return None
-    return evaluate(site, classes, deadline_ns=deadline_ns, quick=True), classes
+    classes, found = demands(site.scenario, sources), judge(site, sources, deadline_ns, quick=True)
+    return None if isinstance(classes, Refused) or isinstance(found, Refused) else (found, classes)
 
 
-def _families(scenario: Scenario) -> Iterator[dict[str, float | int | str]]:
+def _families(scenario: Scenario) -> Iterator[dict[str, Value]]:
     """All combinations of settings except the period. With fewer heads fewer turns are needed, but members send to
     heads.
     """

@@ -216,6 +216,10 @@ def _class(c: ClassPlan, found: ScenarioPlan) -> str:
     line = f"{c.name}, {c.sources} sources every {c.interval_ns / S:g} s: {_bound_text(c.bound)}"
     if isinstance(c.bound, Bounded) and isinstance(c.from_head, Bounded) and c.bound != c.from_head:
         line += f" ({c.from_head.delay_ns / S:.3f} s from the head on)"
+    if isinstance(c.bound, Bounded) and found.draws:
+        line += f" in {100 * found.confidence:.0f} % of flights" + (
+            ", but for changes of the timetable" if found.varying else ""
+        )
     if isinstance(c.bound, Bounded) and not found.proven:
         line += ", an estimate"
     if found.claims is not None and found.claims.lone_ns is not None and not found.cut_off:

@@ -35,6 +35,10 @@ class ScenarioPlan(NamedTuple):
     """The reasons why the scenario is not feasible; empty if it is."""
     notes: tuple[str, ...]
     """The assumptions of the bounds, and what they do not include."""
+    draws: int = 0
+    """The number of draws of reported positions, besides the true ones, for which the bounds hold as well."""
+    varying: int = 0
+    """The number of pairs of nodes that a timetable links in some of these draws only."""
 
     @property
     def feasible(self) -> bool:
@@ -44,6 +48,13 @@ class ScenarioPlan(NamedTuple):
     def proven(self) -> bool:
         """True if the bounds hold; False if some are estimates of contention."""
         return isinstance(self.access, Bounded) and all(cluster.flood.proven for cluster in self.clusters)
+
+    @property
+    def confidence(self) -> float:
+        """The probability that the bounds hold for the positions that GPS gives in flight: another draw exceeds the
+        greatest of n with a probability of 1 / (n + 1).
+        """
+        return self.draws / (self.draws + 1) if self.draws else 1.0
 
     @property
     def carried_per_second(self) -> float | None:

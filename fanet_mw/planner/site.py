@@ -1,6 +1,6 @@
 """The nodes of a scenario where they stand, and what follows from positions alone: links, floods, claimed slots."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from fanet_mw.bounds.guard_time import PLANNED_ERROR_NS, slot_guard_ns
 from fanet_mw.graph.topology import Adjacency, within_range
@@ -9,14 +9,25 @@ from fanet_mw.planner.flood_cost import FloodCost, flood_cost
 from fanet_mw.routing.clustered.claimed.claiming import geometry
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId
+from fanet_mw.wire.places import rounded
 
 
 class Site:
     """A scenario and the positions of its nodes. What depends on positions alone is computed once for all variants."""
 
-    def __init__(self, scenario: Scenario, positions: Mapping[NodeId, Enu], adjacency: Adjacency | None = None) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        positions: Mapping[NodeId, Enu],
+        adjacency: Adjacency | None = None,
+        reported: Sequence[Mapping[NodeId, Enu]] = (),
+    ) -> None:
+        """`reported`: draws of the positions that nodes report, which differ from `positions` by errors of GPS."""
         self.scenario = scenario
-        self.positions = positions
+        self.positions = {node: rounded(at) for node, at in positions.items()} if self.timetable else positions
+        """The positions in whole metres if timetables are computed from them, as a leader announces them."""
+        self.reported = reported
+        self._exact = positions
         self.adjacency = within_range(positions, range_m=scenario.radio.range_m) if adjacency is None else adjacency
         self._floods: dict[tuple[NodeId, int], FloodCost] = {}
         self._claimants: dict[object, Claimants] = {}
@@ -25,11 +36,24 @@ class Site:
         """The same nodes with another scenario; the costs of floods are shared if the rules of
         relaying are the same.
         """
-        other = Site(scenario, self.positions, self.adjacency)
+        other = Site(scenario, self._exact, self.adjacency, self.reported)
         if scenario.clusters.relay == self.scenario.clusters.relay and scenario.radio == self.scenario.radio:
             other._floods = self._floods
         other._claimants = self._claimants
         return other
+
+    def as_reported(self) -> list["Site"]:
+        """The same links, with the positions of each draw: those from which nodes compute a timetable."""
+        return [Site(self.scenario, positions, self.adjacency) for positions in self.reported]
+
+    def varying_links(self) -> int:
+        """The number of pairs of nodes that are near enough for a link of the timetable in some draws only."""
+        link_m = self.scenario.clusters.link_m or self.scenario.radio.range_m
+        found = [
+            {(a, b) for a, near in within_range(positions, range_m=link_m).items() for b in near if a < b}
+            for positions in self.reported
+        ]
+        return len(set().union(*found)) - len(found[0].intersection(*found)) if found else 0
 
     def claimants(self) -> Claimants:
         """The slots and relays of claimed slots, which follow from the positions and the geometry of turns."""

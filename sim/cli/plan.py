@@ -6,9 +6,11 @@ Exit codes: 0 feasible, 1 not feasible, 2 the scenario or a flag is wrong (as wi
 
 import json
 import math
+from random import Random
 from typing import Any, Final
 
 from agents.applications.traffic import sources_of
+from agents.positioning.steady_fix import error_m
 from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.errors import ConfigError
 from fanet_mw.graph.topology import within_range
@@ -36,6 +38,7 @@ from fanet_mw.planner import (
 )
 from fanet_mw.planner.claimed_turns import ClaimedPlan
 from fanet_mw.planner.timetable_plan import TimetablePlan
+from fanet_mw.rng import stream
 from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE
 from fanet_mw.routing.clustered.timetable.timetable import Timetable
 from fanet_mw.routing.clustered.timetable.turn_size import links
@@ -48,6 +51,8 @@ from sim.world.mobility.layout import positions
 
 _DRAWS: Final = 3
 """The number of draws of shadowing for which a plan is made; each takes up to some seconds."""
+_GPS_DRAWS: Final = 20
+"""The number of draws of reported positions; each takes up to some tenths of a second."""
 
 
 def judge(
@@ -62,13 +67,15 @@ def judge(
         raise ConfigError(f'routing.protocol = {scenario.routing.protocol}: only "clustered" can be planned')
     if deadline_s is not None and not (math.isfinite(deadline_s) and deadline_s > 0):
         raise ConfigError(f"--deadline {deadline_s:g}: must be > 0 [s]")
-    at = _places(scenario)
+    at = dict(zip(map(NodeId, scenario.node_ids), positions(scenario), strict=True))
     wanted_s = scenario.traffic.deadline_s if deadline_s is None else deadline_s
     deadline_ns = None if wanted_s is None else seconds_to_ns(wanted_s)
     sources = [NodeId(node) for node in sources_of(scenario)]
     if scenario.measures_links:
-        return _judge_lossy(scenario, at, sources, deadline_ns=deadline_ns)
-    found = plan(scenario, at, sources=sources, deadline_ns=deadline_ns)
+        announced = {node: rounded(place) for node, place in at.items()}
+        return _judge_lossy(scenario, announced, sources, deadline_ns=deadline_ns)
+    reported = _reported(scenario, at)
+    found = plan(scenario, at, reported=reported, sources=sources, deadline_ns=deadline_ns)
     if isinstance(found, Refused):
         return describe(found), {"feasible": False, "problems": [found.reason]}, False
     found = with_capacity(found, at)
@@ -82,11 +89,11 @@ def judge(
         text.append(describe_loss(missed, everyone=found.feasible and not left))
         content["loss"] = None if missed is None else missed._asdict()
     if change and not found.feasible:
-        cheapest = cheapest_change(scenario, at, sources=sources, deadline_ns=deadline_ns)
+        cheapest = cheapest_change(scenario, at, reported=reported, sources=sources, deadline_ns=deadline_ns)
         text.append(describe_change(cheapest, found))
         content["change"] = None if cheapest is None else _change_json(cheapest)
     if search:
-        best = optimum(scenario, at, deadline_ns=deadline_ns, sources=sources)
+        best = optimum(scenario, at, reported=reported, deadline_ns=deadline_ns, sources=sources)
         text.append(describe_optimum(best, deadline_ns=deadline_ns))
         content["search"] = None if best is None else _optimum_json(best)
     return "\n".join(text), content, found.feasible
@@ -132,10 +139,20 @@ def _lossy_json(found: LossyPlan) -> dict[str, Any]:
     }
 
 
-def _places(scenario: Scenario) -> dict[NodeId, Enu]:
-    """The starting positions of the nodes in whole metres, as the leader will announce them."""
-    start = zip(scenario.node_ids, positions(scenario), strict=True)
-    return {NodeId(node): rounded(place) if scenario.clusters.relay == "scheduled" else place for node, place in start}
+def _reported(scenario: Scenario, at: dict[NodeId, Enu]) -> list[dict[NodeId, Enu]]:
+    """Draws of the starting positions as UAVs report them, with errors of GPS; none if GPS is exact."""
+    noise_m = error_m(sigma_m=scenario.world.gps_sigma_m, range_m=scenario.radio.range_m)
+    sigma_m = math.hypot(noise_m, scenario.sensors.gps_bias_m)
+    draws = range(_GPS_DRAWS) if sigma_m else ()
+    return [
+        {node: _displaced(place, sigma_m, stream(draw, "plan/gps", node)) for node, place in at.items()}
+        for draw in draws
+    ]
+
+
+def _displaced(place: Enu, sigma_m: float, random: Random) -> Enu:
+    """A place with a Gaussian error along each axis, in whole metres."""
+    return rounded(Enu(*(axis + random.gauss(0.0, sigma_m) for axis in place)))
 
 
 def _loss(scenario: Scenario, superframe: TimetablePlan, table: Timetable, at: dict[NodeId, Enu]) -> Loss | None:
@@ -145,7 +162,7 @@ def _loss(scenario: Scenario, superframe: TimetablePlan, table: Timetable, at: d
         return None
     turns = superframe.turns
     geometry = links(scenario, turns)
-    adjacency = within_range(at, range_m=geometry.link_m)
+    adjacency = within_range({node: rounded(place) for node, place in at.items()}, range_m=geometry.link_m)
     return loss(table, adjacency, per_superframe=turns.per_superframe, hop_turns=geometry.hop_turns, chance=chance)
 
 
@@ -155,6 +172,8 @@ def _json(found: ScenarioPlan) -> dict[str, Any]:
         "scenario": found.scenario.name,
         "feasible": found.feasible,
         "proven": found.proven,
+        "confidence": found.confidence,
+        "varying_links": found.varying,
         "deadline_ms": None if found.deadline_ns is None else found.deadline_ns / MS,
         "classes": [_class_json(c, found.deadline_ns) for c in found.classes],
         "to_head_ms": _ms(found.access),

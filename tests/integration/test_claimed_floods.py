@@ -4,11 +4,22 @@ from typing import Any
 
 import pytest
 
+from sim.cli.plan import judge
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 
 SHORT = ["duration_s=15", "warmup_s=12", "drain_s=1"]
+
+RELAYED = [
+    "clusters.relay=claimed",
+    "nodes.count=12",
+    "nodes.layout=line",
+    "clusters.count=11",
+    "traffic.sources=11",
+    "traffic.interval_s=0.5",
+    "duration_s=18",
+]
 
 DENSE = ["nodes.layout=disc", "nodes.radius_m=210", "nodes.count=30", "traffic.sources=29", "clusters.count=29"]
 
@@ -26,6 +37,15 @@ def test_on_the_grid_every_packet_reaches_everyone_within_a_fraction_of_a_period
     nodes = [report for report in outcome.reports.values() if report.get("kind") == "agent"]
     assert all(report["superframe"] == 16 for report in nodes)
     assert len({report["slot"] for report in nodes}) <= 12, "45 nodes share them"
+
+
+@pytest.mark.parametrize(("frames", "fits"), [(2, False), (40, True)])
+def test_queues_that_overflow_at_relays_are_a_problem_of_the_plan(frames: int, *, fits: bool) -> None:
+    settings = [*RELAYED, f"routing.queue_frames={frames}"]
+    _, plan, feasible = judge(catalog.find("clusters", settings), change=False)
+    assert feasible == fits
+    assert fits or f"routing.queue_frames = {frames} has to be at least" in plan["problems"][0]
+    assert (summary_of(*settings)["pdr"] == 1.0) == fits
 
 
 def test_a_dense_swarm_needs_few_relays_and_they_win_the_turns_they_need() -> None:

@@ -15,6 +15,7 @@ from fanet_mw.planner.cheapest_change import _changes
 from fanet_mw.planner.demand import TrafficClass, demands
 from fanet_mw.planner.flood_cost import FloodCost
 from fanet_mw.planner.head_slot import ClassLoad, slot_delays, work_ns
+from fanet_mw.planner.site import Site
 from fanet_mw.planner.timetable_plan import table_for
 from fanet_mw.planner.uplink_delay import ways
 from fanet_mw.rng import stream
@@ -147,7 +148,7 @@ def test_the_proposed_change_is_feasible_and_none_that_is_less_is(planned, make_
     change = cheapest_change(scenario, placed(scenario))
     assert change.plan.feasible
     assert plan(change.variant.scenario, placed(scenario)).feasible
-    less = [variant for variant in _changes(scenario) if variant.size < change.variant.size]
+    less = [variant for variant in _changes(Site(scenario, placed(scenario))) if variant.size < change.variant.size]
     assert less
     assert not any(plan(variant.scenario, placed(scenario)).feasible for variant in less)
     assert all(argument in describe_change(change, change.plan) for argument in change.variant.arguments)

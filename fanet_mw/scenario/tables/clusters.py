@@ -54,8 +54,8 @@ class Clusters(Section):
     link_m: Length = 0.0
     """`scheduled`: the greatest distance at which nodes are taken to receive each other; 0: `radio.range_m`."""
     interference_m: Length = 0.0
-    """`scheduled`: the greatest distance at which nodes may disturb each other; 0: `radio.range_m` for `range`, else
-    twice that."""
+    """`scheduled`: the greatest distance at which nodes may disturb each other; 0: twice `radio.range_m`, but with
+    `radio.channel = "range"` only that and what errors of GPS may add."""
     gossip_degree: Annotated[float, Field(gt=0, le=1e6)] = 6.0
     """`gossip`: the mean number of neighbors of a node that relay."""
     counter: Annotated[int, Field(ge=2, le=1_000_000)] = 3

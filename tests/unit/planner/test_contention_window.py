@@ -32,6 +32,17 @@ def test_a_window_that_is_too_short_is_told_with_what_it_needs(hello_s: float, *
     assert fits or ("contention window of 20 ms" in said[0] and hellos_ns(scenario, adjacency) > 15 * MS)
 
 
+@pytest.mark.parametrize(("contention_ms", "fits"), [(5, False), (5.2, False), (6, True)])
+def test_hellos_that_fit_by_their_airtime_need_time_in_which_to_begin(contention_ms: float, *, fits: bool) -> None:
+    """They take 0.6 ms. In the last 5 ms of a window none begins, so in the first one all would begin at once."""
+    keys = ["clusters.flooding_period_s=0.25", "routing.hello_interval_s=1", f"clusters.contention_ms={contention_ms}"]
+    scenario = catalog.find("clusters", keys)
+    assert hellos_ns(scenario, LINE) < 0.6 * MS
+    said = list(too_short(scenario, LINE))
+    assert (not said) == fits
+    assert fits or "which has to be at least 6" in said[0]
+
+
 CLAIMED = ('clusters.relay="claimed"', "clusters.flooding_period_s=1", "routing.hello_interval_s=1")
 
 
@@ -60,7 +71,7 @@ def test_claimed_slots_lose_packets_where_the_plan_says_that_the_hellos_do_not_f
     scenario = catalog.find("clusters", [*keys, "duration_s=26", "warmup_s=14"])
     _, plan, feasible = judge(scenario, change=False)
     assert feasible == fits
-    assert fits or ("contention_ms = 6 has to be at least 9" in plan["problems"][0] and len(plan["problems"]) == 1)
+    assert fits or ("contention_ms = 6 has to be at least 10" in plan["problems"][0] and len(plan["problems"]) == 1)
     assert (finish(simulate(scenario), out=None)["pdr"] == 1.0) == fits
 
 

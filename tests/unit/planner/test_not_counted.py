@@ -83,3 +83,13 @@ def test_a_plan_that_is_not_feasible_does_not_say_that_all_packets_arrive() -> N
     assert "NOT FEASIBLE" in text
     assert "none in this channel" in text
     assert EVERYONE not in text
+
+
+@pytest.mark.parametrize(("relay", "lines"), [("claimed", 1), ("all", 1), ("scheduled", 0)])
+def test_a_channel_with_noise_loses_frames_of_which_only_a_timetable_knows_the_probability(
+    relay: str, lines: int
+) -> None:
+    keys = (f"clusters.relay={relay}", "radio.channel=log_distance", "clusters.links=places")
+    _, left = planned(with_faults(settings=keys))
+    assert len(left) == lines
+    assert all('losses by radio.channel = "log_distance"' in said for said in left)

@@ -25,7 +25,7 @@ from fanet_mw.units import MS, US
 
 _FLIGHT_NS: Final = 20 * US
 """The propagation delay over 6 km; this part of the slack is not available for clock errors."""
-_TAIL_NS: Final = 5 * MS
+TAIL_NS: Final = 5 * MS
 """In this last part of the contention window no frame becomes due, so that contending frames are over when the turns
 begin."""
 
@@ -73,7 +73,7 @@ class Turns(NamedTuple):
         """The instant from which a frame that is due at `start_ns` may contend: `start_ns` itself if that lies in a
         contention window, but not in its last part, otherwise a random instant of the next window.
         """
-        open_ns = max(1, self.contention_ns - _TAIL_NS)
+        open_ns = max(1, self.contention_ns - TAIL_NS)
         superframe_ns = self.superframe_start_ns(start_ns)
         if start_ns - superframe_ns < open_ns:
             return start_ns

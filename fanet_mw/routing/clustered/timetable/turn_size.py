@@ -1,5 +1,6 @@
 """How large the frames of a timetable are, and so how long its turns, and how many a superframe holds."""
 
+import math
 from typing import Final
 
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_ns
@@ -13,6 +14,9 @@ from fanet_mw.wire.links import MESSAGES
 from fanet_mw.wire.places import CAPACITY as PLACES_CAPACITY
 from fanet_mw.wire.schedule import CAPACITY
 
+_AVERAGED: Final = 0.02
+"""The greatest error of a reported position along each axis, as a share of the radio range; it is a little less."""
+_ROUNDING_M: Final = 1.5
 _SCHEDULE_BYTES: Final = SCHEDULE.layout.size + OVERHEAD
 _PLACES_BYTES: Final = PLACES.layout.size + OVERHEAD
 _MOST_DIGESTS: Final = 4
@@ -64,10 +68,22 @@ def links(scenario: Scenario, turns: Turns) -> Geometry:
     wait_ns = radio.lead_ns + radio.handover_ns
     return Geometry(
         link_m=clusters.link_m or radio.range_m,
-        interference_m=clusters.interference_m or radio.range_m * (1 if radio.channel == "range" else 2),
+        interference_m=clusters.interference_m
+        or (radio.range_m + distance_error_m(scenario) if radio.channel == "range" else 2 * radio.range_m),
         turns=turns.per_superframe,
         hop_turns=1 + -(-wait_ns // turns.turn_ns),
     )
+
+
+def distance_error_m(scenario: Scenario) -> float:
+    """By how much the distance of two nodes may differ from that of their reported positions.
+
+    Errors of GPS along the line between both nodes are independent, so four standard deviations of their difference are
+    taken; positions are reported in whole metres. A UAV averages the fixes of a receiver that is less accurate than a
+    small share of the radio range (`agents/positioning/steady_fix.py`).
+    """
+    noise_m = min(scenario.world.gps_sigma_m, _AVERAGED * scenario.radio.range_m)
+    return 4 * math.sqrt(2) * math.hypot(noise_m, scenario.sensors.gps_bias_m) + _ROUNDING_M
 
 
 def measured_period_ns(scenario: Scenario) -> int:

@@ -41,13 +41,24 @@ def test_an_error_that_hellos_cut_may_be_any_and_fits_no_slack(
     assert clocks_fit(scenario, clock_error_ns=error_us * US) == fits
 
 
-@pytest.mark.parametrize(("channel", "times"), [("range", 1), ("log_distance", 2)])
 def test_interference_reaches_twice_as_far_as_reception_where_it_is_a_matter_of_power(
-    make_scenario: MakeScenario, channel: str, times: int
+    make_scenario: MakeScenario,
 ) -> None:
-    scenario = make_scenario(**KEYS, **{"radio.channel": channel})
-    geometry = links(scenario, superframe(scenario))
-    assert geometry.interference_m == times * scenario.radio.range_m
+    scenario = make_scenario(**KEYS, **{"radio.channel": "log_distance"})
+    assert links(scenario, superframe(scenario)).interference_m == 2 * scenario.radio.range_m
+
+
+@pytest.mark.parametrize(
+    ("sigma_m", "bias_m", "margin_m"),
+    [(0, 0, 1.5), (1.5, 0, 1.5 + 4 * 2**0.5 * 1.5), (30, 0, 1.5 + 4 * 2**0.5 * 5), (3, 4, 1.5 + 4 * 2**0.5 * 5)],
+)
+def test_with_a_range_interference_reaches_that_far_and_by_errors_of_gps_farther(
+    make_scenario: MakeScenario, sigma_m: float, bias_m: float, margin_m: float
+) -> None:
+    errors = {"world.gps_sigma_m": sigma_m, "sensors.gps_bias_m": bias_m}
+    scenario = make_scenario(**KEYS, **errors)
+    margin = links(scenario, superframe(scenario)).interference_m - scenario.radio.range_m
+    assert margin == pytest.approx(margin_m)
 
 
 def test_a_hop_takes_the_turns_of_lead_and_handover(make_scenario: MakeScenario) -> None:

@@ -12,6 +12,8 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.timesync.ftsp import MOST_STATED_NS
 from fanet_mw.units import MS, US, S
 
+_JOINED_S: Final = 6.0
+"""The time in which all nodes of a swarm have joined, and have heard the first schedule."""
 _LIFETIMES: Final = {wire.PRIORITY_SAFETY: "safety_lifetime_s", wire.PRIORITY_REPORT: "report_lifetime_s"}
 
 
@@ -94,7 +96,16 @@ def left_out(scenario: Scenario) -> Iterator[str]:
             f"(clusters.turn_slack_us = {scenario.clusters.turn_slack_us:g}), and not before"
         )
     if scenario.clusters.repair_s > 0:
-        yield "repairs of lost packets come later than any bound here, and their load is not counted"
+        bounded = scenario.clusters.relay == "scheduled" and not scenario.measures_links
+        yield "repairs of lost packets come later than any bound here, and their load is not counted" + (
+            "; nodes state no bound in flight" if bounded else ""
+        )
+    ready_s = _JOINED_S + 2 * scenario.clusters.flooding_period_s
+    if scenario.clusters.relay == "scheduled" and scenario.warmup_s < ready_s:
+        yield (
+            f"nodes have their timetable some {ready_s:.0f} s after the start; packets before that have no bound "
+            f"(warmup_s = {scenario.warmup_s:g})"
+        )
 
 
 def notes(access: DelayBound, clusters: Sequence[ClusterPlan], *, guard_ns: int, uplink_ns: int) -> Iterator[str]:

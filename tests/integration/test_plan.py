@@ -106,6 +106,15 @@ def test_links_that_come_and_go_with_errors_of_gps_are_told_with_what_they_do() 
     assert "but for changes of the timetable" not in " ".join(text.split())
 
 
+@pytest.mark.parametrize(("period_s", "told"), [(2, False), (5, True)])
+def test_traffic_that_begins_before_the_timetable_is_told_so(period_s: float, *, told: bool) -> None:
+    """The swarm joins within some 6 s, and its schedule begins with the period after the next."""
+    settings = (f"clusters.flooding_period_s={period_s}", "warmup_s=12", "nodes.count=9", "clusters.count=8",
+                "traffic.sources=8")  # fmt: skip
+    _, plan, _ = planned(*settings)
+    assert any("nodes have their timetable some 16 s after the start" in note for note in plan["notes"]) == told
+
+
 def test_a_leader_whose_announcements_expire_before_its_turn_is_a_problem() -> None:
     _, plan, feasible = planned("routing.lifetime_s=0.4", "clusters.flooding_period_s=0.5", "traffic.interval_s=0.5")
     assert not feasible

@@ -143,7 +143,7 @@ def _out_of_hops(
         return
     geometry = links(scenario, fitted.turns)
     by_range = scenario.radio.channel == "range"
-    adjacency = site.adjacency if by_range else within_range(site.positions, range_m=geometry.link_m)
+    adjacency = site.adjacency if by_range else site.within(geometry.link_m)
     found = flood_hops.flood_hops(fitted.table, adjacency, geometry)
     yield from flood_hops.incomplete(scenario, geometry, found)
     most = max((c.hops + found[NodeId(c.head)].most for c in clusters if c.head in found), default=0)

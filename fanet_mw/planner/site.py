@@ -21,11 +21,15 @@ class Site:
         positions: Mapping[NodeId, Enu],
         adjacency: Adjacency | None = None,
         reported: Sequence[Mapping[NodeId, Enu]] = (),
+        standing: Mapping[NodeId, Enu] | None = None,
     ) -> None:
-        """`reported`: draws of the positions that nodes report, which differ from `positions` by errors of GPS."""
+        """`reported`: draws of the positions that nodes report, which differ from `positions` by errors of GPS;
+        `standing`: where the nodes are, if `positions` is one of these draws.
+        """
         self.scenario = scenario
         self.positions = {node: rounded(at) for node, at in positions.items()} if self.timetable else positions
         """The positions in whole metres if timetables are computed from them, as a leader announces them."""
+        self._standing = standing or self.positions
         self.reported = reported
         self._exact = positions
         self.adjacency = within_range(positions, range_m=scenario.radio.range_m) if adjacency is None else adjacency
@@ -43,8 +47,12 @@ class Site:
         return other
 
     def as_reported(self) -> list["Site"]:
-        """The same links, with the positions of each draw: those from which nodes compute a timetable."""
-        return [Site(self.scenario, positions, self.adjacency) for positions in self.reported]
+        """The same nodes and links, with the positions of each draw: those from which nodes compute a timetable."""
+        return [Site(self.scenario, positions, self.adjacency, standing=self._standing) for positions in self.reported]
+
+    def within(self, distance_m: float) -> Adjacency:
+        """The pairs of nodes that stand within this distance of each other, whatever positions they report."""
+        return within_range(self._standing, range_m=distance_m)
 
     def varying_links(self) -> int:
         """The number of pairs of nodes that are near enough for a link of the timetable in some draws only."""

@@ -86,7 +86,7 @@ def judge(
     table = None if found.superframe is None else found.superframe.table
     if found.superframe is not None and table is not None and len(at) > 1 and not found.cut_off:
         missed = _loss(found.scenario, found.superframe, table, at)
-        text.append(describe_loss(missed, everyone=found.feasible and not left))
+        text.append(describe_loss(missed, everyone=found.feasible and not left and not found.varying))
         content["loss"] = None if missed is None else missed._asdict()
     if change and not found.feasible:
         cheapest = cheapest_change(scenario, at, reported=reported, sources=sources, deadline_ns=deadline_ns)

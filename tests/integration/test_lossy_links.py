@@ -1,9 +1,11 @@
 """A swarm over links that lose frames, with timetables from measured links: what arrives, and what its nodes state."""
 
+from collections import Counter
+
 import pytest
 
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import BoundStated, Delivered, Generated, LikelyStated
+from fanet_mw.trace import BoundStated, Delivered, Dropped, Generated, LikelyStated
 from fanet_mw.units import S
 from sim.run.virtual import simulate
 from sim.scenarios.catalog import find
@@ -45,3 +47,23 @@ def test_the_same_swarm_with_places_leaves_out_a_part() -> None:
     born = sum(isinstance(record, Generated) for record in outcome.records)
     arrived = sum(isinstance(record, Delivered) for record in outcome.records)
     assert arrived / (11 * born) < 0.9
+
+
+def test_no_delay_is_stated_that_is_longer_than_packets_live() -> None:
+    lossy = ('radio.channel="log_distance"', 'radio.fading="rician"', "routing.lifetime_s=0.8")
+    outcome = simulate(scenario(*lossy, "duration_s=36"))
+    assert any(isinstance(record, Generated) for record in outcome.records)
+    stated = [record for record in outcome.records if isinstance(record, LikelyStated)]
+    assert all(record.delay_ns <= 0.8 * S for record in stated)
+
+
+def test_a_packet_that_may_expire_before_its_turn_has_no_bound() -> None:
+    """Three reports a second in turns of half a second: some wait for longer than they live."""
+    reports = ("mission.survivors=4", "mission.report_interval_s=0.3", "world.area_m=600")
+    size = ("nodes.count=9", "clusters.count=8", "traffic.sources=8", "warmup_s=10", "duration_s=16")
+    outcome = simulate(find("clusters", [*size, *reports, "routing.report_lifetime_s=0.3"]))
+    stated = {(r.node, r.seq) for r in outcome.records if isinstance(r, BoundStated) and r.t_ns < 15 * S}
+    arrived = Counter((r.origin, r.seq) for r in outcome.records if isinstance(r, Delivered))
+    assert any(isinstance(r, Dropped) and r.reason == "expired" for r in outcome.records)
+    assert len(stated) > 20
+    assert all(arrived[packet] == 8 for packet in stated)

@@ -77,6 +77,18 @@ def test_where_gps_errs_the_plan_has_the_greatest_bound_of_all_its_draws() -> No
     assert f"at most {plan['classes'][0]['bound_ms'] / 1000:.3f} s in 95 % of flights" in text
 
 
+@pytest.mark.parametrize("channel", ["range", "log_distance"])
+def test_floods_that_miss_nodes_with_reported_positions_are_a_problem(channel: str) -> None:
+    """In the middle of the line two nodes are 2 m too far from each other, and another node is a way around."""
+    places = [[0, 0, 50], [200, 0, 50], [452, 0, 50], [650, 0, 50], [326, 150, 50]]
+    settings = (f"nodes.positions_m={places}", "nodes.layout=explicit", "nodes.count=5", "clusters.count=4",
+                "traffic.sources=4", f"radio.channel={channel}", "clusters.links=places")  # fmt: skip
+    _, plan, feasible = planned(*settings)
+    assert not feasible
+    assert "floods that miss others" in plan["problems"][0]
+    assert planned(*settings, "world.gps_sigma_m=0")[2]
+
+
 @pytest.mark.parametrize("spacing_m", [250, 245])
 def test_links_that_gps_may_take_for_none_are_a_problem_and_a_greater_distance_of_links_is_proposed(
     spacing_m: float,
@@ -101,6 +113,7 @@ def test_links_that_come_and_go_with_errors_of_gps_are_told_with_what_they_do() 
     assert plan["varying_links"] == 16
     assert "16 pairs of nodes are about 250 m apart" in " ".join(text.split())
     assert "but for changes of the timetable" in " ".join(text.split())
+    assert "every packet reaches everyone" not in " ".join(text.split())
     text, plan, _ = planned(*size, "nodes.spacing_m=100")
     assert plan["varying_links"] == 0
     assert "but for changes of the timetable" not in " ".join(text.split())

@@ -3,7 +3,8 @@ deadline.
 
 A bound is stated when a packet is accepted, because only then are its turn and the queue before it known. It is stated
 only if nothing that comes later can break it: no other timetable may come into force before the packet's flood is over.
-Nothing is stated for floods that `routing.hop_limit` ends before all nodes have them.
+Nothing is stated for floods that `routing.hop_limit` ends before all nodes have them, nor for packets that may expire
+before (`routing.lifetime_s`).
 The leader therefore announces each timetable long enough ahead. Each class of packets has room of its own in a turn,
 and so a bound of its own.
 
@@ -180,8 +181,10 @@ class StatedDelays:
             had_ns = through_ns + receipt_ns(self._port.scenario)
             # every timetable that comes into force before this instant has been announced already
             known_ns = self.announced_ns + newest.turns.period_ns + self._ahead_ns(newest)
-            due_ns = packet.header.origin_us * US + bound_ns
-            if had_ns <= min(due_ns, known_ns):
+            born_ns = packet.header.origin_us * US
+            due_ns = born_ns + bound_ns
+            expires_ns = born_ns + self._port.scenario.routing.lifetime_ns(packet.header.priority)
+            if had_ns <= min(due_ns, known_ns, expires_ns):
                 self._port.record(BoundStated(now_ns, self._port.node, packet.header.seq, bound_ns))
                 self._promised[packet.header.seq] = through_ns, due_ns - receipt_ns(self._port.scenario)
                 self._forget_overdue(now_ns)
@@ -255,7 +258,10 @@ class StatedDelays:
             interval_ns=interval_ns_of(load, expected_ns=self._interval_ns),
             hello_ns=seconds_to_ns(self._port.scenario.routing.hello_interval_s),
         )
-        return None if found_ns is None else found_ns + self._lead_ns + receipt_ns(self._port.scenario)
+        if found_ns is None:
+            return None
+        whole_ns = found_ns + self._lead_ns + receipt_ns(self._port.scenario)
+        return whole_ns if whole_ns <= self._port.scenario.routing.lifetime_ns(PRIORITY_BULK) else None
 
     def _in_step(self) -> bool:
         """True if the slack of turns is enough for the known errors of the swarm's clocks."""

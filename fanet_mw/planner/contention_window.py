@@ -1,23 +1,27 @@
 """Whether the hellos fit the contention window of a superframe; a node whose hellos are lost would be taken for failed.
 
-Everything except floods of data contends there, most of it hellos. Two hellos destroy each other at a common neighbor,
-so the hellos of all nodes within two hops are added up, each with DIFS and a mean backoff. This is an estimate.
+Everything except floods of data contends there: hellos, and packets of members if only heads have turns. Two frames
+destroy each other at a common neighbor, so those of all nodes within two hops are added up, each with DIFS and a mean
+backoff. This is an estimate.
 
 With claimed slots a hello names all neighbors of its sender, and half of the hellos go in turns, if these are long
 enough. Until nodes hold slots all hellos go in the window; those that are lost then are repeated, and not counted here.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Final
 
 from fanet_mw.graph.topology import Adjacency, two_hop
+from fanet_mw.planner.demand import TrafficClass
 from fanet_mw.planner.flood_cost import contended_ns
 from fanet_mw.routing.clustered.tdma.turn_timing import TAIL_NS
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import MS, S, seconds_to_ns
+from fanet_mw.units import MS, NodeId, S, seconds_to_ns
 from fanet_mw.wire.hello.claims import CAPACITY, MESSAGE_BYTES
 
+_NONE: Final[Mapping[NodeId, int]] = MappingProxyType({})
 MOST: Final = 0.75
 """The greatest share of the window that hellos may need. On the 9 x 5 grid, hellos that need all of the window reach
 only 0.58 of the nodes that should receive them."""
@@ -75,13 +79,40 @@ def too_short_for_claims(scenario: Scenario, adjacency: Adjacency) -> Iterator[s
         )
 
 
-def too_short(scenario: Scenario, adjacency: Adjacency) -> Iterator[str]:
-    """A sentence about a window that is too short for the hellos; nothing if it is long enough."""
-    needed_ns, window_ns = hellos_ns(scenario, adjacency), round(scenario.clusters.contention_ms * MS)
+def too_short(scenario: Scenario, adjacency: Adjacency, uplinks_ns: Mapping[NodeId, int] = _NONE) -> Iterator[str]:
+    """A sentence about a window that is too short for the hellos, and for what members send to their heads; nothing if
+    it is long enough. `uplinks_ns`: the airtime of the latter in a superframe, by the node that transmits.
+    """
+    needed_ns = hellos_ns(scenario, adjacency) + _densest_ns(adjacency, uplinks_ns)
+    window_ns = round(scenario.clusters.contention_ms * MS)
+    what = "hellos and packets to heads" if any(uplinks_ns.values()) else "hellos"
     if needed_ns > room_ns(window_ns):
         yield (
-            f"the hellos of a superframe take {needed_ns / MS:.1f} ms where nodes are densest, its contention window "
+            f"the {what} of a superframe take {needed_ns / MS:.1f} ms where nodes are densest, its contention window "
             f"of {window_ns / MS:g} ms has {room_ns(window_ns) / MS:g} ms for them: neighbors are missed, taken for "
             f"dead (clusters.contention_ms, which has to be at least {least_ms(needed_ns)}, routing.hello_interval_s, "
             "clusters.flooding_period_s)"
         )
+
+
+def uplinks_ns(
+    scenario: Scenario, through: Mapping[NodeId, Sequence[int]], classes: Sequence[TrafficClass]
+) -> dict[NodeId, int]:
+    """The airtime in a superframe of what each node sends towards a head, own packets and those of others; `through`:
+    the number of sources whose packets it sends, by class.
+    """
+    return {
+        node: sum(
+            n * scenario.clusters.period_ns * contended_ns(scenario.radio, c.payload_bytes) // c.interval_ns
+            for n, c in zip(counts, classes, strict=True)
+        )
+        for node, counts in through.items()
+    }
+
+
+def _densest_ns(adjacency: Adjacency, airtime_ns: Mapping[NodeId, int]) -> int:
+    """The greatest sum of the airtimes of a node and of all nodes within two hops of it."""
+    if not airtime_ns:
+        return 0
+    near = two_hop(adjacency).items()
+    return max(airtime_ns.get(node, 0) + sum(airtime_ns.get(other, 0) for other in others) for node, others in near)

@@ -98,7 +98,7 @@ def left_out(scenario: Scenario) -> Iterator[str]:
     if scenario.clusters.repair_s > 0:
         bounded = scenario.clusters.relay == "scheduled" and not scenario.measures_links
         yield "repairs of lost packets come later than any bound here, and their load is not counted" + (
-            "; nodes state no bound in flight" if bounded else ""
+            ", and may reach into turns; nodes state no bound in flight" if bounded else ""
         )
     ready_s = _JOINED_S + 2 * scenario.clusters.flooding_period_s
     if scenario.clusters.relay == "scheduled" and scenario.warmup_s < ready_s:

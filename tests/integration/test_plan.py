@@ -128,6 +128,25 @@ def test_traffic_that_begins_before_the_timetable_is_told_so(period_s: float, *,
     assert any("nodes have their timetable some 16 s after the start" in note for note in plan["notes"]) == told
 
 
+def test_bounds_with_repair_are_estimates_because_repairs_contend_beside_the_turns() -> None:
+    size = ("nodes.count=9", "clusters.count=8", "traffic.sources=8")
+    assert planned(*size)[1]["proven"]
+    text, plan, feasible = planned(*size, "clusters.repair_s=5")
+    assert feasible
+    assert not plan["proven"]
+    assert "may reach into turns" in " ".join(text.split())
+
+
+def test_packets_to_heads_have_to_fit_the_contention_window_too() -> None:
+    """At 1 Mb/s a frame takes 9 ms, and the turns of such a swarm suffice for heads only."""
+    settings = ("nodes.count=31", "nodes.layout=disc", "nodes.radius_m=180", "clusters.count=11", "traffic.sources=27",
+                "traffic.interval_s=1.35", "radio.rate_mbps=1", "radio.cw_min=3", "radio.lead_ms=0", "seed=3",
+                "clusters.flooding_period_s=0.3", "clusters.contention_ms=60")  # fmt: skip
+    _, plan, feasible = planned(*settings)
+    assert not feasible
+    assert any("hellos and packets to heads of a superframe take" in problem for problem in plan["problems"])
+
+
 def test_a_leader_whose_announcements_expire_before_its_turn_is_a_problem() -> None:
     _, plan, feasible = planned("routing.lifetime_s=0.4", "clusters.flooding_period_s=0.5", "traffic.interval_s=0.5")
     assert not feasible

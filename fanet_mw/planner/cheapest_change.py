@@ -7,7 +7,7 @@ packets together, or tries a timetable. Its last resort is less application traf
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import combinations, product
 from typing import Final, NamedTuple
 
@@ -50,8 +50,12 @@ def cheapest_change(
     reported: Sequence[Mapping[NodeId, Enu]] = (),
     sources: Sequence[NodeId] | None = None,
     deadline_ns: int | None = None,
+    delivers_m: float | None = None,
+    delivers: Callable[[ScenarioPlan], bool] = lambda _: True,
 ) -> ScenarioChange | None:
-    """The least change that makes `plan` feasible; None if none of those searched does.
+    """The least change that makes `plan` feasible; None if none of those searched does. `delivers_m`: the greatest
+    distance of nodes up to which the channel delivers frames, if that is a problem; `delivers`: whether the floods of a
+    feasible plan lose few enough packets.
 
     Nothing is searched for a separated swarm, which is helped only if nodes come nearer to each other.
     """
@@ -59,14 +63,14 @@ def cheapest_change(
     found = judge(site, sources, deadline_ns)
     if isinstance(found, ScenarioPlan) and found.cut_off:
         return None
-    for group, quick in ((_changes(site), True), (_tightest(scenario), False), (_lighter(scenario), True)):
+    for group, quick in ((_changes(site, delivers_m), True), (_tightest(scenario), False), (_lighter(scenario), True)):
         for variant in sorted(group, key=lambda v: v.size):
             if variant.scenario.measures_links or hopeless(site.of(variant.scenario), sources):
                 continue  # a timetable over lossy links is planned otherwise (`lossy_plan.py`)
             found = judge(site.of(variant.scenario), sources, deadline_ns, quick=quick)
             if quick and isinstance(found, ScenarioPlan) and found.feasible:
                 found = judge(site.of(variant.scenario), sources, deadline_ns)
-            if isinstance(found, ScenarioPlan) and found.feasible:
+            if isinstance(found, ScenarioPlan) and found.feasible and delivers(found):
                 return ScenarioChange(variant, found)
     return None
 
@@ -82,21 +86,21 @@ def hopeless(site: Site, sources: Sequence[NodeId] | None) -> bool:
     return any(most is not None and interval_ns < most.least_interval_ns for interval_ns, most in limits)
 
 
-def _changes(site: Site) -> Iterator[Variant]:
+def _changes(site: Site, delivers_m: float | None) -> Iterator[Variant]:
     options = {"scheduled": _turn_options, "claimed": _claim_options}.get(site.scenario.clusters.relay, _slot_options)
-    for settings in options(site):
+    for settings in options(site, delivers_m):
         variant = vary(site.scenario, settings)
         if variant is not None:
             yield variant
 
 
-def _turn_options(site: Site) -> Iterator[dict[str, Value]]:
+def _turn_options(site: Site, delivers_m: float | None) -> Iterator[dict[str, Value]]:
     scenario = site.scenario
     clusters, radio = scenario.clusters, scenario.radio
     counts = dict.fromkeys((clusters.count, scenario.nodes.count - 1))
     windows = dict.fromkeys((radio.cw_min, *(w for w in WINDOWS if w < radio.cw_min)))
     periods = dict.fromkeys((clusters.flooding_period_s, *_TURN_PERIODS_S))
-    others = product(_clock_options(scenario), _hello_options(site), _link_options(site))
+    others = product(_clock_options(scenario), _hello_options(site), _link_options(site, delivers_m))
     for count, window, period_s, (clocks, hellos, links) in product(counts, windows, periods, [*others]):
         yield {
             "clusters.count": count,
@@ -116,18 +120,21 @@ def _hello_options(site: Site) -> list[dict[str, Value]]:
     return [{"clusters.contention_ms": float(ms)} for ms in (least, 2 * least)]
 
 
-def _link_options(site: Site) -> list[dict[str, Value]]:
-    """Changes that help when reported positions leave open which nodes hear each other: a greatest distance of links
-    that no two nodes are near, although errors of GPS are twice what they are likely to be.
+def _link_options(site: Site, delivers_m: float | None) -> list[dict[str, Value]]:
+    """Changes that help when timetables count on links that are not there: a greatest distance of links up to which the
+    channel delivers, or, if reported positions leave open which nodes hear each other, one that no two nodes are near,
+    although errors of GPS are twice what they are likely to be.
     """
-    if not any(site.reported) or site.scenario.radio.channel != "range":
+    range_m, clear_m = delivers_m or site.scenario.radio.range_m, distance_error_m(site.scenario)
+    if delivers_m is None and (not any(site.reported) or site.scenario.radio.channel != "range"):
         return [{}]
-    range_m, clear_m = site.scenario.radio.range_m, distance_error_m(site.scenario)
     apart = sorted({math.dist(a, b) for a, b in combinations(site.positions.values(), 2)})
     gaps = [(a, b) for a, b in zip(apart, [*apart[1:], math.inf], strict=True) if a <= range_m and b - a > 2 * clear_m]
-    if not gaps or gaps[-1][0] <= range_m - clear_m < range_m + clear_m <= gaps[-1][1]:
+    if not gaps:
         return [{}]
     near, far = gaps[-1]
+    if delivers_m is None and near <= range_m - clear_m < range_m + clear_m <= far:
+        return [{}]
     return [{}, {"clusters.link_m": float(round(min((near + far) / 2, near + 2 * clear_m)))}]
 
 
@@ -155,17 +162,17 @@ def _tightest(scenario: Scenario) -> Iterator[Variant]:
         yield variant
 
 
-def _claim_options(site: Site) -> Iterator[dict[str, Value]]:
+def _claim_options(site: Site, delivers_m: float | None) -> Iterator[dict[str, Value]]:
     scenario = site.scenario
     windows = dict.fromkeys((scenario.radio.cw_min, *(w for w in WINDOWS if w < scenario.radio.cw_min)))
     together = dict.fromkeys((scenario.routing.aggregate, True))
     numbers = dict.fromkeys((scenario.clusters.slots, *_SLOTS))
     for window, slots, aggregate, clocks in product(windows, numbers, together, _clock_options(scenario)):
         yield {"radio.cw_min": window, "clusters.slots": slots, "routing.aggregate": aggregate, **clocks}
-    yield from ({"clusters.relay": "scheduled", **turned} for turned in _turn_options(site))
+    yield from ({"clusters.relay": "scheduled", **turned} for turned in _turn_options(site, delivers_m))
 
 
-def _slot_options(site: Site) -> Iterator[dict[str, Value]]:
+def _slot_options(site: Site, _: float | None) -> Iterator[dict[str, Value]]:
     scenario = site.scenario
     clusters, nodes = scenario.clusters, scenario.nodes.count
     counts = dict.fromkeys((clusters.count, *(n for n in _COUNTS if n < max(2, nodes))))

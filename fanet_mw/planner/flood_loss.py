@@ -12,8 +12,8 @@ long, nor for a member's way to its head, where attempts that collide once tend 
 contention window that extend into the turns are not included.
 """
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from typing import Final, NamedTuple
 
 from fanet_mw.graph.topology import Adjacency
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
@@ -21,6 +21,11 @@ from fanet_mw.units import NodeId
 
 Chance = Callable[[NodeId, NodeId, tuple[NodeId, ...]], float]
 """The probability that a receiver (second) gets a sender's (first) frame while other nodes (third) transmit."""
+
+MOST: Final = 0.01
+"""The greatest mean share of copies that a feasible plan may lose; over measured links as many may miss a packet."""
+DELIVERS: Final = 0.999
+"""A link with at least this probability for each frame counts as one that delivers."""
 
 
 class Loss(NamedTuple):
@@ -53,6 +58,19 @@ def loss(table: Timetable, adjacency: Adjacency, *, per_superframe: int, hop_tur
         missed += [(1 - _best(arrivals.get(node, ())), root, node) for node in adjacency if node != root]
     worst, root, node = max(missed, key=lambda item: (item[0], -item[1], -item[2]))
     return Loss(worst, root, node, sum(item[0] for item in missed) / len(missed))
+
+
+def problems(found: Loss, *, link_m: float, delivers_m: float | None) -> Iterator[str]:
+    """A sentence about floods that lose too much; nothing if they do not. `delivers_m`: the greatest distance of nodes
+    up to which the channel delivers frames; None if it is unknown.
+    """
+    if found.mean > MOST:
+        yield (
+            f"a packet misses a node with probability {found.mean:.2g} at most on average, which may be {MOST:g}: the "
+            f"timetable counts on links of up to {link_m:g} m"
+            + ("" if delivers_m is None else f", and this channel delivers up to {delivers_m:.0f} m")
+            + ' (clusters.link_m; clusters.links = "measured" repeats frames)'
+        )
 
 
 def _send(

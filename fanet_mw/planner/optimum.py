@@ -10,7 +10,7 @@ period. Of two periods that meet the deadline the longer one therefore takes les
 the longest period.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from heapq import heappop, heappush
 from typing import Final, NamedTuple
 
@@ -56,8 +56,11 @@ def optimum(
     reported: Sequence[Mapping[NodeId, Enu]] = (),
     deadline_ns: int | None,
     sources: Sequence[NodeId] | None = None,
+    delivers: Callable[[ScenarioPlan], bool] = lambda _: True,
 ) -> Optimum | None:
-    """The configuration of least airtime whose bounds are proven and within the deadline; None if none was found."""
+    """The configuration of least airtime whose bounds are proven and within the deadline, and whose floods lose few
+    enough packets (`delivers`); None if none was found.
+    """
     site = Site(scenario, positions, reported=reported)
     families = [_candidates(site, settings, sources, deadline_ns) for settings in _families(scenario)]
     tried = 0
@@ -74,7 +77,7 @@ def optimum(
             break
         *_, index, best = heappop(cheapest)
         whole = judge(site.of(best.variant.scenario), sources, deadline_ns)
-        if not isinstance(whole, Refused) and whole.feasible and whole.proven:
+        if not isinstance(whole, Refused) and whole.feasible and whole.proven and delivers(whole):
             return best._replace(plan=whole, tried=tried)
         waiting = [index]  # not for all reported positions: try the next period
     return None

@@ -6,6 +6,8 @@ Exit codes: 0 feasible, 1 not feasible, 2 the scenario or a flag is wrong (as wi
 
 import json
 import math
+from collections.abc import Mapping
+from itertools import combinations
 from random import Random
 from typing import Any, Final
 
@@ -29,6 +31,7 @@ from fanet_mw.planner import (
     describe_lossy,
     describe_not_counted,
     describe_optimum,
+    flood_loss,
     loss,
     not_counted,
     optimum,
@@ -37,10 +40,8 @@ from fanet_mw.planner import (
     with_capacity,
 )
 from fanet_mw.planner.claimed_turns import ClaimedPlan
-from fanet_mw.planner.timetable_plan import TimetablePlan
 from fanet_mw.rng import stream
 from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE
-from fanet_mw.routing.clustered.timetable.timetable import Timetable
 from fanet_mw.routing.clustered.timetable.turn_size import links
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
@@ -78,22 +79,32 @@ def judge(
     found = plan(scenario, at, reported=reported, sources=sources, deadline_ns=deadline_ns)
     if isinstance(found, Refused):
         return describe(found), {"feasible": False, "problems": [found.reason]}, False
-    found = with_capacity(found, at)
+    found, missed = _with_loss(with_capacity(found, at), at)
     left = tuple(not_counted(scenario))
     text, content = [describe(found)], {**_json(found), "not_counted": list(left)}
     if left:
         text.append(describe_not_counted(left))
-    table = None if found.superframe is None else found.superframe.table
-    if found.superframe is not None and table is not None and len(at) > 1 and not found.cut_off:
-        missed = _loss(found.scenario, found.superframe, table, at)
+    if _has_floods(found, at):
         text.append(describe_loss(missed, everyone=found.feasible and not left and not found.varying))
         content["loss"] = None if missed is None else missed._asdict()
+
+    def delivers(other: ScenarioPlan) -> bool:
+        return _with_loss(other, at)[0].feasible
+
     if change and not found.feasible:
-        cheapest = cheapest_change(scenario, at, reported=reported, sources=sources, deadline_ns=deadline_ns)
+        cheapest = cheapest_change(
+            scenario,
+            at,
+            reported=reported,
+            sources=sources,
+            deadline_ns=deadline_ns,
+            delivers_m=_delivers_m(scenario, at) if missed is not None and missed.mean > flood_loss.MOST else None,
+            delivers=delivers,
+        )
         text.append(describe_change(cheapest, found))
         content["change"] = None if cheapest is None else _change_json(cheapest)
     if search:
-        best = optimum(scenario, at, reported=reported, deadline_ns=deadline_ns, sources=sources)
+        best = optimum(scenario, at, reported=reported, deadline_ns=deadline_ns, sources=sources, delivers=delivers)
         text.append(describe_optimum(best, deadline_ns=deadline_ns))
         content["search"] = None if best is None else _optimum_json(best)
     return "\n".join(text), content, found.feasible
@@ -155,15 +166,42 @@ def _displaced(place: Enu, sigma_m: float, random: Random) -> Enu:
     return rounded(Enu(*(axis + random.gauss(0.0, sigma_m) for axis in place)))
 
 
-def _loss(scenario: Scenario, superframe: TimetablePlan, table: Timetable, at: dict[NodeId, Enu]) -> Loss | None:
-    """The loss of packets that have turns; ways to a head in contention are not included."""
+def _has_floods(found: ScenarioPlan, at: Mapping[NodeId, Enu]) -> bool:
+    """True if the plan has a timetable whose floods are to reach other nodes."""
+    return found.superframe is not None and found.superframe.table is not None and len(at) > 1 and not found.cut_off
+
+
+def _with_loss(found: ScenarioPlan, at: Mapping[NodeId, Enu]) -> tuple[ScenarioPlan, Loss | None]:
+    """The plan, with a problem more if the floods of its timetable lose too much, and their loss; None without a
+    timetable, and if its probability is not known. Ways to a head in contention are not included.
+    """
+    scenario, superframe = found.scenario, found.superframe
     chance = chance_of(scenario, at)
-    if chance is None:
-        return None
+    if chance is None or superframe is None or superframe.table is None or not _has_floods(found, at):
+        return found, None
     turns = superframe.turns
     geometry = links(scenario, turns)
     adjacency = within_range({node: rounded(place) for node, place in at.items()}, range_m=geometry.link_m)
-    return loss(table, adjacency, per_superframe=turns.per_superframe, hop_turns=geometry.hop_turns, chance=chance)
+    missed = loss(
+        superframe.table, adjacency, per_superframe=turns.per_superframe, hop_turns=geometry.hop_turns, chance=chance
+    )
+    lossy = flood_loss.problems(missed, link_m=geometry.link_m, delivers_m=_delivers_m(scenario, at))
+    return found._replace(problems=(*found.problems, *lossy)), missed
+
+
+def _delivers_m(scenario: Scenario, at: Mapping[NodeId, Enu]) -> float | None:
+    """The distance of the two nodes farthest from each other up to which the channel delivers frames to all that are as
+    near; None if two nodes that are nearest do not hear each other, or if all is within reach of the radio's range.
+    """
+    chance = chance_of(scenario, at)
+    if chance is None or scenario.radio.channel == "range":
+        return None
+    delivers_m = None
+    for apart_m, a, b in sorted((at[a].minus(at[b]).norm(), a, b) for a, b in combinations(at, 2)):
+        if min(chance(a, b, ()), chance(b, a, ())) < flood_loss.DELIVERS:
+            break
+        delivers_m = apart_m
+    return delivers_m
 
 
 def _json(found: ScenarioPlan) -> dict[str, Any]:

@@ -24,6 +24,23 @@ def test_no_more_is_lost_than_stated(spacing_m: float) -> None:
     assert lost > 0.1 * stated
 
 
+def test_a_timetable_that_counts_on_links_which_the_channel_does_not_carry_is_not_feasible() -> None:
+    """With such a range floods end where the timetable sends no relay; a shorter `link_m` makes all of them arrive."""
+    far = ["nodes.count=9", "nodes.columns=3", "nodes.spacing_m=210", "clusters.count=8", "traffic.sources=8",
+           "radio.channel=log_distance", "radio.rate_mbps=2", "radio.range_m=700"]  # fmt: skip
+    text, plan, feasible = judge(catalog.find("clusters", far))
+    assert not feasible
+    assert "counts on links of up to 700 m, and this channel delivers up to" in " ".join(text.split())
+    flight = ["warmup_s=20", "duration_s=30", "drain_s=5"]
+    assert finish(simulate(catalog.find("clusters", [*far, *flight])), out=None)["pdr"] < 0.9
+    change = plan["change"]["set"]
+    assert any(setting.startswith("clusters.link_m=") for setting in change)
+    (bound_ms,) = (c["bound_ms"] for c in plan["change"]["classes"])
+    flown = finish(simulate(catalog.find("clusters", [*far, *change, *flight])), out=None)
+    assert flown["pdr"] == 1.0
+    assert flown["delay_ms"]["max"] <= bound_ms
+
+
 def test_where_no_probability_can_be_given_it_says_so() -> None:
     text, plan, _ = judge(catalog.find("clusters", [*LINE, "radio.fading=nakagami", 'clusters.links="places"']))
     assert plan["loss"] is None

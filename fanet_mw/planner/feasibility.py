@@ -125,6 +125,7 @@ def evaluate(
             *apart,
             *unheard,
             *late,
+            *problems_and_notes.refused_together(scenario, classes),
         ),
         notes=(
             *problems_and_notes.notes(access, judged.clusters, guard_ns=site.guard_ns, uplink_ns=uplink_ns),

@@ -80,3 +80,14 @@ def test_heads_that_release_small_packets_together_need_half_the_frames() -> Non
     assert together["frames"]["sent"] < one_by_one["frames"]["sent"] / 2
     assert together["delay_ms"]["p50"] < one_by_one["delay_ms"]["p50"]
     assert together["frames"]["closes"]
+
+
+@pytest.mark.parametrize(("warmup_s", "told"), [(0, True), (8, False)])
+def test_traffic_that_begins_before_slots_are_held_is_lost_and_told_so(warmup_s: float, *, told: bool) -> None:
+    """A hello is sent every second."""
+    settings = [*SHORT, "clusters.relay=claimed", f"warmup_s={warmup_s}", f"duration_s={warmup_s + 9}", "drain_s=5"]
+    scenario = catalog.find("clusters", settings)
+    _, plan, feasible = judge(scenario, change=False)
+    assert feasible
+    assert any("nodes hold their slots some 8 s after the start" in note for note in plan["notes"]) == told
+    assert (finish(simulate(scenario), out=None)["pdr"] < 0.9) == told

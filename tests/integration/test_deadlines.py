@@ -46,6 +46,22 @@ def test_load_beyond_the_admissible_rate_is_refused_and_the_rest_meets_the_deadl
     assert admission["nodes_without"] <= 1, "the leader at most: its schedules go before its packets"
 
 
+@pytest.mark.parametrize(("sources", "apart"), [([3], True), ([2], False)])
+def test_two_bulk_classes_at_one_node_are_a_problem_because_packets_that_come_together_are_refused(
+    sources: list[int], *, apart: bool
+) -> None:
+    tree = catalog.find("clusters", [*LINE, "duration_s=24", "warmup_s=14"]).model_dump(exclude_none=True)
+    first = {"payload_bytes": 300, "interval_s": 0.4, "sources": [2], "deadline_s": 2}
+    scenario = build(
+        tree | {"traffic": [first, {"name": "second", "payload_bytes": 64, "interval_s": 0.5, "sources": sources}]}
+    )
+    _, plan, feasible = judge(scenario, change=False)
+    assert feasible == apart
+    assert apart == (not any("sends both application and second" in problem for problem in plan["problems"]))
+    refused = finish(simulate(scenario), out=None)["admission"]["refused"]
+    assert (refused == 0) == apart
+
+
 def test_nodes_that_join_later_make_the_way_too_long_for_the_deadline() -> None:
     """Of nine in a line two come late: a packet of node 2 then has to go as far as one did in a line of eight."""
     few, many = bound_s(7), bound_s(8)

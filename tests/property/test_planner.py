@@ -148,7 +148,9 @@ def test_the_proposed_change_is_feasible_and_none_that_is_less_is(planned, make_
     change = cheapest_change(scenario, placed(scenario))
     assert change.plan.feasible
     assert plan(change.variant.scenario, placed(scenario)).feasible
-    less = [variant for variant in _changes(Site(scenario, placed(scenario)), None) if variant.size < change.variant.size]
+    less = [
+        variant for variant in _changes(Site(scenario, placed(scenario)), None) if variant.size < change.variant.size
+    ]
     assert less
     assert not any(plan(variant.scenario, placed(scenario)).feasible for variant in less)
     assert all(argument in describe_change(change, change.plan) for argument in change.variant.arguments)

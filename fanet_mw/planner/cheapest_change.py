@@ -133,9 +133,10 @@ def _link_options(site: Site, delivers_m: float | None) -> list[dict[str, Value]
     if not gaps:
         return [{}]
     near, far = gaps[-1]
-    if delivers_m is None and near <= range_m - clear_m < range_m + clear_m <= far:
-        return [{}]
-    return [{}, {"clusters.link_m": float(round(min((near + far) / 2, near + 2 * clear_m)))}]
+    shorter: dict[str, Value] = {"clusters.link_m": float(round(min((near + far) / 2, near + 2 * clear_m)))}
+    if delivers_m is not None:
+        return [shorter]
+    return [{}] if near <= range_m - clear_m < range_m + clear_m <= far else [{}, shorter]
 
 
 def _clock_options(scenario: Scenario) -> list[dict[str, Value]]:

@@ -92,15 +92,19 @@ def judge(
         return _with_loss(other, at)[0].feasible
 
     if change and not found.feasible:
-        cheapest = cheapest_change(
-            scenario,
-            at,
-            reported=reported,
-            sources=sources,
-            deadline_ns=deadline_ns,
-            delivers_m=_delivers_m(scenario, at) if missed is not None and missed.mean > flood_loss.MOST else None,
-            delivers=delivers,
-        )
+        lossy = missed is not None and missed.mean > flood_loss.MOST
+        delivers_m = _delivers_m(scenario, at) if lossy else None
+        cheapest = None  # for links that nodes nearest to each other do not have
+        if not lossy or delivers_m is not None:
+            cheapest = cheapest_change(
+                scenario,
+                at,
+                reported=reported,
+                sources=sources,
+                deadline_ns=deadline_ns,
+                delivers_m=delivers_m,
+                delivers=delivers,
+            )
         text.append(describe_change(cheapest, found))
         content["change"] = None if cheapest is None else _change_json(cheapest)
     if search:

@@ -8,6 +8,7 @@ The SINR is that in the 22 MHz channel. Values are logarithms of the success pro
 """
 
 import math
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -25,8 +26,17 @@ _SYMBOLS_PER_S: Final = 1.375e6
 Reals = npt.NDArray[np.float64]
 
 
+@cache
 def log_success_per_bit(rate_mbps: float) -> Reals:
-    """ln(1 - bit error rate) at each step of the SINR axis."""
+    """ln(1 - bit error rate) at each step of the SINR axis; read-only. It is kept, because it takes a third of a second
+    for CCK.
+    """
+    found = _log_success_per_bit(rate_mbps)
+    found.setflags(write=False)
+    return found
+
+
+def _log_success_per_bit(rate_mbps: float) -> Reals:
     sinr_db = np.arange(ERROR_FLOOR_DB, _TOP_DB, 1 / ERROR_STEPS_PER_DB)
     sinr = np.power(10.0, sinr_db / 10)
     if is_ofdm(rate_mbps):

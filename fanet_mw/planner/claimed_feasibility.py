@@ -46,7 +46,7 @@ def evaluate_claims(site: Site, classes: Sequence[TrafficClass], *, deadline_ns:
             *_problems(scenario, claims, planned, deadline_ns),
             *problems_and_notes.clocks_apart(scenario),
         ),
-        notes=(*_notes(claims), *problems_and_notes.left_out(scenario)),
+        notes=(*_notes(claims), *problems_and_notes.left_out(scenario, site.adjacency)),
     )
 
 

@@ -129,7 +129,7 @@ def evaluate(
         ),
         notes=(
             *problems_and_notes.notes(access, judged.clusters, guard_ns=site.guard_ns, uplink_ns=uplink_ns),
-            *problems_and_notes.left_out(scenario),
+            *problems_and_notes.left_out(scenario, site.adjacency),
         ),
     )
 

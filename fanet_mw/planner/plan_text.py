@@ -85,6 +85,7 @@ def describe_change(change: ScenarioChange | None, found: ScenarioPlan) -> str:
         return item("change", "none of those searched (clusters, period, backoff, relays, load) makes it feasible")
     lines = [item("change", " ".join(f"--set {argument}" for argument in change.variant.arguments))]
     lines += [item("", f"then {_class(c, change.plan)}") for c in change.plan.classes]
+    lines += [item("", note) for note in change.plan.notes if note not in found.notes]
     return "\n".join(lines)
 
 

@@ -17,6 +17,7 @@ from fanet_mw.planner import plan
 from fanet_mw.routing.clustered.tdma.turn_timing import clocks_fit
 from fanet_mw.trace import Delivered, Generated
 from fanet_mw.units import MS, US, Enu, NodeId
+from sim.cli.plan import judge
 from sim.results.files import finish
 from sim.run.collecting.record_kinds import lines
 from sim.run.outcome import Outcome
@@ -52,6 +53,18 @@ def test_with_time_beacons_every_packet_arrives_within_the_bound(offset_ms: int)
     assert clock["error_us"]["p99"] < 20
     assert clock["beyond_bound"] == 0
     assert summary["valid"], "what a node does not look at before it has the time was received, too"
+
+
+def test_a_plan_says_how_long_time_beacons_take_and_before_that_packets_are_lost() -> None:
+    """Six nodes in a line, five hops, a hello every second: the slack of turns is less than clocks differ."""
+    line = ["nodes.layout=line", "nodes.count=6", "clusters.count=5", "traffic.sources=5", "clock.sync=beacons",
+            "clock.offset_ms=20", "clusters.flooding_period_s=0.5", "drain_s=4"]  # fmt: skip
+    for warmup_s, told in ((6, True), (15, False)):
+        scenario = catalog.find("clusters", [*line, f"warmup_s={warmup_s}", f"duration_s={warmup_s + 8}"])
+        _, plan, feasible = judge(scenario, change=False)
+        assert feasible
+        assert any("time beacons take some 15 s to reach the node 5 hops" in note for note in plan["notes"]) == told
+        assert (finish(simulate(scenario), out=None)["pdr"] < 1) == told
 
 
 def test_with_gps_too() -> None:

@@ -13,8 +13,8 @@ sys.path.insert(0, str(ROOT))
 from sim.figures.colors import BLUE, GRAY, GREEN, RED  # noqa: E402  (the tree's root is on the path now)
 from sim.figures.style import applied, canvas  # noqa: E402
 from sim.world.engines.kinematic import Kinematic  # noqa: E402
-from sim.world.engines.rotors.engine import Rotors  # noqa: E402
 from sim.world.engines.rotors.power import trimmed_w  # noqa: E402
+from sim.world.engines.rotors.rigid_body import Rotors  # noqa: E402
 from tests.tables.flight import STEP_S, TRIALS, Trial, around, in_gusts, stepped  # noqa: E402
 
 NOMINAL_V = 3.7

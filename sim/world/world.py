@@ -21,8 +21,8 @@ from fanet_mw.units import NodeId, S
 from sim.world.engines.battery_drain import BatteryDrain
 from sim.world.engines.contract import Engine
 from sim.world.engines.kinematic import Kinematic
-from sim.world.engines.rotors.engine import Rotors
-from sim.world.engines.rotors.vehicle import VEHICLES
+from sim.world.engines.rotors.rigid_body import Rotors
+from sim.world.engines.rotors.vehicle_types import VEHICLES
 from sim.world.environment.obstacles import Obstacles, obstacles
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors

@@ -10,8 +10,8 @@ from sim.scenarios import catalog
 from sim.world.engines.contract import Engine, Rows
 from sim.world.engines.kinematic import Kinematic
 from sim.world.engines.pybullet import Physics
-from sim.world.engines.rotors.engine import Rotors
-from sim.world.engines.rotors.vehicle import CRAZYFLIE, IRIS
+from sim.world.engines.rotors.rigid_body import Rotors
+from sim.world.engines.rotors.vehicle_types import CRAZYFLIE, IRIS
 from sim.world.environment.obstacles import Box, Obstacles
 from sim.world.environment.survivors import place
 from sim.world.mobility.guidance import Guidance

@@ -9,9 +9,9 @@ import numpy as np
 from sim.world.engines.contract import Engine, Rows, Values
 from sim.world.engines.kinematic import Kinematic
 from sim.world.engines.rotors.battery import Batteries
-from sim.world.engines.rotors.engine import Rotors
 from sim.world.engines.rotors.power import trimmed_w
-from sim.world.engines.rotors.vehicle import CRAZYFLIE, IRIS, Vehicle
+from sim.world.engines.rotors.rigid_body import Rotors
+from sim.world.engines.rotors.vehicle_types import CRAZYFLIE, IRIS, Vehicle
 from sim.world.environment.wind import Wind
 from tests.tables.markdown import Rows as TableRows
 

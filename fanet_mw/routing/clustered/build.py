@@ -26,15 +26,15 @@ from fanet_mw.routing.clustered.forwarding.packet_repair import Repair
 from fanet_mw.routing.clustered.forwarding.uplink import Uplink
 from fanet_mw.routing.clustered.relaying.claimed import ClaimedRelaying
 from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
-from fanet_mw.routing.clustered.relaying.neighbor_knowledge import (
+from fanet_mw.routing.clustered.relaying.gateways_cds_mpr import (
     DominatingSet,
     HeadsFirst,
     MultipointRelays,
     NeighborKnowledgeRelaying,
     RelayChoice,
 )
+from fanet_mw.routing.clustered.relaying.gossip_and_counter import CounterRule, GossipRule, RelayAll, Rule
 from fanet_mw.routing.clustered.relaying.neighborhood import Neighborhood
-from fanet_mw.routing.clustered.relaying.rules import CounterRule, GossipRule, RelayAll, Rule
 from fanet_mw.routing.clustered.relaying.scheduled import ScheduledRelaying
 from fanet_mw.routing.clustered.roles.assigned_roles import AssignedRoles, RoleParts
 from fanet_mw.routing.clustered.roles.failover import Failover

@@ -14,7 +14,7 @@ from fanet_mw.scenario import Scenario
 from sim.world.engines.contract import Engine, Flags, Values
 from sim.world.engines.rotors.battery import Batteries
 from sim.world.engines.rotors.power import trimmed_w
-from sim.world.engines.rotors.vehicle import VEHICLES, Vehicle
+from sim.world.engines.rotors.vehicle_types import VEHICLES, Vehicle
 
 _FASTEST_M_S: Final = 30.0
 _CELLS: Final = 61

@@ -1,4 +1,4 @@
-"""The places of the survivors, and which of them are buried. Ids run from 1."""
+"""The places of the survivors, and which of them are buried. Ids run from 1. Not modeled: survivors that move."""
 
 import math
 from collections.abc import Callable, Sequence

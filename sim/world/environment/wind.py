@@ -10,7 +10,7 @@ the mean wind, w is upwards. Both filters are advanced exactly for a step of any
 order; v and w have two states each, whose covariance over a step is known in closed form. Not modeled: gusts that one
 UAV meets after another, wind behind buildings and over hills, and a mean that grows with height.
 
-The wind acts on bodies with rotors only: that engine moves them through this air (`engines/rotors/engine.py`).
+The wind acts on bodies with rotors only: that engine moves them through this air (`engines/rotors/rigid_body.py`).
 """
 
 import math

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from sim.world.engines.contract import GRAVITY_M_S2, Values
-from sim.world.engines.rotors.vehicle import Vehicle
+from sim.world.engines.rotors.vehicle_types import Vehicle
 
 _RATIO: Final = 3.0
 """Each loop is slower than the one inside it by this factor."""

@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from sim.world.engines.contract import GRAVITY_M_S2, Values
-from sim.world.engines.rotors.vehicle import AIR_KG_M3, Vehicle
+from sim.world.engines.rotors.vehicle_types import AIR_KG_M3, Vehicle
 
 INDUCED_LOSS: Final = 1.15
 _PROFILE_GROWTH: Final = 4.65

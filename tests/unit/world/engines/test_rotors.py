@@ -14,10 +14,10 @@ from sim.world.engines.battery_drain import BatteryDrain
 from sim.world.engines.contract import GRAVITY_M_S2, Rows
 from sim.world.engines.kinematic import Kinematic
 from sim.world.engines.rotors.battery import Batteries
-from sim.world.engines.rotors.engine import Rotors
 from sim.world.engines.rotors.flight_control import allocation, body_up, conjugate, level_attitude, times
 from sim.world.engines.rotors.power import induced_m_s, trimmed_w
-from sim.world.engines.rotors.vehicle import (
+from sim.world.engines.rotors.rigid_body import Rotors
+from sim.world.engines.rotors.vehicle_types import (
     AIR_KG_M3,
     CRAZYFLIE,
     IRIS,

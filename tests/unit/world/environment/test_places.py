@@ -18,8 +18,8 @@ from fanet_mw.units import Enu
 from sim.world.engines.contract import Engine
 from sim.world.engines.kinematic import Kinematic
 from sim.world.engines.pybullet import Physics
-from sim.world.engines.rotors.engine import Rotors
-from sim.world.engines.rotors.vehicle import IRIS
+from sim.world.engines.rotors.rigid_body import Rotors
+from sim.world.engines.rotors.vehicle_types import IRIS
 from sim.world.environment import footprints, heightmap
 from sim.world.environment.obstacles import Box, Hills, Obstacles, obstacles
 from sim.world.environment.solids import Solids

@@ -1,4 +1,4 @@
-"""The types of vehicles: their parameters, with the sources; `engine.py` applies them. Body axes: x ahead, y to the
+"""The types of vehicles: their parameters, with the sources; `rigid_body.py` applies them. Body axes: x ahead, y to the
 left, z up.
 
     thrust of a rotor    k_f w^2 - k_z w V_z          w: its speed, V_z: the air's velocity through it from above

@@ -1,6 +1,6 @@
 """Relaying rules by two-hop knowledge from hellos: `heads`, `cds` and `mpr`.
 
-    heads  the cluster heads relay, and the nodes that are needed to connect them
+    heads  the cluster heads relay, and the gateways, which are the nodes that connect them
     cds    the connected dominating set of Wu and Li relays; each node computes for itself whether it belongs to it
     mpr    the nodes relay that the last sender chose as its multipoint relays; the first copy decides (RFC 3626)
 

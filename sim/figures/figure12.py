@@ -12,6 +12,7 @@ from sim.figures.recipe import Drawing, Recipe, point
 from sim.figures.statistics import DISTANCE, SHARE, Interval, Possible, interval
 from sim.figures.style import Look, beside, canvas, legend_above, line, look_of, plain_log, ticks_at
 
+_LETTERS: Final = "abcdefgh"
 _CASES: Final = ("flooding", "paper", "ours")
 _VARIANTS: Final = {
     "ours": "fanet-mw: 44 heads, 0.5 s, counter, repair",
@@ -136,6 +137,8 @@ def _draw_delivery(axes: Axes, runs: Runs, quantity: str) -> list[Mapping[str, A
     for place, case in enumerate(_CASES):
         found = [runs.of(quantity, case=case, **{_AT: interval_s}) for interval_s in intervals]
         kept = [(at, one) for at, one in zip(intervals, found, strict=True) if one.runs]
+        if not kept:
+            continue  # a sweep without this method
         at_s = [beside(at, place, len(_CASES), log=True, apart=_NEAR) for at, _ in kept]
         line(axes, look_of(case, _VARIANTS), at_s, [one for _, one in kept], most=1.0)
         data += [point(one, app_2_interval_s=at, series=case, delivered=quantity) for at, one in kept]
@@ -183,11 +186,11 @@ def draw(runs: Runs) -> Drawing:
                 axes.set_xlim(_SINCE_S[0], _SINCE_S[-1])
                 plain_log(axes.xaxis)
             else:
-                axes.set_title(f"({'abc'[column]}) app_2 every {interval_s:g} s")
+                axes.set_title(f"({_LETTERS[column]}) app_2 every {interval_s:g} s")
         panels[row_of_panels * columns].set_ylabel("share of UAVs that have turned")
     for axes, quantity, title in (
-        (panels[columns - 1], "pdr", "(d) app_1 (1024 B every 1 s)"),
-        (panels[-1], "reports.pdr", "(e) app_2 (512 B)"),
+        (panels[columns - 1], "pdr", f"({_LETTERS[columns - 1]}) app_1 (1024 B every 1 s)"),
+        (panels[-1], "reports.pdr", f"({_LETTERS[columns]}) app_2 (512 B)"),
     ):
         axes.set_title(title)
         data += _draw_delivery(axes, runs, quantity)

@@ -79,6 +79,20 @@ def test_a_rival_that_was_not_flown_leaves_a_claim_open() -> None:
     assert "no run" in claim.statements[1].text()
 
 
+def test_figure_12_with_two_rates_and_two_methods_counts_its_panels_and_names_no_other_method() -> None:
+    kept = read_kept(Path(__file__).parents[3] / "docs/results/sweeps", "fig12", "full")
+    assert kept is not None
+    few = [
+        row["case"] in ("flooding", "paper") and row["mission.report_interval_s"] in (1, 0.1)
+        for row in kept.select(["case", "mission.report_interval_s"]).to_pylist()
+    ]
+    figure = FIGURES["12"].draw(Runs(kept.filter(few))).figure
+    letters = [axes.get_title()[:3] for axes in figure.axes if axes.get_title()]
+    assert letters == ["(a)", "(b)", "(c)", "(d)"]
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["plain flooding", "the paper's method, 4 clusters, 5 s"]
+
+
 def test_a_legend_that_is_wider_than_its_figure_takes_more_rows() -> None:
     figure, (axes, _) = canvas(2)
     for number in range(7):

@@ -59,11 +59,13 @@ def test_a_plan_says_how_long_time_beacons_take_and_before_that_packets_are_lost
     """Six nodes in a line, five hops, a hello every second: the slack of turns is less than clocks differ."""
     line = ["nodes.layout=line", "nodes.count=6", "clusters.count=5", "traffic.sources=5", "clock.sync=beacons",
             "clock.offset_ms=20", "clusters.flooding_period_s=0.5", "drain_s=4"]  # fmt: skip
-    for warmup_s, told in ((6, True), (15, False)):
+    for warmup_s, told in ((6, True), (19, False)):
         scenario = catalog.find("clusters", [*line, f"warmup_s={warmup_s}", f"duration_s={warmup_s + 8}"])
         _, plan, feasible = judge(scenario, change=False)
         assert feasible
-        assert any("time beacons take some 15 s to reach the node 5 hops" in note for note in plan["notes"]) == told
+        assert (
+            any("time beacons take up to some 19 s to reach the node 5 hops" in note for note in plan["notes"]) == told
+        )
         assert (finish(simulate(scenario), out=None)["pdr"] < 1) == told
 
 

@@ -343,6 +343,9 @@ _KINDS: Final[dict[str, type[Any]]] = {
     "deadline_lost": DeadlineLost,
 }
 _NAMES: Final[dict[type[Any], str]] = {kind: name for name, kind in _KINDS.items()}
+DELIVERED_LINE: Final = '["delivered",%d,%d,%d,%d,%d,%d,%d]'
+"""The format of the line of `Delivered`, without newline; its fields are all integers."""
+_encoded: Final = json.JSONEncoder(separators=(",", ":")).encode
 _JSON_TYPES: Final[dict[object, tuple[type, ...]]] = {
     int: (int,),
     float: (float, int),
@@ -389,9 +392,9 @@ def name_of(kind: type[Record]) -> str:
 
 def line(record: Record) -> str:
     """A record as one JSON array, without newline: `["delivered", t_ns, node, ...]` in the order of fields."""
-    if type(record) is Delivered:  # nine lines in ten are such; formatting is four times as fast as json.dumps
-        return f'["delivered",{record[0]},{record[1]},{record[2]},{record[3]},{record[4]},{record[5]},{record[6]}]'
-    return json.dumps([_NAMES[type(record)], *record], separators=(",", ":"))
+    if type(record) is Delivered:  # nine lines in ten are such; formatting is four times as fast as JSON's encoder
+        return DELIVERED_LINE % record
+    return _encoded([_NAMES[type(record)], *record])
 
 
 def parse(text: str) -> Record:

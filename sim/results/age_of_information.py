@@ -51,7 +51,8 @@ def _heard_of(app: AppPackets) -> dict[tuple[int, int], list[tuple[int, int]]]:
     """(arrival, generation) of each delivered packet by (origin, receiver), in the order of arrivals."""
     sent = [(origin, packet.born_ns) for (origin, _), packet in app.sent.items()]
     heard: dict[tuple[int, int], list[tuple[int, int]]] = {}
-    for packet, node, delay_ns in zip(app.deliveries.packet, app.deliveries.node, app.deliveries.delay_ns, strict=True):
+    columns = app.deliveries.packet.tolist(), app.deliveries.node.tolist(), app.deliveries.delay_ns.tolist()
+    for packet, node, delay_ns in zip(*columns, strict=True):
         origin, born_ns = sent[packet]
         heard.setdefault((origin, node), []).append((born_ns + delay_ns, born_ns))
     for of_pair in heard.values():

@@ -11,12 +11,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from fanet_mw.units import MS
 from sim.results.packets import AppPackets
-
-Column = npt.NDArray[np.int64]
+from sim.run.collecting.delivery_columns import Column
 
 
 def against_bounds(applications: Mapping[str, AppPackets]) -> dict[str, Any]:
@@ -94,5 +92,4 @@ def delays_under_bound(app: AppPackets) -> tuple[Column, Column]:
 def _beside(app: AppPackets, of_packets: list[int]) -> tuple[Column, Column]:
     """The delay of each delivery, and the value in `of_packets` of its packet."""
     figures = np.array(of_packets, dtype=np.int64)
-    places = np.asarray(app.deliveries.packet, dtype=np.int64)
-    return np.asarray(app.deliveries.delay_ns, dtype=np.int64), figures[places]
+    return app.deliveries.delay_ns, figures[app.deliveries.packet]

@@ -10,18 +10,20 @@ import json
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import tomli_w
 
 from fanet_mw import tlog
 from fanet_mw.errors import ConfigError
-from fanet_mw.whole_file import write_items
+from fanet_mw.whole_file import batches, write_items
 from sim.results.file_names import LINKS_FILE, REPORTS_FILE, SCENARIO_FILE, SUMMARY_FILE, TLOG_FILE, TRACE_FILE
 from sim.results.links import described
 from sim.results.metrics import summarize
 from sim.run.collecting.record_kinds import lines
 from sim.run.outcome import Outcome
+
+_HASHED_BYTES: Final = 1 << 16
 
 
 def finish(outcome: Outcome, *, out: Path | None) -> dict[str, Any]:
@@ -35,8 +37,8 @@ def finish(outcome: Outcome, *, out: Path | None) -> dict[str, Any]:
         except OSError as error:
             raise ConfigError(f"--out {out}: cannot be written: {error.strerror}") from error
     digest = hashlib.sha256()
-    for line in lines(outcome.records):
-        digest.update(line)
+    for some in batches(lines(outcome.records), least_bytes=_HASHED_BYTES):
+        digest.update(b"".join(some))
     summary: dict[str, Any] = {}
     try:
         summary = {**summarize(outcome, trace_sha256=digest.hexdigest()), "unwritten": {}}

@@ -99,10 +99,10 @@ def _packets(outcome: Outcome, packets: Mapping[str, AppPackets]) -> dict[str, d
     result: dict[str, dict[str, Any]] = {
         name: {
             "generated": len(app.sent),
-            "delivered": len(app.deliveries),
+            "delivered": app.deliveries.number,
             "repeated": app.repeated,
             "unknown": app.unknown,
-            "pdr": _ratio(len(app.deliveries), app.wanted),
+            "pdr": _ratio(app.deliveries.number, app.wanted),
             "delay_ms": delays.summed_up(app.deliveries.delay_ns),
             "delay_parts_ms": delays.parts(app, lead_ns=lead_ns),
         }
@@ -113,7 +113,7 @@ def _packets(outcome: Outcome, packets: Mapping[str, AppPackets]) -> dict[str, d
     result[first]["worst_nodes"] = _worst_nodes(
         Counter(node for node, _ in traffic.sent),
         targets_by_source(outcome),
-        Counter(traffic.deliveries.node),
+        Counter(traffic.deliveries.node.tolist()),
     )
     return result
 

@@ -5,13 +5,15 @@ same node is `repeated`: the node's process was restarted, and has forgotten the
 if no node sent it at the instant that its header states: it is forged, or its origin's record is lost.
 """
 
-from array import array
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
 
 from agents.applications.traffic import targets_of
-from fanet_mw.trace import BoundStated, Delivered, Generated, LetOut, LikelyStated
+from fanet_mw.trace import BoundStated, Generated, LetOut, LikelyStated
+from sim.run.collecting.delivery_columns import Column, DeliveryColumns, delivery_columns
 from sim.run.collecting.record_kinds import records_of
 from sim.run.outcome import Outcome
 
@@ -19,10 +21,11 @@ OTHER_APPS: Final = ("report", "warning")
 """The built-in applications that send packets, in addition to the traffic classes."""
 Name = tuple[int, int]
 """The identity of a packet: (origin, sequence number)."""
+_EVERYONE: Final = 0
+"""The row of the targets of packets that are meant for all nodes, or of which the trace does not tell the targets."""
 
 
-@dataclass(frozen=True, slots=True)
-class SentPacket:
+class SentPacket(NamedTuple):
     """One packet at its origin."""
 
     born_ns: int
@@ -34,39 +37,36 @@ class SentPacket:
     """The likely delay, and the share of copies that the origin stated to arrive within it; None if it stated none."""
 
 
-@dataclass(slots=True)
-class Deliveries:
-    """The deliveries in columns of equal length, because an hour of a large swarm has millions of them."""
+class Deliveries(NamedTuple):
+    """Deliveries in columns of equal length, because an hour of a large swarm has millions of them."""
 
-    packet: "array[int]" = field(default_factory=lambda: array("I"))
+    packet: Column
     """The index of the packet among those that its application sent."""
-    node: "array[int]" = field(default_factory=lambda: array("H"))
-    delay_ns: "array[int]" = field(default_factory=lambda: array("q"))
-    handover_ns: "array[int]" = field(default_factory=lambda: array("q"))
+    node: Column
+    delay_ns: Column
+    handover_ns: Column
 
-    def __len__(self) -> int:
+    @property
+    def number(self) -> int:
         return len(self.node)
 
-    def add(self, packet: int, record: Delivered) -> None:
-        self.packet.append(packet)
-        self.node.append(record.node)
-        self.delay_ns.append(record.delay_ns)
-        self.handover_ns.append(record.handover_ns)
+
+_NONE: Final = Deliveries(np.empty(0, np.uint32), np.empty(0, np.uint16), np.empty(0, np.int64), np.empty(0, np.int64))
 
 
-@dataclass(slots=True)
 class AppPackets:
     """The packets of one application and their deliveries, of all nodes together."""
 
-    sent: dict[Name, SentPacket] = field(default_factory=dict)
-    """The packets by their identity, in the order of their generation."""
-    wanted: int = 0
-    """The sum over all packets of the number of nodes for which the packet was meant."""
-    deliveries: Deliveries = field(default_factory=Deliveries)
-    repeated: int = 0
-    unknown: int = 0
-    """The number of deliveries of unknown packets, whatever application they claimed; it is only counted for the first
-    application."""
+    def __init__(self) -> None:
+        self.sent: dict[Name, SentPacket] = {}
+        """The packets by their identity, in the order of their generation."""
+        self.wanted = 0
+        """The sum over all packets of the number of nodes for which the packet was meant."""
+        self.deliveries = _NONE
+        self.repeated = 0
+        self.unknown = 0
+        """The number of deliveries of unknown packets, whatever application they claimed; it is only counted for the
+        first application."""
 
 
 def packets_of(outcome: Outcome) -> Mapping[str, AppPackets]:
@@ -77,58 +77,146 @@ def packets_of(outcome: Outcome) -> Mapping[str, AppPackets]:
     """
     classes = [*outcome.scenario.traffic_classes]
     found = {app: AppPackets() for app in (*classes, *OTHER_APPS)}
-    app_of: dict[Name, tuple[AppPackets, int]] = {}  # with the index of the packet there
-    meant_for: dict[Name, frozenset[int]] = {}  # the targets of each packet of the traffic
-    targets = {name: targets_by_source(outcome, name) for name in classes}
-    others = outcome.scenario.nodes.count - 1
-    for born in records_of(outcome.records, Generated):
-        app, name = found.setdefault(born.app, AppPackets()), (born.node, born.seq)
-        app_of[name] = app, len(app.sent)
-        app.sent[name] = SentPacket(born.t_ns)
-        if born.app in targets:
-            meant_for[name] = targets[born.app][born.node]
-            app.wanted += len(targets[born.app][born.node])
-        elif born.app in OTHER_APPS:
-            app.wanted += others
-    for known in records_of(outcome.records, LetOut, BoundStated, LikelyStated):
-        # In real time it may come before the packet's own record, at one instant.
-        name = known.node, known.seq
-        if name in app_of:
-            app, _ = app_of[name]
-            app.sent[name] = _known(app.sent[name], known)
-    had: dict[Name, int] = {}  # one bit per node: there are far fewer packets than deliveries
-    exact = not outcome.scenario.clock.modelled  # otherwise the trace has true delays, whatever the header said
-    for record in records_of(outcome.records, Delivered):
-        name = record.origin, record.seq
-        sender, place = app_of.get(name, (None, 0))
-        if sender is None or (exact and record.t_ns - record.delay_ns != sender.sent[name].born_ns):
-            found[classes[0]].unknown += 1
-            continue
-        wanted_by = meant_for.get(name)
-        if record.node == record.origin or (wanted_by is not None and record.node not in wanted_by):
-            continue
-        before, bit = had.get(name, 0), 1 << record.node
-        if before & bit:
-            sender.repeated += 1
-        else:
-            had[name] = before | bit
-            sender.deliveries.add(place, record)
+    everyone = frozenset(outcome.scenario.node_ids)
+    targets = [everyone]
+    row_of: dict[tuple[str, int], int] = {}  # of the targets, by class and source
+    for traffic_class in classes:
+        for node, meant in targets_by_source(outcome, traffic_class).items():
+            row_of[traffic_class, node] = len(targets)
+            targets.append(meant)
+    packets: dict[Name, _Known] = {}
+    for name, app_name, sent in _sent(outcome):
+        app = found.setdefault(app_name, AppPackets())
+        row = row_of.get((app_name, name[0]), _EVERYONE)
+        packets[name] = _Known(app_name, len(app.sent), sent.born_ns, row)
+        app.sent[name] = sent
+        if row != _EVERYONE:
+            app.wanted += len(targets[row])
+        elif app_name in OTHER_APPS:
+            app.wanted += len(everyone) - 1
+    counting = _DeliveryCount(packets, list(found), targets, exact=not outcome.scenario.clock.modelled)
+    for columns in delivery_columns(outcome.records):
+        counting.take(columns)
+    for app, deliveries, repeated in zip(found.values(), counting.deliveries(), counting.repeated, strict=True):
+        app.deliveries, app.repeated = deliveries, int(repeated)
+    found[classes[0]].unknown = counting.unknown
     return found
+
+
+def _sent(outcome: Outcome) -> list[tuple[Name, str, SentPacket]]:
+    """Each packet with its application, in the order of generation, and all that its origin stated about it.
+
+    In real time a statement may come before the packet's own record, at one instant. If two records name one packet,
+    the first counts.
+    """
+    born: dict[Name, Generated] = {}
+    out_ns: dict[Name, int] = {}
+    bound_ns: dict[Name, int] = {}
+    likely: dict[Name, tuple[int, float]] = {}
+    for record in records_of(outcome.records, Generated, LetOut, BoundStated, LikelyStated):
+        name = record.node, record.seq
+        match record:
+            case Generated():
+                born.setdefault(name, record)
+            case LetOut():
+                out_ns[name] = record.t_ns
+            case BoundStated():
+                bound_ns[name] = record.bound_ns
+            case LikelyStated():
+                likely[name] = record.delay_ns, record.share
+    return [
+        (name, one.app, SentPacket(one.t_ns, out_ns.get(name), bound_ns.get(name), likely.get(name)))
+        for name, one in born.items()
+    ]
+
+
+class _Known(NamedTuple):
+    """What must be known of a packet to count its deliveries."""
+
+    app: str
+    place: int
+    """The index of the packet among those that its application sent."""
+    born_ns: int
+    targets: int
+    """The row of the nodes for which the packet is meant."""
+
+
+class _DeliveryCount:
+    """Counts the deliveries of known packets, portion by portion.
+
+    Packets are numbered in the order of their generation; -1 stands for an unknown one, and finds the last row of each
+    column here, which belongs to no packet.
+    """
+
+    def __init__(
+        self, packets: Mapping[Name, _Known], apps: list[str], targets: list[frozenset[int]], *, exact: bool
+    ) -> None:
+        """`exact`: clocks are exact, so the delay of a delivery tells when its packet was generated. With other clocks
+        the trace has true delays, whatever the header said.
+        """
+        number_of_app = {name: number for number, name in enumerate(apps)}
+        known = [*packets.values(), _Known(apps[0], 0, -1, _EVERYONE)]
+        self._exact = exact
+        self._numbers = {name: number for number, name in enumerate(packets)}
+        self._app = np.array([number_of_app[one.app] for one in known])
+        self._place = np.array([one.place for one in known], np.uint32)
+        self._born_ns = np.array([one.born_ns for one in known])
+        self._row = np.array([one.targets for one in known])
+        width = max(targets[_EVERYONE]) + 1
+        self._meant = np.zeros((len(targets), width), bool)
+        for row, nodes in enumerate(targets):
+            self._meant[row, list(nodes)] = True
+        self._had = np.zeros(len(packets) * width, bool)
+        """For each packet and node, whether a delivery was counted."""
+        self._found: list[list[Deliveries]] = [[] for _ in apps]
+        self.repeated: npt.NDArray[np.int64] = np.zeros(len(apps), np.int64)
+        """The number of repeated deliveries of each application."""
+        self.unknown = 0
+
+    def take(self, columns: DeliveryColumns) -> None:
+        """Count some more deliveries."""
+        names = zip(columns.origin.tolist(), columns.seq.tolist(), strict=True)
+        packet = np.array([self._numbers.get(name, -1) for name in names], np.int64)
+        known = packet >= 0
+        if self._exact:
+            known &= columns.t_ns - columns.delay_ns == self._born_ns[packet]
+        self.unknown += len(known) - int(known.sum())
+        width = self._meant.shape[1]
+        chosen = known & (columns.node != columns.origin) & (columns.node >= 0) & (columns.node < width)
+        chosen[chosen] = self._meant[self._row[packet[chosen]], columns.node[chosen]]
+        packet, node = packet[chosen], columns.node[chosen].astype(np.int64)
+        first = self._first(packet * width + node)
+        app = self._app[packet]
+        self.repeated += np.bincount(app[~first], minlength=len(self.repeated))
+        packet, node, app = packet[first], node[first], app[first]
+        delay_ns, handover_ns = columns.delay_ns[chosen][first], columns.handover_ns[chosen][first]
+        for number in np.unique(app):
+            of_app = app == number
+            self._found[number].append(
+                Deliveries(
+                    self._place[packet[of_app]], node[of_app].astype(np.uint16), delay_ns[of_app], handover_ns[of_app]
+                )
+            )
+
+    def _first(self, pairs: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+        """For each pair of packet and node, whether it comes for the first time."""
+        first = np.zeros(len(pairs), bool)
+        first[np.unique(pairs, return_index=True)[1]] = True
+        first &= ~self._had[pairs]
+        self._had[pairs] = True
+        return first
+
+    def deliveries(self) -> list[Deliveries]:
+        """The deliveries of each application, in the order of the trace."""
+        return [
+            Deliveries(*map(np.concatenate, zip(*portions, strict=True))) if portions else _NONE
+            for portions in self._found
+        ]
 
 
 def first_class_of(outcome: Outcome) -> AppPackets:
     """The first class of traffic."""
     return packets_of(outcome)[next(iter(outcome.scenario.traffic_classes))]
-
-
-def _known(sent: SentPacket, record: LetOut | BoundStated | LikelyStated) -> SentPacket:
-    match record:
-        case LetOut():
-            return replace(sent, out_ns=record.t_ns)
-        case BoundStated():
-            return replace(sent, bound_ns=record.bound_ns)
-        case LikelyStated():
-            return replace(sent, likely=(record.delay_ns, record.share))
 
 
 def targets_by_source(outcome: Outcome, name: str | None = None) -> Mapping[int, frozenset[int]]:

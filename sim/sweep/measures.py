@@ -32,7 +32,7 @@ def delay_counts(outcome: Outcome) -> list[float]:
     """The number of deliveries of application packets in each class of delay (`DELAY_EDGES_S`), and
     of all longer ones.
     """
-    delays_s = np.asarray(first_class_of(outcome).deliveries.delay_ns, dtype=np.float64) / S
+    delays_s = first_class_of(outcome).deliveries.delay_ns / S
     counts = np.bincount(np.searchsorted(DELAY_EDGES_S, delays_s), minlength=len(DELAY_EDGES_S) + 1)
     return [float(count) for count in counts]
 
@@ -57,7 +57,8 @@ def leader_delay_s(outcome: Outcome) -> float | None:
 
 def _at_leader_s(outcome: Outcome) -> list[float]:
     leader, found = outcome.scenario.leader, first_class_of(outcome).deliveries
-    return [delay_ns / S for node, delay_ns in zip(found.node, found.delay_ns, strict=True) if node == leader]
+    delays_s: list[float] = (found.delay_ns[found.node == leader] / S).tolist()
+    return delays_s
 
 
 def connected(outcome: Outcome) -> float:

@@ -13,6 +13,7 @@ from fanet_mw.trace import Record
 A = TypeVar("A", bound=Record)
 B = TypeVar("B", bound=Record)
 C = TypeVar("C", bound=Record)
+D = TypeVar("D", bound=Record)
 KINDS: Final[tuple[type[Any], ...]] = tuple(sorted(get_args(Record), key=trace.name_of))
 """All kinds of records, sorted by name."""
 CODES: Final = {kind: code for code, kind in enumerate(KINDS)}
@@ -41,6 +42,10 @@ def records_of(records: Iterable[Record], kind: type[A], /) -> Iterator[A]: ...
 def records_of(records: Iterable[Record], kind: type[A], other: type[B], /) -> Iterator[A | B]: ...
 @overload
 def records_of(records: Iterable[Record], kind: type[A], other: type[B], third: type[C], /) -> Iterator[A | B | C]: ...
+@overload
+def records_of(
+    records: Iterable[Record], kind: type[A], other: type[B], third: type[C], fourth: type[D], /
+) -> Iterator[A | B | C | D]: ...
 @overload
 def records_of(records: Iterable[Record], *kinds: type[Record]) -> Iterator[Record]: ...
 def records_of(records: Iterable[Record], *kinds: type[Any]) -> Iterator[Any]:

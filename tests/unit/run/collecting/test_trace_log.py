@@ -3,10 +3,12 @@
 import tracemalloc
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fanet_mw.errors import DropReason
 from fanet_mw.trace import Delivered, Dropped, Generated, Posed, Record, line
+from sim.run.collecting.delivery_columns import delivery_columns
 from sim.run.collecting.record_kinds import lines, records_of
 from sim.run.collecting.trace_log import TraceLog
 
@@ -47,10 +49,22 @@ def test_a_reader_gets_the_kinds_it_asks_for_in_order(kinds: tuple[type[Record],
     assert list(records_of(log_of(len(whole)), *kinds)) == [one for one in whole if type(one) in kinds]
 
 
+@pytest.mark.parametrize("changed", [False, True])
+def test_deliveries_come_in_columns_as_in_records(changed: bool) -> None:
+    log = log_of(5 * MOST + 3)
+    if changed:
+        log = log.changed(lambda delivered: delivered._replace(delay_ns=1))
+    expected = [tuple(one) for one in log if type(one) is Delivered]
+    for trace in (log, list(log)):
+        columns = delivery_columns(trace)
+        assert [row for portion in columns for row in np.transpose(portion).tolist()] == [*map(list, expected)]
+
+
 def test_deliveries_are_changed_wherever_they_are() -> None:
     changed = log_of(5 * MOST + 3).changed(lambda delivered: delivered._replace(delay_ns=1))
     expected = [one._replace(delay_ns=1) if type(one) is Delivered else one for one in map(record, range(5 * MOST + 3))]
     assert list(changed) == expected
+    assert b"".join(lines(changed)).decode() == "".join(f"{line(one)}\n" for one in expected)
     assert list(records_of(changed, Delivered)) == [one for one in expected if type(one) is Delivered]
 
 

@@ -189,31 +189,37 @@ def wait_until_signals_are_handled(pid: int) -> None:
         caught = int(next(line.split()[1] for line in status.splitlines() if line.startswith("SigCgt")), 16)
 
 
-def at_start(number: int, *, after_s: float) -> tuple[int, str]:
-    """The exit code and words of a launch that is interrupted so soon, as by Ctrl-C: all its processes hear it."""
+def at_start(number: int, *, services: bool, after_s: float = 0.0) -> tuple[int, str]:
+    """The exit code and words of a launch that is interrupted while it starts, as by Ctrl-C: all its processes hear it.
+
+    With `services` that is some time after it has begun to start them, and else after its first moment.
+    """
     process = subprocess.Popen(
         command("launch", "quick"), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, process_group=0
     )
+    assert process.stderr is not None
     wait_until_signals_are_handled(process.pid)
+    begun = process.stderr.readline() if services else ""
+    assert begun.startswith("swarm quick on") is services
     time.sleep(after_s)
     os.killpg(process.pid, number)
     _, err = process.communicate(timeout=PATIENCE_S)
-    return process.returncode, err
+    return process.returncode, begun + err
 
 
 def test_ctrl_c_while_a_swarm_starts_ends_it_without_a_traceback() -> None:
     """Wherever it comes: in the imports, when the server of children starts, between children, before the clock."""
-    moments_s = (0.0, 0.5, 1.2, 2.2)
+    moments = ((False, 0.0), (False, 0.4), (True, 0.0), (True, 0.2))
     with ThreadPoolExecutor() as pool:  # the four launches have nothing in common
-        ended = list(pool.map(lambda after_s: at_start(signal.SIGINT, after_s=after_s), moments_s))
-    for after_s, (code, said) in zip(moments_s, ended, strict=True):
-        assert code == 130, (after_s, said)
-        assert "Traceback" not in said, (after_s, said)
-        assert len(said.splitlines()) <= 3, (after_s, said)
+        ended = list(pool.map(lambda at: at_start(signal.SIGINT, services=at[0], after_s=at[1]), moments))
+    for at, (code, said) in zip(moments, ended, strict=True):
+        assert code == 130, (at, said)
+        assert "Traceback" not in said, (at, said)
+        assert len(said.splitlines()) <= 3, (at, said)
 
 
 def test_a_launcher_that_is_terminated_while_it_starts_says_so_in_its_exit_code() -> None:
-    code, said = at_start(signal.SIGTERM, after_s=2.0)
+    code, said = at_start(signal.SIGTERM, services=True)
     assert code == 143, said
     assert "Traceback" not in said
 

@@ -68,7 +68,12 @@ class Messenger:
         """Send what an application has submitted; returns the handle of the message, which statuses will name."""
         port, data, to, targets, priority, confirm, lifetime_ns, deadline_ns, born_ns = submission
         plain = port == MAVLINK_PORT and not confirm and not targets and lifetime_ns is None
-        self._check(submission, plain=plain)
+        most = self._room(priority) if plain else self._most_bytes(submission)
+        if len(data) > most:
+            room = self._node.most_packet_bytes(priority)
+            raise LocalProtocolError(
+                f"message of {len(data)} bytes must be <= {most}: packets of this priority have {room} bytes"
+            )
         if confirm and self._sender.full:
             return self._refused(application, DropReason.QUEUE_FULL, now_ns)
         if deadline_ns is not None:
@@ -103,18 +108,13 @@ class Messenger:
         """The room for inner frames in one packet of a priority."""
         return self._node.most_packet_bytes(priority) - wire.HEADER_BYTES
 
-    def _check(self, submission: Submission, *, plain: bool) -> None:
-        """Raise LocalProtocolError for a message that is longer than the network can ever carry."""
-        port, data, to, targets, priority, confirm = submission[:6]
-        if plain:
-            most = self._room(priority)
-        else:
-            most = self._sender.most_bytes(port=port, targets=_targets(to, targets), confirm=confirm, priority=priority)
-        if len(data) > most:
-            packet = self._node.most_packet_bytes(priority)
-            raise LocalProtocolError(
-                f"message of {len(data)} bytes must be <= {most}: packets of this priority have {packet} bytes"
-            )
+    def _most_bytes(self, submission: Submission) -> int:
+        """The length of the longest message of this kind that goes in pieces."""
+        to, targets = submission.to, submission.targets
+        return self._sender.most_bytes(
+            port=submission.port, targets=_targets(to, targets), confirm=submission.confirm,
+            priority=submission.priority,
+        )  # fmt: skip
 
     def _admission(self, deadline_ns: int, born_ns: int) -> tuple[bool, int | None]:
         """Whether a message can arrive in time, and the least interval between such messages if that is known.
@@ -142,13 +142,16 @@ class Messenger:
     def _plain(
         self, application: Application, frames: bytes, to: NodeId, *, priority: int, born_ns: int, now_ns: int
     ) -> int:
+        if not application.follows:
+            return self._node.send(
+                frames, destination=to, priority=priority, app=application.name, born_ns=born_ns, now_ns=now_ns
+            )
         seq = self._node.send(
             frames, destination=to, priority=priority, app=application.name, born_ns=born_ns, now_ns=now_ns,
-            watch=bool(application.follows), watch_radio=_follows_radio(application),
+            watch=True, watch_radio=_follows_radio(application),
         )  # fmt: skip
-        if application.follows:
-            self._statuses.tell(application, Status(seq, Fate.ADMITTED, now_ns))
-            self._statuses.watch(seq, application, seq, first=True, confirmed=False)
+        self._statuses.tell(application, Status(seq, Fate.ADMITTED, now_ns))
+        self._statuses.watch(seq, application, seq, first=True, confirmed=False)
         return seq
 
     def _originate(

@@ -66,6 +66,7 @@ class TrafficGenerator:
     def __init__(self, scenario: Scenario, node: NodeId, name: str | None = None) -> None:
         name, traffic = _class_of(scenario, name)
         self._kind = traffic.arrivals
+        self.saturated = self._kind == "saturated"
         self._lead_ms = math.ceil(scenario.radio.lead_ms)
         self._interval_ns = max(US, round(traffic.interval_s * S))
         start_ns, self._end_ns = scenario.traffic_window_ns
@@ -79,11 +80,11 @@ class TrafficGenerator:
         """The packets yet to come, for arrivals `trace`."""
         self._bytes = traffic.payload_bytes
         self._next_ns: int | None = None
-        self._owed = 1
+        self.owed = 1
         """The number of packets that are generated at `next_ns`."""
         if node in sources_of(scenario, name):
             self._next_ns = start_ns + self._first_gap_ns(start_ns)
-            self._owed = self.depth if self.saturated else 1
+            self.owed = self.depth if self.saturated else 1
 
     @property
     def next_bytes(self) -> int:
@@ -96,10 +97,6 @@ class TrafficGenerator:
         two leads.
         """
         return 1 + 2 * self._lead_ms
-
-    @property
-    def saturated(self) -> bool:
-        return self._kind == "saturated"
 
     def _first_gap_ns(self, start_ns: int) -> int:
         """The time until the first packet: a random phase of the interval, or 0 for a saturated source."""
@@ -145,11 +142,6 @@ class TrafficGenerator:
         while self._next_ns is not None and self._next_ns < min(now_ns, self._end_ns):
             self.advance()
 
-    @property
-    def owed(self) -> int:
-        """The number of packets that are generated at `next_ns`."""
-        return self._owed
-
     def next_ns(self) -> int | None:
         """The instant of the next packet; None if there is none, or if a saturated source waits for one to end."""
         if self._next_ns is None or self._next_ns >= self._end_ns:
@@ -160,7 +152,7 @@ class TrafficGenerator:
         """The packet of `next_ns` was sent: go on to the next one."""
         assert self._next_ns is not None, "only a source that has a next packet can send it"
         if self.saturated:
-            self._next_ns, self._owed = None, 0  # from now on, one packet for each one that ends
+            self._next_ns, self.owed = None, 0  # from now on, one packet for each one that ends
         else:
             self._next_ns = self._following_ns(self._next_ns)
 
@@ -172,7 +164,7 @@ class TrafficGenerator:
         if now_ns >= self._end_ns:
             return False
         if refused:
-            self._owed += 1
+            self.owed += 1
             if self._next_ns is None:
                 self._next_ns = now_ns + _REFUSED_NS + self._lead_ms * MS
         return not refused

@@ -254,4 +254,5 @@ class Receiver:
         self._sweep_ns = min((message.until_ns for message in self._incoming.values()), default=None)
 
     def next_wake_ns(self) -> int | None:
-        return earliest(self._receipts_ns, self._sweep_ns)
+        receipts_ns, sweep_ns = self._receipts_ns, self._sweep_ns
+        return sweep_ns if receipts_ns is None or (sweep_ns is not None and sweep_ns < receipts_ns) else receipts_ns

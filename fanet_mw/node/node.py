@@ -44,7 +44,7 @@ class AnnouncedHello(NamedTuple):
 class Node:
     """One protocol instance: it suppresses duplicates, checks headers, delivers, and asks its routing protocol.
 
-    Most receptions are copies, so `hear` must be quick with them. Five of the nineteen attributes exist only for that:
+    Most receptions are copies, so `hear` must be quick with them. Six of the twenty attributes exist only for speed:
     they are methods, lists and facts of this node's parts, which `hear` would otherwise reach through two objects.
     """
 
@@ -73,6 +73,8 @@ class Node:
         """The lifetime of a packet by its priority; the air may state any of 256."""
         for priority in wire.PRIORITIES.values():
             self._lifetimes_ns[priority] = scenario.routing.lifetime_ns(priority)
+        self._most_bytes: dict[int, int] = {}
+        """The length of the longest packet of each priority for which somebody has asked; it never changes."""
         self._reader = reader or Reader()
         self._duplicates = duplicates.DuplicateSet()
         self._header_check = HeaderCheck(node, scenario)
@@ -151,22 +153,22 @@ class Node:
         if size > most:
             raise LocalProtocolError(f"packet of {size} bytes must be <= {most}, the most that this routing carries")
         born_ns = born_ns // US * US  # what the header can say
-        scenario = self.scenario
         packet = self._own.make(
             Kind.DATA,
             inner,
             destination=destination,
             priority=priority,
             flags=self._protocol.origin_flags,
-            hop_limit=scenario.routing.hop_limit,
+            hop_limit=self.scenario.routing.hop_limit,
             born_ns=born_ns,
         )
-        seq = packet.header.seq
-        self.port.records.append(_new(Generated, (born_ns, self.node, seq, app, len(packet.frame))))
-        self._own.held.add(packet.frame[wire.NAME])
+        header, frame = packet
+        seq = header.seq
+        self.port.records.append(_new(Generated, (born_ns, self.node, seq, app, size)))
+        self._own.held.add(frame[wire.NAME])
         if watch:
             self.watch.begin(seq, radio=watch_radio)
-        due_ns = max(born_ns + scenario.radio.lead_ns, now_ns)
+        due_ns = max(born_ns + self.scenario.radio.lead_ns, now_ns)
         self._protocol.originate(packet, due_ns=due_ns, now_ns=now_ns)
         return seq
 
@@ -267,7 +269,8 @@ class Node:
         _, _, origin_us, seq, origin, destination, _, kind, _, hops, priority, _, _, _ = reader.fields
         known = before != 0 or (origin == self.node and kind == _DATA and self._own.handed_on(origin, seq))
         end_ns = reception.end_ns
-        why = self._header_check.why_not(reader.fields, known, reception.src, end_ns)
+        age_ns = end_ns - origin_us * US
+        why = self._header_check.why_not(reader.fields, known, reception.src, age_ns)
         if why is not None:
             self._disbelieve(why, packet, now_ns)
             return _NONE
@@ -276,7 +279,6 @@ class Node:
             self._protocol.on_hello(packet, reception, now_ns=now_ns)
             self.hellos.append(packet)
             return _NONE
-        age_ns = end_ns - origin_us * US
         if age_ns > self._lifetimes_ns[priority]:
             self._duplicates.put(packet_hash, bits)
             self.port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
@@ -308,7 +310,11 @@ class Node:
 
     def most_packet_bytes(self, priority: int) -> int:
         """The length, header included, of the longest packet that `send` takes at a priority."""
-        return min(self._protocol.most_packet_bytes(priority), self.scenario.radio.max_frame_bytes)
+        most = self._most_bytes.get(priority)
+        if most is None:
+            most = min(self._protocol.most_packet_bytes(priority), self.scenario.radio.max_frame_bytes)
+            self._most_bytes[priority] = most
+        return most
 
     def bound_ns(self) -> int | None:
         """The delay within which all nodes have the next packet of this node; None: the protocol states none."""

@@ -112,8 +112,8 @@ class NodePort:
             return False
         self._held.remove(name)
         own = int.from_bytes(frame[wire.SEQ], "little")
-        self.records.append(LetOut(start_ns, self.node, own))
-        return self.watch.announced(own, request, start_ns)
+        self.records.append(_new(LetOut, (start_ns, self.node, own)))
+        return own in self.watch.watched and self.watch.announced(own, request, start_ns)
 
     # --- packets --------------------------------------------------------------------------------------------------
 

@@ -23,6 +23,7 @@ _KIND: Final = 7
 """The index of the packet's kind among the fields of a header (`wire.Fields`)."""
 _FLAGS: Final = 11
 """The index of the packet's flags among them."""
+_MORE, _PHASE_MASK, _END_TO_END = wire.FLAG_MORE, wire.PHASE_MASK, wire.END_TO_END
 BUNDLE: Final = 1 << 30
 """Stands for the phase of a frame that holds several packets. No duplicate set ever has this bit, so each such frame is
 opened, and its packets are looked up one by one."""
@@ -73,17 +74,17 @@ class Reader:
         that more packets follow is ignored.
         """
         self.frame, self.packet = frame, None
-        fields = self.fields = wire.fields_of(frame) or wire.NO_FIELDS
+        fields = self.fields = wire.fields_of(frame)
         flags = fields[_FLAGS]
-        if flags & wire.FLAG_MORE and not alone:
+        if flags & _MORE and not alone:
             self.hash, self.phase = 0, BUNDLE
         else:
-            name = frame[wire.END_TO_END]
+            name = frame[_END_TO_END]
             size, inner, packet_hash = self._hashes.get(name, _UNKNOWN)
             # packets that differ only in their inner frames are told apart by them: no copy is taken for another packet
             same = len(frame) == size and frame.endswith(inner)
             self.hash = packet_hash if same else self._remember(name, frame)
-            self.phase = PHASES.get(flags & wire.PHASE_MASK, 0)
+            self.phase = PHASES.get(flags & _PHASE_MASK, 0)
 
     def _remember(self, name: bytes, frame: bytes) -> int:
         """Compute the hash of a packet, and keep it for its further copies."""
@@ -95,16 +96,18 @@ class Reader:
 
     def read(self) -> Packet:
         """Check the header and return the packet in the frame; raises MalformedFrameError if the check fails."""
-        # a hello comes from the cache of `packet_of`, because the node's clock has asked for the same hello already
-        hello = self.phase and self.fields[_KIND] == _HELLO
-        packet = self.packet = packet_of(self.frame) if hello else self.checked()
+        if self.fields[_KIND] == _HELLO and self.phase:  # the node's clock has asked for the same hello already
+            packet = packet_of(self.frame)
+        else:
+            packet = _checked(self.frame, self.fields, self.phase)
+        self.packet = packet
         return packet
 
-    def checked(self) -> Packet:
-        """As `read`, but without any cache."""
-        if not self.phase:
-            raise MalformedFrameError("no routing header, or one of two phases")
-        return _new(Packet, (wire.checked(self.frame, self.fields), self.frame))
+
+def _checked(frame: bytes, fields: wire.Fields, phase: int) -> Packet:
+    if not phase:
+        raise MalformedFrameError("no routing header, or one of two phases")
+    return _new(Packet, (wire.checked(frame, fields), frame))
 
 
 T = TypeVar("T")
@@ -150,4 +153,4 @@ def packet_of(frame: bytes) -> Packet:
     """The packet in a frame, checked; raises MalformedFrameError. The latest packets are cached."""
     reader = Reader()
     reader.look(frame)
-    return reader.checked()
+    return _checked(frame, reader.fields, reader.phase)

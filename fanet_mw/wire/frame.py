@@ -166,15 +166,15 @@ NO_FIELDS: Final[Fields] = (b"", b"", 0, 0, 0, 0, 0, 0, 0, 0, 0, PHASE_MASK, 0, 
 is."""
 
 
-def fields_of(frame: bytes) -> Fields | None:
-    """The values at the offsets of a header; None if these bytes cannot begin with a routing header.
+def fields_of(frame: bytes) -> Fields:
+    """The values at the offsets of a header; NO_FIELDS if these bytes cannot begin with a routing header.
 
     Origin, sequence number and flags suffice to recognize a duplicate; any further use needs `checked`.
     """
     if len(frame) < HEADER_BYTES:
-        return None
+        return NO_FIELDS
     fields: Fields = _CHECKED.unpack_from(frame)
-    return fields if fields[0] == _ROUTE_MARK and fields[1] == _ROUTE_ID else None
+    return fields if fields[0] == _ROUTE_MARK and fields[1] == _ROUTE_ID else NO_FIELDS
 
 
 def peek_kind(frame: bytes) -> int | None:
@@ -186,7 +186,7 @@ def peek_kind(frame: bytes) -> int | None:
 def decode_header(frame: bytes) -> Header:
     """The routing header of a frame; raises MalformedFrameError."""
     fields = fields_of(frame)
-    if fields is None:
+    if fields is NO_FIELDS:
         raise MalformedFrameError("no routing header")
     return checked(frame, fields)
 

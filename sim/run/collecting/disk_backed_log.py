@@ -11,7 +11,7 @@ from fanet_mw.errors import ConfigError
 from sim.run.collecting.spool import Spool
 
 T = TypeVar("T")
-MOST_IN_MEMORY: Final = 1 << 12
+MOST_IN_MEMORY: Final = 1 << 9
 """The number of items at which those in memory are moved to disk. So few trace records are still in the processor's
 cache when they are packed, and the next ones take their place there: a run takes less time than if all its records
 stayed in memory."""

@@ -12,7 +12,7 @@ deliveries are given as columns, and as lines of the trace file, without making 
 import pickle
 import struct
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from itertools import starmap
+from itertools import compress, starmap
 from pathlib import Path
 from typing import Any, Final
 
@@ -24,6 +24,9 @@ from sim.run.collecting.disk_backed_log import MOST_IN_MEMORY, DiskBackedLog
 from sim.run.collecting.record_kinds import CODES, KINDS
 
 _DELIVERED: Final = CODES[Delivered]
+_IS_DELIVERED: Final = bytes(code == _DELIVERED for code in range(256))
+"""For each code of a kind, 1 if it is that of deliveries; else 0."""
+_IS_OTHER: Final = bytes(code != _DELIVERED for code in range(256))
 _FIELDS: Final = "qHHIqHq"
 """The layout of `Delivered`: instant, node, origin, sequence number, delay, hops, handover."""
 _ROW: Final = struct.Struct("<" + _FIELDS)
@@ -120,8 +123,8 @@ class TraceLog(Collection[Record]):
 
 def _packed(records: Sequence[Record]) -> tuple[bytes, bytes, bytes]:
     codes = bytes(map(CODES.__getitem__, map(type, records)))
-    rows = b"".join(starmap(_ROW.pack, [record for record in records if type(record) is Delivered]))
-    return codes, rows, pickle.dumps([tuple(record) for record in records if type(record) is not Delivered])
+    rows = b"".join(starmap(_ROW.pack, compress(records, codes.translate(_IS_DELIVERED))))
+    return codes, rows, pickle.dumps(list(map(tuple, compress(records, codes.translate(_IS_OTHER)))))
 
 
 def _lines(rows: bytes) -> list[bytes]:

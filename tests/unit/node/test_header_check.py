@@ -6,12 +6,12 @@ from kit import MakeScenario
 from fanet_mw import wire
 from fanet_mw.errors import DropReason
 from fanet_mw.node.header_check import CONTROL, HeaderCheck
-from fanet_mw.units import BROADCAST, NodeId, S
+from fanet_mw.units import BROADCAST, US, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Header, Kind
 
 OURS, NEIGHBOR, FAR = NodeId(2), NodeId(3), NodeId(4)
 NOW_NS = 50 * S
-NOW_US = NOW_NS // 1000
+NOW_US = NOW_NS // US
 FIRST = Header(NOW_US, 7, NEIGHBOR, BROADCAST, NEIGHBOR, Kind.DATA, 8, 0, PRIORITY_BULK, FLAG_FLOOD)
 """A neighbor's own packet."""
 RELAYED = FIRST._replace(origin=FAR, hops=1)
@@ -24,9 +24,8 @@ def plausible(make_scenario: MakeScenario) -> HeaderCheck:
 
 
 def judged(plausible: HeaderCheck, header: Header, *, src: NodeId = NEIGHBOR, known: bool = False) -> DropReason | None:
-    fields = wire.fields_of(header.encode())
-    assert fields is not None
-    return plausible.why_not(fields, known, src, NOW_NS)
+    age_ns = NOW_NS - header.origin_us * US
+    return plausible.why_not(wire.fields_of(header.encode()), known, src, age_ns)
 
 
 @pytest.mark.parametrize("header", [FIRST, RELAYED, RELAYED._replace(hops=200, hop_limit=55)], ids=str)

@@ -111,7 +111,7 @@ class Messenger:
     def _most_bytes(self, submission: Submission) -> int:
         """The length of the longest message of this kind that goes in pieces."""
         to, targets = submission.to, submission.targets
-        return self._sender.most_bytes(
+        return self._sender.fragmentation.most_bytes(
             port=submission.port, targets=_targets(to, targets), confirm=submission.confirm,
             priority=submission.priority,
         )  # fmt: skip

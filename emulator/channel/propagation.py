@@ -14,6 +14,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
+from emulator.channel.pairs_in_reach import neighbors
 from emulator.channel.path_loss import (
     AIR_TO_AIR_EXPONENT,
     ENVIRONMENTS,
@@ -26,7 +27,6 @@ from emulator.channel.path_loss import (
     uma_av_db,
 )
 from emulator.channel.shadowing import Shadowing
-from emulator.channel.spatial import neighbors
 from emulator.kernel.state import (
     AUDIBLE,
     DELAY,

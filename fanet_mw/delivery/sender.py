@@ -14,11 +14,12 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
+from fanet_mw.delivery.fragmentation import FEW, MOST_NAMED, Fragmentation, Fragments
 from fanet_mw.delivery.retransmission_timeout import RetransmissionTimeout
 from fanet_mw.delivery.send_window import SendWindow
 from fanet_mw.units import BROADCAST, MS, US, NodeId
 from fanet_mw.wire import application_message
-from fanet_mw.wire.application_message import DELIVERED, MAVLINK_PORT, MOST_PIECES, Head, Receipt
+from fanet_mw.wire.application_message import DELIVERED, Head, Receipt
 
 MOST_BYTES: Final = 4 << 20
 """The greatest number of bytes that are kept, of all messages together."""
@@ -27,10 +28,6 @@ EXPIRED: Final = -1
 """The outcome of a message whose lifetime is over; all other outcomes are those of receipts."""
 _MOST_DOUBLINGS: Final = 3
 _MOST_FLOWS: Final = 1024
-_FEW: Final = 2
-"""Up to this number of targets, missing pieces are sent to each target; to more targets they are broadcast."""
-_NAMED: Final = 32
-"""A message for all nodes that is broadcast again names at most this many nodes that still lack something."""
 
 
 class PieceToSend(NamedTuple):
@@ -74,8 +71,7 @@ class _OutgoingMessage:
     data: bytes
     port: int
     priority: int
-    stride: int
-    pieces: int
+    fragments: Fragments
     born_us: int
     lifetime_ms: int
     everyone: bool
@@ -101,7 +97,7 @@ class Sender:
         """
         self._node = node
         self._everyone = tuple(NodeId(other) for other in everyone if other != node)
-        self._room = room
+        self.fragmentation = Fragmentation(len(self._everyone), room)
         self._round_trips = RetransmissionTimeout(wait_ns)
         self._messages: dict[int, _OutgoingMessage] = {}
         self._flows: dict[tuple[tuple[NodeId, ...], int, int], _Flow] = {}
@@ -127,35 +123,17 @@ class Sender:
     def full(self) -> bool:
         return self._kept_bytes >= MOST_BYTES or len(self._messages) >= MOST_MESSAGES
 
-    def most_bytes(self, *, port: int, targets: tuple[NodeId, ...] | None, confirm: bool, priority: int) -> int:
-        """The length of the longest message to these targets (None: all nodes); below 0 if not even an empty one fits
-        a packet.
-        """
-        room = self._room_beside_head(self._most_named(targets, confirm=confirm), priority)
-        return room if port == MAVLINK_PORT or room < 0 else MOST_PIECES * application_message.room_for_data(room)
-
-    def _most_named(self, targets: tuple[NodeId, ...] | None, *, confirm: bool) -> int:
-        """The greatest number of targets that any packet of a message names; a repetition to all nodes names some."""
-        if targets is not None:
-            return len(targets) if len(targets) > 1 else 0
-        return min(len(self._everyone), _NAMED) if confirm and len(self._everyone) > _FEW else 0
-
-    def _room_beside_head(self, named: int, priority: int) -> int:
-        """The room of a packet for data, and for what stands around it."""
-        return self._room(priority) - application_message.HEAD_BYTES - application_message.targets_bytes(named)
-
     def unconfirmed(
         self, data: bytes, *, port: int, destination: NodeId, targets: tuple[NodeId, ...], priority: int,
         born_us: int, lifetime_ms: int,
     ) -> tuple[int, Sequence[PieceToSend]]:  # fmt: skip
         """The number and all packets of a message that is not confirmed."""
         number = self.take_number()
-        stride, pieces = self._division(data, port, self._most_named(targets or None, confirm=False), priority)
+        cut = self.fragmentation.cut(data, port=port, targets=targets or None, confirm=False, priority=priority)
         packets = []
-        for piece in range(pieces):
-            head = Head(born_us, number, 0, len(data), lifetime_ms, port, 0, stride, piece, pieces, 0)
-            part = data[piece * stride : (piece + 1) * stride]
-            inner = application_message.encode_piece(head, part, node=self._node, targets=targets)
+        for piece in range(cut.pieces):
+            head = Head(born_us, number, 0, len(data), lifetime_ms, port, 0, cut.stride, piece, cut.pieces, 0)
+            inner = application_message.encode_piece(head, cut.part(data, piece), node=self._node, targets=targets)
             packets.append(PieceToSend(number, inner, destination, priority, piece == 0))
         return number, packets
 
@@ -171,11 +149,10 @@ class Sender:
             return number
         flow = self._flow(whom, port, priority)
         flow.open.append(number)
-        stride, pieces = self._division(data, port, self._most_named(targets, confirm=True), priority)
+        fragments = self.fragmentation.cut(data, port=port, targets=targets, confirm=True, priority=priority)
         message = _OutgoingMessage(
-            number, flow, data, port, priority, stride, pieces, born_us, lifetime_ms, targets is None,
-            dict.fromkeys(whom, 0),
-        )  # fmt: skip
+            number, flow, data, port, priority, fragments, born_us, lifetime_ms, targets is None, dict.fromkeys(whom, 0)
+        )
         self._kept_bytes += len(data)
         self._messages[number] = message
         self._window.wait(number, priority=priority, rounds=0)
@@ -185,13 +162,6 @@ class Sender:
     def take_number(self) -> int:
         self._next_number += 1
         return self._next_number - 1
-
-    def _division(self, data: bytes, port: int, named: int, priority: int) -> tuple[int, int]:
-        """The number of bytes of each piece but the last, and the number of pieces."""
-        if port == MAVLINK_PORT or not data:
-            return len(data), 1
-        stride = min(len(data), application_message.room_for_data(self._room_beside_head(named, priority)))
-        return stride, -(-len(data) // stride)
 
     def _flow(self, whom: tuple[NodeId, ...], port: int, priority: int) -> _Flow:
         key = whom, port, priority
@@ -212,7 +182,7 @@ class Sender:
         if message.rounds == 1:  # after a repetition it is not known which copy the receipt answers
             self._round_trips.measured(origin, now_ns - message.sent_ns)
         if receipt.outcome == application_message.MISSING:
-            message.lacking[origin] |= receipt.held & ((1 << message.pieces) - 1)
+            message.lacking[origin] |= receipt.held & ((1 << message.fragments.pieces) - 1)
             return
         del message.lacking[origin]
         self._window.widen()
@@ -225,7 +195,7 @@ class Sender:
         message.flow.open.remove(message.number)
         self._kept_bytes -= len(message.data)
         if message.again_ns:
-            self._window.over(message.pieces, rounds=message.rounds)
+            self._window.over(message.fragments.pieces, rounds=message.rounds)
 
     # --- out ------------------------------------------------------------------------------------------------------
 
@@ -240,7 +210,7 @@ class Sender:
                 self.told.append(Told(number, EXPIRED, tuple(message.lacking), last=True))
                 self._close(message)
             elif 0 < message.again_ns <= now_ns:
-                self._window.over(message.pieces, rounds=message.rounds)
+                self._window.over(message.fragments.pieces, rounds=message.rounds)
                 message.again_ns = 0
                 self._window.halve()
                 self._window.wait(number, priority=message.priority, rounds=message.rounds)
@@ -255,10 +225,10 @@ class Sender:
         """Send the missing pieces of a message; a target that has all of them is sent the last one again, to ask for
         its receipt.
         """
-        whole, last = (1 << message.pieces) - 1, 1 << (message.pieces - 1)
+        whole, last = (1 << message.fragments.pieces) - 1, 1 << (message.fragments.pieces - 1)
         wanted = {target: (whole & ~held) or last for target, held in message.lacking.items()}
         packets: list[PieceToSend] = []
-        if len(wanted) <= _FEW:
+        if len(wanted) <= FEW:
             for target, bits in wanted.items():
                 packets += self._packets(message, bits, target, (), (target,))
         else:
@@ -266,7 +236,7 @@ class Sender:
             for bits in wanted.values():
                 union |= bits
             all_lack = len(wanted) == len(self._everyone)
-            named = () if all_lack or (message.everyone and len(wanted) > _NAMED) else tuple(wanted)
+            named = () if all_lack or (message.everyone and len(wanted) > MOST_NAMED) else tuple(wanted)
             packets += self._packets(message, union, BROADCAST, named, tuple(wanted))
         if message.rounds:
             self.repeated += len(packets)
@@ -275,7 +245,7 @@ class Sender:
         message.rounds += 1
         message.sent_ns = now_ns
         message.again_ns = now_ns + self._patience_ns(message)
-        self._window.sent(message.pieces, rounds=message.rounds)
+        self._window.sent(message.fragments.pieces, rounds=message.rounds)
         heapq.heappush(self._timers, (message.again_ns, message.number))
         return packets
 
@@ -298,14 +268,14 @@ class Sender:
         """The pieces of `bits`, in packets to the destination; `readers` are the targets that lack any of them."""
         previous = self._previous(message, readers)
         packets: list[PieceToSend] = []
-        for piece in range(message.pieces):
+        for piece in range(message.fragments.pieces):
             if not bits >> piece & 1:
                 continue
             head = Head(
                 message.born_us, message.number, previous, len(message.data), message.lifetime_ms, message.port,
-                message.flow.number, message.stride, piece, message.pieces, 1,
+                message.flow.number, message.fragments.stride, piece, message.fragments.pieces, 1,
             )  # fmt: skip
-            part = message.data[piece * message.stride : (piece + 1) * message.stride]
+            part = message.fragments.part(message.data, piece)
             inner = application_message.encode_piece(head, part, node=self._node, targets=named)
             packets.append(PieceToSend(message.number, inner, destination, message.priority, first=False))
         return packets

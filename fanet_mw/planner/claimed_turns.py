@@ -20,8 +20,8 @@ from fanet_mw.bounds import TurnServer
 from fanet_mw.graph.connected_dominating_set import dominates
 from fanet_mw.graph.topology import Adjacency, two_hop
 from fanet_mw.planner.demand import TrafficClass
-from fanet_mw.routing.clustered.claimed.claiming import IDLE, LISTEN_HELLOS, geometry, longest_superframe
 from fanet_mw.routing.clustered.claimed.own_turns import Share
+from fanet_mw.routing.clustered.claimed.slot_acquisition import IDLE, LISTEN_HELLOS, geometry, longest_superframe
 from fanet_mw.routing.clustered.claimed.slot_claims import SlotClaims
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.scenario import Scenario

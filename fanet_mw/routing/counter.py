@@ -11,8 +11,8 @@ from typing import ClassVar
 
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet, Relay
-from fanet_mw.routing.assessment import Assessment
 from fanet_mw.routing.flooding import FloodingProtocol
+from fanet_mw.routing.random_assessment_delay import Assessment
 from fanet_mw.units import MS
 
 

@@ -17,7 +17,7 @@ from fanet_mw import wire
 from fanet_mw.bus.messages import Reception
 from fanet_mw.graph.topology import components, two_hop
 from fanet_mw.routing.clustered.claimed.claimed_access import ClaimedAccess
-from fanet_mw.routing.clustered.claimed.claiming import Claiming
+from fanet_mw.routing.clustered.claimed.slot_acquisition import Claiming
 from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.scenario import config
 from fanet_mw.units import MS, NodeId, S

@@ -158,7 +158,7 @@ def test_an_unconfirmed_message_needs_all_its_pieces_and_is_handed_over_once(siz
 
 def test_what_a_sender_cannot_get_rid_of_fills_it_up_to_a_bound() -> None:
     sender = Sender(NodeId(1), NODES, room=lambda _: 1000, wait_ns=S)
-    data = bytes(sender.most_bytes(port=5, targets=(NodeId(2),), confirm=False, priority=3))
+    data = bytes(sender.fragmentation.most_bytes(port=5, targets=(NodeId(2),), confirm=False, priority=3))
     count = 0
     while not sender.full:
         sender.confirmed(data, port=5, targets=(NodeId(2),), priority=3, born_us=0, lifetime_ms=5000)

@@ -16,8 +16,8 @@ from fanet_mw.node.neighbors import Neighbors, neighbor_lifetime_ns
 from fanet_mw.node.queue import TxQueue, sooner_us
 from fanet_mw.routing.clustered.claimed.claimed_access import ClaimedAccess
 from fanet_mw.routing.clustered.claimed.claimed_release import ClaimedRelease
-from fanet_mw.routing.clustered.claimed.claiming import Claiming, geometry
 from fanet_mw.routing.clustered.claimed.own_turns import OwnTurns
+from fanet_mw.routing.clustered.claimed.slot_acquisition import Claiming, geometry
 from fanet_mw.routing.clustered.clustered import Clustered, Parts
 from fanet_mw.routing.clustered.contract import HearsCopies, ScheduledAccess
 from fanet_mw.routing.clustered.forwarding.floods import Floods

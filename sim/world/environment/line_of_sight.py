@@ -9,8 +9,8 @@ from array import array
 
 import numpy as np
 
+from emulator.channel.pairs_in_reach import neighbors
 from emulator.channel.propagation import reach_m
-from emulator.channel.spatial import neighbors
 from fanet_mw.bus.messages import Obstructions
 from fanet_mw.scenario import Scenario
 from sim.world.engines.contract import Engine, Rows

@@ -9,7 +9,7 @@ from agents.applications.telemetry_streams import TelemetryStreams
 from fanet_mw import wire
 from fanet_mw.errors import ConfigError
 from fanet_mw.mavlink import Encoder
-from fanet_mw.routing.clustered.claimed.claiming import geometry
+from fanet_mw.routing.clustered.claimed.slot_acquisition import geometry
 from fanet_mw.scenario import Scenario, config, grid_columns
 from fanet_mw.scenario.cross_checks import MESSAGE_BYTES
 from fanet_mw.units import Enu, NodeId

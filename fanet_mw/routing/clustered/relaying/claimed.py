@@ -9,7 +9,7 @@ from fanet_mw.node.contract import Port
 from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.clustered.claimed.claimed_access import ClaimedAccess
-from fanet_mw.routing.clustered.claimed.claiming import Claiming
+from fanet_mw.routing.clustered.claimed.slot_acquisition import Claiming
 from fanet_mw.routing.clustered.contract import Relaying
 from fanet_mw.wire import Kind
 

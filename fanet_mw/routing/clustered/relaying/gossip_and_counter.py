@@ -15,7 +15,7 @@ from typing import Protocol
 
 from fanet_mw.node.neighbors import Neighbors
 from fanet_mw.node.packet import Packet
-from fanet_mw.routing.assessment import Assessment
+from fanet_mw.routing.random_assessment_delay import Assessment
 from fanet_mw.scenario import Clusters
 from fanet_mw.units import MS
 

@@ -1,7 +1,8 @@
 """Timetables of collision-free floods: computed from positions or from measured links, followed by every node.
 
 computed     `timetabling` (when), `turn_size` and `turn_allocation` (how many turns), `list_scheduling` and
-             `redundant_scheduling` (who sends in which), `flood_geometry`; the result is a `timetable`
+             `redundant_scheduling` (who sends in which), `interference` (who disturbs whom), `flood_geometry`;
+             the result is a `timetable`
 from         `heard_load` (what nodes send), `link_quality` and `link_state` (measured links)
 followed     `node_timetable`, `timetables_in_force`; `turn_access` sends in the turns: own packets by `root_release`,
              whose classes have `reserved_room`, frames to neighbors alone by `call_release`

@@ -17,7 +17,7 @@ from typing import Final, NamedTuple
 
 from fanet_mw.rng import stream
 from fanet_mw.routing.clustered.timetable.flood_geometry import rows
-from fanet_mw.routing.clustered.timetable.redundant_scheduling import Network
+from fanet_mw.routing.clustered.timetable.interference import InterferenceByPower
 from fanet_mw.units import NodeId
 from fanet_mw.wire.links import NEPERS
 
@@ -48,7 +48,9 @@ class Odds(NamedTuple):
         return next((count for count, share in enumerate(self.missed[root]) if share <= missed), None)
 
 
-def odds(network: Network, floods: Sequence[tuple[NodeId, Sequence[Sent]]], *, turns: int, hop_turns: int) -> Odds:
+def odds(
+    network: InterferenceByPower, floods: Sequence[tuple[NodeId, Sequence[Sent]]], *, turns: int, hop_turns: int
+) -> Odds:
     """The odds of the floods of a timetable. `floods` has the root of each flood, and its frames in order."""
     together: dict[int, int] = {}
     for _, sent in floods:
@@ -75,7 +77,7 @@ def odds(network: Network, floods: Sequence[tuple[NodeId, Sequence[Sent]]], *, t
 
 
 def _flood(
-    network: Network,
+    network: InterferenceByPower,
     root: int,
     sent: Sequence[Sent],
     together: Mapping[int, int],
@@ -106,7 +108,7 @@ def _flood(
     return [1 - trials.bit_count() / _TRIALS for trials in has]
 
 
-def _answered(network: Network, row: int) -> float:
+def _answered(network: InterferenceByPower, row: int) -> float:
     """The probability that a node's best neighbor receives its hello and the node receives the answer."""
     grades = [network.dose[row, other] for other in rows(network.hears[row])]
     best = 1 - exp(-max(grades, default=0) / NEPERS)

@@ -2,7 +2,7 @@
 
     for each turn: list the transmissions that all floods under way could make now, each with the nodes that lack the
                    packet around its sender; take them in the order of their worth, the oldest flood first among
-                   equals, as long as none disturbs one that is already taken
+                   equals, as long as none disturbs one that is already taken (`interference.py`)
 
 The beginnings of floods are spread evenly over the superframe, or over a part of it when turns are scarce. Each node
 sends a packet at most once, to all its neighbors that lack it. A neighbor that only this node can serve counts half
@@ -14,7 +14,6 @@ The computation uses integers and one named random stream, so all machines get t
 per packet and try for 45 nodes.
 """
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
@@ -24,13 +23,11 @@ from fanet_mw.routing.clustered.timetable.flood_geometry import (
     RECEIVER,
     WINDOW,
     Geometry,
-    NodeRows,
     age,
-    reach,
     rows,
     turn_by_turn,
 )
-from fanet_mw.units import Enu, NodeId
+from fanet_mw.routing.clustered.timetable.interference import InterferenceByDistance
 
 _NOISE: Final = 50
 _TRIAL: Final = 64
@@ -48,52 +45,10 @@ class Effort(NamedTuple):
     """The number of ways in which each turn is filled, of which the best is taken."""
 
 
-class FloodNetwork:
-    """Which nodes receive, and which disturb, each other: bit sets over the nodes' row numbers."""
-
-    def __init__(self, positions: Sequence[tuple[NodeId, Enu]], geometry: Geometry) -> None:
-        self.nodes = NodeRows(node for node, _ in positions)
-        self._parts: dict[int, tuple[int, int]] = {}
-        at = [place for _, place in positions]
-        self.hears = [_within(at, row, geometry.link_m) for row in range(len(at))]
-        reach = max(geometry.interference_m, geometry.link_m)
-        self.disturbs = self.hears if reach == geometry.link_m else [_within(at, row, reach) for row in range(len(at))]
-
-    def part(self, root: int) -> tuple[int, int]:
-        """The rows that a flood from this row can reach, itself included, and the number of hops to the farthest."""
-        if root not in self._parts:
-            self._parts[root] = reach(self.hears, root)
-        return self._parts[root]
-
-    def way(self, node: NodeId, head: NodeId) -> list[int]:
-        """The rows of a shortest way to the head, both ends included, the lowest rows first among equals. It is empty
-        for a head, and for a node without a head.
-        """
-        start, end = self.nodes.row[node], self.nodes.row.get(head)
-        if end is None or start == end:
-            return []
-        before = {start: start}
-        frontier = [start]
-        while frontier and end not in before:
-            following = []
-            for row in frontier:
-                for near in rows(self.hears[row]):
-                    if near not in before:
-                        before[near] = row
-                        following.append(near)
-            frontier = following
-        if end not in before:
-            return []
-        found = [end]
-        while found[-1] != start:
-            found.append(before[found[-1]])
-        return found[::-1]
-
-
 class Flood:
     """The flood of one packet, as far as it is scheduled."""
 
-    def __init__(self, swarm: FloodNetwork, root: int, way: list[int]) -> None:
+    def __init__(self, swarm: InterferenceByDistance, root: int, way: list[int]) -> None:
         self.root = root
         self.goal, self.hops = swarm.part(root)
         self.sent: list[tuple[int, int]] = []
@@ -161,7 +116,7 @@ _Choice = tuple[int, list[_Offer], _FilledTurn]
 class Packing:
     """Assigns the turns of one superframe to the transmissions of floods."""
 
-    def __init__(self, swarm: FloodNetwork, geometry: Geometry, effort: Effort) -> None:
+    def __init__(self, swarm: InterferenceByDistance, geometry: Geometry, effort: Effort) -> None:
         self._disturbs = swarm.disturbs
         self._turns = geometry.turns
         self._hop_turns = geometry.hop_turns
@@ -268,12 +223,3 @@ class Packing:
 def _will_be_late(left: int, turns: int, *, done: int, within: int) -> bool:
     """True if floods end too slowly: `done` of them ended within `within` turns in which the window was full."""
     return within >= _TRIAL and left * within > _HOPE * done * turns
-
-
-def _within(at: Sequence[Enu], row: int, reach_m: float) -> int:
-    here = at[row]
-    return sum(
-        1 << other
-        for other, there in enumerate(at)
-        if other != row and math.dist((here.east, here.north, here.up), (there.east, there.north, there.up)) <= reach_m
-    )

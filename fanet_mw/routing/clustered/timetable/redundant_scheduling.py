@@ -9,7 +9,7 @@ arrived.
 Turns are filled one after the other as in `list_scheduling.py`, with one difference: if another sender in the turn
 disturbs one of a frame's receivers, that receiver is left out and served later, provided that half of the worth of the
 frame remains. All neighbors count for a call. Whether a node disturbs a link depends on the strength of that link
-(`Network`).
+(`InterferenceByPower`).
 
 In flight, `turn_access.py` repeats a node's own packets, and `relaying/scheduled.py` its relays. Not modeled: that a
 relay may lack the packet although it has had enough copies (`fanet_mw/planner/flood_loss.py` includes that).
@@ -17,100 +17,20 @@ relay may lack the packet although it has had enough copies (`fanet_mw/planner/f
 
 import math
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from fanet_mw.routing.clustered.timetable.flood_geometry import (
     ONLY,
     RECEIVER,
     WINDOW,
     Geometry,
-    NodeRows,
     age,
     reach,
     rows,
     turn_by_turn,
 )
-from fanet_mw.units import Enu, NodeId
-from fanet_mw.wire.links import NEPERS, Link
-
-_CHANCES: Final = (0.5, 0.25, 0.1)
-"""The least share of frames that must arrive over a link for it to be used. The lower values are tried only if nodes
-would be cut off otherwise."""
-_SINR_DB: Final = 11
-"""A frame survives another one in the same turn if it is stronger by this much: 8 dB at 11 Mb/s,
-and a margin of 3 dB."""
-_DECADE_DB: Final = 30
-"""The decrease of power over a decade of distance."""
-
-
-class Network:
-    """The quality of each link, and the nodes that disturb it, as bit sets over the nodes' row numbers."""
-
-    def __init__(
-        self, positions: Sequence[tuple[NodeId, Enu]], geometry: Geometry, measured: Sequence[Link], *, margin_db: float
-    ) -> None:
-        """`geometry.interference_m` holds for pairs that do not receive each other at all, and for a link that is
-        `margin_db` stronger than the weakest. A greater margin keeps senders of the same turn farther apart.
-        """
-        self.nodes = NodeRows(node for node, _ in positions)
-        row = self.nodes.row
-        known = [link for link in measured if link.a in row and link.b in row]
-        self._dbm = {
-            pair: link.power_dbm for link in known for pair in ((row[link.a], row[link.b]), (row[link.b], row[link.a]))
-        }
-        self.senses = self._links(known, least=0.0)
-        self.hears, chance = self._connected(known)
-        self.dose: dict[tuple[int, int], int] = {}
-        """The grade of each link, by (sender, receiver)."""
-        for link in known:
-            if link.chance >= chance:
-                a, b = row[link.a], row[link.b]
-                self.dose[a, b] = self.dose[b, a] = max(1, link.grade)
-        self._disturbing = self._who_disturbs([place for _, place in positions], geometry.interference_m, margin_db)
-
-    def _links(self, known: Sequence[Link], *, least: float) -> list[int]:
-        row, found = self.nodes.row, [0] * len(self.nodes.ids)
-        for link in known:
-            if link.chance >= least:
-                a, b = row[link.a], row[link.b]
-                found[a] |= 1 << b
-                found[b] |= 1 << a
-        return found
-
-    def _connected(self, known: Sequence[Link]) -> tuple[list[int], float]:
-        """The best links that keep the swarm as connected as it is, and the least share of frames that arrives over
-        them.
-        """
-        choices = [(self._links(known, least=least), least) for least in _CHANCES]
-        whole = [reach(choices[-1][0], row)[0] for row in range(len(self.nodes.ids))]
-        for hears, least in choices:
-            if [reach(hears, row)[0] for row in range(len(self.nodes.ids))] == whole:
-                return hears, least
-        raise AssertionError("the last choice is the whole")
-
-    def _who_disturbs(self, at: Sequence[Enu], interference_m: float, margin_db: float) -> dict[tuple[int, int], int]:
-        """The rows whose frames disturb each link."""
-        weakest = min((dbm for dbm in self._dbm.values()), default=0)
-        apart = [[here.minus(there).norm() for there in at] for here in at]
-        found = {}
-        for sender, receiver in self.dose:
-            dbm = self._dbm[sender, receiver]
-            near_m = interference_m * math.pow(10.0, (weakest + margin_db - dbm) / _DECADE_DB)
-            found[sender, receiver] = sum(
-                1 << other
-                for other in range(len(at))
-                if other not in (sender, receiver)
-                and self._spoils(other, receiver, dbm, apart[other][receiver], near_m)
-            )
-        return found
-
-    def _spoils(self, other: int, receiver: int, dbm: int, apart_m: float, near_m: float) -> bool:
-        heard_dbm = self._dbm.get((other, receiver))
-        return apart_m <= near_m if heard_dbm is None else heard_dbm > dbm - _SINR_DB
-
-    def disturbing(self, sender: int, receiver: int) -> int:
-        """The rows whose frames disturb this link."""
-        return self._disturbing[sender, receiver]
+from fanet_mw.routing.clustered.timetable.interference import InterferenceByPower
+from fanet_mw.wire.links import NEPERS
 
 
 class _Offer(NamedTuple):
@@ -127,7 +47,7 @@ class _Offer(NamedTuple):
 class Wave:
     """The flood of one packet over lossy links; a call is a wave that ends with its first frame."""
 
-    def __init__(self, network: Network, root: int, *, enough: int, call: bool = False) -> None:
+    def __init__(self, network: InterferenceByPower, root: int, *, enough: int, call: bool = False) -> None:
         self.root = root
         self.call = call
         self.sent: list[tuple[int, int]] = []
@@ -191,7 +111,7 @@ class _RepeatingTurn(NamedTuple):
 class RedundantPacking:
     """Assigns the turns of one superframe to the transmissions of waves."""
 
-    def __init__(self, network: Network, geometry: Geometry, *, pace: float = 1.0) -> None:
+    def __init__(self, network: InterferenceByPower, geometry: Geometry, *, pace: float = 1.0) -> None:
         """`pace`: the share of the superframe within which waves begin."""
         self._network = network
         self._turns = geometry.turns

@@ -23,8 +23,9 @@ from typing import NamedTuple
 
 from fanet_mw.routing.clustered.timetable.delivery_odds import Odds, odds
 from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry, NodeRows, rows
-from fanet_mw.routing.clustered.timetable.list_scheduling import Effort, Flood, FloodNetwork, Packing
-from fanet_mw.routing.clustered.timetable.redundant_scheduling import Network, RedundantPacking, Wave, enough_for
+from fanet_mw.routing.clustered.timetable.interference import InterferenceByDistance, InterferenceByPower
+from fanet_mw.routing.clustered.timetable.list_scheduling import Effort, Flood, Packing
+from fanet_mw.routing.clustered.timetable.redundant_scheduling import RedundantPacking, Wave, enough_for
 from fanet_mw.units import Enu, NodeId
 from fanet_mw.wire.links import Link
 
@@ -88,7 +89,7 @@ def timetable(
     whole, geometry = geometry.turns, geometry._replace(turns=geometry.turns // blocks)
     if not geometry.turns:
         return None
-    swarm = FloodNetwork(positions, geometry)
+    swarm = InterferenceByDistance(positions, geometry)
     head_of = dict(heads)
     ordered = _in_order(roots, dict(positions))
     floods = [Flood(swarm, swarm.nodes.row[root], swarm.way(root, head_of.get(root, root))) for root, _ in ordered]
@@ -126,7 +127,7 @@ def redundant_timetable(
     if not geometry.turns:
         return None
     at = dict(positions)
-    network = Network(positions, geometry, measured, margin_db=margin_db)
+    network = InterferenceByPower(positions, geometry, measured, margin_db=margin_db)
     enough = enough_for(epsilon)
     ordered = _in_order(roots, at)
     called = _in_order([node for node, _ in positions for _ in range(calls)], at)

@@ -8,8 +8,8 @@ from fanet_mw.bus.messages import Reception
 from fanet_mw.node.node import Node
 from fanet_mw.routing import make_protocol
 from fanet_mw.routing.clustered.claimed.claimed_access import ClaimedAccess
-from fanet_mw.routing.clustered.claimed.claiming import Claiming
 from fanet_mw.routing.clustered.claimed.own_turns import Share, draws
+from fanet_mw.routing.clustered.claimed.slot_acquisition import Claiming
 from fanet_mw.routing.clustered.claimed.slot_claims import SlotClaim, SlotClaims, SlotHello
 from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S

@@ -10,9 +10,10 @@ from kit import examples
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.routing.clustered.timetable.delivery_odds import odds
 from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
+from fanet_mw.routing.clustered.timetable.interference import InterferenceByPower
 from fanet_mw.routing.clustered.timetable.link_quality import FAST, FIRST, WINDOW, LinkQuality
 from fanet_mw.routing.clustered.timetable.link_state import LinkState, adjacency, worth_a_change
-from fanet_mw.routing.clustered.timetable.redundant_scheduling import Network, Wave, enough_for
+from fanet_mw.routing.clustered.timetable.redundant_scheduling import Wave, enough_for
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, redundant_timetable
 from fanet_mw.units import Enu, NodeId, S
 from fanet_mw.wire import HEADER_BYTES
@@ -187,7 +188,7 @@ def test_every_node_gets_its_dose_from_holders_undisturbed(links: tuple[Link, ..
     table = planned(links)
     if table is None:
         return
-    network = Network(GRID, GEOMETRY, links, margin_db=3)
+    network = InterferenceByPower(GRID, GEOMETRY, links, margin_db=3)
     sending: dict[int, set[int]] = {}
     for turn in table.turns:
         sending.setdefault(turn.offset % GEOMETRY.turns, set()).add(network.nodes.row[turn.node])
@@ -251,7 +252,7 @@ def test_any_measured_links_give_a_timetable_or_none(drawn: tuple[int, tuple[Lin
 def test_in_a_call_all_neighbors_hear_the_caller(links: tuple[Link, ...]) -> None:
     table = planned(links, epsilon=0.3)
     assert table is not None
-    network = Network(GRID, GEOMETRY, links, margin_db=3)
+    network = InterferenceByPower(GRID, GEOMETRY, links, margin_db=3)
     sending: dict[int, int] = {}
     frames = [(turn.offset, turn.node) for turn in table.turns]
     frames += [(offset, node) for node, offsets in table.calls.items() for offset in offsets]
@@ -271,7 +272,7 @@ LINE = tuple((NodeId(node), Enu(200.0 * node, 0.0, 0.0)) for node in range(1, 5)
 
 def test_the_odds_of_a_line_are_those_of_its_hops_and_each_round_of_repair_mends_its_part() -> None:
     links = tuple(Link(NodeId(a), NodeId(a + 1), grade_of(0.8), -79) for a in range(1, 4))
-    network = Network(LINE, Geometry(250, 500, 50, 1), links, margin_db=3)
+    network = InterferenceByPower(LINE, Geometry(250, 500, 50, 1), links, margin_db=3)
     once = [(0, 0), (1, 1), (2, 2)]
     twice = [(0, 0), (1, 0), (2, 1), (3, 1), (4, 2), (5, 2)]
     first, second = (
@@ -285,7 +286,7 @@ def test_the_odds_of_a_line_are_those_of_its_hops_and_each_round_of_repair_mends
 
 def test_who_sends_at_the_same_time_is_not_heard_and_who_disturbs_spoils_the_frame() -> None:
     links = tuple(Link(NodeId(a), NodeId(a + 1), grade_of(0.995), -79) for a in range(1, 4))
-    network = Network(LINE, Geometry(250, 500, 50, 1), links, margin_db=3)
+    network = InterferenceByPower(LINE, Geometry(250, 500, 50, 1), links, margin_db=3)
     flood = (NodeId(1), [(0, 0), (1, 1), (2, 2)])
     clear = odds(network, [flood], turns=50, hop_turns=1).mean
     spoiled = odds(network, [flood, (NodeId(3), [(0, 2)])], turns=50, hop_turns=1).missed[NodeId(1)][0]
@@ -309,7 +310,7 @@ def test_a_wave_repeats_its_frames_over_lossy_links_and_not_over_good_ones() -> 
 
 def test_a_call_is_over_after_one_frame() -> None:
     links = (Link(NodeId(1), NodeId(2), grade_of(0.7), -79),)
-    network = Network(LINE[:2], GEOMETRY, links, margin_db=3)
+    network = InterferenceByPower(LINE[:2], GEOMETRY, links, margin_db=3)
     wave = Wave(network, 0, enough=500, call=True)
     wave.send(3, 0, [1], hop_turns=1)
     assert wave.done

@@ -1,0 +1,146 @@
+"""Interference: whose transmissions disturb each other, so that they must not share a turn of a timetable.
+
+    InterferenceByDistance    for links without losses (`list_scheduling.py`): by the distance alone
+    InterferenceByPower       for lossy links (`redundant_scheduling.py`): by the powers that nodes measure
+
+A sender disturbs a receiver of another frame only if the frame is meant for that receiver. Sets of nodes are
+represented as the bits of integers, by the nodes' row numbers (`flood_geometry.py`).
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry, NodeRows, reach, rows
+from fanet_mw.units import Enu, NodeId
+from fanet_mw.wire.links import Link
+
+_CHANCES: Final = (0.5, 0.25, 0.1)
+"""The least share of frames that must arrive over a link for it to be used. The lower values are tried only if nodes
+would be cut off otherwise."""
+_SINR_DB: Final = 11
+"""A frame survives another one in the same turn if it is stronger by this much: 8 dB at 11 Mb/s,
+and a margin of 3 dB."""
+_DECADE_DB: Final = 30
+"""The decrease of power over a decade of distance."""
+
+
+class InterferenceByDistance:
+    """Links without losses: nodes receive each other up to `link_m`, and disturb each other up to `interference_m`."""
+
+    def __init__(self, positions: Sequence[tuple[NodeId, Enu]], geometry: Geometry) -> None:
+        self.nodes = NodeRows(node for node, _ in positions)
+        self._parts: dict[int, tuple[int, int]] = {}
+        at = [place for _, place in positions]
+        self.hears = [_within(at, row, geometry.link_m) for row in range(len(at))]
+        reach = max(geometry.interference_m, geometry.link_m)
+        self.disturbs = self.hears if reach == geometry.link_m else [_within(at, row, reach) for row in range(len(at))]
+
+    def part(self, root: int) -> tuple[int, int]:
+        """The rows that a flood from this row can reach, itself included, and the number of hops to the farthest."""
+        if root not in self._parts:
+            self._parts[root] = reach(self.hears, root)
+        return self._parts[root]
+
+    def way(self, node: NodeId, head: NodeId) -> list[int]:
+        """The rows of a shortest way to the head, both ends included, the lowest rows first among equals. It is empty
+        for a head, and for a node without a head.
+        """
+        start, end = self.nodes.row[node], self.nodes.row.get(head)
+        if end is None or start == end:
+            return []
+        before = {start: start}
+        frontier = [start]
+        while frontier and end not in before:
+            following = []
+            for row in frontier:
+                for near in rows(self.hears[row]):
+                    if near not in before:
+                        before[near] = row
+                        following.append(near)
+            frontier = following
+        if end not in before:
+            return []
+        found = [end]
+        while found[-1] != start:
+            found.append(before[found[-1]])
+        return found[::-1]
+
+
+class InterferenceByPower:
+    """Lossy links as nodes have measured them: a frame is disturbed by what is not weaker enough at its receiver."""
+
+    def __init__(
+        self, positions: Sequence[tuple[NodeId, Enu]], geometry: Geometry, measured: Sequence[Link], *, margin_db: float
+    ) -> None:
+        """`geometry.interference_m` holds for pairs that do not receive each other at all, and for a link that is
+        `margin_db` stronger than the weakest. A greater margin keeps senders of the same turn farther apart.
+        """
+        self.nodes = NodeRows(node for node, _ in positions)
+        row = self.nodes.row
+        known = [link for link in measured if link.a in row and link.b in row]
+        self._dbm = {
+            pair: link.power_dbm for link in known for pair in ((row[link.a], row[link.b]), (row[link.b], row[link.a]))
+        }
+        self.senses = self._links(known, least=0.0)
+        self.hears, chance = self._connected(known)
+        self.dose: dict[tuple[int, int], int] = {}
+        """The grade of each link, by (sender, receiver)."""
+        for link in known:
+            if link.chance >= chance:
+                a, b = row[link.a], row[link.b]
+                self.dose[a, b] = self.dose[b, a] = max(1, link.grade)
+        self._disturbing = self._who_disturbs([place for _, place in positions], geometry.interference_m, margin_db)
+
+    def _links(self, known: Sequence[Link], *, least: float) -> list[int]:
+        row, found = self.nodes.row, [0] * len(self.nodes.ids)
+        for link in known:
+            if link.chance >= least:
+                a, b = row[link.a], row[link.b]
+                found[a] |= 1 << b
+                found[b] |= 1 << a
+        return found
+
+    def _connected(self, known: Sequence[Link]) -> tuple[list[int], float]:
+        """The best links that keep the swarm as connected as it is, and the least share of frames that arrives over
+        them.
+        """
+        choices = [(self._links(known, least=least), least) for least in _CHANCES]
+        whole = [reach(choices[-1][0], row)[0] for row in range(len(self.nodes.ids))]
+        for hears, least in choices:
+            if [reach(hears, row)[0] for row in range(len(self.nodes.ids))] == whole:
+                return hears, least
+        raise AssertionError("the last choice is the whole")
+
+    def _who_disturbs(self, at: Sequence[Enu], interference_m: float, margin_db: float) -> dict[tuple[int, int], int]:
+        """The rows whose frames disturb each link."""
+        weakest = min((dbm for dbm in self._dbm.values()), default=0)
+        apart = [[here.minus(there).norm() for there in at] for here in at]
+        found = {}
+        for sender, receiver in self.dose:
+            dbm = self._dbm[sender, receiver]
+            near_m = interference_m * math.pow(10.0, (weakest + margin_db - dbm) / _DECADE_DB)
+            found[sender, receiver] = sum(
+                1 << other
+                for other in range(len(at))
+                if other not in (sender, receiver)
+                and self._spoils(other, receiver, dbm, apart[other][receiver], near_m)
+            )
+        return found
+
+    def _spoils(self, other: int, receiver: int, dbm: int, apart_m: float, near_m: float) -> bool:
+        heard_dbm = self._dbm.get((other, receiver))
+        return apart_m <= near_m if heard_dbm is None else heard_dbm > dbm - _SINR_DB
+
+    def disturbing(self, sender: int, receiver: int) -> int:
+        """The rows whose frames disturb this link."""
+        return self._disturbing[sender, receiver]
+
+
+def _within(at: Sequence[Enu], row: int, reach_m: float) -> int:
+    here = at[row]
+    return sum(
+        1 << other
+        for other, there in enumerate(at)
+        if other != row and math.dist((here.east, here.north, here.up), (there.east, there.north, there.up)) <= reach_m
+    )

@@ -9,7 +9,7 @@ headings refer to north and east at the origin: 0.1 degrees off at 10 km).
 """
 
 import math
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, Final, NamedTuple
 
 from pymavlink.dialects.v20 import common
@@ -182,16 +182,29 @@ class Encoder:
     """Makes the native messages of one node, as MAVLink 2 frames with a sequence of their own."""
 
     def __init__(self, node: NodeId, *, component: int = COMPONENT, origin: Geodetic = ORIGIN) -> None:
-        self._mav = common.MAVLink(None, srcSystem=system_id(node), srcComponent=component)
+        self._sender = system_id(node), component
         self._origin = origin
+
+    @cached_property
+    def _mav(self) -> Any:  # noqa: ANN401  (pymavlink has no types)
+        """The state of the sender; it takes a while to make, and many encoders are never used."""
+        system, component = self._sender
+        return common.MAVLink(None, srcSystem=system, srcComponent=component)
+
+    @cached_property
+    def _heartbeat(self) -> bytes:
         mode = common.MAV_MODE_FLAG_SAFETY_ARMED | common.MAV_MODE_FLAG_AUTO_ENABLED
         heartbeat = common.MAVLink_heartbeat_message(
             common.MAV_TYPE_QUADROTOR, common.MAV_AUTOPILOT_GENERIC, mode, 0, common.MAV_STATE_ACTIVE, 3
         )
+        return bytes(heartbeat.pack(self._mav))
+
+    @cached_property
+    def _in_the_air(self) -> bytes:
         in_the_air = common.MAVLink_extended_sys_state_message(
             common.MAV_VTOL_STATE_UNDEFINED, common.MAV_LANDED_STATE_IN_AIR
         )
-        self._heartbeat, self._in_the_air = bytes(heartbeat.pack(self._mav)), bytes(in_the_air.pack(self._mav))
+        return bytes(in_the_air.pack(self._mav))
 
     def _pack(self, message: Any) -> bytes:  # noqa: ANN401  (pymavlink has no types)
         data = bytes(message.pack(self._mav))

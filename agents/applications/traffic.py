@@ -6,8 +6,9 @@ microseconds, because the header states no more.
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from random import Random
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from fanet_mw import wire
 from fanet_mw.application import Application, AppPort, Fate, Status
@@ -22,49 +23,79 @@ _ENDS: Final = frozenset((Fate.SENT, Fate.TURNED_AWAY, Fate.REFUSED, Fate.EXPIRE
 """The fates after which a saturated source offers its next packet."""
 
 
+class _Class(NamedTuple):
+    """One class of traffic."""
+
+    name: str
+    traffic: Traffic
+    first: bool
+    """True for the first class of the scenario."""
+
+    @classmethod
+    def of(cls, scenario: Scenario, name: str | None) -> "_Class":
+        """The class of this name; None stands for the first one."""
+        classes = scenario.traffic_classes
+        first = next(iter(classes))
+        chosen = first if name is None else name
+        return cls(chosen, classes[chosen], chosen == first)
+
+    def stream_name(self, use: str) -> str:
+        """The name of a random stream. The first class always has the name that a single class has."""
+        return use if self.first else f"{use} {self.name}"
+
+
 def sources_of(scenario: Scenario, name: str | None = None) -> Sequence[int]:
     """The ids of the nodes that are sources of a traffic class, ascending; by default of the first class."""
-    name, traffic = _class_of(scenario, name)
-    eligible = [node for node in scenario.node_ids if node != traffic.destination]
+    return _sources(scenario, _Class.of(scenario, name))
+
+
+def _sources(scenario: Scenario, chosen: _Class) -> Sequence[int]:
+    traffic = chosen.traffic
     if traffic.arrivals == "none":
-        return []
-    if traffic.sources == "all":
-        return eligible
-    if isinstance(traffic.sources, tuple):
-        return sorted(set(traffic.sources))
-    members = [node for node in eligible if node != scenario.leader]
-    if traffic.sources >= len(eligible):
-        return eligible
-    if traffic.sources > len(members):
+        return ()
+    return _drawn(
+        traffic.sources, traffic.destination, count=scenario.nodes.count, leader=scenario.leader, seed=scenario.seed,
+        stream_name=chosen.stream_name("sources"),
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=64)
+def _drawn(
+    sources: str | int | tuple[int, ...],
+    destination: str | int,
+    *,
+    count: int,
+    leader: NodeId,
+    seed: int,
+    stream_name: str,
+) -> tuple[int, ...]:
+    """The sources of a class among `count` nodes; each node of a large swarm asks for the same ones."""
+    if isinstance(sources, tuple):
+        return tuple(sorted(set(sources)))
+    eligible = [node for node in range(1, count + 1) if node != destination]
+    if isinstance(sources, str) or sources >= len(eligible):
+        return tuple(eligible)
+    members = [node for node in eligible if node != leader]
+    if sources > len(members):
         members = eligible
-    return sorted(stream(scenario.seed, _use(scenario, name, "sources")).sample(members, traffic.sources))
+    return tuple(sorted(stream(seed, stream_name).sample(members, sources)))
 
 
 def targets_of(scenario: Scenario, source: int, name: str | None = None) -> Sequence[int]:
     """The ids of the nodes that are targets of the packets of `source`, of one class or of the first."""
-    name, traffic = _class_of(scenario, name)
+    traffic = _Class.of(scenario, name).traffic
     if traffic.destination != "all":
         return [traffic.destination]
     wanted = traffic.targets or scenario.node_ids
     return [node for node in wanted if node != source]
 
 
-def _class_of(scenario: Scenario, name: str | None) -> tuple[str, Traffic]:
-    classes = scenario.traffic_classes
-    known = next(iter(classes)) if name is None else name
-    return known, classes[known]
-
-
-def _use(scenario: Scenario, name: str, use: str) -> str:
-    """The name of a random stream. The first class always has the name that a single class has."""
-    return use if name == next(iter(scenario.traffic_classes)) else f"{use} {name}"
-
-
 class TrafficGenerator:
     """The instants and lengths of the packets of one class at one source."""
 
     def __init__(self, scenario: Scenario, node: NodeId, name: str | None = None) -> None:
-        name, traffic = _class_of(scenario, name)
+        chosen = _Class.of(scenario, name)
+        traffic = chosen.traffic
         self._kind = traffic.arrivals
         self.saturated = self._kind == "saturated"
         self._lead_ms = math.ceil(scenario.radio.lead_ms)
@@ -72,7 +103,7 @@ class TrafficGenerator:
         start_ns, self._end_ns = scenario.traffic_window_ns
         if traffic.start_s is not None:
             start_ns = seconds_to_ns(traffic.start_s)
-        self._random: Random = stream(scenario.seed, _use(scenario, name, "traffic"), node)
+        self._random: Random = stream(scenario.seed, chosen.stream_name("traffic"), node)
         self._on_ns, self._off_ns = seconds_to_ns(traffic.on_s), seconds_to_ns(traffic.off_s)
         self._active_until_ns = 0
         """The end of the present active period, for arrivals `on_off`."""
@@ -82,7 +113,7 @@ class TrafficGenerator:
         self._next_ns: int | None = None
         self.owed = 1
         """The number of packets that are generated at `next_ns`."""
-        if node in sources_of(scenario, name):
+        if node in _sources(scenario, chosen):
             self._next_ns = start_ns + self._first_gap_ns(start_ns)
             self.owed = self.depth if self.saturated else 1
 
@@ -174,13 +205,12 @@ class Load(Application):
     """The application that sends the packets of one class at one node; their content does not matter."""
 
     def __init__(self, scenario: Scenario, node: NodeId, name: str) -> None:
-        traffic = scenario.traffic_classes[name]
+        _, traffic, first = _Class.of(scenario, name)
         self.name = name
         self._node = node
         self._traffic = TrafficGenerator(scenario, node, name)
         self._destination = BROADCAST if traffic.destination == "all" else NodeId(traffic.destination)
         self._priority = PRIORITIES[traffic.priority]
-        first = name == next(iter(scenario.traffic_classes))
         self._deadline_ns = None if traffic.deadline_s is None or first else seconds_to_ns(traffic.deadline_s)
         """The deadline of each packet. For the first class it is None, because the protocol's admission control
         enforces it."""

@@ -12,6 +12,7 @@ bounded, too: the caller asks `full` first, and refuses a message that does not 
 import heapq
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Final, NamedTuple
 
 from fanet_mw.delivery.fragmentation import FEW, MOST_NAMED, Fragmentation, Fragments
@@ -96,8 +97,8 @@ class Sender:
         of which no receipt has come.
         """
         self._node = node
-        self._everyone = tuple(NodeId(other) for other in everyone if other != node)
-        self.fragmentation = Fragmentation(len(self._everyone), room)
+        self._nodes = everyone
+        self.fragmentation = Fragmentation(len(everyone) - (node in everyone), room)
         self._round_trips = RetransmissionTimeout(wait_ns)
         self._messages: dict[int, _OutgoingMessage] = {}
         self._flows: dict[tuple[tuple[NodeId, ...], int, int], _Flow] = {}
@@ -118,6 +119,11 @@ class Sender:
         self._next_flow = first_number
 
     # --- in -------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _everyone(self) -> tuple[NodeId, ...]:
+        """All other nodes; few nodes ever send a message that all must confirm."""
+        return tuple(NodeId(other) for other in self._nodes if other != self._node)
 
     @property
     def full(self) -> bool:

@@ -86,9 +86,9 @@ def simulate(
     by default in the folder for temporary files. Raises KeyboardInterrupt with the signal's number if it comes before
     anything was simulated.
     """
-    observed = Observed(scenario, capture=capture, applications=applications, folder=spool_folder)
-    began = time.perf_counter()
     with GARBAGE.not_collected():
+        observed = Observed(scenario, capture=capture, applications=applications, folder=spool_folder)
+        began = time.perf_counter()
         _run(observed.host, scenario, on_progress, signals)
     interrupted = f"interrupted by {Signals(signals[0]).name}" if signals else ""
     return observed.outcome(wall_s=time.perf_counter() - began, cut_short=interrupted)

@@ -92,7 +92,7 @@ def of_class(scenario: Scenario, node: int, name: str) -> list[tuple[int, int]]:
 def test_each_class_has_its_own_sources_start_size_and_interval(make_scenario: MakeScenario) -> None:
     scenario = make_scenario(**{"nodes.count": 9, "duration_s": 40, "warmup_s": 5, "drain_s": 2, "traffic": CLASSES})
     assert [*scenario.traffic_classes] == ["app_1", "app_2"]
-    assert sources_of(scenario, "app_2") == [2, 3]
+    assert list(sources_of(scenario, "app_2")) == [2, 3]
     first, second = of_class(scenario, 2, "app_1"), of_class(scenario, 2, "app_2")
     assert (len(first), {size for _, size in first}) == (33, {1024})
     assert (len(second), {size for _, size in second}) == (56, {512})

@@ -1,9 +1,12 @@
 """A list of items that only grows, and that moves its items from memory to a file on disk whenever they become many.
 
-It bounds the memory that a long run needs. Once the disk is full, later items stay in memory.
+    latest items  ->  packed, some hundred at a time  ->  written to the file, some hundred kilobytes at a time
+
+It bounds the memory that a long run needs. Once the disk is full, what is packed stays in memory.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Final, Generic, TypeVar
 
@@ -12,51 +15,71 @@ from sim.run.collecting.spool import Spool
 
 T = TypeVar("T")
 MOST_IN_MEMORY: Final = 1 << 9
-"""The number of items at which those in memory are moved to disk. So few trace records are still in the processor's
-cache when they are packed, and the next ones take their place there: a run takes less time than if all its records
-stayed in memory."""
+"""The number of items at which those in memory are packed. So few trace records are still in the processor's cache when
+they are packed, and the next ones take their place there: a run takes less time than if all its records stayed in
+memory."""
+MOST_PACKED_BYTES: Final = 1 << 18
+"""The number of packed bytes at which they are written. Each call of the operating system takes the processor's cache
+from the run, so there are few."""
 
 
 class DiskBackedLog(Generic[T]):
-    """Items of one type in the order of their adding: the latest in memory, all before them on disk."""
+    """Items of one type in the order of their adding: the latest as they are, all before them packed."""
 
     def __init__(
-        self, pack: Callable[[Sequence[T]], Sequence[bytes]], folder: Path | None, most_in_memory: int
+        self,
+        pack: Callable[[Sequence[T]], Sequence[bytes]],
+        folder: Path | None,
+        *,
+        most_in_memory: int = MOST_IN_MEMORY,
+        most_packed_bytes: int = MOST_PACKED_BYTES,
     ) -> None:
-        """`pack` encodes the items that are moved to disk together, as one or several byte strings. The file is made in
-        `folder`, by default in the system's folder for temporary files.
+        """`pack` encodes items together, as one or several byte strings. The file is made in `folder`, by default in
+        the system's folder for temporary files.
         """
         self._pack = pack
         self._folder = folder
         self._most = most_in_memory
+        self._most_packed_bytes = most_packed_bytes
         self._spool: Spool | None = None
         self._disk_is_full = False
-        self._moved = 0
-        """The number of items on disk."""
+        self._count = 0
+        """The number of items that were packed."""
+        self._packed: list[bytes] = []
+        """The packed items that are not on disk."""
+        self._packed_bytes = 0
         self.latest: list[T] = []
-        """The items in memory."""
+        """The items that are not packed yet."""
 
     def __len__(self) -> int:
-        return self._moved + len(self.latest)
+        return self._count + len(self.latest)
 
     def extend(self, items: Iterable[T]) -> None:
         self.latest += items
-        if len(self.latest) >= self._most and not self._disk_is_full:
-            self._move()
+        if len(self.latest) >= self._most:
+            self._pack_latest()
 
     def stored(self) -> Iterator[bytes]:
-        """The byte strings that `pack` has made of the items on disk, in their order."""
-        return iter(()) if self._spool is None else self._spool.items()
+        """The byte strings that `pack` has made of all items but the latest, in their order."""
+        return chain(() if self._spool is None else self._spool.items(), self._packed)
 
-    def _move(self) -> None:
-        """Move all items in memory to disk; if they cannot be written, they and all later ones stay in memory."""
+    def _pack_latest(self) -> None:
+        strings = self._pack(self.latest)
+        self._count += len(self.latest)
+        self.latest = []
+        self._packed += strings
+        self._packed_bytes += sum(map(len, strings))
+        if self._packed_bytes >= self._most_packed_bytes and not self._disk_is_full:
+            self._write()
+
+    def _write(self) -> None:
+        """Move what is packed to disk; if it cannot be written, it and all later items stay in memory."""
         try:
             if self._spool is None:
                 self._spool = Spool(self._folder)
-            kept = self._spool.append(*self._pack(self.latest))
+            kept = self._spool.append(*self._packed)
         except ConfigError:  # no file can be made there
             kept = False
         if kept:
-            self._moved += len(self.latest)
-            self.latest = []
+            self._packed, self._packed_bytes = [], 0
         self._disk_is_full = not kept

@@ -34,7 +34,7 @@ class TapLog(Collection[Tap]):
     """The taps of a run in virtual time, in the order in which they were added; all but the latest are on disk."""
 
     def __init__(self, folder: Path | None = None, *, most_in_memory: int = MOST_IN_MEMORY) -> None:
-        self._taps = DiskBackedLog[Tap](_encoded, folder, most_in_memory)
+        self._taps = DiskBackedLog[Tap](_encoded, folder, most_in_memory=most_in_memory)
 
     def append(self, tap: Tap) -> None:
         self._taps.extend((tap,))

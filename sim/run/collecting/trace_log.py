@@ -1,6 +1,6 @@
 """The trace of a run in virtual time: the latest records are in memory, all records before them in a file on disk.
 
-Records are moved to the file in portions of many thousands. Each portion consists of three byte strings:
+Records are packed in portions of some hundred. Each portion consists of three byte strings:
 
     the kind of each record, one byte each | the deliveries, packed in rows | all other records, pickled
 
@@ -20,7 +20,7 @@ import numpy as np
 
 from fanet_mw.trace import DELIVERED_LINE, Delivered, Record, line
 from sim.run.collecting.delivery_columns import DeliveryColumns, in_columns
-from sim.run.collecting.disk_backed_log import MOST_IN_MEMORY, DiskBackedLog
+from sim.run.collecting.disk_backed_log import MOST_IN_MEMORY, MOST_PACKED_BYTES, DiskBackedLog
 from sim.run.collecting.record_kinds import CODES, KINDS
 
 _DELIVERED: Final = CODES[Delivered]
@@ -39,8 +39,16 @@ Change = Callable[[Delivered], Delivered]
 class TraceLog(Collection[Record]):
     """The trace records of a run, in the order in which they were added."""
 
-    def __init__(self, folder: Path | None = None, *, most_in_memory: int = MOST_IN_MEMORY) -> None:
-        self._records = DiskBackedLog[Record](_packed, folder, most_in_memory)
+    def __init__(
+        self,
+        folder: Path | None = None,
+        *,
+        most_in_memory: int = MOST_IN_MEMORY,
+        most_packed_bytes: int = MOST_PACKED_BYTES,
+    ) -> None:
+        self._records = DiskBackedLog[Record](
+            _packed, folder, most_in_memory=most_in_memory, most_packed_bytes=most_packed_bytes
+        )
         self._change: Change | None = None
 
     def extend(self, records: Iterable[Record]) -> None:

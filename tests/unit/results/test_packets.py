@@ -84,7 +84,7 @@ def test_deliveries_count_as_they_would_one_by_one(
     packets: list[Generated], deliveries: list[Delivered], most: int
 ) -> None:
     records: list[Record] = [*packets, *deliveries]
-    log = TraceLog(most_in_memory=most)
+    log = TraceLog(most_in_memory=most, most_packed_bytes=100 * most)
     for one in records:
         log.extend([one])
     for trace in (records, log):

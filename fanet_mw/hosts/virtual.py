@@ -18,10 +18,12 @@ from fanet_mw.units import S
 
 Listener = Callable[[str, Message], None]
 Receive = Callable[[str, Message, int], bool | None]
-Route = tuple[int, Receive, list[tuple[int, Receive]]]
-"""The index and the `receive` of a topic's first receiver, then those of the others; most topics have only one."""
+Route = tuple[tuple[int, Receive], ...]
+"""The index and the `receive` of each receiver of a topic; most topics have only one."""
 _NOBODY: Final = -1
 """Takes the place of an actor's index for a receiver that is a listener, and so has no wake-ups."""
+_BEFORE_ALL_NS: Final = -1
+"""No event is at this instant, or before it."""
 _STALL_LIMIT: Final = 100_000
 """Actors count as stuck after this number of wake-ups at one instant, of one actor or of several."""
 
@@ -43,10 +45,6 @@ def _without_time(listener: Listener) -> Receive:
     return hear
 
 
-def _discard(_topic: str, _message: Message, _now_ns: int) -> bool:
-    return True
-
-
 class VirtualHost:
     """Runs actors in virtual time. `listeners` receive topics without being actors, for example to record them."""
 
@@ -63,6 +61,7 @@ class VirtualHost:
         self._heap: list[tuple[int, int, int]] = []
         self._seq = 0
         self._asks = [actor.next_wake_ns for actor in self._actors]
+        self._wakes = [actor.wake for actor in self._actors]
         self._armed: list[int | None] = [None] * len(self._actors)
         self._queue: list[tuple[str, Message]] = []
         self._records: list[Record] = []
@@ -86,31 +85,17 @@ class VirtualHost:
         """Start every actor, in order, at instant 0."""
         for index, actor in enumerate(self._actors):
             actor.start(self.now_ns)
-            self._arm(index, actor.next_wake_ns())
+            wake_ns = actor.next_wake_ns()
+            if wake_ns is not None:
+                self._seq += 1
+                self._armed[index] = max(wake_ns, self.now_ns)
+                heapq.heappush(self._heap, (max(wake_ns, self.now_ns), self._seq, index))
         self._flush({})
         self._hand_over()
 
     def run(self, until_ns: int) -> None:
         """Process all events up to and including `until_ns`; may be called again with a later instant."""
-        heap, armed, wakes, flush = self._heap, self._armed, [actor.wake for actor in self._actors], self._flush
-        push_and_pop, pop, now_ns = heapq.heappushpop, heapq.heappop, self.now_ns
-        while self._latest or heap:
-            entry = push_and_pop(heap, self._latest) if self._latest else pop(heap)
-            self._latest = None
-            t_ns, _, index = entry
-            if t_ns > until_ns:
-                self._latest = entry
-                break
-            if armed[index] != t_ns:
-                continue  # the actor has requested another wake-up since
-            armed[index] = None
-            if t_ns > now_ns:
-                self.now_ns = now_ns = t_ns
-                self._stalled = 0
-            else:
-                self._watch(index)
-            wakes[index](now_ns)
-            flush({index: None})
+        self._process(until_ns, None)
         self.now_ns = max(self.now_ns, until_ns)
         self._hand_over()
 
@@ -142,36 +127,65 @@ class VirtualHost:
 
     def _flush(self, awake: dict[int, None]) -> None:
         """Deliver all messages of this instant, in order; then plan the wake-ups of `awake` and of all receivers."""
-        queue, routes, now_ns = self._queue, self._routes, self.now_ns
-        for topic, message in queue:  # deliveries may append further messages to the queue
-            try:
-                index, receive, others = routes[topic]
-            except KeyError:
-                index, receive, others = routes[topic] = self._resolve(topic)
-            if not receive(topic, message, now_ns):
-                awake[index] = None  # the keys of a dict keep their order, and each occurs once
-            if others:  # seldom
-                for index, receive in others:
-                    if not receive(topic, message, now_ns):
-                        awake[index] = None
-        queue.clear()
-        asks, armed = self._asks, self._armed
-        for index in awake:
-            wake_ns = asks[index]()
-            if wake_ns != armed[index]:
-                self._arm(index, wake_ns)
+        self._process(_BEFORE_ALL_NS, awake)
 
-    def _arm(self, index: int, wake_ns: int | None) -> None:
-        """Plan an actor's next wake-up; an instant in the past counts as now."""
-        if wake_ns is not None and wake_ns < self.now_ns:
-            wake_ns = self.now_ns
-        if wake_ns != self._armed[index]:
-            self._armed[index] = wake_ns
-            if wake_ns is not None:
-                self._seq += 1
-                if self._latest is not None:
-                    heapq.heappush(self._heap, self._latest)
-                self._latest = wake_ns, self._seq, index
+    def _process(  # noqa: C901  (one loop for each frame; a call for each of its parts takes time)
+        self, until_ns: int, awake: dict[int, None] | None
+    ) -> None:
+        """The loop of the host: wake an actor, deliver all messages of this instant, in order, and plan the wake-ups of
+        the actor and of all receivers; then go on to the next wake-up, if it is not after `until_ns`.
+
+        `awake`: the actors that were called already, so that the loop begins with the delivery; None if it begins with
+        the next wake-up.
+        """
+        heap, armed, wakes, asks = self._heap, self._armed, self._wakes, self._asks
+        queue, routes, now_ns = self._queue, self._routes, self.now_ns
+        push_and_pop, pop, push = heapq.heappushpop, heapq.heappop, heapq.heappush
+        while True:
+            if awake is None:
+                latest = self._latest
+                if latest is not None:
+                    entry = push_and_pop(heap, latest)
+                elif heap:
+                    entry = pop(heap)
+                else:
+                    return
+                t_ns, _, index = entry
+                if t_ns > until_ns:
+                    self._latest = entry
+                    return
+                self._latest = None
+                if armed[index] != t_ns:
+                    continue  # the actor has requested another wake-up since
+                armed[index] = None
+                if t_ns > now_ns:
+                    self.now_ns = now_ns = t_ns
+                    self._stalled = 0
+                else:
+                    self._watch(index)
+                wakes[index](now_ns)
+                awake = {index: None}
+            for topic, message in queue:  # deliveries may append further messages to the queue
+                try:
+                    route = routes[topic]
+                except KeyError:
+                    route = routes[topic] = self._resolve(topic)
+                for index, receive in route:
+                    if not receive(topic, message, now_ns):
+                        awake[index] = None  # the keys of a dict keep their order, and each occurs once
+            queue.clear()
+            for index in awake:
+                wake_ns = asks[index]()
+                if wake_ns is not None and wake_ns < now_ns:
+                    wake_ns = now_ns  # an instant in the past counts as now
+                if wake_ns != armed[index]:
+                    armed[index] = wake_ns
+                    if wake_ns is not None:
+                        self._seq = seq = self._seq + 1
+                        if self._latest is not None:
+                            push(heap, self._latest)
+                        self._latest = wake_ns, seq, index
+            awake = None
 
     def _hand_over(self) -> None:
         """Pass on the trace records, once per call from outside; each record states its own instant."""
@@ -192,5 +206,4 @@ class VirtualHost:
             for order, expression, index, receive in self._receivers.get(beginning, ()):
                 if matches(expression, topic):
                     found[order] = index, receive
-        hearers = [found[order] for order in sorted(found)] or [(_NOBODY, _discard)]
-        return (*hearers[0], hearers[1:])
+        return tuple(found[order] for order in sorted(found))

@@ -78,10 +78,12 @@ def test_an_actor_that_never_lets_time_move_is_named() -> None:
         def next_wake_ns(self) -> int | None:
             return 0
 
-    host = VirtualHost([Stuck("culprit", [])])
+    stuck = Stuck("culprit", [])
+    host = VirtualHost([stuck])
     host.start()
     with pytest.raises(LocalProtocolError, match="culprit"):
         host.run(MS)
+    assert 100_000 < len(stuck.log) < 200_000, "it is named soon, but many may act at one instant"
 
 
 @pytest.mark.parametrize(

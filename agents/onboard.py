@@ -210,8 +210,8 @@ class _ApplicationPort:
         to, targets = self._sending.whom(destination)
         submission = Submission(
             port, data, to, targets, priority_of(priority), confirm,
-            None if lifetime_ns is None else positive("lifetime_ns", lifetime_ns),
-            None if deadline_ns is None else positive("deadline_ns", deadline_ns),
+            positive("lifetime_ns", lifetime_ns),
+            positive("deadline_ns", deadline_ns),
             born_ns,
         )  # fmt: skip
         return self._onboard.send(self._application, submission)

@@ -94,8 +94,8 @@ def priority_of(priority: str | int) -> int:
     return number
 
 
-def positive(name: str, duration_ns: int) -> int:
-    """A duration, which must be positive."""
-    if duration_ns <= 0:
+def positive(name: str, duration_ns: int | None) -> int | None:
+    """A duration, which must be positive; None if the application states none."""
+    if duration_ns is not None and duration_ns <= 0:
         raise LocalProtocolError(f"{name} = {duration_ns} must be above 0")
     return duration_ns

@@ -135,11 +135,13 @@ class Sender:
     ) -> tuple[int, Sequence[PieceToSend]]:  # fmt: skip
         """The number and all packets of a message that is not confirmed."""
         number = self.take_number()
-        cut = self.fragmentation.cut(data, port=port, targets=targets or None, confirm=False, priority=priority)
+        fragments = self.fragmentation.cut(data, port=port, targets=targets or None, confirm=False, priority=priority)
+        stride, pieces = fragments
         packets = []
-        for piece in range(cut.pieces):
-            head = Head(born_us, number, 0, len(data), lifetime_ms, port, 0, cut.stride, piece, cut.pieces, 0)
-            inner = application_message.encode_piece(head, cut.part(data, piece), node=self._node, targets=targets)
+        for piece in range(pieces):
+            head = Head(born_us, number, 0, len(data), lifetime_ms, port, 0, stride, piece, pieces, 0)
+            part = fragments.part(data, piece)
+            inner = application_message.encode_piece(head, part, node=self._node, targets=targets)
             packets.append(PieceToSend(number, inner, destination, priority, piece == 0))
         return number, packets
 

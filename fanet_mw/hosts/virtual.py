@@ -88,8 +88,8 @@ class VirtualHost:
             wake_ns = actor.next_wake_ns()
             if wake_ns is not None:
                 self._seq += 1
-                self._armed[index] = max(wake_ns, self.now_ns)
-                heapq.heappush(self._heap, (max(wake_ns, self.now_ns), self._seq, index))
+                self._armed[index] = wake_ns = max(wake_ns, self.now_ns)
+                heapq.heappush(self._heap, (wake_ns, self._seq, index))
         self._flush({})
         self._hand_over()
 

@@ -56,19 +56,16 @@ class HeaderCheck:
         """
         _, _, origin_us, seq, origin, destination, prev_hop, kind, hop_limit, hops, _, _, _, _ = fields
         count = self._count
-        if (  # what must be true; nearly all headers pass, so the reason is only looked for afterwards
-            prev_hop == src <= count
-            and origin <= count
-            and (destination == BROADCAST or destination <= count)
-            and (origin == prev_hop or (hops and kind != _HELLO))
-            and hops + hop_limit <= MOST_HOPS
-            and age_ns >= self._youngest_ns
-            and (seq & _NUMBER) - _BURST <= origin_us // _STEP_US
-            and (known or origin != self._node)
-        ):
-            return None
         if origin > count or prev_hop > count or not (destination <= count or destination == BROADCAST):
             return DropReason.UNKNOWN_NODE
         if origin == self._node and not known:
             return DropReason.OWN
-        return DropReason.FORGED
+        if (
+            prev_hop != src
+            or (origin != prev_hop and (hops == 0 or kind == _HELLO))
+            or hops + hop_limit > MOST_HOPS
+            or age_ns < self._youngest_ns
+            or (seq & _NUMBER) - _BURST > origin_us // _STEP_US
+        ):
+            return DropReason.FORGED
+        return None

@@ -77,9 +77,7 @@ class NodePort:
         packet, start_ns = relay
         hop_limit, hops = after_hop(packet.header)  # as `forwarded`, without a call for each relay
         frame = wire.rewrite(packet.frame, self.node, hop_limit, hops, wire.FLAG_FLOOD)
-        seq = self.frames_sent  # as `transmit`, without a call for each relay; a packet of another node is never held
-        self.frames_sent = seq + 1
-        self.requests.append(_new(TxRequest, (seq, start_ns, frame, BROADCAST, False)))
+        self.transmit(frame, BROADCAST, start_ns=start_ns)
 
     def relay_together(self, relays: Sequence[Relay]) -> None:
         self._share([(start_ns, self.forwarded(packet, flags=wire.FLAG_FLOOD)) for packet, start_ns in relays])
@@ -115,7 +113,7 @@ class NodePort:
         self._held.remove(name)
         own = int.from_bytes(frame[wire.SEQ], "little")
         self.records.append(_new(LetOut, (start_ns, self.node, own)))
-        return own in self.watch.watched and self.watch.announced(own, request, start_ns)
+        return self.watch.announced(own, request, start_ns)
 
     # --- packets --------------------------------------------------------------------------------------------------
 

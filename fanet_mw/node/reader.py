@@ -23,7 +23,6 @@ _KIND: Final = 7
 """The index of the packet's kind among the fields of a header (`wire.Fields`)."""
 _FLAGS: Final = 11
 """The index of the packet's flags among them."""
-_MORE, _PHASE_MASK, _END_TO_END = wire.FLAG_MORE, wire.PHASE_MASK, wire.END_TO_END
 BUNDLE: Final = 1 << 30
 """Stands for the phase of a frame that holds several packets. No duplicate set ever has this bit, so each such frame is
 opened, and its packets are looked up one by one."""
@@ -76,15 +75,15 @@ class Reader:
         self.frame, self.packet = frame, None
         fields = self.fields = wire.fields_of(frame)
         flags = fields[_FLAGS]
-        if flags & _MORE and not alone:
+        if flags & wire.FLAG_MORE and not alone:
             self.hash, self.phase = 0, BUNDLE
         else:
-            name = frame[_END_TO_END]
+            name = frame[wire.END_TO_END]
             size, inner, packet_hash = self._hashes.get(name, _UNKNOWN)
             # packets that differ only in their inner frames are told apart by them: no copy is taken for another packet
             same = len(frame) == size and frame.endswith(inner)
             self.hash = packet_hash if same else self._remember(name, frame)
-            self.phase = PHASES.get(flags & _PHASE_MASK, 0)
+            self.phase = PHASES.get(flags & wire.PHASE_MASK, 0)
 
     def _remember(self, name: bytes, frame: bytes) -> int:
         """Compute the hash of a packet, and keep it for its further copies."""

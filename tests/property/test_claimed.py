@@ -17,7 +17,7 @@ from fanet_mw import wire
 from fanet_mw.bus.messages import Reception
 from fanet_mw.graph.topology import components, two_hop
 from fanet_mw.routing.clustered.claimed.claimed_access import ClaimedAccess
-from fanet_mw.routing.clustered.claimed.slot_acquisition import Claiming
+from fanet_mw.routing.clustered.claimed.slot_acquisition import SlotAcquisition
 from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.scenario import config
 from fanet_mw.units import MS, NodeId, S
@@ -36,7 +36,7 @@ def scenario_of(*, aggregate: bool = False, **clusters: Any) -> Any:
     return config.build(tree)
 
 
-def claiming(radio: GraphRadio, node: int) -> Claiming:
+def claiming(radio: GraphRadio, node: int) -> SlotAcquisition:
     found = radio.nodes[NodeId(node)]._protocol
     assert isinstance(found, Clustered)
     assert isinstance(found.parts.access, ClaimedAccess)

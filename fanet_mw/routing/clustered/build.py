@@ -17,7 +17,7 @@ from fanet_mw.node.queue import TxQueue, sooner_us
 from fanet_mw.routing.clustered.claimed.claimed_access import ClaimedAccess
 from fanet_mw.routing.clustered.claimed.claimed_release import ClaimedRelease
 from fanet_mw.routing.clustered.claimed.own_turns import OwnTurns
-from fanet_mw.routing.clustered.claimed.slot_acquisition import Claiming, geometry
+from fanet_mw.routing.clustered.claimed.slot_acquisition import SlotAcquisition, geometry
 from fanet_mw.routing.clustered.clustered import Clustered, Parts
 from fanet_mw.routing.clustered.contract import HearsCopies, ScheduledAccess
 from fanet_mw.routing.clustered.forwarding.floods import Floods
@@ -298,7 +298,7 @@ def _by_claims(ground: _Ground) -> Clustered:
     port, scenario = ground.port, ground.port.scenario
     own = OwnTurns(geometry(scenario))
     ground.contention.turns_at = lambda _: own.turns
-    claiming = Claiming(port, own)
+    claiming = SlotAcquisition(port, own)
     frame_bytes = scenario.radio.max_frame_bytes if scenario.routing.aggregate else 0
     access = ClaimedAccess(
         port, claiming=claiming, turn_bytes=scenario.claimed_turn_bytes, gradient=ground.gradient, uplink=ground.uplink,

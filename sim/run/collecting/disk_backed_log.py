@@ -47,7 +47,6 @@ class DiskBackedLog(Generic[T]):
         """The number of items that were packed."""
         self._packed: list[bytes] = []
         """The packed items that are not on disk."""
-        self._packed_bytes = 0
         self.latest: list[T] = []
         """The items that are not packed yet."""
 
@@ -64,12 +63,10 @@ class DiskBackedLog(Generic[T]):
         return chain(() if self._spool is None else self._spool.items(), self._packed)
 
     def _pack_latest(self) -> None:
-        strings = self._pack(self.latest)
+        self._packed += self._pack(self.latest)
         self._count += len(self.latest)
         self.latest = []
-        self._packed += strings
-        self._packed_bytes += sum(map(len, strings))
-        if self._packed_bytes >= self._most_packed_bytes and not self._disk_is_full:
+        if not self._disk_is_full and sum(map(len, self._packed)) >= self._most_packed_bytes:
             self._write()
 
     def _write(self) -> None:
@@ -81,5 +78,5 @@ class DiskBackedLog(Generic[T]):
         except ConfigError:  # no file can be made there
             kept = False
         if kept:
-            self._packed, self._packed_bytes = [], 0
+            self._packed = []
         self._disk_is_full = not kept

@@ -22,7 +22,7 @@ from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.claimed.claimed_release import ClaimedRelease
-from fanet_mw.routing.clustered.claimed.slot_acquisition import Change, Claiming
+from fanet_mw.routing.clustered.claimed.slot_acquisition import Change, SlotAcquisition
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import NO_HEAD, Gradient
 from fanet_mw.routing.clustered.forwarding.uplink import Uplink
@@ -41,7 +41,7 @@ class ClaimedAccess:
         self,
         port: Port,
         *,
-        claiming: Claiming,
+        claiming: SlotAcquisition,
         queue: ClaimedRelease,
         turn_bytes: int,
         gradient: Gradient,

@@ -67,7 +67,7 @@ class ClaimedLoad:
         return min(self._said)
 
 
-class Claiming:
+class SlotAcquisition:
     """The claim of one node, and the claims of others as far as it knows them."""
 
     def __init__(self, port: Port, own: OwnTurns) -> None:

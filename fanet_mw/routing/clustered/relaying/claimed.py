@@ -9,7 +9,7 @@ from fanet_mw.node.contract import Port
 from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.clustered.claimed.claimed_access import ClaimedAccess
-from fanet_mw.routing.clustered.claimed.slot_acquisition import Claiming
+from fanet_mw.routing.clustered.claimed.slot_acquisition import SlotAcquisition
 from fanet_mw.routing.clustered.contract import Relaying
 from fanet_mw.wire import Kind
 
@@ -19,7 +19,7 @@ _NOTHING: Final[Mapping[str, object]] = {}
 class ClaimedRelaying:
     """Queues a node's relays behind its own packets. Control packets are relayed by the rule `otherwise`."""
 
-    def __init__(self, port: Port, claiming: Claiming, access: ClaimedAccess, otherwise: Relaying) -> None:
+    def __init__(self, port: Port, claiming: SlotAcquisition, access: ClaimedAccess, otherwise: Relaying) -> None:
         self._port = port
         self._claiming = claiming
         self._access = access

@@ -3,7 +3,7 @@
     InterferenceByDistance    for links without losses (`list_scheduling.py`): by the distance alone
     InterferenceByPower       for lossy links (`redundant_scheduling.py`): by the powers that nodes measure
 
-A sender disturbs a receiver of another frame only if the frame is meant for that receiver. Sets of nodes are
+Only the receivers that a frame is meant for count: nobody minds if another node cannot receive it. Sets of nodes are
 represented as the bits of integers, by the nodes' row numbers (`flood_geometry.py`).
 """
 

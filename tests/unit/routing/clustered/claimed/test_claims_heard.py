@@ -9,7 +9,7 @@ from fanet_mw.node.node import Node
 from fanet_mw.routing import make_protocol
 from fanet_mw.routing.clustered.claimed.claimed_access import ClaimedAccess
 from fanet_mw.routing.clustered.claimed.own_turns import Share, draws
-from fanet_mw.routing.clustered.claimed.slot_acquisition import Claiming
+from fanet_mw.routing.clustered.claimed.slot_acquisition import SlotAcquisition
 from fanet_mw.routing.clustered.claimed.slot_claims import SlotClaim, SlotClaims, SlotHello
 from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
@@ -28,7 +28,7 @@ def node(make_scenario: MakeScenario) -> Node:
     return made
 
 
-def claiming_of(node: Node) -> Claiming:
+def claiming_of(node: Node) -> SlotAcquisition:
     protocol = node._protocol
     assert isinstance(protocol, Clustered)
     assert isinstance(protocol.parts.access, ClaimedAccess)

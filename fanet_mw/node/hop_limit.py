@@ -5,17 +5,13 @@
 
 A packet that is heard with a hop limit of 1 has made its last hop: the node may deliver it, but passes it on to no one.
 The part that would have passed it on drops it by the reason `hop_limit`.
+
+Each hop is counted where the next frame of the packet is written (`wire.rewrite`).
 """
 
-from fanet_mw.wire import MOST_HOPS, Header
+from fanet_mw.wire import Header
 
 
 def is_used_up(header: Header) -> bool:
     """True if a packet that was heard with this header may not be passed on."""
     return header.hop_limit <= 1
-
-
-def after_hop(header: Header) -> tuple[int, int]:
-    """The hops left, and the hops made, that the next frame of a packet states."""
-    hops = header.hops
-    return header.hop_limit - 1, hops + 1 if hops < MOST_HOPS else hops  # a hostile frame may state the greatest number

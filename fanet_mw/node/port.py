@@ -15,7 +15,6 @@ from fanet_mw import wire
 from fanet_mw.bus.messages import TxRequest
 from fanet_mw.errors import DropReason
 from fanet_mw.node.duplicates import PHASES, DuplicateSet, hash_of
-from fanet_mw.node.hop_limit import after_hop
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.node.packet_numbering import PacketNumbering
 from fanet_mw.node.packet_watch import PacketWatch
@@ -75,23 +74,17 @@ class NodePort:
 
     def relay(self, relay: Relay) -> None:
         packet, start_ns = relay
-        hop_limit, hops = after_hop(packet.header)  # as `forwarded`, without a call for each relay
-        frame = wire.rewrite(packet.frame, self.node, hop_limit, hops, wire.FLAG_FLOOD)
-        self.transmit(frame, BROADCAST, start_ns=start_ns)
+        self.transmit(wire.rewrite(packet.frame, self.node, wire.FLAG_FLOOD), BROADCAST, start_ns=start_ns)
 
     def relay_together(self, relays: Sequence[Relay]) -> None:
         self._share([(start_ns, self.forwarded(packet, flags=wire.FLAG_FLOOD)) for packet, start_ns in relays])
 
     def forwarded(self, packet: Packet, *, flags: int) -> bytes:
-        hop_limit, hops = after_hop(packet.header)
-        return wire.rewrite(packet.frame, self.node, hop_limit, hops, flags)
+        return wire.rewrite(packet.frame, self.node, flags)
 
     def _begun(self, packet: Packet, flags: int) -> bytes:
         """The bytes of a packet whose phase begins here: an own packet as it is, another node's with one more hop."""
-        header = packet.header
-        if header.origin != self.node:
-            return self.forwarded(packet, flags=flags)
-        return wire.rewrite(packet.frame, self.node, header.hop_limit, header.hops, flags)
+        return wire.rewrite(packet.frame, self.node, flags, hop=0 if packet.header.origin == self.node else 1)
 
     def _share(self, packets: Sequence[tuple[int, bytes]]) -> None:
         """Broadcast packets in as few frames as possible."""

@@ -123,7 +123,7 @@ def test_custody_may_come_back_but_a_packet_never_goes_back_to_whom_it_came_from
     (sent,) = found.data(seq, 1)
     assert (sent.dst, found.protocol(1).waiting()) == (2, 0)
     beacon(found, 2, 390)
-    back = wire.rewrite(sent.frame, prev_hop=2, hop_limit=30, hops=1, flags=0)
+    back = wire.rewrite(sent.frame, 2, 0)
     found.hear(1, back, src=2)
     found.advance(1 * S)
     assert found.protocol(1).waiting() == 1, "neither suppressed as a duplicate nor played back"

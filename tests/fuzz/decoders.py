@@ -86,7 +86,7 @@ def _of_the_air(found: Corpus) -> Iterator[Decoder]:
     def header(data: bytes) -> object:
         head = wire.decode_header(data)
         assert wire.decode_header(head.encode()) == head
-        wire.rewrite(data, prev_hop=7, hop_limit=1, hops=2, flags=1)
+        wire.rewrite(data, 7, 1, hop=min(head.hop_limit, 1))
         return head
 
     yield Decoder("routing header", header, of(wire.ROUTE.msgid))

@@ -179,12 +179,14 @@ def test_filler_that_no_frames_can_add_up_to_is_refused(size: int) -> None:
         wire.filler(size)
 
 
-@given(headers, u8, u8, ids)
-def test_a_rewritten_frame_keeps_its_inner_bytes_and_its_name(header: Header, left: int, hops: int, node: int) -> None:
+@given(headers.filter(lambda header: header.hop_limit), ids, st.booleans())
+def test_a_rewritten_frame_keeps_its_inner_bytes_and_its_name(header: Header, node: int, at_origin: bool) -> None:
     inner = wire.filler(100)
-    frame = wire.rewrite(header.encode() + inner, prev_hop=node, hop_limit=left, hops=hops, flags=1)
+    hop = 0 if at_origin else 1
+    frame = wire.rewrite(header.encode() + inner, node, 1, hop=hop)
     assert frame[wire.HEADER_BYTES :] == inner
-    after = header._replace(prev_hop=node, hop_limit=left, hops=hops, flags=1)
+    left, made = header.hop_limit - hop, min(header.hops + hop, wire.MOST_HOPS)
+    after = header._replace(prev_hop=node, hop_limit=left, hops=made, flags=1)
     assert wire.decode_header(frame) == after
     assert frame == after.encode() + inner
 

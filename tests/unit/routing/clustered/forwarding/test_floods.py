@@ -42,7 +42,7 @@ def hops_left(frame: bytes) -> tuple[int, int]:
 def test_who_begins_a_flood_knows_it_when_it_comes_back(node: Node) -> None:
     floods(node).begin([packet()], start_ns=1 * MS)
     (request,) = node.requests
-    back = wire.rewrite(request.frame, THEIRS, 6, 2, FLAG_FLOOD)
+    back = wire.rewrite(request.frame, THEIRS, FLAG_FLOOD)
     assert node.hear(Reception(back, THEIRS, 3 * MS, -60.0), 3 * MS), "a copy"
 
 

@@ -94,6 +94,6 @@ def test_a_parent_that_does_not_acknowledge_is_given_up_until_it_is_heard_again(
 
 
 def test_a_packet_of_our_own_that_comes_back_on_its_way_is_known(beside_a_head: Node) -> None:
-    back = wire.rewrite(beside_a_head.requests[0].frame, 3, 5, 3, FLAG_TO_HEAD)
+    back = wire.rewrite(beside_a_head.requests[0].frame, 3, FLAG_TO_HEAD)
     assert beside_a_head.hear(Reception(back, NodeId(3), 9 * MS, -60.0), 9 * MS)
     assert len(beside_a_head.requests) == 1

@@ -144,7 +144,6 @@ class Medium(Actor):
         if seq != numbers.expected[station] and (lost := numbers.lost_before(station, seq)):
             self._counters.dropped[DropReason.BUS] += lost
         numbers.expected[station] = (seq + 1) & NUMBER_MASK
-        numbers.made[station] += 1
         size = len(frame)
         if (dst != BROADCAST and not 1 <= dst <= self._count) or not 0 < size <= self._max_bytes:
             self._refuse_shape(station, request, now_ns)

@@ -22,37 +22,42 @@ class RequestNumbers:
     def __init__(self, stations: int) -> None:
         self.expected: list[int | None] = [None] * stations
         """The expected number of each node's next request; None before its first one."""
-        self.made = [0] * stations
-        """The number of requests that each node has made, including those that a gap in the numbers
-        shows to be lost."""
+        self._first = [0] * stations
+        """The number of the first request of each node since its numbers last began anew."""
+        self._earlier = [0] * stations
+        """The number of requests that each node had made before that one."""
         self._before = [0] * stations
         """The number of requests that each node had made before its process was restarted."""
 
-    def lost_before(self, station: int, seq: int) -> int:
-        """Count the requests that were lost before one with an unexpected number; returns how many there are."""
+    def made(self, station: int) -> int:
+        """The number of requests that a node has made, including those that a gap in the numbers shows to be lost."""
         expected = self.expected[station]
-        # the emulator was restarted, or the first requests were lost; the run's ledger will show that
-        if expected is None:
-            return 0
-        if seq == 0:  # the node was restarted
-            self._before[station] = self.made[station]
-            return 0
-        gap = (seq - expected) & NUMBER_MASK
-        if gap >= _LONGEST_GAP:
-            return 0
-        self.made[station] += gap
-        return gap
+        return 0 if expected is None else self._earlier[station] + ((expected - self._first[station]) & NUMBER_MASK)
+
+    def lost_before(self, station: int, seq: int) -> int:
+        """The number of requests that were lost before one with an unexpected number, which is about to be taken."""
+        expected = self.expected[station]
+        if expected is not None:
+            gap = (seq - expected) & NUMBER_MASK
+            if gap < _LONGEST_GAP:
+                return gap
+            self._earlier[station] = self.made(station)
+            if seq == 0:  # the node was restarted
+                self._before[station] = self._earlier[station]
+        # else the emulator was restarted, or the first requests were lost; the run's ledger will show that
+        self._first[station] = seq
+        return 0
 
     @property
     def total(self) -> int:
         """The number of requests of all nodes."""
-        return sum(self.made)
+        return sum(map(self.made, range(len(self.expected))))
 
     def report(self) -> dict[str, Mapping[str, int]]:
         """The requests of each node, by its id."""
         return {
-            str(node): {"all": made, "before_restart": before}
-            for node, (made, before) in enumerate(zip(self.made, self._before, strict=True), start=1)
+            str(station + 1): {"all": self.made(station), "before_restart": before}
+            for station, before in enumerate(self._before)
         }
 
 

@@ -67,8 +67,10 @@ class Node:
         Other packets are delivered as well, but nobody takes them."""
         self.hellos: list[Packet] = []
         """The hellos of neighbors, in which the applications and the clock read more than routing does."""
-        self.receptions = 0
         self._copies = 0
+        """The number of frames that were only copies, as most are."""
+        self._others = 0
+        """The number of all other frames that were received."""
         self._lifetimes_ns = [scenario.routing.lifetime_ns(wire.PRIORITY_BULK)] * 256
         """The lifetime of a packet by its priority; the air may state any of 256."""
         for priority in wire.PRIORITIES.values():
@@ -113,6 +115,11 @@ class Node:
     def dropped(self) -> Counter[str]:
         """The number of packets that have ended in this node, by reason."""
         return self.port.dropped
+
+    @property
+    def receptions(self) -> int:
+        """The number of frames that were received."""
+        return self._copies + self._others
 
     def moved(self, position: Enu, velocity: Enu) -> None:
         """Set the node's own position and velocity, as its navigation knows them."""
@@ -201,7 +208,6 @@ class Node:
 
     def hear(self, reception: Reception, now_ns: int) -> bool:
         """Handle a reception; returns True if it was only a copy of a packet that was handled before."""
-        self.receptions += 1
         reader, frame, handled = self._reader, reception.frame, self._duplicates
         if frame is not reader.frame:
             reader.look(frame)
@@ -214,6 +220,7 @@ class Node:
             if self._on_copy is not None:
                 self._on_copy(reader.key, now_ns=now_ns)
             return True
+        self._others += 1
         if phase == BUNDLE:
             self._hear_bundle(reception, now_ns)
             return False
@@ -249,7 +256,7 @@ class Node:
         reader = self._reader
         known = self._duplicates.bits(reader.hash)
         if known & reader.phase:
-            self._copies += 1
+            self.port.dropped[DropReason.DUPLICATE] += 1
             if self._on_copy is not None:
                 self._on_copy(reader.key, now_ns=now_ns)
             return _NONE

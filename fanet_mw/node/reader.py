@@ -93,20 +93,21 @@ class Reader:
         self._hashes[name] = len(frame), frame[wire.HEADER_BYTES :], packet_hash
         return packet_hash
 
-    def read(self) -> Packet:
-        """Check the header and return the packet in the frame; raises MalformedFrameError if the check fails."""
-        if self.fields[_KIND] == _HELLO and self.phase:  # the node's clock has asked for the same hello already
-            packet = packet_of(self.frame)
+    def read(self, cached: bool = True) -> Packet:
+        """Check the header and return the packet in the frame; raises MalformedFrameError if the check fails.
+
+        With `cached`, a hello is taken from the cache of `packet_of`, because the node's clock has asked for it
+        already.
+        """
+        frame, fields = self.frame, self.fields
+        if not self.phase:
+            raise MalformedFrameError("no routing header, or one of two phases")
+        if cached and fields[_KIND] == _HELLO:
+            packet = packet_of(frame)
         else:
-            packet = _checked(self.frame, self.fields, self.phase)
+            packet = _new(Packet, (wire.checked(frame, fields), frame))
         self.packet = packet
         return packet
-
-
-def _checked(frame: bytes, fields: wire.Fields, phase: int) -> Packet:
-    if not phase:
-        raise MalformedFrameError("no routing header, or one of two phases")
-    return _new(Packet, (wire.checked(frame, fields), frame))
 
 
 T = TypeVar("T")
@@ -152,4 +153,4 @@ def packet_of(frame: bytes) -> Packet:
     """The packet in a frame, checked; raises MalformedFrameError. The latest packets are cached."""
     reader = Reader()
     reader.look(frame)
-    return _checked(frame, reader.fields, reader.phase)
+    return reader.read(cached=False)

@@ -219,7 +219,7 @@ def checked(frame: bytes, fields: Fields) -> Header:
     return header
 
 
-def rewrite(frame: bytes, prev_hop: int, flags: int, *, hop: int = 1) -> bytes:
+def rewrite(frame: bytes, prev_hop: int, flags: int, hop: int = 1) -> bytes:
     """The frame as the node `prev_hop` transmits it: a new header, the inner frames byte for byte.
 
     One hop less is left, and one more is made; with `hop=0`, at the packet's origin, both stay. The frame must have

@@ -7,7 +7,7 @@ older or another system, nothing changes but the speed. The results of a run do 
 
 The kernel copies a page when it moves it, which takes from some tenths of a millisecond to 13 ms on a busy machine. So
 requests take a small share of the run's CPU time at most: a run of a few seconds is not made slower by them, and a long
-one gets all its pages in time.
+one gets all its pages in time. A run that adds little memory gains nothing from them, and makes none.
 """
 
 import ctypes
@@ -25,6 +25,8 @@ _EVERY_S: Final = 2.0
 """The least CPU time between two rounds of requests [s]. A shorter run makes none."""
 _MOST_SHARE: Final = 0.02
 """The greatest share of a run's CPU time that requests may take."""
+_LEAST_ADDED: Final = 32
+"""The number of huge pages that the memory of a run must have grown by before it asks for any: 64 MB."""
 Request = Callable[[int], bool]
 """Asks for the huge page that begins at an address; False if the kernel refuses."""
 
@@ -38,6 +40,8 @@ class HugePages:
         """
         self._request = request or _to_kernel()
         self._cpu_s = cpu_s
+        self._at_start = self._count() if self._request else 0
+        """The number of huge pages into which the memory fitted when the run began."""
         self._asked: set[int] = set()
         """The addresses for which a page was asked for already."""
         self._began_s = cpu_s()
@@ -46,13 +50,14 @@ class HugePages:
         """The CPU time that requests have taken."""
 
     def keep_up(self) -> None:
-        """Ask for huge pages for the memory that has been added, as far as the share of CPU time for it allows, unless
-        that was done a moment ago.
+        """Ask for huge pages if much memory has been added, as far as the share of CPU time for it allows, unless that
+        was done a moment ago.
         """
         now_s = self._cpu_s()
         if self._request is not None and now_s >= self._next_s:
             left_s = _MOST_SHARE * (now_s - self._began_s) - self._spent_s
-            self.ask(self._request, until_s=now_s + left_s)
+            if self._count() >= self._at_start + _LEAST_ADDED:
+                self.ask(self._request, until_s=now_s + left_s)
             after_s = self._cpu_s()
             self._spent_s += after_s - now_s
             self._next_s = after_s + _EVERY_S
@@ -70,6 +75,10 @@ class HugePages:
             self._asked.add(address)
             done += request(address)
         return done
+
+    @staticmethod
+    def _count() -> int:
+        return sum(1 for _ in huge_pages(_MAPS.read_text()))
 
 
 def huge_pages(maps: str) -> Iterator[int]:

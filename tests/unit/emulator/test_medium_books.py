@@ -95,6 +95,15 @@ def test_a_node_that_starts_again_has_lost_nothing_on_the_bus(make_scenario: Mak
     assert air.medium.report()["frames"] == {"sent": 3, "delivered": 3, "in_flight": 0, "dropped": {}}
 
 
+def test_a_number_that_makes_no_sense_shows_no_lost_requests(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2}), [0, 100])
+    for at_ms, number in enumerate((7, 5, 1 << 31, (1 << 32) - 1, 0, 2), start=1):
+        air._seq[1] = number
+        air.send(1, at_ms * 2 * MS)
+    air.run()
+    assert air.medium.report()["frames"] == {"sent": 7, "delivered": 6, "in_flight": 0, "dropped": {"bus": 1}}
+
+
 def test_a_driver_hands_receptions_over_in_batches(make_scenario: MakeScenario) -> None:
     air = Air(make_scenario(**{"nodes.count": 2, "radio.handover_ms": 5}), [0, 100])
     air.send(1, 1 * MS)

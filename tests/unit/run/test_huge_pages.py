@@ -1,5 +1,6 @@
 """Huge pages for the memory of a long run."""
 
+import itertools
 import mmap
 import sys
 
@@ -43,6 +44,22 @@ def test_a_page_is_asked_for_once_however_often_a_run_asks() -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the list of a process's memory is Linux's")
+@pytest.mark.parametrize(("added", "asks"), [(16, False), (64, True)])
+def test_a_run_that_adds_little_memory_asks_for_no_page(added: int, asks: bool) -> None:
+    asked: list[int] = []
+
+    def request(address: int) -> bool:
+        asked.append(address)
+        return True
+
+    times_s = itertools.chain((0.0,), itertools.repeat(10.0))
+    pages = HugePages(request, cpu_s=lambda: next(times_s))
+    with mmap.mmap(-1, added * _HUGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS):
+        pages.keep_up()
+    assert bool(asked) is asks
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the list of a process's memory is Linux's")
 def test_requests_take_a_small_share_of_the_cpu_time_however_dear_a_page_is() -> None:
     page_s, step_s, run_s = 0.013, 0.05, 20.0
     spent_s: list[float] = []
@@ -52,8 +69,8 @@ def test_requests_take_a_small_share_of_the_cpu_time_however_dear_a_page_is() ->
         spent_s.append(page_s)
         return True
 
+    pages = HugePages(request, cpu_s=lambda: own_s + sum(spent_s))
     with mmap.mmap(-1, 512 * _HUGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS):  # more than there is time for
-        pages = HugePages(request, cpu_s=lambda: own_s + sum(spent_s))
         while own_s < run_s:
             own_s += step_s
             pages.keep_up()

@@ -30,7 +30,7 @@ class Port(Protocol):
     velocity: Enu
     """The node's last known velocity [m/s]."""
 
-    def transmit(self, frame: bytes, dst: NodeId, *, start_ns: int, wants_status: bool = False) -> int:
+    def transmit(self, frame: bytes, dst: NodeId, start_ns: int, wants_status: bool = False) -> int:
         """Announce a transmission to the radio; returns the sequence number of the request."""
 
     def transmit_together(self, packets: Sequence[Packet], *, flags: int, at_ns: Sequence[int]) -> None:

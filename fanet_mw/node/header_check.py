@@ -2,6 +2,7 @@
 any effect.
 
     origin, transmitter, destination    nodes that exist; the transmitter is the one that the radio names
+    origin                              not this node, unless it knows the packet as its own
     hops                                0 only at the origin; together with the remaining ones at most 255
     instant of generation               not in the future
     sequence number                     not above those for which there was time since swarm instant 0
@@ -14,6 +15,7 @@ node's own packets, because duplicates are found by a hash of the whole packet, 
 (`duplicates.hash_of`).
 """
 
+from collections.abc import Callable
 from typing import Final
 
 from fanet_mw.errors import DropReason
@@ -34,38 +36,44 @@ _BURST: Final = 100_000
 _STEP_US: Final = RESTART_STEP_NS // US
 _NUMBER: Final = CONTROL - 1
 """The bits of a sequence number that count the packets of its kind."""
+_DATA: Final = int(Kind.DATA)
 _HELLO: Final = int(Kind.HELLO)
 
 
 class HeaderCheck:
     """The header check at one node."""
 
-    def __init__(self, node: NodeId, scenario: Scenario) -> None:
+    def __init__(self, node: NodeId, scenario: Scenario, *, handed_on: Callable[[int], bool]) -> None:
+        """`handed_on`: True for the sequence number of a data packet of this node that it has handed over, so that it
+        may come back (`PacketNumbering.handed_on`).
+        """
         clock = scenario.clock
+        self._handed_on = handed_on
         self._node = node
         self._count = scenario.nodes.count
         error_ns = clock.unsynchronized_error_ns(scenario.duration_ns)
         self._youngest_ns = -_AHEAD_NS - (2 * error_ns + S if clock.modelled else 0)
         """The least age of a packet: a packet from further in the future is a lie."""
 
-    def why_not(self, fields: Fields, known: bool, src: NodeId, age_ns: int) -> DropReason | None:
+    def why_not(self, fields: Fields, before: int, src: NodeId, age_ns: int) -> DropReason | None:
         """The reason why the header of a frame that `src` sent is rejected; None if it is accepted.
 
-        `known`: the packet was handled before, in another phase. `age_ns`: the time from the stated instant of its
-        generation to the end of the frame.
+        `before`: the bits of the phases in which the packet was handled before. `age_ns`: the time from the stated
+        instant of its generation to the end of the frame.
         """
         _, _, origin_us, seq, origin, destination, prev_hop, kind, hop_limit, hops, _, _, _, _ = fields
         count = self._count
         if origin > count or prev_hop > count or not (destination <= count or destination == BROADCAST):
             return DropReason.UNKNOWN_NODE
-        if origin == self._node and not known:
+        if origin == self._node and not before and not (kind == _DATA and self._handed_on(seq)):
             return DropReason.OWN
+        number = seq & _NUMBER
         if (
             prev_hop != src
             or (origin != prev_hop and (hops == 0 or kind == _HELLO))
             or hops + hop_limit > MOST_HOPS
             or age_ns < self._youngest_ns
-            or (seq & _NUMBER) - _BURST > origin_us // _STEP_US
+            or (number > _BURST and number - _BURST > origin_us // _STEP_US)  # the first part saves time
         ):
             return DropReason.FORGED
         return None

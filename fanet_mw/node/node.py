@@ -79,8 +79,8 @@ class Node:
         """The length of the longest packet of each priority for which somebody has asked; it never changes."""
         self._reader = reader or Reader()
         self._duplicates = duplicates.DuplicateSet()
-        self._header_check = HeaderCheck(node, scenario)
         self._own = PacketNumbering(node, self._duplicates, most_bytes=scenario.radio.max_frame_bytes)
+        self._header_check = HeaderCheck(node, scenario, handed_on=self._own.handed_on)
         self.port = NodePort(node, scenario, self._duplicates, self._own, position=position)
         self.requests = self.port.requests
         """The transmissions that the actor is to take to the radio."""
@@ -274,10 +274,9 @@ class Node:
         reader = self._reader
         packet_hash, bits = reader.hash, before | reader.phase
         _, _, origin_us, seq, origin, destination, _, kind, _, hops, priority, _, _, _ = reader.fields
-        known = before != 0 or (origin == self.node and kind == _DATA and self._own.handed_on(origin, seq))
         end_ns = reception.end_ns
         age_ns = end_ns - origin_us * US
-        why = self._header_check.why_not(reader.fields, known, reception.src, age_ns)
+        why = self._header_check.why_not(reader.fields, before, reception.src, age_ns)
         if why is not None:
             self._disbelieve(why, packet, now_ns)
             return _NONE

@@ -56,8 +56,8 @@ class PacketNumbering:
         self._duplicates.put(hash_of(frame), duplicates.DELIVERED | PHASES[flags & wire.PHASE_MASK])
         return _new(Packet, (header, frame))
 
-    def handed_on(self, origin: int, seq: int) -> bool:
-        """True if this is a data packet that the node has originated since its start and handed
-        over; it may come back.
+    def handed_on(self, seq: int) -> bool:
+        """True if this is the number of a data packet that the node has originated since its start and handed over; it
+        may come back.
         """
-        return origin == self._node and self._first_seq <= seq < self._next_seq[False]
+        return self._first_seq <= seq < self._next_seq[False]

@@ -50,7 +50,7 @@ class NodePort:
 
     # --- frames ---------------------------------------------------------------------------------------------------
 
-    def transmit(self, frame: bytes, dst: NodeId, *, start_ns: int, wants_status: bool = False) -> int:
+    def transmit(self, frame: bytes, dst: NodeId, start_ns: int, wants_status: bool = False) -> int:
         seq = self.frames_sent
         if self._held and self._let_out(frame, seq, start_ns):
             wants_status = True
@@ -74,7 +74,7 @@ class NodePort:
 
     def relay(self, relay: Relay) -> None:
         packet, start_ns = relay
-        self.transmit(wire.rewrite(packet.frame, self.node, wire.FLAG_FLOOD), BROADCAST, start_ns=start_ns)
+        self.transmit(wire.rewrite(packet.frame, self.node, wire.FLAG_FLOOD), BROADCAST, start_ns)
 
     def relay_together(self, relays: Sequence[Relay]) -> None:
         self._share([(start_ns, self.forwarded(packet, flags=wire.FLAG_FLOOD)) for packet, start_ns in relays])

@@ -27,7 +27,7 @@ class CounterBased(FloodingProtocol):
         self._assess_ns = round(routing.assess_ms * MS)
         self._assessment = Assessment(enough=routing.counter)
 
-    def _consider(self, packet: Packet, *, now_ns: int) -> Sequence[Relay]:
+    def _consider(self, packet: Packet, now_ns: int) -> Sequence[Relay]:
         self._assessment.first_copy(packet, due_ns=now_ns + int(self._random() * self._assess_ns))
         return ()
 

@@ -39,10 +39,10 @@ class FloodingProtocol(RoutingProtocol):
         if is_used_up(header):
             self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
             return ()
-        return self._consider(packet, now_ns=now_ns)
+        return self._consider(packet, now_ns)
 
     @abstractmethod
-    def _consider(self, packet: Packet, *, now_ns: int) -> Sequence[Relay]:
+    def _consider(self, packet: Packet, now_ns: int) -> Sequence[Relay]:
         """Decide about the first copy of a packet that may be relayed; returns the relay if that is decided already."""
 
 
@@ -55,5 +55,5 @@ class Flooding(FloodingProtocol):
         super().__init__(port)
         self._jitter_ns = port.scenario.routing.jitter_ns
 
-    def _consider(self, packet: Packet, *, now_ns: int) -> Sequence[Relay]:
+    def _consider(self, packet: Packet, now_ns: int) -> Sequence[Relay]:
         return ((packet, now_ns + self._lead_ns + int(self._random() * self._jitter_ns)),)

@@ -23,7 +23,7 @@ class Gossip(FloodingProtocol):
         routing = port.scenario.routing
         self._p, self._k, self._jitter_ns = routing.gossip_p, routing.gossip_k, routing.jitter_ns
 
-    def _consider(self, packet: Packet, *, now_ns: int) -> Sequence[Relay]:
+    def _consider(self, packet: Packet, now_ns: int) -> Sequence[Relay]:
         """Relay within k hops, or with probability p; `hops` counts the transmissions before the one received."""
         draw, jitter = self._random(), self._random()
         if packet.header.hops + 1 <= self._k or draw < self._p:

@@ -5,6 +5,7 @@ from kit import MakeScenario
 
 from fanet_mw import wire
 from fanet_mw.errors import DropReason
+from fanet_mw.node.duplicates import DELIVERED
 from fanet_mw.node.header_check import CONTROL, HeaderCheck
 from fanet_mw.units import BROADCAST, US, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Header, Kind
@@ -14,18 +15,20 @@ NOW_NS = 50 * S
 NOW_US = NOW_NS // US
 FIRST = Header(NOW_US, 7, NEIGHBOR, BROADCAST, NEIGHBOR, Kind.DATA, 8, 0, PRIORITY_BULK, FLAG_FLOOD)
 """A neighbor's own packet."""
+HANDED_ON = {8}
+"""The numbers of the data packets that we have handed on."""
 RELAYED = FIRST._replace(origin=FAR, hops=1)
 """One that the neighbor has passed on."""
 
 
 @pytest.fixture
 def plausible(make_scenario: MakeScenario) -> HeaderCheck:
-    return HeaderCheck(OURS, make_scenario(**{"nodes.count": 5}))
+    return HeaderCheck(OURS, make_scenario(**{"nodes.count": 5}), handed_on=HANDED_ON.__contains__)
 
 
-def judged(plausible: HeaderCheck, header: Header, *, src: NodeId = NEIGHBOR, known: bool = False) -> DropReason | None:
+def judged(plausible: HeaderCheck, header: Header, *, src: NodeId = NEIGHBOR, before: int = 0) -> DropReason | None:
     age_ns = NOW_NS - header.origin_us * US
-    return plausible.why_not(wire.fields_of(header.encode()), known, src, age_ns)
+    return plausible.why_not(wire.fields_of(header.encode()), before, src, age_ns)
 
 
 @pytest.mark.parametrize("header", [FIRST, RELAYED, RELAYED._replace(hops=200, hop_limit=55)], ids=str)
@@ -43,7 +46,10 @@ def test_the_last_node_is_one_and_the_next_is_none(plausible: HeaderCheck, field
 def test_a_packet_in_our_own_name_is_ours_only_if_we_have_made_it(plausible: HeaderCheck) -> None:
     header = RELAYED._replace(origin=OURS)
     assert judged(plausible, header) is DropReason.OWN
-    assert judged(plausible, header, known=True) is None, "we know it from the phase before"
+    assert judged(plausible, header, before=DELIVERED) is None, "we know it from the phase before"
+    back = header._replace(seq=8)
+    assert judged(plausible, back) is None, "we have handed it on, and it may come back"
+    assert judged(plausible, back._replace(kind=Kind.SCHEDULE)) is DropReason.OWN, "control is numbered apart"
 
 
 def test_the_transmitter_is_whom_the_radio_names(plausible: HeaderCheck) -> None:
@@ -71,7 +77,7 @@ def test_a_birth_lies_no_further_ahead_than_clocks_may_differ(
     assert judged(plausible, FIRST._replace(origin_us=NOW_US + 100_000)) is None
     assert judged(plausible, FIRST._replace(origin_us=NOW_US + 100_001)) is DropReason.FORGED
     clocks = {"clock.offset_ms": 20, "clock.drift_ppm": 100, "clock.sync": "beacons", "duration_s": 100}
-    drifting = HeaderCheck(OURS, make_scenario(**{"nodes.count": 5, **clocks}))
+    drifting = HeaderCheck(OURS, make_scenario(**{"nodes.count": 5, **clocks}), handed_on=HANDED_ON.__contains__)
     most_us = 100_000 + 2 * (20_000 + 100 * 100) + 1_000_000
     assert judged(drifting, FIRST._replace(origin_us=NOW_US + most_us)) is None
     assert judged(drifting, FIRST._replace(origin_us=NOW_US + most_us + 1)) is DropReason.FORGED

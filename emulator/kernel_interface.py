@@ -22,6 +22,7 @@ from fanet_mw.scenario import Scenario
 _ROW: Final = struct.Struct("=6q")
 """The layout of one row of `asked` and of `out`."""
 _pack, _unpack, _ROW_BYTES = _ROW.pack_into, _ROW.iter_unpack, _ROW.size
+_ASKED_N, _OUT_N = s.ASKED_N, s.OUT_N
 Rows = list[tuple[int, ...]]
 
 
@@ -106,28 +107,28 @@ class KernelInterface:
             radio = self._radio
             airtime = self._airtime[size] = airtime_ns(size + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
         counts = self._counts
-        asked = counts[s.ASKED_N]
+        asked = counts[_ASKED_N]
         _pack(self._asked_bytes, asked * _ROW_BYTES, slot, src, dst, airtime, start_ns, wants_status)
-        counts[s.ASKED_N] = asked + 1
+        counts[_ASKED_N] = asked + 1
         if start_ns + airtime < self.next_output_ns or asked + 1 == MOST_ASKED:
             self._take_in()
 
     def _take_in(self) -> None:
         """Pass the requests that wait in `asked` to the kernel."""
         counts, a = self._counts, self.arrays
-        if counts[s.HS_N] + counts[s.ASKED_N] + 2 * kernel.MARGIN > len(a.hs):
+        if counts[s.HS_N] + counts[_ASKED_N] + 2 * kernel.MARGIN > len(a.hs):
             self._more_starts(len(a.hs))
         self.next_output_ns = kernel.take_in(a.g, a.p, a.st, a.fr, a.hs, a.asked, self.next_output_ns)
 
     def advance(self, until_ns: int) -> Rows:
         """Let time pass until `until_ns`; returns the output rows (`emulator.kernel.state.OUT_*`) in order."""
         bound_ns = self._entry.advance(until_ns)
-        rows: Rows = list(_unpack(self._out_rows[self._counts[s.OUT_N]]))
+        rows: Rows = list(_unpack(self._out_rows[self._counts[_OUT_N]]))
         while bound_ns < 0:  # the kernel has stopped on the way, because `out` was full, or else `hs`
-            if not self._counts[s.OUT_N]:
+            if not self._counts[_OUT_N]:
                 self._more_starts(len(self.arrays.hs))
             bound_ns = self._entry.advance(until_ns)
-            rows += _unpack(self._out_rows[self._counts[s.OUT_N]])
+            rows += _unpack(self._out_rows[self._counts[_OUT_N]])
         self.next_output_ns = bound_ns
         return rows
 

@@ -140,52 +140,54 @@ class VirtualHost:
         """
         heap, armed, wakes, asks = self._heap, self._armed, self._wakes, self._asks
         queue, routes, now_ns = self._queue, self._routes, self.now_ns
+        latest, seq = self._latest, self._seq
         push_and_pop, pop, push = heapq.heappushpop, heapq.heappop, heapq.heappush
-        while True:
-            if awake is None:
-                latest = self._latest
-                if latest is not None:
-                    entry = push_and_pop(heap, latest)
-                elif heap:
-                    entry = pop(heap)
-                else:
-                    return
-                t_ns, _, index = entry
-                if t_ns > until_ns:
-                    self._latest = entry
-                    return
-                self._latest = None
-                if armed[index] != t_ns:
-                    continue  # the actor has requested another wake-up since
-                armed[index] = None
-                if t_ns > now_ns:
-                    self.now_ns = now_ns = t_ns
-                    self._stalled = 0
-                else:
-                    self._watch(index)
-                wakes[index](now_ns)
-                awake = {index: None}
-            for topic, message in queue:  # deliveries may append further messages to the queue
-                try:
-                    route = routes[topic]
-                except KeyError:
-                    route = routes[topic] = self._resolve(topic)
-                for index, receive in route:
-                    if not receive(topic, message, now_ns):
-                        awake[index] = None  # the keys of a dict keep their order, and each occurs once
-            queue.clear()
-            for index in awake:
-                wake_ns = asks[index]()
-                if wake_ns is not None and wake_ns < now_ns:
-                    wake_ns = now_ns  # an instant in the past counts as now
-                if wake_ns != armed[index]:
-                    armed[index] = wake_ns
-                    if wake_ns is not None:
-                        self._seq = seq = self._seq + 1
-                        if self._latest is not None:
-                            push(heap, self._latest)
-                        self._latest = wake_ns, seq, index
-            awake = None
+        try:
+            while True:
+                if awake is None:
+                    if latest is not None:
+                        latest = push_and_pop(heap, latest)
+                    elif heap:
+                        latest = pop(heap)
+                    else:
+                        return
+                    t_ns, _, index = latest
+                    if t_ns > until_ns:
+                        return
+                    latest = None
+                    if armed[index] != t_ns:
+                        continue  # the actor has requested another wake-up since
+                    armed[index] = None
+                    if t_ns > now_ns:
+                        self.now_ns = now_ns = t_ns
+                        self._stalled = 0
+                    else:
+                        self._watch(index)
+                    wakes[index](now_ns)
+                    awake = {index: None}
+                for topic, message in queue:  # deliveries may append further messages to the queue
+                    try:
+                        route = routes[topic]
+                    except KeyError:
+                        route = routes[topic] = self._resolve(topic)
+                    for index, receive in route:
+                        if not receive(topic, message, now_ns):
+                            awake[index] = None  # the keys of a dict keep their order, and each occurs once
+                queue.clear()
+                for index in awake:
+                    wake_ns = asks[index]()
+                    if wake_ns is not None and wake_ns < now_ns:
+                        wake_ns = now_ns  # an instant in the past counts as now
+                    if wake_ns != armed[index]:
+                        armed[index] = wake_ns
+                        if wake_ns is not None:
+                            seq += 1
+                            if latest is not None:
+                                push(heap, latest)
+                            latest = wake_ns, seq, index
+                awake = None
+        finally:
+            self._latest, self._seq = latest, seq
 
     def _hand_over(self) -> None:
         """Pass on the trace records, once per call from outside; each record states its own instant."""

@@ -14,8 +14,8 @@ from typing import Final, NamedTuple
 from fanet_mw import wire
 from fanet_mw.bus.messages import Reception, TxStatus
 from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
-from fanet_mw.node import duplicates
 from fanet_mw.node.contract import Port, RoutingProtocol
+from fanet_mw.node.duplicates import DELIVERED, DuplicateSet
 from fanet_mw.node.header_check import HeaderCheck
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.node.packet_numbering import PacketNumbering
@@ -78,7 +78,7 @@ class Node:
         self._most_bytes: dict[int, int] = {}
         """The length of the longest packet of each priority for which somebody has asked; it never changes."""
         self._reader = reader or Reader()
-        self._duplicates = duplicates.DuplicateSet()
+        self._duplicates = DuplicateSet()
         self._own = PacketNumbering(node, self._duplicates, most_bytes=scenario.radio.max_frame_bytes)
         self._header_check = HeaderCheck(node, scenario, handed_on=self._own.handed_on)
         self.port = NodePort(node, scenario, self._duplicates, self._own, position=position)
@@ -290,8 +290,8 @@ class Node:
             self.port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
             return _NONE
         to_us = destination == BROADCAST or destination == self.node
-        if kind == _DATA and to_us and not before & duplicates.DELIVERED:
-            bits |= duplicates.DELIVERED
+        if kind == _DATA and to_us and not before & DELIVERED:
+            bits |= DELIVERED
             if self.listened is None or packet.frame[wire.INNER_ID] in self.listened:
                 self.deliveries.append(packet)
             late_ns = now_ns - end_ns

@@ -11,11 +11,20 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, Final, TypeVar
 
-from fanet_mw import wire
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.node.duplicates import PHASES, hash_of, key_of
 from fanet_mw.node.packet import Packet
-from fanet_mw.wire import Content, Kind
+from fanet_mw.wire import (
+    END_TO_END,
+    FLAG_MORE,
+    HEADER_BYTES,
+    NO_FIELDS,
+    PHASE_MASK,
+    Content,
+    Kind,
+    checked,
+    fields_of,
+)
 
 _new: Final = tuple.__new__  # faster than the constructor, for objects that are made once per frame
 _HELLO: Final = int(Kind.HELLO)
@@ -51,7 +60,7 @@ class Reader:
         holds several packets."""
         self.packet: Packet | None = None
         """The packet in the frame; None until `read` has been called."""
-        self.fields = wire.NO_FIELDS
+        self.fields = NO_FIELDS
         """The fields of the header, which may be nonsense until `read` has checked them."""
         self._hashes: dict[bytes, tuple[int, bytes, int]] = {}
         """The length, the inner frames and the hash of packets that were looked at lately, by what no hop changes in
@@ -73,24 +82,24 @@ class Reader:
         that more packets follow is ignored.
         """
         self.frame, self.packet = frame, None
-        fields = self.fields = wire.fields_of(frame)
+        fields = self.fields = fields_of(frame)
         flags = fields[_FLAGS]
-        if flags & wire.FLAG_MORE and not alone:
+        if flags & FLAG_MORE and not alone:
             self.hash, self.phase = 0, BUNDLE
         else:
-            name = frame[wire.END_TO_END]
+            name = frame[END_TO_END]
             size, inner, packet_hash = self._hashes.get(name, _UNKNOWN)
             # packets that differ only in their inner frames are told apart by them: no copy is taken for another packet
             same = len(frame) == size and frame.endswith(inner)
             self.hash = packet_hash if same else self._remember(name, frame)
-            self.phase = PHASES.get(flags & wire.PHASE_MASK, 0)
+            self.phase = PHASES.get(flags & PHASE_MASK, 0)
 
     def _remember(self, name: bytes, frame: bytes) -> int:
         """Compute the hash of a packet, and keep it for its further copies."""
         if len(self._hashes) >= _REMEMBERED:
             self._hashes.clear()
         packet_hash = hash_of(frame)
-        self._hashes[name] = len(frame), frame[wire.HEADER_BYTES :], packet_hash
+        self._hashes[name] = len(frame), frame[HEADER_BYTES:], packet_hash
         return packet_hash
 
     def read(self, cached: bool = True) -> Packet:
@@ -105,7 +114,7 @@ class Reader:
         if cached and fields[_KIND] == _HELLO:
             packet = packet_of(frame)
         else:
-            packet = _new(Packet, (wire.checked(frame, fields), frame))
+            packet = _new(Packet, (checked(frame, fields), frame))
         self.packet = packet
         return packet
 

@@ -40,9 +40,10 @@ from sim.scenarios import catalog
 
 NAMES = Topics("test")
 SMALL = [
-    "nodes.count=4", "clusters.count=1", "duration_s=4", "warmup_s=1", "drain_s=1", "clusters.flooding_period_s=0.5",
+    "nodes.count=4", "clusters.count=1", "duration_s=7", "warmup_s=4", "drain_s=1", "clusters.flooding_period_s=0.5",
     "radio.lead_ms=150",
 ]  # fmt: skip
+"""The timetable is in force before the warm-up ends: within 4 s with 24 of 24 seeds, within 1 s with 16."""
 SETTLE_S = 0.5
 
 pytestmark = pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl")
@@ -190,7 +191,7 @@ def test_a_swarm_of_processes_works_with_keys_and_access_lists(keys: Path) -> No
     assert summary["heard"]["malformed"] == 0
     assert summary["frames"]["sent"] > 30
     assert summary["frames"]["closes"]
-    assert summary["pdr"] > 0.5
+    assert summary["pdr"] > 0.9
 
 
 def test_a_file_that_is_no_configuration_is_one_message(tmp_path: Path) -> None:

@@ -109,12 +109,13 @@ def test_links_are_measured_and_a_timetable_made_of_them_by_real_processes() -> 
 
 @pytest.mark.timeout(LIMIT_S)
 def test_a_swarm_of_processes_delivers_and_accounts_for_every_frame(tmp_path: Path) -> None:
-    outcome, _ = undisturbed(lambda slower: run(scenario(slower))[0])
+    times = ["duration_s=7", "warmup_s=4"]  # 2 s are too short for the timetable with 7 of 24 seeds
+    outcome, _ = undisturbed(lambda slower: run(scenario(*times, slower))[0])
     summary = finish(outcome, out=tmp_path / "out")
     assert summary["mode"] == "realtime"
     assert summary["frames"]["closes"]
     assert summary["frames"]["sent"] > 100
-    assert summary["pdr"] > 0.5
+    assert summary["pdr"] > 0.7
     frames = summary["frames"]
     assert summary["lateness"]["frames"] >= frames["sent"] - frames["dropped"].get("bus", 0)
     assert {report["host"]["malformed"] for report in outcome.reports.values()} == {0}

@@ -51,6 +51,15 @@ def test_ties_go_by_the_order_in_which_wakes_were_asked_for() -> None:
     assert [name for _, name in ear.log[1:]] == ["s0", "s1", "s2", "s3", "s4"]
 
 
+def test_ties_go_by_that_order_over_several_runs_too() -> None:
+    ear = Script("ear", [], hears=("t/x",))
+    host = VirtualHost([ear, Script("second", [2 * MS, 10 * MS]), Script("first", [MS, 10 * MS])])
+    host.start()
+    for until_ns in (MS, 2 * MS, 10 * MS):
+        host.run(until_ns)
+    assert [name for t_ns, name in ear.log if t_ns == 10 * MS] == ["first", "second"]
+
+
 def test_running_in_steps_is_running_at_once() -> None:
     def log(steps: list[int]) -> list[tuple[int, str]]:
         ear = Script("ear", [], hears=("t/*",))

@@ -122,15 +122,16 @@ class KernelInterface:
 
     def advance(self, until_ns: int) -> Rows:
         """Let time pass until `until_ns`; returns the output rows (`emulator.kernel.state.OUT_*`) in order."""
-        bound_ns = self._entry.advance(until_ns)
-        rows: Rows = list(_unpack(self._out_rows[self._counts[_OUT_N]]))
-        while bound_ns < 0:  # the kernel has stopped on the way, because `out` was full, or else `hs`
-            if not self._counts[_OUT_N]:
-                self._more_starts(len(self.arrays.hs))
+        rows: Rows = []
+        while True:
             bound_ns = self._entry.advance(until_ns)
-            rows += _unpack(self._out_rows[self._counts[_OUT_N]])
-        self.next_output_ns = bound_ns
-        return rows
+            count = self._counts[_OUT_N]
+            rows += _unpack(self._out_rows[count])
+            if bound_ns >= 0:
+                self.next_output_ns = bound_ns
+                return rows
+            if not count:  # the kernel has stopped on the way, not because `out` was full, but `hs`
+                self._more_starts(len(self.arrays.hs))
 
     def _more_starts(self, rows: int) -> None:
         """Make room for `rows` more planned starts of frames."""

@@ -40,7 +40,7 @@ class HugePages:
         """
         self._request = request or _to_kernel()
         self._cpu_s = cpu_s
-        self._at_start = self._count() if self._request else 0
+        self._at_start = len(_pages()) if self._request else 0
         """The number of huge pages into which the memory fitted when the run began."""
         self._asked: set[int] = set()
         """The addresses for which a page was asked for already."""
@@ -56,18 +56,17 @@ class HugePages:
         now_s = self._cpu_s()
         if self._request is not None and now_s >= self._next_s:
             left_s = _MOST_SHARE * (now_s - self._began_s) - self._spent_s
-            if self._count() >= self._at_start + _LEAST_ADDED:
-                self.ask(self._request, until_s=now_s + left_s)
+            self.ask(self._request, least=self._at_start + _LEAST_ADDED, until_s=now_s + left_s)
             after_s = self._cpu_s()
             self._spent_s += after_s - now_s
             self._next_s = after_s + _EVERY_S
 
-    def ask(self, request: Request, *, until_s: float = math.inf) -> int:
-        """Ask for every page once, until the process has taken this much CPU time; returns for how many the kernel
-        does as it is asked.
+    def ask(self, request: Request, *, least: int = 0, until_s: float = math.inf) -> int:
+        """Ask for every page once, if there are at least this many, until the process has taken this much CPU time;
+        returns for how many the kernel does as it is asked.
         """
-        done = 0
-        for address in huge_pages(_MAPS.read_text()):
+        done, pages = 0, _pages()
+        for address in pages if len(pages) >= least else ():
             if address in self._asked:
                 continue
             if self._cpu_s() >= until_s:
@@ -76,9 +75,10 @@ class HugePages:
             done += request(address)
         return done
 
-    @staticmethod
-    def _count() -> int:
-        return sum(1 for _ in huge_pages(_MAPS.read_text()))
+
+def _pages() -> list[int]:
+    """The huge pages of this process."""
+    return list(huge_pages(_MAPS.read_text()))
 
 
 def huge_pages(maps: str) -> Iterator[int]:

@@ -8,6 +8,7 @@ needs a `tests/benchmarks/simulation_speed.py`. The default takes 8 minutes.
 """
 
 import argparse
+import json
 import math
 import os
 import subprocess
@@ -17,32 +18,27 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from statistics import median, stdev
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
+
+from simulation_speed import INTERVALS_S, settings_of_one_source
 
 _ROOT: Final = Path(__file__).parents[2]
 _RUN: Final = """
+import json
 import sys
 from time import process_time
 import simulation_speed as speed
 
-def one_source(count):
-    return speed.timed(speed.config.build({
-        "duration_s": 20,
-        "nodes": {"count": count, "telemetry_hz": 0},
-        "routing": {"protocol": "flooding", "hello_interval_s": 0, "hop_limit": 128},
-        "clusters": {"count": 1},
-        "traffic": {"sources": 1, "interval_s": 1.0},
-        "radio": {"access": "ns3", "lead_ms": 0},
-    }))
-
-case, *values = sys.argv[1:]
+case = json.loads(sys.argv[1])
 speed.grid(1.0, 2.0)  # the kernel is loaded
 began_s = process_time()
-found = speed.grid(*map(float, values)) if case == "grid" else one_source(int(values[0]))
+found = speed.grid(*case) if isinstance(case, list) else speed.timed(speed.config.build(case))
 print(found["cpu_s"], process_time() - began_s, found["frames"]["sent"])
 """
-"""Runs one case with the `simulation_speed` of either tree. It makes the swarms of one source itself, because that of
-this tree times each of them three times."""
+"""Runs one case with the `simulation_speed` of either tree: on the grid, or a scenario by its settings. Swarms of one
+source come as settings, because `one_source` of this tree times each of them three times."""
+Case = list[float] | dict[str, Any]
+"""The interval between packets and the length of a run on the grid [s], or the settings of a scenario."""
 
 
 class Timed(NamedTuple):
@@ -53,11 +49,11 @@ class Timed(NamedTuple):
     frames: int
 
 
-def timed(tree: Path, case: str) -> Timed:
-    """Run a case, `grid INTERVAL_S SECONDS` or `one_source NODES`, with the code of a tree."""
+def run(tree: Path, case: Case) -> Timed:
+    """Run a case with the code of a tree."""
     path = os.pathsep.join((str(tree), str(tree / "tests" / "benchmarks")))
     found = subprocess.run(
-        [sys.executable, "-c", _RUN, *case.split()],
+        [sys.executable, "-c", _RUN, json.dumps(case)],
         cwd=tree, env={**os.environ, "PYTHONPATH": path}, check=True, capture_output=True, text=True,
     )  # fmt: skip
     cpu_s, whole_s, frames = found.stdout.split()
@@ -76,15 +72,13 @@ def _tree_of(revision: str) -> Iterator[Path]:
             subprocess.run(["git", "worktree", "remove", "--force", tree], cwd=_ROOT, check=True)
 
 
-def in_turns(case: str, theirs: Path, *, turns: int) -> list[tuple[Timed, Timed]]:
+def in_turns(case: Case, theirs: Path, *, turns: int) -> list[tuple[Timed, Timed]]:
     """A case by this code and by theirs; they begin by turns."""
     found = []
     for turn in range(turns):
-        if turn % 2:
-            other = timed(theirs, case)
-            found.append((timed(_ROOT, case), other))
-        else:
-            found.append((timed(_ROOT, case), timed(theirs, case)))
+        trees = (theirs, _ROOT) if turn % 2 else (_ROOT, theirs)
+        timed = {tree: run(tree, case) for tree in trees}
+        found.append((timed[_ROOT], timed[theirs]))
     return found
 
 
@@ -102,16 +96,20 @@ def main() -> int:
     chosen = flags.parse_args()
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
-    cases = [f"grid {interval_s} {seconds}" for seconds in chosen.seconds for interval_s in (1.0, 0.1)]
-    cases += [f"one_source {size}" for size in chosen.sizes]
+    cases: dict[str, Case] = {
+        f"grid {interval_s} {seconds}": [interval_s, seconds]
+        for seconds in chosen.seconds
+        for interval_s in INTERVALS_S
+    }
+    cases |= {f"one_source {size}": settings_of_one_source(size) for size in chosen.sizes}
     print(f"CPU time relative to {chosen.revision}, {chosen.turns} turns")
     print("case (interval s, seconds; nodes)   CPU of the run   with its summary   frames")
     with _tree_of(chosen.revision) as tree:
-        for case in cases:
+        for name, case in cases.items():
             pairs = in_turns(case, tree, turns=chosen.turns)
             same = "the same" if all(a.frames == b.frames for a, b in pairs) else "differ"
-            run, whole = [a.cpu_s / b.cpu_s for a, b in pairs], [a.whole_s / b.whole_s for a, b in pairs]
-            print(f"{case:34}  {_shown(run)}   {_shown(whole)}     {same}", flush=True)
+            cpu, whole = [a.cpu_s / b.cpu_s for a, b in pairs], [a.whole_s / b.whole_s for a, b in pairs]
+            print(f"{name:34}  {_shown(cpu)}   {_shown(whole)}     {same}", flush=True)
     return 0
 
 

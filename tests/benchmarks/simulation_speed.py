@@ -17,7 +17,7 @@ from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 
-_INTERVALS_S: Final = (1.0, 0.1)
+INTERVALS_S: Final = (1.0, 0.1)
 _SIZES: Final = (45, 100, 200, 400, 1000)
 _ASKED_EXPONENT: Final = 1.2
 
@@ -36,18 +36,20 @@ def grid(interval_s: float, seconds: float) -> dict[str, Any]:
     return timed(catalog.find("flooding", settings))
 
 
-def one_source(count: int) -> dict[str, Any]:
+def settings_of_one_source(count: int) -> dict[str, Any]:
     """1 packet per second from one node, 20 s, at the density of the grid."""
-    scenario = config.build(
-        {
-            "duration_s": 20,
-            "nodes": {"count": count, "telemetry_hz": 0},
-            "routing": {"protocol": "flooding", "hello_interval_s": 0, "hop_limit": 128},
-            "clusters": {"count": 1},
-            "traffic": {"sources": 1, "interval_s": 1.0},
-            "radio": {"access": "ns3", "lead_ms": 0},
-        }
-    )
+    return {
+        "duration_s": 20,
+        "nodes": {"count": count, "telemetry_hz": 0},
+        "routing": {"protocol": "flooding", "hello_interval_s": 0, "hop_limit": 128},
+        "clusters": {"count": 1},
+        "traffic": {"sources": 1, "interval_s": 1.0},
+        "radio": {"access": "ns3", "lead_ms": 0},
+    }
+
+
+def one_source(count: int) -> dict[str, Any]:
+    scenario = config.build(settings_of_one_source(count))
     runs = [timed(scenario) for _ in range(3)]  # one of them may collect the garbage of earlier runs
     return min(runs, key=lambda run: run["cpu_s"])
 
@@ -59,7 +61,7 @@ def main() -> int:
     simulate(catalog.find("flooding", ["duration_s=2"]))  # the kernel is loaded
     print(f"9 x 5 grid, flooding by 44 sources, {seconds:g} s simulated")
     print("interval s   CPU s  with results  frames   us/frame  PDR")
-    for interval_s in _INTERVALS_S:
+    for interval_s in INTERVALS_S:
         found = grid(interval_s, seconds)
         cpu_s, frames = found["cpu_s"], found["frames"]["sent"]
         print(

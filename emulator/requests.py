@@ -25,7 +25,7 @@ class RequestNumbers:
         self._first = [0] * stations
         """The number of the first request of each node since its numbers last began anew."""
         self._earlier = [0] * stations
-        """The number of requests that each node had made before that one."""
+        """The number of requests that each node had made before its numbers last began anew."""
         self._before = [0] * stations
         """The number of requests that each node had made before its process was restarted."""
 

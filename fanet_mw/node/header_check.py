@@ -3,9 +3,10 @@ any effect.
 
     origin, transmitter, destination    nodes that exist; the transmitter is the one that the radio names
     origin                              not this node, unless it knows the packet as its own
-    hops                                0 only at the origin; together with the remaining ones at most 255
+    hops                                0 only at the origin; hops made and hop limit are at most 255 together
+    kind                                nobody relays a hello
     instant of generation               not in the future
-    sequence number                     not above those for which there was time since swarm instant 0
+    sequence number                     not greater than a node had time to reach since swarm instant 0
 
 Frames that cannot be decoded (`reader.py`) are counted as `malformed` by the node (`node.py`). A packet that was
 recorded and is sent again is a copy (`duplicates.py`), or has outlived its lifetime (`expired`, `node.py`).
@@ -32,7 +33,8 @@ one is noticed."""
 _AHEAD_NS: Final = 100 * MS
 """How far ahead an instant of generation may be if all clocks are exact, because hosts get their time over a bus."""
 _BURST: Final = 100_000
-"""How far ahead sequence numbers may be of one per `RESTART_STEP_NS`: ten seconds of the densest traffic."""
+"""A sequence number may be greater by this than one packet per `RESTART_STEP_NS` would reach: it is ten seconds of the
+densest traffic."""
 _STEP_US: Final = RESTART_STEP_NS // US
 _NUMBER: Final = CONTROL - 1
 """The bits of a sequence number that count the packets of its kind."""
@@ -53,7 +55,8 @@ class HeaderCheck:
         self._count = scenario.nodes.count
         error_ns = clock.unsynchronized_error_ns(scenario.duration_ns)
         self._youngest_ns = -_AHEAD_NS - (2 * error_ns + S if clock.modelled else 0)
-        """The least age of a packet: a packet from further in the future is a lie."""
+        """The least age of a packet. It is negative, because clocks differ: a packet from further in the future is a
+        lie."""
 
     def why_not(self, fields: Fields, before: int, src: NodeId, age_ns: int) -> DropReason | None:
         """The reason why the header of a frame that `src` sent is rejected; None if it is accepted.
@@ -73,7 +76,7 @@ class HeaderCheck:
             or (origin != prev_hop and (hops == 0 or kind == _HELLO))
             or hops + hop_limit > MOST_HOPS
             or age_ns < self._youngest_ns
-            or (number > _BURST and number - _BURST > origin_us // _STEP_US)  # the first part saves time
+            or (number > _BURST and number - _BURST > origin_us // _STEP_US)  # the first comparison spares most packets the division
         ):
             return DropReason.FORGED
         return None

@@ -62,8 +62,8 @@ class HugePages:
             self._next_s = after_s + _EVERY_S
 
     def ask(self, request: Request, *, least: int = 0, until_s: float = math.inf) -> int:
-        """Ask for every page once, if there are at least this many, until the process has taken this much CPU time;
-        returns for how many the kernel does as it is asked.
+        """Ask for every page once, if there are at least `least` pages, until the process has taken `until_s` of CPU
+        time; returns the number of pages that the kernel has moved.
         """
         done, pages = 0, _pages()
         for address in pages if len(pages) >= least else ():

@@ -1,7 +1,7 @@
 """Speed beside earlier code: `python tests/benchmarks/beside_commit.py REVISION [--turns N] [--seconds S ...]`.
 
-The runs of `simulation_speed` (plain flooding on the grid, and by one source in swarms of several sizes) by the code of
-this work tree and by that of a commit of this repository, in turns on one processor. Every run has a new process,
+The code of this work tree and that of a commit of this repository make the runs of `simulation_speed` (plain flooding
+on the grid, and by one source in swarms of several sizes) in turns on one processor. Every run has a new process,
 because where a process has its memory changes its speed by a percent or two. For each case it prints the CPU time of
 this code divided by that of the commit: the median over the turns, and the standard error of their mean. The commit
 needs a `tests/benchmarks/simulation_speed.py`. The default takes 8 minutes.
@@ -45,7 +45,7 @@ class Timed(NamedTuple):
     cpu_s: float
     """The CPU time of the run."""
     whole_s: float
-    """That of the run with its summary."""
+    """The CPU time of the run with its summary."""
     frames: int
 
 
@@ -62,7 +62,7 @@ def run(tree: Path, case: Case) -> Timed:
 
 @contextmanager
 def _tree_of(revision: str) -> Iterator[Path]:
-    """The files of a commit, in a folder for a while."""
+    """A temporary folder with the files of a commit."""
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder) / "tree"
         subprocess.run(["git", "worktree", "add", "--detach", "--quiet", tree, revision], cwd=_ROOT, check=True)
@@ -73,7 +73,7 @@ def _tree_of(revision: str) -> Iterator[Path]:
 
 
 def in_turns(case: Case, theirs: Path, *, turns: int) -> list[tuple[Timed, Timed]]:
-    """A case by this code and by theirs; they begin by turns."""
+    """The times of a case with this code and with theirs; each of the two begins every other turn."""
     found = []
     for turn in range(turns):
         trees = (theirs, _ROOT) if turn % 2 else (_ROOT, theirs)

@@ -76,7 +76,7 @@ class HeaderCheck:
             or (origin != prev_hop and (hops == 0 or kind == _HELLO))
             or hops + hop_limit > MOST_HOPS
             or age_ns < self._youngest_ns
-            or (number > _BURST and number - _BURST > origin_us // _STEP_US)  # the first comparison spares most packets the division
+            or (number > _BURST and number - _BURST > origin_us // _STEP_US)  # mostly no division
         ):
             return DropReason.FORGED
         return None

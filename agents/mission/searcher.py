@@ -79,7 +79,7 @@ class Searcher:
         own_motion = OwnMotion(position, obstacles)
         self._neighbors = neighbors = NeighborMotions(hello_interval_s=scenario.routing.hello_interval_s)
         self._radar = RadarWatch(own_motion, obstacles, neighbors, mission.avoid_by)
-        self._place = place = FormationPlace(node, own_motion, reach_m=reach_m)
+        self._place = place = FormationPlace(node, own_motion, reach_m=reach_m, look_m=_view_m(scenario)[0])
         least_m_s, _ = mission.approach_speeds_m_s
         nodes = scenario.nodes
         planner = FormationPlanner(
@@ -94,7 +94,10 @@ class Searcher:
         self._reception = PhoneReception(scenario, node, survivors, own_motion, outbox, coverage)
         self._sightings = Sightings(scenario, node, survivors, own_motion, outbox)
         self._announcing = Announcing(node, survivors, outbox)
-        approach = Approach(node, survivors, own_motion, outbox, arrival_m=mission.arrival_m, speed_m_s=speed_m_s)
+        approach = Approach(
+            node, survivors, own_motion, outbox,
+            arrival_m=mission.arrival_m, speed_m_s=speed_m_s, look_m=min(_view_m(scenario)),
+        )  # fmt: skip
         self._bidding = Bidding(
             scenario, node, survivors=survivors, own_motion=own_motion, formation=place, approach=approach,
             outbox=outbox, speed_m_s=speed_m_s,
@@ -149,7 +152,7 @@ class Searcher:
         self._identify(now_ns)
         self._announcing.tell(self._bidding.survivor, now_ns)
         if not self._return_home.leaves:
-            self._bidding.bid(now_ns)
+            self._bidding.bid(now_ns, delay_s=self._flight.take_off_s)
             self._bidding.choose(now_ns)
         self._mode.review(self._bidding.survivor, now_ns)
 
@@ -283,6 +286,18 @@ def phone_model(scenario: Scenario) -> PhoneModel:
         mission.detection_dbm,
         scenario.world.area_m / 2,
     )
+
+
+def _view_m(scenario: Scenario) -> tuple[float, float]:
+    """How far to the east and west, and to the north and south, a camera shows the ground from the height of the
+    search; infinite for a UAV without a camera.
+    """
+    sensors = scenario.sensors
+    if not sensors.camera_hz:
+        return math.inf, math.inf
+    wide_m = scenario.nodes.altitude_m * math.tan(math.radians(sensors.camera_fov_deg) / 2)
+    width, height = sensors.camera_pixels
+    return wide_m, wide_m * height / width
 
 
 def formation(scenario: Scenario, count: int) -> Pattern | None:

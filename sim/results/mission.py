@@ -7,6 +7,7 @@ swarm.
     confirmed   survivors whom a UAV announced within 25 m of their true place and did not take back; farther ones are
                 mistaken. The error is that of the first announced place, for both
     reopened    confirmations that were taken back, because later receptions contradicted them
+    wait        time from the first reception of a survivor's phone by any UAV to the right confirmation
     nearest     distance of each living UAV to the nearest other one, once a second
 
 Positions are the true ones, once a second (`Posed`).
@@ -62,6 +63,7 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
     """The table `mission` of the summary."""
     truth = place(scenario)
     first: dict[int, int] = {}
+    heard: dict[int, int] = {}
     errors: list[float] = []
     found = Confirmations(truth)
     for record in records_of(records, Approaching, Confirmed, Refuted):
@@ -72,17 +74,20 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
                 errors.append(math.hypot(at.east - record.east_m, at.north - record.north_m))
         else:
             found.add(record)
+    for detected in records_of(records, Detected):
+        heard.setdefault(detected.survivor, detected.t_ns)
     right, mistaken = found.right(), found.mistaken()
     confirmed = [*right, *mistaken]
     return {
         "survivors": scenario.mission.survivors,
-        "detected": len({r.survivor for r in records_of(records, Detected)}),
+        "detected": len(heard),
         "approached": len({r.survivor for r in records_of(records, Approaching)}),
         "reached": len({r.survivor for r in records_of(records, Arrived)}),
         "confirmed": len(right),
         "mistaken": len(mistaken),
         "reopened": found.reopened,
         "time_to_confirm_s": sorted(round(one.t_ns / S, 3) for one in right),
+        "wait_s": _waits([(one.t_ns - heard[one.survivor]) / S for one in right if one.survivor in heard]),
         "uavs_approaching": len(first),
         "time_to_approach_s": sorted(round(t_ns / S, 3) for t_ns in first.values()),
         "localization_error_m": _median(errors),
@@ -132,6 +137,13 @@ class Confirmations:
 def _takes_back(refuted: Refuted, confirmed: Confirmed) -> bool:
     """True if the refutation is about this confirmation, or about another one at the same place."""
     return math.hypot(refuted.east_m - confirmed.east_m, refuted.north_m - confirmed.north_m) <= SAME_PLACE_M
+
+
+def _waits(values_s: list[float]) -> dict[str, float | None]:
+    """The median and the greatest of some times."""
+    if not values_s:
+        return {"p50": None, "max": None}
+    return {"p50": round(statistics.median(values_s), 3), "max": round(max(values_s), 3)}
 
 
 def _median(values: list[float]) -> float | None:

@@ -18,7 +18,7 @@ b. Once a person has been recognized as the phone's owner, the position of that 
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache, reduce
 from itertools import compress
 from operator import add, and_, mul
@@ -240,6 +240,19 @@ class PhoneFilter:
         if not (0 <= i <= 2 * _HALF_CELLS and 0 <= j <= 2 * _HALF_CELLS):
             return math.inf
         return self._best - self._totals[j * _WIDTH + i]
+
+    def likely_cells(self, most: float) -> Iterator[tuple[float, float, float]]:
+        """East and north of each cell whose `deficit` is at most this, and the deficit; none before the phone was
+        received.
+        """
+        self._catch_up()
+        if self._middle is None:
+            return
+        west, south = self._middle.east - _HALF_CELLS * _CELL_M, self._middle.north - _HALF_CELLS * _CELL_M
+        possible = _inside(self._middle, self._model.half_m + _CELL_M / 2)
+        for cell, (total, inside) in enumerate(zip(self._totals, possible, strict=False)):
+            if inside and self._best - total <= most:
+                yield west + cell % _WIDTH * _CELL_M, south + cell // _WIDTH * _CELL_M, self._best - total
 
     def near(self, place: Enu, *, within_m: float) -> bool:
         """True if the middle of the grid is within a distance of a place, or if the phone was not received yet.

@@ -51,6 +51,11 @@ class Flight:
         """True from the start of a UAV that stands on the ground until it has taken off, or leaves its mission."""
         return self._take_off is not None and self._take_off.lasts and not self._return_home.leaves
 
+    @property
+    def take_off_s(self) -> float:
+        """The time that the take-off still takes; 0 for a UAV in the air."""
+        return self._take_off.left_s if self._take_off is not None else 0.0
+
     def _climbs(self, now_ns: int) -> bool:
         """Go on with the take-off; returns False once it is over, and the UAV departs for its place."""
         assert self._take_off is not None, "who takes off stood on the ground"

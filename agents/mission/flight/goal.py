@@ -6,8 +6,8 @@ from agents.mission.finding.known_survivors import KnownSurvivors
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.search_formation.formation_place import FormationPlace, along
 from agents.mission.search_formation.missed_cells import MissedCells
-from agents.mission.tasking.approach import Approach
-from agents.mission.tasking.bidding import FAR_M, VAGUE_M
+from agents.mission.tasking.approach import VAGUE_M, Approach
+from agents.mission.tasking.bidding import FAR_M
 from agents.mission.tasking.voice_descent import VoiceDescent
 from fanet_mw.units import STILL, Enu
 
@@ -37,9 +37,10 @@ class Goal:
     def at(self, task: int | None, now_ns: int) -> tuple[Enu, Enu]:
         """The place to fly to, and how it moves; `task` is the survivor that this UAV has won, if any."""
         formation = self._formation
-        lane, moves = formation.lane(now_ns)
+        lane, moves = formation.lane(now_ns)  # before the sweep, on the way to it
         survivor = task
-        if not formation.is_free:
+        leaves = formation.is_free or not formation.is_taken_up(now_ns)
+        if not leaves:
             place = None if task is None else self._survivors.by_id[task].place()
             if task is None or not formation.leads_by(place, lane, moves):
                 survivor = self._in_lane(lane, moves, now_ns)
@@ -48,12 +49,13 @@ class Goal:
             missed = self._missed_place(now_ns)
             return (lane, moves) if missed is None else (Enu(*missed, lane.up), STILL)
         east, north = self._approach.next_point(survivor, place, now_ns, responding=survivor == task)
-        if self._listening is None:
-            return formation.bounded(east, north, lane, moves)
-        seen = self._survivors.by_id[survivor].filter.is_seen
-        around = Enu(east, north, lane.up)
-        misses_m = formation.misses_m(place, lane, moves)
-        look = self._listening.goal(survivor, place, around, seen=seen, misses_m=misses_m, now_ns=now_ns)
+        look = Enu(east, north, lane.up)
+        if self._listening is not None:
+            seen = self._survivors.by_id[survivor].filter.is_seen
+            misses_m = 0.0 if leaves else formation.misses_m(place, lane, moves)
+            look = self._listening.goal(survivor, place, look, seen=seen, misses_m=misses_m, now_ns=now_ns)
+        if leaves:
+            return look, STILL
         goal, feed = formation.bounded(look.east, look.north, lane, moves)
         return goal._replace(up=look.up), feed
 

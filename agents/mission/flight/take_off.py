@@ -54,6 +54,12 @@ class TakeOff:
         self.lasts = True
         """True until the UAV has taken off."""
 
+    @property
+    def left_s(self) -> float:
+        """The time that the climb still takes; 0 once the UAV has taken off."""
+        climb_m = _UP * self._height_m - (self._own_motion.position.up - self._pad.up)
+        return max(0.0, climb_m) / _CLIMB_M_S if self.lasts else 0.0
+
     def fix(self, now_ns: int) -> None:
         """A position fix: wait, command the take-off, or find that it is over."""
         if self._began_ns is None:

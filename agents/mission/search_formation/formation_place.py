@@ -20,7 +20,9 @@ _FREE_REACH: Final = 0.84
 flies."""
 _ASIDE_M: Final = 70.0
 """A UAV of a team examines a survivor who is at most this far to the side of the farthest point that `_LEASH_M`
-permits."""
+permits, or less far if its camera does not look so far to the side."""
+_LOOK_SHARE: Final = 0.9
+"""The share of its view to the side that a UAV relies on."""
 _AHEAD_M: Final = 250.0
 """A UAV of a team examines a survivor who is at most this far ahead of its place."""
 _LEASH_M: Final = 58.0
@@ -32,10 +34,12 @@ _LAG_M: Final = 140.0
 class FormationPlace:
     """The place of one UAV in the plan that it follows."""
 
-    def __init__(self, node: NodeId, own_motion: OwnMotion, *, reach_m: float) -> None:
+    def __init__(self, node: NodeId, own_motion: OwnMotion, *, reach_m: float, look_m: float = math.inf) -> None:
+        """`look_m`: how far to the side of the UAV its camera shows people on the ground."""
         self._node = node
         self._own_motion = own_motion
         self._most_m = _FREE_REACH * reach_m
+        self._aside_m = min(_ASIDE_M, _LOOK_SHARE * look_m)
         self.plan: Search | None = None
         self.pattern: Pattern | None = None
         self.place: int | None = None
@@ -108,7 +112,7 @@ class FormationPlace:
         if estimate is None:
             return False
         ahead_m, aside_m = along(moves, estimate.east_m - lane.east, estimate.north_m - lane.north)
-        return abs(aside_m) <= _LEASH_M + _ASIDE_M and -_LAG_M <= ahead_m <= _AHEAD_M
+        return abs(aside_m) <= _LEASH_M + self._aside_m and -_LAG_M <= ahead_m <= _AHEAD_M
 
     def misses_m(self, estimate: Estimate, lane: Enu, moves: Enu) -> float:
         """How far from an estimated place this UAV has to stay, wherever its moving place takes it; 0 if it can get

@@ -1,4 +1,5 @@
-"""The approach to a survivor: straight to the estimated place, then on a spiral around it.
+"""The approach to a survivor: straight to the estimated place, then to the other probable ones (`look_around.py`), then
+on a spiral.
 
 Once a sensor of this UAV has detected a person who seems to own the survivor's phone, the estimated place is that of
 the person. The UAV then flies on a circle around it, until the survivor is confirmed.
@@ -11,6 +12,7 @@ from agents.mission.finding.known_survivors import KnownSurvivors
 from agents.mission.finding.phone_localization import Estimate
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
+from agents.mission.tasking.look_around import LookAround
 from fanet_mw.trace import Arrived
 from fanet_mw.units import GOLDEN_ANGLE, NodeId, S
 
@@ -25,6 +27,8 @@ _IN_VIEW_M: Final = 40.0
 """The greatest radius of the circle around a person: from there a camera still sees the person in its middle."""
 _FIRST_RADIUS_M: Final = 14.0
 """The radius at which spiral and circle begin."""
+VAGUE_M: Final = 50.0
+"""An estimate with a greater standard deviation makes no UAV leave its place in a team; a follower may go there."""
 
 
 class Approach:
@@ -39,13 +43,17 @@ class Approach:
         *,
         arrival_m: float,
         speed_m_s: float,
+        look_m: float = math.inf,
     ) -> None:
-        """`speed_m_s`: the greatest speed of this UAV."""
+        """`speed_m_s`: the greatest speed of this UAV. `look_m`: how far its camera surely shows people to all sides;
+        infinite for a UAV without a camera.
+        """
         self._node = node
         self._survivors, self._own_motion = survivors, own_motion
         self._outbox = outbox
         self._arrival_m = arrival_m
         self._along_m_s = _SPEED_SHARE * speed_m_s
+        self._look_around = LookAround(look_m)
         self.arrived_ns: dict[int, int] = {}
         """The instant at which this UAV came to the estimated place of each survivor."""
 
@@ -56,7 +64,8 @@ class Approach:
         self.arrived_ns.pop(survivor, None)
 
     def next_point(self, survivor: int, place: Estimate, now_ns: int, *, responding: bool) -> tuple[float, float]:
-        """East and north of the point to fly to: the estimated `place`, then a point on the spiral or the circle.
+        """East and north of the point to fly to: the estimated `place`, then another probable one, then a point on the
+        spiral or the circle.
 
         Each UAV starts at an angle of its own, so that several are spread around one place. The circle around a
         person lets the UAV receive phones from many sides, and their powers show whose phone the person has.
@@ -70,7 +79,11 @@ class Approach:
             arrived_ns = self.arrived_ns[survivor] = now_ns
             if responding:
                 self._outbox.records.append(Arrived(now_ns, self._node, survivor))
-        seen = self._survivors.by_id[survivor].filter.is_seen
+        phone = self._survivors.by_id[survivor].filter
+        seen = phone.is_seen
+        looked_for = None if seen else self._look_around.next_place(survivor, phone, self._own_motion.position, now_ns)
+        if looked_for is not None:
+            return looked_for
         searched_s = (now_ns - arrived_ns) / S
         radius = _FIRST_RADIUS_M + _GROWTH_M_S * searched_s
         turned = _TURN_PER_S * searched_s if seen else self._turned_rad(radius)

@@ -1,7 +1,9 @@
 """Decides for which survivors one UAV bids, and to which of those that it has won it flies.
 
+the survivor is heard                    an auction for one responder, the nearest UAV that may leave
 enough UAVs have reported the survivor   an auction for as many responders as the scenario wants
-too few have                             an auction for one more UAV that has not, to get another bearing
+too few have, after a while              an auction for one more UAV that has not, to get another bearing
+before the sweep                         any UAV may respond, a little aside of the way to its place
 a responder does not find the survivor   it withdraws its bid after a while
 a responder does not come to the place   it withdraws its bid, a while after it should have been there
 """
@@ -14,7 +16,7 @@ from agents.mission.finding.known_survivors import KnownSurvivor, KnownSurvivors
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
 from agents.mission.search_formation.formation_place import FormationPlace, along
-from agents.mission.tasking.approach import Approach
+from agents.mission.tasking.approach import VAGUE_M, Approach
 from agents.mission.tasking.auction import Auction
 from agents.mission.tasking.voice_descent import descent_ns
 from fanet_mw.scenario import Scenario
@@ -22,8 +24,6 @@ from fanet_mw.trace import Approaching
 from fanet_mw.units import NodeId, S
 from fanet_mw.wire.bids import Bid
 
-VAGUE_M: Final = 50.0
-"""An estimate with a greater standard deviation makes no UAV leave its place in a team; a follower may go there."""
 FAR_M: Final = 450.0
 """A UAV does not bid for a survivor if the middle of the phone filter's grid is farther away than this."""
 _SCOUT_AFTER_NS: Final = 4 * S
@@ -35,6 +35,10 @@ _AGAIN_NS: Final = 20 * S
 _LONG_AGO_NS: Final = -(10**18)
 _HANDOVER_S: Final = 15.0
 """The time that a responder is assumed to need at its present survivor."""
+_ASTRAY_M: Final = 100.0
+"""Before the sweep a responder stays within this distance of where it would be on the way to its place, so that it is
+there in time and the swarm does not fall apart.
+"""
 
 
 class Bidding:
@@ -96,24 +100,21 @@ class Bidding:
             self._auction.withdraw(survivor, now_ns=now_ns)
         self.survivor = None
 
-    def bid(self, now_ns: int) -> None:
-        """Bid for each survivor for whom this UAV would be among the winners, if its place in the formation permits."""
-        if self._formation.pattern is None:
-            return
+    def bid(self, now_ns: int, *, delay_s: float = 0.0) -> None:
+        """Bid for each survivor for whom this UAV would be among the winners, if its place in the formation permits.
+
+        `delay_s`: the time after which this UAV can leave, because it takes off.
+        """
         for survivor in self._survivors.unconfirmed():
             known = self._survivors.by_id[survivor]
             if self._auction.has_bid(survivor) or not known.filter.near(self._own_motion.position, within_m=FAR_M):
                 continue
-            if not self._is_reported(known) and (
-                self._node in known.reporters or now_ns - known.first_ns < _SCOUT_AFTER_NS
-            ):
-                continue
             if now_ns - self._taken_back_ns.get(survivor, _LONG_AGO_NS) < _AGAIN_NS:
                 continue
-            eta_s = self._eta_s(survivor, now_ns)
+            eta_s = self._eta_s(survivor, delay_s, now_ns)
             if eta_s is None:
                 continue
-            if self._auction.would_win(survivor, eta_s=eta_s, count=self._wanted(known), now_ns=now_ns):
+            if self._auction.would_win(survivor, eta_s=eta_s, count=self._wanted(known, now_ns), now_ns=now_ns):
                 self._auction.bid(survivor, eta_s=eta_s, now_ns=now_ns)
 
     def choose(self, now_ns: int) -> None:
@@ -139,26 +140,33 @@ class Bidding:
 
     def _reconsider(self, survivor: int, now_ns: int) -> None:
         """Give up the present survivor if this UAV has lost the auction, has searched there in vain for too long,
-        has not come there in time (a building or a closed area may lie between), or, as a follower, would be out of
-        reach of its team there. In all cases but the first its bid is withdrawn.
+        has not come there in time (a building or a closed area may lie between), or if its place in the formation does
+        not permit it any more. In all cases but the first its bid is withdrawn.
         """
         known = self._survivors.by_id[survivor]
         lost = not self._wins(survivor, known, now_ns)
         there_ns = self._approach.arrived_ns.get(survivor, self._due_ns)
-        late = now_ns - there_ns > self._patience_ns
-        if not late and self._formation.is_free:
-            late = not self._formation.holds_together(known.place(), now_ns, within_s=-5.0)
+        late = now_ns - there_ns > self._patience_ns or not self._may_stay(known, now_ns)
         if late:
             self._auction.withdraw(survivor, now_ns=now_ns)
             self._taken_back_ns[survivor] = now_ns
         if lost or late:
             self.survivor = None
 
+    def _may_stay(self, known: KnownSurvivor, now_ns: int) -> bool:
+        """True while this UAV may be with a survivor, by its place in the formation."""
+        formation, here = self._formation, self._own_motion.position
+        if not formation.is_taken_up(now_ns):
+            return formation.lane(now_ns)[0].minus(here).horizontal() <= _ASTRAY_M
+        if formation.is_free:
+            return formation.holds_together(known.place(), now_ns, within_s=-5.0)
+        return formation.leads_by(known.place(), *formation.lane(now_ns))
+
     def _announce(self, survivor: int, now_ns: int) -> None:
-        """Record that this UAV approaches a survivor, once a place is known and enough UAVs have reported it."""
+        """Record that this UAV approaches a survivor, once a place is known."""
         known = self._survivors.by_id[survivor]
         place = known.place()
-        if place is None or not self._is_reported(known):
+        if place is None:
             return
         self._announced = True
         east_m, north_m = round(place.east_m, 2), round(place.north_m, 2)
@@ -168,31 +176,38 @@ class Bidding:
         """True if enough different nodes have reported a survivor (`mission.reports_to_approach`)."""
         return len(known.reporters) >= self._config.reports_to_approach
 
-    def _wanted(self, known: KnownSurvivor) -> int:
+    def _wanted(self, known: KnownSurvivor, now_ns: int) -> int:
         """The number of UAVs that a survivor needs now."""
-        return self._config.responders if self._is_reported(known) else 1
+        if self._is_reported(known):
+            return self._config.responders
+        return min(self._config.responders, 1 if now_ns - known.first_ns < _SCOUT_AFTER_NS else 2)
 
     def _wins(self, survivor: int, known: KnownSurvivor, now_ns: int) -> bool:
-        return self._node in self._auction.winners(survivor, count=self._wanted(known), now_ns=now_ns)
+        return self._node in self._auction.winners(survivor, count=self._wanted(known, now_ns), now_ns=now_ns)
 
     def _distance_m(self, survivor: int) -> float:
         place = self._survivors.by_id[survivor].place()
         return math.inf if place is None else place.distance_m(self._own_motion.position)
 
-    def _eta_s(self, survivor: int, now_ns: int) -> float | None:
+    def _eta_s(self, survivor: int, delay_s: float, now_ns: int) -> float | None:
         """The time in which this UAV could be at a survivor; None if its place in the formation
         does not permit that.
         """
         formation, here = self._formation, self._own_motion.position
         place = self._survivors.by_id[survivor].place()
-        if place is None or (place.sigma_m > VAGUE_M and not formation.is_free):
+        if place is None:
             return None
         busy_s = 0.0 if self.survivor is None else _HANDOVER_S + self._distance_m(self.survivor) / self._speed_m_s
-        eta_s = busy_s + place.distance_m(here) / self._speed_m_s
+        eta_s = delay_s + busy_s + place.distance_m(here) / self._speed_m_s
+        if not formation.is_taken_up(now_ns):
+            lane, _ = formation.lane(now_ns + round(eta_s * S))
+            return eta_s if place.distance_m(lane) <= _ASTRAY_M else None
+        if place.sigma_m > VAGUE_M and not formation.is_free:
+            return None
         if formation.is_free:
             return eta_s if formation.holds_together(place, now_ns, within_s=eta_s) else None
         lane, moves = formation.lane(now_ns)
-        if not formation.is_taken_up(now_ns) or not formation.leads_by(place, lane, moves):
+        if not formation.leads_by(place, lane, moves):
             return None
         ahead_m, _ = along(moves, place.east_m - here.east, place.north_m - here.north)
         return max(eta_s, abs(ahead_m) / self._cruise_m_s) if moves.norm() else eta_s

@@ -7,7 +7,16 @@ from typing import Any
 import pytest
 
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Confirmed, FlightModeChanged, MissionModeChanged, Posed, ProcessEnded, Record, Refuted
+from fanet_mw.trace import (
+    Confirmed,
+    Detected,
+    FlightModeChanged,
+    MissionModeChanged,
+    Posed,
+    ProcessEnded,
+    Record,
+    Refuted,
+)
 from fanet_mw.units import S
 from sim.results.mission import mission
 from sim.scenarios import catalog
@@ -69,6 +78,15 @@ def test_coverage_is_the_share_of_the_area_within_range_of_a_receiver() -> None:
 def test_a_survivor_is_confirmed_once_and_its_error_is_that_of_the_place_that_was_told_first() -> None:
     found = measured([Confirmed(7 * S, 1, 1, 103.0, 4.0), Confirmed(9 * S, 2, 1, 100.0, 0.0)])
     assert (found["confirmed"], found["time_to_confirm_s"], found["confirmed_error_m"]) == (1, [7.0], 5.0)
+
+
+def test_a_survivor_waits_from_the_first_reception_to_the_right_confirmation() -> None:
+    heard = [Detected(2 * S, 1, 1, -80.0), Detected(3 * S, 2, 1, -70.0), Detected(5 * S, 2, 2, -70.0)]
+    found = [Confirmed(7 * S, 1, 1, 103.0, 4.0), Confirmed(15 * S, 1, 2, -100.0, 0.0)]
+    assert measured([*heard, *found])["wait_s"] == {"p50": 7.5, "max": 10.0}
+    assert measured(heard)["wait_s"] == {"p50": None, "max": None}
+    away = Confirmed(4 * S, 1, 1, -100.0, 0.0)
+    assert measured([*heard, away, Refuted(6 * S, 1, 1, -100.0, 0.0), found[0]])["wait_s"]["max"] == 5.0
 
 
 def test_without_positions_nothing_is_claimed_of_the_flight() -> None:

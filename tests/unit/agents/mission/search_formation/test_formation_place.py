@@ -7,12 +7,10 @@ from agents.mission.finding.phone_localization import Estimate
 from fanet_mw.units import STILL, Enu, NodeId, S
 
 
-def test_who_has_no_plan_waits_where_it_is_and_may_go_nowhere_for_the_swarm() -> None:
+def test_who_has_no_plan_waits_where_it_is() -> None:
     board = Board(LINE, Enu(7, 8, UP_M), planned=False)
     assert board.place.lane(5 * S) == (Enu(7, 8, UP_M), Enu(0, 0, 0))
-    board.hear(1, Enu(20, 20, 0), range(1, 5), now_ns=5 * S)
-    board.tasks.bid(5 * S)
-    assert board.tasks.bids_to_tell(now_ns=5 * S) == []
+    assert board.goal.at(None, 5 * S) == (Enu(7, 8, UP_M), Enu(0, 0, 0))
 
 
 def test_a_place_is_taken_up_on_a_straight_way_that_begins_and_ends_with_the_plan() -> None:

@@ -1,6 +1,7 @@
 """Tasks: a UAV bids for survivors that were reported, wins, and gives up."""
 
-from search_board import FOLLOWER, LINE, TAKEN_UP_NS, Board, lane_of
+import pytest
+from search_board import FOLLOWER, LINE, TAKEN_UP_NS, UP_M, Board, lane_of
 
 from fanet_mw.trace import Approaching, Arrived
 from fanet_mw.units import Enu, S
@@ -37,15 +38,51 @@ def test_better_bids_take_a_task_away() -> None:
     assert board.tasks.survivor is None
 
 
-def test_one_who_has_not_reported_is_sent_where_reporters_are_too_few_and_one_who_has_is_not() -> None:
+@pytest.mark.parametrize("reporters", [range(1, 2), range(FOLLOWER, FOLLOWER + 1)])
+def test_where_reporters_are_too_few_the_nearest_uav_goes_at_once_and_later_a_second_one(reporters: range) -> None:
     at = lane_of(FOLLOWER, NOW_NS)
-    for reporters, bids in ((range(1, 2), 1), (range(FOLLOWER, FOLLOWER + 1), 0)):
-        board = Board(FOLLOWER, at)
-        board.hear(1, Enu(at.east + 60, at.north + (80 if at.north > 0 else -80), 0), reporters, now_ns=NOW_NS)
-        board.tasks.bid(NOW_NS + 3 * S)
-        assert board.tasks.bids_to_tell(now_ns=NOW_NS) == [], "somebody may still come by"
-        board.tasks.bid(NOW_NS + 5 * S)
-        assert len(board.tasks.bids_to_tell(now_ns=NOW_NS + 5 * S)) == bids
+    board = Board(FOLLOWER, at)
+    board.hear(1, Enu(at.east + 60, at.north + (80 if at.north > 0 else -80), 0), reporters, now_ns=NOW_NS)
+    board.tasks.merge([Bid(1, 30, 1, 1)], now_ns=NOW_NS)
+    board.tasks.bid(NOW_NS + 3 * S)
+    assert [bid.bidder for bid in board.tasks.bids_to_tell(now_ns=NOW_NS)] == [30], "one is enough, and nearer"
+    board.tasks.bid(NOW_NS + 5 * S)
+    board.tasks.choose(NOW_NS + 5 * S)
+    assert board.tasks.survivor == 1
+
+
+def test_who_has_no_plan_yet_goes_to_a_survivor_nearby_and_not_far_from_the_swarm() -> None:
+    for east_m, task in ((60, 1), (170, None)):
+        board = Board(LINE, Enu(0, 0, UP_M), planned=False)
+        board.hear(1, Enu(east_m, 0, 0), range(1, 5), now_ns=0)
+        board.tasks.bid(0)
+        board.tasks.choose(0)
+        assert board.tasks.survivor == task
+        goal, _ = board.goal.at(task, 0)
+        assert (goal.minus(Enu(60, 0, 0)).horizontal() < 30) == (task is not None)
+
+
+def test_before_the_sweep_a_uav_responds_that_is_not_led_away_from_the_survivor_by_the_plan() -> None:
+    place = lane_of(LINE, TAKEN_UP_NS)
+    board = Board(LINE, place._replace(north=place.north + 300))
+    truth = Enu(place.east + 80, place.north + 280, 0)
+    board.hear(1, truth, range(1, 5), now_ns=S)
+    board.tasks.bid(TAKEN_UP_NS - 10 * S)
+    assert board.tasks.bids_to_tell(now_ns=S) == [], "by then its place is far away"
+    board.tasks.bid(S)
+    board.tasks.choose(S)
+    assert board.tasks.survivor == 1
+    assert board.goal.at(1, S)[0].minus(truth).horizontal() < 30, "no lane limits it yet"
+    for share, task in ((0.3, 1), (0.4, None)):
+        board.tasks.choose(10 * S + round(share * 50 * S))
+        assert board.tasks.survivor == task, "it may be 100 m behind"
+
+
+def test_who_still_takes_off_comes_later_than_who_is_in_the_air() -> None:
+    board = Board(LINE, Enu(0, 0, UP_M), planned=False)
+    board.hear(1, Enu(60, 0, 0), range(1, 5), now_ns=0)
+    board.tasks.bid(0, delay_s=20.0)
+    assert board.tasks.bids_to_tell(now_ns=0)[0].eta_ds == pytest.approx(260, abs=25)
 
 
 def test_a_responder_that_finds_nobody_takes_its_bid_back_and_does_not_bid_again_at_once() -> None:
@@ -61,10 +98,20 @@ def test_a_responder_that_finds_nobody_takes_its_bid_back_and_does_not_bid_again
     assert board.approach.arrived_ns == {}, "what it came to was not the place"
 
 
-def test_a_responder_that_does_not_come_in_time_takes_its_bid_back() -> None:
+def test_a_responder_whose_lane_leaves_a_survivor_behind_takes_its_bid_back() -> None:
     at = lane_of(LINE, NOW_NS)
     board = Board(LINE, at)
     board.hear(1, Enu(at.east + 60, at.north, 0), range(1, 5), now_ns=NOW_NS)
+    board.tasks.bid(NOW_NS)
+    for after_s, task in ((0, 1), (15, 1), (22, None)):
+        board.tasks.choose(NOW_NS + after_s * S)
+        assert board.tasks.survivor == task, "it may stay 140 m behind, which are 19 s"
+    assert [bid.eta_ds for bid in board.tasks.bids_to_tell(now_ns=NOW_NS + 22 * S)] == [0xFFFF]
+
+
+def test_a_responder_that_does_not_come_in_time_takes_its_bid_back() -> None:
+    board = Board(LINE, Enu(0, 0, UP_M), planned=False)
+    board.hear(1, Enu(60, 0, 0), range(1, 5), now_ns=NOW_NS)
     board.tasks.bid(NOW_NS)
     board.tasks.choose(NOW_NS)
     assert board.tasks.survivor == 1

@@ -1,0 +1,47 @@
+"""A responder that sees nobody at the estimated place looks at the other probable ones."""
+
+import math
+
+from search_board import MODEL, UP_M
+
+from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, PhoneFilter
+from agents.mission.tasking.look_around import LookAround
+from fanet_mw.units import Enu, S
+
+LOOK_M = 36.0
+
+
+def heard_once(truth: Enu, at: Enu) -> PhoneFilter:
+    """The filter of a phone of which one power was received."""
+    phone = PhoneFilter(MODEL)
+    phone.on_rssi(1, at, MODEL.power_dbm - REFERENCE_LOSS_DB - 30 * math.log10(at.minus(truth).norm()))
+    return phone
+
+
+def test_a_uav_that_has_heard_a_phone_once_passes_all_places_where_it_may_be_and_sees_the_person() -> None:
+    start, passed = Enu(0, 0, UP_M), 0
+    for angle in range(0, 360, 15):
+        truth = Enu(80 * math.cos(math.radians(angle)), 80 * math.sin(math.radians(angle)), 0)
+        phone, here, look = heard_once(truth, start), start, LookAround(LOOK_M)
+        for step in range(600):
+            there = look.next_place(1, phone, here, step * S // 10)
+            if there is None or here.minus(truth).horizontal() <= LOOK_M:
+                break
+            way = Enu(there[0] - here.east, there[1] - here.north, 0)
+            share = min(1.0, 0.8 / max(1e-9, way.horizontal()))
+            here = Enu(here.east + share * way.east, here.north + share * way.north, UP_M)
+        passed += here.minus(truth).horizontal() <= LOOK_M
+    assert passed >= 20, "within a minute at 8 m/s, without any further power, of 24 places around it"
+
+
+def test_what_was_looked_at_for_one_survivor_is_looked_at_again_for_another() -> None:
+    phone, look = heard_once(Enu(0, 0, 0), Enu(0, 0, UP_M)), LookAround(LOOK_M)
+    first = look.next_place(1, phone, Enu(300, 0, UP_M), 0)
+    assert first is not None
+    here = Enu(*first, UP_M)
+    assert look.next_place(1, phone, here, S) != first
+    assert look.next_place(2, phone, Enu(300, 0, UP_M), 2 * S) == first
+
+
+def test_without_a_camera_there_is_nothing_to_look_at() -> None:
+    assert LookAround(math.inf).next_place(1, heard_once(Enu(0, 0, 0), Enu(0, 0, UP_M)), Enu(0, 0, UP_M), 0) is None

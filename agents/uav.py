@@ -32,6 +32,7 @@ from fanet_mw.bus.messages import (
 )
 from fanet_mw.bus.topics import Topics
 from fanet_mw.extensions import load
+from fanet_mw.mavlink import Geodetic
 from fanet_mw.node.node import Node
 from fanet_mw.node.reader import Reader
 from fanet_mw.routing import make_protocol
@@ -83,7 +84,12 @@ class Uav(Actor):
         """The greatest delay of a reception after the end of its frame: a relay must still be
         announced one lead ahead."""
         self._node = Node(node, scenario, make_protocol, position=position, reader=reader)
-        self._streams = TelemetryStreams(node, position=position, telemetry_hz=scenario.nodes.telemetry_hz)
+        self._streams = TelemetryStreams(
+            node,
+            position=position,
+            telemetry_hz=scenario.nodes.telemetry_hz,
+            origin=Geodetic(*scenario.world.origin_deg, 0.0),
+        )
         self._reckoning = DeadReckoning()
         self._fixes = SteadyFix(sigma_m=scenario.world.gps_sigma_m, range_m=scenario.radio.range_m)
         asked_for = _asked_for(scenario, node, self._streams, position, onboard_map)

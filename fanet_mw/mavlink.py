@@ -9,14 +9,15 @@ headings refer to north and east at the origin: 0.1 degrees off at 10 km).
 """
 
 import math
-from functools import cached_property, lru_cache
+from collections.abc import Callable
+from functools import cached_property, lru_cache, partial
 from typing import Any, Final, NamedTuple
 
 from pymavlink.dialects.v20 import common
 
 from fanet_mw.dialect import fanet
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
-from fanet_mw.units import MAX_NODES, MS, US, Enu, NodeId
+from fanet_mw.units import DEFAULT_ORIGIN_DEG, MAX_NODES, MS, US, Enu, NodeId
 from fanet_mw.wire import COMPONENT, Packed, frames, inner_frames, renumbered, system_id
 
 common.mavlink_map.update(fanet.mavlink_map)  # one parser decodes both dialects
@@ -48,8 +49,9 @@ class Geodetic(NamedTuple):
     alt_m: float
 
 
-ORIGIN: Final = Geodetic(37.5665, 126.978, 0.0)
-"""The point at which the swarm's frame touches the earth by default."""
+ORIGIN: Final = Geodetic(*DEFAULT_ORIGIN_DEG, 0.0)
+"""The point at which the swarm's frame touches the earth unless the scenario or its map names another one
+(`world.origin_deg`)."""
 
 
 # --- coordinates --------------------------------------------------------------------------------------------------
@@ -373,6 +375,12 @@ def kinematics(message: Any, origin: Geodetic = ORIGIN) -> Kinematics:  # noqa: 
 def kinematics_of(packed: Packed, origin: Geodetic = ORIGIN) -> Kinematics:
     """What the GLOBAL_POSITION_INT in a packet says; raises MalformedFrameError."""
     return kinematics(_only(packed, common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT), origin)
+
+
+@lru_cache(maxsize=8)
+def kinematics_about(origin: Geodetic) -> Callable[[Packed], Kinematics]:
+    """`kinematics_of` with this origin; always the same function, because what it returns is cached by it."""
+    return partial(kinematics_of, origin=origin)
 
 
 class Collision(NamedTuple):

@@ -18,6 +18,8 @@ BROADCAST: Final = NodeId(0xFFFF)
 LIGHT_M_PER_S: Final = 299_792_458
 GOLDEN_ANGLE: Final = math.pi * (3 - math.sqrt(5))
 """The angle [rad] between the bearings of successive ids that spreads any number of them evenly over a circle."""
+DEFAULT_ORIGIN_DEG: Final = (37.5665, 126.978)
+"""Latitude and longitude of the origin of a swarm that nobody has put anywhere: the city hall of Seoul."""
 FARTHEST_M: Final = 1e7
 """The greatest coordinate: no swarm is so large, and its square is still exact."""
 FASTEST_M_S: Final = 1e4

@@ -27,13 +27,14 @@ class CollisionAvoidance(Application):
 
     def __init__(self, scenario: Scenario, node: NodeId) -> None:
         self._monitor = ConflictMonitor(scenario, node)
+        self._origin = mavlink.Geodetic(*scenario.world.origin_deg, 0.0)
         self._encoder = mavlink.Encoder(node)
         self._bad_positions = 0
         """The number of hellos without a credible position, or with one that is too old."""
 
     def on_hello(self, frame: bytes, now_ns: int) -> None:
         """A neighbor's hello was received, which states how the neighbor flies."""
-        heard = motion_in(frame, own=self.port.node, now_ns=now_ns)
+        heard = motion_in(frame, own=self.port.node, now_ns=now_ns, place=self._origin)
         if heard is None or not self._monitor.on_hello(*heard, now_ns=now_ns):
             self._bad_positions += 1
 

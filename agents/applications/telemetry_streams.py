@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from fanet_mw.bus.messages import Battery, Gps
-from fanet_mw.mavlink import AUTOPILOT_COMPONENT, Attitude, BatteryState, Encoder
+from fanet_mw.mavlink import AUTOPILOT_COMPONENT, ORIGIN, Attitude, BatteryState, Encoder, Geodetic
 from fanet_mw.units import STILL, Enu, NodeId, S
 
 GRAVITY_M_S2: Final = 9.80665
@@ -41,7 +41,7 @@ class _Stream:
 class TelemetryStreams:
     """The telemetry of one UAV."""
 
-    def __init__(self, node: NodeId, *, position: Enu, telemetry_hz: float) -> None:
+    def __init__(self, node: NodeId, *, position: Enu, telemetry_hz: float, origin: Geodetic = ORIGIN) -> None:
         self.position = position
         self.velocity = STILL
         self._home = position
@@ -53,8 +53,8 @@ class TelemetryStreams:
         self._battery: BatteryState | None = None
         self._read_ns: int | None = None
         self._consumed_mah = 0.0
-        self._encoder = Encoder(node, component=AUTOPILOT_COMPONENT)
-        self._beacons = Encoder(node, component=AUTOPILOT_COMPONENT)
+        self._encoder = Encoder(node, component=AUTOPILOT_COMPONENT, origin=origin)
+        self._beacons = Encoder(node, component=AUTOPILOT_COMPONENT, origin=origin)
         """The encoder of frames for the air. It counts them apart from telemetry, so that a gap in their numbers is a
         loss."""
         self._streams = self._plan(node, telemetry_hz) if telemetry_hz else []

@@ -17,6 +17,7 @@ from agents.positioning.received_motion import motion_in
 from fanet_mw.application import Application, AppPort, Received
 from fanet_mw.bus.messages import Altimeter, Battery, Camera, Gps, Radar, SensorReading, Voice, WifiScan
 from fanet_mw.errors import MalformedFrameError
+from fanet_mw.mavlink import Geodetic
 from fanet_mw.node.reader import decoded
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId
@@ -72,6 +73,7 @@ class PlannedSearch(Application):
         self._outbox = Outbox()
         self._searcher = Searcher(scenario, node, position=position, outbox=self._outbox, onboard_map=onboard_map)
         self._plausibility = Plausibility(phone_model(scenario))
+        self._origin = Geodetic(*scenario.world.origin_deg, 0.0)
         self._bad_positions = 0
         """The number of hellos without a credible position."""
 
@@ -91,7 +93,10 @@ class PlannedSearch(Application):
 
     def on_hello(self, frame: bytes, now_ns: int) -> None:
         """A neighbor's hello states how it flies, and passes on what it knows."""
-        messages, heard = decoded(frame, told_in), motion_in(frame, own=self.port.node, now_ns=now_ns)
+        messages, heard = (
+            decoded(frame, told_in),
+            motion_in(frame, own=self.port.node, now_ns=now_ns, place=self._origin),
+        )
         if heard is None:
             self._bad_positions += 1
             return

@@ -15,14 +15,15 @@ FUTURE_NS: Final = S
 """What was sent by an instant further in the future than this is rejected: the clocks of a swarm differ by less."""
 
 
-def motion_in(frame: bytes, *, own: NodeId, now_ns: int) -> tuple[NodeId, Motion] | None:
-    """The origin of a frame, and the motion of that UAV at the instant that the frame states.
+def motion_in(frame: bytes, *, own: NodeId, now_ns: int, place: mavlink.Geodetic) -> tuple[NodeId, Motion] | None:
+    """The origin of a frame, and the motion of that UAV at the instant that the frame states; `place` is the origin of
+    the swarm's coordinates.
 
     None if the frame is malformed or has no position, if its instant lies too far in the future, or if this UAV itself
     (`own`) is the origin.
     """
     try:
-        origin, heard = packet_of(frame).origin, decoded(frame, mavlink.kinematics_of)
+        origin, heard = packet_of(frame).origin, decoded(frame, mavlink.kinematics_about(place))
     except MalformedFrameError:
         return None
     motion = Motion(heard.position, heard.velocity, heard.t_ms * MS)

@@ -9,6 +9,8 @@ The model is re-exported here.
     validation_errors.py         what the user reads of a scenario that is not valid
     commented.py, reference.py   a file with every key explained; what can be said of each key
     fingerprint.py               whether two processes run the same scenario
+    named_files.py               digests of the files that it names, and the place of a map on earth
+    ascii_grid.py, outlines.py   headers of grids of heights; outlines of buildings
 """
 
 from fanet_mw.scenario.model import Scenario

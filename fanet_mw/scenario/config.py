@@ -8,7 +8,7 @@ Each message names the file, the key, the value and the bound, because the user 
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -16,10 +16,8 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.overrides import apply_override
 from fanet_mw.scenario.quantities import in_unit_of, unit_of
+from fanet_mw.scenario.tables.world import FILE_KEYS
 from fanet_mw.scenario.validation_errors import sentence
-
-_PATHS: Final = ("heightmap", "buildings_geojson")
-"""Keys of `[world]` that name files."""
 
 
 def load(path: Path, overrides: Iterable[str] = ()) -> Scenario:
@@ -94,7 +92,7 @@ def _from_folder(tree: dict[str, Any], folder: Path) -> None:
     world = tree.get("world")
     if not isinstance(world, dict):
         return
-    for key in _PATHS:
+    for key in FILE_KEYS:
         if isinstance(world.get(key), str) and world[key]:
             world[key] = str(folder.absolute() / world[key])
 

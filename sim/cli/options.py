@@ -173,6 +173,14 @@ def with_engine(scenario: "Scenario") -> "Scenario":
     return Scenario.model_validate(tree)
 
 
+def print_notes(scenario: "Scenario") -> None:
+    """Say what in a scenario was guessed, or will have no effect."""
+    from sim.scenarios.notes import notes
+
+    for note in notes(scenario):
+        _err.print(f"note: {note}", highlight=False, soft_wrap=True, markup=False)
+
+
 def warn_of(endpoint: str | None, *, listens: bool) -> None:
     """Warn if others can reach an endpoint, or forge messages on it."""
     if endpoint is None:

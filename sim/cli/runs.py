@@ -15,7 +15,7 @@ from cyclopts.validators import Number
 from sim.cli.command_groups import RUN
 from sim.cli.completion import ScenarioName
 from sim.cli.console import Console
-from sim.cli.options import OutputFlags, ScenarioFlags, warn_of, with_engine
+from sim.cli.options import OutputFlags, ScenarioFlags, print_notes, warn_of, with_engine
 
 if TYPE_CHECKING:
     from cyclopts import App
@@ -51,6 +51,7 @@ def simulate(
 
     chosen = with_engine(choice.scenario(scenario))
     output.prepare()
+    print_notes(chosen)
     if must_compile():
         _err.print(COMPILING_NOTICE, highlight=False)
         warm_up()
@@ -112,6 +113,7 @@ def launch(
 
     chosen = with_engine(choice.realtime_scenario(scenario))
     output.prepare()
+    print_notes(chosen)
     warn_of(listen, listens=True)
     warn_of(connect, listens=False)
     with _progress(chosen, quiet=output.json) as tell:

@@ -12,7 +12,7 @@ from fanet_mw.errors import ConfigError
 from sim.cli.command_groups import SCENARIO
 from sim.cli.completion import ScenarioName
 from sim.cli.console import Console
-from sim.cli.options import ScenarioFlags
+from sim.cli.options import ScenarioFlags, print_notes
 from sim.scenarios.shipped import shipped
 
 if TYPE_CHECKING:
@@ -136,6 +136,7 @@ def check(file: ScenarioName, *, choice: ScenarioFlags = ScenarioFlags()) -> int
 
     chosen = choice.scenario(file)
     require_possible(chosen)
+    print_notes(chosen)
     Console().print(f"{file}: {_sentence(chosen)}", highlight=False, soft_wrap=True, markup=False)
     return 0
 

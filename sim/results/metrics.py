@@ -24,6 +24,7 @@ from sim.results.packets import OTHER_APPS, AppPackets, packets_of, targets_by_s
 from sim.results.separation import separation
 from sim.run.collecting.record_kinds import records_of
 from sim.run.outcome import Outcome
+from sim.scenarios.notes import notes
 
 
 def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
@@ -44,6 +45,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "mode": outcome.mode,
         "nodes": scenario.nodes.count,
         "duration_s": scenario.duration_s,
+        "notes": notes(scenario),
         "simulated_s": round(outcome.simulated_ns / S, 3),
         "time_scale": _last_scale(outcome),
         "slowed": [{"t_s": round(t_ns / S, 3), "time_scale": round(scale, 6)} for t_ns, scale in outcome.slowed],

@@ -48,7 +48,8 @@ class FormationFlight(Application):
             node, motions, route, radius_m=scenario.mission.formation_m, clusters=lambda: self.port.clusters()
         )
         self._begins_ns = seconds_to_ns(scenario.warmup_s)
-        self._encoder = mavlink.Encoder(node)
+        self._origin = mavlink.Geodetic(*scenario.world.origin_deg, 0.0)
+        self._encoder = mavlink.Encoder(node, origin=self._origin)
         self._next_ns: int | None = None
         self._bad_positions = 0
         """The number of hellos and floods without a credible position."""
@@ -68,7 +69,7 @@ class FormationFlight(Application):
         self._on_motion(frame, now_ns)
 
     def _on_motion(self, frame: bytes, now_ns: int) -> None:
-        heard = motion_in(frame, own=self.port.node, now_ns=now_ns)
+        heard = motion_in(frame, own=self.port.node, now_ns=now_ns, place=self._origin)
         if heard is None:
             self._bad_positions += 1
             return

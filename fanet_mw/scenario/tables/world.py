@@ -1,17 +1,22 @@
 """The `[world]` table: the engine that moves bodies, the area, and the obstacles in it."""
 
-from typing import Annotated, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
+from fanet_mw.scenario.named_files import digest_of, middle_deg
 from fanet_mw.scenario.tables.sections import (
     Coordinate,
     Section,
     SomeLength,
 )
-from fanet_mw.units import MS
+from fanet_mw.units import DEFAULT_ORIGIN_DEG, MS
 
+FILE_KEYS: Final = {"heightmap": "heightmap_sha256", "buildings_geojson": "buildings_sha256"}
+"""The keys that name files, and those of their digests."""
 WindSpeed = Annotated[float, Field(ge=-50, le=50)]
+Sha256 = Annotated[str, Field(pattern=r"^([0-9a-f]{16})?$")]
 Building = tuple[Coordinate, Coordinate, SomeLength, SomeLength, SomeLength]
 
 
@@ -59,8 +64,12 @@ class World(Section):
     terrain_scale_m: Annotated[float, Field(ge=1, le=1e6)] = 400.0
     """Distance between neighboring hills."""
     heightmap: str = ""
-    """A file with heights of the ground, in place of random hills: an ASCII grid (.asc), or a grayscale picture (.png).
-    Its middle is put at the origin, its lowest point at height 0. A path is relative to the scenario file's folder."""
+    """A file with heights of the ground, in place of random hills: an ASCII grid (.asc), an SRTM tile (.hgt), a GeoTIFF
+    (.tif, an extra of the package), or a grayscale picture (.png). What says where on earth it lies is laid there; of a
+    picture, and of an ASCII grid in metres, the middle is put at the origin. The lowest point is at height 0. A path is
+    relative to the scenario file's folder."""
+    heightmap_sha256: Sha256 = ""
+    """Beginning of the SHA-256 of that file, which is filled in when the scenario is read. Another file is refused."""
     heightmap_white_m: Annotated[float, Field(gt=0, le=9000)] = 100.0
     """Height of a white pixel above a black one."""
     heightmap_pixel_m: Annotated[float, Field(gt=0, le=1e5)] = 10.0
@@ -68,14 +77,45 @@ class World(Section):
     buildings_geojson: str = ""
     """A file with outlines of buildings (GeoJSON), in place of `buildings`. A path is relative to the scenario file's
     folder."""
-    origin_deg: tuple[Annotated[float, Field(ge=-90, le=90)], Annotated[float, Field(ge=-180, le=180)]] | None = None
-    """Latitude and longitude of the origin; unset: those of the middle of the buildings in the file."""
+    buildings_sha256: Sha256 = ""
+    """The same for the file of buildings."""
+    origin_deg: tuple[Annotated[float, Field(ge=-90, le=90)], Annotated[float, Field(ge=-180, le=180)]] = (
+        DEFAULT_ORIGIN_DEG
+    )
+    """Latitude and longitude of the origin, also in MAVLink; unset: the middle of the buildings in their file, or else
+    of an ASCII grid in degrees, or else Seoul."""
     no_fly_m: tuple[tuple[Coordinate, Coordinate, SomeLength], ...] = ()
     """No-fly areas, each as [east, north, radius]; the world counts entries."""
     gps_hz: Annotated[float, Field(ge=1e-6, le=1000)] = 5.0
     """Position fixes of each UAV per second."""
     gps_sigma_m: Annotated[float, Field(ge=0, le=1000)] = 1.5
     """Standard deviation of a fix along each axis."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_files(cls, tree: object) -> object:
+        """The digests of the files, and the origin that they give."""
+        if not isinstance(tree, Mapping):
+            return tree
+        found = dict(tree)
+        for key, digest_key in FILE_KEYS.items():
+            path, said = tree.get(key), tree.get(digest_key)
+            digest = digest_of(path) if path and isinstance(path, str) else ""
+            if said and digest and said != digest:
+                raise ValueError(
+                    f"world.{key} = {path}: the file has the digest {digest}, and world.{digest_key} = {said} is that "
+                    "of another one; leave it out to take this file"
+                )
+            if digest:
+                found[digest_key] = digest
+        if tree.get("origin_deg") is None:
+            found.pop("origin_deg", None)
+            place = middle_deg(
+                heightmap=str(tree.get("heightmap") or ""), buildings=str(tree.get("buildings_geojson") or "")
+            )
+            if place is not None:
+                found["origin_deg"] = place
+        return found
 
     @model_validator(mode="after")
     def _obstacles_agree(self) -> Self:

@@ -1,15 +1,17 @@
-"""Buildings from a GeoJSON file (RFC 7946), as OpenStreetMap tools export them.
+"""Buildings from a GeoJSON file (`fanet_mw/scenario/outlines.py`), as OpenStreetMap tools export them.
 
-Each Polygon, and each part of a MultiPolygon, becomes an upright box: the smallest rectangle around its outer ring. Its
-height is the property `height` [m]; if that is missing, `building:levels` (or `levels`) times 3 m; if that is missing,
-too, the middle of `world.building_height_m`. Longitude and latitude are converted to east and north of
-`world.origin_deg`, or of the middle of all buildings if that is unset. Other geometries are ignored. Not modeled:
-courtyards, and roofs that are not flat.
+Each outline becomes upright boxes: the smallest rectangle around it or, if it is concave and fills less than
+`_LEAST_FILLED` of that, those of its parts. Its height is the property `height` [m], else `building:height` or
+`est_height`, else `building:levels` (or `levels`) times 3 m, else the middle of `world.building_height_m`; what cannot
+be read is passed over, and of several values the greatest counts. Longitude and latitude are converted to east and
+north of `world.origin_deg`. Other geometries are ignored. Not modeled: courtyards, and roofs that are not flat.
 """
 
 import json
 import math
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -17,16 +19,35 @@ import numpy as np
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.mavlink import Geodetic, to_enu
+from fanet_mw.scenario import outlines
 from sim.world.engines.contract import Rows
 from sim.world.environment.given_file import content
 
 LEVEL_M: Final = 3.0
+_FOOT_M: Final = 0.3048
+_INCH_M: Final = 0.0254
 _LEAST_SIDE_M: Final = 0.1
 _HIGHEST_M: Final = 2000.0
+_LEAST_FILLED: Final = 0.85
+_LEAST_CONVEX: Final = 0.95
+_LEAST_PART_M2: Final = 0.01
+_MOST_PARTS: Final = 16
+_MOST_CUTS: Final = 24
+"""The number of cuts that are tried on a part, along each axis."""
+_KEYS: Final = (
+    ("height", 1.0), ("building:height", 1.0), ("est_height", 1.0), ("building:levels", LEVEL_M), ("levels", LEVEL_M)
+)  # fmt: skip
+_NUMBER: Final = r"\d+(?:[.,]\d+)?|[.,]\d+"
+_FEET: Final = re.compile(
+    rf"({_NUMBER})\s*(?:'|ft\.?|feet|foot|\u2032)\s*(?:({_NUMBER})\s*(?:\"|in\.?|inch(?:es)?|\u2033|'')?)?"
+)
+_METRES: Final = re.compile(rf"({_NUMBER})\s*(?:m|m\.|metres?|meters?|mètres?)?")
+_ABOUT: Final = re.compile(r"^(?:~|≈|<|>|<=|>=|ca\.?|c\.|approx\.?|approximately|about|around)\s*")
+_SEVERAL: Final = re.compile(r"\s*(?:;|\||/|\u2013|\u2014|-|\bto\b|\bor\b)\s*")
 
 
 class Footprint(NamedTuple):
-    """One building: the middle of its rectangle, its sides, its rotation, and its height above ground."""
+    """One box: the middle of its rectangle, its sides, its rotation, and its height above ground."""
 
     east: float
     north: float
@@ -36,79 +57,187 @@ class Footprint(NamedTuple):
     height: float
 
 
-def read(path: Path, *, origin_deg: tuple[float, float] | None, height_m: float) -> list[Footprint]:
-    """The buildings in a file; raises ConfigError with the name of the file."""
-    data = content(path, key="world.buildings_geojson")
+class Town(NamedTuple):
+    """The buildings within the area, and how many of the file were guessed or passed over."""
+
+    boxes: tuple[Footprint, ...]
+    buildings: int
+    """The number of buildings in the file."""
+    guessed: tuple[str, ...]
+    """The buildings within the area of which a tag could not be read as it is written."""
+    broken: tuple[str, ...]
+    """The outlines of the file that enclose nothing."""
+
+
+@lru_cache(maxsize=8)
+def read(path: Path, *, origin_deg: tuple[float, float], height_m: float, area_m: float, digest: str = "") -> Town:
+    """The buildings of a file whose middle lies in the area; raises ConfigError with the name of the file.
+
+    `digest` is that of the content, so that a file that has changed is read again.
+    """
+    data = content(path, key="world.buildings_geojson", digest=digest)
     try:
-        tree = json.loads(data.decode("utf-8"))
-    except (UnicodeDecodeError, ValueError, RecursionError) as error:
-        raise ConfigError(f"world.buildings_geojson: {path} is no JSON: {error}") from error
-    try:
-        rings = [(_ring(points), _height(properties, height_m)) for points, properties in _polygons(tree)]
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
-        reason = str(error) if isinstance(error, ValueError) else repr(error)
-        raise ConfigError(f"world.buildings_geojson: {path} is no GeoJSON of buildings: {reason}") from error
-    if not rings:
-        raise ConfigError(f"world.buildings_geojson: {path} holds no Polygon")
-    if origin_deg is None:
-        every = np.vstack([ring for ring, _ in rings])
-        lon, lat = ((every.min(axis=0) + every.max(axis=0)) / 2).tolist()
-    else:
-        lat, lon = origin_deg
-    origin = Geodetic(lat, lon, 0.0)
-    return [_rectangle(_plane(ring, origin), height) for ring, height in rings]
+        found = outlines.parse(data)
+    except (UnicodeDecodeError, RecursionError, ValueError) as error:
+        what = (
+            "JSON"
+            if isinstance(error, json.JSONDecodeError | UnicodeDecodeError | RecursionError)
+            else "GeoJSON of buildings"
+        )
+        raise ConfigError(f"world.buildings_geojson: {path} is no {what}: {error}") from error
+    origin = Geodetic(*origin_deg, 0.0)
+    boxes: list[Footprint] = []
+    guessed: list[str] = []
+    for outline in found.buildings:
+        ring = _plane(outline.ring, origin)
+        whole = _rectangle(ring, 0.0)
+        if max(abs(whole.east), abs(whole.north)) > area_m / 2:
+            continue
+        height, why = height_of(outline.tags, height_m)
+        boxes += _parts(ring, whole, height)
+        if why:
+            guessed.append(f"{outline.name}: {why}")
+    return Town(tuple(boxes), len(found.buildings), tuple(guessed), tuple(found.broken))
 
 
-def _polygons(tree: dict[str, Any]) -> Iterator[tuple[list[Any], dict[str, Any]]]:
-    """The outer ring of every polygon, with the properties of its feature."""
-    features = tree["features"] if tree["type"] == "FeatureCollection" else [tree]
-    for feature in features:
-        geometry = feature.get("geometry") if feature["type"] == "Feature" else feature
-        properties = feature.get("properties") or {}
-        if geometry and geometry["type"] == "Polygon":
-            yield geometry["coordinates"][0], properties
-        elif geometry and geometry["type"] == "MultiPolygon":
-            for polygon in geometry["coordinates"]:
-                yield polygon[0], properties
+def height_of(tags: Mapping[str, Any], default_m: float) -> tuple[float, str]:
+    """The height that the tags of a building state, and what had to be guessed, if anything."""
+    passed: list[str] = []
+    for key, unit_m in _KEYS:
+        if (said := tags.get(key)) is None or not str(said).strip():
+            continue
+        values = _values(str(said), feet_allowed=unit_m == 1.0)
+        height = max(values, default=0.0) * unit_m
+        if 0 < height <= _HIGHEST_M:
+            passed += [f"{key} = {said}"] if len(values) > 1 else []
+            return height, f"{', '.join(passed)}: taken as {height:g} m" if passed else ""
+        passed.append(f"{key} = {said}")
+    return default_m, f"{', '.join(passed)}: taken as {default_m:g} m" if passed else ""
 
 
-def _ring(points: list[Any]) -> Rows:
-    """Longitude and latitude of the corners."""
-    ring = np.array([[float(point[0]), float(point[1])] for point in points])
-    if len(ring) < 4 or not (np.abs(ring) <= [180.0, 90.0]).all():
-        raise ValueError(f"a ring must have four positions of longitude and latitude, not {points[:4]!r}")
-    return ring
+def _values(text: str, *, feet_allowed: bool) -> list[float]:
+    """The numbers that a tag states, in metres or levels; none if it states anything else."""
+    found = []
+    for part in _SEVERAL.split(_ABOUT.sub("", text.strip().lower())):
+        word = part.strip()
+        if match := _METRES.fullmatch(word):
+            found.append(_float(match[1]))
+        elif feet_allowed and (match := _FEET.fullmatch(word)):
+            found.append(_float(match[1]) * _FOOT_M + _float(match[2] or "0") * _INCH_M)
+        else:
+            return []
+    return found
 
 
-def _height(properties: dict[str, Any], default_m: float) -> float:
-    for key, unit_m in (("height", 1.0), ("building:levels", LEVEL_M), ("levels", LEVEL_M)):
-        if properties.get(key) is not None:
-            height = float(str(properties[key]).removesuffix("m").strip()) * unit_m
-            if not 0 < height <= _HIGHEST_M:
-                raise ValueError(f"{key} = {properties[key]!r} must be within (0, {_HIGHEST_M:g}] m")
-            return height
-    return default_m
+def _float(text: str) -> float:
+    return float(text.replace(",", "."))
 
 
-def _plane(ring: Rows, origin: Geodetic) -> Rows:
-    return np.array([to_enu(Geodetic(lat, lon, 0.0), origin)[:2] for lon, lat in ring.tolist()])
+def _plane(ring: list[tuple[float, float]], origin: Geodetic) -> Rows:
+    return np.array([to_enu(Geodetic(lat, lon, 0.0), origin)[:2] for lon, lat in ring])
+
+
+def _turn(yaw: float) -> Rows:
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return np.array([[cos, -sin], [sin, cos]])
 
 
 def _rectangle(ring: Rows, height: float) -> Footprint:
     """The smallest rectangle around a ring; one of its sides lies along a side of the ring's hull (Freeman and Shapira,
     1975).
     """
-    edges = np.diff(ring, axis=0)
+    edges = np.diff(_hull(ring), axis=0)
     angles = np.unique(np.round(np.arctan2(edges[:, 1], edges[:, 0]) % (math.pi / 2), 9))
     best: tuple[float, Footprint] | None = None
     for yaw in angles.tolist():
-        cos, sin = math.cos(yaw), math.sin(yaw)
-        turned = ring @ np.array([[cos, -sin], [sin, cos]])
-        low, high = turned.min(axis=0), turned.max(axis=0)
-        width, depth = np.maximum(high - low, _LEAST_SIDE_M).tolist()
-        middle = (low + high) / 2
-        east, north = (np.array([[cos, -sin], [sin, cos]]) @ middle).tolist()
-        if best is None or width * depth < best[0] - 1e-9:
-            best = width * depth, Footprint(east, north, width, depth, yaw, height)
+        box = _around(ring, yaw, height)
+        if best is None or box.width * box.depth < best[0] - 1e-9:
+            best = box.width * box.depth, box
     assert best is not None, "a ring has edges"
     return best[1]
+
+
+def _around(ring: Rows, yaw: float, height: float) -> Footprint:
+    """The rectangle of this rotation around a ring."""
+    turned = ring @ _turn(yaw)
+    low, high = turned.min(axis=0), turned.max(axis=0)
+    width, depth = np.maximum(high - low, _LEAST_SIDE_M).tolist()
+    east, north = (_turn(yaw) @ ((low + high) / 2)).tolist()
+    return Footprint(east, north, width, depth, yaw, height)
+
+
+def _hull(ring: Rows) -> Rows:
+    """The convex hull of a ring, closed (Andrew, 1979)."""
+    corners = sorted(set(map(tuple, ring.tolist())))
+    sides = []
+    for order in (corners, corners[::-1]):
+        side: list[tuple[float, float]] = []
+        for x, y in order:
+            while len(side) > 1 and _left(side[-2], side[-1], (x, y)) <= 0:
+                side.pop()
+            side.append((x, y))
+        sides += side[:-1]
+    return np.array([*sides, sides[0]])
+
+
+def _left(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def _parts(ring: Rows, whole: Footprint, height: float) -> Iterator[Footprint]:
+    """Rectangles that cover the inside of a ring together: a concave part is cut in two, where that saves most."""
+    waiting, count = [ring @ _turn(whole.yaw)], 1
+    while waiting:
+        part = waiting.pop(0)
+        halves = [] if count >= _MOST_PARTS or _is_simple(part) else _halves(part)
+        if halves:
+            waiting += halves
+            count += len(halves) - 1
+        else:
+            yield _around(part @ _turn(whole.yaw).T, whole.yaw, height)
+
+
+def _is_simple(ring: Rows) -> bool:
+    """True if a ring fills its rectangle, or is convex."""
+    area = _enclosed(ring)
+    return area >= _LEAST_FILLED * _covered(ring) or area >= _LEAST_CONVEX * _enclosed(_hull(ring))
+
+
+def _enclosed(ring: Rows) -> float:
+    x, y = (ring - ring[0]).T
+    return abs(float(np.dot(x[:-1], y[1:]) - np.dot(x[1:], y[:-1]))) / 2
+
+
+def _covered(ring: Rows) -> float:
+    width, depth = (ring.max(axis=0) - ring.min(axis=0)).tolist()
+    return float(width * depth)
+
+
+def _halves(ring: Rows) -> list[Rows]:
+    """The parts on both sides of the best cut: their rectangles are smallest, or else one of them needs no further cut.
+    What encloses nothing is no part.
+    """
+    best: tuple[float, float] | None = None
+    halves: list[Rows] = []
+    for axis in (0, 1):
+        places = np.unique(np.round(ring[:, axis], 2))[1:-1]
+        for place in places[:: max(1, -(-len(places) // _MOST_CUTS))].tolist():
+            parts = [half for side in (1, -1) if _enclosed(half := _clipped(ring, axis, place, side)) > _LEAST_PART_M2]
+            done = max((_enclosed(part) for part in parts if _is_simple(part)), default=0.0)
+            score = round(sum(map(_covered, parts)), 1), -done
+            if parts and (best is None or score < best):
+                best, halves = score, parts
+    return halves
+
+
+def _clipped(ring: Rows, axis: int, place: float, side: int) -> Rows:
+    """The part of a ring on one side of a line (Sutherland and Hodgman, 1974)."""
+    beyond = (ring[:, axis] - place) * side
+    found: list[Rows] = []
+    for i in range(len(ring) - 1):
+        first, second = beyond[i], beyond[i + 1]
+        if first <= 0:
+            found.append(ring[i])
+        if (first < 0 < second) or (second < 0 < first):
+            found.append(ring[i] + (ring[i + 1] - ring[i]) * (first / (first - second)))
+    return np.array([*found, found[0]]) if found else ring[:1]

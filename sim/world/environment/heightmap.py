@@ -1,129 +1,278 @@
-"""Reads heights of the ground from a file: an ASCII grid (`.asc`), or a grayscale picture (`.png`).
+"""Reads heights of the ground from a file: an ASCII grid (`.asc`), a tile of SRTM (`.hgt`), a GeoTIFF (`.tif`), or a
+grayscale picture (`.png`).
 
-An ASCII grid (Esri; GDAL's AAIGrid) has a header with `ncols`, `nrows`, `cellsize` and others, then one line of heights
-in metres for each row, the northernmost first. A picture is grayscale with 8 or 16 bits, without interlacing: black is
-0, white is `world.heightmap_white_m`, and a pixel is `world.heightmap_pixel_m` wide. Whatever the file says about its
-place on earth, its middle is put at the origin and its lowest point at height 0.
+A file in longitude and latitude, or with a reference system, is laid where it belongs about `world.origin_deg`, and
+its lowest point within the area is at height 0. Of a picture, and of an ASCII grid in metres, the middle is put at the
+origin and the lowest point of the file at height 0; of a picture, black is 0, white is `world.heightmap_white_m`, and a
+pixel is `world.heightmap_pixel_m` wide. Cells without a height (voids) within the area are refused.
 """
 
+import math
+import re
 import struct
 import zlib
+from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from fanet_mw.errors import ConfigError
-from sim.world.engines.contract import Rows, Values
+from fanet_mw.mavlink import Geodetic, to_geodetic
+from fanet_mw.scenario import ascii_grid
+from fanet_mw.scenario.outlines import half_turn
+from fanet_mw.units import Enu
+from sim.world.engines.contract import Flags, Rows, Values
 from sim.world.environment.given_file import content
+from sim.world.environment.grayscale_png import SIGNATURE, brightness
 
-Bytes = npt.NDArray[np.uint8]
 _MOST_CELLS: Final = 64_000_000
-_SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
-_HEADER: Final = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize", "nodata_value")
+_LOWEST_M: Final = -500.0
+_HIGHEST_M: Final = 9000.0
+"""Land lies between the shore of the Dead Sea, -430 m, and Mount Everest, 8849 m."""
+_TIFF: Final = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+_TILE: Final = re.compile(r"([NS])(\d\d)([EW])(\d\d\d)", re.IGNORECASE)
 
 
-def read(path: Path, *, white_m: float, pixel_m: float) -> tuple[Rows, float]:
-    """Heights, the southernmost row first, and the distance of neighboring points [m]; raises ConfigError with the
-    file's name.
-    """
-    data = content(path, key="world.heightmap")
+class Heightmap(NamedTuple):
+    """Heights of a file, the southernmost row first, and where its cells lie in the world."""
+
+    metres: Rows
+    """NaN where there is none."""
+    middle: tuple[float, float]
+    """Column and row at the origin."""
+    per_m: Rows
+    """Columns and rows for each metre to the east and to the north [2, 2]."""
+    middle_deg: tuple[float, float] | None = None
+    """Latitude and longitude of the file's middle, if the file says where on earth it lies."""
+    name_of: Callable[[int, int], str] = lambda row, column: f"row {row + 1} from the south, column {column + 1}"
+    """How a cell is called in the file, by its row and column."""
+
+    @property
+    def cell_m(self) -> float:
+        """The lesser extent of a cell."""
+        return 1 / float(np.linalg.norm(self.per_m, axis=1).max())
+
+    def cell(self, east: Values, north: Values) -> tuple[Values, Values]:
+        """Column and row of places."""
+        (a, b), (c, d) = self.per_m.tolist()
+        return self.middle[0] + a * east + b * north, self.middle[1] + c * east + d * north
+
+    def places(self) -> tuple[Values, Values]:
+        """East and north of all cells."""
+        rows, columns = self.metres.shape
+        (a, b), (c, d) = np.linalg.inv(self.per_m).tolist()
+        x, y = np.meshgrid(np.arange(columns) - self.middle[0], np.arange(rows) - self.middle[1])
+        return a * x + b * y, c * x + d * y
+
+    def sample(self, east: Values, north: Values) -> Values:
+        """Heights at places by bilinear interpolation; outside of the grid those of its edge."""
+        rows, columns = self.metres.shape
+        x, y = self.cell(east, north)
+        x, y = np.clip(x, 0, columns - 1 - 1e-9), np.clip(y, 0, rows - 1 - 1e-9)
+        i, j = y.astype(np.int64), x.astype(np.int64)
+        v, u = y - i, x - j
+        corners = ((0, 0, (1 - u) * (1 - v)), (0, 1, u * (1 - v)), (1, 0, (1 - u) * v), (1, 1, u * v))
+        found = np.zeros_like(x)
+        for up, right, weight in corners:  # a void of no weight counts for nothing
+            found += np.where(weight > 1e-6, weight * self.metres[i + up, j + right], 0.0)
+        return found
+
+
+@lru_cache(maxsize=4)
+def read(
+    path: Path, *, white_m: float, pixel_m: float, origin_deg: tuple[float, float], area_m: float, digest: str = ""
+) -> Heightmap:
+    """Heights of the area, and a cell beyond it; raises ConfigError with the file's name."""
     try:
-        if data.startswith(_SIGNATURE):
-            heights, cell_m = _png(data) * white_m, pixel_m
-        else:
-            heights, cell_m = _asc(data.decode("ascii"))
+        found = _read(
+            path, content(path, key="world.heightmap", digest=digest), white_m, pixel_m, _lattice(origin_deg, area_m)
+        )
     except (ValueError, KeyError, IndexError, struct.error, zlib.error) as error:
         raise ConfigError(
-            f"world.heightmap: {path} is neither an ASCII grid nor a plain grayscale PNG: {error}"
+            f"world.heightmap: {path} is neither an ASCII grid, an SRTM tile (.hgt), a GeoTIFF nor a plain grayscale "
+            f"PNG: {error}"
         ) from error
-    if min(heights.shape) < 2 or not np.isfinite(heights).all() or not 0 < cell_m < float("inf"):
-        raise ConfigError(f"world.heightmap: {path} must hold at least 2 x 2 finite heights and a cell size > 0")
-    return heights[::-1] - heights.min(), cell_m
+    if min(found.metres.shape) < 2:
+        raise ConfigError(f"world.heightmap: {path} must hold at least 2 x 2 heights")
+    _require_area(found, path, origin_deg, area_m)
+    return _without_voids(found, path, area_m)
 
 
-def sample(heights: Rows, cell_m: float, east: Values, north: Values) -> Values:
-    """Heights at some places by bilinear interpolation; outside of the grid those of its edge."""
-    rows, columns = heights.shape
-    x = np.clip(east / cell_m + (columns - 1) / 2, 0, columns - 1 - 1e-9)
-    y = np.clip(north / cell_m + (rows - 1) / 2, 0, rows - 1 - 1e-9)
-    i, j = y.astype(np.int64), x.astype(np.int64)
-    v, u = y - i, x - j
-    low = heights[i, j] * (1 - u) + heights[i, j + 1] * u
-    high = heights[i + 1, j] * (1 - u) + heights[i + 1, j + 1] * u
-    return np.asarray(low * (1 - v) + high * v)
+class _Place(NamedTuple):
+    """A place in the world, and on earth."""
+
+    at: Enu
+    on_earth: Geodetic
 
 
-def _asc(text: str) -> tuple[Rows, float]:
-    lines = text.splitlines()
-    header: dict[str, float] = {}
-    while lines and lines[0].split()[:1] and lines[0].split()[0].lower() in _HEADER:
-        key, value = lines.pop(0).split()
-        header[key.lower()] = float(value)
-    columns, rows = int(header["ncols"]), int(header["nrows"])
-    if not 0 < columns * rows <= _MOST_CELLS:
-        raise ValueError(f"{columns} x {rows} cells")
-    heights = np.array(" ".join(lines).split(), dtype=np.float64)
-    if len(heights) != columns * rows:
-        raise ValueError(f"{len(heights)} heights, not {columns} x {rows}")
-    missing = header.get("nodata_value")
-    if missing is not None and (heights == missing).any():
-        raise ValueError(f"{int((heights == missing).sum())} cells have no data")
-    return heights.reshape(rows, columns), header["cellsize"]
+def _lattice(origin_deg: tuple[float, float], area_m: float) -> list[_Place]:
+    """Nine places over the area, by which a file in degrees is laid under it."""
+    origin, sides = Geodetic(*origin_deg, 0.0), (-area_m / 2, 0.0, area_m / 2)
+    every = [Enu(east, north, 0.0) for north in sides for east in sides]
+    return [_Place(at, to_geodetic(at, origin)) for at in every]
 
 
-def _png(data: bytes) -> Rows:
-    """Brightness from 0 to 1 (PNG specification, third edition: chunks, filters)."""
-    at, pixels, head = len(_SIGNATURE), b"", b""
-    while at < len(data):
-        length, kind = struct.unpack_from(">I4s", data, at)
-        body = data[at + 8 : at + 8 + length]
-        head = body if kind == b"IHDR" else head
-        pixels += body if kind == b"IDAT" else b""
-        at += 12 + length
-    width, height, depth, color, _, _, interlace = struct.unpack(">IIBBBBB", head)
-    if color != 0 or depth not in (8, 16) or interlace:
-        raise ValueError(f"color type {color}, {depth} bits, interlace {interlace}")
-    if not 0 < width * height <= _MOST_CELLS:
-        raise ValueError(f"{width} x {height} pixels")
-    step = depth // 8
-    line = 1 + width * step
-    opened = zlib.decompressobj()
-    raw = opened.decompress(pixels, line * height)
-    if len(raw) != line * height:
-        raise ValueError("too few pixels")
-    rows = np.frombuffer(raw, np.uint8).reshape(height, line)
-    found = np.zeros((height, line - 1), np.uint8)
-    before = np.zeros(line - 1, np.uint8)
-    for index in range(height):
-        before = found[index] = _unfiltered(int(rows[index, 0]), rows[index, 1:], before, step)
-    values = found.reshape(height, width, step)
-    bright = values[..., 0].astype(np.float64)
-    if step == 2:
-        bright = bright * 256 + values[..., 1]
-    return np.asarray(bright / (256.0**step - 1))
+def _read(path: Path, data: bytes, white_m: float, pixel_m: float, lattice: list[_Place]) -> Heightmap:
+    if path.suffix.lower() == ".hgt":
+        return _tile(path.name, data, lattice)
+    if data.startswith(SIGNATURE):
+        return _centered(brightness(data)[::-1] * white_m, (pixel_m, pixel_m))
+    if data.startswith(_TIFF):
+        from sim.world.environment import geotiff  # it needs an extra of the package
+
+        metres, cells, middle_deg = geotiff.read(
+            path, data, [place.on_earth for place in lattice], most_cells=_MOST_CELLS
+        )
+        return _laid(metres, cells, lattice, middle_deg)
+    return _ascii(ascii_grid.parse(data), lattice)
 
 
-def _unfiltered(kind: int, line: Bytes, above: Bytes, step: int) -> Bytes:
-    """One line of bytes without its PNG filter."""
-    if kind == 0:
-        return line
-    if kind == 2:
-        return np.add(line, above, dtype=np.uint8)
-    if kind not in (1, 3, 4):
-        raise ValueError(f"filter {kind}")
-    out = [0] * len(line)
-    up = above.tolist()
-    for i, value in enumerate(line.tolist()):
-        left = out[i - step] if i >= step else 0
-        corner = up[i - step] if i >= step else 0
-        guess = left if kind == 1 else (left + up[i]) // 2 if kind == 3 else _paeth(left, up[i], corner)
-        out[i] = (value + guess) & 0xFF
-    return np.array(out, np.uint8)
+def _ascii(grid: ascii_grid.AsciiGrid, lattice: list[_Place]) -> Heightmap:
+    rows, columns = grid.rows, grid.columns
+    metres = _numbers(grid)[::-1]
+    if grid.void is not None:  # the header may write it with more digits than the cells do
+        metres[np.isclose(metres, grid.void, rtol=1e-6, atol=0.0)] = np.nan
+    one_row_a_line = len(grid.lines) == rows
+
+    def name_of(row: int, column: int) -> str:
+        place = rows - 1 - row
+        return f"{f'line {grid.first_line + place}' if one_row_a_line else f'row {place + 1}'}, column {column + 1}"
+
+    if grid.place_deg is None:
+        return _centered(metres, grid.cell)._replace(name_of=name_of)
+    width, height = grid.cell
+    lat, lon = grid.place_deg
+    cells = [
+        (half_turn(place.lon_deg - lon) / width + (columns - 1) / 2, (place.lat_deg - lat) / height + (rows - 1) / 2)
+        for _, place in lattice
+    ]
+    return _laid(metres, cells, lattice, grid.place_deg)._replace(name_of=name_of)
 
 
-def _paeth(left: int, up: int, corner: int) -> int:
-    """Whichever of the three neighbors is nearest to left + up - corner."""
-    guess = left + up - corner
-    return min((left, up, corner), key=lambda value: abs(guess - value))
+def _tile(name: str, data: bytes, lattice: list[_Place]) -> Heightmap:
+    """A tile of SRTM: 16-bit heights over one degree, whose corner in the south west is in the file's name."""
+    corner = _TILE.match(name)
+    if corner is None:
+        raise ValueError("the name of a .hgt file says where it lies: N48E002.hgt")
+    south = int(corner[2]) * (1 if corner[1] in "Nn" else -1)
+    west = int(corner[4]) * (1 if corner[3] in "Ee" else -1)
+    side = math.isqrt(len(data) // 2)
+    if side < 2 or 2 * side * side != len(data):
+        raise ValueError(f"{len(data)} bytes are no square of 16-bit heights")
+    metres = np.frombuffer(data, ">i2").reshape(side, side)[::-1].astype(np.float64)
+    cells = [
+        (half_turn(place.lon_deg - west) * (side - 1), (place.lat_deg - south) * (side - 1)) for _, place in lattice
+    ]
+    return _laid(metres, cells, lattice, (south + 0.5, west + 0.5))
+
+
+def _centered(metres: Rows, cell_m: tuple[float, float]) -> Heightmap:
+    rows, columns = metres.shape
+    return Heightmap(metres, ((columns - 1) / 2, (rows - 1) / 2), np.diag([1 / cell_m[0], 1 / cell_m[1]]))
+
+
+def _laid(
+    metres: Rows, cells: list[tuple[float, float]], lattice: list[_Place], middle_deg: tuple[float, float]
+) -> Heightmap:
+    """Heights under the area, of which column and row are known at each place of the lattice.
+
+    The cells are taken for parallelograms: over an area of 10 km that is right to about 5 m.
+    """
+    known = np.array([[1.0, place.at.east, place.at.north] for place in lattice])
+    fit, *_ = np.linalg.lstsq(known, np.array(cells), rcond=None)
+    return Heightmap(metres, (float(fit[0, 0]), float(fit[0, 1])), fit[1:].T, middle_deg)
+
+
+def _require_area(found: Heightmap, path: Path, origin_deg: tuple[float, float], area_m: float) -> None:
+    """Raises ConfigError unless there is a cell under each corner of the area."""
+    rows, columns = found.metres.shape
+    if found.middle_deg is None:
+        for axis, side, count in ((0, "east", columns), (1, "north", rows)):
+            cell_m = 1 / float(found.per_m[axis, axis])
+            if (count - 1) * cell_m < area_m - cell_m:
+                raise ConfigError(
+                    f"world.heightmap: {path} covers {(count - 1) * cell_m:g} m to the {side}, "
+                    f"which must be >= world.area_m = {area_m:g}"
+                )
+        return
+    corners = np.array([-area_m / 2, area_m / 2])
+    x, y = found.cell(*np.meshgrid(corners, corners))
+    if x.min() < -0.5 or y.min() < -0.5 or x.max() > columns - 0.5 or y.max() > rows - 0.5:
+        lat, lon = found.middle_deg
+        raise ConfigError(
+            f"world.heightmap: {path} does not cover world.area_m = {area_m:g} about world.origin_deg = "
+            f"[{origin_deg[0]:g}, {origin_deg[1]:g}]; the middle of the file is [{lat:.5f}, {lon:.5f}]"
+        )
+
+
+def _without_voids(found: Heightmap, path: Path, area_m: float) -> Heightmap:
+    """The part of the heights that lies under the area, from its lowest point on, or that of the file."""
+    with np.errstate(invalid="ignore"):
+        void = ~((found.metres >= _LOWEST_M) & (found.metres <= _HIGHEST_M))
+    if void.all():
+        raise ConfigError(f"world.heightmap: {path} holds no height within [{_LOWEST_M:g}, {_HIGHEST_M:g}] m")
+    part, (first_row, first_column) = _under(found, area_m)
+    rows, columns = part.metres.shape
+    used, void_here = _used(part, area_m), void[first_row : first_row + rows, first_column : first_column + columns]
+    missing = void_here & used
+    if missing.any():
+        row = int(np.nonzero(missing.any(axis=1))[0][-1])
+        column = int(missing[row].argmax())
+        cell, value = found.name_of(first_row + row, first_column + column), part.metres[row, column]
+        said = f"{value:g}" if np.isfinite(value) else "the value of a void"
+        raise ConfigError(
+            f"world.heightmap: {path}: {int(missing.sum())} cells within world.area_m = {area_m:g} have no data, or no "
+            f"height on earth, [{_LOWEST_M:g}, {_HIGHEST_M:g}] m: the first has {said} ({cell}); "
+            "fill them, for example by gdal_fillnodata.py, or put the area where there are none"
+        )
+    lowest = part.metres[used] if found.middle_deg else found.metres[~void]
+    return part._replace(metres=np.where(void_here, np.nan, part.metres - lowest.min()))
+
+
+def _under(found: Heightmap, area_m: float) -> tuple[Heightmap, tuple[int, int]]:
+    """The rectangle of cells that holds the area, and its first row and column."""
+    corners = np.array([-area_m / 2, area_m / 2])
+    x, y = found.cell(*np.meshgrid(corners, corners))
+    rows, columns = found.metres.shape
+    low = [max(0, min(size - 2, math.floor(part.min()) - 1)) for part, size in ((y, rows), (x, columns))]
+    high = [min(size, max(2, math.ceil(part.max()) + 2)) for part, size in ((y, rows), (x, columns))]
+    part = found.metres[low[0] : high[0], low[1] : high[1]]
+    return found._replace(metres=part, middle=(found.middle[0] - low[1], found.middle[1] - low[0])), (low[0], low[1])
+
+
+def _used(part: Heightmap, area_m: float) -> Flags:
+    """True for the cells on which some height within the area depends."""
+    (a, b), (c, d) = np.abs(np.linalg.inv(part.per_m)).tolist()
+    east, north = part.places()
+    half = area_m / 2 - 1e-6
+    return np.asarray((np.abs(east) < half + a + b) & (np.abs(north) < half + c + d))
+
+
+def _numbers(grid: ascii_grid.AsciiGrid) -> Rows:
+    """The heights of an ASCII grid, the northernmost row first; raises ValueError with the line that is wrong."""
+    count = grid.columns * grid.rows
+    if count > _MOST_CELLS:
+        raise ValueError(f"{grid.columns} x {grid.rows} cells must be at most {_MOST_CELLS}")
+    lines = [line for line in grid.lines if not line.lstrip().startswith(ascii_grid.COMMENTS)]
+    text = "\n".join(lines).replace(";", " ").replace("\t", " ")
+    if "," in text:  # between two heights, unless each of them may have one as its decimal comma
+        is_decimal = len(text.split()) == count and not re.search(r",\s|\.", text)
+        text = text.replace(",", "." if is_decimal else " ")
+    words = re.sub(r"-?1\.#\w+", "nan", text).split() if "#" in text else text.split()
+    try:
+        heights = np.array(words, dtype=np.float64)
+    except ValueError:
+        for at, line in enumerate(grid.lines):
+            for word in line.replace(";", " ").split():
+                ascii_grid.number(word, line=grid.first_line + at)
+        raise
+    if len(heights) != count:
+        widths = [len(line.split()) for line in text.split("\n")]
+        odd = next((at for at, width in enumerate(widths) if width != grid.columns), None)
+        where = (
+            f"; line {grid.first_line + odd} has {widths[odd]}" if odd is not None and len(lines) == grid.rows else ""
+        )
+        raise ValueError(f"{len(heights)} heights, not {grid.columns} x {grid.rows}{where}")
+    return heights.reshape(grid.rows, grid.columns)

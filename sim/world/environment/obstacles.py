@@ -17,7 +17,7 @@ import numpy as np
 from fanet_mw.errors import ConfigError
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario, World
-from sim.world.engines.contract import Rows
+from sim.world.engines.contract import Rows, Values
 from sim.world.environment import footprints, heightmap
 
 _CLEAR_M: Final = 5.0
@@ -28,6 +28,9 @@ _CELLS: Final = 96
 _FILE_CELLS: Final = 255
 """The same for hills from a file; pybullet accepts no more."""
 _WAVES: Final = 8
+_EXACT_M: Final = 1e-3
+_ROUNDS: Final = 12
+"""The number of times that a grid is raised before it takes the highest point around each of its own."""
 
 
 class Box(NamedTuple):
@@ -115,17 +118,26 @@ def obstacles(scenario: Scenario, starts: Rows) -> Obstacles:
     return Obstacles(hills, tuple(boxes))
 
 
+def town_of(world: World) -> footprints.Town:
+    """What the scenario's GeoJSON file holds."""
+    return footprints.read(
+        Path(world.buildings_geojson),
+        origin_deg=world.origin_deg,
+        height_m=sum(world.building_height_m) / 2,
+        area_m=world.area_m,
+        digest=world.buildings_sha256,
+    )
+
+
 def _of_file(world: World, hills: Hills | None, starts: Rows) -> Iterator[Box]:
     """The buildings of the scenario's GeoJSON file whose middle lies in the area."""
-    height_m = sum(world.building_height_m) / 2
-    found = footprints.read(Path(world.buildings_geojson), origin_deg=world.origin_deg, height_m=height_m)
-    inside = [b for b in found if max(abs(b.east), abs(b.north)) <= world.area_m / 2]
-    if not inside:
+    town = town_of(world)
+    if not town.boxes:
         raise ConfigError(
-            f"world.buildings_geojson: none of the {len(found)} buildings of {world.buildings_geojson} lies within "
+            f"world.buildings_geojson: none of the {town.buildings} buildings of {world.buildings_geojson} lies within "
             f"world.area_m = {world.area_m:g}; is world.origin_deg right?"
         )
-    for east, north, width, depth, yaw, height in inside:
+    for east, north, width, depth, yaw, height in town.boxes:
         box = Box(east, north, width, depth, height + (hills.at(east, north) if hills else 0.0), yaw)
         if box.near(starts, margin_m=0.0):
             raise ConfigError(
@@ -135,22 +147,52 @@ def _of_file(world: World, hills: Hills | None, starts: Rows) -> Iterator[Box]:
 
 
 def _hills_of_file(scenario: Scenario) -> Hills:
-    """The heights of the file on a square grid over the area; outside of the file its edge continues."""
+    """The heights of the file on a square grid over the area; outside of the file its edge continues.
+
+    The grid is nowhere lower than the file: where it is coarser, ridges and towers keep their highest point.
+    """
     world = scenario.world
-    heights, cell_m = heightmap.read(
-        Path(world.heightmap), white_m=world.heightmap_white_m, pixel_m=world.heightmap_pixel_m
+    found = heightmap.read(
+        Path(world.heightmap),
+        white_m=world.heightmap_white_m,
+        pixel_m=world.heightmap_pixel_m,
+        origin_deg=world.origin_deg,
+        area_m=world.area_m,
+        digest=world.heightmap_sha256,
     )
-    rows, columns = heights.shape
-    for side, count in (("east", columns), ("north", rows)):
-        if (count - 1) * cell_m < world.area_m - cell_m:
-            raise ConfigError(
-                f"world.heightmap: {world.heightmap} covers {(count - 1) * cell_m:g} m to the {side}, "
-                f"which must be >= world.area_m = {world.area_m:g}"
-            )
-    cells = max(8, min(_FILE_CELLS, math.ceil(world.area_m / cell_m)))
+    cells = max(8, min(_FILE_CELLS, math.ceil(world.area_m / found.cell_m - 1e-6)))
     axis = np.linspace(-world.area_m / 2, world.area_m / 2, cells + 1)
-    east, north = np.meshgrid(axis, axis)
-    return Hills(heightmap.sample(heights, cell_m, east, north), world.area_m / cells)
+    heights = found.sample(*np.meshgrid(axis, axis))
+    east, north = found.places()
+    inside = (np.maximum(np.abs(east), np.abs(north)) <= world.area_m / 2) & np.isfinite(found.metres)
+    return Hills(
+        _not_below(heights, world.area_m / cells, east[inside], north[inside], found.metres[inside]),
+        world.area_m / cells,
+    )
+
+
+def _not_below(heights: Rows, cell_m: float, east: Values, north: Values, least: Values) -> Rows:
+    """The heights of a grid, raised where it would be lower than `least` at a place between its points, but nowhere
+    above the highest of the places beside a point.
+    """
+    side = len(heights)
+    x, y = (np.clip(part / cell_m + (side - 1) / 2, 0, side - 1 - 1e-9) for part in (east, north))
+    i, j = y.astype(np.int64), x.astype(np.int64)
+    v, u = y - i, x - j
+    corners = [(i + up, j + right, (v if up else 1 - v) * (u if right else 1 - u)) for up in (0, 1) for right in (0, 1)]
+    highest = heights.copy()
+    for row, column, _ in corners:
+        np.maximum.at(highest, (row, column), least)
+    raised = heights.copy()
+    for _ in range(_ROUNDS):
+        lacking = least - sum(raised[row, column] * weight for row, column, weight in corners)
+        if lacking.max(initial=0.0) < _EXACT_M:
+            return raised
+        more = np.zeros_like(raised)
+        for row, column, _ in corners:
+            np.maximum.at(more, (row, column), lacking)
+        raised = np.minimum(raised + more, highest)
+    return highest
 
 
 def _seeded(world: World, random: Random, hills: Hills | None, starts: Rows) -> Box:

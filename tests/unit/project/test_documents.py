@@ -71,8 +71,3 @@ def test_every_link_to_a_heading_finds_it(page: Path) -> None:
             if name[1:] not in {anchor(line) for line in lines if line.startswith("#")}:
                 missing.append(target + name)
     assert not missing
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_no_page_is_longer_than_two_thousand_words(page: Path) -> None:
-    assert len(page.read_text(encoding="utf-8").split()) <= 2000

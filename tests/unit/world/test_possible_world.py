@@ -18,7 +18,7 @@ from sim.world.environment import obstacles
 IMPOSSIBLE = [
     ('world.heightmap="nope.asc"', r"world.heightmap: .*nope.asc cannot be read"),
     ('world.heightmap="small.asc"', r"covers 1 m to the east, which must be >= world.area_m = 800"),
-    ('world.buildings_geojson="low.json"', r"height = -5 must be within \(0, 2000\] m"),
+    ('world.buildings_geojson="none.json"', r"none.json is no GeoJSON of buildings: it holds no Polygon"),
     ("world.no_fly_m=[[0,0,50]]", r"world.no_fly_m.0: node 1 starts within it"),
     ("world.buildings=[[0,0,300,300,200]]", r"a node starts within the building at \[0, 0\]"),
     ("world.base_m=[100000,0]", r"world.base_m = \[100000, 0\] must be within \+-2 x world.area_m = 1600"),
@@ -29,9 +29,7 @@ IMPOSSIBLE = [
 def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "small.asc").write_text("ncols 2\nnrows 2\ncellsize 1\n1 2\n3 4\n")
-    ring = [[8.0, 50.0], [8.001, 50.0], [8.001, 50.001], [8.0, 50.001], [8.0, 50.0]]
-    low = {"type": "Feature", "properties": {"height": -5}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
-    (tmp_path / "low.json").write_text(json.dumps({"type": "FeatureCollection", "features": [low]}))
+    (tmp_path / "none.json").write_text(json.dumps({"type": "FeatureCollection", "features": []}))
     scenario = tmp_path / "m.toml"
     scenario.write_text("[world]\narea_m = 800\n[nodes]\ncount = 9\nspacing_m = 20\n")
     return str(scenario)

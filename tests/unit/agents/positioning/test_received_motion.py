@@ -3,7 +3,7 @@
 import pytest
 
 from agents.positioning.received_motion import motion_in
-from fanet_mw.mavlink import Encoder
+from fanet_mw.mavlink import ORIGIN, Encoder
 from fanet_mw.motion import Motion
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
 from fanet_mw.wire import PRIORITY_CONTROL, Header, Kind
@@ -24,7 +24,7 @@ def position(t_ns: int) -> bytes:
 
 def test_a_hello_says_where_its_origin_is_how_it_flies_and_when_that_was() -> None:
     t_ns = 5 * S
-    heard = motion_in(hello(position(t_ns), t_ns=t_ns), own=OURS, now_ns=t_ns + 20 * MS)
+    heard = motion_in(hello(position(t_ns), t_ns=t_ns), own=OURS, now_ns=t_ns + 20 * MS, place=ORIGIN)
     assert heard is not None
     origin, motion = heard
     assert (origin, motion.at_ns) == (THEIRS, t_ns)
@@ -34,14 +34,14 @@ def test_a_hello_says_where_its_origin_is_how_it_flies_and_when_that_was() -> No
 
 @pytest.mark.parametrize(("ahead_ns", "is_believed"), [(S, True), (S + MS, False)])
 def test_a_position_more_than_a_second_ahead_is_not_believed(ahead_ns: int, is_believed: bool) -> None:
-    heard = motion_in(hello(position(9 * S + ahead_ns), t_ns=9 * S), own=OURS, now_ns=9 * S)
+    heard = motion_in(hello(position(9 * S + ahead_ns), t_ns=9 * S), own=OURS, now_ns=9 * S, place=ORIGIN)
     assert isinstance(heard and heard[1], Motion) is is_believed
 
 
 def test_nobody_takes_a_frame_in_its_own_name_for_another_uav() -> None:
-    assert motion_in(hello(position(9 * S), t_ns=9 * S), own=THEIRS, now_ns=9 * S) is None
+    assert motion_in(hello(position(9 * S), t_ns=9 * S), own=THEIRS, now_ns=9 * S, place=ORIGIN) is None
 
 
 def test_a_frame_without_a_position_or_a_header_has_no_motion() -> None:
-    assert motion_in(hello(t_ns=9 * S), own=OURS, now_ns=9 * S) is None
-    assert motion_in(b"not a frame", own=OURS, now_ns=9 * S) is None
+    assert motion_in(hello(t_ns=9 * S), own=OURS, now_ns=9 * S, place=ORIGIN) is None
+    assert motion_in(b"not a frame", own=OURS, now_ns=9 * S, place=ORIGIN) is None

@@ -19,7 +19,7 @@ def test_a_file_that_is_too_large_is_called_that_and_not_a_wrong_format(tmp_path
     with path.open("wb") as file:
         file.truncate(256 * 1024 * 1024 + 1)  # a hole: it takes no disk
     with pytest.raises(ConfigError, match=r"^world\.buildings_geojson: \S*town\.geojson must be at most 256 MB$"):
-        footprints.read(path, origin_deg=None, height_m=10.0)
+        footprints.read(path, origin_deg=(0.0, 0.0), height_m=10.0, area_m=1000.0)
 
 
 def test_a_file_that_is_not_there_is_named_with_its_key(tmp_path: Path) -> None:

@@ -139,9 +139,12 @@ def test_a_path_is_taken_from_the_scenario_files_folder(tmp_path: Path) -> None:
     [
         ("", "neither an ASCII grid"),
         ("ncols 2\nnrows 2\ncellsize 10\n1 2 3\n", "3 heights, not 2 x 2"),
-        ("ncols 2\nnrows 2\ncellsize 10\nNODATA_value -9\n1 2 3 -9\n", "1 cells have no data"),
+        (
+            "ncols 2\nnrows 2\ncellsize 790\nNODATA_value -9\n1 2\n-9 3\n",
+            r"1 cells within .* = 800 have no data, or .*: the first has the value of a void \(line 6, column 1\)",
+        ),
         ("ncols 2\nnrows 2\ncellsize 0\n1 2 3 4\n", "cell size > 0"),
-        ("ncols 2\nnrows 2\ncellsize 10\n1 2 3 nan\n", "finite heights"),
+        ("ncols 2\nnrows 2\ncellsize 790\n1 2\n3 nan\n", "1 cells within .* have no data"),
         ("ncols 2\nnrows 2\ncellsize 10\n1 2 3 4\n", r"covers 10 m to the east, which must be >= world.area_m = 800"),
     ],
 )
@@ -154,7 +157,15 @@ def test_a_heightmap_that_is_none_is_refused_by_name(
     with pytest.raises(ConfigError, match=named):
         obstacles(scenario, np.array(positions(scenario)))
     with pytest.raises(ConfigError, match="cannot be read"):
-        heightmap.read(tmp_path / "none.asc", white_m=1, pixel_m=1)
+        heights_of(tmp_path / "none.asc")
+
+
+def heights_of(path: Path, *, white_m: float = 1, pixel_m: float = 1, area_m: float = 1) -> heightmap.Heightmap:
+    return heightmap.read(path, white_m=white_m, pixel_m=pixel_m, origin_deg=PARIS[:2], area_m=area_m)
+
+
+def town_of(path: Path) -> footprints.Town:
+    return footprints.read(path, origin_deg=PARIS[:2], height_m=19.0, area_m=1000.0)
 
 
 def png(values: np.ndarray, kind: int, depth: int = 8) -> bytes:
@@ -187,9 +198,9 @@ def test_a_picture_of_any_filter_and_depth_gives_its_heights(tmp_path: Path, kin
     values[0, 0], values[1, 1] = 0, white
     path = tmp_path / "hills.png"
     path.write_bytes(png(values, kind, depth))
-    heights, cell_m = heightmap.read(path, white_m=80.0, pixel_m=5.0)
-    assert cell_m == 5.0
-    assert heights[::-1] == pytest.approx(values / white * 80.0)
+    found = heights_of(path, white_m=80.0, pixel_m=5.0, area_m=20.0)
+    assert found.cell_m == 5.0
+    assert found.metres[::-1] == pytest.approx(values / white * 80.0)
 
 
 def test_a_picture_with_colors_is_refused(tmp_path: Path) -> None:
@@ -198,7 +209,7 @@ def test_a_picture_with_colors_is_refused(tmp_path: Path) -> None:
     data[25] = 2  # color type RGB
     path.write_bytes(bytes(data))
     with pytest.raises(ConfigError, match="color type 2"):
-        heightmap.read(path, white_m=1, pixel_m=1)
+        heights_of(path)
 
 
 # --- buildings from files ---------------------------------------------------------------------------------------------
@@ -232,7 +243,7 @@ def test_a_building_is_the_smallest_rectangle_about_its_outline(tmp_path: Path) 
         (turned(HOUSE, 0, (-80, 0)), {"building:levels": 4}),
         (turned(HOUSE, 0, (0, 90)), {}),
     )
-    first, second, third = footprints.read(path, origin_deg=(PARIS.lat_deg, PARIS.lon_deg), height_m=19.0)
+    first, second, third = town_of(path).boxes
     assert (first.east, first.north) == pytest.approx((100, 50), abs=0.05)
     assert (first.width, first.depth, math.degrees(first.yaw)) == pytest.approx((40, 10, 30), abs=0.05)
     assert (first.height, second.height, third.height) == (12.0, 12.0, 19.0)
@@ -277,7 +288,7 @@ def test_a_file_without_buildings_is_refused_by_name(tmp_path: Path, text: str, 
     path = tmp_path / "bad.geojson"
     path.write_text(text)
     with pytest.raises(ConfigError, match=named):
-        footprints.read(path, origin_deg=None, height_m=10)
+        town_of(path)
 
 
 def test_buildings_far_from_the_origin_and_on_a_start_are_refused(make_scenario: MakeScenario, tmp_path: Path) -> None:

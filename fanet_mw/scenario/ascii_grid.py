@@ -1,0 +1,117 @@
+"""The header of an ASCII grid of heights (Esri; GDAL's AAIGrid): how many cells, how large, and where on earth.
+
+Read are also files with `dx` and `dy` in place of `cellsize`, comments, decimal commas, byte-order marks, and cells in
+degrees, as OpenTopography delivers them. The heights themselves are read where they are needed, with numpy.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+_KEYS: Final = {
+    "ncols": "ncols", "nrows": "nrows", "cellsize": "cellsize", "dx": "dx", "dy": "dy", "xdim": "dx", "ydim": "dy",
+    "xllcorner": "xllcorner", "yllcorner": "yllcorner", "xllcenter": "xllcenter", "yllcenter": "yllcenter",
+    "nodata_value": "nodata", "nodata": "nodata",
+}  # fmt: skip
+COMMENTS: Final = ("#", "//", "!")
+_COARSEST_DEG: Final = 0.02
+"""A grid with places in degrees has cells of at most this; cells of less than 2 cm there are none."""
+
+
+class AsciiGrid(NamedTuple):
+    """An ASCII grid, whose heights are still text."""
+
+    columns: int
+    rows: int
+    cell: tuple[float, float]
+    """The extent of a cell along x and along y: metres, or degrees if `in_degrees`."""
+    middle: tuple[float, float]
+    """x and y of the middle of the grid."""
+    void: float | None
+    """The value of cells without a height, if the header declares one."""
+    lines: Sequence[str]
+    """The lines below the header."""
+    first_line: int
+    """The number of the first of them in the file."""
+
+    @property
+    def in_degrees(self) -> bool:
+        """True if x and y are longitude and latitude; metres are never so small and so near to 0."""
+        (x, y), (width, height) = self.middle, self.cell
+        fits = abs(x) <= 360 and abs(y) + height * self.rows / 2 <= 90 + height
+        return fits and max(width, height) < _COARSEST_DEG and width * self.columns <= 360
+
+    @property
+    def place_deg(self) -> tuple[float, float] | None:
+        """Latitude and longitude of the middle; None for a grid in metres, of which they are unknown."""
+        return (self.middle[1], (self.middle[0] + 180) % 360 - 180) if self.in_degrees else None
+
+
+def parse(data: bytes) -> AsciiGrid:
+    """Read the header; raises ValueError with the line that is wrong."""
+    lines = _text(data).splitlines()
+    found: dict[str, float] = {}
+    body = len(lines)
+    for at, line in enumerate(lines):
+        words = line.replace("=", " ").replace(":", " ").split()
+        if not words or words[0].startswith(COMMENTS):
+            continue
+        key = _KEYS.get(words[0].lower())
+        if key is None:
+            if words[0][0].isalpha() and words[0].lower() not in {"nan", "inf", "infinity"}:
+                raise ValueError(f"line {at + 1}: {line.strip()[:60]!r} is no line of the header of an ASCII grid")
+            body = at
+            break
+        if len(words) != 2:
+            raise ValueError(f"line {at + 1}: {line.strip()[:60]!r} must be a key and one number")
+        found[key] = number(words[1], line=at + 1)
+    columns, rows = _count(found, "ncols"), _count(found, "nrows")
+    cell = _side(found, "dx"), _side(found, "dy")
+    middle = (
+        _middle(found, "x", cells=columns, cell=cell[0]),
+        _middle(found, "y", cells=rows, cell=cell[1]),
+    )
+    return AsciiGrid(columns, rows, cell, middle, found.get("nodata"), lines[body:], body + 1)
+
+
+def number(text: str, *, line: int) -> float:
+    """A number, with a decimal point or comma."""
+    try:
+        return float(text.replace(",", ".", 1))
+    except ValueError:
+        raise ValueError(f"line {line}: {text[:40]!r} is no number") from None
+
+
+def _text(data: bytes) -> str:
+    """The text of a file; byte-order marks say in which encoding it is, and comments may be in any."""
+    for mark, encoding in ((b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"), (b"\xef\xbb\xbf", "utf-8-sig")):
+        if data.startswith(mark):
+            return data.decode(encoding, "replace")
+    if b"\0" in data[:4096]:
+        raise ValueError("it is binary")
+    return data.decode("latin-1")
+
+
+def _count(found: dict[str, float], key: str) -> int:
+    if key not in found:
+        raise ValueError(f"its header has no {key}")
+    value = found[key]
+    if not (1 <= value <= 1e9 and value == int(value)):
+        raise ValueError(f"{key} = {value:g} must be a whole number > 0")
+    return int(value)
+
+
+def _side(found: dict[str, float], key: str) -> float:
+    value = found.get(key, found.get("cellsize"))
+    if value is None:
+        raise ValueError("its header has no cellsize, nor dx and dy")
+    if not 0 < value < math.inf:
+        raise ValueError(f"{'cellsize' if key not in found else key} = {value:g} must be a cell size > 0")
+    return value
+
+
+def _middle(found: dict[str, float], axis: str, *, cells: int, cell: float) -> float:
+    """X or y of the middle; NaN if the file does not say where it lies."""
+    if f"{axis}llcenter" in found:
+        return found[f"{axis}llcenter"] + (cells - 1) * cell / 2
+    return found.get(f"{axis}llcorner", math.nan) + cells * cell / 2

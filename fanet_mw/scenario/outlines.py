@@ -1,0 +1,159 @@
+"""The outlines of buildings in a GeoJSON file (RFC 7946), as the tools of OpenStreetMap export it.
+
+Read are collections of features, single ones and one a line (RFC 8142), with tags as properties, in `tags`
+(osmtogeojson) or in `other_tags` (GDAL). A polygon is left out if it has less than three corners, or if its tags say
+that it is no building, such as a park.
+"""
+
+import json
+import math
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any, Final, NamedTuple
+
+_NO_BUILDINGS: Final = (
+    "landuse", "natural", "leisure", "waterway", "boundary", "highway", "place", "railway", "power", "barrier",
+)  # fmt: skip
+"""Tags of areas that are no buildings, unless they have the tag `building`, too."""
+_BUILDING: Final = ("building", "building:part")
+_OTHER_TAG: Final = re.compile(r'"([^"]+)"=>"([^"]*)"')
+_TURN_DEG: Final = 360.0
+_MOST_LON_DEG: Final = 190.0
+"""Towns across 180 degrees are also written with longitudes that run on."""
+_Ring = list[tuple[float, float]]
+
+
+class Outline(NamedTuple):
+    """The outline of one building, or of one part of it."""
+
+    name: str
+    """What a message calls it: its id, or its number in the file."""
+    ring: _Ring
+    """Longitude and latitude of its corners; across 180 degrees longitudes run on."""
+    tags: Mapping[str, Any]
+
+
+class Outlines(NamedTuple):
+    """What a file holds."""
+
+    buildings: list[Outline]
+    broken: list[str]
+    """The names of polygons that enclose nothing, each with the reason."""
+
+    @property
+    def middle_deg(self) -> tuple[float, float]:
+        """Latitude and longitude of the middle of all outlines."""
+        lons = [lon for outline in self.buildings for lon, _ in outline.ring]
+        lats = [lat for outline in self.buildings for _, lat in outline.ring]
+        return (min(lats) + max(lats)) / 2, half_turn((min(lons) + max(lons)) / 2)
+
+
+def half_turn(degrees: float) -> float:
+    """An angle in [-180, 180): the shorter way from one longitude to another."""
+    return degrees if -180 <= degrees < 180 else (degrees + 180) % _TURN_DEG - 180
+
+
+def parse(data: bytes) -> Outlines:
+    """Read a file; raises ValueError with the reason if it holds no outline of a building."""
+    buildings: list[Outline] = []
+    broken: list[str] = []
+    start: float | None = None
+    for name, tags, points in _polygons(_tree(data)):
+        if not _is_building(tags):
+            continue
+        try:
+            ring = _ring(points)
+        except (TypeError, IndexError, KeyError, ValueError) as error:
+            reason = str(error) if isinstance(error, ValueError) else f"no list of positions: {str(points)[:60]}"
+            broken.append(f"{name}: {reason}")
+            continue
+        start = ring[0][0] if start is None else start
+        buildings.append(Outline(name, [(start + half_turn(lon - start), lat) for lon, lat in ring], tags))
+    if not buildings:
+        raise ValueError(broken[0] if broken else "it holds no Polygon of a building")
+    return Outlines(buildings, broken)
+
+
+def _tree(data: bytes) -> Any:  # noqa: ANN401  (JSON)
+    text = data.decode("utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+    try:
+        tree = json.loads(text)
+    except json.JSONDecodeError:
+        lines = [line.strip("\x1e \r") for line in text.split("\n")]
+        lines = [line for line in lines if line]
+        if len(lines) < 2 or not all(line.startswith("{") and line.endswith("}") for line in lines):
+            raise
+        return {"type": "FeatureCollection", "features": [json.loads(line) for line in lines]}
+    if isinstance(tree, dict) and "elements" in tree:
+        raise ValueError("it is the JSON of Overpass; export it as GeoJSON")
+    if not isinstance(tree, dict) or "type" not in tree:
+        raise ValueError("it is no object with a type")
+    return tree
+
+
+def _polygons(tree: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any], Any]]:
+    """Name, tags and outer ring of every polygon."""
+    if tree["type"] == "FeatureCollection":
+        features = tree.get("features")
+        if not isinstance(features, list):
+            raise ValueError("its features are no list")
+    else:
+        features = [tree]
+    for number, feature in enumerate(features, start=1):
+        if not isinstance(feature, dict):
+            continue
+        is_feature = feature.get("type") == "Feature"
+        tags = _tags(feature.get("properties")) if is_feature else {}
+        name = str(tags.get("@id") or feature.get("id") or tags.get("osm_id") or tags.get("id") or f"feature {number}")
+        for ring in _rings(feature.get("geometry") if is_feature else feature):
+            yield name, tags, ring
+
+
+def _rings(geometry: object) -> Iterator[Any]:
+    """The outer rings of a geometry; what has no area has none."""
+    if not isinstance(geometry, dict):
+        return
+    inner = geometry.get("geometries" if geometry.get("type") == "GeometryCollection" else "coordinates")
+    polygons = [inner] if geometry.get("type") == "Polygon" else inner
+    if geometry.get("type") == "GeometryCollection":
+        for each in inner or ():
+            yield from _rings(each)
+    elif geometry.get("type") in {"Polygon", "MultiPolygon"}:
+        for polygon in polygons if isinstance(polygons, list) else [None]:
+            yield polygon[0] if isinstance(polygon, list) and polygon else polygon
+
+
+def _tags(properties: object) -> Mapping[str, Any]:
+    if not isinstance(properties, dict):
+        return {}
+    found: dict[str, Any] = {}
+    others = properties.get("other_tags")
+    if isinstance(others, str):
+        found.update(_OTHER_TAG.findall(others))
+    nested = properties.get("tags")
+    if isinstance(nested, dict):
+        found.update(nested)
+    found.update((key, value) for key, value in properties.items() if value is not None)
+    return found
+
+
+def _is_building(tags: Mapping[str, Any]) -> bool:
+    said = [tags[key] for key in _BUILDING if key in tags]
+    if said:
+        return any(str(value).lower() not in {"no", "false", "0"} for value in said)
+    return not any(key in tags for key in _NO_BUILDINGS)
+
+
+def _ring(points: Any) -> _Ring:  # noqa: ANN401  (JSON)
+    """Longitude and latitude of the corners, closed; raises ValueError unless there are three of them."""
+    ring = [(float(point[0]), float(point[1])) for point in points]
+    if not all(math.isfinite(lon) and math.isfinite(lat) for lon, lat in ring):
+        raise ValueError("a position is not finite")
+    if any(abs(lon) > _MOST_LON_DEG or abs(lat) > 90 for lon, lat in ring):
+        raise ValueError(
+            f"a position must be longitude and latitude, not {points[0]!r}; convert the file to EPSG:4326: "
+            "ogr2ogr -t_srs EPSG:4326 town.geojson in.geojson"
+        )
+    if len(set(ring)) < 3:
+        raise ValueError(f"a ring must have four positions of longitude and latitude, not {points[:4]!r}")
+    return ring if ring[0] == ring[-1] else [*ring, ring[0]]

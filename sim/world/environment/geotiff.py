@@ -1,0 +1,58 @@
+"""Heights from a GeoTIFF of whatever reference system, by rasterio (GDAL): the extra `maps` of the package."""
+
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from fanet_mw.errors import ConfigError
+from fanet_mw.mavlink import Geodetic
+from sim.world.engines.contract import Rows
+
+_FEET: Final = {"ft": 0.3048, "foot": 0.3048, "feet": 0.3048, "us-ft": 1200 / 3937, "us survey foot": 1200 / 3937}
+
+
+def read(
+    path: Path, data: bytes, places: Sequence[Geodetic], *, most_cells: int
+) -> tuple[Rows, list[tuple[float, float]], tuple[float, float]]:
+    """The heights of the first band, the southernmost row first, NaN where there is none; the column and row of each
+    place; and latitude and longitude of the middle.
+    """
+    try:
+        from rasterio.errors import RasterioError
+        from rasterio.io import MemoryFile
+        from rasterio.warp import transform
+    except ModuleNotFoundError as error:
+        raise ConfigError(
+            f"world.heightmap: {path} is a GeoTIFF, which needs rasterio: pip install 'fanet-mw[maps]'"
+        ) from error
+    try:
+        with warnings.catch_warnings(), MemoryFile(data).open() as file:
+            warnings.simplefilter("ignore")
+            if file.crs is None:
+                raise ValueError("it has no reference system; give it one: gdal_translate -a_srs EPSG:...")
+            if file.width * file.height > most_cells:
+                raise ValueError(
+                    f"{file.width} x {file.height} cells must be at most {most_cells}: cut it by gdalwarp -te"
+                )
+            band = file.read(1, masked=True).astype(np.float64)
+            metres = band.filled(np.nan) * file.scales[0] + file.offsets[0]
+            metres *= _FEET.get((file.units[0] or "m").lower(), 1.0)
+            lons, lats = [place.lon_deg for place in places], [place.lat_deg for place in places]
+            x, y = transform("EPSG:4326", file.crs, lons, lats)
+            to_cell, to_place = ~file.transform, file.transform
+            cells = [
+                (to_cell.a * px + to_cell.b * py + to_cell.c, to_cell.d * px + to_cell.e * py + to_cell.f)
+                for px, py in zip(x, y, strict=True)
+            ]
+            across, down = file.width / 2, file.height / 2
+            middle_x = to_place.a * across + to_place.b * down + to_place.c
+            middle_y = to_place.d * across + to_place.e * down + to_place.f
+            (lon,), (lat,) = transform(file.crs, "EPSG:4326", [middle_x], [middle_y])
+            middle_deg = float(lat), float(lon)
+    except RasterioError as error:
+        raise ValueError(str(error)) from error
+    last = metres.shape[0] - 1
+    return metres[::-1], [(column - 0.5, last - (row - 0.5)) for column, row in cells], middle_deg

@@ -1,0 +1,69 @@
+"""What a scenario says that will have no effect is said to its author, and in the summary."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from fanet_mw.scenario import config
+from sim.cli.app import app
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.scenarios.notes import notes
+
+SHORT = {
+    "duration_s": 5, "drain_s": 1, "nodes": {"count": 2, "layout": "line"}, "routing": {"protocol": "flooding"},
+    "traffic": {"arrivals": "none"},
+}  # fmt: skip
+
+
+TOWN = """duration_s = 1
+[nodes]
+count = 2
+layout = "line"
+[routing]
+protocol = "flooding"
+[traffic]
+arrivals = "none"
+[world]
+buildings_geojson = "town.geojson"
+origin_deg = [48.85, 2.35]
+"""
+CUTS = [{"kind": "cut", "node": 1, "at_s": 5}, {"kind": "cut", "node": 1, "at_s": 4}]
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, []),
+        (
+            {"faults": [{"kind": "cut", "node": 1, "at_s": 5}, {"kind": "cut", "node": 1, "at_s": 4}]},
+            ["faults.0.at_s = 5"],
+        ),
+        ({"traffic": {"start_s": 4}}, ["traffic: start_s = 4, after the last packet, duration_s - drain_s = 4"]),
+        (
+            {"traffic": {"arrivals": "trace", "packets": [[1, 99], [4, 99], [9, 99]]}},
+            ["traffic: 2 of 3 packets come too late to be sent, from 4 s on; duration_s - drain_s = 4"],
+        ),
+    ],
+)
+def test_what_comes_after_the_end_is_noted(changes: dict[str, object], said: list[str]) -> None:
+    found = notes(config.build({**SHORT, **changes}))
+    assert [text.partition(": after the end")[0] for text in found] == said
+
+
+def test_a_guessed_height_is_noted_before_the_run_and_in_its_summary(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ring = [[2.3538, 48.8564], [2.3542, 48.8564], [2.3542, 48.8568], [2.3538, 48.8564]]
+    house = {
+        "type": "Feature", "properties": {"@id": "way/7", "height": "tall"},
+        "geometry": {"type": "Polygon", "coordinates": [ring]},
+    }  # fmt: skip
+    (tmp_path / "town.geojson").write_text(json.dumps(house))
+    (tmp_path / "s.toml").write_text(TOWN)
+    app(["check", str(tmp_path / "s.toml")], result_action="return_value")
+    said = "1 buildings of heights that were guessed: way/7: height = tall: taken as 19 m"
+    assert said in capsys.readouterr().err
+    summary = finish(simulate(config.load(tmp_path / "s.toml")), out=None)
+    assert summary["notes"] == [f"world.buildings_geojson: {said}"]

@@ -8,6 +8,8 @@ import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
+from fanet_mw.scenario.text_files import decoded
+
 _KEYS: Final = {
     "ncols": "ncols", "nrows": "nrows", "cellsize": "cellsize", "dx": "dx", "dy": "dy", "xdim": "dx", "ydim": "dy",
     "xllcorner": "xllcorner", "yllcorner": "yllcorner", "xllcenter": "xllcenter", "yllcenter": "yllcenter",
@@ -84,12 +86,10 @@ def number(text: str, *, line: int) -> float:
 
 def _text(data: bytes) -> str:
     """The text of a file; byte-order marks say in which encoding it is, and comments may be in any."""
-    for mark, encoding in ((b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"), (b"\xef\xbb\xbf", "utf-8-sig")):
-        if data.startswith(mark):
-            return data.decode(encoding, "replace")
-    if b"\0" in data[:4096]:
+    text = decoded(data, otherwise="latin-1")
+    if "\0" in text[:4096]:
         raise ValueError("it is binary")
-    return data.decode("latin-1")
+    return text
 
 
 def _count(found: dict[str, float], key: str) -> int:

@@ -5,10 +5,12 @@ Each message names the file, the key, the value and the bound, because the user 
 (`validation_errors.py`).
 """
 
+import re
 import tomllib
+import unicodedata
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from pydantic import ValidationError
 
@@ -17,16 +19,23 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.overrides import apply_override
 from fanet_mw.scenario.quantities import in_unit_of, unit_of
 from fanet_mw.scenario.tables.world import FILE_KEYS
+from fanet_mw.scenario.text_files import read_text
 from fanet_mw.scenario.validation_errors import sentence
+
+_LIKE_A_NUMBER: Final = re.compile(r"[-+.\d]")
+_DECIMAL: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,2})?")
 
 
 def load(path: Path, overrides: Iterable[str] = ()) -> Scenario:
     """Read one scenario file; raises ConfigError with all mistakes of the file and the overrides."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
-    return parse(text, source=str(path), name=path.stem, overrides=overrides, folder=path.parent)
+    text = read_text(path, what=str(path))
+    return parse(text, source=str(path), name=_name_of(path), overrides=overrides, folder=path.parent)
+
+
+def _name_of(path: Path) -> str:
+    """The name of a scenario by that of its file, in the letters that a topic may have."""
+    letters = unicodedata.normalize("NFKD", path.stem).encode("ascii", "ignore").decode()
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", letters).strip("-")[:64] or "unnamed"
 
 
 def parse(text: str, *, source: str, name: str, overrides: Iterable[str] = (), folder: Path | None = None) -> Scenario:
@@ -97,25 +106,36 @@ def _from_folder(tree: dict[str, Any], folder: Path) -> None:
             world[key] = str(folder.absolute() / world[key])
 
 
-def _packets(path: Path, key: str) -> list[list[str]]:
-    """The packets of a file with `seconds,bytes` on each line; raises ConfigError with the line that is wrong."""
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{key} = {path}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
-    found = []
-    for number, line in enumerate(lines, start=1):
-        cells = [cell.strip() for cell in line.split(",")]
-        if not line.strip() or line.startswith("#") or (number == 1 and not _is_number(cells[0])):
-            continue  # a heading or an empty line
-        if len(cells) != 2 or not all(_is_number(cell) for cell in cells):
-            raise ConfigError(f"{key} = {path}, line {number}: {line!r} must be seconds,bytes")
-        found.append(cells)
+def _packets(path: Path, key: str) -> list[tuple[float, int]]:
+    """The packets of a file with `seconds,bytes` on each line, as spreadsheets write it: also with semicolons or tabs,
+    and then with decimal commas; raises ConfigError with the line that is wrong.
+    """
+    text = read_text(path, what=f"{key} = {path}")
+    between = next((mark for mark in (";", "\t") if mark in text), ",")
+    found: list[tuple[float, int]] = []
+    may_be_heading = True
+    for number, line in enumerate(text.splitlines(), start=1):
+        cells = [cell.strip().strip("\"'").strip() for cell in line.rstrip(f"{between} \t").split(between)]
+        if not "".join(cells) or line.startswith("#"):
+            continue
+        if between != ",":
+            cells = [cell.replace(",", ".", 1) for cell in cells]
+        is_heading = may_be_heading and not any(_LIKE_A_NUMBER.match(cell) for cell in cells)
+        may_be_heading = False
+        if is_heading:
+            continue
+        seconds, size = map(_number, cells) if len(cells) == 2 else (None, None)
+        if seconds is None or size is None or seconds < 0 or size != int(size):
+            raise ConfigError(
+                f"{key} = {path}, line {number}: {line!r} must be seconds,bytes: a number >= 0 and a whole one"
+            )
+        found.append((seconds, int(size)))
     return found
 
 
-def _is_number(text: str) -> bool:
-    return text.replace(".", "", 1).replace("e-", "", 1).isdecimal()
+def _number(text: str) -> float | None:
+    """A finite number as people write it; None for anything else."""
+    return float(text) if _DECIMAL.fullmatch(text) else None
 
 
 def _plain(key: str, value: object, problems: list[str], path: str) -> object:

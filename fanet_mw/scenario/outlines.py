@@ -11,6 +11,8 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any, Final, NamedTuple
 
+from fanet_mw.scenario.text_files import decoded
+
 _NO_BUILDINGS: Final = (
     "landuse", "natural", "leisure", "waterway", "boundary", "highway", "place", "railway", "power", "barrier",
 )  # fmt: skip
@@ -75,7 +77,7 @@ def parse(data: bytes) -> Outlines:
 
 
 def _tree(data: bytes) -> Any:  # noqa: ANN401  (JSON)
-    text = data.decode("utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+    text = decoded(data)
     try:
         tree = json.loads(text)
     except json.JSONDecodeError:

@@ -5,8 +5,9 @@ from pathlib import Path
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario, config
+from fanet_mw.scenario.text_files import read_text
 from fanet_mw.wire.search_plan import MOST_PLACES
-from sim.scenarios.shipped import Entry, entry, shipped
+from sim.scenarios.shipped import Entry, entry, is_file, shipped
 
 __all__ = ["Entry", "find", "shipped", "text_of"]
 
@@ -43,8 +44,8 @@ def _searchable(scenario: Scenario, source: str) -> Scenario:
 def text_of(name: str) -> str:
     """The text of a valid scenario: that of a file, or that of the shipped scenario of this name."""
     find(name)
-    return Path(name).read_text(encoding="utf-8") if _is_file(name) else entry(name).text
+    return read_text(Path(name), what=name) if _is_file(name) else entry(name).text
 
 
 def _is_file(name: str) -> bool:
-    return name.endswith(".toml") or "/" in name
+    return is_file(name, [entry.name for entry in shipped()])

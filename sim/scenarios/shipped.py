@@ -2,8 +2,10 @@
 
 import difflib
 import tomllib
+from collections.abc import Collection
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 from typing import NamedTuple
 
 from fanet_mw.errors import ConfigError
@@ -26,6 +28,11 @@ def shipped() -> tuple[Entry, ...]:
             text = item.read_text(encoding="utf-8")
             entries.append(Entry(item.name.removesuffix(".toml"), tomllib.loads(text).get("description", ""), text))
     return tuple(entries)
+
+
+def is_file(name: str, known: Collection[str]) -> bool:
+    """True if what a user names is a file, and not a known thing: it has a slash, ends in .toml, or is there."""
+    return name.lower().endswith(".toml") or "/" in name or (name not in known and Path(name).is_file())
 
 
 def entry(name: str) -> Entry:

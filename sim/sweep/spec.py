@@ -32,6 +32,8 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.scenario.text_files import decoded, read_text
+from sim.scenarios.shipped import is_file
 from sim.sweep.toml_values import toml_value
 
 MOST_RUNS: Final = 100_000
@@ -187,16 +189,12 @@ def shipped() -> list[str]:
 
 def find(name: str) -> Sweep:
     """The sweep in a file, if the name has a slash or ends in .toml; otherwise the shipped sweep of that name."""
-    if not (name.endswith(".toml") or "/" in name):
+    if not is_file(name, shipped()):
         if name not in shipped():
             raise ConfigError(f"unknown sweep {name!r}; shipped: {', '.join(shipped())}; or give a .toml file")
         return parse(files("sim.sweeps").joinpath(f"{name}.toml").read_text(encoding="utf-8"), source=f"sweep {name}")
     path = Path(name)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
-    sweep = parse(text, source=str(path))
+    sweep = parse(read_text(path, what=str(path)), source=str(path))
     if sweep.base.endswith(".toml") and not Path(sweep.base).is_absolute():
         return sweep.model_copy(update={"base": str(path.parent / sweep.base)})
     return sweep
@@ -204,11 +202,11 @@ def find(name: str) -> Sweep:
 
 def is_sweep(name: str) -> bool:
     """True for a shipped sweep, and for a file with the key `base`, which scenarios do not have."""
-    if not (name.endswith(".toml") or "/" in name):
+    if not is_file(name, shipped()):
         return name in shipped()
     try:
-        return "base" in tomllib.loads(Path(name).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+        return "base" in tomllib.loads(decoded(Path(name).read_bytes()))
+    except (OSError, UnicodeError, tomllib.TOMLDecodeError):
         return False
 
 

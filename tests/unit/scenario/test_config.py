@@ -13,6 +13,7 @@ from fanet_mw.routing.clustered.claimed.slot_acquisition import geometry
 from fanet_mw.scenario import Scenario, config, grid_columns
 from fanet_mw.scenario.cross_checks import MESSAGE_BYTES
 from fanet_mw.units import Enu, NodeId
+from sim.cli.app import app
 from sim.scenarios import catalog
 
 
@@ -158,3 +159,73 @@ def test_a_contention_window_that_leaves_one_claimed_turn_is_accepted() -> None:
     most = float(message.split("must be <= ")[1].split(",")[0])
     found = config.parse(CLAIMED + f"contention_ms = {most}\nflooding_period_s = 0.5\n", source="a.toml", name="a")
     assert geometry(found).per_superframe == 1
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0.5,200\n1.5,300\n",
+        "seconds,bytes\n0.5,200\n1.5,300\n",
+        "\n# by hand\nseconds,bytes\n0.5, 200\n1.5, 300",
+        "+0.5,200\n1.5,300\n",
+        "5E-01,200\n15e-1,3.0e2\n",
+        "5.0e-1,200\r\n1.5,300\r\n",
+        ".5,200\n1.5,300\n",
+        '"0.5","200"\n"1.5","300"\n',
+        "0,5;200\n1,5;300\n",
+        "Zeit;Bytes\n0,5;200;\n1,5;300;\n",
+        "0.5\t200\n1.5\t300\n",
+    ],
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_no_packet_of_a_spreadsheet_is_lost(tmp_path: Path, text: str, encoding: str) -> None:
+    (tmp_path / "load.csv").write_bytes(text.encode(encoding))
+    (tmp_path / "s.toml").write_text('[traffic]\narrivals = "trace"\npackets_csv = "load.csv"\n')
+    assert config.load(tmp_path / "s.toml").traffic.packets == ((0.5, 200), (1.5, 300))
+
+
+@pytest.mark.parametrize(
+    ("text", "wrong"),
+    [
+        ("0.5,200\nx,300\n", "line 2: 'x,300'"),
+        ("O.5,200\n1.5,300\n", "line 1: 'O.5,200'"),
+        ("seconds,bytes\nseconds,bytes\n", "line 2"),
+        ("0.5,200\n-1,300\n", "line 2: '-1,300' must be seconds,bytes: a number >= 0"),
+        ("0.5,200.5\n", "line 1: '0.5,200.5'"),
+        ("0.5,nan\n", "line 1: '0.5,nan'"),
+        ("0,5,200\n", "line 1: '0,5,200'"),
+        ("0.5,1_000\n", "line 1: '0.5,1_000'"),
+    ],
+)
+def test_a_line_of_a_packet_file_that_is_none_is_named(tmp_path: Path, text: str, wrong: str) -> None:
+    (tmp_path / "load.csv").write_text(text)
+    (tmp_path / "s.toml").write_text('[traffic]\narrivals = "trace"\npackets_csv = "load.csv"\n')
+    with pytest.raises(ConfigError, match=re.escape(wrong)):
+        config.load(tmp_path / "s.toml")
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+@pytest.mark.parametrize(
+    ("file", "name"),
+    [
+        ("my scénario v1.2.toml", "my-scenario-v1-2"),
+        ("Übung.TOML", "Ubung"),
+        ("日本.toml", "unnamed"),
+        ("mine.txt", "mine"),
+    ],
+)
+def test_a_scenario_file_may_have_a_byte_order_mark_and_any_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str, name: str, encoding: str
+) -> None:
+    (tmp_path / file).write_bytes("duration_s = 7\n".encode(encoding))
+    monkeypatch.chdir(tmp_path)
+    found = catalog.find(file)
+    assert (found.name, found.duration_s) == (name, 7)
+
+
+def test_the_command_that_init_recommends_works_whatever_the_file_is_called(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert app(["init", "mine.txt", "--short"], result_action="return_value") == 0
+    assert app(["check", "mine.txt"], result_action="return_value") == 0

@@ -8,12 +8,19 @@ The names of this project's own parts cannot be redefined. Each named part is lo
 that no run begins with a part that is missing.
 """
 
+import ast
 import difflib
+import hashlib
 import json
-from collections.abc import Mapping, Sequence
+import sys
+import sysconfig
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from importlib import import_module
+from importlib.machinery import EXTENSION_SUFFIXES, SOURCE_SUFFIXES
 from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any, Final
 
 from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationError, ValidationInfo
@@ -28,6 +35,10 @@ GROUPS: Final[Mapping[str, str]] = {
     "applications.use": "fanet_mw.applications",
 }
 """The keys of a scenario that may name a part of another package, and the group of entry points for each."""
+_OURS: Final = ("fanet_mw", "agents", "emulator", "sim")
+_SUFFIXES: Final = frozenset(Path(f"_{suffix}").suffix for suffix in (*SOURCE_SUFFIXES, *EXTENSION_SUFFIXES))
+_INSTALLED: Final = frozenset(Path(sysconfig.get_path(name)) for name in ("purelib", "platlib"))
+_DIGITS: Final = 16
 _NOT_EVERYWHERE: Final = ("numpy", "numba")
 """Modules that a companion computer lacks. A part that needs one of them is checked where it runs."""
 
@@ -52,6 +63,66 @@ def installed(key: str) -> dict[str, EntryPoint]:
     return {entry.name: entry for entry in sorted(entry_points(group=GROUPS[key]))}
 
 
+def module_of(key: str, name: str) -> str:
+    """The top-level module of the part that a scenario names; empty if the name is none of a part."""
+    entry = installed(key).get(name)
+    module, colon, _ = (entry.value if entry is not None else name).partition(":")
+    return module.partition(".")[0] if colon else ""
+
+
+@lru_cache(maxsize=64)
+def digest(module: str) -> str:
+    """The digest of a top-level module's sources, and of those modules beside it that they import.
+
+    It is computed once, before the module is imported, because a process goes on with what it has imported.
+    """
+    whole = hashlib.sha256()
+    for name, path in sorted(_sources(module)):
+        whole.update(f"{name} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
+    return whole.hexdigest()[:_DIGITS]
+
+
+def _sources(module: str) -> Iterator[tuple[str, Path]]:
+    """Name and file of each source, without those of Python, of this project, and of packages that were installed."""
+    waiting, known = [module], {module, *_OURS, *sys.stdlib_module_names}
+    while waiting:
+        for name, path in _files(waiting.pop()):
+            yield name, path
+            for other in _imported(path) - known:
+                known.add(other)
+                if not any(_INSTALLED & {*file.parents} for _, file in _files(other)):
+                    waiting.append(other)
+
+
+def _files(module: str) -> list[tuple[str, Path]]:
+    """The files of a top-level module or package, by their names in it."""
+    loaded = getattr(sys.modules.get(module), "__file__", None) if module == "__main__" else None
+    try:
+        spec = None if loaded else find_spec(module)
+    except (ImportError, ValueError):
+        spec = None
+    if spec is not None and spec.submodule_search_locations is not None:
+        found = [(folder, path) for folder in map(Path, spec.submodule_search_locations) for path in folder.rglob("*")]
+        return [
+            (f"{module}/{path.relative_to(folder).as_posix()}", path)
+            for folder, path in found
+            if path.suffix in _SUFFIXES and path.is_file()
+        ]
+    origin = loaded or (spec.origin if spec is not None and spec.has_location else None)
+    return [(module, Path(origin))] if origin and Path(origin).is_file() else []
+
+
+def _imported(path: Path) -> set[str]:
+    """The top-level modules that a source imports."""
+    try:
+        tree = ast.parse(path.read_bytes()) if path.suffix == ".py" else ast.Module([], [])
+    except (SyntaxError, ValueError):
+        return set()
+    names = [alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names]
+    froms = [node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and not node.level]
+    return {name.partition(".")[0] for name in (*names, *froms)} - {""}
+
+
 @lru_cache(maxsize=64)
 def load(key: str, name: str) -> Any:  # noqa: ANN401  (whatever the contract of the key asks for)
     """The class that a scenario names; raises ValueError with a sentence if there is none.
@@ -67,6 +138,7 @@ def load(key: str, name: str) -> Any:  # noqa: ANN401  (whatever the contract of
             f"{key} = {name!r}: is neither one of ours, nor an entry point of the group {GROUPS[key]} "
             f"(installed: {known}), nor MODULE:CLASS"
         )
+    digest(module.partition(".")[0])
     try:
         found: Any = import_module(module)
         for part in path.split("."):

@@ -1,19 +1,58 @@
-"""Compares the scenarios of two processes: a fingerprint of all values, and which keys differ."""
+"""Compares the scenarios of two processes: a fingerprint of all that makes one, and which keys differ."""
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any, Final
 
+from fanet_mw.extensions import digest, module_of
 from fanet_mw.scenario.model import Scenario
+from fanet_mw.scenario.tables.clusters import METHODS
+from fanet_mw.scenario.tables.mobility import MOBILITY_MODELS
+from fanet_mw.scenario.tables.radio import CHANNELS
+from fanet_mw.scenario.tables.routing import PROTOCOLS
+from fanet_mw.scenario.tables.world import FILE_KEYS
 
+_OURS: Final[Mapping[str, Sequence[str]]] = {
+    "routing.protocol": PROTOCOLS,
+    "clusters.method": METHODS,
+    "mobility.model": MOBILITY_MODELS,
+    "radio.channel": CHANNELS,
+    "applications.use": (),
+}
+"""The keys that name parts, and those parts that are this project's own."""
 DIGITS: Final = 16
 """Hexadecimal digits of a fingerprint."""
 
 
+def identity(scenario: Scenario) -> dict[str, Any]:
+    """Whatever makes this scenario another one than others: its values, the contents of the files that it names,
+    wherever they lie, and the sources of the parts of other packages.
+    """
+    tree: dict[str, Any] = scenario.model_dump(mode="json")
+    for key, digest_key in FILE_KEYS.items():
+        if tree["world"][digest_key]:
+            tree["world"][key] = Path(tree["world"][key]).name
+    return {**tree, "modules": modules_of(scenario)}
+
+
+def modules_of(scenario: Scenario) -> dict[str, str]:
+    """The digests of the modules from which the scenario takes parts."""
+    named = [
+        ("routing.protocol", scenario.routing.protocol),
+        ("clusters.method", scenario.clusters.method),
+        ("mobility.model", scenario.mobility.model),
+        ("radio.channel", scenario.radio.channel),
+        *(("applications.use", application.use) for application in scenario.applications),
+    ]
+    modules = {module_of(key, name) for key, name in named if name not in _OURS[key]}
+    return {module: digest(module) for module in sorted(modules - {""})}
+
+
 def as_json(scenario: Scenario) -> str:
-    """All values of a scenario as text, the same text for the same values."""
-    return json.dumps(scenario.model_dump(mode="json"), sort_keys=True, separators=(",", ":"))
+    """The identity of a scenario as text, the same text for the same scenario."""
+    return json.dumps(identity(scenario), sort_keys=True, separators=(",", ":"))
 
 
 def fingerprint(scenario: Scenario) -> str:

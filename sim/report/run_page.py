@@ -3,7 +3,6 @@ the mission achieved.
 """
 
 import json
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -27,8 +26,8 @@ def is_run(folder: Path) -> bool:
 def blocks_of_run(folder: Path, out: Path) -> list[Block]:
     """The page of one run; its pictures go to a folder beside the page."""
     summary = json.loads((folder / SUMMARY_FILE).read_text(encoding="utf-8"))
-    tree = tomllib.loads((folder / SCENARIO_FILE).read_text(encoding="utf-8"))
-    run = RunRecords(config.build(tree, source=str(folder / SCENARIO_FILE)))
+    scenario = config.load(folder / SCENARIO_FILE)
+    run = RunRecords(scenario)
     run.read(read_trace(folder, *SHOWN))
     links, reports = _content(folder / LINKS_FILE, []), agents(_content(folder / REPORTS_FILE, {}))
     pictures = out / PICTURES
@@ -36,7 +35,7 @@ def blocks_of_run(folder: Path, out: Path) -> list[Block]:
     name = f"{summary['scenario']}-{summary['seed']}"
     blocks: list[Block] = [
         Heading(f"{summary['scenario']}, seed {summary['seed']}, {summary['nodes']} nodes"),
-        Text(tree.get("description", "")),
+        Text(scenario.description),
         Text("The result may be used." if summary["valid"] else f"NOT VALID: {'; '.join(summary['invalid_because'])}."),
         *_slowed(summary),
         Heading("Network", 3),

@@ -16,8 +16,18 @@ import tomli_w
 
 from fanet_mw import tlog
 from fanet_mw.errors import ConfigError
+from fanet_mw.scenario.named_files import digest_of_bytes
+from fanet_mw.scenario.tables.world import FILE_KEYS
 from fanet_mw.whole_file import batches, write_items
-from sim.results.file_names import LINKS_FILE, REPORTS_FILE, SCENARIO_FILE, SUMMARY_FILE, TLOG_FILE, TRACE_FILE
+from sim.results.file_names import (
+    LINKS_FILE,
+    REPORTS_FILE,
+    RUN_FILES,
+    SCENARIO_FILE,
+    SUMMARY_FILE,
+    TLOG_FILE,
+    TRACE_FILE,
+)
 from sim.results.links import described
 from sim.results.metrics import summarize
 from sim.run.collecting.record_kinds import lines
@@ -54,6 +64,7 @@ def finish(outcome: Outcome, *, out: Path | None) -> dict[str, Any]:
 def _write(outcome: Outcome, summary: dict[str, Any], out: Path) -> dict[str, str]:
     """Write all files that can be written; returns what was wrong with the others, by name."""
     resolved = outcome.scenario.model_dump(mode="json", exclude_none=True)
+    maps = _maps(resolved["world"])
     links = ",\n".join(json.dumps(row) for row in described(outcome.links.rows()))  # one line per link
     writers: dict[str, Callable[[Path], object]] = {
         SUMMARY_FILE: lambda path: write_items(path, _json_lines(summary)),
@@ -63,8 +74,30 @@ def _write(outcome: Outcome, summary: dict[str, Any], out: Path) -> dict[str, st
         TRACE_FILE: lambda path: write_items(path, lines(outcome.records)),
         TLOG_FILE: lambda path: tlog.write(path, outcome.taps, epoch_us=outcome.epoch_unix_ns // 1000),
     }
+    writers |= {name: partial(_copy, *source) for name, source in maps.items()}
     failed = {name: _try(partial(write, out / name)) for name, write in writers.items()}
     return {name: why for name, why in failed.items() if why is not None}
+
+
+def _maps(world: dict[str, Any]) -> dict[str, tuple[Path, str]]:
+    """The files that a world names, which go into the folder, by the names that they have there; the world then names
+    those; each with its digest.
+    """
+    found: dict[str, tuple[Path, str]] = {}
+    for key, digest_key in FILE_KEYS.items():
+        if world[digest_key]:
+            source = Path(world[key])
+            world[key] = source.name if source.name not in (*RUN_FILES, *found) else f"{key}-{source.name}"
+            found[world[key]] = source, world[digest_key]
+    return found
+
+
+def _copy(source: Path, digest: str, path: Path) -> None:
+    data = source.read_bytes()
+    if digest_of_bytes(data) != digest:
+        raise OSError(f"{source} has changed since the run began")
+    if not (path.exists() and path.samefile(source)):
+        write_items(path, [data])
 
 
 def _json_lines(content: dict[str, Any]) -> list[bytes]:

@@ -8,7 +8,6 @@ sensors       `detected`, `sighted`
 finds         `approaching`, `arrived`, `confirmed`
 """
 
-import tomllib
 from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -21,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fanet_mw.errors import ConfigError
-from fanet_mw.scenario import Scenario
+from fanet_mw.scenario import Scenario, config
 from fanet_mw.trace import (
     Approaching,
     Arrived,
@@ -98,10 +97,10 @@ class Replay:
         ConfigError.
         """
         try:
-            keys = tomllib.loads((folder / SCENARIO_FILE).read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
+            scenario = config.load(folder / SCENARIO_FILE)
+        except ConfigError as error:
             raise ConfigError(f"{folder}: cannot be replayed: {error}") from error
-        return cls(Scenario.model_validate(keys), list(read_trace(folder, *kinds)))
+        return cls(scenario, list(read_trace(folder, *kinds)))
 
     def at(self, t_s: float) -> Mapping[NodeId, UavState]:
         """The states of all UAVs at an instant. A wreck is where it was last seen flying."""

@@ -14,7 +14,7 @@ from sim.run.outcome import Outcome
 from sim.run.virtual import simulate
 from sim.sweep.measures import MEASURES, Value
 from sim.sweep.provenance import code
-from sim.sweep.tasks import Task
+from sim.sweep.tasks import Task, require_same
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +61,7 @@ def carry_out(task: Task) -> Finished:
 
     try:
         scenario = config.build(task.tree)
+        require_same(task, scenario)
         outcome = _launched(scenario, slow_down_to=task.slow_down_to) if task.realtime else simulate(scenario)
         summary = finish(outcome, out=None)
         if task.realtime and not summary["valid"]:

@@ -3,12 +3,14 @@
 import hashlib
 import json
 import shlex
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.scenario.fingerprint import identity, modules_of
 from fanet_mw.scenario.model import Scenario
+from fanet_mw.scenario.named_files import digest_of
 from sim.scenarios import catalog
 from sim.sweep import measures
 from sim.sweep.spec import MOST_RUNS, Setting, Sweep
@@ -20,7 +22,8 @@ class Task:
     """One run as plain values, which can be sent to any process on any machine."""
 
     key: str
-    """A hash of the resolved scenario and of the measures: runs with equal keys are equal."""
+    """A hash of the resolved scenario, of the contents of its files and modules, and of the measures: runs with equal
+    keys are equal."""
     case: str
     seed: int
     tree: Mapping[str, Any]
@@ -32,6 +35,8 @@ class Task:
     """True for a run as real processes, which needs the machine to itself."""
     slow_down_to: float | None = None
     """The scale to which their clock may slow down."""
+    contents: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    """The digests of the modules and files of others, by which the run is told from one with other contents."""
 
     def value(self, key: str) -> object:
         """The resolved value of a dotted scenario key; None if the scenario leaves it unset."""
@@ -78,7 +83,30 @@ def _first_of(settings: Sequence[str]) -> str:
 
 def _task(scenario: Scenario, setting: Setting, measure: tuple[str, ...], command: str) -> Task:
     tree = scenario.model_dump(mode="json", exclude_none=True)
-    named = {key: value for key, value in tree.items() if key != "description"}
-    text = json.dumps([named, sorted(measure), *(["realtime"] if setting.realtime else [])], sort_keys=True)
+    named = {key: value for key, value in identity(scenario).items() if key != "description"}
+    contents = {"modules": modules_of(scenario), "files": dict(_files_in(tree))}
+    realtime = ["realtime"] if setting.realtime else []
+    text = json.dumps([named, contents["files"], sorted(measure), *realtime], sort_keys=True)
     key = hashlib.sha256(text.encode()).hexdigest()[:16]
-    return Task(key, setting.case, scenario.seed, tree, measure, command, setting.realtime, setting.slow_down_to)
+    return Task(
+        key, setting.case, scenario.seed, tree, measure, command, setting.realtime, setting.slow_down_to, contents
+    )
+
+
+def require_same(task: Task, scenario: Scenario) -> None:
+    """Raises ConfigError if a file or a module of the run is another one here, or now, than when the sweep began."""
+    here = {"modules": modules_of(scenario), "files": dict(_files_in(task.tree))}
+    for kind, wanted in task.contents.items():
+        for name, digest in wanted.items():
+            if here[kind].get(name) != digest:
+                raise ConfigError(
+                    f"{name} is another one here than when the sweep began; start the sweep, and its workers, again"
+                )
+
+
+def _files_in(tree: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Files that options of parts of other packages name, with their digests."""
+    for table in (tree["routing"], tree["mobility"], tree["clusters"], tree["radio"], *tree["applications"]):
+        for value in table.get("options", {}).values():
+            if isinstance(value, str) and (digest := digest_of(value)):
+                yield value, digest

@@ -64,6 +64,7 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
     strangers = sorted(node for node in scenario.sensors.image_nodes if node > count)
     if strangers:
         found.append(f"sensors.image_nodes: {', '.join(map(str, strangers))} must be <= nodes.count = {count}")
+    found += _too_frequent_readings(scenario)
     found += _too_small_frames(scenario)
     found += _unkept_deadline(scenario)
     found += _blind_warnings(scenario)
@@ -93,6 +94,21 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
             )
         found += _no_claimed_turns(scenario)
     return found
+
+
+def _too_frequent_readings(scenario: Scenario) -> Iterator[str]:
+    """The world moves once a tick, and a sensor gives one reading of what it is then."""
+    most_hz = 1000 / scenario.world.tick_ms
+    rates = {f"sensors.{key}": value for key, value in scenario.sensors if key.endswith("_hz")}
+    for key, rate_hz in {"world.gps_hz": scenario.world.gps_hz, **rates}.items():
+        if rate_hz > most_hz * (1 + 1e-9):
+            yield (
+                f"{key} = {rate_hz:g} must be <= {most_hz:g}: one reading for each world.tick_ms = "
+                f"{scenario.world.tick_ms:g}"
+            )
+    scan_s, tick_s = scenario.mission.scan_interval_s, scenario.world.tick_ms / 1000
+    if scenario.mission.survivors and scan_s < tick_s * (1 - 1e-9):
+        yield f"mission.scan_interval_s = {scan_s:g} must be >= world.tick_ms, {tick_s:g} s"
 
 
 def _no_claimed_turns(scenario: Scenario) -> Iterator[str]:

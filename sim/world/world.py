@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 _TRACED_NS: Final = S
 """The interval at which positions go into the trace."""
 _STILL_NS: Final = S
-"""The interval at which a world in which nothing moves publishes its poses."""
+"""The longest interval at which a world in which nothing moves publishes its poses and fixes."""
 _WRECK_M: Final = 0.5
 """A UAV that is nearer to the ground or a wall than this is not in flight."""
 _EMERGENCY_CHARGE: Final = 0.05
@@ -54,7 +54,7 @@ def make_engine(scenario: Scenario, solid: Obstacles | None = None) -> Engine:
     """The engine that the scenario names, with the obstacles of its world."""
     world = scenario.world
     if world.engine == "kinematic":
-        return Kinematic(Solids(solid))
+        return Kinematic(Solids(solid), radius_m=VEHICLES[world.vehicle].reach_m)
     if world.engine == "rotors":
         random = np.random.Generator(np.random.PCG64(stream_seed(scenario.seed, "wind")))
         wind = Wind(random, scenario.nodes.count, mean_m_s=world.wind_m_s, w20_m_s=world.gusts_m_s)
@@ -64,11 +64,11 @@ def make_engine(scenario: Scenario, solid: Obstacles | None = None) -> Engine:
     return Physics(physics_hz=world.physics_hz, obstacles=solid)
 
 
-def _sight(scenario: Scenario, engine: Engine, solid: Obstacles) -> "Sight":
+def _sight(scenario: Scenario, solids: Solids) -> "Sight":
     """Imported only when needed, because it brings the emulator's geometry, and numba with it."""
     from sim.world.environment.line_of_sight import Sight
 
-    return Sight(scenario, engine, top_m=solid.top_m)
+    return Sight(scenario, solids)
 
 
 class WorldActor(Actor):
@@ -89,8 +89,8 @@ class WorldActor(Actor):
             self._engine.reset(starts)
         else:
             self._engine.reset(flight.positions, flight.velocities)
-        self._sight = _sight(scenario, self._engine, solid) if solid else None
-        self._guidance = Guidance(starts, scenario, ground_m=solids.ground_m)
+        self._sight = _sight(scenario, solids) if solid else None
+        self._guidance = Guidance(starts, scenario, surface_m=solids.surface_m)
         for node, sent in sorted(flight.setpoints.items()) if flight else ():
             self._guidance.obey(node, sent, at=self._engine.positions()[node - 1], t_s=sent.t_ns / S)
         drained = scenario.sensors.battery_hz > 0 or scenario.world.engine == "rotors"
@@ -157,7 +157,7 @@ class WorldActor(Actor):
     @property
     def _period_ns(self) -> int:
         tick_ns = self._scenario.world.tick_ns
-        return max(tick_ns, _STILL_NS) if self._guidance.still else tick_ns
+        return max(tick_ns, min(_STILL_NS, self._suite.shortest_ns)) if self._guidance.still else tick_ns
 
     def _move(self, last_ns: int, now_ns: int) -> None:
         engine = self._engine
@@ -166,9 +166,10 @@ class WorldActor(Actor):
         for step in range(steps):
             t_s = last_ns / S + step * elapsed_s / steps
             before = engine.positions().copy()
+            engine.stand(self._guidance.grounded(before))
             engine.advance(elapsed_s / steps, self._guidance.wanted(t_s, before, engine.velocities()))
             self._incidents.separation.watch(before, engine.positions())
-        self._incidents.no_fly.watch(engine.positions())
+            self._incidents.no_fly.watch(before, engine.positions())
         if self._drain is not None:
             motors = self._flies & ~self._guidance.grounded(engine.positions())
             for row in self._drain.pass_time(elapsed_s, engine, motors):

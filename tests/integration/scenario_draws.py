@@ -41,12 +41,12 @@ WAKES_A_SECOND: Final = 60_000
 _KEPT: Final = {
     "name", "description", "faults", "time_scale", "duration_s", "seed", "traffic.interval_s",
     "routing.options", "clusters.options", "radio.options", "mobility.options",
-    "world.heightmap", "world.buildings_geojson", "traffic.name", "traffic.packets_csv",
+    "world.heightmap", "world.buildings_geojson", "world.physics_hz", "traffic.name", "traffic.packets_csv",
     "applications", "further_traffic",
 }  # fmt: skip
 """Keys that are set below, mean nothing in virtual time, belong to parts of other packages, or name files."""
 _SMALL: Final = {
-    "nodes.count": (1, 9), "world.buildings": (0, 4), "mission.survivors": (0, 12), "world.physics_hz": (10, 240),
+    "nodes.count": (1, 9), "world.buildings": (0, 4), "mission.survivors": (0, 12),
     "clusters.count": (1, 8),
 }  # fmt: skip
 _SEED_KEYS: Final = (

@@ -1,7 +1,7 @@
 """The map that a UAV carries: heights of the ground, and the buildings that are known before the flight. ENU metres.
 
-Buildings are upright boxes, which may be turned about the vertical. The ground is interpolated bilinearly between the
-points of a square grid about the origin. A UAV must notice by itself whatever is not on the map.
+Buildings are upright boxes, which may be turned about the vertical. The ground is made of triangles between the
+points of a square grid about the origin, two for each cell. A UAV must notice by itself whatever is not on the map.
 """
 
 import math
@@ -65,9 +65,9 @@ class OnboardMap(NamedTuple):
         row = min(last - 1e-9, max(0.0, north_m / self.cell_m + last / 2))
         i, j = int(row), int(column)
         v, u = row - i, column - j
-        low = rows[i][j] * (1 - u) + rows[i][j + 1] * u
-        high = rows[i + 1][j] * (1 - u) + rows[i + 1][j + 1] * u
-        return low * (1 - v) + high * v
+        low, high = min(u, v), max(u, v)
+        beside = rows[i][j + 1] if u > v else rows[i + 1][j]
+        return rows[i][j] * (1 - high) + rows[i + 1][j + 1] * low + beside * (high - low)
 
 
 NO_MAP: Final = OnboardMap()

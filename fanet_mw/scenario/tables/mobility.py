@@ -9,7 +9,6 @@ from fanet_mw.scenario.tables.sections import (
     Duration,
     Length,
     Section,
-    Speed,
 )
 
 MOBILITY_MODELS: Final = ("static", "formation", "random_waypoint", "crossing", "onboard")
@@ -25,8 +24,8 @@ class Mobility(Section):
     each UAV's computer commands, and keeps no UAV clear of others."""
     options: Annotated[dict[str, Any], OptionsOf("mobility.model", MOBILITY_MODELS)] = Field(default_factory=Options)
     """The options of a model from another package, as that package documents them."""
-    speed_m_s: Speed = 7.5
-    """Cruising speed."""
+    speed_m_s: Annotated[float, Field(ge=0, le=60)] = 7.5
+    """Cruising speed. A vehicle of `rotors` flies as fast as its tilt limit lets it, and no faster."""
     see_m: Length = 50.0
     """Within this distance the world keeps UAVs clear of each other, without any radio; 0: it does not."""
     return_after_s: Duration = 0.0

@@ -1,5 +1,6 @@
 """The `[world]` table: the engine that moves bodies, the area, and the obstacles in it."""
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Final, Literal, Self
 
@@ -18,6 +19,11 @@ FILE_KEYS: Final = {"heightmap": "heightmap_sha256", "buildings_geojson": "build
 WindSpeed = Annotated[float, Field(ge=-50, le=50)]
 Sha256 = Annotated[str, Field(pattern=r"^([0-9a-f]{16})?$")]
 Building = tuple[Coordinate, Coordinate, SomeLength, SomeLength, SomeLength]
+
+
+FASTEST_AIR_M_S: Final = {"iris": 19.0, "crazyflie": 10.0}
+"""The airspeed in level flight at the tilt limit of each type of vehicle, rounded down
+(`sim/world/engines/rotors/vehicle_types.py`)."""
 
 
 class World(Section):
@@ -49,8 +55,8 @@ class World(Section):
     stays there."""
     crash_radio: Literal["survives", "dies"] = "dies"
     """Whether the radio of a crashed vehicle continues to work."""
-    physics_hz: Annotated[int, Field(ge=10, le=2000)] = 240
-    """`pybullet`: steps of the physics per second."""
+    physics_hz: Annotated[int, Field(ge=60, le=1980, multiple_of=60)] = 240
+    """`pybullet`: steps of the physics per second, a multiple of the 60 at which thrust is set."""
     buildings: Annotated[int, Field(ge=0, le=10_000)] | tuple[Building, ...] = 0
     """A number of boxes at random places, or each building as [east, north, width, depth, height] in metres: its
     middle, its extent to the east and to the north, and the height of its roof above ground. UAVs collide with
@@ -87,7 +93,7 @@ class World(Section):
     no_fly_m: tuple[tuple[Coordinate, Coordinate, SomeLength], ...] = ()
     """No-fly areas, each as [east, north, radius]; the world counts entries."""
     gps_hz: Annotated[float, Field(ge=1e-6, le=1000)] = 5.0
-    """Position fixes of each UAV per second."""
+    """Position fixes of each UAV per second, at most one a tick; one a second while nothing moves."""
     gps_sigma_m: Annotated[float, Field(ge=0, le=1000)] = 1.5
     """Standard deviation of a fix along each axis."""
 
@@ -125,6 +131,16 @@ class World(Section):
             raise ValueError("world.terrain_m and world.heightmap exclude each other")
         if self.engine != "rotors" and (any(self.wind_m_s) or self.gusts_m_s):
             raise ValueError(f'world.wind_m_s and world.gusts_m_s need world.engine = "rotors", not "{self.engine}"')
+        wind_m_s, most_m_s = math.hypot(*self.wind_m_s), FASTEST_AIR_M_S[self.vehicle]
+        if wind_m_s > most_m_s:
+            raise ValueError(
+                f"world.wind_m_s = [{self.wind_m_s[0]:g}, {self.wind_m_s[1]:g}] must be <= {most_m_s:g} m/s together, "
+                f"the airspeed at which world.vehicle = {self.vehicle} leans as far as it can"
+            )
+        if self.gusts_m_s and not wind_m_s:
+            raise ValueError(
+                f"world.gusts_m_s = {self.gusts_m_s:g} is a wind near the ground and needs world.wind_m_s other than 0"
+            )
         for key in ("building_size_m", "building_height_m", "charge"):
             least, greatest = getattr(self, key)
             if least > greatest:

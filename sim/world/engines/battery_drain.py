@@ -16,9 +16,9 @@ from sim.world.engines.rotors.battery import Batteries
 from sim.world.engines.rotors.power import trimmed_w
 from sim.world.engines.rotors.vehicle_types import VEHICLES, Vehicle
 
-_FASTEST_M_S: Final = 30.0
-_CELLS: Final = 61
-_CLIMBS_M_S: Final = np.array([0.0, 2.0, 5.0, 10.0])
+_FASTEST_M_S: Final = 60.0
+_CELLS: Final = 121
+_CLIMBS_M_S: Final = np.array([0.0, 2.0, 5.0, 10.0, 20.0])
 
 
 class BatteryDrain:

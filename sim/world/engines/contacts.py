@@ -1,14 +1,41 @@
-"""Detects which bodies touch each other, once for each contact. The ground, walls and hillsides count as body 0."""
+"""Detects which bodies touch each other, once for each contact. The ground, roofs, walls and hillsides count as body 0.
 
-from typing import Final
+A step moves bodies straight, and a contact is the closest approach within it, as in `incidents/separation.py`: two that
+pass each other between two instants have touched, too.
+"""
 
 import numpy as np
+import numpy.typing as npt
 
-from sim.world.engines.contract import Rows
+from sim.world.engines.contract import Rows, Values
 from sim.world.environment.solids import Solids
 
-_CROWD: Final = 400
-"""With more bodies than this, contacts between bodies are not detected, because the effort is quadratic."""
+Indices = npt.NDArray[np.int64]
+
+
+def approaches(before: Rows, after: Rows, *, within_m: float) -> tuple[Indices, Indices, Values]:
+    """The pairs of bodies that come nearer than this to each other in a step, and how near.
+
+    Candidates are found by sorting the middles of all steps along the axis along which they are spread most (sweep and
+    prune; Cohen et al., I-COLLIDE, 1995).
+    """
+    way = after - before
+    middle = before + way / 2
+    reach = within_m + float(np.linalg.norm(way, axis=1).max(initial=0.0))
+    along = middle[:, int(np.ptp(middle, axis=0).argmax())] if len(middle) else middle[:, 0]
+    order = np.argsort(along, kind="stable")
+    ends = np.searchsorted(along[order], along[order] + reach, side="right")
+    counts = ends - np.arange(len(order)) - 1
+    first = np.repeat(np.arange(len(order)), counts)
+    second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
+    a, b = order[first], order[second]
+    a, b = np.minimum(a, b), np.maximum(a, b)
+    apart, change = before[a] - before[b], way[a] - way[b]
+    moved2 = np.maximum((change**2).sum(axis=1), 1e-12)
+    share = np.clip(-(apart * change).sum(axis=1) / moved2, 0.0, 1.0)
+    distance = np.sqrt(((apart + change * share[:, None]) ** 2).sum(axis=1))
+    near = distance < within_m
+    return a[near], b[near], distance[near]
 
 
 class Contacts:
@@ -23,14 +50,15 @@ class Contacts:
     def reset(self) -> None:
         self._touching, self._new = frozenset(), []
 
-    def notice(self, at: Rows) -> None:
-        """Examine all bodies at their places [nodes, 3]."""
-        gap = at[:, 2] if self._solids is None else self._solids.gap_m(at)
-        now = {(0, int(i) + 1) for i in np.flatnonzero(gap <= self._radius_m)}
-        if len(at) <= _CROWD:
-            apart = np.linalg.norm(at[:, None] - at[None], axis=2)
-            first, second = np.nonzero(np.triu(apart < 2 * self._radius_m, k=1))
-            now |= {(int(a) + 1, int(b) + 1) for a, b in zip(first, second, strict=True)}
+    def notice(self, before: Rows, after: Rows, also: frozenset[tuple[int, int]] = frozenset()) -> None:
+        """Examine a step of all bodies between two places [nodes, 3]; `also`: pairs that are known to touch in it."""
+        if self._solids is None:
+            gap = np.minimum(before[:, 2], after[:, 2])
+        else:
+            gap = self._solids.least_gap_m(before, after, within_m=self._radius_m)
+        first, second, _ = approaches(before, after, within_m=2 * self._radius_m)
+        now = {(0, row + 1) for row in np.flatnonzero(gap <= self._radius_m).tolist()} | also
+        now |= {(a + 1, b + 1) for a, b in zip(first.tolist(), second.tolist(), strict=True)}
         self._new += sorted(now - self._touching)
         self._touching = frozenset(now)
 

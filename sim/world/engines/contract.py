@@ -49,11 +49,10 @@ class Engine(ABC):
         and obstacles.
         """
 
-    def blocked(self, first: Rows, second: Rows) -> Flags:
-        """True where an obstacle stands between `first` and `second` [n, 3]; bodies and the flat
-        ground do not count.
+    def stand(self, rows: Flags) -> None:  # noqa: B027  (an engine without wind moves nobody who wants no velocity)
+        """Switch the motors of these bodies off until the next call: they stand on the ground, where friction holds
+        them, or sink to it.
         """
-        return np.zeros(len(first), bool)
 
     def power_w(self) -> Values | None:
         """The power that each battery delivers now; None for an engine without rotors."""

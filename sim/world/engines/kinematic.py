@@ -1,7 +1,7 @@
 """A cheap engine: point masses with limited acceleration, for work on protocols, where only distances matter.
 
-Not modeled: attitude, drag and wind; gravity only acts on crashed UAVs. Bodies are spheres of `RADIUS_M` whose contacts
-are detected, but which do not bounce. The greatest speed is in `sim/world/mobility/guidance.py`.
+Not modeled: attitude, drag and wind; gravity only acts on crashed UAVs. Bodies are spheres whose contacts are
+detected, but which do not bounce. The greatest speed is in `sim/world/mobility/guidance.py`.
 """
 
 from typing import Final
@@ -9,11 +9,11 @@ from typing import Final
 import numpy as np
 
 from sim.world.engines.contacts import Contacts
-from sim.world.engines.contract import GRAVITY_M_S2, Engine, Flags, Rows
+from sim.world.engines.contract import GRAVITY_M_S2, Engine, Rows
+from sim.world.engines.rotors.vehicle_types import IRIS
 from sim.world.environment.solids import Solids
 
 ACCELERATION_M_S2: Final = 5.0
-RADIUS_M: Final = 0.25
 
 
 class Kinematic(Engine):
@@ -21,11 +21,11 @@ class Kinematic(Engine):
 
     name = "kinematic"
 
-    def __init__(self, solids: Solids | None = None) -> None:
+    def __init__(self, solids: Solids | None = None, *, radius_m: float = IRIS.reach_m) -> None:
         self._solids = solids if solids is not None and solids.any else None
         self._at = np.zeros((0, 3))
         self._velocity = np.zeros((0, 3))
-        self._contacts = Contacts(RADIUS_M, self._solids)
+        self._contacts = Contacts(radius_m, self._solids)
         self._wrecks: list[int] = []
 
     def reset(self, positions: Rows, velocities: Rows | None = None) -> None:
@@ -45,15 +45,13 @@ class Kinematic(Engine):
         self._velocity = before + change
         came_from = self._at
         self._at = came_from + (before + self._velocity) * (dt_s / 2)
-        below = self._at[:, 2] < 0
-        self._at[below, 2] = 0.0
-        self._velocity[below] = 0.0
-        if self._solids is not None:
-            self._stop_at_walls(came_from, self._solids)
-        self._contacts.notice(self._at)
-
-    def blocked(self, first: Rows, second: Rows) -> Flags:
-        return super().blocked(first, second) if self._solids is None else self._solids.blocked(first, second)
+        if self._solids is None:
+            stopped = self._at[:, 2] < 0
+            self._at[stopped, 2] = 0.0
+        else:
+            stopped = self._solids.stop(came_from, self._at)
+        self._velocity[stopped] = 0.0
+        self._contacts.notice(came_from, self._at)
 
     def positions(self) -> Rows:
         return self._at
@@ -66,11 +64,3 @@ class Kinematic(Engine):
 
     def contacts(self) -> list[tuple[int, int]]:
         return self._contacts.take()
-
-    def _stop_at_walls(self, came_from: Rows, solids: Solids) -> None:
-        """Put a body that has entered something solid back to where it came from, or on the ground, at rest."""
-        inside = solids.gap_m(self._at) <= 0
-        if inside.any():
-            self._at[inside] = came_from[inside]
-            self._at[inside, 2] = np.maximum(self._at[inside, 2], solids.ground_m(self._at[inside]))
-            self._velocity[inside] = 0.0

@@ -1,7 +1,9 @@
 """Rigid bodies in pybullet: mass, gravity, drag, limited thrust, collisions between bodies and with the ground.
 
-Each multirotor is a rigid body under a thrust vector. The attitude loop, ten times faster than the velocity loop, is
-taken as ideal within the tilt limit. Not modeled: rotor dynamics, wind, ground effect, downwash.
+Each multirotor is an upright disc under a thrust vector. The attitude loop, ten times faster than the velocity loop, is
+taken as ideal within the tilt limit, so no hit turns a body over. Contacts between bodies are those of their closest
+approach within a step (`contacts.py`), and those that the physics sees. Not modeled: rotor dynamics, wind, ground
+effect, downwash.
 
 Pybullet keeps an external force over the substeps of one step, so the thrust is set at 60 Hz while contacts and motion
 are solved at `physics_hz`.
@@ -12,12 +14,14 @@ from typing import Final
 
 import numpy as np
 
-from sim.world.engines.contract import Engine, Flags, Rows
+from sim.world.engines.contacts import Contacts
+from sim.world.engines.contract import Engine, Rows, Values
 from sim.world.engines.quiet_pybullet import pybullet
+from sim.world.engines.rotors.vehicle_types import IRIS
 from sim.world.environment.obstacles import Hills, Obstacles
+from sim.world.environment.solids import Solids
 
 MASS_KG: Final = 1.5
-ARM_M: Final = 0.25
 _HEIGHT_M: Final = 0.1
 _GRAVITY: Final = 9.81
 _MAX_THRUST_N: Final = 2.0 * MASS_KG * _GRAVITY
@@ -28,8 +32,7 @@ _GAIN: Final = 2.5
 """The gain of the velocity loop [1/s]."""
 _CONTROL_HZ: Final = 60
 _OBSTACLE_GROUP: Final = 64
-"""The collision group of hills and buildings: they collide with bodies, but not with the ground or each other. Rays
-only test this group."""
+"""The collision group of hills and buildings: they collide with bodies, but not with the ground or each other."""
 _BODY_GROUP: Final = 1
 
 
@@ -42,13 +45,13 @@ class Physics(Engine):
         self._client = pybullet.connect(pybullet.DIRECT)
         self._substeps = max(1, round(physics_hz / _CONTROL_HZ))
         self._obstacles = obstacles
+        self._solids = Solids(obstacles)
+        self._contacts = Contacts(IRIS.reach_m, self._solids)
         self._left_s = 0.0
         self._bodies: list[int] = []
         self._node_of: dict[int, int] = {}
         self._at = np.zeros((0, 3))
         self._velocity = np.zeros((0, 3))
-        self._touching: frozenset[tuple[int, int]] = frozenset()
-        self._new: list[tuple[int, int]] = []
         self._wrecks: list[int] = []
 
     def reset(self, positions: Rows, velocities: Rows | None = None) -> None:
@@ -62,7 +65,7 @@ class Physics(Engine):
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
         ground = pybullet.createMultiBody(0, plane, physicsClientId=client)
         hull = pybullet.createCollisionShape(
-            pybullet.GEOM_CYLINDER, radius=ARM_M, height=_HEIGHT_M, physicsClientId=client
+            pybullet.GEOM_CYLINDER, radius=IRIS.reach_m, height=_HEIGHT_M, physicsClientId=client
         )
         self._bodies = [
             pybullet.createMultiBody(MASS_KG, hull, basePosition=at.tolist(), physicsClientId=client)
@@ -70,7 +73,7 @@ class Physics(Engine):
         ]
         for body in self._bodies:
             pybullet.changeDynamics(
-                body, -1, linearDamping=0, angularDamping=0.9,
+                body, -1, linearDamping=0, localInertiaDiagonal=[0.0, 0.0, 0.0],
                 activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=client,
             )  # fmt: skip
         solid = [ground, *self._build()]
@@ -79,7 +82,8 @@ class Physics(Engine):
         self._velocity = np.zeros_like(positions) if velocities is None else velocities.copy()
         for body, velocity in zip(self._bodies, self._velocity.tolist(), strict=True):
             pybullet.resetBaseVelocity(body, linearVelocity=velocity, physicsClientId=client)
-        self._touching, self._new, self._wrecks, self._left_s = frozenset(), [], [], 0.0
+        self._wrecks, self._left_s = [], 0.0
+        self._contacts.reset()
 
     def _build(self) -> list[int]:
         """Place hills and buildings; returns their bodies."""
@@ -102,26 +106,12 @@ class Physics(Engine):
         return bodies
 
     def _raise_hills(self, hills: Hills) -> int:
-        """A height field, which pybullet centers between its lowest and its highest point."""
-        side = hills.heights.shape[0]
+        corners, triangles = hills.mesh()
         shape = pybullet.createCollisionShape(
-            pybullet.GEOM_HEIGHTFIELD, meshScale=[hills.cell_m, hills.cell_m, 1.0],
-            heightfieldData=hills.heights.ravel().tolist(), numHeightfieldRows=side, numHeightfieldColumns=side,
+            pybullet.GEOM_MESH, vertices=corners.tolist(), indices=triangles.ravel().tolist(),
             physicsClientId=self._client,
         )  # fmt: skip
-        middle = float(hills.heights.max() + hills.heights.min()) / 2
-        return int(pybullet.createMultiBody(0, shape, basePosition=[0, 0, middle], physicsClientId=self._client))
-
-    def blocked(self, first: Rows, second: Rows) -> Flags:
-        most = pybullet.MAX_RAY_INTERSECTION_BATCH_SIZE - 1
-        hits: list[bool] = []
-        for i in range(0, len(first), most):
-            rays = pybullet.rayTestBatch(
-                first[i : i + most].tolist(), second[i : i + most].tolist(), collisionFilterMask=_OBSTACLE_GROUP,
-                physicsClientId=self._client,
-            )  # fmt: skip
-            hits += [ray[0] >= 0 for ray in rays]
-        return np.array(hits, bool)
+        return int(pybullet.createMultiBody(0, shape, physicsClientId=self._client))
 
     def advance(self, dt_s: float, wanted_m_s: Rows) -> None:
         self._left_s += dt_s
@@ -134,11 +124,14 @@ class Physics(Engine):
         client, at = self._client, self._at.tolist()
         for body, push, place in zip(self._bodies, force, at, strict=True):
             pybullet.applyExternalForce(body, -1, push, place, pybullet.WORLD_FRAME, physicsClientId=client)
+        before, free = self._at.copy(), self._at + self._velocity / _CONTROL_HZ
         pybullet.stepSimulation(physicsClientId=client)
         for i, body in enumerate(self._bodies):
             self._at[i] = pybullet.getBasePositionAndOrientation(body, physicsClientId=client)[0]
             self._velocity[i] = pybullet.getBaseVelocity(body, physicsClientId=client)[0]
-        self._notice_contacts()
+        self._lift_out()
+        # where they would have flown: bodies that bounce within a step are apart again at its end
+        self._contacts.notice(before, free, self._touching())
 
     def _force(self, wanted_m_s: Rows) -> Rows:
         """Thrust within its limits, plus drag [N]."""
@@ -153,15 +146,21 @@ class Physics(Engine):
         thrust[self._wrecks] = 0.0
         return np.asarray(thrust - _DRAG_N_S_M * self._velocity, dtype=np.float64)
 
-    def _notice_contacts(self) -> None:
+    def _lift_out(self) -> None:
+        """Put those bodies back on the ground that have passed through it within a step, which no triangle prevents."""
+        ground = self._solids.ground_m(self._at)
+        for row in np.flatnonzero(self._at[:, 2] < ground).tolist():
+            self._at[row, 2] = ground[row] + _HEIGHT_M / 2
+            self._velocity[row] = 0.0
+            pybullet.resetBasePositionAndOrientation(
+                self._bodies[row], self._at[row].tolist(), [0.0, 0.0, 0.0, 1.0], physicsClientId=self._client
+            )
+
+    def _touching(self) -> frozenset[tuple[int, int]]:
+        """The bodies that touch by the physics; obstacles rest on the ground, which does not count."""
         points = pybullet.getContactPoints(physicsClientId=self._client) or ()
-        touching = set()
-        for point in points:
-            pair = sorted((self._node_of[point[1]], self._node_of[point[2]]))
-            if pair[0] != pair[1]:  # obstacles rest on the ground
-                touching.add((pair[0], pair[1]))
-        self._new += sorted(touching - self._touching)
-        self._touching = frozenset(touching)
+        pairs = {(self._node_of[point[1]], self._node_of[point[2]]) for point in points}
+        return frozenset((min(pair), max(pair)) for pair in pairs if pair[0] != pair[1])
 
     def positions(self) -> Rows:
         return self._at
@@ -169,12 +168,16 @@ class Physics(Engine):
     def velocities(self) -> Rows:
         return self._velocity
 
+    def tilts_rad(self) -> Values:
+        """The angle between each body's axis and the vertical."""
+        attitudes = [pybullet.getBasePositionAndOrientation(body, self._client)[1] for body in self._bodies]
+        return np.array([math.acos(max(-1.0, min(1.0, 1 - 2 * (x * x + y * y)))) for x, y, _, _ in attitudes])
+
     def fall(self, row: int) -> None:
         self._wrecks.append(row)
 
     def contacts(self) -> list[tuple[int, int]]:
-        new, self._new = self._new, []
-        return new
+        return self._contacts.take()
 
     def close(self) -> None:
         if self._client >= 0:

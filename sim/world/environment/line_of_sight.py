@@ -2,7 +2,7 @@
 
 Only pairs within the radio's reach are examined, and only if one end is below the highest obstacle. Not modeled:
 diffraction over an edge, the Fresnel zone, and the thickness of an obstacle. Survivors' phones are not examined,
-because they can be received through walls. The rays are cast by the engine; those of sensors are in `solids.py`.
+because they can be received through walls.
 """
 
 from array import array
@@ -13,22 +13,22 @@ from emulator.channel.pairs_in_reach import neighbors
 from emulator.channel.propagation import reach_m
 from fanet_mw.bus.messages import Obstructions
 from fanet_mw.scenario import Scenario
-from sim.world.engines.contract import Engine, Rows
+from sim.world.engines.contract import Rows
+from sim.world.environment.solids import Solids
 
 
 class Sight:
-    """The lines of sight between bodies, by the rays of the engine."""
+    """The lines of sight between bodies."""
 
-    def __init__(self, scenario: Scenario, engine: Engine, *, top_m: float) -> None:
+    def __init__(self, scenario: Scenario, solids: Solids) -> None:
         self._reach_m = reach_m(scenario.radio)
-        self._engine = engine
-        self._top_m = top_m
+        self._solids = solids
 
     def obstructions(self, at: Rows, now_ns: int) -> Obstructions:
         """The blocked pairs among nodes at `at` [nodes, 3]."""
         found, _ = neighbors(at, self._reach_m)
         found = found[found[:, 0] < found[:, 1]]
-        found = found[np.minimum(at[found[:, 0], 2], at[found[:, 1], 2]) < self._top_m]
+        found = found[np.minimum(at[found[:, 0], 2], at[found[:, 1], 2]) < self._solids.top_m]
         if len(found):
-            found = found[self._engine.blocked(at[found[:, 0]], at[found[:, 1]])]
+            found = found[self._solids.blocked(at[found[:, 0]], at[found[:, 1]])]
         return Obstructions(now_ns, array("H", (found + 1).ravel().tolist()))

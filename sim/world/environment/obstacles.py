@@ -13,6 +13,7 @@ from random import Random
 from typing import Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.rng import stream
@@ -31,6 +32,9 @@ _WAVES: Final = 8
 _EXACT_M: Final = 1e-3
 _ROUNDS: Final = 12
 """The number of times that a grid is raised before it takes the highest point around each of its own."""
+_BEYOND_M: Final = 1000.0
+"""The mesh of the ground extends this far beyond the area."""
+Indices = npt.NDArray[np.int64]
 
 
 class Box(NamedTuple):
@@ -59,16 +63,46 @@ class Box(NamedTuple):
 
 
 class Hills(NamedTuple):
-    """Heights above 0 at the corners of a square grid, centered at the origin; row by row to the north."""
+    """The ground, as triangles over a square grid of heights above 0 that is centered at the origin, row by row to the
+    north. Each cell is divided along its diagonal from southwest to northeast; beyond the grid its edge continues.
+    """
 
     heights: Rows
     cell_m: float
 
-    def at(self, east: float, north: float) -> float:
-        """Height of the nearest grid point."""
-        side = self.heights.shape[0]
-        row, column = (min(side - 1, max(0, round(value / self.cell_m + (side - 1) / 2))) for value in (north, east))
-        return float(self.heights[row, column])
+    def at(self, places: Rows) -> Values:
+        """Height of the ground at each place [n, 2 or 3]."""
+        last = self.heights.shape[0] - 1
+        column = np.clip(places[:, 0] / self.cell_m + last / 2, 0, last)
+        row = np.clip(places[:, 1] / self.cell_m + last / 2, 0, last)
+        i, j = np.minimum(row.astype(np.int64), last - 1), np.minimum(column.astype(np.int64), last - 1)
+        v, u = row - i, column - j
+        beside = np.where(u > v, self.heights[i, j + 1], self.heights[i + 1, j])
+        low, high = np.minimum(u, v), np.maximum(u, v)
+        return np.asarray(self.heights[i, j] * (1 - high) + self.heights[i + 1, j + 1] * low + beside * (high - low))
+
+    @property
+    def steepest(self) -> float:
+        """The greatest slope of any triangle is at most this."""
+        steps = (np.abs(np.diff(self.heights, axis=axis)).max() / self.cell_m for axis in (0, 1))
+        return math.hypot(*steps)
+
+    def height_m(self, east: float, north: float) -> float:
+        """Height of the ground at one place."""
+        return float(self.at(np.array([[east, north]]))[0])
+
+    def mesh(self) -> tuple[Rows, Indices]:
+        """The same surface for a physics engine or a renderer: corners [n, 3], and three of them for each triangle. It
+        extends `_BEYOND_M` beyond the grid.
+        """
+        side = self.heights.shape[0] + 2
+        axis = (np.arange(side) - (side - 1) / 2) * self.cell_m
+        axis[[0, -1]] += [self.cell_m - _BEYOND_M, _BEYOND_M - self.cell_m]
+        east, north = np.meshgrid(axis, axis)
+        corners = np.stack([east.ravel(), north.ravel(), np.pad(self.heights, 1, mode="edge").ravel()], axis=1)
+        first = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)[None]).ravel()
+        triangles = np.stack([first, first + 1, first + side + 1, first, first + side + 1, first + side], axis=1)
+        return corners, triangles.reshape(-1, 3)
 
 
 class Obstacles(NamedTuple):
@@ -98,10 +132,10 @@ def obstacles(scenario: Scenario, starts: Rows) -> Obstacles:
     hills = terrain(scenario)
     if hills is not None:
         key = f"world.heightmap = {world.heightmap}" if world.heightmap else f"world.terrain_m = {world.terrain_m:g}"
-        for node, (east, north, up) in enumerate(starts.tolist(), 1):
-            if up < hills.at(east, north):
+        for node, (up, ground_m) in enumerate(zip(starts[:, 2].tolist(), hills.at(starts).tolist(), strict=True), 1):
+            if up < ground_m:
                 raise ConfigError(
-                    f"node {node} starts at {up:g} m, below a hill of {hills.at(east, north):.0f} m; "
+                    f"node {node} starts at {up:g} m, below the ground there, which is {ground_m:.2f} m high; "
                     f"{key} must leave room for nodes.altitude_m"
                 )
     if world.buildings_geojson:
@@ -111,7 +145,7 @@ def obstacles(scenario: Scenario, starts: Rows) -> Obstacles:
         return Obstacles(hills, tuple(_seeded(world, random, hills, starts) for _ in range(world.buildings)))
     boxes = []
     for east, north, width, depth, height in world.buildings:
-        box = Box(east, north, width, depth, height + (hills.at(east, north) if hills else 0.0))
+        box = Box(east, north, width, depth, height + (hills.height_m(east, north) if hills else 0.0))
         if box.near(starts, margin_m=0.0):
             raise ConfigError(f"world.buildings: a node starts within the building at [{east:g}, {north:g}]")
         boxes.append(box)
@@ -138,7 +172,7 @@ def _of_file(world: World, hills: Hills | None, starts: Rows) -> Iterator[Box]:
             f"world.area_m = {world.area_m:g}; is world.origin_deg right?"
         )
     for east, north, width, depth, yaw, height in town.boxes:
-        box = Box(east, north, width, depth, height + (hills.at(east, north) if hills else 0.0), yaw)
+        box = Box(east, north, width, depth, height + (hills.height_m(east, north) if hills else 0.0), yaw)
         if box.near(starts, margin_m=0.0):
             raise ConfigError(
                 f"world.buildings_geojson: a node starts within the building at [{east:.0f}, {north:.0f}]"
@@ -179,7 +213,10 @@ def _not_below(heights: Rows, cell_m: float, east: Values, north: Values, least:
     x, y = (np.clip(part / cell_m + (side - 1) / 2, 0, side - 1 - 1e-9) for part in (east, north))
     i, j = y.astype(np.int64), x.astype(np.int64)
     v, u = y - i, x - j
-    corners = [(i + up, j + right, (v if up else 1 - v) * (u if right else 1 - u)) for up in (0, 1) for right in (0, 1)]
+    corners = [  # with their weights in the triangle of the place
+        (i, j, 1 - np.maximum(u, v)), (i + 1, j + 1, np.minimum(u, v)),
+        (i, j + 1, np.maximum(u - v, 0.0)), (i + 1, j, np.maximum(v - u, 0.0)),
+    ]  # fmt: skip
     highest = heights.copy()
     for row, column, _ in corners:
         np.maximum.at(highest, (row, column), least)
@@ -189,8 +226,8 @@ def _not_below(heights: Rows, cell_m: float, east: Values, north: Values, least:
         if lacking.max(initial=0.0) < _EXACT_M:
             return raised
         more = np.zeros_like(raised)
-        for row, column, _ in corners:
-            np.maximum.at(more, (row, column), lacking)
+        for row, column, weight in corners:
+            np.maximum.at(more, (row, column), np.where(weight > 0, lacking, 0.0))
         raised = np.minimum(raised + more, highest)
     return highest
 
@@ -200,7 +237,7 @@ def _seeded(world: World, random: Random, hills: Hills | None, starts: Rows) -> 
     for _ in range(_TRIES):
         east, north = random.uniform(-half, half), random.uniform(-half, half)
         width, depth = random.uniform(*world.building_size_m), random.uniform(*world.building_size_m)
-        roof = random.uniform(*world.building_height_m) + (hills.at(east, north) if hills else 0.0)
+        roof = random.uniform(*world.building_height_m) + (hills.height_m(east, north) if hills else 0.0)
         box = Box(east, north, width, depth, roof)
         if not box.near(starts, margin_m=_CLEAR_M):
             return box

@@ -1,7 +1,8 @@
 """Rays against hills and buildings, in numpy: for sensors, and for engines that know no obstacles themselves.
 
-Buildings are upright boxes, which may be rotated about the vertical. Hills are a grid of heights with bilinear
-interpolation. The flat ground at height 0 is not among them and stops no ray.
+Buildings are upright boxes, which may be rotated about the vertical. Hills are triangles (`obstacles.py`): between the
+places where a straight line crosses an edge of one, its height above them is linear, so a ray meets them exactly. The
+flat ground at height 0 stops no ray.
 """
 
 import math
@@ -12,9 +13,12 @@ import numpy as np
 from sim.world.engines.contract import Flags, Rows, Values
 from sim.world.environment.obstacles import Obstacles
 
-_STEPS_PER_CELL: Final = 2
-"""The number of samples of a ray over hills, for each cell of their grid that it crosses."""
-_MOST_STEPS: Final = 2000
+_RAYS: Final = 1000
+"""Rays that are cast over hills at once; more would take much memory."""
+_SHORT_M: Final = 0.01
+"""A body stops this far before a wall or the ground."""
+_ROUNDS: Final = 40
+"""Rounds of the search for the place at which a path is nearest to a box; each leaves two thirds of the path."""
 
 
 class Solids:
@@ -28,6 +32,7 @@ class Solids:
         self._cos, self._sin = np.cos(yaw), np.sin(yaw)
         self._radius = np.hypot(self._half[:, 0], self._half[:, 1])
         self._hills = obstacles.hills if obstacles else None
+        self._steepest = self._hills.steepest if self._hills else 0.0
         self.top_m = obstacles.top_m if obstacles else 0.0
 
     @property
@@ -39,15 +44,7 @@ class Solids:
         """Height of the ground at each place [n, 2 or 3]: hills, or the plain."""
         if self._hills is None:
             return np.zeros(len(places))
-        heights, cell_m = self._hills
-        side = heights.shape[0]
-        column = np.clip(places[:, 0] / cell_m + (side - 1) / 2, 0, side - 1 - 1e-9)
-        row = np.clip(places[:, 1] / cell_m + (side - 1) / 2, 0, side - 1 - 1e-9)
-        i, j = row.astype(np.int64), column.astype(np.int64)
-        v, u = row - i, column - j
-        low = heights[i, j] * (1 - u) + heights[i, j + 1] * u
-        high = heights[i + 1, j] * (1 - u) + heights[i + 1, j + 1] * u
-        return np.asarray(low * (1 - v) + high * v)
+        return self._hills.at(places)
 
     def surface_m(self, at: Rows) -> Values:
         """The height of the surface straight below each place [n, 3]: a roof or the ground. For a place inside a
@@ -65,10 +62,52 @@ class Solids:
         ground.
         """
         gap: Values = at[:, 2] - self.ground_m(at)
+        return gap if not len(self._middle) else np.minimum(gap, self._boxes_gap_m(at).min(axis=1))
+
+    def least_gap_m(self, before: Rows, after: Rows, *, within_m: float) -> Values:
+        """The least gap on the straight path of each body; that at its end where no path can lead nearer than
+        `within_m`.
+        """
+        gap = self.gap_m(after)
+        path = after - before
+        length = np.linalg.norm(path, axis=1)
+        near = np.flatnonzero(gap - length * math.hypot(1.0, self._steepest) <= within_m)
+        if not len(near):
+            return gap
+        start, way = before[near], path[near]
+        least = np.minimum(gap[near], self.gap_m(start))
+        if self._hills is not None:
+            _, above = self._above_hills(start, way, np.ones(len(near)))
+            least = np.minimum(least, above.min(axis=1))
         if len(self._middle):
-            out = np.maximum(np.abs(self._local(at)) - self._half[None], 0.0)
-            gap = np.minimum(gap, np.sqrt((out**2).sum(axis=2)).min(axis=1))
+            least = np.minimum(least, self._boxes_least_m(start, way, within_m=within_m))
+        gap[near] = least
         return gap
+
+    def stop(self, before: Rows, after: Rows) -> Flags:
+        """Put those bodies of `after` where something solid stops them on their straight path from `before`; returns
+        which these are.
+        """
+        path = after - before
+        length = np.linalg.norm(path, axis=1)
+        gap = self.gap_m(after)
+        stopped = gap <= 0
+        near = np.flatnonzero(gap <= length * math.hypot(1.0, self._steepest))
+        near = near[(length[near] > 0) & (self.gap_m(before[near]) > 0)]
+        if len(near):
+            direction = path[near] / length[near, None]
+            hit = self.first_hit_m(before[near], direction, length[near])
+            met = np.isfinite(hit)
+            rows = near[met]
+            after[rows] = before[rows] + direction[met] * np.maximum(hit[met] - _SHORT_M, 0.0)[:, None]
+            stopped[near] = met | stopped[near]
+            inside = np.setdiff1d(np.flatnonzero(stopped), rows)
+        else:
+            inside = np.flatnonzero(stopped)
+        after[inside] = before[inside]
+        if stopped.any():
+            after[stopped, 2] = np.maximum(after[stopped, 2], self.ground_m(after[stopped]))
+        return stopped
 
     def blocked(self, first: Rows, second: Rows) -> Flags:
         """True where something stands between `first` and `second` [n, 3]."""
@@ -90,6 +129,36 @@ class Solids:
         if self._hills is not None:
             hit = np.minimum(hit, self._hills_hit_m(origin, direction, reach))
         return np.where(hit <= reach, hit, math.inf)
+
+    def _boxes_gap_m(self, at: Rows) -> Values:
+        """The distance of each place from each box [n, boxes]; 0 inside."""
+        out = np.maximum(np.abs(self._local(at)) - self._half[None], 0.0)
+        return np.asarray(np.sqrt((out**2).sum(axis=2)))
+
+    def _boxes_least_m(self, start: Rows, way: Rows, *, within_m: float) -> Values:
+        """The least distance from the boxes on straight paths; infinite if it is greater than `within_m`. It is convex
+        along a path, because boxes are convex.
+        """
+        rows = np.arange(len(start))
+        reach = np.linalg.norm(way, axis=1)
+        first, second = np.nonzero(self._boxes_gap_m(start) <= reach[:, None] + within_m)
+        least = np.full(len(rows), math.inf)
+        if not len(first):
+            return least
+        low, high = np.zeros(len(first)), np.ones(len(first))
+
+        def gap(share: Values) -> Values:
+            off = start[first] + way[first] * share[:, None] - self._middle[second]
+            cos, sin = self._cos[second], self._sin[second]
+            local = np.stack([cos * off[:, 0] + sin * off[:, 1], cos * off[:, 1] - sin * off[:, 0], off[:, 2]], axis=1)
+            return np.asarray(np.linalg.norm(np.maximum(np.abs(local) - self._half[second], 0.0), axis=1))
+
+        for _ in range(_ROUNDS):
+            third = (high - low) / 3
+            farther = gap(low + third) > gap(high - third)
+            low, high = np.where(farther, low + third, low), np.where(farther, high, high - third)
+        np.minimum.at(least, first, gap((low + high) / 2))
+        return least
 
     def _local(self, at: Rows) -> Values:
         """Each place in the axes of each box [n, boxes, 3]."""
@@ -130,25 +199,44 @@ class Solids:
         return hit
 
     def _hills_hit_m(self, origin: Rows, direction: Rows, reach: Values) -> Values:
-        """Sample each ray; where a sample is below ground, the hit is interpolated between it and the sample before."""
-        assert self._hills is not None, "only hills are sampled"
+        """The first place at which each ray is not above the ground."""
+        assert self._hills is not None, "asked only where there are hills"
         hit = np.full(len(origin), math.inf)
         lowest = np.minimum(origin[:, 2], origin[:, 2] + direction[:, 2] * reach)
-        rows = np.flatnonzero(lowest <= float(self._hills.heights.max()))
-        if not len(rows):
-            return hit
-        longest = float(reach[rows].max())
-        steps = min(_MOST_STEPS, max(2, math.ceil(_STEPS_PER_CELL * longest / self._hills.cell_m) + 1))
-        along = np.linspace(0.0, 1.0, steps)[None] * reach[rows][:, None]
-        points = origin[rows][:, None] + direction[rows][:, None] * along[..., None]
-        above = points[..., 2] - self.ground_m(points.reshape(-1, 3)).reshape(points.shape[:2])
-        below = above <= 0
-        first = below.argmax(axis=1)
-        met = below[np.arange(len(rows)), first]
-        before = np.maximum(first - 1, 0)
-        every = np.arange(len(rows))
-        high, low = above[every, before], above[every, first]
-        share = np.where(first > 0, high / np.maximum(high - low, 1e-12), 0.0)
-        distance = along[every, before] + share * (along[every, first] - along[every, before])
-        hit[rows] = np.where(met, distance, math.inf)
+        every = np.flatnonzero(lowest <= float(self._hills.heights.max()))
+        for begin in range(0, len(every), _RAYS):
+            rows = every[begin : begin + _RAYS]
+            along, above = self._above_hills(origin[rows], direction[rows], reach[rows])
+            below = above <= 0
+            first = below.argmax(axis=1)
+            each = np.arange(len(rows))
+            before = np.maximum(first - 1, 0)
+            high, low = above[each, before], above[each, first]
+            share = np.where(first > 0, high / np.maximum(high - low, 1e-12), 0.0)
+            distance = along[each, before] + share * (along[each, first] - along[each, before])
+            hit[rows] = np.where(below[each, first], distance, math.inf)
         return hit
+
+    def _above_hills(self, origin: Rows, direction: Rows, reach: Values) -> tuple[Values, Values]:
+        """Where each ray begins, crosses the edges of triangles, and ends, in order; and its height above them there.
+
+        The edges lie where east, north, or their difference is a whole number of cells.
+        """
+        assert self._hills is not None, "asked only where there are hills"
+        cell_m, last = self._hills.cell_m, self._hills.heights.shape[0] - 1
+        start, step = origin[:, :2] / cell_m + last / 2, direction[:, :2] / cell_m
+        along = [np.zeros((len(origin), 1)), reach[:, None]]
+        for at, speed, least in (
+            (start[:, 0], step[:, 0], 0),
+            (start[:, 1], step[:, 1], 0),
+            (start[:, 0] - start[:, 1], step[:, 0] - step[:, 1], -last),
+        ):
+            end = at + speed * reach
+            low = np.clip(np.ceil(np.minimum(at, end)), least, last + 1)
+            count = int((np.clip(np.floor(np.maximum(at, end)), least - 1, last) - low).max(initial=-1)) + 1
+            lines = low[:, None] + np.arange(count)
+            fast = np.where(np.abs(speed) < 1e-12, 1e-12, speed)
+            along.append(np.clip((lines - at[:, None]) / fast[:, None], 0.0, reach[:, None]))
+        every = np.sort(np.hstack(along), axis=1)
+        points = origin[:, None] + direction[:, None] * every[..., None]
+        return every, points[..., 2] - self.ground_m(points.reshape(-1, 3)).reshape(every.shape)

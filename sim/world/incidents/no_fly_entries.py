@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fanet_mw.errors import ConfigError
-from sim.world.engines.contract import Rows
+from sim.world.engines.contract import Flags, Rows
 
 
 class NoFlyEntries:
@@ -19,18 +19,22 @@ class NoFlyEntries:
         self._within = np.zeros((len(starts), len(self._areas)), bool)
         self.entries = 0
         """The number of times that a UAV came into an area."""
-        rows, columns = np.nonzero(self._inside(starts))
+        rows, columns = np.nonzero(self._reached(starts, starts))
         if len(rows):
             raise ConfigError(f"world.no_fly_m.{columns[0]}: node {rows[0] + 1} starts within it")
 
-    def watch(self, at: Rows) -> None:
-        """Count the UAVs that have entered an area since the previous call; `at` has the positions of all."""
+    def watch(self, before: Rows, after: Rows) -> None:
+        """Count the UAVs that enter an area on their straight ways from `before` to `after`, also those that leave it
+        at once.
+        """
         if not len(self._areas):
             return
-        within = self._inside(at)
-        self.entries += int((within & ~self._within).sum())
-        self._within = within
+        self.entries += int((self._reached(before, after) & ~self._within).sum())
+        self._within = self._reached(after, after)
 
-    def _inside(self, at: Rows) -> np.ndarray:
-        apart = np.linalg.norm(at[:, None, :2] - self._areas[None, :, :2], axis=2)
-        return np.asarray(apart <= self._areas[:, 2])
+    def _reached(self, before: Rows, after: Rows) -> Flags:
+        """Whether the nearest place to the middle of each area on each way is within the area [nodes, areas]."""
+        way = (after - before)[:, None, :2]
+        off = before[:, None, :2] - self._areas[None, :, :2]
+        share = np.clip(-(off * way).sum(axis=2) / np.maximum((way**2).sum(axis=2), 1e-12), 0.0, 1.0)
+        return np.asarray(np.linalg.norm(off + way * share[..., None], axis=2) <= self._areas[:, 2])

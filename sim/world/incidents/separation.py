@@ -3,11 +3,13 @@
 Bodies are taken to fly straight between two steps of the engine, so the least distance within a step is known, too.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
+from sim.world.engines.contacts import approaches
 from sim.world.engines.contract import Rows
 
 
@@ -25,14 +27,11 @@ class Separation:
         """Watch one step between two positions [nodes, 3] in m. A pair that stays near counts once."""
         if not self._distance_m or len(before) < 2:
             return
-        first, second = np.triu_indices(len(before), k=1)
-        apart = before[first] - before[second]
-        change = after[first] - after[second] - apart
-        moved2 = np.maximum((change**2).sum(axis=1), 1e-12)
-        share = np.clip(-(apart * change).sum(axis=1) / moved2, 0.0, 1.0)
-        distance = np.linalg.norm(apart + change * share[:, None], axis=1)
-        least = float(distance.min())
-        self._least_m = least if self._least_m is None else min(self._least_m, least)
+        within_m = math.inf if self._least_m is None else max(self._distance_m, self._least_m)
+        first, second, distance = approaches(before, after, within_m=within_m)
+        if len(distance):
+            least = float(distance.min())
+            self._least_m = least if self._least_m is None else min(self._least_m, least)
         rows = np.flatnonzero(distance < self._distance_m).tolist()
         near = frozenset((int(first[row]), int(second[row])) for row in rows)
         self._losses += len(near - self._near)

@@ -102,9 +102,9 @@ class Guidance:
     command, its flight mode, and whether it may still stand on the ground.
     """
 
-    def __init__(self, starts: Rows, scenario: Scenario, *, ground_m: Callable[[Rows], Values] | None = None) -> None:
-        """`ground_m` gives the height of the ground below places [n, 3]; None means that the ground is flat, at 0."""
-        self._ground_m = ground_m or (lambda places: np.zeros(len(places)))
+    def __init__(self, starts: Rows, scenario: Scenario, *, surface_m: Callable[[Rows], Values] | None = None) -> None:
+        """`surface_m` gives the height of the roof or ground below places [n, 3]; None means flat ground at 0."""
+        self._surface_m = surface_m or (lambda places: np.zeros(len(places)))
         model = scenario.mobility.model
         self._onboard = model == "onboard"
         """True if the UAVs are flown by their companion computers, which then avoid collisions themselves."""
@@ -112,7 +112,7 @@ class Guidance:
         half = scenario.world.area_m / 2
         reach = np.maximum(half, np.abs(starts[:, :2]).max(axis=0)) if self._onboard else (half, half)
         self._fence = Geofence(half_east_m=float(reach[0]), half_north_m=float(reach[1]))
-        self._returns = ReturnMode(starts, scenario, ground_m=self._ground_m)
+        self._returns = ReturnMode(starts, scenario, surface_m=self._surface_m)
         self._starts = starts.copy()
         """The place at which each UAV holds while neither a mobility model nor a setpoint moves it."""
         self._model: MobilityModel | None = (
@@ -216,12 +216,12 @@ class Guidance:
         off = np.zeros(len(at), bool)
         landing = [row for row, command in self._commands.items() if isinstance(command, _Land)]
         off[[*landing, *self._waiting()]] = True
-        return np.asarray(off & (at[:, 2] - self._ground_m(at) <= _ON_GROUND_M))
+        return np.asarray(off & (at[:, 2] - self._surface_m(at) <= _ON_GROUND_M))
 
     def _stands(self, row: int, here: Enu) -> bool:
         """True if the UAV of a row, which is at a place, stands on the ground with its motors off."""
         off = isinstance(self._commands.get(row), _Land) or row in self._waiting()
-        return off and here.up - float(self._ground_m(np.array([here]))[0]) <= _ON_GROUND_M
+        return off and here.up - float(self._surface_m(np.array([here]))[0]) <= _ON_GROUND_M
 
     def _waiting(self) -> list[int]:
         """The rows that stand on the ground and have no command to take off."""
@@ -296,7 +296,7 @@ class Guidance:
         Landing UAVs (`landings`: sinking speed by row) sink straight down, more slowly near the ground. UAVs that wait
         for take-off stand still. A UAV that has climbed clear of the ground leaves `_grounded`.
         """
-        height = at[:, 2] - self._ground_m(at)
+        height = at[:, 2] - self._surface_m(at)
         for row, speed_m_s in landings.items():
             sink = min(speed_m_s, max(_TOUCHDOWN_M_S, _FLARE_PER_S * float(height[row])))
             wish[row] = [0.0, 0.0, -sink if height[row] > _ON_GROUND_M else 0.0]

@@ -24,7 +24,8 @@ def positions(scenario: Scenario) -> list[Enu]:
 
     ground = terrain(scenario)
     return [
-        Enu(at.east, at.north, ground.at(at.east, at.north) + ON_GROUND_M if ground else ON_GROUND_M) for at in places
+        Enu(at.east, at.north, ground.height_m(at.east, at.north) + ON_GROUND_M if ground else ON_GROUND_M)
+        for at in places
     ]
 
 

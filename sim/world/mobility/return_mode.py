@@ -67,14 +67,14 @@ class _Heights:
 class ReturnMode:
     """Which UAVs of a swarm have to return, and how."""
 
-    def __init__(self, starts: Rows, scenario: Scenario, *, ground_m: Callable[[Rows], Values]) -> None:
-        """`starts`: the homes of the UAVs, at any height. `ground_m`: the height of the ground below places."""
+    def __init__(self, starts: Rows, scenario: Scenario, *, surface_m: Callable[[Rows], Values]) -> None:
+        """`starts`: the homes of the UAVs, at any height. `surface_m`: the height of the roof or ground below."""
         mobility = scenario.mobility
         self._after_s = mobility.return_after_s
         self._speed_m_s = mobility.speed_m_s
         self.at_fence: Final = mobility.geofence == "return"
         self._homes = starts.copy()
-        self._homes[:, 2] = ground_m(starts).max()
+        self._homes[:, 2] = surface_m(starts).max()
         """The homes of the UAVs, each as high as the ground at the highest of them."""
         self._heights = _Heights(scenario)
         self._told_s: dict[int, float] = {}

@@ -5,6 +5,7 @@ black discs. No application of this project reads the images: its own detector i
 (`sensors/camera.py`). Not modeled: textures, shadows, weather, darkness, motion blur, and errors of the lens.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Final
 
@@ -49,8 +50,10 @@ class Scene:
             if obstacles.hills is not None:
                 self._put(self._hills_shape(obstacles.hills), (0.0, 0.0, 0.0))
         lying = self._box_shape(_PERSON_M, _PERSON) if len(people) else -1
+        hills = obstacles.hills if obstacles else None
         for east, north, up in people.tolist():
-            self._put(lying, (east, north, up + _PERSON_M[2] / 2))
+            slopes = _slopes_rad(hills, east, north) if hills else (0.0, 0.0)
+            self._put(lying, (east, north, up + _PERSON_M[2] / 2), turned=(slopes[1], -slopes[0], 0.0))
         disc = self._shape(pybullet.GEOM_CYLINDER, _UAV, radius=_UAV_RADIUS_M, length=_UAV_HEIGHT_M)
         self._uavs = [self._put(disc, (0.0, 0.0, -10.0)) for _ in range(uavs)]
 
@@ -81,18 +84,13 @@ class Scene:
 
     def _build(self, box: Box) -> None:
         shape = self._box_shape((box.width, box.depth, box.roof), _BUILDING)
-        self._put(shape, (box.east, box.north, box.roof / 2), yaw=box.yaw)
+        self._put(shape, (box.east, box.north, box.roof / 2), turned=(0.0, 0.0, box.yaw))
 
     def _hills_shape(self, hills: Hills) -> int:
         """The surface through the heights of the grid: two triangles for each of its cells."""
-        side = hills.heights.shape[0]
-        axis = (np.arange(side) - (side - 1) / 2) * hills.cell_m
-        east, north = np.meshgrid(axis, axis)
-        corners = np.stack([east.ravel(), north.ravel(), hills.heights.ravel()], axis=1)
-        slope_north, slope_east = np.gradient(hills.heights, hills.cell_m)
+        corners, triangles = hills.mesh()
+        slope_north, slope_east = np.gradient(np.pad(hills.heights, 1, mode="edge"), hills.cell_m)
         upright = np.stack([-slope_east.ravel(), -slope_north.ravel(), np.ones(len(corners))], axis=1)
-        first = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)[None]).ravel()
-        triangles = np.stack([first, first + 1, first + side + 1, first, first + side + 1, first + side], axis=1)
         return self._shape(
             pybullet.GEOM_MESH, _HILL, vertices=corners.tolist(), indices=triangles.ravel().tolist(),
             normals=(upright / np.linalg.norm(upright, axis=1, keepdims=True)).tolist(),
@@ -104,10 +102,21 @@ class Scene:
     def _shape(self, kind: int, color: _Color, **size: object) -> int:
         return int(pybullet.createVisualShape(kind, rgbaColor=color, physicsClientId=self._client, **size))
 
-    def _put(self, shape: int, at: Sequence[float], *, yaw: float = 0.0) -> int:
-        turned = pybullet.getQuaternionFromEuler((0.0, 0.0, yaw))
+    def _put(self, shape: int, at: Sequence[float], *, turned: Sequence[float] = (0.0, 0.0, 0.0)) -> int:
+        """Put a body somewhere, rotated about east, north and up [rad]."""
+        attitude = pybullet.getQuaternionFromEuler(turned)
         return int(
             pybullet.createMultiBody(
-                baseVisualShapeIndex=shape, basePosition=at, baseOrientation=turned, physicsClientId=self._client
+                baseVisualShapeIndex=shape, basePosition=at, baseOrientation=attitude, physicsClientId=self._client
             )
         )
+
+
+def _slopes_rad(hills: Hills, east: float, north: float) -> tuple[float, float]:
+    """The angles by which the ground rises to the east and to the north across a person who lies there."""
+    length, width, _ = _PERSON_M
+    sides = np.array(
+        [[east - length / 2, north], [east + length / 2, north], [east, north - width / 2], [east, north + width / 2]]
+    )
+    west_m, east_m, south_m, north_m = hills.at(sides).tolist()
+    return math.atan2(east_m - west_m, length), math.atan2(north_m - south_m, width)

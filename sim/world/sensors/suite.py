@@ -6,6 +6,7 @@ from fanet_mw.bus.messages import Message
 from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.routing import PROTOCOLS
+from fanet_mw.units import S
 from sim.world.engines.battery_drain import BatteryDrain
 from sim.world.engines.contract import Flags
 from sim.world.environment.obstacles import Obstacles
@@ -80,6 +81,11 @@ class Suite:
             (sensor, [topics.sensor(node, sensor.kind) for node in scenario.node_ids]) for sensor in sensors
         ]
         self._count = scenario.nodes.count
+
+    @property
+    def shortest_ns(self) -> int:
+        """The shortest period of all sensors but GPS."""
+        return min((sensor.period_ns for sensor, _ in self._sensors if sensor.kind != "gps"), default=S)
 
     def readings(self, truth: Truth, alive: Flags, *, before_ns: int) -> Iterator[tuple[str, Message]]:
         """The topics and readings of all instants in (before, now], for UAVs that are `alive`."""

@@ -9,6 +9,7 @@ import pytest
 
 from fanet_mw.bus.messages import Gps, Poses, Setpoint, WifiScan
 from fanet_mw.bus.topics import Topics
+from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Collided
 from fanet_mw.units import MS, Enu, S
@@ -105,6 +106,30 @@ def test_fixes_come_at_their_rate_whatever_the_ticks_are(make_scenario: MakeScen
     )
     at_ns = [message.t_ns for _, topic, message in said if topic == NAMES.sensor(1, "gps") and isinstance(message, Gps)]
     assert at_ns == [step * 500 * MS for step in range(11)]
+
+
+@pytest.mark.parametrize(
+    ("keys", "named"),
+    [
+        (
+            {"sensors.inertial_hz": 50},
+            r"sensors.inertial_hz = 50 must be <= 10: one reading for each world.tick_ms = 100",
+        ),
+        ({"world.gps_hz": 20}, r"world.gps_hz = 20 must be <= 10"),
+        ({"world.tick_ms": 500, "sensors.radar_hz": 4, "world.gps_hz": 1}, r"sensors.radar_hz = 4 must be <= 2"),
+        ({"mission.survivors": 1, "mission.scan_interval_s": 0.05}, r"mission.scan_interval_s = 0.05 must be >= "),
+    ],
+)
+def test_a_rate_that_no_tick_can_keep_is_refused(make_scenario: MakeScenario, keys: dict[str, Any], named: str) -> None:
+    with pytest.raises(ConfigError, match=named):
+        make_scenario(**keys)
+
+
+@pytest.mark.parametrize("model", ["static", "formation"])
+def test_readings_come_at_their_rate_whether_anything_moves_or_not(make_scenario: MakeScenario, model: str) -> None:
+    keys = {"sensors.inertial_hz": 10, "mobility.model": model}
+    said = advance(world(make_scenario, **keys), 5 * S)
+    assert 50 <= sum(topic == NAMES.sensor(3, "inertial") for _, topic, _ in said) <= 51
 
 
 def test_poses_name_every_node_and_come_before_anyone_transmits(make_scenario: MakeScenario) -> None:

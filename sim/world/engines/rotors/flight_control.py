@@ -1,12 +1,13 @@
 """The nested control loops on board: velocity, attitude, rates. Positions are held by `mobility/guidance.py`.
 
-    velocity   a = k (wanted - v) + integral, within what the tilt limit gives; thrust direction and size from a + g
+    velocity   a = k (wanted - v) + drag(v) / m + integral, within what the tilt limit gives; thrust from a + g
     attitude   rates = 2 k_q sign(q_w) q_xyz of the quaternion error (Brescianini, Hehn and D'Andrea, ETH, 2013)
     rates      torque = J k_r (wanted - rates) + rates x J rates
     mixer      thrust and torques to the thrust of each rotor, by the inverse of the allocation matrix
 
-All gains follow from the vehicle's rate gain: each loop is three times slower than the one inside it. The yaw angle is
-always 0, so the nose points east. Arrays are [components, UAVs].
+drag(v) is that of still air at the rotor speed of hover, which leaves the wind to the integral. All gains follow from
+the vehicle's rate gain: each loop is three times slower than the one inside it. The yaw angle is always 0, so the nose
+points east. Arrays are [components, UAVs].
 """
 
 import math
@@ -14,13 +15,12 @@ from typing import Final
 
 import numpy as np
 
-from sim.world.engines.contract import GRAVITY_M_S2, Values
-from sim.world.engines.rotors.vehicle_types import Vehicle
+from sim.world.engines.contract import GRAVITY_M_S2, Flags, Values
+from sim.world.engines.rotors.vehicle_types import Vehicle, hover_rad_s
 
 _RATIO: Final = 3.0
 """Each loop is slower than the one inside it by this factor."""
 _INTEGRAL_PER_S: Final = 0.3
-_MOST_INTEGRAL_M_S2: Final = 4.0
 _MOST_ERROR_M_S: Final = 0.5
 """Greater velocity errors count as this in the integral, which is meant for wind and drag and not for steps."""
 _MOST_RATE_RAD_S: Final = 6.0
@@ -35,8 +35,7 @@ _YAW_SHARE: Final = 0.3
 class FlightControl:
     """The controllers of all UAVs of one type."""
 
-    def __init__(self, vehicle: Vehicle, trim_m_s2: Values) -> None:
-        """`trim_m_s2`: the acceleration against drag at the moment in which the control takes over [3, UAVs]."""
+    def __init__(self, vehicle: Vehicle, count: int) -> None:
         self._vehicle = vehicle
         self._inertia = np.array(vehicle.inertia_kg_m2)[:, None]
         rate = vehicle.rate_per_s
@@ -44,16 +43,20 @@ class FlightControl:
         attitude = rate / _RATIO
         self._attitude_gain = np.array([attitude, attitude, attitude * _YAW_SHARE])[:, None]
         self.velocity_per_s = attitude / _RATIO
-        self._integral = trim_m_s2.copy()
+        self._integral = np.zeros((3, count))
         self._mixer = np.linalg.inv(allocation(vehicle))
         self._max_n = 4 * vehicle.thrust_n_s2 * vehicle.max_rad_s**2
         self._tan_tilt = math.tan(math.radians(vehicle.tilt_deg))
+
+    def restart(self, rows: Flags) -> None:
+        """Forget what the loops of these UAVs have integrated while their motors were off."""
+        self._integral[:, rows] = 0.0
 
     def thrust_vector(self, wanted: Values, velocity: Values, dt_s: float) -> Values:
         """The wanted total force of the rotors [N], in east, north, up, within the limits of tilt and thrust."""
         error = wanted - velocity
         mass, gravity = self._vehicle.mass_kg, GRAVITY_M_S2
-        acceleration = self.velocity_per_s * error + self._integral
+        acceleration = self.velocity_per_s * error + still_drag_m_s2(self._vehicle, velocity) + self._integral
         lift = np.clip(acceleration[2] + gravity, _LEAST_LIFT * gravity, _THRUST_RESERVE * self._max_n / mass)
         size = np.sqrt(acceleration[0] ** 2 + acceleration[1] ** 2)
         room = np.sqrt(np.maximum((_THRUST_RESERVE * self._max_n / mass) ** 2 - lift**2, 0.0))
@@ -63,7 +66,8 @@ class FlightControl:
         grown = _INTEGRAL_PER_S * self.velocity_per_s * dt_s * np.clip(error, -_MOST_ERROR_M_S, _MOST_ERROR_M_S)
         self._integral[:2] += np.where(free, grown[:2], 0.0)
         self._integral[2] += grown[2]
-        np.clip(self._integral, -_MOST_INTEGRAL_M_S2, _MOST_INTEGRAL_M_S2, out=self._integral)
+        most = gravity * self._tan_tilt
+        np.clip(self._integral, -most, most, out=self._integral)
         return np.asarray(mass * np.stack([acceleration[0] * scale, acceleration[1] * scale, lift]))
 
     def rotor_thrusts(self, force: Values, attitude: Values, rates: Values) -> Values:
@@ -77,6 +81,13 @@ class FlightControl:
         # Thrust along the body's own axis lifts less while it leans elsewhere than wanted.
         along = np.maximum((body_up(attitude) * force).sum(axis=0), 0.3 * size)
         return np.asarray(self._mixer @ np.vstack([along, torque]))
+
+
+def still_drag_m_s2(vehicle: Vehicle, velocity: Values) -> Values:
+    """What drag takes from a level vehicle at this velocity in still air [3, UAVs]."""
+    speed = np.sqrt((velocity**2).sum(axis=0))
+    rotors = 4 * vehicle.rotor_drag_n_s2_m * hover_rad_s(vehicle) * np.array([[1.0], [1.0], [0.0]])
+    return np.asarray((rotors + vehicle.frame_drag_kg_m * speed) * velocity / vehicle.mass_kg)
 
 
 def allocation(vehicle: Vehicle) -> Values:

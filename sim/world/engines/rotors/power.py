@@ -22,6 +22,7 @@ from sim.world.engines.rotors.vehicle_types import AIR_KG_M3, Vehicle
 INDUCED_LOSS: Final = 1.15
 _PROFILE_GROWTH: Final = 4.65
 _ROUNDS: Final = 12
+_HALVINGS: Final = 50
 _FASTEST_M_S: Final = 60.0
 
 
@@ -52,18 +53,30 @@ def electrical_w(vehicle: Vehicle, mechanical_w: Values) -> Values:
 
 
 def trimmed_w(vehicle: Vehicle, airspeed_m_s: Values, climb_m_s: Values) -> Values:
-    """Electrical power in steady flight: the rotors carry weight and drag, and nothing accelerates."""
+    """Electrical power in steady flight: the rotors carry weight and drag, and nothing accelerates.
+
+    The lean at which the forces across the body balance is found by bisection.
+    """
     speed = np.minimum(np.asarray(airspeed_m_s, dtype=np.float64), _FASTEST_M_S)
     weight_n = vehicle.mass_kg * GRAVITY_M_S2
-    rotor = np.full_like(speed, math.sqrt(weight_n / (4 * vehicle.thrust_n_s2)))
-    lean = np.zeros_like(speed)
-    for _ in range(_ROUNDS):
-        frame_n = vehicle.frame_drag_kg_m * speed**2
-        # the drag of the rotors acts across the leaning body, so that it lifts, too
-        rotors_n = 4 * vehicle.rotor_drag_n_s2_m * rotor * speed * np.cos(lean)
-        lean = np.arcsin(np.minimum((rotors_n + frame_n * np.cos(lean)) / weight_n, 0.95))
-        thrust_n = (weight_n * np.cos(lean) + frame_n * np.sin(lean)) / 4
-        inflow = vehicle.inflow_n_s2_m * (speed * np.sin(lean) + climb_m_s * np.cos(lean))
-        rotor = (inflow + np.sqrt(inflow**2 + 4 * vehicle.thrust_n_s2 * thrust_n)) / (2 * vehicle.thrust_n_s2)
-    across, through = speed * np.cos(lean), speed * np.sin(lean) + climb_m_s * np.cos(lean)
+    frame = vehicle.frame_drag_kg_m * np.hypot(speed, climb_m_s)
+
+    def balance(lean: Values) -> tuple[Values, Values, Values, Values]:
+        """Rotor speed, thrust of a rotor, the air's velocity through it, and the force that is missing across it."""
+        through = speed * np.sin(lean) + climb_m_s * np.cos(lean)
+        across = speed * np.cos(lean) - climb_m_s * np.sin(lean)
+        thrust_n = (weight_n * np.cos(lean) + frame * through) / 4
+        inflow = vehicle.inflow_n_s2_m * through
+        root = np.sqrt(np.maximum(inflow**2 + 4 * vehicle.thrust_n_s2 * thrust_n, 0.0))
+        rotor = np.maximum(inflow + root, 0.0) / (2 * vehicle.thrust_n_s2)
+        missing_n = weight_n * np.sin(lean) - (4 * vehicle.rotor_drag_n_s2_m * rotor + frame) * across
+        return rotor, thrust_n, through, missing_n
+
+    least, most = np.full_like(speed, -math.pi / 2), np.full_like(speed, math.pi / 2)
+    for _ in range(_HALVINGS):
+        lean = (least + most) / 2
+        enough = balance(lean)[3] >= 0
+        least, most = np.where(enough, least, lean), np.where(enough, lean, most)
+    rotor, thrust_n, through, _ = balance(most)
+    across = np.abs(speed * np.cos(most) - climb_m_s * np.sin(most))
     return electrical_w(vehicle, 4 * rotor_power_w(vehicle, rotor, thrust_n, across, through))

@@ -4,7 +4,9 @@
     motors: first-order lag towards the wanted speed, faster up than down; symplectic Euler at `STEP_HZ`
 
 The battery delivers the power that the rotors take (`power.py`); an empty one stops them. A body that reaches the
-ground or a wall stops there, upright. Not modeled: ground effect, downwash on UAVs below, blade flapping, bouncing.
+ground or a wall stops there, upright. One that stands with its motors off is held by friction, which at a coefficient
+of 0.6 is stronger than the drag of an Iris below 23 m/s of wind. Not modeled: ground effect, downwash on UAVs below,
+blade flapping, bouncing.
 """
 
 from typing import Final
@@ -18,11 +20,14 @@ from sim.world.engines.rotors.power import electrical_w, rotor_power_w
 from sim.world.engines.rotors.vehicle_types import Vehicle, hover_rad_s
 from sim.world.environment.solids import Solids
 from sim.world.environment.wind import Wind
+from sim.world.mobility.layout import ON_GROUND_M
 
 STEP_HZ: Final = 200
 _DT_S: Final = 1 / STEP_HZ
 _LEAST_SHARE: Final = 0.1
 """The least rotor speed in flight, as a share of the greatest: motors idle, but do not stop."""
+_SINK_M_S: Final = 1.0
+"""The mean speed of the fall of a few decimetres from where the motors are switched off to the ground."""
 _TUMBLE_PER_S: Final = 2.0
 """The rate at which a body without power stops rotating."""
 
@@ -40,7 +45,7 @@ class Rotors(Engine):
         self.vehicle = vehicle
         self._wind = wind
         self._solids = solids if solids is not None and solids.any else None
-        self._contacts = Contacts(vehicle.arm_m, self._solids)
+        self._contacts = Contacts(vehicle.reach_m, self._solids)
         self._allocation = allocation(vehicle)
         self._inertia = np.array(vehicle.inertia_kg_m2)[:, None]
         self.reset(np.zeros((0, 3)))
@@ -55,10 +60,11 @@ class Rotors(Engine):
         self._attitude = level_attitude(lift / np.sqrt((lift**2).sum(axis=0)))
         self._rates = np.zeros((3, count))
         self._speed = np.full((4, count), hover)
-        self._control = FlightControl(self.vehicle, drag / self.vehicle.mass_kg)
+        self._control = FlightControl(self.vehicle, count)
         self._air = np.zeros((3, count))
         self._power_w = np.zeros(count)
         self._dead = np.zeros(count, bool)
+        self._stands = np.zeros(count, bool)
         self._left_s = 0.0
         self._contacts.reset()
 
@@ -66,11 +72,12 @@ class Rotors(Engine):
         if self._wind is not None:
             self._air = np.ascontiguousarray(self._wind.advance(dt_s, self._at.T, self._velocity.T).T)
         self._left_s += dt_s
+        before = self._at.T
         wanted = np.ascontiguousarray(wanted_m_s.T)
         while self._left_s >= _DT_S - 1e-9:
             self._left_s -= _DT_S
             self._step(wanted)
-        self._contacts.notice(self._at.T)
+        self._contacts.notice(before, self._at.T)
         self._power_w = self._electrical()
 
     def _step(self, wanted: Values) -> None:
@@ -95,7 +102,18 @@ class Rotors(Engine):
         self._at = before + self._velocity * _DT_S
         self._rates = self._rates + turning * _DT_S
         self._turn_bodies()
+        if self._stands.any():
+            self._hold(before)
         self._stop(before)
+
+    def _hold(self, before: Values) -> None:
+        """Let the bodies that stand with their motors off neither slide nor turn; they sink until their legs touch."""
+        rows = np.flatnonzero(self._stands)
+        legs = ON_GROUND_M if self._solids is None else self._solids.surface_m(before[:, rows].T) + ON_GROUND_M
+        self._at[:2, rows] = before[:2, rows]
+        self._at[2, rows] = np.maximum(before[2, rows] - _SINK_M_S * _DT_S, np.minimum(legs, before[2, rows]))
+        self._velocity[:, rows] = self._rates[:, rows] = self._speed[:, rows] = 0.0
+        self._attitude[:, rows] = [[1.0], [0.0], [0.0], [0.0]]
 
     def _drag_n(self, across: Values, rotors_rad_s: Values, airflow: Values) -> Values:
         """Drag of the rotors by the air across them, and of the frame."""
@@ -122,17 +140,14 @@ class Rotors(Engine):
     def _stop(self, before: Values) -> None:
         """Stop the bodies that have reached the ground or a wall."""
         if self._solids is None:
-            if self._at[2].min(initial=1.0) >= 0:
-                return
-            inside, floor = self._at[2] < 0, 0.0
-            self._at[2, inside] = floor
+            inside = self._at[2] < 0
+            self._at[2, inside] = 0.0
         else:
-            gap = self._solids.gap_m(self._at.T)
-            inside = gap <= 0
-            if not inside.any():
-                return
-            self._at[:, inside] = before[:, inside]
-            self._at[2, inside] = np.maximum(self._at[2, inside], self._solids.ground_m(self._at[:, inside].T))
+            after = np.ascontiguousarray(self._at.T)
+            inside = self._solids.stop(before.T, after)
+            self._at = np.ascontiguousarray(after.T)
+        if not inside.any():
+            return
         self._velocity[:, inside] = 0.0
         self._rates[:, inside] = 0.0
         self._attitude[:, inside] = [[1.0], [0.0], [0.0], [0.0]]
@@ -146,8 +161,9 @@ class Rotors(Engine):
         mechanical = rotor_power_w(vehicle, self._speed, lift, across, through).sum(axis=0)
         return np.where(self._dead, 0.0, electrical_w(self.vehicle, mechanical))
 
-    def blocked(self, first: Rows, second: Rows) -> Flags:
-        return super().blocked(first, second) if self._solids is None else self._solids.blocked(first, second)
+    def stand(self, rows: Flags) -> None:
+        self._control.restart(self._stands & ~rows)
+        self._stands = rows
 
     def fall(self, row: int) -> None:
         self._dead[row] = True

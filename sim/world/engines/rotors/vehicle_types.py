@@ -9,6 +9,7 @@ The rotor drag, which grows with airspeed and rotor speed, is that of Martin and
 the frame.
 """
 
+import math
 from typing import Final, NamedTuple
 
 from sim.world.engines.contract import GRAVITY_M_S2
@@ -61,8 +62,11 @@ class Vehicle(NamedTuple):
     """The tilt limit of the flight control."""
     rate_per_s: float
     """The gain of the rate loop; each loop outside of it is about three times slower."""
-    arm_m: float
-    """The radius of the sphere with which the vehicle touches things."""
+
+    @property
+    def reach_m(self) -> float:
+        """How far the tips of the blades reach: the radius of the sphere with which the vehicle touches things."""
+        return max(math.hypot(x, y) for x, y in self.rotors_m) + self.rotor_radius_m
 
 
 IRIS: Final = Vehicle(
@@ -75,18 +79,18 @@ IRIS: Final = Vehicle(
     rotor_radius_m=0.127, thrust_n_s2=8.54858e-6, torque_m=0.016, inflow_n_s2_m=0.0, rotor_drag_n_s2_m=8.06428e-5,
     frame_drag_kg_m=0.0158, max_rad_s=838.0, motor_up_s=0.0125, motor_down_s=0.025, lead=0.0, drive_efficiency=0.85,
     avionics_w=4.0, battery=Cell(cells=3, capacity_ah=5.1, resistance_ohm=0.03), tilt_deg=35.0, rate_per_s=18.0,
-    arm_m=0.25,
 )  # fmt: skip
 CRAZYFLIE: Final = Vehicle(
     # Mass, inertia, rotors, motor lag: RotorPy (University of Pennsylvania), vehicles/crazyflie_params.py; torque over
     # thrust: Forster, "System Identification of the Crazyflie 2.0 Nano Quadrocopter", ETH, 2015. Battery and time
     # of flight (0.24 Ah, 7 min): Bitcraze, Crazyflie 2.0. The efficiency of the brushed motors is what gives that time.
+    # Frame: 12 cm2 of board, battery and motors (Bitcraze, assumed outline) with 1.17, the drag coefficient of a flat
+    # plate (Hoerner, Fluid-Dynamic Drag, 1965).
     name="crazyflie", mass_kg=0.030, inertia_kg_m2=(1.43e-5, 1.43e-5, 2.89e-5),
     rotors_m=((0.0304, 0.0304), (0.0304, -0.0304), (-0.0304, -0.0304), (-0.0304, 0.0304)), spins=(1, -1, 1, -1),
     rotor_radius_m=0.0231, thrust_n_s2=2.3e-8, torque_m=0.00596, inflow_n_s2_m=7.553e-7, rotor_drag_n_s2_m=1.02506e-6,
-    frame_drag_kg_m=0.0, max_rad_s=2500.0, motor_up_s=0.072, motor_down_s=0.072, lead=3.0, drive_efficiency=0.44,
+    frame_drag_kg_m=0.00086, max_rad_s=2500.0, motor_up_s=0.072, motor_down_s=0.072, lead=3.0, drive_efficiency=0.44,
     avionics_w=0.4, battery=Cell(cells=1, capacity_ah=0.24, resistance_ohm=0.12), tilt_deg=30.0, rate_per_s=20.0,
-    arm_m=0.07,
 )  # fmt: skip
 VEHICLES: Final = {vehicle.name: vehicle for vehicle in (IRIS, CRAZYFLIE)}
 

@@ -1,4 +1,4 @@
-"""What stands in the way: buildings and hills in the physics, the pairs they part, and what the medium makes of it."""
+"""What stands in the way: buildings and hills, the pairs they part, and what the medium makes of it."""
 
 from array import array
 from collections.abc import Callable, Iterator
@@ -14,18 +14,20 @@ from fanet_mw.units import MS, S
 from sim.world.engines.pybullet import Physics
 from sim.world.environment.line_of_sight import Sight
 from sim.world.environment.obstacles import Box, Obstacles, obstacles
+from sim.world.environment.solids import Solids
 from sim.world.mobility.layout import positions
 from sim.world.world import WorldActor
 from tests.unit.emulator.hand_driven import NAMES, Air, receptions
 
 MakeScenario = Callable[..., Scenario]
 TOWER = Box(0, 0, 20, 40, 60)
+TOWN = Obstacles(hills=None, boxes=(TOWER, Box(200, 0, 10, 10, 10)))
 PYBULLET = {"world.engine": "pybullet", "nodes.layout": "explicit"}
 
 
 @pytest.fixture
 def town() -> Iterator[Physics]:
-    made = Physics(physics_hz=240, obstacles=Obstacles(hills=None, boxes=(TOWER, Box(200, 0, 10, 10, 10))))
+    made = Physics(physics_hz=240, obstacles=TOWN)
     made.reset(np.array([[-50.0, 0, 50], [0, 0, 80]]))
     yield made
     made.close()
@@ -46,16 +48,14 @@ def town() -> Iterator[Physics]:
     ],
 )
 def test_a_building_hides_what_is_behind_it_and_nothing_else(
-    town: Physics, first: tuple[float, ...], second: tuple[float, ...], blocked: bool
+    first: tuple[float, ...], second: tuple[float, ...], blocked: bool
 ) -> None:
-    assert town.blocked(np.array([first], float), np.array([second], float)).tolist() == [blocked]
+    assert Solids(TOWN).blocked(np.array([first], float), np.array([second], float)).tolist() == [blocked]
 
 
-def test_a_pair_is_asked_for_if_one_of_them_is_below_the_highest_obstacle(
-    town: Physics, make_scenario: MakeScenario
-) -> None:
+def test_a_pair_is_asked_for_if_one_of_them_is_below_the_highest_obstacle(make_scenario: MakeScenario) -> None:
     """Node 1 is low; node 2, above every roof, is hidden from it by the tower; node 3, as high, sees node 2."""
-    sight = Sight(make_scenario(**{"nodes.count": 3}), town, top_m=60.0)
+    sight = Sight(make_scenario(**{"nodes.count": 3}), Solids(TOWN))
     at = np.array([[50.0, 0, 30], [-50, 0, 100], [-60, 0, 100]])
     assert sight.obstructions(at, 0).pairs.tolist() == [1, 2, 1, 3]
 
@@ -77,19 +77,17 @@ def test_hills_rise_to_their_height_and_hide(make_scenario: MakeScenario) -> Non
     heights = solid.hills.heights
     assert heights.min() == 0
     assert heights.max() == solid.top_m == 40
-    engine = Physics(physics_hz=240, obstacles=solid)
-    engine.reset(starts)
+    solids = Solids(solid)
     side = heights.shape[0]
     row, column = np.unravel_index(int(heights[2:-2, 2:-2].argmax()), (side - 4, side - 4))
     peak = [(i + 2 - (side - 1) / 2) * solid.hills.cell_m for i in (column, row)]
     west, east = [peak[0] - 100, peak[1], 36], [peak[0] + 100, peak[1], 36]
     above = [[x, y, 41] for x, y, _ in (west, east)]
-    assert engine.blocked(np.array([west, above[0]]), np.array([east, above[1]])).tolist() == [True, False]
+    assert solids.blocked(np.array([west, above[0]]), np.array([east, above[1]])).tolist() == [True, False]
     height = heights[row + 2, column + 2]
     low = [[*peak, height + 0.5], [*peak, height - 0.5]]
-    down = engine.blocked(np.array([[*peak, height + 1]] * 2), np.array(low))
+    down = solids.blocked(np.array([[*peak, height + 1]] * 2), np.array(low))
     assert down.tolist() == [False, True], "the ground of the rays is that of the heights"
-    engine.close()
 
 
 def test_seeded_buildings_are_those_of_the_seed_and_clear_of_every_start(make_scenario: MakeScenario) -> None:

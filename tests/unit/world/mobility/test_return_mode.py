@@ -18,7 +18,7 @@ def mode(make_scenario: MakeScenario) -> ReturnMode:
         "mobility.return_height_m": 30, "mobility.return_step_m": 4,
     })  # fmt: skip
     starts = np.array([[0.0, 0.0, 70.0], [100.0, 0.0, 70.0], [200.0, 0.0, 70.0]])
-    return ReturnMode(starts, scenario, ground_m=lambda _places: np.array(GROUND_M))
+    return ReturnMode(starts, scenario, surface_m=lambda _places: np.array(GROUND_M))
 
 
 def test_heights_count_from_the_highest_home(mode: ReturnMode) -> None:

@@ -23,8 +23,9 @@ from sim.world.mobility.guidance import Guidance
 from sim.world.mobility.layout import ON_GROUND_M, positions
 
 terrains = st.builds(
-    lambda seed, side, cell_m, rough: Hills(np.random.default_rng(seed).uniform(0, rough, (side, side)), cell_m),
-    st.integers(0, 2**32 - 1), st.integers(3, 12), st.sampled_from([7.0, 10.0, 26.3]), st.sampled_from([1.0, 8.0, 40.0]),
+    lambda seed, side, cell_m, most: Hills(np.random.default_rng(seed).uniform(0, most, (side, side)), cell_m),
+    st.integers(0, 2**32 - 1), st.integers(3, 12), st.sampled_from([7.0, 10.0, 26.3]),
+    st.sampled_from([1.0, 8.0, 40.0]),
 )  # fmt: skip
 quick = settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 

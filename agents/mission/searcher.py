@@ -55,7 +55,7 @@ from fanet_mw.wire.bids import Bids, encode_bids
 from fanet_mw.wire.search_messages import Told
 from fanet_mw.wire.search_plan import MOST_PLACES, Search, SearchStatus
 from fanet_mw.wire.searched_cells import Covered
-from fanet_mw.wire.survivors import Found, Standing, Survivor
+from fanet_mw.wire.survivors import Found, Standing, Survivor, is_person
 
 _MOST_DECADES: Final = 12.0
 """The greatest range of a phone's receiver is 10^12 m, farther than anything is apart; its square is a number."""
@@ -146,10 +146,14 @@ class Searcher:
             self._leave(now_ns)
         self._reception.review(now_ns)
         for survivor in self._sightings.contradicted():
+            self._announcing.keep_person(survivor, now_ns, steady_m2=self._sightings.steady_m2)
             self._announcing.refute(survivor, now_ns)
             self._bidding.reopen(survivor)
         self._plans.review(self._return_home.percent, now_ns)
         self._identify(now_ns)
+        for place in self._sightings.unreported(now_ns):
+            self._announcing.report_person(place, now_ns)
+        self._announcing.give_up_doubles(now_ns, steady_m2=self._sightings.steady_m2)
         self._announcing.tell(self._bidding.survivor, now_ns)
         if not self._return_home.leaves:
             self._bidding.bid(now_ns, delay_s=self._flight.take_off_s)
@@ -254,11 +258,13 @@ class Searcher:
         """Another node states the place of a survivor: an estimate, a confirmation, or a refutation."""
         if self._survivors.on_found(found, now_ns=now_ns):
             self._announcing.decided(found.survivor, now_ns)
+            if is_person(found.survivor):
+                return
             if found.standing is Standing.CONFIRMED:
                 self._bidding.close(found.survivor, now_ns=now_ns)
             else:
                 self._bidding.reopen(found.survivor)
-        elif found.standing is Standing.CONFIRMED and self._survivors.by_id[found.survivor].is_refuted(found):
+        elif self._survivors.is_outdated(found):
             self._announcing.outdated(found, now_ns)
 
     # --- sent messages --------------------------------------------------------------------------------------------

@@ -2491,7 +2491,7 @@ class MAVLink(object):
         confirmed there; or that it is not there after all.
 
         t_us                      : When that was estimated, confirmed or taken back. [us] (type:uint64_t)
-        survivor                  : Which one. (type:uint32_t)
+        survivor                  : Which one; from 1,000,000 on, a person without a phone. (type:uint32_t)
         east                      : Where. [m] (type:float)
         north                     : Where. [m] (type:float)
         east_variance             : Variance of east, in square metres. (type:float)
@@ -2510,7 +2510,7 @@ class MAVLink(object):
         confirmed there; or that it is not there after all.
 
         t_us                      : When that was estimated, confirmed or taken back. [us] (type:uint64_t)
-        survivor                  : Which one. (type:uint32_t)
+        survivor                  : Which one; from 1,000,000 on, a person without a phone. (type:uint32_t)
         east                      : Where. [m] (type:float)
         north                     : Where. [m] (type:float)
         east_variance             : Variance of east, in square metres. (type:float)

@@ -17,7 +17,20 @@ MOST_DBM: Final = 300.0
 """The greatest absolute value of a received power."""
 MOST_SURVIVORS: Final = 10_000
 """The greatest id of a survivor, which bounds how much must be remembered."""
+_FIRST_PERSON: Final = 1_000_000
+_PER_NODE: Final = 10_000
+"""People without a phone have numbers from `_FIRST_PERSON` on, so many for each node that may find them."""
 _MOST_VARIANCE_M2: Final = 1e10
+
+
+def person_id(node: int, number: int) -> int:
+    """The number of a person whom a node has found without a phone, its first, second, ... one from 0 on."""
+    return _FIRST_PERSON + node * _PER_NODE + number % _PER_NODE
+
+
+def is_person(survivor: int) -> bool:
+    """True for the number of a person who was found without a phone, not that of a phone."""
+    return survivor >= _FIRST_PERSON
 
 
 class Survivor(NamedTuple):
@@ -84,7 +97,9 @@ class Found(NamedTuple):
         refuse_unless(version == VERSION and standing <= Standing.REFUTED, f"a find of standing {standing}")
         found = cls._make((*values, Standing(standing)))
         refuse_unless(
-            0 < found.survivor <= MOST_SURVIVORS and 0 < found.node < ANY_NODE and found.t_us <= LATEST_US,
+            (0 < found.survivor <= MOST_SURVIVORS or _is_of_a_node(found))
+            and 0 < found.node < ANY_NODE
+            and found.t_us <= LATEST_US,
             f"survivor {found.survivor} found by {found.node}",
         )
         east, north = found.east_variance_m2, found.north_variance_m2
@@ -97,3 +112,8 @@ class Found(NamedTuple):
             f"an estimate with variances {east}, {north} and covariance {found.covariance_m2}",
         )
         return found
+
+
+def _is_of_a_node(found: Found) -> bool:
+    """True for the verdict on a person without a phone, whose number is one of those of a node."""
+    return found.standing is not Standing.ESTIMATED and person_id(1, 0) <= found.survivor < person_id(ANY_NODE, 0)

@@ -7,6 +7,8 @@ swarm.
     confirmed   survivors whom a UAV announced within 25 m of their true place and did not take back; farther ones are
                 mistaken. The error is that of the first announced place, for both
     reopened    confirmations that were taken back, because later receptions contradicted them
+    persons     survivors whom a UAV has told of by name, or as a person without a phone (within 25 m, each find of one)
+    false       finds of persons where nobody is, or somebody of whom there is another find
     wait        time from the first reception of a survivor's phone by any UAV to the right confirmation
     nearest     distance of each living UAV to the nearest other one, once a second
 
@@ -37,6 +39,7 @@ from fanet_mw.trace import (
     Refuted,
 )
 from fanet_mw.units import Enu, S
+from fanet_mw.wire.survivors import is_person
 from sim.run.collecting.record_kinds import records_of
 from sim.world.environment.survivors import place
 from sim.world.sensors.phone import REFERENCE_LOSS_DB
@@ -77,6 +80,7 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
     for detected in records_of(records, Detected):
         heard.setdefault(detected.survivor, detected.t_ns)
     right, mistaken = found.right(), found.mistaken()
+    persons, false_persons = found.persons()
     confirmed = [*right, *mistaken]
     return {
         "survivors": scenario.mission.survivors,
@@ -85,6 +89,8 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
         "reached": len({r.survivor for r in records_of(records, Arrived)}),
         "confirmed": len(right),
         "mistaken": len(mistaken),
+        "persons": len({one.survivor for one in right} | set(persons)),
+        "persons_false": false_persons,
         "reopened": found.reopened,
         "time_to_confirm_s": sorted(round(one.t_ns / S, 3) for one in right),
         "wait_s": _waits([(one.t_ns - heard[one.survivor]) / S for one in right if one.survivor in heard]),
@@ -104,18 +110,19 @@ class Confirmations:
         """`truth`: the true places of the survivors, in the order of their ids."""
         self._truth = truth
         self._held: dict[int, list[Confirmed]] = {}
-        """For each survivor, the confirmations that hold, in the order of their announcement."""
+        """For each survivor, and each person found without a phone, the confirmations that hold, in the order of their
+        announcement."""
         self.reopened = 0
         """The number of times that a confirmation was taken back."""
 
     def add(self, record: Record) -> None:
         """Take in a record; others than confirmations and refutations change nothing."""
-        if type(record) is Confirmed and 1 <= record.survivor <= len(self._truth):
+        if type(record) is Confirmed and (1 <= record.survivor <= len(self._truth) or is_person(record.survivor)):
             self._held.setdefault(record.survivor, []).append(record)
         elif type(record) is Refuted and record.survivor in self._held:
             held = self._held[record.survivor]
             self._held[record.survivor] = [one for one in held if not _takes_back(record, one)]
-            self.reopened += len(self._held[record.survivor]) < len(held)
+            self.reopened += not is_person(record.survivor) and len(self._held[record.survivor]) < len(held)
 
     def error_m(self, confirmed: Confirmed) -> float:
         """The distance between the announced place and the true one."""
@@ -130,8 +137,25 @@ class Confirmations:
         """The same for those who were announced far from it."""
         return [one for one in self._first() if self.error_m(one) > MISTAKEN_M]
 
+    def persons(self) -> tuple[list[int], int]:
+        """The survivors who were found as persons without a phone, and the number of finds of persons that are of
+        nobody, or of somebody of whom there is another one. Each find is of one survivor, the nearest pairs first.
+        """
+        finds = [held[0] for number, held in sorted(self._held.items()) if held and is_person(number)]
+        near = sorted(
+            (apart_m, find.survivor, survivor)
+            for find in finds
+            for survivor, at in enumerate(self._truth, start=1)
+            if (apart_m := math.hypot(at.east - find.east_m, at.north - find.north_m)) <= MISTAKEN_M
+        )
+        of: dict[int, int] = {}
+        for _, find, survivor in near:
+            if find not in of and survivor not in of.values():
+                of[find] = survivor
+        return sorted(of.values()), len(finds) - len(of)
+
     def _first(self) -> list[Confirmed]:
-        return [held[0] for held in self._held.values() if held]
+        return [held[0] for survivor, held in self._held.items() if held and not is_person(survivor)]
 
 
 def _takes_back(refuted: Refuted, confirmed: Confirmed) -> bool:

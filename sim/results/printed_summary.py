@@ -130,6 +130,9 @@ def _mission_rows(mission: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if mission["confirmed"]:
         last_s, error_m = mission["time_to_confirm_s"][-1], mission["confirmed_error_m"]
         yield "confirmed", f"{mission['confirmed']}, the last after {last_s:.0f} s, median error {error_m:.1f} m"
+    if mission["persons"] > mission["confirmed"] or mission["persons_false"]:
+        without = mission["persons"] - mission["confirmed"]
+        yield "persons", f"{without} more found without a phone, {mission['persons_false']} finds of nobody else"
     if mission["wait_s"]["p50"] is not None:
         wait = mission["wait_s"]
         yield "waited", f"from heard to confirmed: median {wait['p50']:.0f} s, longest {wait['max']:.0f} s"

@@ -2,17 +2,20 @@
 
 seen often enough at close range, place certain  -> confirmed: flooded three times, then in hellos for a while
 later receptions make that place impossible      -> refuted: flooded likewise, and the survivor is searched again
+somebody seen, without a phone that fits         -> a person: flooded likewise
 another UAV does not seem to know of a verdict   -> some of those that know it flood it again
 """
 
 import math
 from typing import Final
 
-from agents.mission.finding.known_survivors import KnownSurvivors
+from agents.mission.finding.identities import paired
+from agents.mission.finding.known_survivors import KnownSurvivors, estimate_of
+from agents.mission.finding.phone_localization import Estimate
 from agents.mission.outbox import Outbox, OutgoingPacket
 from fanet_mw.trace import Confirmed, Refuted
 from fanet_mw.units import US, NodeId, S
-from fanet_mw.wire.survivors import Found, Standing, Survivor
+from fanet_mw.wire.survivors import Found, Standing, Survivor, person_id
 
 _TELLINGS: Final = 3
 """The number of times that a UAV floods a verdict of its own."""
@@ -36,6 +39,10 @@ class Announcing:
     def __init__(self, node: NodeId, survivors: KnownSurvivors, outbox: Outbox) -> None:
         self._node = node
         self._survivors, self._outbox = survivors, outbox
+        self._persons = 0
+        """The number of people whom this UAV has found without a phone."""
+        self._took_over: set[int] = set()
+        """The finds in whose favor this UAV has given up a person."""
         self._told_sigma_m: dict[int, float] = {}
         self._tellings: dict[int, tuple[int, int]] = {}
         """For each survivor that this UAV has confirmed or refuted: how often the verdict must still be flooded, and
@@ -58,6 +65,40 @@ class Announcing:
         refuted = mistaken._replace(t_us=now_ns // US, node=self._node, standing=Standing.REFUTED)
         self._decide(refuted, Refuted, now_ns)
 
+    def report_person(self, place: Estimate, now_ns: int) -> None:
+        """Somebody was seen who carries no phone that fits: flood that a person is there."""
+        person = person_id(self._node, self._persons)
+        self._persons += 1
+        self._decide(Found(now_ns // US, person, *place, self._node, Standing.CONFIRMED), Confirmed, now_ns)
+
+    def give_up_doubles(self, now_ns: int, *, steady_m2: float) -> None:
+        """Give up the people found by this UAV who were also found by a UAV with a lower id. One find takes the place
+        of one person for good.
+        """
+        people = self._survivors.person_places()
+        own = {person: place for person, place in people.items() if self._survivors.persons[person].node == self._node}
+        others = {
+            person: place
+            for person, place in people.items()
+            if person < min(own, default=0) and person not in self._took_over
+        }
+        if not own or not others:
+            return
+        chosen = paired(list(own.values()), list(others.values()), steady_m2=steady_m2)
+        for person, column in zip(own, chosen, strict=True):
+            if column is not None:
+                self._took_over.add(list(others)[column])
+                given_up = self._survivors.persons[person]._replace(t_us=now_ns // US, standing=Standing.REFUTED)
+                self._decide(given_up, Refuted, now_ns)
+
+    def keep_person(self, survivor: int, now_ns: int, *, steady_m2: float) -> None:
+        """A confirmation is about to be taken back: whoever was seen there is a person all the same."""
+        mistaken = self._survivors.by_id[survivor].confirmed
+        assert mistaken is not None, "only a confirmation is taken back"
+        place, people = estimate_of(mistaken), list(self._survivors.person_places().values())
+        if not people or paired([place], people, steady_m2=steady_m2) == [None]:
+            self.report_person(place, now_ns)
+
     def _decide(self, verdict: Found, record: type[Confirmed | Refuted], now_ns: int) -> None:
         """Record a verdict of this UAV, and flood it from now on."""
         survivor, east_m, north_m = verdict.survivor, round(verdict.east_m, 2), round(verdict.north_m, 2)
@@ -76,7 +117,7 @@ class Announcing:
         for survivor, (left, next_ns) in sorted(self._tellings.items()):
             if now_ns < next_ns:
                 continue
-            verdict = self._survivors.by_id[survivor].verdict
+            verdict = self._survivors.verdict(survivor)
             assert verdict is not None, "only a verdict is announced"
             self._flood(verdict)
             if left > 1:
@@ -97,7 +138,7 @@ class Announcing:
 
     def _remind(self, survivor: int, of_node: int, now_ns: int) -> None:
         """Flood a verdict again, unless that was done recently or other UAVs are to do it."""
-        verdict = self._survivors.by_id[survivor].verdict
+        verdict = self._survivors.verdict(survivor)
         if verdict is None or now_ns - self._heard_ns.get(survivor, now_ns) <= _AGAIN_NS:
             return
         self._heard_ns[survivor] = now_ns
@@ -109,7 +150,7 @@ class Announcing:
         recent = [
             (heard_ns, survivor) for survivor, heard_ns in self._heard_ns.items() if now_ns - heard_ns < _PASSED_ON_NS
         ]
-        latest = [self._survivors.by_id[survivor].verdict for _, survivor in sorted(recent, reverse=True)[:_PASSED_ON]]
+        latest = [self._survivors.verdict(survivor) for _, survivor in sorted(recent, reverse=True)[:_PASSED_ON]]
         return b"".join(found.encode_frame(self._node) for found in latest if found is not None)
 
     def _tell_estimate(self, survivor: int, now_ns: int) -> None:

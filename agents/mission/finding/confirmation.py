@@ -16,9 +16,8 @@ from agents.mission.finding.person_track import PersonTrack
 from fanet_mw.units import S
 
 CLOSE_M: Final = 100.0
-"""The greatest slant range of a sighting from close by; only such sightings count for a confirmation."""
-SECOND_SIGMA_M: Final = 30.0
-"""A second person can only carry a phone whose place is known from received powers with this standard deviation."""
+"""The greatest slant range from which a call counts for a confirmation. Whom a camera shows counts from any height: how
+often it shows people from there is known (`camera_view.py`)."""
 GREATEST_MARGIN: Final = 9.0
 """By how much the next best assignment must cost more, at first: it is then 90 times less likely."""
 _LEAST_MARGIN: Final = 2.0
@@ -28,7 +27,7 @@ _PATIENT_NS: Final = 15 * S
 _IMPATIENT_NS: Final = 50 * S
 """The time since the first sighting from which only the least margin is required; it decreases linearly in between."""
 _SIGHTINGS: Final = 2
-"""A person is not confirmed before this number of sightings from close by."""
+"""A person is not confirmed before this number of sightings by a camera, or calls from close by."""
 _SURE_M: Final = 3.5
 """The greatest standard deviation of a confirmed place."""
 _VAGUE_M: Final = 80.0
@@ -42,8 +41,8 @@ _SAMPLES_ALONE: Final = 8
 
 
 def is_seen_enough(person: PersonTrack) -> bool:
-    """True if a person was seen often enough from close by."""
-    return person.close_sightings >= _SIGHTINGS
+    """True if a person was seen often enough from close by, so that it is no false alarm."""
+    return person.close_sightings >= _SIGHTINGS and person.is_proven
 
 
 def is_confirmable(person: PersonTrack, phone: KnownSurvivor) -> bool:
@@ -54,7 +53,7 @@ def is_confirmable(person: PersonTrack, phone: KnownSurvivor) -> bool:
     return (
         is_seen_enough(person)
         and person.place.sigma_m <= _SURE_M
-        and phone.is_heard_within(SECOND_SIGMA_M if person.confirmed else _VAGUE_M)
+        and phone.is_heard_within(_VAGUE_M)
         and phone.filter.included_powers >= enough
     )
 

@@ -1,21 +1,21 @@
 """Decides which person carries which phone: cameras and microphones show people, receivers identify phones.
 
-    sightings near each other     are taken for one person (`person_track.py`)
+    what one reading shows        is assigned to the people known so far, all at once; who is left over is new
     all people and all phones     are assigned at once, so that all received powers together are most likely
     a person's phone is certain   when every other assignment of this person is far less likely (`confirmation.py`)
 
-A survivor is known by the id of the phone. The cost of a pair of person and phone tells how much less likely the
+A survivor is known by the id of the phone; a person who is certainly there and carries no phone that fits is reported
+without one (`unreported`). The cost of a pair of person and phone tells how much less likely the
 phone's received powers are from the person's place than from the best place. It is twice a difference of
 log-likelihoods, so for the true pair it has a chi-square distribution with 2 degrees of freedom.
 """
 
 import math
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Callable, Sequence
+from typing import Final, NamedTuple
 
 from agents.mission.finding.confirmation import (
     GREATEST_MARGIN,
-    SECOND_SIGMA_M,
     is_confirmable,
     is_seen_enough,
     required_margin,
@@ -24,11 +24,20 @@ from agents.mission.finding.known_survivors import SAME_PLACE_M, KnownSurvivors,
 from agents.mission.finding.person_track import PersonTrack
 from agents.mission.finding.phone_localization import Estimate
 from agents.mission.hungarian import assign
-from fanet_mw.units import Enu
-from fanet_mw.wire.survivors import Found
+from fanet_mw.units import Enu, S
+from fanet_mw.wire.survivors import Found, is_person
 
-_SAME_SIGMAS: Final = 2.5
-"""A sighting also belongs to a person within this number of its standard deviations; voices have wide ones."""
+_SAME_SIGMAS: Final = 4.0
+"""A sighting also belongs to a person within this number of standard deviations of both, and so does a find."""
+_STEADY_M: Final = 1.5
+"""The part of the error of a sighting, along each axis, that is the same for successive sightings."""
+_TOGETHER: Final = 2
+"""Where somebody is confirmed, another person is believed after this number of readings that show somebody beside; in a
+single one a false alarm may stand beside a person."""
+_UNREPORTED_NS: Final = 4 * S
+"""How long a person who is certainly there waits for a phone before being reported without one."""
+_SURE_M: Final = 3.5
+"""The greatest standard deviation with which a person is reported without a phone."""
 _GATE: Final = 16.0
 """The cost of assigning no phone to a person, so that a phone of a greater cost is never assigned. The value is above
 11.8, the 99.7 % quantile of chi-square with 2 degrees of freedom, because the shadowing of neighboring samples is not
@@ -43,54 +52,90 @@ _IMPOSSIBLE: Final = 1e6
 """The cost of a pair that is excluded."""
 _REFUTED_COST: Final = 9.0
 """An additional cost at a place where the same survivor was confirmed by mistake, because other UAVs know better."""
-_SECOND_GATE: Final = 6.0
-"""The cost of assigning no phone to a second person, who is then not taken for a second one."""
+_DOUBTED_NS: Final = 30 * S
+"""For how long: whatever was received since then tells more than the refutation."""
+
+
+class Sighting(NamedTuple):
+    """A place at which one reading of a sensor shows a person."""
+
+    at: Enu
+    sigma_m: float
+    close: bool
+    """From so near that it certainly is a person."""
 
 
 class Identities:
     """The people whom one UAV has seen, and the phones that they carry."""
 
-    def __init__(self, survivors: KnownSurvivors) -> None:
+    def __init__(self, survivors: KnownSurvivors, *, bias_m: float = 0.0) -> None:
+        """`bias_m`: the standard deviation of the slow error of position fixes along each axis."""
         self._survivors = survivors
+        self._steady_m2 = _STEADY_M * _STEADY_M + bias_m * bias_m
         self._people: list[PersonTrack] = []
+        self._now_ns = 0
 
-    def on_sighting(self, at: Enu, *, sigma_m: float, close: bool, now_ns: int, sensor: str = "camera") -> int | None:
-        """A sensor has shown a person; `close`: from so near that it certainly is one. All that one reading of a sensor
-        shows has the same instant.
-
-        Returns the survivor whose phone was last assigned to that person.
+    def on_reading(
+        self, sightings: Sequence[Sighting], *, here: Enu, evidence: float, now_ns: int
+    ) -> list[PersonTrack]:
+        """One reading of a sensor has shown people, from a position of this UAV; `evidence` is that of one sighting.
+        Returns the person of each sighting, known or new.
         """
-        near = min(self._people, key=lambda person: person.place.distance_m(at), default=None)
-        variance = sigma_m * sigma_m
-        if near is None or near.place.distance_m(at) > max(SAME_PLACE_M, _SAME_SIGMAS * sigma_m):
-            place = Estimate(at.east, at.north, variance, 0.0, variance)
-            near = PersonTrack(place, now_ns, now_ns, shown_by=(sensor, now_ns))
-            self._people.append(near)
-        else:
-            near.on_sighting(at, variance, (sensor, now_ns))
-        near.close_sightings += close
-        return near.survivor
+        people = self._people
+        costs = [
+            [person.distance2(sighting.at, sighting.sigma_m**2 + self._steady_m2) for person in people]
+            for sighting in sightings
+        ]
+        chosen = _assigned(costs, [_SAME_SIGMAS * _SAME_SIGMAS] * len(sightings))[1] if people and sightings else []
+        shown: list[PersonTrack] = []
+        for row, (at, sigma_m, close) in enumerate(sightings):
+            column, variance = chosen[row] if chosen else None, sigma_m * sigma_m
+            if column is None:
+                place = Estimate(at.east, at.north, variance, 0.0, variance)
+                shown.append(PersonTrack(place, now_ns, now_ns, here, evidence))
+            else:
+                shown.append(people[column])
+                people[column].on_sighting(at, variance, here=here, evidence=evidence, now_ns=now_ns)
+            shown[-1].close_sightings += close
+        self._people = [*people, *(person for person in shown if person not in people)]
+        for person in shown:
+            person.together += any(
+                other is not person and other.place.distance_m(person.place.at) <= SAME_PLACE_M for other in shown
+            )
+        return shown
+
+    def on_images(
+        self, count: int, shows: Callable[[Enu], bool], *, evidence: float, but: Sequence[PersonTrack] = ()
+    ) -> None:
+        """So many images have shown none of the people whose places were in them, except those of `but`."""
+        for person in self._people:
+            if count and person not in but and shows(person.place.at):
+                person.evidence += count * evidence
 
     def review(self, now_ns: int) -> list[int]:
         """Assign phones to people anew; returns the survivors who may be confirmed now, in the order of ids."""
+        self._now_ns = now_ns
         self._people = [person for person in self._people if person.is_remembered(now_ns)]
+        self._recognize_finds()
         for person in self._people:
             person.on_neighborhood(confirmed=self._confirmed_at(person.place.at), now_ns=now_ns)
-            person.survivor = None if person.unnamed else person.survivor
         for survivor in self._survivors.unconfirmed():
             self._survivors.by_id[survivor].filter.on_sighting(None)
-        people = [person for person in self._people for _ in range(person.unnamed)]
+        people = [person for person in self._people if self._is_unnamed(person)]
+        for person in self._people:
+            person.survivor = person.survivor if person in people else None
         phones = self._phones(people)
         if not people or not phones:
             return []
-        costs = [[self._cost_of(person, phone) for phone in phones] for person in people]
-        nobody = [_SECOND_GATE if person.confirmed else _GATE for person in people]
+        costs = [[self._cost(person.place, phone) for phone in phones] for person in people]
+        nobody = [_GATE] * len(people)
         least, chosen = _assigned(costs, nobody)
         sure = []
         for person, column in zip(people, chosen, strict=True):
+            person.survivor = None if column is None else phones[column]
             if column is None:
                 continue
-            person.survivor = survivor = phones[column]
+            survivor = phones[column]
             known = self._survivors.by_id[survivor]
             known.filter.on_sighting(person.place)
             if is_confirmable(person, known):
@@ -98,6 +143,37 @@ class Identities:
                 if margin >= required_margin(person, now_ns):
                     sure.append(survivor)
         return sorted(sure)
+
+    def unreported(self, now_ns: int) -> list[Estimate]:
+        """The places of the people who are certainly there, seen from two places, and of whom there is no find."""
+        return [
+            person.place
+            for person in self._people
+            if person.find is None
+            and self._is_unnamed(person)
+            and person.proven_ns is not None
+            and now_ns - person.proven_ns >= _UNREPORTED_NS
+            and person.place.sigma_m <= _SURE_M
+        ]
+
+    def _is_unnamed(self, person: PersonTrack) -> bool:
+        """True for a person who is not known to be a confirmed survivor."""
+        named = person.find is not None and not is_person(person.find)
+        return not named and (not person.confirmed or person.together >= _TOGETHER)
+
+    def _recognize_finds(self) -> None:
+        """Assign the finds to the people seen, each to one person; a survivor's comes before that of a person without a
+        phone.
+        """
+        for person in self._people:
+            person.find = None
+        for finds in (self._survivors.confirmed_places(), self._survivors.person_places()):
+            left = [person for person in self._people if person.find is None]
+            if not left or not finds:
+                continue
+            chosen = paired([person.place for person in left], list(finds.values()), steady_m2=self._steady_m2)
+            for person, column in zip(left, chosen, strict=True):
+                person.find = None if column is None else list(finds)[column]
 
     def against(self, confirmed: Found) -> float:
         """How much less likely a confirmed pair is than the best assignment without it.
@@ -149,7 +225,7 @@ class Identities:
         """The least total cost if neither this person nor anybody beside carries this phone: whoever finds one of them
         finds the others.
 
-        Carrying none is made more expensive by `GREATEST_MARGIN`, except for a second person at a confirmed place.
+        Carrying none is made more expensive by `GREATEST_MARGIN`.
         """
         others = [list(one) for one in costs]
         bound = list(nobody)
@@ -157,7 +233,7 @@ class Identities:
             if other.place.distance_m(person.place.at) <= _BY_SIDE_M:
                 others[row][column] = _IMPOSSIBLE
             if other is person:
-                bound[row] += 0.0 if person.confirmed else GREATEST_MARGIN
+                bound[row] += GREATEST_MARGIN
         return _assigned(others, bound)[0]
 
     def _phones(self, people: Sequence[PersonTrack]) -> list[int]:
@@ -173,21 +249,26 @@ class Identities:
             and any(self._survivors.by_id[survivor].filter.near(place.at, within_m=_NEAR_M) for place in places)
         ]
 
-    def _cost_of(self, person: PersonTrack, survivor: int) -> float:
-        """The cost of one pair.
-
-        At a place where a survivor is confirmed, a second person can only carry a phone whose place is well known,
-        because any other phone that was received not far from there would fit, too.
-        """
-        if person.confirmed and not self._survivors.by_id[survivor].is_heard_within(SECOND_SIGMA_M):
-            return _IMPOSSIBLE
-        return self._cost(person.place, survivor)
-
     def _cost(self, place: Estimate, survivor: int) -> float:
         """The cost of one pair by received powers, and by earlier refutations."""
         known, at = self._survivors.by_id[survivor], place.at
-        doubt = _REFUTED_COST if known.was_mistaken_at(at) else 0.0
+        doubt = _REFUTED_COST if known.was_mistaken_at(at, since_ns=self._now_ns - _DOUBTED_NS) else 0.0
         return min(_IMPOSSIBLE, known.filter.deficit(at.east, at.north) + doubt)
+
+
+def paired(seen: Sequence[Estimate], found: Sequence[Estimate], *, steady_m2: float) -> list[int | None]:
+    """For each of these places, which of those of finds is of the same person, if any; one find is of one person."""
+    costs = [
+        [
+            one.distance_m(other.at) ** 2
+            / (one.east_variance_m2 + other.east_variance_m2 + other.north_variance_m2 + 2 * steady_m2)
+            if one.distance_m(other.at) <= SAME_PLACE_M
+            else _IMPOSSIBLE
+            for other in found
+        ]
+        for one in seen
+    ]
+    return _assigned(costs, [_SAME_SIGMAS * _SAME_SIGMAS] * len(seen))[1]
 
 
 def _assigned(costs: Sequence[Sequence[float]], nobody: Sequence[float]) -> tuple[float, list[int | None]]:

@@ -20,7 +20,7 @@ from typing import Final, NamedTuple, assert_never
 from agents.mission.finding.calibration import common_offset, likelihood
 from agents.mission.finding.phone_localization import AS_ASSUMED, Estimate, PhoneFilter, PhoneModel, PhoneOffset
 from fanet_mw.units import US, Enu, S
-from fanet_mw.wire.survivors import Found, Standing, Survivor
+from fanet_mw.wire.survivors import Found, Standing, Survivor, is_person
 
 _PASSED_ON: Final = 5
 """The greatest number of reports in one hello."""
@@ -28,6 +28,8 @@ _FRESH_NS: Final = 8 * S
 """Hellos pass on reports that are not older than this, whoever made them."""
 SAME_PLACE_M: Final = 12.0
 """Two sightings, or two confirmations, at no more than this distance are of one place."""
+_MOST_PERSONS: Final = 2000
+"""The greatest number of people without a phone that are remembered."""
 _MOST_REFUTED: Final = 4
 """The greatest number of refutations of one survivor that are kept, the youngest ones."""
 
@@ -59,9 +61,12 @@ class KnownSurvivor:
         """True for a confirmation that a known refutation takes back."""
         return any(_refutes(refuted, found) for refuted in self.refuted)
 
-    def was_mistaken_at(self, at: Enu) -> bool:
-        """True if the survivor was confirmed by mistake at this place."""
-        return any(estimate_of(refuted).distance_m(at) <= SAME_PLACE_M for refuted in self.refuted)
+    def was_mistaken_at(self, at: Enu, *, since_ns: int) -> bool:
+        """True if the survivor was confirmed by mistake at this place, as was found out since an instant."""
+        return any(
+            refuted.t_us * US >= since_ns and estimate_of(refuted).distance_m(at) <= SAME_PLACE_M
+            for refuted in self.refuted
+        )
 
     def is_heard_within(self, sigma_m: float) -> bool:
         """True if received powers alone give the place of the phone with at most this standard deviation."""
@@ -97,6 +102,8 @@ class KnownSurvivors:
     def __init__(self, model: PhoneModel) -> None:
         self._model = model
         self.by_id: dict[int, KnownSurvivor] = {}
+        self.persons: dict[int, Found] = {}
+        """The latest verdict on each person who was found without a phone: found, or given up."""
         self._likelihoods: dict[int, PhoneLikelihood] = {}
         """The likelihood of the common offset by each confirmed survivor's phone."""
         self.offset: PhoneOffset = AS_ASSUMED
@@ -120,6 +127,8 @@ class KnownSurvivors:
         """Take in an announced estimate, confirmation or refutation; True if it confirms a survivor who was not
         confirmed, or takes the present confirmation back.
         """
+        if is_person(found.survivor):
+            return self._on_person(found)
         known = self.by_id.get(found.survivor)
         if known is None:
             known = self._first_heard(found.survivor, now_ns)
@@ -143,6 +152,48 @@ class KnownSurvivors:
                 return False
             case _:
                 assert_never(found.standing)
+
+    def _on_person(self, found: Found) -> bool:
+        """Take in that a person without a phone was found, or given up, which holds for ever; True if that is news."""
+        before = self.persons.get(found.survivor)
+        if before is None and len(self.persons) >= _MOST_PERSONS:
+            return False
+        if before is not None and (before.standing is Standing.REFUTED or found.standing is Standing.CONFIRMED):
+            return False
+        self.persons[found.survivor] = found
+        return True
+
+    def verdict(self, survivor: int) -> Found | None:
+        """The confirmation of a survivor or a person that holds, otherwise the latest refutation; None without any."""
+        if is_person(survivor):
+            return self.persons.get(survivor)
+        known = self.by_id.get(survivor)
+        return None if known is None else known.verdict
+
+    def is_outdated(self, found: Found) -> bool:
+        """True for a confirmation that a known refutation takes back."""
+        if found.standing is not Standing.CONFIRMED:
+            return False
+        if is_person(found.survivor):
+            verdict = self.persons.get(found.survivor)
+            return verdict is not None and verdict.standing is Standing.REFUTED
+        return self.by_id[found.survivor].is_refuted(found)
+
+    def confirmed_places(self) -> dict[int, Estimate]:
+        """The places of the confirmed survivors."""
+        return {
+            survivor: estimate_of(known.confirmed)
+            for survivor, known in sorted(self.by_id.items())
+            if known.confirmed is not None
+        }
+
+    def person_places(self) -> dict[int, Estimate]:
+        """The places of the people who were found without a phone."""
+        return {
+            person: estimate_of(found)
+            for person, found in sorted(self.persons.items())
+            if found.standing is Standing.CONFIRMED
+        }
 
     def unconfirmed(self) -> list[int]:
         """The survivors without a confirmation that holds, in order of id."""

@@ -1,9 +1,8 @@
-"""People at one place on the ground whom cameras or microphones show, mostly one: a Kalman filter over the sightings.
-
-However often one person is seen, only people whom the same reading of a sensor shows are several.
+"""One person on the ground whom cameras or microphones show: a Kalman filter over the sightings, and the evidence that
+somebody is there.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final
 
 from agents.mission.finding.phone_localization import Estimate
@@ -13,34 +12,45 @@ _FORGOTTEN_NS: Final = 60 * S
 """A person of whom there was no further sighting for this long is forgotten."""
 _FALSE_ALARM_NS: Final = 10 * S
 """A single sighting without another one within this time was a false alarm."""
-_TOGETHER: Final = 2
-"""Several people are believed to be at one place after this number of readings that showed as many; in a single one a
-false alarm may stand beside a person."""
+_MOST_EVIDENCE: Final = 40.0
+_GONE: Final = -7.0
+"""With less evidence than this nobody is there, or no longer."""
+_PROVEN: Final = 18.0
+"""The evidence by which a person is there: e^-18 of all false alarms would come as far."""
+_BASE_M: Final = 8.0
+"""A person was seen from two places if they are at least this far apart."""
+_SIGHTINGS: Final = 2
+"""A person is not proven before this number of sightings."""
 
 
 @dataclass
 class PersonTrack:
-    """The people at one place, by the sightings so far."""
+    """One person, by the sightings so far."""
 
     place: Estimate
     first_ns: int
     last_ns: int
+    seen_from: Enu
+    """The position of the UAV at the first sighting."""
+    evidence: float
     sightings: int = 1
     close_sightings: int = 0
     """The number of sightings from close by."""
+    base_m: float = 0.0
+    """The greatest distance of the UAV's positions at a sighting from that at the first one."""
+    together: int = 0
+    """The number of readings that have shown somebody else beside this person."""
     survivor: int | None = None
     """The survivor whose phone was last assigned to this person."""
+    find: int | None = None
+    """The find that is of this person: the id of a confirmed survivor, or of a person without a phone."""
     confirmed: int = 0
     """The number of survivors who are confirmed at this place."""
-    shown_by: tuple[str, int] | None = None
-    """The sensor and the instant of the latest sighting, which are the same for all that one reading shows."""
-    in_reading: int = 1
-    """How many sightings of this place the latest reading has brought so far."""
-    readings: list[int] = field(default_factory=list)
-    """The number of readings that have shown at least two people here, three, and so on."""
+    proven_ns: int | None = None
+    """The instant from which it was certain that somebody is there."""
 
-    def on_sighting(self, at: Enu, variance_m2: float, shown_by: tuple[str, int]) -> None:
-        """Add a sighting, by a Kalman filter with the same variance along each axis."""
+    def on_sighting(self, at: Enu, variance_m2: float, *, here: Enu, evidence: float, now_ns: int) -> None:
+        """Add a sighting from a position of the UAV, by a Kalman filter with the same variance along each axis."""
         before = self.place
         gain = before.east_variance_m2 / (before.east_variance_m2 + variance_m2)
         self.place = Estimate(
@@ -51,24 +61,28 @@ class PersonTrack:
             before.north_variance_m2 * (1 - gain),
         )
         self.sightings += 1
-        self.in_reading = self.in_reading + 1 if shown_by == self.shown_by else 1
-        self.shown_by, self.last_ns = shown_by, shown_by[1]
-        if self.in_reading > 1:
-            self.readings += [0] * (self.in_reading - 1 - len(self.readings))
-            self.readings[self.in_reading - 2] += 1
+        self.last_ns = now_ns
+        self.evidence = min(_MOST_EVIDENCE, self.evidence + evidence)
+        self.base_m = max(self.base_m, here.minus(self.seen_from).horizontal())
+
+    def distance2(self, at: Enu, variance_m2: float) -> float:
+        """The squared distance of a sighting from this person, in variances of both."""
+        return self.place.distance_m(at) ** 2 / (variance_m2 + self.place.east_variance_m2)
 
     def on_neighborhood(self, *, confirmed: int, now_ns: int) -> None:
         """Note how many survivors are confirmed at this place now."""
         if confirmed and not self.confirmed:
             self.first_ns = now_ns
         self.confirmed = confirmed
+        if self.proven_ns is None and self.is_proven and self.base_m >= _BASE_M:
+            self.proven_ns = now_ns
 
     @property
-    def unnamed(self) -> int:
-        """The number of people here who are not known to be confirmed."""
-        people = 1 + sum(count >= _TOGETHER for count in self.readings)
-        return max(0, people - self.confirmed)
+    def is_proven(self) -> bool:
+        """True if this is certainly somebody, not a false alarm."""
+        return self.evidence >= _PROVEN and self.sightings >= _SIGHTINGS
 
     def is_remembered(self, now_ns: int) -> bool:
         """True while this person has been seen recently enough; a single sighting is forgotten sooner."""
-        return now_ns - self.last_ns <= (_FORGOTTEN_NS if self.sightings > 1 else _FALSE_ALARM_NS)
+        lasts_ns = _FORGOTTEN_NS if self.sightings > 1 else _FALSE_ALARM_NS
+        return self.evidence > _GONE and now_ns - self.last_ns <= lasts_ns

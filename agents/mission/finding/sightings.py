@@ -4,22 +4,29 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
+from agents.mission.finding.camera_view import CameraView
 from agents.mission.finding.confirmation import CLOSE_M
 from agents.mission.finding.contradictions import Contradictions
-from agents.mission.finding.identities import Identities
+from agents.mission.finding.identities import Identities, Sighting
 from agents.mission.finding.known_survivors import KnownSurvivors
+from agents.mission.finding.person_track import PersonTrack
+from agents.mission.finding.phone_localization import Estimate
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Sighted
-from fanet_mw.units import Enu, NodeId
+from fanet_mw.units import Enu, NodeId, S
 
 _FARTHEST_M: Final = 2 * CLOSE_M
-"""Sightings from a greater slant range are ignored."""
+"""Calls from a greater slant range are ignored."""
 _ANGLE_RAD: Final = 0.03
 """The standard deviation of the direction in which a camera shows a person, errors of the UAV's attitude included."""
 _LEAST_DEPRESSION_RAD: Final = 0.05
 """A direction that is less steep than this is not taken to hit the ground."""
+_CALL_EVIDENCE: Final = 9.0
+"""The evidence of a call: an array hardly takes anything else for one."""
+_SETTLED_NS: Final = S // 5
+"""An image that has not come after this time has shown nobody."""
 
 
 class Sightings:
@@ -31,46 +38,90 @@ class Sightings:
         self, scenario: Scenario, node: NodeId, survivors: KnownSurvivors, own_motion: OwnMotion, outbox: Outbox
     ) -> None:
         self._node = node
-        self._identities = Identities(survivors)
+        bias_m = scenario.sensors.gps_bias_m
+        self._identities = Identities(survivors, bias_m=bias_m)
+        self.steady_m2 = 1.0 + bias_m * bias_m
+        """The variance of the part of the error of positions that lasts, along each axis."""
         self._contradictions = Contradictions(survivors, self._identities)
         self._own_motion, self._outbox = own_motion, outbox
         self._voice_rad = math.radians(scenario.sensors.voice_sigma_deg)
+        self._view = CameraView(scenario)
+        self._imaged_ns: int | None = None
+        """The instant up to which the images are taken in."""
 
     def camera(self, people: Sequence[tuple[float, float]], *, now_ns: int) -> None:
         """The camera shows people at these bearings and elevations [rad]."""
-        for direction in people:
-            self._sighted("camera", direction, sigma_rad=_ANGLE_RAD, now_ns=now_ns)
+        self._empty_images(now_ns)
+        here = self._own_motion.over_ground(now_ns)
+        self._imaged_ns = now_ns
+        evidence = self._view.sighting_evidence(here.up)
+        directions = [(*direction, _ANGLE_RAD) for direction in people]
+        shown = self._sighted("camera", directions, math.inf, evidence=evidence, now_ns=now_ns)
+        self._identities.on_images(
+            1, lambda place: self._view.shows(place, here), evidence=self._view.empty_evidence(here.up), but=shown
+        )
 
     def voice(self, calls: Sequence[tuple[float, float, float]], *, now_ns: int) -> None:
         """The microphones detect voices at these bearings and elevations [rad], with these signal-to-noise ratios."""
-        for bearing_rad, elevation_rad, snr_db in calls:
-            sigma_rad = max(_ANGLE_RAD, self._voice_rad * math.pow(10.0, -snr_db / 20))
-            self._sighted("voice", (bearing_rad, elevation_rad), sigma_rad=sigma_rad, now_ns=now_ns)
+        directions = [
+            (bearing_rad, elevation_rad, max(_ANGLE_RAD, self._voice_rad * math.pow(10.0, -snr_db / 20)))
+            for bearing_rad, elevation_rad, snr_db in calls
+        ]
+        self._sighted("voice", directions, _FARTHEST_M, evidence=_CALL_EVIDENCE, now_ns=now_ns)
 
     def review(self, now_ns: int) -> list[int]:
         """The survivors who may be confirmed now, because each of their phones surely belongs to a person who has been
         seen.
         """
+        self._empty_images(now_ns - _SETTLED_NS)
         return self._identities.review(now_ns)
+
+    def unreported(self, now_ns: int) -> list[Estimate]:
+        """The places of the people who are certainly there and of whom there is no find."""
+        return self._identities.unreported(now_ns)
 
     def contradicted(self) -> list[int]:
         """The survivors whose confirmation is contradicted by powers and sightings that came after it."""
         return self._contradictions.review()
 
-    def _sighted(self, sensor: str, direction: tuple[float, float], *, sigma_rad: float, now_ns: int) -> None:
-        """Take in that a sensor detects a person in a direction, if the place on the ground is not too far away."""
-        here = self._own_motion.over_ground(now_ns)
-        looked = ground_place(here, bearing_rad=direction[0], elevation_rad=direction[1])
-        if looked is None or looked[2] > _FARTHEST_M:
+    def _empty_images(self, now_ns: int) -> None:
+        """Take in the images up to now that have shown nobody, of which nothing was told."""
+        if not self._view.hz or self._imaged_ns is None:
             return
-        sigma_m = max(1.0, sigma_rad * looked[2] * looked[2] / max(1.0, here.up))
-        at = Enu(looked[0], looked[1], 0.0)
-        survivor = self._identities.on_sighting(
-            at, sigma_m=sigma_m, close=looked[2] <= CLOSE_M, now_ns=now_ns, sensor=sensor
-        )
-        self._outbox.records.append(
-            Sighted(now_ns, self._node, sensor, survivor or 0, round(at.east, 2), round(at.north, 2))
-        )
+        period_ns = S / self._view.hz
+        count = max(0, math.ceil((now_ns - self._imaged_ns) / period_ns - 0.5) - 1)
+        if count:
+            self._imaged_ns += round(count * period_ns)
+            here = self._own_motion.over_ground(now_ns)
+            evidence = self._view.empty_evidence(here.up)
+            self._identities.on_images(count, lambda place: self._view.shows(place, here), evidence=evidence)
+
+    def _sighted(
+        self,
+        sensor: str,
+        directions: Sequence[tuple[float, float, float]],
+        farthest_m: float,
+        *,
+        evidence: float,
+        now_ns: int,
+    ) -> list[PersonTrack]:
+        """Take in that one reading of a sensor shows people at these bearings and elevations, each with its standard
+        deviation [rad], if their places on the ground are not too far away.
+        """
+        here, sightings = self._own_motion.over_ground(now_ns), []
+        for bearing_rad, elevation_rad, sigma_rad in directions:
+            looked = ground_place(here, bearing_rad=bearing_rad, elevation_rad=elevation_rad)
+            if looked is None or looked[2] > farthest_m:
+                continue
+            sigma_m = max(1.0, sigma_rad * looked[2] * looked[2] / max(1.0, here.up))
+            close = sensor == "camera" or looked[2] <= CLOSE_M
+            sightings.append(Sighting(Enu(looked[0], looked[1], 0.0), sigma_m, close))
+        shown = self._identities.on_reading(sightings, here=here, evidence=evidence, now_ns=now_ns)
+        for (at, _, _), person in zip(sightings, shown, strict=True):
+            self._outbox.records.append(
+                Sighted(now_ns, self._node, sensor, person.survivor or 0, round(at.east, 2), round(at.north, 2))
+            )
+        return shown
 
 
 def ground_place(at: Enu, *, bearing_rad: float, elevation_rad: float) -> tuple[float, float, float] | None:

@@ -21,15 +21,18 @@ from fanet_mw.errors import MalformedFrameError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import (
     Collided,
+    Confirmed,
     FlightModeChanged,
     MissionModeChanged,
     Posed,
     ProcessEnded,
     RadioFault,
     Record,
+    Refuted,
     Sighted,
 )
 from fanet_mw.units import S
+from fanet_mw.wire.survivors import is_person
 
 _SLACK_NS: Final = 10 * S
 """How far an instant may lie outside the scenario's time, because processes start before it and end after it."""
@@ -48,6 +51,8 @@ _SPEAKERS: Final[dict[type[Any], str | None]] = {
 node that they name."""
 _ABOUT_NOBODY: Final = (MissionModeChanged, Sighted)
 """The kinds of records in which survivor 0 means none."""
+_ABOUT_PERSONS: Final = frozenset({Confirmed, Refuted})
+"""The kinds of records that may be about a person without a phone, by a number of its own."""
 _ABOUT_NODES: Final = ("origin", "other", "reference")
 """The fields of records that hold the id of a node, or 0 for none."""
 
@@ -178,7 +183,9 @@ class BusChecks:
         if any(not 0 <= getattr(record, field, 0) <= self._nodes for field in _ABOUT_NODES):
             return "node"
         least = 0 if kind in _ABOUT_NOBODY else 1
-        if not least <= getattr(record, "survivor", 1) <= max(1, self._survivors):
+        survivor = getattr(record, "survivor", 1)
+        of_person = kind in _ABOUT_PERSONS and is_person(survivor)
+        if not of_person and not least <= survivor <= max(1, self._survivors):
             return "survivor"
         return None
 

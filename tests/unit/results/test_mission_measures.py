@@ -18,6 +18,7 @@ from fanet_mw.trace import (
     Refuted,
 )
 from fanet_mw.units import S
+from fanet_mw.wire.survivors import person_id
 from sim.results.mission import mission
 from sim.scenarios import catalog
 
@@ -87,6 +88,24 @@ def test_a_survivor_waits_from_the_first_reception_to_the_right_confirmation() -
     assert measured(heard)["wait_s"] == {"p50": None, "max": None}
     away = Confirmed(4 * S, 1, 1, -100.0, 0.0)
     assert measured([*heard, away, Refuted(6 * S, 1, 1, -100.0, 0.0), found[0]])["wait_s"]["max"] == 5.0
+
+
+def test_a_person_without_a_phone_is_a_survivor_once_and_otherwise_false() -> None:
+    def person(node: int, east_m: float) -> Confirmed:
+        return Confirmed(9 * S, node, person_id(node, 0), east_m, 0.0)
+
+    named = Confirmed(7 * S, 1, 1, 103.0, 4.0)
+    assert figures([person(1, -98.0)]) == (0, 1, 0)
+    assert figures([named, person(1, -98.0)]) == (1, 2, 0)
+    assert figures([named, person(1, 99.0)]) == (1, 1, 0), "the same one, with and without a name"
+    assert figures([person(1, -98.0), person(2, -103.0)]) == (0, 1, 1), "told twice"
+    assert figures([person(1, 0.0)]) == (0, 0, 1), "nobody there"
+    assert figures([person(1, 0.0), Refuted(9 * S, 1, person_id(1, 0), 0.0, 0.0)]) == (0, 0, 0)
+
+
+def figures(records: Sequence[Record]) -> tuple[int, int, int]:
+    found = measured(records)
+    return found["confirmed"], found["persons"], found["persons_false"]
 
 
 def test_without_positions_nothing_is_claimed_of_the_flight() -> None:

@@ -3,7 +3,7 @@
 import math
 from typing import Final
 
-from agents.mission.finding.identities import Identities
+from agents.mission.finding.identities import Identities, Sighting
 from agents.mission.finding.known_survivors import KnownSurvivors
 from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, PhoneModel
 from fanet_mw.units import US, Enu
@@ -23,6 +23,7 @@ class Uav:
     def __init__(self) -> None:
         self.survivors = KnownSurvivors(MODEL)
         self.identities = Identities(self.survivors)
+        self.here = Enu(0, 0, UP_M)
         self.named: dict[int, Enu] = {}
 
     def hear(self, survivor: int, node: int, at: Enu, rssi_dbm: float, *, now_ns: int = 0) -> None:
@@ -30,8 +31,8 @@ class Uav:
 
     def see(self, *people: Enu, now_ns: int) -> list[int]:
         """An image from close by; who may be confirmed, is."""
-        for at in people:
-            self.identities.on_sighting(at, sigma_m=2, close=True, now_ns=now_ns)
+        sightings = [Sighting(at, 2.0, close=True) for at in people]
+        self.identities.on_reading(sightings, here=self.here, evidence=9.0, now_ns=now_ns)
         sure = self.identities.review(now_ns)
         for survivor in sure:
             place = self.survivors.by_id[survivor].place()

@@ -4,6 +4,7 @@ import pytest
 from seeing_uav import UP_M, Uav, mean_dbm
 
 from agents.mission.finding.confirmation import required_margin
+from agents.mission.finding.identities import Sighting
 from agents.mission.finding.person_track import PersonTrack
 from agents.mission.finding.phone_localization import Estimate
 from fanet_mw.units import Enu, S
@@ -40,7 +41,7 @@ def test_while_two_phones_fit_one_person_nobody_is_named_until_waiting_longer_is
 
 @pytest.mark.parametrize(("second", "margin"), [(0, 9.0), (15, 9.0), (32.5, 5.5), (50, 2.0), (500, 2.0)])
 def test_a_uav_is_content_with_less_certainty_the_longer_it_waits(second: float, margin: float) -> None:
-    person = PersonTrack(Estimate(0, 0, 1, 0, 1), first_ns=0, last_ns=0)
+    person = PersonTrack(Estimate(0, 0, 1, 0, 1), 0, 0, Enu(0, 0, 0), 9.0)
     assert required_margin(person, round(second * S)) == margin
 
 
@@ -51,7 +52,8 @@ def test_only_a_person_seen_from_close_by_is_confirmed() -> None:
             at = Enu(east, north, UP_M)
             uav.hear(1, node, at, mean_dbm(Enu(0, 0, 0), at))
     for second in range(10):
-        uav.identities.on_sighting(Enu(0, 0, 0), sigma_m=2, close=False, now_ns=second * S)
+        call = Sighting(Enu(0, 0, 0), 2.0, close=False)
+        uav.identities.on_reading([call], here=uav.here, evidence=9.0, now_ns=second * S)
         assert uav.identities.review(second * S) == []
     assert uav.see(Enu(0, 0, 0), now_ns=11 * S) == [], "once is not enough"
     assert uav.see(Enu(0, 0, 0), now_ns=12 * S) == [1]

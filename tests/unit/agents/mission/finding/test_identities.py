@@ -8,6 +8,7 @@ from typing import Final
 import pytest
 from seeing_uav import MODEL, UP_M, Uav, mean_dbm
 
+from agents.mission.finding.identities import Sighting
 from fanet_mw.units import Enu, S
 from fanet_mw.wire.survivors import Found, Standing
 
@@ -145,7 +146,8 @@ def test_where_somebody_is_confirmed_a_second_person_is_named_if_two_images_have
 def test_however_often_a_confirmed_person_is_seen_that_is_one_person() -> None:
     uav = two_phones_at_one_place()
     for second in range(90):
-        uav.identities.on_sighting(Enu(1, 0, 0), sigma_m=4, close=True, now_ns=second * S, sensor="voice")
+        call = Sighting(Enu(1, 0, 0), 4.0, close=True)
+        uav.identities.on_reading([call], here=uav.here, evidence=9.0, now_ns=second * S)
         assert uav.see(Enu(0, 0, 0), now_ns=second * S) == [], "seen and heard at the same instant"
 
 

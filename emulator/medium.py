@@ -55,12 +55,13 @@ class Medium(Actor):
         self._count = len(nodes)
         self._max_bytes = radio.max_frame_bytes
         self._handover_ns = radio.handover_ns
+        self._close_ns = radio.lead_ns // 4
         self._rx_topics = [topics.radio_rx(node) for node in nodes]
         self._station_of = {topics.radio_tx(node): node - 1 for node in nodes}
         faults = Faults(radio, stations=self._count, planned=scenario.planned_faults)
         self._capture = capture
         self._kernel = KernelInterface(scenario, stations=self._count, faults=faults, capture=capture is not None)
-        self._counters = MediumCounters()
+        self._counters = MediumCounters(time_scale=scenario.time_scale)
         self._measurement = Measurement(scenario.traffic_window_ns)
         self._numbers = RequestNumbers(self._count)
         self._slots = FrameSlots(self._kernel.slots(), nodes, most_held=radio.queue_frames + ANNOUNCED)
@@ -152,6 +153,8 @@ class Medium(Actor):
             if self._refuse_instant(station, request, now_ns):
                 return
             start_ns = now_ns
+        elif start_ns < now_ns + self._close_ns:
+            self._counters.late.close += 1
         if slots.held[station] >= slots.most_held:
             self._refuse(station, request, DropReason.BACKLOG, now_ns)
             return
@@ -185,7 +188,7 @@ class Medium(Actor):
         if not -_HORIZON_NS < late_ns < _HORIZON_NS:
             self._refuse(station, request, DropReason.MALFORMED, now_ns)
             return True
-        too_late = self._counters.late.is_too_late(late_ns)
+        too_late = self._counters.late.is_too_late(late_ns, now_ns=now_ns)
         if too_late:
             self._refuse(station, request, DropReason.LATE, now_ns)
         return too_late

@@ -24,7 +24,7 @@ _REASON_OF: Final = {
 class MediumCounters:
     """The counters of requests by the medium, and those of copies by the kernel."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, time_scale: float) -> None:
         self.delivered = 0
         self.delivered_bytes = 0
         self.dropped: Counter[str] = Counter()
@@ -34,7 +34,7 @@ class MediumCounters:
         """The number of sets of positions that were accepted."""
         self.controls = 0
         """The number of changes of the air that were made."""
-        self.late = LateRequests()
+        self.late = LateRequests(time_scale=time_scale)
 
     def drop(self, reason: DropReason) -> None:
         self.dropped[reason] += 1

@@ -38,10 +38,10 @@ clock.
    `alive/<name>/<fingerprint>/<instance>` instead: the router names those that are missing, there twice, or of
    another scenario.
 4. Ask `clock` every half second until a `ClockEpoch` in state RUNNING is the answer; puts there are only hints to ask
-   again: with `--slow-down-to` the launcher announces later epochs with a smaller scale, which give the same instant at
-   that moment. Swarm instant = (unix time - `epoch_unix_ns`) x `time_scale`; on the machine of the keeper
-   (`machine` says which) monotonic time and `epoch_mono_ns` are better.
-5. When the clock is STOPPED or the scenario's duration is over, send a last report and leave.
+   again: with `--slow-down-to` the launcher announces further epochs with another scale, which give the same instant at
+   that moment; the greatest `number` counts. Swarm instant = (unix time - `epoch_unix_ns`) x `time_scale`; on the
+   machine of the keeper (`machine` says which) monotonic time and `epoch_mono_ns` are better.
+5. When the clock is STOPPED, or `ends_ns` or the scenario's duration is over, send a last report and leave.
 
 A world puts all poses ten times a second (`world.tick_ms`), from instant 0 on, and a fix per node on
 `world/<id>/sensor/gps`. A node puts each request one lead (`radio.lead_ms`) before its instant. Puts are best effort,

@@ -50,7 +50,7 @@ _STATUS = struct.Struct("<IBqB")
 _SETPOINT = struct.Struct("<q4dB3d")
 _POSES = struct.Struct("<qI")
 _OBSTRUCTIONS = struct.Struct("<qI")
-_CLOCK = struct.Struct("<qdBqQ")
+_CLOCK = struct.Struct("<qdBqQIq")
 _INSTANT = struct.Struct("<q")
 _DEGRADE = struct.Struct("<HHBddq")
 _JAM = struct.Struct("<5dq")
@@ -139,14 +139,14 @@ def _decode_trace(body: bytes) -> TraceBatch:
 
 
 def _encode_clock(m: ClockEpoch) -> bytes:
-    return _CLOCK.pack(m.epoch_unix_ns, m.time_scale, m.state, m.epoch_mono_ns, m.machine)
+    return _CLOCK.pack(m.epoch_unix_ns, m.time_scale, m.state, m.epoch_mono_ns, m.machine, m.number, m.ends_ns)
 
 
 def _decode_clock(body: bytes) -> ClockEpoch:
-    epoch_unix_ns, time_scale, state, epoch_mono_ns, machine = _CLOCK.unpack(body)
+    epoch_unix_ns, time_scale, state, epoch_mono_ns, machine, number, ends_ns = _CLOCK.unpack(body)
     if not 0 < time_scale <= 100:
         raise ValueError("time_scale")
-    return ClockEpoch(epoch_unix_ns, time_scale, ClockState(state), epoch_mono_ns, machine)
+    return ClockEpoch(epoch_unix_ns, time_scale, ClockState(state), epoch_mono_ns, machine, number, ends_ns)
 
 
 def _encode_report(m: Report) -> bytes:

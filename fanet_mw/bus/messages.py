@@ -276,6 +276,10 @@ class ClockEpoch(NamedTuple):
     """The same instant as the epoch, on the monotonic clock of the keeper's machine."""
     machine: int = 0
     """The keeper's machine (`Timebase.machine`); with 0 it is unknown, and only unix time counts."""
+    number: int = 0
+    """The number of this announcement, counted by the keeper from 0: a later one replaces all earlier ones."""
+    ends_ns: int = 0
+    """The swarm instant at which all leave before the scenario is over; 0: nobody leaves early."""
 
 
 @dataclass(frozen=True, slots=True)

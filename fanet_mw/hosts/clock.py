@@ -5,9 +5,10 @@ from the monotonic epoch, whenever it starts: all of these agree to microseconds
 moves any of them. A process of another machine reads its unix time once, when it starts, and continues by its own
 monotonic clock: it is as accurate as the agreement of the two machines' unix clocks at the epoch and at its start.
 
-While the swarm runs, the keeper may slow the clock down: it announces an epoch and a smaller scale that give the same
-instant at that moment. A process that hears of it later is ahead, and its instant stands still until the slower clock
-has come so far. Swarm time never goes back, and never passes faster again.
+While the swarm runs, the keeper may change the pace: it announces an epoch and another scale that give the same
+instant at that moment. A process that hears later of a slower clock is ahead, and its instant stands still until that
+clock has come so far; one that hears later of a faster clock goes on from the instant of the others. Swarm time never
+goes back. Announcements are numbered, so that an older one changes nothing.
 """
 
 import asyncio
@@ -48,8 +49,11 @@ class SwarmClock:
         self._unix_less_mono_ns = timebase.unix_ns() - timebase.mono_ns()
         self._epoch_mono_ns = self._on_this_machine(clock)
         self._scale = clock.time_scale
+        self._number = clock.number
         self._reached_ns = self._by_line_ns()
         """The clock does not go back behind this instant."""
+        self.ends_ns = clock.ends_ns
+        """The swarm instant at which all leave before the scenario is over; 0: nobody leaves early."""
 
     def _on_this_machine(self, clock: ClockEpoch) -> int:
         """The epoch on the monotonic clock of this machine."""
@@ -57,12 +61,14 @@ class SwarmClock:
             return clock.epoch_mono_ns
         return clock.epoch_unix_ns - self._unix_less_mono_ns
 
-    def slow_down(self, clock: ClockEpoch) -> None:
-        """Go on by what the keeper has announced; a clock that is not slower than this one is ignored."""
-        if clock.time_scale < self._scale:
-            self._reached_ns = self.now_ns()
-            self._epoch_mono_ns = self._on_this_machine(clock)
-            self._scale = clock.time_scale
+    def follow(self, clock: ClockEpoch) -> bool:
+        """Go on by what the keeper has announced; returns False for an announcement that is not newer."""
+        if clock.number <= self._number:
+            return False
+        self._reached_ns = self.now_ns()
+        self._number, self._scale, self.ends_ns = clock.number, clock.time_scale, clock.ends_ns
+        self._epoch_mono_ns = self._on_this_machine(clock)
+        return True
 
     def _by_line_ns(self) -> int:
         elapsed_ns = self._mono_ns() - self._epoch_mono_ns
@@ -137,30 +143,33 @@ class ClockKeeper:
             raise BusError(f"{len(names)} of the swarm did not come up within {timeout_s:g} s: {why}") from None
         unix_ns = self._timebase.unix_ns() + _START_DELAY_NS
         mono_ns = self._timebase.mono_ns() + _START_DELAY_NS
-        self._publish(ClockEpoch(unix_ns, self._time_scale, ClockState.RUNNING, mono_ns, self._timebase.machine))
-        assert self.clock is not None, "just published"
-        return self.clock
+        return self._publish(ClockEpoch(unix_ns, self._time_scale, ClockState.RUNNING, mono_ns, self._timebase.machine))
 
-    def slow_down(self, time_scale: float) -> ClockEpoch:
-        """Let swarm time pass more slowly from this instant on; every host follows as soon as it hears of it."""
+    def pace(self, time_scale: float) -> ClockEpoch:
+        """Let swarm time pass at this scale from now on; every host follows as soon as it hears of it."""
         clock = self.clock
         assert clock is not None, "the clock runs"
-        assert time_scale < clock.time_scale, "it runs faster"
         elapsed_ns = self._timebase.mono_ns() - clock.epoch_mono_ns
         later_ns = elapsed_ns - round(elapsed_ns * clock.time_scale / time_scale)
         unix_ns, mono_ns = clock.epoch_unix_ns + later_ns, clock.epoch_mono_ns + later_ns
-        slower = clock._replace(epoch_unix_ns=unix_ns, epoch_mono_ns=mono_ns, time_scale=time_scale)
-        self._publish(slower)
-        return slower
+        return self._publish(clock._replace(epoch_unix_ns=unix_ns, epoch_mono_ns=mono_ns, time_scale=time_scale))
+
+    def end_at(self, instant_ns: int) -> ClockEpoch:
+        """Let every process end in good order at this swarm instant, as at the end of the scenario."""
+        clock = self.clock
+        assert clock is not None, "the clock runs"
+        return self._publish(clock._replace(ends_ns=instant_ns))
 
     def stop(self) -> None:
         """Stop the clock, so that every process ends at once."""
         clock = self.clock or ClockEpoch(0, self._time_scale, ClockState.STOPPED)
         self._publish(clock._replace(state=ClockState.STOPPED))
 
-    def _publish(self, clock: ClockEpoch) -> None:
-        self.clock = clock
-        self._bus.put(self._names.clock, codecs.encode([clock]), reliable=True)
+    def _publish(self, clock: ClockEpoch) -> ClockEpoch:
+        numbered = clock._replace(number=clock.number + 1)
+        self.clock = numbered
+        self._bus.put(self._names.clock, codecs.encode([numbered]), reliable=True)
+        return numbered
 
 
 class ClockListener:
@@ -178,6 +187,8 @@ class ClockListener:
         self._loop = asyncio.get_running_loop()
         self._running: asyncio.Future[SwarmClock] = self._loop.create_future()
         self.stopped = asyncio.Event()
+        self.changed = asyncio.Event()
+        """Set when the clock that runs has another pace or end than before; whoever waits for it clears it."""
         self._asked_s = -math.inf
         self._asks_again: asyncio.TimerHandle | None = None
         bus.subscribe(names.clock, self._on_hint)
@@ -216,12 +227,13 @@ class ClockListener:
                 if message.state is ClockState.STOPPED:
                     self.stopped.set()
                 if self._running.done():
-                    self._running.result().slow_down(message)
+                    if self._running.result().follow(message):
+                        self.changed.set()
                 else:
                     self._running.set_result(SwarmClock(message, self._timebase))
 
     async def running(self, *, timeout_s: float) -> SwarmClock:
-        """The clock, once it has started; it slows down when the keeper says so. Raises BusError if it does not start
+        """The clock, once it has started; it follows the keeper's announcements. Raises BusError if it does not start
         in time, or if the router goes away.
         """
         waited_s = 0.0

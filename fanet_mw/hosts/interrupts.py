@@ -1,9 +1,9 @@
-"""How the commands of this project react to SIGINT and SIGTERM, and how a command exits.
+"""How the commands of this project react to SIGINT, SIGTERM and SIGHUP, and how a command exits.
 
 Python handles SIGINT only if it was not ignored when the process started, and a shell script starts `command &` with
-SIGINT ignored. Each entry point therefore calls `install`, after which both signals raise KeyboardInterrupt with the
-signal's number. While `hosts.loop.run` runs, they cancel its coroutine instead, so that nothing is interrupted
-half-way.
+SIGINT ignored. Each entry point therefore calls `install`, after which the signals raise KeyboardInterrupt with the
+signal's number. A SIGHUP that was ignored from the start, as by nohup, stays ignored. While `hosts.loop.run` runs, they
+cancel its coroutine instead, so that nothing is interrupted half-way.
 
 A KeyboardInterrupt during an import can get lost: some libraries try an import, and go on whatever exception it raises.
 The code that runs after the imports therefore calls `raise_again`. Other libraries raise an error of their own in its
@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Final, NoReturn
 
-SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
+SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _raised: Final[list[int]] = []
 
 
@@ -27,10 +27,15 @@ def _raise(number: int, _frame: FrameType | None) -> NoReturn:
     raise KeyboardInterrupt(number)
 
 
+def heeded() -> list[signal.Signals]:
+    """The signals that this process handles."""
+    return [number for number in SIGNALS if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN]
+
+
 def install() -> None:
-    """Handle both signals from now on, even if the process was started with them ignored."""
+    """Handle the signals from now on, even if the process was started with SIGINT ignored."""
     _raised.clear()
-    for number in SIGNALS:
+    for number in heeded():
         signal.signal(number, _raise)
 
 
@@ -52,7 +57,7 @@ def undisguised() -> Iterator[None]:
 
 def installed() -> bool:
     """True if `install` was called; it is not in children of `fanet launch`, whose launcher handles the signals."""
-    return all(signal.getsignal(number) is _raise for number in SIGNALS)
+    return signal.getsignal(signal.SIGTERM) is _raise
 
 
 @contextmanager
@@ -66,14 +71,14 @@ def handed_to(on_signal: Callable[[int], None]) -> Iterator[None]:
         install()
         on_signal(number)
 
-    before = [signal.getsignal(number) for number in SIGNALS]
-    for number in SIGNALS:
+    before = {number: signal.getsignal(number) for number in heeded()}
+    for number in before:
         signal.signal(number, first)
     try:
         raise_again()
         yield
     finally:
-        for number, handler in zip(SIGNALS, before, strict=True):
+        for number, handler in before.items():
             signal.signal(number, handler)
 
 

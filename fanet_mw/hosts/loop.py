@@ -32,7 +32,8 @@ async def _cancelled_by_signals(main: Coroutine[Any, Any, T]) -> T:
         caught.append(number)
         task.cancel()
 
-    for number in interrupts.SIGNALS:
+    heeded = interrupts.heeded()
+    for number in heeded:
         loop.add_signal_handler(number, on_signal, number)
     try:
         interrupts.raise_again()
@@ -42,7 +43,7 @@ async def _cancelled_by_signals(main: Coroutine[Any, Any, T]) -> T:
             raise
         raise KeyboardInterrupt(caught[0]) from None
     finally:
-        for number in interrupts.SIGNALS:
+        for number in heeded:
             loop.remove_signal_handler(number)
         interrupts.install()
 

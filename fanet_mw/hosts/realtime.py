@@ -110,7 +110,7 @@ class RealtimeHost:
             self._halt()
             self._publish_records()  # they show what led to the failure
             raise
-        await self._finish(until_ns)
+        await self._finish(min(until_ns, self._clock.ends_ns or until_ns))
 
     async def _agree(self, scenario: Scenario | None) -> None:
         """Ask the keeper which scenario the swarm runs; one that does not answer is content with any."""
@@ -157,18 +157,25 @@ class RealtimeHost:
 
     async def _watch(self, until_ns: int, listener: ClockListener) -> None:
         """Publish records and reports until the time is over, the clock is stopped or the router is gone."""
-        assert self._clock is not None, "the clock is running"
-        stopped = asyncio.ensure_future(listener.stopped.wait())
+        clock = self._clock
+        assert clock is not None, "the clock is running"
+        stopped, changed = (asyncio.ensure_future(event.wait()) for event in (listener.stopped, listener.changed))
         looks = 0
         try:
-            while (left_s := self._clock.wait_s(until_ns)) > 0:
+            while (left_s := clock.wait_s(min(until_ns, clock.ends_ns or until_ns))) > 0:
                 wait_s, began_s = min(left_s, _LOOK_EVERY_S), self._loop.time()
-                await asyncio.wait((stopped, self._failure), timeout=wait_s, return_when=asyncio.FIRST_COMPLETED)
+                waited = (stopped, changed, self._failure)
+                await asyncio.wait(waited, timeout=wait_s, return_when=asyncio.FIRST_COMPLETED)
                 self._lateness.stalled(round((self._loop.time() - began_s - wait_s) * S))
                 if self._failure.done():
                     break
                 if stopped.done():
                     return
+                if changed.done():
+                    listener.changed.clear()
+                    changed = asyncio.ensure_future(listener.changed.wait())
+                    self._set_timer()
+                    continue
                 self._bus.check()
                 self._publish_records()
                 looks += 1
@@ -176,6 +183,7 @@ class RealtimeHost:
                     self._publish_report(final=False)
         finally:
             stopped.cancel()
+            changed.cancel()
         if self._failure.done():
             self._failure.result()
 
@@ -261,6 +269,14 @@ class RealtimeHost:
         due_ns = max(wake_ns + self._actor.slack_ns, self._call_ns)
         timer = self._loop.call_later(self._clock.wait_s(due_ns), self._wake)
         self._wake_up = _WakeUp(wake_ns, due_ns, timer)
+
+    def _set_timer(self) -> None:
+        """Set the timer of the next wake-up again: at a faster clock it is due sooner."""
+        wake_up, clock = self._wake_up, self._clock
+        if wake_up is not None and clock is not None:
+            wake_up.timer.cancel()
+            timer = self._loop.call_later(clock.wait_s(wake_up.due_ns), self._wake)
+            self._wake_up = wake_up._replace(timer=timer)
 
     def _wake(self) -> None:
         self._guard(self._wake_actor)

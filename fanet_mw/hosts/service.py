@@ -2,7 +2,7 @@
 
 It uses the standard library only, for machines that carry one UAV and not the whole of `fanet`. Exit codes: 0 the
 swarm's time is over or its clock was stopped, 2 the request was wrong, 3 the bus could not be used or was lost, 130
-SIGINT, 143 SIGTERM.
+SIGINT, 143 SIGTERM, 129 SIGHUP.
 """
 
 import argparse

@@ -5,8 +5,9 @@ A command parses, shows progress and returns an exit code. It imports the functi
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
@@ -21,9 +22,12 @@ if TYPE_CHECKING:
     from cyclopts import App
 
     from fanet_mw.scenario import Scenario
+    from sim.run.launcher.progress import Progress
     from sim.run.outcome import Outcome
 
 _err = Console(stderr=True)
+_WORD_EVERY_S = 10.0
+"""The interval of the lines that say how a run fares where no terminal shows a progress bar."""
 
 
 def add_to(app: "App") -> None:
@@ -93,8 +97,8 @@ def launch(
     respawn
         Start a process again when it dies.
     slow_down_to
-        Let the swarm's clock slow down while this machine cannot keep up with it, at most to this share of real time;
-        by default it does not, and the run says that it is not valid.
+        Let the swarm's clock slow down while this machine cannot keep up with it, at most to this share of real time,
+        and speed up again afterwards; by default it does not, and the run says that it is not valid.
     no_world
         Start no world: another program says where all UAVs are (see docs/reference/bus.md).
     listen
@@ -116,7 +120,7 @@ def launch(
     print_notes(chosen)
     warn_of(listen, listens=True)
     warn_of(connect, listens=False)
-    with _progress(chosen, quiet=output.json) as tell:
+    with _watched(chosen, quiet=output.json) as tell:
         outcome = asyncio.run(
             run(
                 chosen,
@@ -130,7 +134,7 @@ def launch(
                 emulator_options={"pcap": output.capture_path(), "receptions": output.pcap_receptions},
                 spool_folder=output.out,
                 on_progress=tell,
-                on_event=lambda text: _err.print(text, highlight=False),
+                on_event=_say,
             )
         )
     return _finish(outcome, output)
@@ -166,17 +170,41 @@ def plan(
 
 
 @contextmanager
-def _progress(scenario: "Scenario", *, quiet: bool) -> Iterator[Callable[[float], None]]:
+def _progress(scenario: "Scenario", *, quiet: bool) -> Iterator[Callable[..., None]]:
     """A progress bar of simulated seconds on standard error, if a person is watching."""
     if quiet or not _err.is_terminal:
-        yield lambda _seconds: None
+        yield lambda _seconds, _what="": None
         return
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f}/{task.total:.0f} s"))
     with Progress(*columns, TimeElapsedColumn(), console=_err, transient=True) as progress:
         task = progress.add_task(scenario.name, total=scenario.duration_s)
-        yield lambda seconds: progress.update(task, completed=seconds)
+        yield lambda seconds, what=scenario.name: progress.update(task, completed=seconds, description=what)
+
+
+@contextmanager
+def _watched(scenario: "Scenario", *, quiet: bool) -> Iterator[Callable[["Progress"], None]]:
+    """A progress bar for a person who is watching, and else a line every ten seconds, both on standard error."""
+    if _err.is_terminal:
+        with _progress(scenario, quiet=quiet) as tell:
+            yield lambda progress: tell(progress.swarm_s, f"{scenario.name}: {progress.figures()}")
+        return
+    said_s = monotonic()
+
+    def say(progress: "Progress") -> None:
+        nonlocal said_s
+        if monotonic() >= said_s + _WORD_EVERY_S:
+            said_s += _WORD_EVERY_S
+            _say(progress.sentence())
+
+    yield say
+
+
+def _say(text: str) -> None:
+    """Say something to whoever watches; a terminal that has gone must not cost the result."""
+    with suppress(OSError):
+        _err.print(text, highlight=False, soft_wrap=True, markup=False)
 
 
 def _finish(outcome: "Outcome", output: OutputFlags) -> int:

@@ -15,6 +15,7 @@ from sim.report.html import Block, Commands, Heading, Picture, Text
 from sim.report.names import KINDS, PICTURES
 from sim.report.run_records import SHOWN, RunRecords, agents
 from sim.results.file_names import LINKS_FILE, REPORTS_FILE, SCENARIO_FILE, SUMMARY_FILE, TRACE_FILE
+from sim.results.printed_summary import clock_sentence
 from sim.results.trace_file import read_trace
 
 
@@ -89,8 +90,7 @@ def _slowed(summary: Mapping[str, Any]) -> list[Block]:
     """How slow the swarm's clock became where the machine could not keep up; nothing if it kept up."""
     if not summary.get("slowed"):
         return []
-    scale = summary["time_scale"]
-    return [Text(f"The machine could not keep up: the swarm's clock slowed to {scale:.3g} of real time.")]
+    return [Text(f"The machine could not keep up{clock_sentence(summary)}.")]
 
 
 def _content(path: Path, missing: Any) -> Any:  # noqa: ANN401 JSON of a run

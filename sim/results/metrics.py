@@ -7,6 +7,7 @@ delay    = from the hand-over by one application to the receipt by the other, pe
 
 from collections import Counter
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any
 
 from fanet_mw.errors import DropReason
@@ -49,6 +50,8 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "simulated_s": round(outcome.simulated_ns / S, 3),
         "time_scale": _last_scale(outcome),
         "slowed": [{"t_s": round(t_ns / S, 3), "time_scale": round(scale, 6)} for t_ns, scale in outcome.slowed],
+        "paces": _paces(outcome),
+        "pauses": dict(outcome.pauses),
         "wall_s": round(outcome.wall_s, 3),
         **packets[classes[0]],
         "classes": {name: packets[name] for name in classes} if len(classes) > 1 else {},
@@ -85,6 +88,19 @@ def _last_scale(outcome: Outcome) -> float | None:
     if outcome.mode == "virtual":
         return None
     return round(outcome.slowed[-1][1], 6) if outcome.slowed else outcome.scenario.time_scale
+
+
+def _paces(outcome: Outcome) -> list[dict[str, float]]:
+    """For how long the swarm's clock ran at which scale, the fastest first; empty in virtual time."""
+    if outcome.mode == "virtual":
+        return []
+    changes = [(0, outcome.scenario.time_scale), *outcome.slowed, (outcome.simulated_ns, 0.0)]
+    wall_s: dict[float, float] = {}
+    for (since_ns, scale), (until_ns, _) in pairwise(changes):
+        wall_s[scale] = wall_s.get(scale, 0.0) + max(0, until_ns - since_ns) / scale / S
+    return [
+        {"time_scale": round(scale, 6), "wall_s": round(wall_s[scale], 3)} for scale in sorted(wall_s, reverse=True)
+    ]
 
 
 def _messages(outcome: Outcome) -> dict[str, int]:

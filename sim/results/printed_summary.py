@@ -10,8 +10,7 @@ from rich.table import Table
 def show(summary: Mapping[str, Any], console: Console) -> None:
     """Print a summary."""
     mode = "virtual time" if summary["mode"] == "virtual" else "real processes"
-    if summary["time_scale"] not in (None, 1):
-        mode += f", swarm clock {'slowed to' if summary['slowed'] else 'at'} {summary['time_scale']:.3g}"
+    mode += clock_sentence(summary)
     pace = summary["simulated_s"] / summary["wall_s"] if summary["wall_s"] else 0.0
     length = f"{summary['duration_s']:g} s"
     if summary["simulated_s"] < summary["duration_s"]:
@@ -28,6 +27,19 @@ def show(summary: Mapping[str, Any], console: Console) -> None:
     console.print(table)
     for warning in _warnings(summary):
         console.print(f"[bold red]{warning}[/]")
+
+
+def clock_sentence(summary: Mapping[str, Any]) -> str:
+    """At which pace the swarm's clock ran, unless it was real time throughout."""
+    paces = summary["paces"]
+    if not paces or (len(paces) == 1 and paces[0]["time_scale"] == 1):
+        return ""
+    full, slower = paces[0], paces[1:]
+    text = f", swarm clock at {full['time_scale']:.3g}"
+    if not slower:
+        return text
+    slow_s = sum(pace["wall_s"] for pace in slower)
+    return f"{text} for {full['wall_s']:.0f} s, slower for {slow_s:.0f} s (at least {slower[-1]['time_scale']:.3g})"
 
 
 def _rows(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -95,6 +107,13 @@ def _network_rows(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
             "lateness",
             f"{late['late_frames']} of {late['frames']} frames late ({late['share']:.2%}, limit {late['limit']:.1%}), "
             f"worst {late['max_ms']:.1f} ms",
+        )
+    pauses = summary["pauses"]
+    if pauses and pauses["count"]:
+        yield (
+            "pauses",
+            f"{pauses['count']} times this machine stood still for a while: {pauses['longest_ms']:.0f} ms at most, "
+            f"{pauses['total_ms']:.0f} ms together",
         )
 
 

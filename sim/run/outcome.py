@@ -41,8 +41,10 @@ class Outcome:
     absent: Mapping[str, str] = field(default_factory=dict)
     """Why the report of an actor is missing, by the actor's name; in real time only."""
     slowed: Sequence[tuple[int, float]] = ()
-    """When the swarm's clock was slowed down because the machine could not keep up: swarm instant [ns] and the scale
-    from then on; in real time only."""
+    """When the pace of the swarm's clock changed because the machine could not keep up, or could again: swarm instant
+    [ns] and the scale from then on; in real time only."""
+    pauses: Mapping[str, Any] = field(default_factory=dict)
+    """The pauses of the machine as the launcher saw them, in real time only."""
     stall_ms: float = 0.0
     """The longest time for which the launcher, and with it the bus, could do nothing; in real time only."""
 

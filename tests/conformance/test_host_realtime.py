@@ -423,7 +423,7 @@ async def test_an_actor_follows_a_clock_that_slows_down_while_it_runs() -> None:
         clock = SwarmClock(await keeper.start(timeout_s=_PATIENCE_S))
         host = asyncio.create_task(run_actor(actor, SwarmAddress("host", endpoint), until_ns=1000 * S))
         await asyncio.sleep(clock.wait_s(500 * MS))
-        clock.slow_down(keeper.slow_down(0.1))
+        clock.follow(keeper.pace(0.1))
         slowed_ns = clock.now_ns()
         await asyncio.sleep(1)
         assert slowed_ns < clock.now_ns() < slowed_ns + 500 * MS
@@ -432,6 +432,39 @@ async def test_an_actor_follows_a_clock_that_slows_down_while_it_runs() -> None:
         assert actor.next_ns < clock.now_ns() + 40 * MS, "not ahead of the keeper's clock"
         keeper.stop()
         await host
+        await observer.last_report()
+
+
+async def test_an_actor_follows_a_clock_that_speeds_up_while_it_waits() -> None:
+    """At a thousandth of real time the next wake-up would be 20 s away."""
+    endpoint, actor = free_endpoint(), Ticker()
+    with Bus.serve(endpoint) as bus:
+        observer = Observer(bus)
+        keeper = ClockKeeper(bus, NAMES, time_scale=0.001, expected=[])
+        clock = SwarmClock(await keeper.start(timeout_s=_PATIENCE_S))
+        host = asyncio.create_task(run_actor(actor, SwarmAddress("host", endpoint), until_ns=1000 * S))
+        await asyncio.sleep(clock.wait_s(MS // 2))
+        clock.follow(keeper.pace(1.0))
+        began_s = time.monotonic()
+        while actor.wakes < 10 and not host.done():  # noqa: ASYNC110  (real time passes)
+            await asyncio.sleep(0.01)
+        assert time.monotonic() < began_s + 10
+        keeper.stop()
+        await host
+        await observer.last_report()
+
+
+async def test_an_actor_ends_at_the_instant_that_the_keeper_says() -> None:
+    endpoint, actor = free_endpoint(), Ticker()
+    with Bus.serve(endpoint) as bus:
+        observer = Observer(bus)
+        keeper = ClockKeeper(bus, NAMES, time_scale=1.0, expected=[])
+        clock = SwarmClock(await keeper.start(timeout_s=_PATIENCE_S))
+        host = asyncio.create_task(run_actor(actor, SwarmAddress("host", endpoint), until_ns=1000 * S))
+        await asyncio.sleep(clock.wait_s(300 * MS))
+        keeper.end_at(900 * MS)
+        await host
+        assert actor.stopped_ns == 900 * MS
         await observer.last_report()
 
 

@@ -99,13 +99,6 @@ def sleeper(*, seconds: float) -> int:
     return 0
 
 
-def deaf() -> int:
-    """Ends by nothing but SIGKILL."""
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    time.sleep(300)
-    return 0
-
-
 def crash() -> int:
     raise RuntimeError("on purpose")
 
@@ -153,22 +146,20 @@ async def test_every_end_is_told_with_its_name_and_exit_code() -> None:
     assert processes.names() == []
 
 
-async def test_a_child_that_ignores_ctrl_c_and_terminate_is_killed_in_the_end() -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+async def test_a_child_waits_for_its_launcher_whatever_signal_all_of_them_are_sent(number: int) -> None:
     ended: dict[str, int] = {}
     processes = Processes(ended.__setitem__)
-    processes.start("deaf", deaf, {})
     processes.start("sleeper", sleeper, {"seconds": 300})
-    pids = [processes.pid("deaf"), processes.pid("sleeper")]
-    for pid in pids:  # before a child has said that it ignores Ctrl-C, and after
-        os.kill(pid, signal.SIGINT)
-    assert eventually(lambda: ignores(pids[0], signal.SIGTERM))
-    for pid in pids:
-        os.kill(pid, signal.SIGINT)
+    pid = processes.pid("sleeper")
+    os.kill(pid, number)  # before the child has said that it ignores the signal, and after
+    assert eventually(lambda: ignores(pid, number))
+    os.kill(pid, number)
     await asyncio.sleep(0.2)
-    assert ended == {}, "Ctrl-C is the launcher's to hear"
+    assert ended == {}, "the signal is the launcher's to hear"
     await processes.end_all()
-    assert ended == {"sleeper": -signal.SIGTERM, "deaf": -signal.SIGKILL}, "they would have slept on"
-    assert [pid for pid in pids if exists(pid)] == []
+    assert ended == {"sleeper": -signal.SIGKILL}, "it would have slept on"
+    assert not exists(pid)
 
 
 async def test_a_child_is_called_by_its_name_wherever_processes_are_listed() -> None:
@@ -200,7 +191,7 @@ async def test_a_restarted_child_is_the_same_with_a_new_pid() -> None:
     assert processes.pid("child") != first
     await processes.end_all()
     assert ended[0] == ("child", -signal.SIGKILL)
-    assert [name for name, _ in ended] == ["child", "child"], "by SIGTERM, or SIGKILL where 2 s did not suffice"
+    assert [name for name, _ in ended] == ["child", "child"]
 
 
 # --- commands ---------------------------------------------------------------------------------------------------------

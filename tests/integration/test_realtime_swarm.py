@@ -181,6 +181,40 @@ def test_ctrl_c_ends_everything_cleanly_with_a_partial_result() -> None:
     assert 1 < summary["simulated_s"] < summary["duration_s"]
 
 
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_to_all_processes_of_a_swarm_leaves_a_partial_result_that_closes(number: int, tmp_path: Path) -> None:
+    """As `timeout`, systemd and `docker stop` send it; and as a terminal does that is closed, where nothing more can be
+    said.
+    """
+    out = tmp_path / "out"
+    process = subprocess.Popen(
+        command("launch", "quick", "--set", "radio.lead_ms=150", "--out", str(out)), stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, process_group=0,
+    )  # fmt: skip
+    assert process.stdout is not None
+    assert process.stderr is not None
+    for line in process.stderr:
+        if b"processes up" in line:
+            break
+    time.sleep(2.5)
+    if number == signal.SIGHUP:
+        process.stdout.close()
+        process.stderr.close()
+    os.killpg(process.pid, number)
+    process.wait(PATIENCE_S)
+    summary = json.loads((out / "summary.json").read_text("utf-8"))
+    assert summary["aborted"] == f"interrupted by {signal.Signals(number).name}"
+    assert 2 < summary["simulated_s"] < summary["duration_s"]
+    assert not summary["processes"]["ended"]
+    assert not summary["absent"]
+    assert summary["frames"]["closes"], summary["frames"]
+    assert summary["copies"]["closes"]
+    with pytest.raises(ProcessLookupError):  # nobody of the group is left
+        os.killpg(process.pid, 0)
+    for stream in (process.stdout, process.stderr):
+        stream.close()
+
+
 def wait_until_signals_are_handled(pid: int) -> None:
     """Python itself catches SIGINT from its first moment on, SIGTERM only a program that wants to."""
     caught = 0

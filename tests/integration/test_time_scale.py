@@ -4,6 +4,7 @@ import asyncio
 import json
 import struct
 import time
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -87,13 +88,14 @@ async def test_a_machine_that_cannot_keep_up_slows_the_clock_if_it_may(slow_down
     outcome = await launch(scenario, swarm="hurried", slow_down_to=slow_down_to, on_event=said.append)
     summary = finish(outcome, out=None)
     scales = [step["time_scale"] for step in summary["slowed"]]
-    assert sum("slows to" in text for text in said) == len(scales)
+    falls = [later < earlier for earlier, later in pairwise([80.0, *scales])]
+    assert sum("slows to" in text for text in said) == sum(falls)
     if slow_down_to is None:
         assert scales == []
         assert summary["wall_s"] < 240 / 80 + 2 + outcome.stall_ms / 1000
     else:
-        assert scales == sorted(scales, reverse=True)
-        assert 5.0 <= scales[-1] < 80
+        assert 5.0 <= min(scales) < 80
+        assert sum(pace["wall_s"] for pace in summary["paces"]) == pytest.approx(summary["wall_s"], rel=0.2)
         assert summary["wall_s"] > 240 / 80 + 0.5
     assert summary["frames"]["unaccounted"] == 0
     assert not summary["processes"]["ended"]

@@ -98,7 +98,14 @@ messages: st.SearchStrategy[Message] = st.one_of(
     st.builds(MavlinkTap, instants, st.binary(max_size=50)),
     st.builds(TraceBatch, st.lists(records, max_size=5).map(tuple)),
     st.builds(
-        ClockEpoch, instants, st.floats(0.01, 100), st.sampled_from(ClockState), instants, st.integers(0, 2**64 - 1)
+        ClockEpoch,
+        instants,
+        st.floats(0.01, 100),
+        st.sampled_from(ClockState),
+        instants,
+        st.integers(0, 2**64 - 1),
+        st.integers(0, 2**32 - 1),
+        instants,
     ),
     st.builds(Degrade, words, nodes, nodes, st.booleans(), doubles, doubles, instants),
     st.builds(Jam, words, vectors, doubles, doubles, instants),

@@ -106,6 +106,9 @@ class _AirReport(_Checked):
 class _Late(_Checked):
     late_frames: Count
     frames: Count
+    close_frames: Count = 0
+    late_moments: Count = 0
+    sum_ms: Number = 0.0
     p50_ms: Number
     p99_ms: Number
     max_ms: Number

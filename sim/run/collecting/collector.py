@@ -25,6 +25,7 @@ from fanet_mw.trace import Record
 from fanet_mw.units import S
 from sim.results.links import LinkTotals
 from sim.run.collecting.bus_checks import BusChecks
+from sim.run.collecting.running_tally import RunningTally
 from sim.run.collecting.spool import Spool
 from sim.run.collecting.stored_records import RecordSpools
 from sim.run.collecting.taps import encoded_tap, taps_of
@@ -70,6 +71,7 @@ class Collector:
         self._lock = threading.Lock()  # Zenoh calls from several threads
         self._allowance = Allowance(burst=BURST_BYTES, per_s=BYTES_PER_S)
         self._records = RecordSpools(folder)
+        self.tally = RunningTally(scenario)
         self._taps = Spool(folder)
         self._reports: dict[str, dict[str, Any]] = {}
         self._links = LinkTotals()
@@ -128,6 +130,7 @@ class Collector:
             else:
                 self._refused[f"trace: {why}"] += 1
         self._keep(good)
+        self.tally.take(good)
         return None
 
     def _keep(self, records: Iterable[Record]) -> None:

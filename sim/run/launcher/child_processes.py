@@ -1,7 +1,8 @@
 """The processes of a swarm: forked from one warmed-up server, watched, and ended without leaving any behind.
 
-Children ignore Ctrl-C, because the launcher decides when they end. They are killed when the server ends, and the server
-ends with the launcher, however the launcher ends.
+Children ignore Ctrl-C and the signals by which a service is ended, because these often go to all processes of a group
+and the launcher decides when its children end: by the swarm's clock, or else by killing them. They are killed when the
+server ends, and the server ends with the launcher, however the launcher ends.
 """
 
 import asyncio
@@ -24,7 +25,7 @@ from sim.run.launcher.process_title import entitle
 _PRELOAD: Final = ["agents.__main__", "emulator.__main__", "sim.world.__main__"]
 _NICENESS: Final = 10
 """The niceness of a child that runs with lower priority, added to that of the launcher."""
-_BLOCKED: Final = (signal.SIGINT, signal.SIGTERM)
+_FOR_THE_LAUNCHER: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _LAUNCHES_WHEN_IMPORTED: Final = 79
 """The exit code of a child whose import of the main program starts a swarm."""
 Entry = Callable[..., int]
@@ -43,8 +44,9 @@ class ChildRecipe(NamedTuple):
 
 def _child(recipe: ChildRecipe) -> None:
     """Prepare a child process, do its work, and exit with its code."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, _BLOCKED)  # the launcher's SIGTERM ends it
+    for number in _FOR_THE_LAUNCHER:
+        signal.signal(number, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _FOR_THE_LAUNCHER)
     be_killed_with_parent()
     _keep_no_server_alive()
     entitle(recipe.name, recipe.title)
@@ -98,14 +100,15 @@ def _nothing() -> None:
 
 
 def _start_server() -> None:
-    """Start the server from which children are forked, with both signals blocked in it and in its children.
+    """Start the server from which children are forked, with the launcher's signals blocked in it and in its children.
 
-    Ctrl-C, and the end of a system service, send a signal to all of them. The server ignores Ctrl-C only after its
-    imports, and a child only from `_child` on; without the block each would print a traceback until then.
+    Ctrl-C, the end of a system service and of a terminal send a signal to all of them. The server ignores Ctrl-C only
+    after its imports, and a child only from `_child` on; without the block each would print a traceback until then.
     """
-    resource_tracker.ensure_running()  # otherwise the server starts the tracker, which unblocks SIGINT
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, _BLOCKED)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGHUP])  # the tracker ignores the other two by itself
     try:
+        resource_tracker.ensure_running()  # otherwise the server starts the tracker, which unblocks SIGINT
+        signal.pthread_sigmask(signal.SIG_BLOCK, _FOR_THE_LAUNCHER)
         forkserver.ensure_running()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
@@ -200,12 +203,11 @@ class Processes:
         return True
 
     async def end_all(self) -> None:
-        """Ask all children to end, then kill those that have not; none is left running."""
-        for send, patience_s in (("terminate", 2.0), ("kill", 5.0)):
-            for process in list(self._running.values()):
-                getattr(process, send)()
-            if not self._running or await self.wait(patience_s):
-                return
+        """Kill all children that have not ended by themselves."""
+        for process in list(self._running.values()):
+            process.kill()
+        if self._running:
+            await self.wait(5.0)
 
 
 @atexit.register

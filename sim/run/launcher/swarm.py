@@ -3,6 +3,8 @@
     start all -> wait until all are present -> start the clock -> collect traces, reports and taps -> all end -> outcome
                                                (and slow it down, if that is allowed, while the machine cannot keep up)
 
+A signal ends the swarm early, at an instant that all are told a second before, so that the partial result closes.
+
 If the process of a UAV dies, that is reported and the others go on. A run needs the emulator and the world, so it ends
 if either of them dies. With `respawn`, any process is started again, and continues by the clock.
 """
@@ -26,14 +28,16 @@ from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
 from fanet_mw.hosts.realtime import SwarmAddress
 from fanet_mw.routing import module_of
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import S
+from fanet_mw.units import MS, S
 from sim.run.bus.router import ROUTER, expected_names
 from sim.run.bus.running_swarms import registered
 from sim.run.collecting.collector import Collector
 from sim.run.launcher import limits
 from sim.run.launcher.child_processes import Processes, describe, end_if_imported_by_a_child
-from sim.run.launcher.clock_governor import ClockGovernor
+from sim.run.launcher.clock_governor import ClockGovernor, Instant
 from sim.run.launcher.deaths import Deaths
+from sim.run.launcher.pauses import PauseWatch, processors
+from sim.run.launcher.progress import Progress
 from sim.run.launcher.services import Services
 from sim.run.outcome import Outcome
 from sim.world.flight_recorder import FlightRecorder
@@ -44,6 +48,8 @@ READY_TIMEOUT_S: Final = 300.0
 compilation may come on top."""
 WORD_EVERY_S: Final = 10.0
 """The interval at which the launcher says for which processes it is waiting."""
+_NOTICE_S: Final = 1.0
+"""How long before its early end the swarm is told of it."""
 _GRACE_S: Final = 5.0
 """How long the launcher waits for last reports after the end of the swarm's time."""
 _LAST_WORDS_S: Final = 1.0
@@ -51,6 +57,7 @@ _LAST_WORDS_S: Final = 1.0
 still be on the bus."""
 _PROGRESS_S: Final = 0.25
 Tell = Callable[[str], None]
+OnProgress = Callable[[Progress], None]
 
 
 def free_endpoint(protocol: str = "tcp") -> str:
@@ -87,24 +94,26 @@ class SwarmRun:
             least=scenario.time_scale if slow_down_to is None else slow_down_to,
             late_limit=scenario.radio.late_limit,
             end_ns=scenario.duration_ns,
+            processors=processors(),
         )
         protocol = module_of(scenario.routing.protocol)
         self.processes = Processes(self._process_ended, title=f"fanet {names.swarm}", preload=[protocol])
         self._deaths = Deaths(respawn=respawn)
+        self._pauses = PauseWatch()
         self._clock: SwarmClock | None = None
         self._over = asyncio.Event()
         self._ending = False
         self._aborted: str | None = None
-        self._stall_s = 0.0
-        """The longest time for which this process could do nothing although it should have."""
+        self._broken = False
+        """True if the run was ended because the swarm cannot go on, not even to an end in good order."""
         self._signal: int | None = None
 
-    async def run(self, on_progress: Callable[[float], None], on_started: Callable[["SwarmRun"], None]) -> Outcome:
+    async def run(self, on_progress: OnProgress, on_started: Callable[["SwarmRun"], None]) -> Outcome:
         """Start, run and collect. Whatever happens, no process and no temporary file is left.
 
         `on_started` receives this run when nothing is left that could keep its processes from starting.
         """
-        with contextlib.closing(self._collector):
+        with contextlib.closing(self._collector), contextlib.closing(self._pauses):
             began = time.monotonic()
             try:
                 await self.processes.warm_up()
@@ -114,7 +123,7 @@ class SwarmRun:
                 ready_s = await self._start_clock(began)
                 run_began = time.monotonic()
                 await self._follow(on_progress)
-                ended_ns = None if self._aborted is None else self._now_ns()
+                ended_ns = None if self._aborted is None else await self._end_early()
                 wall_s = time.monotonic() - run_began
                 await self._wind_up()
             finally:
@@ -141,18 +150,20 @@ class SwarmRun:
             ended_ns=ended_ns,
             absent={name: why for name, why in heard.absent.items() if name not in foreign},
             slowed=self._governor.steps,
-            stall_ms=self._stall_s * 1000,
+            stall_ms=self._pauses.longest_ns / MS,
+            pauses=self._pauses.summary(),
         )
 
     def interrupt(self, number: int) -> None:
         """End the run early because of a signal."""
         self._signal = number
-        self.abort(f"interrupted by {signal.Signals(number).name}")
+        nothing = "" if self._clock else " before the swarm's time began: there is no result"
+        self.abort(f"interrupted by {signal.Signals(number).name}{nothing}")
 
-    def abort(self, why: str) -> None:
-        """End the run early; what has been collected becomes a partial result."""
+    def abort(self, why: str, *, broken: bool = False) -> None:
+        """End the run early; what has been collected becomes a partial result. A `broken` swarm is stopped at once."""
         if self._aborted is None and not self._over.is_set():
-            self._aborted = why
+            self._aborted, self._broken = why, broken
             self._tell(why)
         self._over.set()
 
@@ -181,29 +192,57 @@ class SwarmRun:
             start.cancel()
             self._check_not_over()
         self._clock = SwarmClock(start.result())
+        self._pauses.restart()
         ready_s = time.monotonic() - began
         self._tell(f"{len(self.processes.names())} processes up after {ready_s:.1f} s")
         return ready_s
 
-    async def _follow(self, on_progress: Callable[[float], None]) -> None:
+    async def _follow(self, on_progress: OnProgress) -> None:
         """Wait until the swarm's time is over or the run is aborted."""
         assert self._clock is not None, "the clock was started"
         while self._clock.wait_s(self._services.scenario.duration_ns) > 0 and not self._over.is_set():
-            on_progress(max(0.0, self._clock.now_ns() / S))
-            began_s = time.monotonic()
+            reports = self._collector.reports()
+            self._govern(reports)
+            on_progress(self._progress(reports))
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._over.wait(), _PROGRESS_S)
-            self._stall_s = max(self._stall_s, time.monotonic() - began_s - _PROGRESS_S)
-            self._govern()
 
-    def _govern(self) -> None:
-        """Slow the clock down if the reports say that the machine cannot keep up."""
+    def _govern(self, reports: Mapping[str, Mapping[str, Any]]) -> None:
+        """Fit the pace of the clock to what the reports say of the machine."""
         assert self._clock is not None, "the clock was started"
-        now_ns = self._now_ns()
-        scale = None if self._over.is_set() else self._governor.slower(self._collector.reports(), now_ns)
-        if scale is not None:
-            self._clock.slow_down(self._keeper.slow_down(scale))
+        now_ns, before = self._now_ns(), self._governor.scale
+        scale = self._governor.pace(reports, Instant(now_ns, time.monotonic_ns(), time.process_time()))
+        if scale is None:
+            return
+        self._clock.follow(self._keeper.pace(scale))
+        if scale < before:
             self._tell(f"the machine cannot keep up: at {now_ns / S:.1f} s the swarm's clock slows to {scale:.3g}")
+        elif scale == self._services.scenario.time_scale:
+            self._tell(f"at {now_ns / S:.1f} s the swarm's clock is back at {scale:.3g}")
+
+    def _progress(self, reports: Mapping[str, Mapping[str, Any]]) -> Progress:
+        scenario, tally = self._services.scenario, self._collector.tally
+        late = reports.get("emulator", {}).get("late", {})
+        return Progress(
+            swarm_s=self._now_ns() / S,
+            duration_s=scenario.duration_s,
+            time_scale=self._governor.scale,
+            delivered=tally.delivered_share(),
+            late=late.get("late_frames", 0) / max(1, late.get("frames", 0)),
+            confirmed=len(tally.confirmed),
+            survivors=scenario.mission.survivors,
+        )
+
+    async def _end_early(self) -> int:
+        """Let the swarm end in a second, or stop it at once if it is broken; returns its last instant."""
+        assert self._clock is not None, "the clock was started"
+        if self._broken:
+            return self._now_ns()
+        notice_ns = round(_NOTICE_S * self._governor.scale * S)
+        ends_ns = min(max(0, self._clock.now_ns()) + notice_ns, self._services.scenario.duration_ns)
+        self._clock.follow(self._keeper.end_at(ends_ns))
+        await asyncio.sleep(self._clock.wait_s(ends_ns))
+        return ends_ns
 
     async def _wind_up(self) -> None:
         """End all processes, by the clock or by a signal, and wait for last reports."""
@@ -215,7 +254,7 @@ class SwarmRun:
             await asyncio.sleep(_LAST_WORDS_S / 20)
 
     async def _end_processes(self) -> None:
-        if self._aborted is not None:
+        if self._broken:
             self._keeper.stop()
         if not await self.processes.wait(_GRACE_S):
             late = self.processes.names()
@@ -235,8 +274,7 @@ class SwarmRun:
         self._deaths.note(name, exit_code, node=node, now_ns=now_ns)
         what = f"{name} ended with {describe(exit_code)} at {now_ns / S:.1f} s"
         if self._over.is_set():
-            if exit_code == -(self._signal or 0):
-                return  # the signal that interrupted this process was sent to all of them
+            self._broken |= not node
             self._tell(f"{what}, while the swarm was ending")
             return
         if self._deaths.grant_respawn(name):
@@ -248,7 +286,7 @@ class SwarmRun:
         elif node and self._clock is not None:
             self._tell(f"{what}; the others carry on")
         else:
-            self.abort(f"{what}; the run cannot go on without it")
+            self.abort(f"{what}; the run cannot go on without it", broken=True)
 
     def _now_ns(self) -> int:
         """The swarm instant, limited to the swarm's time."""
@@ -287,7 +325,7 @@ async def launch(
     emulator_options: Mapping[str, Any] | None = None,
     spool_folder: Path | None = None,
     zenoh_config: Path | None = None,
-    on_progress: Callable[[float], None] = lambda _: None,
+    on_progress: OnProgress = lambda _: None,
     on_event: Tell = lambda _: None,
     on_started: Callable[[SwarmRun], None] = lambda _: None,
     leave_out: Collection[int] = (),
@@ -295,7 +333,8 @@ async def launch(
 ) -> Outcome:
     """Run a scenario as real processes. `on_started` receives the swarm while it runs, for tests and tools.
 
-    With `slow_down_to` the swarm's clock slows down, at most to that scale, while the machine cannot keep up with it.
+    With `slow_down_to` the swarm's clock slows down, at most to that scale, while the machine cannot keep up with it,
+    and speeds up again afterwards.
     The nodes of `leave_out` are waited for and not started: a program of the user's own joins in their place.
     Without `own_world` the swarm waits for a foreign world, which declares the liveliness token of `world`.
     `zenoh_config` is Zenoh's own configuration: a file for all processes, or a folder with one file for each. What is
@@ -319,7 +358,7 @@ async def launch(
             services, bus, respawn=respawn, tell=on_event, spool_folder=spool_folder, slow_down_to=slow_down_to
         )
         loop = asyncio.get_running_loop()
-        signals = interrupts.SIGNALS if heed_signals else ()
+        signals = interrupts.heeded() if heed_signals else ()
         for number in signals:
             loop.add_signal_handler(number, run.interrupt, number)
         try:

@@ -70,7 +70,22 @@ def test_requests_in_time_count_for_the_percentiles_of_lateness(make_scenario: M
         air.send(1, at_ns, now_ns=at_ns + (8 * MS if number >= 98 else 0))
     air.run()
     late = air.medium.report()["late"]
-    assert late == {"late_frames": 2, "frames": 100, "p50_ms": 0.0, "p99_ms": 10.0, "max_ms": 8.0}
+    percentiles = {"p50_ms": 0.0, "p99_ms": 10.0, "max_ms": 8.0}
+    assert (
+        late == {"late_frames": 2, "frames": 100, "close_frames": 98, "late_moments": 1, "sum_ms": 16.0} | percentiles
+    )
+
+
+def test_requests_in_the_last_quarter_of_their_lead_and_moments_with_late_ones_are_counted(
+    make_scenario: MakeScenario,
+) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2, "radio.lead_ms": 40.0, "time_scale": 2.0}), [0, 100])
+    for ahead_ms in (40, 10, 9, 0):
+        air.send(1, (100 + ahead_ms) * MS, now_ns=100 * MS)
+    for at_ms in (200, 249, 250, 251, 300):  # a moment is 50 ms long at twice real time
+        air.send(1, (at_ms - 1) * MS, now_ns=at_ms * MS)
+    late = air.medium.report()["late"]
+    assert (late["close_frames"], late["late_frames"], late["late_moments"]) == (2, 5, 3)
 
 
 def test_what_a_node_may_announce_is_bounded_and_what_has_ended_makes_room(make_scenario: MakeScenario) -> None:

@@ -55,9 +55,9 @@ async def test_a_clock_slows_down_at_the_instant_that_it_has_reached() -> None:
     keeper, told = await started(machine, 2.0)
     same, other = SwarmClock(told, machine.keepers), SwarmClock(told, machine.other)
     machine.let_pass(10)
-    slower = keeper.slow_down(0.5)
+    slower = keeper.pace(0.5)
     for clock in (same, other):
-        clock.slow_down(slower)
+        clock.follow(slower)
         assert clock.now_ns() == 20 * S
     machine.let_pass(4)
     assert same.now_ns() == other.now_ns() == 22 * S
@@ -71,9 +71,9 @@ async def test_a_process_that_hears_of_it_late_waits_for_the_others_and_does_not
     keeper, told = await started(machine, 1.0)
     late = SwarmClock(told, machine.keepers)
     machine.let_pass(10)
-    slower = keeper.slow_down(0.5)
+    slower = keeper.pace(0.5)
     machine.let_pass(0.2)
-    late.slow_down(slower)
+    late.follow(slower)
     assert late.now_ns() == 10 * S + 200 * MS, "the others are at 10.1 s"
     assert late.wait_s(10 * S + 300 * MS) == pytest.approx(0.4), "by the clock of the others"
     machine.let_pass(0.2)
@@ -82,26 +82,52 @@ async def test_a_process_that_hears_of_it_late_waits_for_the_others_and_does_not
     assert late.now_ns() == 10 * S + 300 * MS
 
 
-async def test_an_older_word_of_the_keeper_makes_no_clock_faster_again() -> None:
+async def test_an_older_word_of_the_keeper_changes_nothing() -> None:
     machine = Machine()
     keeper, told = await started(machine, 1.0)
     clock = SwarmClock(told, machine.keepers)
     machine.let_pass(10)
-    first, second = keeper.slow_down(0.5), keeper.slow_down(0.25)
+    first, second = keeper.pace(0.5), keeper.pace(0.25)
     for word in (second, first, told):
-        clock.slow_down(word)
+        clock.follow(word)
     machine.let_pass(8)
     assert clock.now_ns() == 12 * S
 
 
+async def test_a_clock_speeds_up_at_the_instant_that_it_has_reached() -> None:
+    machine = Machine()
+    keeper, told = await started(machine, 0.5)
+    same, late = SwarmClock(told, machine.keepers), SwarmClock(told, machine.other)
+    machine.let_pass(10)
+    faster = keeper.pace(2.0)
+    assert same.follow(faster)
+    assert same.now_ns() == 5 * S
+    machine.let_pass(1)
+    assert late.follow(faster)
+    assert same.now_ns() == late.now_ns() == 7 * S
+    assert not late.follow(faster), "it is no news"
+
+
+async def test_an_early_end_reaches_the_clocks_and_moves_no_instant() -> None:
+    machine = Machine()
+    keeper, told = await started(machine, 0.5)
+    clock = SwarmClock(told, machine.keepers)
+    machine.let_pass(10)
+    assert clock.ends_ns == 0
+    assert clock.follow(keeper.end_at(7 * S))
+    assert (clock.now_ns(), clock.ends_ns) == (5 * S, 7 * S)
+    clock.follow(keeper.pace(1.0))
+    assert clock.ends_ns == 7 * S, "another pace does not take it back"
+
+
 @given(
-    st.lists(st.tuples(st.floats(0.01, 50), st.floats(0.3, 0.99), st.floats(0, 2)), max_size=6),
+    st.lists(st.tuples(st.floats(0.01, 50), st.floats(0.3, 3), st.floats(0, 2)), max_size=6),
     st.floats(0.1, 20),
 )
 async def test_time_never_goes_back_and_every_clock_ends_where_the_keepers_is(
     steps: list[tuple[float, float, float]], scale: float
 ) -> None:
-    """Steps of: seconds that pass, by what the clock slows down, and how much later this process hears of it."""
+    """Steps of: seconds that pass, by what the pace changes, and how much later this process hears of it."""
     machine = Machine()
     keeper, told = await started(machine, scale)
     clock, latest_ns = SwarmClock(told, machine.keepers), 0
@@ -109,10 +135,10 @@ async def test_time_never_goes_back_and_every_clock_ends_where_the_keepers_is(
         machine.let_pass(seconds)
         assert latest_ns <= (latest_ns := clock.now_ns())
         scale *= factor
-        slower = keeper.slow_down(scale)
+        slower = keeper.pace(scale)
         machine.let_pass(later_s)
         assert latest_ns <= (latest_ns := clock.now_ns())
-        clock.slow_down(slower)
+        clock.follow(slower)
         assert latest_ns <= clock.now_ns()
     machine.let_pass(10_000)
     assert keeper.clock is not None

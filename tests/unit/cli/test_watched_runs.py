@@ -1,0 +1,39 @@
+"""What a run in real time says while it lasts, without a terminal."""
+
+import pytest
+from kit import MakeScenario
+
+from sim.cli import runs
+from sim.run.launcher.progress import Progress
+
+
+def state(swarm_s: float) -> Progress:
+    return Progress(swarm_s, 300.0, 0.75, 0.9876, 0.00456, 7, 16)
+
+
+def test_a_line_every_ten_seconds_says_how_the_swarm_fares(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], make_scenario: MakeScenario
+) -> None:
+    now_s = 100.0
+    monkeypatch.setattr(runs, "monotonic", lambda: now_s)
+    with runs._watched(make_scenario(), quiet=True) as tell:
+        for quarter in range(4 * 35):
+            now_s = 100 + quarter / 4
+            tell(state(quarter / 4))
+    out, err = capsys.readouterr()
+    assert out == "", "that is for the summary"
+    assert err.splitlines() == [
+        f"{s} of 300 s: clock 0.75, delivered 98.8%, late 0.46%, confirmed 7 of 16" for s in (10, 20, 30)
+    ]
+
+
+def test_what_is_not_known_or_not_searched_for_is_not_said() -> None:
+    assert Progress(1.4, 60.0, 1.0, None, 0.0, 0, 0).sentence() == "1 of 60 s: clock 1, late 0.00%"
+
+
+def test_nobody_who_listens_costs_no_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    def gone(*_: object, **__: object) -> None:
+        raise BrokenPipeError
+
+    monkeypatch.setattr(runs._err, "print", gone)
+    runs._say("47 processes up")

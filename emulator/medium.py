@@ -133,6 +133,7 @@ class Medium(Actor):
             "poses": counters.poses,
             "controls": counters.controls,
             "refused": dict(sorted(counters.refused.items())),
+            "capture_failed": None if self._capture is None else self._capture.failure(),
             "handed": {i + 1: count for i, count in enumerate(arrays.st[s.HANDED].tolist()) if count},
         }
 

@@ -64,6 +64,9 @@ class Capture(Protocol):
         self, t_ns: int, station: int, src: int, dst: int, seq: int, frame: bytes, rssi_dbm: float
     ) -> None: ...
 
+    def failure(self) -> str | None:
+        """Write what was gathered; returns why the file ends before the run, None if it does not."""
+
 
 def mac_address(node: int) -> bytes:
     """The locally administered MAC address of a node; that of the broadcast is all ones."""
@@ -90,12 +93,15 @@ class Pcap:
         radio: Radio,
         *,
         receptions: bool = False,
-        flush: Callable[[], object] = lambda: None,
+        flush: Callable[[], str | None] = lambda: None,
     ) -> None:
-        """`flush` is called once a second of swarm time, between records, so that the file can be read meanwhile."""
+        """`flush` returns why no more can be written. It is called once a second of swarm time, between records, so
+        that the file can be read meanwhile.
+        """
         self.epoch_unix_ns = 0
         self._flush = flush
         self._flush_ns = S
+        self.failure: Callable[[], str | None] = flush
         self.records = 0
         self._write = write
         self._receptions = receptions

@@ -44,6 +44,7 @@ class PcapFile:
         except OSError as error:
             raise ConfigError(f"--pcap: {path}: cannot be written: {error.strerror}") from error
         self._path = path
+        self._failure: str | None = None
         self.pcap = Pcap(self._write, radio, receptions=receptions, flush=self._flush)
 
     def _write(self, data: bytes) -> None:
@@ -53,18 +54,20 @@ class PcapFile:
             except OSError as error:
                 self._give_up(error)
 
-    def _flush(self) -> None:
+    def _flush(self) -> str | None:
         if self._file is not None:
             try:
                 self._file.flush()
             except OSError as error:
                 self._give_up(error)
+        return self._failure
 
     def _give_up(self, error: OSError) -> None:
         assert self._file is not None, "it was written to"
         with contextlib.suppress(OSError):
             self._file.close()
         self._file = None
+        self._failure = error.strerror or str(error)
         sys.stderr.write(f"{self._path}: the capture ends here: {error.strerror}\n")
 
     def __enter__(self) -> Self:

@@ -5,12 +5,15 @@
     [routing.options]                         the part's own table, checked by its `Options`, a pydantic model
 
 The names of this project's own parts cannot be redefined. Each named part is looked up when the scenario is read, so
-that no run begins with a part that is missing.
+that no run begins with a part that is missing. A part is a class with the methods of its contract: anything else is
+refused without being called, modules of Python itself without being imported. A scenario that is read with `AS_TEXT`,
+such as that of a result folder, imports nothing.
 """
 
 import ast
 import difflib
 import hashlib
+import inspect
 import json
 import sys
 import sysconfig
@@ -39,6 +42,16 @@ _OURS: Final = ("fanet_mw", "agents", "emulator", "sim")
 _SUFFIXES: Final = frozenset(Path(f"_{suffix}").suffix for suffix in (*SOURCE_SUFFIXES, *EXTENSION_SUFFIXES))
 _INSTALLED: Final = frozenset(Path(sysconfig.get_path(name)) for name in ("purelib", "platlib"))
 _DIGITS: Final = 16
+_METHODS: Final[Mapping[str, Sequence[str]]] = {
+    "routing.protocol": ("start", "originate", "receive", "wake", "next_wake_ns", "report"),
+    "mobility.model": ("track",),
+    "clusters.method": ("divide",),
+    "radio.channel": ("loss_db", "reach_m"),
+    "applications.use": ("start", "on_message", "wake", "next_wake_ns", "report"),
+}
+"""The methods by which a class of each kind is recognized."""
+AS_TEXT: Final[Mapping[str, bool]] = {"imports": False}
+"""The context of pydantic in which names of parts of other packages are taken as they are."""
 _NOT_EVERYWHERE: Final = ("numpy", "numba")
 """Modules that a companion computer lacks. A part that needs one of them is checked where it runs."""
 
@@ -138,6 +151,8 @@ def load(key: str, name: str) -> Any:  # noqa: ANN401  (whatever the contract of
             f"{key} = {name!r}: is neither one of ours, nor an entry point of the group {GROUPS[key]} "
             f"(installed: {known}), nor MODULE:CLASS"
         )
+    if module.partition(".")[0] in sys.stdlib_module_names:
+        raise ValueError(f"{key} = {name!r}: {text} is a part of Python, and no class with {_methods(key)}")
     digest(module.partition(".")[0])
     try:
         found: Any = import_module(module)
@@ -148,11 +163,26 @@ def load(key: str, name: str) -> Any:  # noqa: ANN401  (whatever the contract of
             raise
         remedy = "; install it, or put its folder on PYTHONPATH" if error.name == module.partition(".")[0] else ""
         raise ValueError(f"{key} = {name!r}: {text} cannot be imported: {error}{remedy}") from error
-    except (ImportError, AttributeError) as error:
+    except (Exception, SystemExit) as error:  # whatever the code of another package does when it is imported
         raise ValueError(f"{key} = {name!r}: {text} cannot be imported: {error}") from error
-    if not callable(found):
-        raise ValueError(f"{key} = {name!r}: {text} is no class")  # noqa: TRY004  (a value of a file)
+    if not _is_part(key, found):
+        raise ValueError(f"{key} = {name!r}: {text} is no class with {_methods(key)}")
     return found
+
+
+def _is_part(key: str, found: object) -> bool:
+    """True for a class that can be made and has the methods of the contract."""
+    if not isinstance(found, type) or inspect.isabstract(found):
+        return False
+    return all(callable(inspect.getattr_static(found, method, None)) for method in _METHODS[key])
+
+
+def _methods(key: str) -> str:
+    return f"the methods {', '.join(_METHODS[key])}" if len(_METHODS[key]) > 1 else f"a method {_METHODS[key][0]}"
+
+
+def _imports(info: ValidationInfo) -> bool:
+    return info.context is None or info.context.get("imports", True) is True
 
 
 class PartName:
@@ -163,15 +193,15 @@ class PartName:
         self.ours: Final = tuple(ours)
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        return core_schema.no_info_after_validator_function(self._check, handler(source))
+        return core_schema.with_info_after_validator_function(self._check, handler(source))
 
     def __get_pydantic_json_schema__(self, _: core_schema.CoreSchema, __: GetJsonSchemaHandler) -> JsonSchemaValue:
         other = f"an entry point of {GROUPS[self._key]}, or MODULE:CLASS"
         foreign = {"type": "string", "x-names": other}
         return {"anyOf": [{"enum": list(self.ours), "type": "string"}, foreign]} if self.ours else foreign
 
-    def _check(self, name: str) -> str:
-        if name not in self.ours:
+    def _check(self, name: str, info: ValidationInfo) -> str:
+        if name not in self.ours and _imports(info):
             try:
                 load(self._key, name)
             except ModuleNotFoundError:
@@ -204,7 +234,7 @@ class OptionsOf:
         name = info.data.get(field)
         if name is None:
             return Options(options)  # the name itself is wrong, which was reported already
-        model = None if name in self._ours else _model(self._key, name)
+        model = _model(self._key, name) if name not in self._ours and _imports(info) else None
         if model is None:
             if options and name in self._ours:
                 raise ValueError(f"{table}.options: {field} = {name!r} is one of ours and has no options")

@@ -33,5 +33,5 @@ def records(folder: str | Path, *kinds: type[R]) -> Iterator[R]:
     With `kinds` (classes of `fanet_mw.trace`) only those: `records(DIR, Delivered, Dropped)`. Raises ConfigError for a
     folder without a trace, and at a line that is no record.
     """
-    found: Iterator[R] = import_module("sim.results.trace_file").read_trace(Path(folder), *kinds)
+    found: Iterator[R] = import_module("sim.results.run_folder").read_trace(Path(folder), *kinds)
     return found

@@ -13,7 +13,7 @@ from typing import BinaryIO, Final
 
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.units import US
-from fanet_mw.whole_file import write_items
+from fanet_mw.whole_file import Written, write_items
 from fanet_mw.wire import frames, renumbered
 
 _STAMP: Final = struct.Struct(">Q")
@@ -29,12 +29,12 @@ def append(file: BinaryIO, data: bytes, *, t_us: int) -> int:
     return len(whole)
 
 
-def write(path: Path, taps: Iterable[tuple[int, bytes]], *, epoch_us: int = 0) -> None:
-    """Write (instant ns, frames) pairs; `epoch_us` is the unix time of swarm instant 0.
+def write(path: Path, taps: Iterable[tuple[int, bytes]], *, epoch_us: int = 0, held: Written | None = None) -> None:
+    """Write (instant ns, frames) pairs; `epoch_us` is the unix time of swarm instant 0, `held` what the file holds.
 
     Raises OSError when the disk is full; the file then ends with the last frame that fits.
     """
-    write_items(path, _stamped(taps, epoch_us))
+    write_items(path, _stamped(taps, epoch_us), held)
 
 
 def _stamped(taps: Iterable[tuple[int, bytes]], epoch_us: int) -> Iterator[bytes]:

@@ -404,7 +404,7 @@ def parse(text: str) -> Record:
         if tuple(map(type, fields)) not in _ROWS[name] or not all(map(_in_bounds, fields)):
             raise ValueError("fields")
         record: Record = _KINDS[name](*fields)
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise MalformedFrameError(f"trace line {text[:80]!r} is no record") from error
     return record
 

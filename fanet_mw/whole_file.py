@@ -1,5 +1,7 @@
-"""A file of whole items: when the disk is full, the file ends with the last item that fits."""
+"""Files that are whole: items that end with the last one that fits, or one content that replaces another."""
 
+import contextlib
+import hashlib
 import os
 from collections.abc import Iterable, Iterator
 from itertools import accumulate
@@ -9,13 +11,29 @@ from typing import Final
 _BATCH_BYTES: Final = 1 << 18
 
 
-def write_items(path: Path, items: Iterable[bytes]) -> int:
-    """Write items one after another; returns the number of bytes written.
+class Written:
+    """The size and the digest of what a file holds."""
+
+    def __init__(self) -> None:
+        self.bytes = 0
+        self._digest = hashlib.sha256()
+
+    def add(self, data: bytes | memoryview) -> None:
+        self.bytes += len(data)
+        self._digest.update(data)
+
+    @property
+    def sha256(self) -> str:
+        return self._digest.hexdigest()
+
+
+def write_items(path: Path, items: Iterable[bytes], held: Written | None = None) -> None:
+    """Write items one after another; `held` takes in what the file then holds.
 
     Raises OSError when the file cannot be opened or written; it then holds as many whole items as fit.
     """
+    held = held or Written()
     with path.open("wb", buffering=0) as file:
-        done = 0
         for batch in batches(items, least_bytes=_BATCH_BYTES):
             data = b"".join(batch)
             written = 0
@@ -25,10 +43,37 @@ def write_items(path: Path, items: Iterable[bytes]) -> int:
             except OSError:
                 ends = accumulate(map(len, batch))
                 kept = max((end for end in ends if end <= written), default=0)
-                os.ftruncate(file.fileno(), done + kept)
+                os.ftruncate(file.fileno(), held.bytes + kept)
+                held.add(memoryview(data)[:kept])
                 raise
-            done += written
-    return done
+            held.add(data)
+
+
+def replace_file(path: Path, data: bytes) -> None:
+    """Put a file with this content in the place of a file, or of a link, of this name; raises OSError.
+
+    The old one stays until the new one is whole, and nothing is ever written through a link.
+    """
+    fresh = path.with_name(f".{path.name}.{os.getpid()}.new")
+    try:
+        with contextlib.suppress(FileNotFoundError):
+            fresh.unlink()
+        with fresh.open("xb", buffering=0) as file:
+            written = 0
+            while written < len(data):
+                written += os.write(file.fileno(), data[written:])
+        fresh.replace(path)
+    except OSError:
+        fresh.unlink(missing_ok=True)
+        raise
+
+
+def require_folder(path: Path) -> None:
+    """Make a folder if there is none; raises NotADirectoryError for a link to one, which might be anywhere."""
+    with contextlib.suppress(FileExistsError):
+        path.mkdir()
+    if path.is_symlink() or not path.is_dir():
+        raise NotADirectoryError(20, f"{path.name} is no folder of its own", str(path))
 
 
 def batches(items: Iterable[bytes], *, least_bytes: int) -> Iterator[list[bytes]]:

@@ -6,7 +6,6 @@ Each message names the file, the key, the value and the bound, because the user 
 """
 
 import re
-import tomllib
 import unicodedata
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -15,12 +14,14 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.extensions import AS_TEXT
+from fanet_mw.foreign_file import require_plain, toml_of
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.overrides import apply_override
 from fanet_mw.scenario.quantities import in_unit_of, unit_of
 from fanet_mw.scenario.tables.world import FILE_KEYS
 from fanet_mw.scenario.text_files import read_text
-from fanet_mw.scenario.validation_errors import sentence
+from fanet_mw.scenario.validation_errors import sentences
 
 _LIKE_A_NUMBER: Final = re.compile(r"[-+.\d]")
 _DECIMAL: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,2})?")
@@ -38,15 +39,19 @@ def _name_of(path: Path) -> str:
     return re.sub(r"[^A-Za-z0-9_-]+", "-", letters).strip("-")[:64] or "unnamed"
 
 
-def parse(text: str, *, source: str, name: str, overrides: Iterable[str] = (), folder: Path | None = None) -> Scenario:
+def parse(
+    text: str,
+    *,
+    source: str,
+    name: str,
+    overrides: Iterable[str] = (),
+    folder: Path | None = None,
+) -> Scenario:
     """Build a scenario from TOML text; `source` is what messages call it, `name` its name unless it has its own.
 
     Paths in the text are taken from `folder`, those in overrides from the current one.
     """
-    try:
-        tree: dict[str, Any] = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{source}: not valid TOML: {error}") from error
+    tree = toml_of(text, source=source)
     tree.setdefault("name", name)
     if folder is not None:
         _from_folder(tree, folder)
@@ -55,17 +60,20 @@ def parse(text: str, *, source: str, name: str, overrides: Iterable[str] = (), f
     return build(tree, source=source)
 
 
-def build(tree: Mapping[str, Any], *, source: str = "scenario") -> Scenario:
-    """Validate a tree of plain values; a number may be text with a unit, which its key turns into its own."""
+def build(tree: Mapping[str, Any], *, source: str = "scenario", imports: bool = True) -> Scenario:
+    """Validate a tree of plain values; a number may be text with a unit, which its key turns into its own.
+
+    Without `imports`, parts of other packages are taken as the names that they are.
+    """
+    require_plain(tree, source=source)
     problems: list[str] = []
     tree = {key: _plain(key, value, problems, key) for key, value in tree.items()}
     if problems:
         raise ConfigError("\n".join(f"{source}: {problem}" for problem in problems))
     try:
-        return Scenario.model_validate(tree)
+        return Scenario.model_validate(tree, context=None if imports else AS_TEXT)
     except ValidationError as error:
-        lines = [sentence(dict(item)) for item in error.errors()]
-        raise ConfigError("\n".join(f"{source}: {text}" for text in dict.fromkeys(lines))) from error
+        raise ConfigError("\n".join(f"{source}: {text}" for text in sentences(error))) from error
 
 
 def departures(scenario: Scenario) -> dict[str, Any]:

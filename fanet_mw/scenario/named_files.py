@@ -26,7 +26,7 @@ def digest_of(path: str) -> str:
     try:
         found = Path(path).stat()
         return _digest(path, found.st_size, found.st_mtime_ns, found.st_ino) if stat.S_ISREG(found.st_mode) else ""
-    except OSError:
+    except (OSError, ValueError):  # ValueError: a path with a NUL
         return ""
 
 
@@ -50,8 +50,10 @@ def _middle_of_buildings(path: str, digest: str) -> tuple[float, float] | None:
 
 @lru_cache(maxsize=8)
 def _middle_of_heights(path: str, digest: str) -> tuple[float, float] | None:
+    if not digest:
+        return None  # a pipe would be waited for
     try:
         with Path(path).open("rb") as file:
-            return ascii_grid.parse(file.read(_HEADER_BYTES)).place_deg if digest else None
+            return ascii_grid.parse(file.read(_HEADER_BYTES)).place_deg
     except (OSError, ValueError):
         return None

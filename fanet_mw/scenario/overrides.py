@@ -42,5 +42,8 @@ def one_value(text: str) -> object:
     """The value of some TOML text; text that is no TOML is a string, so that names need no quotes."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (
+        ValueError,
+        RecursionError,
+    ):  # no TOML, thousands of digits or of brackets: whoever checks the key refuses it
         return text

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Final
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.foreign_file import read_regular
 
 _MARKS: Final = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
 
@@ -16,8 +17,6 @@ def decoded(data: bytes, *, otherwise: str = "utf-8") -> str:
 def read_text(path: Path, *, what: str) -> str:
     """The text of a file; raises ConfigError, which calls it `what`."""
     try:
-        return decoded(path.read_bytes())
-    except OSError as error:
-        raise ConfigError(f"{what}: cannot be read: {error.strerror or error}") from error
+        return decoded(read_regular(path, what=what))
     except UnicodeError as error:
         raise ConfigError(f"{what}: is no text in UTF-8: {error}") from error

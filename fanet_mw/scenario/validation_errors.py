@@ -4,23 +4,56 @@ An unknown key is answered with the known key that is spelt most like it.
 """
 
 import difflib
-from typing import Any
+from collections.abc import Iterator
+from typing import Any, Final
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ValidationError
 
 from fanet_mw.scenario.model import Scenario
+
+_MOST_UNKNOWN: Final = 8
+"""More unknown keys than this are named together, by the first ones."""
+_LONGEST_VALUE: Final = 80
+
+
+def sentences(error: ValidationError) -> list[str]:
+    """All mistakes of a scenario, each once."""
+    items = error.errors(include_url=False)
+    unknown = [item for item in items if item["type"] == "extra_forbidden"]
+    return list(dict.fromkeys(_sentences([dict(item) for item in items], many=len(unknown) > _MOST_UNKNOWN)))
+
+
+def _sentences(items: list[dict[str, Any]], *, many: bool) -> Iterator[str]:
+    unknown = [_key(item) for item in items if many and item["type"] == "extra_forbidden"]
+    if unknown:
+        yield f"{', '.join(unknown[:_MOST_UNKNOWN])} and {len(unknown) - _MOST_UNKNOWN} more: unknown keys"
+    yield from (sentence(item) for item in items if not (many and item["type"] == "extra_forbidden"))
 
 
 def sentence(item: dict[str, Any]) -> str:
     """One mistake as `key = value: bound`."""
-    path = [str(part) for part in item["loc"] if not _is_branch(str(part))]
-    key = ".".join(path)
+    path, key = _path(item), _key(item)
     if item["type"] == "extra_forbidden":
         return f"{key}: unknown key{_suggestion(path)}"
     message = str(item["msg"]).removeprefix("Value error, ")
     if item["type"] == "value_error":
         return message
-    return f"{key} = {item['input']!r}: {message[0].lower()}{message[1:]}"
+    value = repr(item["input"])
+    shown = value if len(value) <= _LONGEST_VALUE else f"{value[:_LONGEST_VALUE]}..."
+    return f"{key} = {shown}: {message[0].lower()}{message[1:]}"
+
+
+def _path(item: dict[str, Any]) -> list[str]:
+    """The keys on the way to a mistake; an unknown key is kept however it is spelt."""
+    *path, last = map(str, item["loc"] or ("scenario",))
+    kept = item["type"] == "extra_forbidden" or not _is_branch(last)
+    return [*(part for part in path if not _is_branch(part)), *([last] if kept else [])]
+
+
+def _key(item: dict[str, Any]) -> str:
+    """The dotted key of a mistake; a part that could not stand so in a file is quoted, and shortened."""
+    parts = [part if part.replace("-", "_").isidentifier() or part.isdecimal() else repr(part) for part in _path(item)]
+    return ".".join(part if len(part) <= _LONGEST_VALUE else f"{part[:_LONGEST_VALUE]}..." for part in parts)
 
 
 def _is_branch(part: str) -> bool:

@@ -4,8 +4,10 @@ The commands are in the modules beside this one, by subject. All of them are reg
 these modules import at their top only what `--help` needs.
 """
 
+import errno
 import sys
 from collections.abc import Sequence
+from typing import Final
 
 from cyclopts import App
 
@@ -29,6 +31,9 @@ app.command(air_app)
 for commands in (scenario_files, sweep, figures, runs, replay, single_services, swarms, tool_files):
     commands.add_to(app)
 app.register_install_completion_command()
+_NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_MOST_LINES: Final = 20
+_LONGEST_LINE: Final = 900
 for option in ("--help", "--version", "--install-completion"):
     app[option].group = (OPTIONS,)
 
@@ -55,11 +60,21 @@ def changes_last(words: Sequence[str]) -> list[str]:
 
 
 def refused(why: str) -> int:
-    """Print why a request could not be met; returns the exit code for that."""
-    from rich.markup import escape
+    """Print why a request could not be met, in few short lines; returns the exit code for that."""
+    from rich.text import Text
 
-    Console(stderr=True).print(f"[bold red]fanet:[/] {escape(why)}", highlight=False, soft_wrap=True)
+    lines = [_printable(line) for line in why.split("\n")]
+    if len(lines) > _MOST_LINES:
+        lines = [*lines[: _MOST_LINES - 1], f"and {len(lines) - _MOST_LINES + 1} more mistakes"]
+    text = Text.assemble(("fanet:", "bold red"), " ", "\n".join(lines))
+    Console(stderr=True).print(text, highlight=False, soft_wrap=True)
     return 2
+
+
+def _printable(line: str) -> str:
+    """A line that may hold what somebody else wrote: what would move the cursor is escaped, and the middle left out."""
+    shown = "".join(c if c.isprintable() else repr(c)[1:-1] for c in line)
+    return shown if len(shown) <= _LONGEST_LINE else f"{shown[: _LONGEST_LINE - 200]} ... {shown[-190:]}"
 
 
 def main() -> None:
@@ -73,6 +88,12 @@ def main() -> None:
         nobody_reads()
     except FanetError as error:
         code = refused(str(error))
+    except OSError as error:
+        if error.errno not in _NO_ROOM:
+            raise
+        code = refused(f"{error.filename or 'standard output'}: cannot be written: {error.strerror}")
+    except MemoryError:
+        code = refused("not enough memory, or the limit of this shell is too low (ulimit -v)")
     except ModuleNotFoundError as error:
         from fanet_mw.installation import missing_extra
 

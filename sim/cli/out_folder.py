@@ -4,6 +4,7 @@ It is checked first, because a run may take an hour, and its result has nowhere 
 """
 
 import contextlib
+import os
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,7 +14,7 @@ from emulator.pcap_file import NAME as CAPTURE
 from emulator.pcap_file import captures
 from fanet_mw.errors import ConfigError
 from sim.report import names
-from sim.results.file_names import RUN_FILES
+from sim.results.file_names import RESERVED, RUN_FILES
 
 _MOST_SAID: Final = 8
 
@@ -27,8 +28,8 @@ def prepare(out: Path, *, force: bool) -> None:
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=out) as file:
             file.write(b"a run would be lost")
-        named = (out / name for name in (*RUN_FILES, *names.PAGES))
-        used = [path for path in (*named, *captures(out / CAPTURE), *names.pictures(out)) if path.exists()]
+        named = (out / name for name in (*RUN_FILES, *names.PAGES, *RESERVED))
+        used = [path for path in (*named, *captures(out / CAPTURE), *names.pictures(out)) if os.path.lexists(path)]
         if used and not force:
             raise ConfigError(
                 f"--out {out}: holds the result of another run ({_said(used)}); "

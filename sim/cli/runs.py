@@ -6,6 +6,7 @@ A command parses, shows progress and returns an exit code. It imports the functi
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, suppress
+from functools import partial
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any
@@ -50,6 +51,7 @@ def simulate(
     from emulator.kernel.compile import COMPILING_NOTICE, must_compile, warm_up
     from emulator.pcap_file import PcapFile
     from fanet_mw.hosts import interrupts
+    from sim.results.files import begun
     from sim.run.virtual import EPOCH_UNIX_NS
     from sim.run.virtual import simulate as run
 
@@ -62,7 +64,12 @@ def simulate(
     signals: list[int] = []
     path = output.capture_path()
     capture = PcapFile(path, chosen.radio, receptions=output.pcap_receptions) if path else nullcontext()
-    with _progress(chosen, quiet=output.json) as tell, capture as file, interrupts.handed_to(signals.append):
+    with (
+        begun(output.out),
+        _progress(chosen, quiet=output.json) as tell,
+        capture as file,
+        interrupts.handed_to(signals.append),
+    ):
         if file is not None:
             file.pcap.epoch_unix_ns = EPOCH_UNIX_NS
         outcome = run(
@@ -113,6 +120,7 @@ def launch(
     """
     import asyncio
 
+    from sim.results.files import begun
     from sim.run.launcher.swarm import launch as run
 
     chosen = with_engine(choice.realtime_scenario(scenario))
@@ -120,7 +128,7 @@ def launch(
     print_notes(chosen)
     warn_of(listen, listens=True)
     warn_of(connect, listens=False)
-    with _watched(chosen, quiet=output.json) as tell:
+    with begun(output.out), _watched(chosen, quiet=output.json) as tell:
         outcome = asyncio.run(
             run(
                 chosen,
@@ -214,11 +222,12 @@ def _finish(outcome: "Outcome", output: OutputFlags) -> int:
     from sim.results import printed_summary
     from sim.results.files import finish
 
-    summary: dict[str, Any] = finish(outcome, out=output.out)
+    page = None
     if output.report and output.out is not None:
         from sim.report.page import write
 
-        write([output.out], output.out)
+        page = partial(write, [output.out], output.out)
+    summary: dict[str, Any] = finish(outcome, out=output.out, page=page)
     if output.json:
         sys.stdout.write(dumps(summary, indent=2) + "\n")
     else:
@@ -227,7 +236,6 @@ def _finish(outcome: "Outcome", output: OutputFlags) -> int:
         if output.out is not None:
             console.print(f"written to {output.out}")
     for name, why in summary["unwritten"].items():
-        _err.print(f"{name} in --out {output.out} ends early: {why}", highlight=False, soft_wrap=True)
-    if summary["unwritten"]:
-        return 1
+        _err.print(f"{name} in --out {output.out} ends early or is missing: {why}", highlight=False, soft_wrap=True,
+                   markup=False)  # fmt: skip
     return 0 if summary["valid"] else 1

@@ -11,6 +11,7 @@ from typing import Any
 
 from pyarrow import Table
 
+from fanet_mw.errors import ConfigError
 from sim.figures.statistics import Interval, interval
 from sim.sweep.measures import DELAY_EDGES_S
 
@@ -23,6 +24,8 @@ class Runs:
     """The rows of a sweep's table, one per run; failed runs are counted and left out of everything else."""
 
     def __init__(self, table: Table) -> None:
+        if missing := {"status", "seed", "code"} - {*table.column_names}:
+            raise ConfigError(f"the table has no column {', '.join(sorted(missing))}, so it is not of a sweep")
         rows = table.drop_columns([name for name in ("scenario", "summary") if name in table.column_names]).to_pylist()
         self.rows: list[Row] = [row for row in rows if row["status"] == "ok"]
         self.failed = len(rows) - len(self.rows)

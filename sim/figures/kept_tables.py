@@ -9,7 +9,7 @@ from typing import Final
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from fanet_mw.errors import ConfigError
+from sim.results.run_table import read_parquet
 
 _LEFT_OUT: Final = ("summary", "trace_sha256")
 """The summary as JSON, whose figures are columns, and the hash of each trace, which nothing compresses: half of the
@@ -27,10 +27,7 @@ def keep(table: pa.Table, folder: Path, sweep: str, variant: str) -> Path:
 def read_kept(folder: Path, sweep: str, variant: str) -> pa.Table | None:
     """The kept table of a sweep; None if there is none."""
     path = _path(folder, sweep, variant)
-    try:
-        return pq.read_table(path) if path.exists() else None
-    except (OSError, pa.ArrowException) as error:
-        raise ConfigError(f"{path}: cannot be read: {error}") from error
+    return read_parquet(path, follow=True) if path.exists() else None
 
 
 def _path(folder: Path, sweep: str, variant: str) -> Path:

@@ -41,4 +41,6 @@ def render(recipe: Recipe, table: Table, folder: Path, *, variant: str = "quick"
         (folder / f"{recipe.name}.json").write_text(f"{json.dumps(about, indent=2)}\n", encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"{folder}: cannot be written: {error.strerror}") from error
+    except (KeyError, IndexError, TypeError, ArithmeticError) as error:  # a table that is not of this sweep
+        raise ConfigError(f"{recipe.name}: cannot be drawn from this table: {error!r}") from error
     return claims

@@ -8,6 +8,7 @@ import csv
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
+from io import BytesIO
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -18,6 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
+from fanet_mw.whole_file import replace_file
 from sim.figures.colors import BLUE, GRAY, GREEN, ORANGE, PINK, RED
 from sim.figures.statistics import Interval
 
@@ -191,8 +193,10 @@ def band(
 def save(figure: Figure, folder: Path, name: str) -> list[Path]:
     """Write PNG and SVG; the same figure always gives the same bytes."""
     paths = [folder / f"{name}.png", folder / f"{name}.svg"]
-    figure.savefig(paths[0], metadata={"Software": None})
-    figure.savefig(paths[1], metadata={"Date": None})
+    for path, unnamed in zip(paths, ("Software", "Date"), strict=True):
+        content = BytesIO()
+        figure.savefig(content, format=path.suffix[1:], metadata={unnamed: None})
+        replace_file(path, content.getvalue())
     return paths
 
 

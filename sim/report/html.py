@@ -4,11 +4,16 @@ it.
 
 import base64
 import html
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from fanet_mw.foreign_file import read_regular
+
+_MOST_BYTES: Final = 1 << 26
+"""The greatest size of a picture."""
 _STYLE: Final = """
 body { font: 16px/1.5 system-ui, sans-serif; color: #1a1a1a; max-width: 72rem; margin: 2rem auto; padding: 0 1.2rem; }
 h1 { font-size: 1.7rem; } h2 { font-size: 1.3rem; margin-top: 2.5rem; border-bottom: 1px solid #ccc; }
@@ -38,6 +43,13 @@ class Text:
 
 
 @dataclass(frozen=True, slots=True)
+class Quoted:
+    """A paragraph that somebody else has written: shown as it is, whatever it would mean in HTML or Markdown."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class Commands:
     """Lines to be typed into a shell."""
 
@@ -60,7 +72,11 @@ class Rows:
     rows: Sequence[Sequence[str]]
 
 
-Block = Heading | Text | Commands | Picture | Rows
+Block = Heading | Text | Quoted | Commands | Picture | Rows
+_FIRST: Final = re.compile(r"^(\d*)([-+=.)#>])")
+"""The beginning of a line that Markdown would take for that of a list, a heading or a quotation."""
+_INSIDE: Final = re.compile(r"[\\`*_\[\]|~@]|:(?=//)|(?<=www)\.", re.IGNORECASE)
+"""The characters inside a line to which Markdown gives a meaning, among them those that make addresses links."""
 _VERDICTS: Final = ("agrees", "partly", "differs")
 
 
@@ -77,12 +93,13 @@ def _html(block: Block) -> str:
     match block:
         case Heading(text, level):
             return f"<h{level}>{html.escape(text)}</h{level}>"
-        case Text(text):
+        case Text(text) | Quoted(text):
             return f"<p>{html.escape(text)}</p>"
         case Commands(lines):
             return f"<pre>{html.escape(chr(10).join(lines))}</pre>"
         case Picture(path, caption):
-            image, said = base64.b64encode(path.read_bytes()).decode(), html.escape(caption)
+            image = base64.b64encode(read_regular(path, most_bytes=_MOST_BYTES, follow=False)).decode()
+            said = html.escape(caption)
             drawn = f'<img alt="{said}" src="data:image/png;base64,{image}">'
             return f"<figure>{drawn}<figcaption>{said}</figcaption></figure>"
         case Rows(head, rows):
@@ -106,19 +123,30 @@ def as_markdown(title: str, blocks: Iterable[Block], folder: Path) -> str:
 def _markdown(block: Block, folder: Path) -> str:
     match block:
         case Heading(text, level):
-            return f"{'#' * level} {text}"
+            return f"{'#' * level} {_without_tags(text)}"
         case Text(text):
             return text
+        case Quoted(text):
+            return _inert(_FIRST.sub(r"\1\\\2", " ".join(text.split())))
         case Commands(lines):
             return "\n".join(["```", *lines, "```"])
         case Picture(path, caption):
             place = path.resolve()
             near = place.relative_to(folder) if place.is_relative_to(folder) else place
-            return f"![{caption}]({near.as_posix()})"
+            return f"![{_without_tags(caption).replace(']', ')')}]({near.as_posix()})"
         case Rows(head, rows):
             table: list[Sequence[str]] = [head, ["---"] * len(head), *rows]
             return "\n".join(f"| {' | '.join(_plain(cell) for cell in line)} |" for line in table)
 
 
 def _plain(text: str) -> str:
-    return text.replace("|", "\\|").replace("\n", "<br>")
+    return _without_tags(text).replace("|", "\\|").replace("\n", "<br>")
+
+
+def _without_tags(text: str) -> str:
+    """Text in which nothing is HTML or the beginning of a link."""
+    return text.replace("<", "&lt;").replace("](", "] (").replace("![", "! [")
+
+
+def _inert(text: str) -> str:
+    return _INSIDE.sub(r"\\\g<0>", text).replace("&", "&amp;").replace("<", "&lt;")

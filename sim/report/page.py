@@ -2,15 +2,20 @@
 commands.
 """
 
-import json
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Annotated, Any, Final, Literal, NamedTuple
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.foreign_file import json_of, read_regular
+from fanet_mw.whole_file import replace_file
 from sim.figures.paper_claims import BEYOND
 from sim.report.html import Block, Commands, Heading, Picture, Rows, Text, as_html, as_markdown
-from sim.report.run_page import blocks_of_run, is_run
+from sim.report.run_page import blocks_of_run
+from sim.results.run_folder import checked, holds_run
 
 _TITLE: Final = "Reliable Flying IoT Networks for UAV Disaster Rescue Operations, recreated"
 _ORDER: Final = (
@@ -125,6 +130,49 @@ _SETTINGS: Final = (
 )
 """The settings of the paper beside those here."""
 
+Sentence = Annotated[str, Field(max_length=10_000)]
+Word = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.+-]{1,64}$")]
+
+
+class _FigureShape(BaseModel):
+    model_config = ConfigDict(extra="allow", strict=True)
+
+
+class _FigureStatement(_FigureShape):
+    text: Sentence
+
+
+class _FigureReason(_FigureShape):
+    text: Sentence
+    shown: bool
+    set_afterwards: Sentence = ""
+    statements: list[_FigureStatement]
+
+
+class _FigureClaim(_FigureShape):
+    figure: int
+    claim: Sentence
+    verdict: Literal["agrees", "partly", "differs"]
+    statements: list[_FigureStatement]
+    reasons: list[_FigureReason]
+
+
+class _FigureAbout(_FigureShape):
+    """The file of one figure."""
+
+    name: Word
+    title: Sentence
+    caption: Sentence
+    sweep: Word
+    variant: Word
+    runs: int
+    failed: int
+    seeds: int
+    code: list[Word]
+    runs_by_code: dict[Word, int] = {}
+    claims: list[_FigureClaim]
+
+
 _COLUMNS: Final = ("claim", "findings", "verdict", "why")
 """The columns of the table of claims; the last one is left out if no claim needs a reason."""
 
@@ -136,7 +184,7 @@ def write(folders: Sequence[Path], out: Path) -> list[Path]:
         title, blocks = _blocks(folders, out)
         pages = {out / "report.html": as_html(title, blocks), out / "report.md": as_markdown(title, blocks, out)}
         for path, text in pages.items():
-            path.write_text(text, encoding="utf-8")
+            replace_file(path, text.encode())
     except OSError as error:
         raise ConfigError(f"{error.filename or out}: {error.strerror}") from error
     return list(pages)
@@ -144,11 +192,13 @@ def write(folders: Sequence[Path], out: Path) -> list[Path]:
 
 def _blocks(folders: Sequence[Path], out: Path) -> tuple[str, list[Block]]:
     figures = [found for folder in folders for found in _figures(folder)]
-    runs = [folder for folder in folders if is_run(folder)]
+    runs = [folder for folder in folders if holds_run(folder)]
     for folder in folders:
         if folder not in runs and not _figures(folder):
             sweep = (
-                ", but a sweep, whose table fanet_mw.results.read gives" if (folder / "runs.parquet").exists() else ""
+                ", but a sweep, whose table fanet_mw.results.read gives"
+                if os.path.lexists(folder / "runs.parquet")
+                else ""
             )
             raise ConfigError(
                 f"{folder}: holds neither figures (fanet figures) nor a run (fanet simulate --out){sweep}"
@@ -197,8 +247,16 @@ def _all(folders: Sequence[Path]) -> list[tuple[Path, dict[str, Any]]]:
 
 def _figures(folder: Path) -> list[tuple[Path, dict[str, Any]]]:
     """The figures that `fanet figures` has left in a folder, in the order of the paper."""
-    names = [name for name in _ORDER if (folder / f"{name}.json").exists() and (folder / f"{name}.png").exists()]
-    return [(folder, json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))) for name in names]
+    names = [name for name in _ORDER if all(os.path.lexists(folder / f"{name}.{kind}") for kind in ("json", "png"))]
+    return [(folder, _about(folder / f"{name}.json")) for name in names]
+
+
+def _about(path: Path) -> dict[str, Any]:
+    """What `fanet figures` has written about one figure; raises ConfigError."""
+    about: dict[str, Any] = json_of(read_regular(path, follow=False), source=str(path))
+    if checked(TypeAdapter(_FigureAbout), about, path).name != path.stem:
+        raise ConfigError(f"{path}: is about another figure, {about['name']}")
+    return about
 
 
 def _overview(figures: Sequence[tuple[Path, dict[str, Any]]]) -> list[Block]:

@@ -31,6 +31,7 @@ from fanet_mw.trace import (
     RoleChanged,
 )
 from fanet_mw.units import NodeId, S
+from fanet_mw.whole_file import replace_file
 from sim.figures import colors
 from sim.results.replay import Replay
 from sim.world.environment.obstacles import Box, obstacles
@@ -53,7 +54,7 @@ def write(replay: Replay, path: Path) -> None:
     for name, value in _COLORS.items():
         template = template.replace(f"%{name}%", value)
     try:
-        path.write_text(template.replace("%CONTENT%", text), "utf-8")
+        replace_file(path, template.replace("%CONTENT%", text).encode())
     except OSError as error:
         raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
 

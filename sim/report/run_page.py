@@ -2,42 +2,34 @@
 the mission achieved.
 """
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from fanet_mw.scenario import config
+from fanet_mw.whole_file import require_folder
 from sim.figures.style import applied, save
 from sim.report import mission_pictures, run_pictures, run_rows
-from sim.report.html import Block, Commands, Heading, Picture, Text
+from sim.report.html import Block, Commands, Heading, Picture, Quoted, Text
 from sim.report.names import KINDS, PICTURES
-from sim.report.run_records import SHOWN, RunRecords, agents
-from sim.results.file_names import LINKS_FILE, REPORTS_FILE, SCENARIO_FILE, SUMMARY_FILE, TRACE_FILE
+from sim.report.run_records import SHOWN, RunRecords
 from sim.results.printed_summary import clock_sentence
-from sim.results.trace_file import read_trace
-
-
-def is_run(folder: Path) -> bool:
-    """True for a folder of `fanet simulate --out` or `fanet launch --out`."""
-    return all((folder / name).exists() for name in (SUMMARY_FILE, SCENARIO_FILE, TRACE_FILE))
+from sim.results.run_folder import RunFolder
 
 
 def blocks_of_run(folder: Path, out: Path) -> list[Block]:
     """The page of one run; its pictures go to a folder beside the page."""
-    summary = json.loads((folder / SUMMARY_FILE).read_text(encoding="utf-8"))
-    scenario = config.load(folder / SCENARIO_FILE)
-    run = RunRecords(scenario)
-    run.read(read_trace(folder, *SHOWN))
-    links, reports = _content(folder / LINKS_FILE, []), agents(_content(folder / REPORTS_FILE, {}))
+    found = RunFolder(folder)
+    summary, run = found.summary, RunRecords(found.scenario)
+    run.read(found.records(*SHOWN))
+    links, reports = found.links(), found.agents()
     pictures = out / PICTURES
-    pictures.mkdir(parents=True, exist_ok=True)
+    require_folder(pictures)
     name = f"{summary['scenario']}-{summary['seed']}"
     blocks: list[Block] = [
         Heading(f"{summary['scenario']}, seed {summary['seed']}, {summary['nodes']} nodes"),
-        Text(scenario.description),
-        Text("The result may be used." if summary["valid"] else f"NOT VALID: {'; '.join(summary['invalid_because'])}."),
+        Quoted(run.scenario.description),
+        *_verdict(summary),
         *_slowed(summary),
         Heading("Network", 3),
         run_rows.network(summary),
@@ -82,6 +74,13 @@ def _drawings(
     )
 
 
+def _verdict(summary: Mapping[str, Any]) -> list[Block]:
+    """Whether the result may be used, and if not, why."""
+    if summary["valid"]:
+        return [Text("The result may be used.")]
+    return [Quoted(f"NOT VALID: {'; '.join(summary['invalid_because'])}.")]
+
+
 def _nothing() -> None:
     """No picture."""
 
@@ -91,7 +90,3 @@ def _slowed(summary: Mapping[str, Any]) -> list[Block]:
     if not summary.get("slowed"):
         return []
     return [Text(f"The machine could not keep up{clock_sentence(summary)}.")]
-
-
-def _content(path: Path, missing: Any) -> Any:  # noqa: ANN401 JSON of a run
-    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else missing

@@ -3,7 +3,7 @@
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from agents.applications.traffic import targets_of
 from fanet_mw.errors import ConfigError
@@ -128,12 +128,3 @@ def _length(track: Sequence[Posed]) -> float:
     """The extent of a track on the map [m]."""
     east, north = [one.east_m for one in track], [one.north_m for one in track]
     return max(max(east) - min(east), max(north) - min(north))
-
-
-def agents(reports: Mapping[str, Any]) -> dict[int, Mapping[str, Any]]:
-    """The last report of each UAV, by node id."""
-    return {
-        int(name.removeprefix("agent-")): report
-        for name, report in reports.items()
-        if name.startswith("agent-") and name.removeprefix("agent-").isdecimal()
-    }

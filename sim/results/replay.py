@@ -19,8 +19,7 @@ from typing import Any, Final, NamedTuple, Self, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from fanet_mw.errors import ConfigError
-from fanet_mw.scenario import Scenario, config
+from fanet_mw.scenario import Scenario
 from fanet_mw.trace import (
     Approaching,
     Arrived,
@@ -35,9 +34,8 @@ from fanet_mw.trace import (
     RoleChanged,
 )
 from fanet_mw.units import Enu, NodeId, S
-from sim.results.file_names import SCENARIO_FILE
 from sim.results.mission import Confirmations, OverflownCells, mission
-from sim.results.trace_file import read_trace
+from sim.results.run_folder import RunFolder
 from sim.world.environment.survivors import place
 
 UNHEARD: Final = "not heard"
@@ -96,11 +94,8 @@ class Replay:
         """Read what `fanet simulate --out` or `fanet launch --out` has written, or records of these kinds alone; raises
         ConfigError.
         """
-        try:
-            scenario = config.load(folder / SCENARIO_FILE)
-        except ConfigError as error:
-            raise ConfigError(f"{folder}: cannot be replayed: {error}") from error
-        return cls(scenario, list(read_trace(folder, *kinds)))
+        found = RunFolder(folder)
+        return cls(found.scenario, list(found.records(*kinds)))
 
     def at(self, t_s: float) -> Mapping[NodeId, UavState]:
         """The states of all UAVs at an instant. A wreck is where it was last seen flying."""

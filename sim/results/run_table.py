@@ -1,18 +1,22 @@
 """Results as a table: one row per run, for a notebook. `read` takes the folder of a sweep, or of a single run."""
 
 import json
-import tomllib
+import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from fanet_mw.errors import ConfigError
-from sim.results.file_names import SCENARIO_FILE, SUMMARY_FILE
+from fanet_mw.foreign_file import open_regular
+from sim.results.file_names import SUMMARY_FILE
 from sim.results.flat_summary import flat
+from sim.results.run_folder import RunFolder
 
 if TYPE_CHECKING:
     from pyarrow import Table
 
-_SWEEP = "runs.parquet"
+_SWEEP: Final = "runs.parquet"
+_MOST_BYTES: Final = 1 << 31
+"""The greatest size of a table, packed and unpacked."""
 
 
 def read(*folders: str | Path) -> "Table":
@@ -33,22 +37,35 @@ def read(*folders: str | Path) -> "Table":
 
 def _read(folder: Path) -> "Table":
     import pyarrow as pa
+
+    if folder.is_file():
+        return read_parquet(folder, follow=True)
+    if os.path.lexists(folder / _SWEEP):
+        return read_parquet(folder / _SWEEP)
+    if os.path.lexists(folder / SUMMARY_FILE):
+        return pa.Table.from_pylist([_row(folder)])
+    raise ConfigError(f"{folder}: holds neither {_SWEEP} (of a sweep) nor {SUMMARY_FILE} (of a run)")
+
+
+def read_parquet(path: Path, *, follow: bool = False) -> "Table":
+    """The table of a regular file of bounded size, also when it is unpacked; raises ConfigError."""
+    import pyarrow as pa
     import pyarrow.parquet as pq
 
-    path = folder if folder.is_file() else folder / _SWEEP
-    try:
-        if path.exists():
-            return pq.read_table(path)
-        if (folder / SUMMARY_FILE).exists():
-            return pa.Table.from_pylist([_row(folder)])
-    except (OSError, ValueError, pa.ArrowException) as error:
-        raise ConfigError(f"{path}: cannot be read: {error}") from error
-    raise ConfigError(f"{folder}: holds neither {_SWEEP} (of a sweep) nor {SUMMARY_FILE} (of a run)")
+    with open_regular(path, most_bytes=_MOST_BYTES, follow=follow) as file:
+        try:
+            found = pq.ParquetFile(file)
+            size = sum(found.metadata.row_group(i).total_byte_size for i in range(found.metadata.num_row_groups))
+            if not 0 <= size <= _MOST_BYTES:
+                raise ConfigError(f"{path}: cannot be read: {size} bytes when unpacked, at most {_MOST_BYTES}")
+            return found.read()
+        except (OSError, pa.ArrowException) as error:
+            raise ConfigError(f"{path}: cannot be read: {str(error)[:200]}") from error
 
 
 def _row(folder: Path) -> dict[str, Any]:
     """A single run as one row with the same columns."""
-    text = (folder / SUMMARY_FILE).read_text(encoding="utf-8")
-    scenario = tomllib.loads((folder / SCENARIO_FILE).read_text(encoding="utf-8"))
-    row: dict[str, Any] = {"seed": scenario.get("seed"), "status": "ok", **flat(json.loads(text))}
-    return {**row, "scenario": json.dumps(scenario), "summary": text}
+    run = RunFolder(folder)
+    scenario = run.scenario.model_dump(mode="json", exclude_none=True)
+    row: dict[str, Any] = {"seed": scenario["seed"], "status": "ok", **flat(run.summary)}
+    return {**row, "scenario": json.dumps(scenario), "summary": run.text.decode()}

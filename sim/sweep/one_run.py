@@ -66,7 +66,7 @@ def carry_out(task: Task) -> Finished:
         summary = finish(outcome, out=None)
         if task.realtime and not summary["valid"]:
             raise HostError(f"not valid: {'; '.join(summary['invalid_because'])}")
-        del summary["wall_s"], summary["unwritten"]
+        del summary["wall_s"], summary["unwritten"], summary["files"]
         measured: dict[str, Value] = {name: MEASURES[name](outcome) for name in task.measure}
     except Exception as error:  # noqa: BLE001 one run of many: the others go on, and the table names this one
         lines = error.args[0] if isinstance(error, FanetError) and error.args else traceback.format_exc()

@@ -23,7 +23,6 @@ differences of pairs (common random numbers).
 """
 
 import itertools
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -32,7 +31,8 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from fanet_mw.errors import ConfigError
-from fanet_mw.scenario.text_files import decoded, read_text
+from fanet_mw.foreign_file import toml_of
+from fanet_mw.scenario.text_files import read_text
 from sim.scenarios.shipped import is_file
 from sim.sweep.toml_values import toml_value
 
@@ -205,17 +205,14 @@ def is_sweep(name: str) -> bool:
     if not is_file(name, shipped()):
         return name in shipped()
     try:
-        return "base" in tomllib.loads(decoded(Path(name).read_bytes()))
-    except (OSError, UnicodeError, tomllib.TOMLDecodeError):
+        return "base" in toml_of(read_text(Path(name), what=name), source=name)
+    except ConfigError:
         return False
 
 
 def parse(text: str, *, source: str) -> Sweep:
     """The sweep of some TOML text; raises ConfigError with every mistake."""
-    try:
-        tree = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{source}: not valid TOML: {error}") from error
+    tree = toml_of(text, source=source)
     try:
         return Sweep.model_validate(tree)
     except ValidationError as error:

@@ -11,15 +11,21 @@ order of the runs: the same sweep with the same code gives the same table.
 import contextlib
 import fcntl
 import os
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import pyarrow as pa
 import pyarrow.parquet as pq
+from pydantic import TypeAdapter, ValidationError
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.foreign_file import json_of
+from fanet_mw.whole_file import require_folder
+from sim.results.run_folder import checked
+from sim.results.run_table import read_parquet
 from sim.sweep.one_run import Finished
 from sim.sweep.table import table_of
 from sim.sweep.tasks import Task
@@ -31,6 +37,11 @@ _SCHEMA: Final = pa.schema(
         for field in fields(Finished)
     ]
 )  # fmt: skip
+_UNFINISHED: Final = re.compile(r"\d{6,}-\d+\.tmp")
+_PART: Final = re.compile(r"\d{6,12}\.parquet")
+"""The names of files that this store makes; no others are read or removed."""
+_ROW: Final = TypeAdapter(Finished)
+_TABLE: Final = TypeAdapter(dict[str, Any])
 _MERGE_AT: Final = 200
 """The number of files with single runs that are merged into one, because a folder with thousands is slow to read."""
 
@@ -48,17 +59,24 @@ class Store:
     def read(self) -> None:
         """Read what earlier sweeps have finished here; half-written files are removed."""
         try:
-            self._parts.mkdir(parents=True, exist_ok=True)
-            for left in self._parts.glob("*.tmp"):
-                left.unlink()
-            self._files = sorted(self._parts.glob("*.parquet"))
+            require_folder(self._parts)
+            names = sorted(path.name for path in self._parts.iterdir())
+            for left in filter(_UNFINISHED.fullmatch, names):
+                (self._parts / left).unlink()
+            self._files = [self._parts / name for name in names if _PART.fullmatch(name)]
             for path in self._files:
-                for row in pq.read_table(path).to_pylist():
-                    self._finished[row["key"]] = Finished(**row)
+                for row in read_parquet(path).to_pylist():
+                    done = _ROW.validate_python(row)
+                    for text in (done.summary or "{}", done.measured):
+                        checked(_TABLE, json_of(text.encode(), source=str(path)), path)
+                    if done.failed and not done.error:
+                        raise ConfigError(f"{path}: run {done.key} has neither a summary nor an error")
+                    self._finished[done.key] = done
         except OSError as error:
             raise ConfigError(f"--out {self.folder}: cannot be written: {error.strerror}") from error
-        except pa.ArrowException as error:
-            raise ConfigError(f"--out {self.folder}: {error}") from error
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            raise ConfigError(f"{path}: {'.'.join(map(str, first['loc']))}: {first['msg'].lower()}") from error
         self._next = max((int(path.stem) for path in self._files), default=0) + 1
 
     def get(self, key: str) -> Finished | None:
@@ -100,7 +118,7 @@ class Store:
         """Lock the folder against other processes; raises ConfigError if another one has locked it."""
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            lock = os.open(self.folder / ".lock", os.O_CREAT | os.O_RDWR)
+            lock = os.open(self.folder / ".lock", os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK)
         except OSError as error:
             raise ConfigError(f"--out {self.folder}: cannot be written: {error.strerror}") from error
         try:
@@ -115,7 +133,8 @@ class Store:
 def write_whole(path: Path, table: pa.Table) -> None:
     """Write a table so that the file is either complete or missing, even if the process or the machine dies."""
     fresh = path.with_name(f"{path.stem}-{os.getpid()}.tmp")
-    with fresh.open("wb") as file:  # with the mode that the umask gives, so that colleagues may read it
+    fresh.unlink(missing_ok=True)
+    with fresh.open("xb") as file:  # with the mode that the umask gives, so that colleagues may read it
         pq.write_table(table, file, compression="zstd")
         file.flush()
         os.fsync(file.fileno())

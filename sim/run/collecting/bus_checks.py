@@ -36,6 +36,8 @@ from fanet_mw.wire.survivors import is_person
 
 _SLACK_NS: Final = 10 * S
 """How far an instant may lie outside the scenario's time, because processes start before it and end after it."""
+_FARTHEST_M: Final = 1e7
+"""How far from the origin anything can be."""
 _DEEPEST: Final = 6
 """The greatest depth of nesting in a report's JSON."""
 _MOST_RSSI_MDBM: Final = 400_000
@@ -125,6 +127,7 @@ class _Emulator(_Checked):
     controls: Count
     refused: Reasons
     handed: Reasons
+    capture_failed: str | None = None
 
 
 class _SeparationReport(_Checked):
@@ -181,6 +184,13 @@ class BusChecks:
                 return "node"
         elif record.node != self.node_of[name] or not record.node:
             return "speaker" if 1 <= record.node <= self._nodes else "node"
+        return self.named(record)
+
+    def named(self, record: Record) -> str | None:
+        """What is wrong with the nodes, the survivor, the instant or the place that a record names."""
+        kind = type(record)
+        if not 0 <= record.node <= self._nodes:
+            return "node"
         if not -_SLACK_NS <= record.t_ns <= self._until_ns:
             return "instant"
         if any(not 0 <= getattr(record, field, 0) <= self._nodes for field in _ABOUT_NODES):
@@ -190,6 +200,8 @@ class BusChecks:
         of_person = kind in _ABOUT_PERSONS and is_person(survivor)
         if not of_person and not least <= survivor <= max(1, self._survivors):
             return "survivor"
+        if any(abs(getattr(record, field, 0.0)) > _FARTHEST_M for field in ("east_m", "north_m", "up_m")):
+            return "place"
         return None
 
     def tap(self, tap: MavlinkTap) -> str | None:

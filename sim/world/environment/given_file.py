@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.foreign_file import read_regular
 from fanet_mw.scenario.named_files import MOST_BYTES, digest_of_bytes
 
 
@@ -11,11 +12,9 @@ def content(path: Path, *, key: str, digest: str = "") -> bytes:
     one with this digest.
     """
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise ConfigError(f"{key}: {path} must be at most {MOST_BYTES // 2**20} MB")
-        data = path.read_bytes()
-    except OSError as error:
-        raise ConfigError(f"{key}: {path} cannot be read: {error.strerror}") from error
+        data = read_regular(path, most_bytes=MOST_BYTES)
+    except ConfigError as error:
+        raise ConfigError(f"{key}: {error}") from error
     if digest and digest != digest_of_bytes(data):
         raise ConfigError(f"{key}: {path} has changed since the scenario was read")
     return data

@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 from fanet_mw.trace import Confirmed, Detected, Generated, LetOut, Posed, Record, Refuted, RoleChanged
 from fanet_mw.units import MS, S
 from sim.report import mission_pictures, run_pictures, run_rows
-from sim.report.run_records import RunRecords, agents
+from sim.report.run_records import RunRecords
 from sim.results.mission import mission
 from sim.run.virtual import simulate
 
@@ -175,7 +175,7 @@ def test_turns_that_nodes_claim_are_those_in_which_they_let_packets_out(make_sce
         "routing.protocol": "clustered", "clusters.relay": "claimed", "radio.lead_ms": 0,
     })  # fmt: skip
     outcome = simulate(scenario)
-    reports = agents(outcome.reports)
+    reports = {node: outcome.reports[f"agent-{node}"] for node in scenario.node_ids}
     drawing = run_pictures.slots(run_of(scenario, *outcome.records), reports)
     assert drawing is not None
     assert {len(report["turns"]["own"]) > 0 for report in reports.values()} == {True}

@@ -3,15 +3,22 @@
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from fanet_mw import tlog
+from fanet_mw.errors import ConfigError
 from fanet_mw.whole_file import write_items
-from sim.results.files import finish
+from sim.cli.out_folder import prepare
+from sim.results.file_names import RUN_FILES
+from sim.results.files import begin, finish
+from sim.results.run_folder import RunFolder
 from sim.run.outcome import Outcome
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
@@ -28,6 +35,8 @@ def full_after(monkeypatch: pytest.MonkeyPatch, room: int) -> None:
 
     def limited(descriptor: int, data: bytes) -> int:
         nonlocal left
+        if ".summary" in str(Path(f"/proc/self/fd/{descriptor}").readlink()):
+            return write(descriptor, data)  # there is room for it already
         if not left:
             raise OSError(28, os.strerror(28))
         written = write(descriptor, bytes(data[:left]))
@@ -43,19 +52,65 @@ def test_a_full_disk_keeps_what_fits_and_says_what_does_not(
     whole = tmp_path / "whole"
     finish(outcome, out=whole)
     sizes = {path.name: path.stat().st_size for path in whole.iterdir()}
-    small = sum(sizes[name] for name in ("summary.json", "scenario.toml", "reports.json", "links.json"))
+    small = sum(sizes[name] for name in ("scenario.toml", "reports.json", "links.json"))
     with monkeypatch.context() as patch:
+        begin(tmp_path / "full")
         full_after(patch, small + sizes["trace.jsonl"] // 2)
         summary = finish(outcome, out=tmp_path / "full")
     assert summary["unwritten"] == dict.fromkeys(("trace.jsonl", "mavlink.tlog"), "No space left on device")
     assert summary["pdr"] == finish(outcome, out=None)["pdr"]
-    assert json.loads((tmp_path / "full/summary.json").read_text())["pdr"] == summary["pdr"]
+    assert json.loads((tmp_path / "full/summary.json").read_text()) == summary
+    assert not summary["valid"]
+    assert "trace.jsonl ends early or is missing: No space left on device" in summary["invalid_because"]
     kept = (tmp_path / "full/trace.jsonl").read_bytes()
     assert (whole / "trace.jsonl").read_bytes().startswith(kept)
     assert kept.endswith(b"]\n")
     assert sizes["trace.jsonl"] // 2 - 200 < len(kept) <= sizes["trace.jsonl"] // 2
     assert list(tlog.read(tmp_path / "full/mavlink.tlog")) == []
-    assert not (tmp_path / "full/summary.new").exists()
+    assert {path.name for path in (tmp_path / "full").iterdir()} == {*RUN_FILES}
+    assert len(list(RunFolder(tmp_path / "full").records())) == kept.count(b"\n"), "what is there can be looked at"
+
+
+def killed_before_call(number: int, outcome: Outcome, out: Path) -> int:
+    """A child that writes the result and is killed before this write or renaming; returns the signal that ended it."""
+    child = os.fork()
+    if child == 0:
+        left, write, replace = number, os.write, os.replace
+
+        def counted(call: Callable[..., int]) -> Callable[..., int]:
+            def counting(*arguments: Any) -> int:
+                nonlocal left
+                if not left:
+                    os.kill(os.getpid(), signal.SIGKILL)
+                left -= 1
+                return call(*arguments)
+
+            return counting
+
+        os.write, os.replace = counted(write), counted(replace)  # type: ignore[assignment]
+        finish(outcome, out=out)
+        os._exit(0)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+def test_a_run_that_is_killed_while_it_writes_is_no_result(outcome: Outcome, tmp_path: Path) -> None:
+    """Six files are written and the summary is renamed; killed before each of these, and after all."""
+    for number in range(8):
+        out = tmp_path / str(number)
+        begin(out)
+        signaled = killed_before_call(number, outcome, out)
+        summary = json.loads((out / "summary.json").read_text())
+        if number < 7:
+            assert signaled == -signal.SIGKILL
+            assert not summary["valid"]
+            with pytest.raises(ConfigError, match="did not end"):
+                RunFolder(out)
+            prepare(out, force=True)
+            assert list(out.iterdir()) == []
+        else:
+            assert signaled == 0
+            assert summary["valid"]
+            assert len(list(RunFolder(out).records())) > 100
 
 
 def test_a_log_that_is_cut_off_ends_with_a_whole_frame(

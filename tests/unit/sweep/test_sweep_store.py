@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from fanet_mw.errors import ConfigError
@@ -91,11 +92,11 @@ def test_a_sweep_that_is_ended_three_times_and_taken_up_again_is_byte_for_byte_a
 def test_what_is_half_written_is_removed_and_what_is_not_ours_is_left_alone(tmp_path) -> None:
     parts = tmp_path / "finished"
     parts.mkdir()
-    for name in ("half.tmp", "notes.txt"):
+    for name in ("000007-123.tmp", "notes.txt", "mine.tmp", "mine.parquet"):
         (parts / name).write_bytes(b"PAR1 half written")
     store = Store(tmp_path)
     store.read()
-    assert [path.name for path in parts.iterdir()] == ["notes.txt"]
+    assert [path.name for path in parts.iterdir() if path.name[0] == "0"] == []
     assert store.codes() == set()
 
 
@@ -223,3 +224,28 @@ def test_who_may_read_a_table_is_what_the_umask_says(tmp_path: Path) -> None:
         os.umask(before)
     (table,) = tmp_path.iterdir()
     assert table.stat().st_mode & 0o777 == 0o644
+
+
+def test_a_folder_that_leads_elsewhere_or_holds_no_results_of_runs_is_refused(tmp_path: Path) -> None:
+    elsewhere, out = tmp_path / "elsewhere", tmp_path / "out"
+    for folder in (elsewhere, out):
+        folder.mkdir()
+    (elsewhere / "000001-1.tmp").touch()
+    (out / "finished").symlink_to(elsewhere)
+    with pytest.raises(ConfigError, match="finished is no folder of its own"):
+        Store(out).read()
+    assert (elsewhere / "000001-1.tmp").exists()
+    (out / "finished").unlink()
+    (out / ".lock").symlink_to(elsewhere / "made")
+    with pytest.raises(ConfigError), Store(out).alone():
+        pytest.fail("locked")
+    assert not (elsewhere / "made").exists()
+    (out / "finished").mkdir()
+    row = {"key": "a", "code": "b", "wall_s": 1.0, "cpu_s": 1.0, "measured": "{}", "summary": None, "error": None}
+    for wrong in ({"summary": "[1]"}, {"summary": "{"}, {"measured": "NaN"}, {"code": None}, {"wall_s": None}, {}):
+        pq.write_table(pa.Table.from_pylist([{**row, **wrong}]), out / "finished" / "000001.parquet")
+        with pytest.raises(ConfigError, match=r"000001\.parquet"):
+            Store(out).read()
+    (out / "finished" / "000001.parquet").write_bytes(b"PAR1")
+    with pytest.raises(ConfigError, match=r"000001\.parquet"):
+        Store(out).read()

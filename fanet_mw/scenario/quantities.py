@@ -22,7 +22,6 @@ _SUFFIXES: Final[Mapping[str, tuple[str, Mapping[str, str]]]] = {
     "_us": ("us", _TIME),
     "_ms": ("ms", _TIME),
     "_s": ("s", _TIME),
-    "_min": ("min", _TIME),
     "_m": ("m", _LENGTH),
     "_m2": ("m²", {"m2": "1", "m²": "1"}),
     "_per_hour": ("per hour", {"per hour": "1"}),
@@ -45,6 +44,10 @@ _SUFFIXES: Final[Mapping[str, tuple[str, Mapping[str, str]]]] = {
 """The unit for each ending of a key's name, the longest ending first, and the factors of units of
 the same dimension."""
 _QUANTITY: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([a-zA-Zµ°][a-zA-Zµ°/²0-9]*)")
+
+
+_NO_UNIT: Final = frozenset({"nakagami_m"})
+"""Keys whose names end like a unit, but whose values have none: the shape m of a distribution."""
 
 
 def unit_of(key: str) -> str:
@@ -73,6 +76,8 @@ def in_unit_of(key: str, text: str) -> float | None:
 
 
 def _entry(key: str) -> tuple[str, Mapping[str, str]] | None:
+    if key in _NO_UNIT:
+        return None
     return next((entry for suffix, entry in _SUFFIXES.items() if f"_{key}".endswith(suffix)), None)
 
 

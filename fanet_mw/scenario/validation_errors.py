@@ -10,6 +10,7 @@ from typing import Any, Final
 from pydantic import BaseModel, ValidationError
 
 from fanet_mw.scenario.model import Scenario
+from fanet_mw.scenario.tables.sections import NO_TRUTH
 
 _MOST_UNKNOWN: Final = 8
 """More unknown keys than this are named together, by the first ones."""
@@ -36,6 +37,8 @@ def sentence(item: dict[str, Any]) -> str:
     if item["type"] == "extra_forbidden":
         return f"{key}: unknown key{_suggestion(path)}"
     message = str(item["msg"]).removeprefix("Value error, ")
+    if item["type"] == NO_TRUTH:
+        return f"{key}.{message}".lstrip(".")
     if item["type"] == "value_error":
         return message
     value = repr(item["input"])

@@ -4,12 +4,16 @@ The bounds exist so that all that a run computes stays finite: instants fit 64 b
 enough to be counted, powers are those of some radio or noise. They are too wide to restrict any experiment.
 """
 
-from typing import Annotated, Final
+from collections.abc import Mapping
+from typing import Annotated, Any, Final, Literal, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
 
 from fanet_mw.units import MAX_NODES
 
+NO_TRUTH: Final = "no_truth"
+"""The kind of a mistake: `true` where a number is meant. Its message begins with the key within the table."""
 MOST_S: Final = 1e6
 """The longest duration: some eleven days."""
 
@@ -44,3 +48,25 @@ class Section(BaseModel):
     model_config = ConfigDict(
         frozen=True, extra="forbid", validate_default=True, allow_inf_nan=False, use_attribute_docstrings=True
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_truth_for_a_number(cls, tree: object) -> object:
+        """Refuse `true` where a number is meant, which pydantic would take for 1."""
+        for name, value in tree.items() if isinstance(tree, Mapping) else ():
+            field = cls.model_fields.get(name)
+            if field is not None and _has_truth(value) and not {bool, Any} & _types(field.annotation):
+                raise PydanticCustomError(NO_TRUTH, "{key}: must not be true or false", {"key": name})
+        return tree
+
+
+def _has_truth(value: object) -> bool:
+    return isinstance(value, bool) or (isinstance(value, list | tuple) and any(map(_has_truth, value)))
+
+
+def _types(annotation: object) -> set[object]:
+    """All types in an annotation."""
+    if get_origin(annotation) is Literal:
+        return {type(choice) for choice in get_args(annotation)}
+    found: set[object] = {annotation} if isinstance(annotation, type) or annotation is Any else set()
+    return found.union(*map(_types, get_args(annotation)))

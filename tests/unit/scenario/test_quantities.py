@@ -1,5 +1,7 @@
 """A number with a unit is understood or refused, and never taken for a number without one."""
 
+import re
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -7,6 +9,7 @@ from hypothesis import strategies as st
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.scenario.quantities import in_unit_of, unit_of
+from fanet_mw.scenario.reference import tables
 
 
 def scenario(*overrides: str, text: str = "") -> Scenario:
@@ -69,3 +72,36 @@ def test_words_and_plain_text_stay_what_they_are() -> None:
     made = scenario("clusters.guard_ms=auto", "description=5 s", text='name = "a"\n[clusters]\nrelay = "scheduled"')
     assert made.clusters.guard_ms == "auto"
     assert made.description == "5 s"
+
+
+_COUNTS = re.compile(r"\bin slots\b|\bthe shape\b|^(the )?(number of|share of|probability|how often)|exponent\b", re.I)
+
+
+def test_no_key_whose_value_is_a_count_or_a_ratio_has_a_unit_by_the_ending_of_its_name() -> None:
+    keys = [(table.path, key) for table in tables() for key in table.keys]
+    assert len(keys) > 200
+    wrong = [f"{path}.{key.name}" for path, key in keys if unit_of(key.name) and _COUNTS.search(key.meaning)]
+    assert wrong == []
+    assert {key.name for _, key in keys if "in slots" in key.meaning} >= {"cw_min", "cw_max"}
+
+
+@pytest.mark.parametrize("value", ['radio.cw_min="1 h"', 'radio.nakagami_m="0.005km"', 'radio.max_attempts="5 s"'])
+def test_a_unit_for_a_number_without_one_is_refused(value: str) -> None:
+    with pytest.raises(ConfigError, match="unable to parse"):
+        scenario(value)
+
+
+@pytest.mark.parametrize(
+    ("value", "key"),
+    [
+        ("nodes.count=true", "nodes.count"),
+        ("duration_s=true", "duration_s"),
+        ("world.no_fly_m=[[true,0,5]]", "world.no_fly_m"),
+        ("traffic.sources=false", "traffic.sources"),
+        ('faults=[{kind="cut",node=true,at_s=1}]', "faults.0.cut.node"),
+    ],
+)
+def test_true_is_no_number(value: str, key: str) -> None:
+    with pytest.raises(ConfigError, match=f"^a.toml: {key}: must not be true or false$"):
+        scenario(value)
+    assert scenario("clock.sync=none", "routing.aggregate=true").routing.aggregate is True

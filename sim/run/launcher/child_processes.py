@@ -95,6 +95,11 @@ def end_if_imported_by_a_child() -> None:
         os._exit(_LAUNCHES_WHEN_IMPORTED)
 
 
+_started: Final[dict[str, int]] = {}
+"""Which of multiprocessing's helper processes were started here, and by which process; a program of a user's may use
+them, too."""
+
+
 def _nothing() -> None:
     pass
 
@@ -105,6 +110,11 @@ def _start_server() -> None:
     Ctrl-C, the end of a system service and of a terminal send a signal to all of them. The server ignores Ctrl-C only
     after its imports, and a child only from `_child` on; without the block each would print a traceback until then.
     """
+    helpers = {
+        "tracker": resource_tracker._resource_tracker._pid,  # type: ignore[attr-defined]  # noqa: SLF001
+        "server": forkserver._forkserver._forkserver_pid,  # type: ignore[attr-defined]  # noqa: SLF001
+    }
+    _started.update({name: 1 for name, pid in helpers.items() if pid is None}, process=os.getpid())
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGHUP])  # the tracker ignores the other two by itself
     try:
         resource_tracker.ensure_running()  # otherwise the server starts the tracker, which unblocks SIGINT
@@ -212,11 +222,15 @@ class Processes:
 
 @atexit.register
 def end_servers() -> None:
-    """End multiprocessing's helper processes with this process; by themselves they would end some tens of milliseconds
-    later.
+    """End those of multiprocessing's helper processes that this process has started for a swarm; by themselves they
+    would end some tens of milliseconds later.
+
+    Each ends when its last user does, and is waited for. A program with living children of its own is not held up.
     """
-    if multiprocessing.parent_process() is not None:
-        return  # from Python 3.13 on, children come here, too; the helpers belong to their parent
+    if _started.get("process") != os.getpid() or multiprocessing.active_children():
+        return
     # There is no public function for this; CPython's own tests use these calls.
-    forkserver._forkserver._stop()  # type: ignore[attr-defined]  # noqa: SLF001
-    resource_tracker._resource_tracker._stop()  # type: ignore[attr-defined]  # noqa: SLF001
+    if "server" in _started:
+        forkserver._forkserver._stop()  # type: ignore[attr-defined]  # noqa: SLF001
+    if "tracker" in _started:
+        resource_tracker._resource_tracker._stop()  # type: ignore[attr-defined]  # noqa: SLF001

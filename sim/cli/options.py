@@ -6,7 +6,6 @@ The names of the fields are the flags and their docstrings the help text; the co
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -153,24 +152,6 @@ class SwarmFlags:
         """The endpoint and, if it is known, the name of the swarm; warns if others can reach the endpoint."""
         warn_of(self.connect, listens=False)
         return locate(self.connect, self.swarm)
-
-
-def with_engine(scenario: "Scenario") -> "Scenario":
-    """The scenario with an installed world engine: without pybullet it is `kinematic`, which a message says."""
-    world = scenario.world
-    if world.engine != "pybullet" or find_spec("pybullet") is not None:
-        return scenario
-    _err.print(
-        "pybullet is not installed (pip install 'fanet-mw[pybullet]'): world.engine = \"kinematic\" serves instead.",
-        highlight=False,
-        soft_wrap=True,
-        markup=False,
-    )
-    from fanet_mw.scenario import Scenario
-
-    tree = scenario.model_dump()
-    tree["world"]["engine"] = "kinematic"
-    return Scenario.model_validate(tree)
 
 
 def print_notes(scenario: "Scenario") -> None:

@@ -17,7 +17,7 @@ from cyclopts.validators import Number
 from sim.cli.command_groups import RUN
 from sim.cli.completion import ScenarioName
 from sim.cli.console import Console
-from sim.cli.options import OutputFlags, ScenarioFlags, print_notes, warn_of, with_engine
+from sim.cli.options import OutputFlags, ScenarioFlags, print_notes, warn_of
 
 if TYPE_CHECKING:
     from cyclopts import App
@@ -55,7 +55,7 @@ def simulate(
     from sim.run.virtual import EPOCH_UNIX_NS
     from sim.run.virtual import simulate as run
 
-    chosen = with_engine(choice.scenario(scenario))
+    chosen = choice.scenario(scenario)
     output.prepare()
     print_notes(chosen)
     if must_compile():
@@ -123,7 +123,7 @@ def launch(
     from sim.results.files import begun
     from sim.run.launcher.swarm import launch as run
 
-    chosen = with_engine(choice.realtime_scenario(scenario))
+    chosen = choice.realtime_scenario(scenario)
     output.prepare()
     print_notes(chosen)
     warn_of(listen, listens=True)

@@ -9,7 +9,7 @@ from fanet_mw.errors import FanetError
 from sim.cli.command_groups import SERVICE
 from sim.cli.completion import ScenarioName
 from sim.cli.console import Console
-from sim.cli.options import OutputFlags, ScenarioFlags, ServiceFlags, warn_of, with_engine
+from sim.cli.options import OutputFlags, ScenarioFlags, ServiceFlags, warn_of
 from sim.run.bus.running_swarms import DEFAULT_ENDPOINT
 
 _err = Console(stderr=True)
@@ -119,7 +119,7 @@ def world(
     """
     from sim.world.__main__ import run
 
-    chosen = with_engine(choice.realtime_scenario(scenario))
+    chosen = choice.realtime_scenario(scenario)
     return run(chosen, join.address(chosen))
 
 

@@ -10,6 +10,7 @@ from fanet_mw.application import Application
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario, config
 from sim.scenarios import catalog
+from sim.scenarios.available_engine import with_engine
 
 OfUser = Callable[[int], Sequence[Application]] | Mapping[int, Sequence[Application]]
 """A user's applications: a list for each node, or a function that makes the list for a node."""
@@ -23,7 +24,7 @@ def scenario_of(given: Scenario | str | Path, *, seed: int | None = None, overri
         return catalog.find(given, overrides if seed is None else [*overrides, f"seed={seed}"])
     if overrides:
         raise ConfigError("overrides are for scenarios that are named; this one is built already")
-    return given if seed is None else config.build({**given.model_dump(), "seed": seed})
+    return with_engine(given if seed is None else config.build({**given.model_dump(), "seed": seed}))
 
 
 def by_node(applications: object, scenario: Scenario) -> Callable[[int], Sequence[Application]]:

@@ -7,6 +7,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.scenario.text_files import read_text
 from fanet_mw.wire.search_plan import MOST_PLACES
+from sim.scenarios.available_engine import with_engine
 from sim.scenarios.shipped import Entry, entry, is_file, shipped
 
 __all__ = ["Entry", "find", "shipped", "text_of"]
@@ -24,7 +25,10 @@ def find(name: str | Path, overrides: Iterable[str] = ()) -> Scenario:
 
 
 def _searchable(scenario: Scenario, source: str) -> Scenario:
-    """The scenario, if it has enough UAVs for the search that it asks for; raises ConfigError otherwise."""
+    """The scenario with an engine that is there, if it has enough UAVs for the search that it asks for; raises
+    ConfigError otherwise.
+    """
+    scenario = with_engine(scenario)
     search = scenario.mission.search
     if search == "none":
         return scenario

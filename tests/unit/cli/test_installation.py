@@ -10,8 +10,13 @@ from pathlib import Path
 import pytest
 
 from fanet_mw import installation
-from sim.cli.options import with_engine
-from sim.scenarios import catalog
+from fanet_mw.scenario import Scenario, config
+from fanet_mw.scenario.fingerprint import fingerprint
+from sim.cli.options import ScenarioFlags
+from sim.run.arguments import scenario_of
+from sim.scenarios import available_engine, catalog
+from sim.sweep.spec import Sweep
+from sim.sweep.tasks import tasks_of
 
 ROOT = Path(__file__).parents[3]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -112,21 +117,30 @@ def test_a_public_name_that_needs_an_extra_says_which(core_only: Path) -> None:
     ], ended.stderr
 
 
-def test_where_pybullet_is_not_installed_kinematic_serves_and_one_sentence_says_so(
+def test_where_pybullet_is_not_installed_kinematic_serves_for_all_and_one_sentence_says_so(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setitem(sys.modules, "pybullet", None)  # an import of it fails
-
-    assert with_engine(catalog.find("quick")).world.engine == "kinematic"
+    available_engine.say.cache_clear()
+    given = Scenario.model_validate({"world": {"engine": "pybullet"}, "duration_s": 1, "warmup_s": 0})
+    (task, *_) = tasks_of(Sweep(base="quick"))
+    found = {
+        "a command": ScenarioFlags().scenario("quick"),
+        "a service": ScenarioFlags().realtime_scenario("quick"),
+        "simulate": scenario_of("quick"),
+        "simulate of a built one": scenario_of(given),
+        "a sweep": config.build(task.tree),
+        "a scenario with obstacles": catalog.find("town"),
+    }
+    assert {who: scenario.world.engine for who, scenario in found.items()} == dict.fromkeys(found, "kinematic")
+    assert len({fingerprint(found[who]) for who in ("a command", "simulate", "a sweep")}) == 1
     assert capsys.readouterr().err.splitlines() == [
         "pybullet is not installed (pip install 'fanet-mw[pybullet]'): world.engine = \"kinematic\" serves instead."
     ]
-    assert with_engine(catalog.find("town")).world.engine == "kinematic", "which knows obstacles, too"
 
 
 def test_where_pybullet_is_installed_it_serves() -> None:
-    scenario = catalog.find("quick")
-    assert with_engine(scenario) is scenario
+    assert catalog.find("quick").world.engine == "pybullet"
 
 
 def test_everything_together_asks_for_no_pybullet_where_there_is_no_wheel_of_it() -> None:

@@ -85,12 +85,15 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401  (whatever the name stands fo
             value = import_module("sim.scenarios.catalog").find
         else:
             value = getattr(import_module(_HOME_OF[name]), name)
-    except ModuleNotFoundError as error:
-        from fanet_mw.installation import missing_extra
+    except (ImportError, AttributeError) as error:
+        from fanet_mw.installation import damage, missing_extra
 
-        if (why := missing_extra(error, f"fanet_mw.{name}")) is None:
+        extra = missing_extra(error, f"fanet_mw.{name}") if isinstance(error, ModuleNotFoundError) else None
+        if extra is not None:
+            raise ModuleNotFoundError(extra, name=error.name) from error
+        if (why := damage()) is None:
             raise
-        raise ModuleNotFoundError(why, name=error.name) from error
+        raise ImportError(f"fanet_mw.{name}: {why}") from error
     globals()[name] = value
     return value
 

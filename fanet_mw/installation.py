@@ -30,12 +30,25 @@ def damage() -> str | None:
     """What is wrong with this installation, and how to repair it; None if it is complete. No package is imported."""
     for package in PACKAGES:
         spec = find_spec(package)
+        if spec is not None and spec.origin is None and spec.submodule_search_locations:
+            return f"{next(iter(spec.submodule_search_locations))} {_in_the_way(package)}"
         if spec is None or spec.origin is None:
             return f"the package {package!r} of fanet-mw is not there (another distribution removed it?); {_REMEDY}"
         path = Path(spec.origin)
         if _MARK not in path.read_text(encoding="utf-8", errors="replace"):
-            return f"{path.parent} is not the package {package!r} of fanet-mw{_owner(package)}; {_REMEDY}"
+            owner = _owner(package)
+            place = path.parent if path.name == "__init__.py" else path
+            if not owner:
+                return f"{place} {_in_the_way(package)}"
+            return f"{place} is not the package {package!r} of fanet-mw{owner}; {_REMEDY}"
     return None
+
+
+def _in_the_way(package: str) -> str:
+    return (
+        f"is not the package {package!r} of fanet-mw, and comes before it on sys.path; if it is yours, give it another "
+        "name or take its folder off the path"
+    )
 
 
 def missing_extra(error: ModuleNotFoundError, what: str = "this command") -> str | None:

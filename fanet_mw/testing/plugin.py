@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from fanet_mw.installation import damage, missing_extra
+
 if TYPE_CHECKING:
     from sim.run.api import Launched
     from sim.run.virtual_swarm import VirtualSwarm
@@ -30,11 +32,15 @@ LaunchSwarm = Callable[..., contextlib.AbstractAsyncContextManager["Launched"]]
 
 
 def _emulator(module: str) -> Any:  # noqa: ANN401  (a module)
-    """A module that runs swarms; a test that asks for it is skipped where the emulator is not installed."""
+    """A module that runs swarms; a test that asks for it is skipped where the emulator is not installed, and fails
+    where another package stands in its way.
+    """
     try:
         return importlib.import_module(module)
-    except ModuleNotFoundError as error:
-        pytest.skip(f"needs fanet-mw[emulator]: {error}")
+    except (ImportError, AttributeError) as error:
+        if isinstance(error, ModuleNotFoundError) and missing_extra(error) is not None:
+            pytest.skip(f"needs fanet-mw[emulator]: {error}")
+        pytest.fail(damage() or f"{module} cannot be imported: {error}")
 
 
 @pytest.fixture

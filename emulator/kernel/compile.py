@@ -25,22 +25,26 @@ _MOVES: Final = 60
 
 def must_compile() -> bool:
     """True if `warm_up` will take half a minute, because some function's machine code is not cached yet."""
-    return COMPILED and not _marker().exists()
+    marker = _marker() if COMPILED else None
+    return COMPILED and (marker is None or not marker.exists())
 
 
 def warm_up() -> bool:
     """Call every compiled function once, including the optional ones; returns True if they run as machine code."""
     _run({})
     _run({"channel": "friis", "shadowing_db": 1.0, "fading": "rician", "capture": True})
-    if must_compile():
+    if COMPILED and (marker := _marker()) is not None:
         with contextlib.suppress(OSError):  # without this mark the next process compiles again, which only takes time
-            _marker().touch()
+            marker.touch()
     return COMPILED
 
 
-def _marker() -> Path:
-    """The file whose existence says that everything has been compiled by this numba for this Python."""
-    return cache_folder() / f"whole-{version('numba')}-{sys.implementation.cache_tag}"
+def _marker() -> Path | None:
+    """The file whose existence says that everything has been compiled by this numba for this Python; None where
+    machine code cannot be kept.
+    """
+    folder = cache_folder()
+    return None if folder is None else folder / f"whole-{version('numba')}-{sys.implementation.cache_tag}"
 
 
 def _run(radio: Mapping[str, object]) -> None:

@@ -10,7 +10,9 @@ has a cache directory of its own.
 import contextlib
 import hashlib
 import os
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -31,12 +33,38 @@ def _fingerprint(folder: Path) -> str:
     return digest.hexdigest()[:16]
 
 
-def cache_folder() -> Path:
-    """The directory in which the machine code of these sources is cached."""
+@cache
+def cache_folder() -> Path | None:
+    """The directory in which the machine code of these sources is cached; None if it cannot be kept.
+
+    It is beside the sources, or else in the user's cache folder, or else in that for temporary files. numba itself
+    would take its own folder of the user instead, where it goes on with the code of older sources.
+    """
     import numba
 
-    folder = Path(__file__).parents[1]
-    return Path(numba.config.CACHE_DIR or folder / "__pycache__") / f"kernel-{_fingerprint(folder)}"
+    sources = Path(__file__).parents[1]
+    places = [Path(numba.config.CACHE_DIR)] if numba.config.CACHE_DIR else [sources / "__pycache__", *_of_user()]
+    return first_writable([place / f"kernel-{_fingerprint(sources)}" for place in places])
+
+
+def _of_user() -> Iterator[Path]:
+    with contextlib.suppress(RuntimeError):  # without HOME, and without an entry among the users
+        yield Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "fanet-mw"
+    shared = Path(tempfile.gettempdir()) / f"fanet-mw-{os.getuid()}"
+    with contextlib.suppress(OSError):
+        shared.mkdir(mode=0o700, exist_ok=True)
+        if shared.lstat().st_uid == os.getuid():  # what is found there is run
+            yield shared
+
+
+def first_writable(folders: Iterable[Path]) -> Path | None:
+    """The first of some folders that can be made and written."""
+    for folder in folders:
+        with contextlib.suppress(OSError):
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                return folder
+    return None
 
 
 def _as_far_as_the_disk_goes(save: Callable[..., None]) -> Callable[..., None]:
@@ -57,17 +85,20 @@ def _decorator(*, counted: bool) -> Callable[[F], F]:
     except ImportError:
         return _identity
     everyone = numba.config.CACHE_DIR
-    ours = str(cache_folder())
+    ours = cache_folder()
 
     def compiled(function: F) -> F:
-        numba.config.CACHE_DIR = ours  # numba reads this when it decorates a function; others rely on it: put it back
+        numba.config.CACHE_DIR = str(
+            ours or ""
+        )  # numba reads this when it decorates a function; others rely on it: put it back
         try:
-            compile_ = numba.njit(cache=True, error_model="numpy", _nrt=counted, forceinline=not counted)
+            compile_ = numba.njit(cache=ours is not None, error_model="numpy", _nrt=counted, forceinline=not counted)
             dispatcher = compile_(function)
         finally:
             numba.config.CACHE_DIR = everyone
-        cache = dispatcher._cache  # noqa: SLF001  (numba has no option for this)
-        cache.save_overload = _as_far_as_the_disk_goes(cache.save_overload)
+        if ours is not None:
+            kept = dispatcher._cache  # noqa: SLF001  (numba has no option for this)
+            kept.save_overload = _as_far_as_the_disk_goes(kept.save_overload)
         return cast("F", dispatcher)
 
     return compiled

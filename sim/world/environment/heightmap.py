@@ -85,10 +85,11 @@ def read(
     path: Path, *, white_m: float, pixel_m: float, origin_deg: tuple[float, float], area_m: float, digest: str = ""
 ) -> Heightmap:
     """Heights of the area, and a cell beyond it; raises ConfigError with the file's name."""
+    data = content(path, key="world.heightmap", digest=digest)
     try:
-        found = _read(
-            path, content(path, key="world.heightmap", digest=digest), white_m, pixel_m, _lattice(origin_deg, area_m)
-        )
+        found = _read(path, data, white_m, pixel_m, _lattice(origin_deg, area_m))
+    except ConfigError:
+        raise
     except (ValueError, KeyError, IndexError, struct.error, zlib.error) as error:
         raise ConfigError(
             f"world.heightmap: {path} is neither an ASCII grid, an SRTM tile (.hgt), a GeoTIFF nor a plain grayscale "

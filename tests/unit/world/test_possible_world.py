@@ -16,7 +16,7 @@ from sim.sweep.tasks import tasks_of
 from sim.world.environment import obstacles
 
 IMPOSSIBLE = [
-    ('world.heightmap="nope.asc"', r"world.heightmap: .*nope.asc cannot be read"),
+    ('world.heightmap="nope.asc"', r"world.heightmap: .*nope.asc: cannot be read"),
     ('world.heightmap="small.asc"', r"covers 1 m to the east, which must be >= world.area_m = 800"),
     ('world.buildings_geojson="none.json"', r"none.json is no GeoJSON of buildings: it holds no Polygon"),
     ("world.no_fly_m=[[0,0,50]]", r"world.no_fly_m.0: node 1 starts within it"),

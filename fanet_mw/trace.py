@@ -130,6 +130,16 @@ class Confirmed(NamedTuple):
     north_m: float
 
 
+class PlacedInside(NamedTuple):
+    """A UAV that saw nobody around a building announced that a survivor is inside, at this place."""
+
+    t_ns: int
+    node: int
+    survivor: int
+    east_m: float
+    north_m: float
+
+
 class Refuted(NamedTuple):
     """A UAV took a confirmation back, because what it heard of the survivor since contradicts the announced place."""
 
@@ -297,6 +307,7 @@ Record = (
     | Approaching
     | Arrived
     | Confirmed
+    | PlacedInside
     | Refuted
     | Planned
     | Posed
@@ -326,6 +337,7 @@ _KINDS: Final[dict[str, type[Any]]] = {
     "approaching": Approaching,
     "arrived": Arrived,
     "confirmed": Confirmed,
+    "placed_inside": PlacedInside,
     "refuted": Refuted,
     "planned": Planned,
     "posed": Posed,
@@ -413,6 +425,6 @@ __all__ = [
     "Approaching", "Arrived", "BoundStated", "ClockSampled", "Collided", "Confirmed", "ConflictForeseen",
     "ConflictOver", "DeadlineLost", "DeadlineMet", "Delivered", "Detected", "DropReason", "Dropped",
     "FlightModeChanged", "Generated", "LetOut", "LikelyStated", "MissionModeChanged", "Planned", "Posed",
-    "ProcessEnded", "RadioFault", "Record", "Refuted", "RoleChanged", "Sighted", "Warned", "kind_of", "line",
-    "name_of", "parse",
+    "PlacedInside", "ProcessEnded", "RadioFault", "Record", "Refuted", "RoleChanged", "Sighted", "Warned", "kind_of",
+    "line", "name_of", "parse",
 ]  # fmt: skip

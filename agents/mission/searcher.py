@@ -18,6 +18,7 @@ from typing import Final, assert_never
 
 from agents.mission.finding.announcing import Announcing
 from agents.mission.finding.coverage_map import CoverageMap
+from agents.mission.finding.in_building import place_in_building
 from agents.mission.finding.known_survivors import KnownSurvivors
 from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, PhoneModel
 from agents.mission.finding.phone_reception import PhoneReception
@@ -62,6 +63,8 @@ _MOST_DECADES: Final = 12.0
 _OFFSET_DB: Final = 1.0
 """The standard deviation that is assumed for the difference between one phone's power and the mean of all phones."""
 _REVIEW_NS: Final = 1 * S
+_LOOKED_NS: Final = 10 * S
+"""How long a UAV looks for a survivor before the verdict that the survivor is inside a building."""
 _DEPLOY: Final = 0.9
 """The share of its greatest speed at which the slowest UAV flies to its first place."""
 
@@ -94,7 +97,8 @@ class Searcher:
         self._reception = PhoneReception(scenario, node, survivors, own_motion, outbox, coverage)
         self._sightings = Sightings(scenario, node, survivors, own_motion, outbox)
         self._announcing = Announcing(node, survivors, outbox)
-        approach = Approach(
+        self._map = onboard_map
+        self._approach = approach = Approach(
             node, survivors, own_motion, outbox,
             arrival_m=mission.arrival_m, speed_m_s=speed_m_s, look_m=min(_view_m(scenario)),
         )  # fmt: skip
@@ -154,6 +158,7 @@ class Searcher:
         for place in self._sightings.unreported(now_ns):
             self._announcing.report_person(place, now_ns)
         self._announcing.give_up_doubles(now_ns, steady_m2=self._sightings.steady_m2)
+        self._place_inside(now_ns)
         self._announcing.tell(self._bidding.survivor, now_ns)
         if not self._return_home.leaves:
             self._bidding.bid(now_ns, delay_s=self._flight.take_off_s)
@@ -218,6 +223,20 @@ class Searcher:
             self._announcing.confirm(survivor, now_ns)
             self._bidding.close(survivor, now_ns=now_ns)
 
+    def _place_inside(self, now_ns: int) -> None:
+        """Decide whether the survivor at whom this UAV has looked in vain is inside a building."""
+        survivor = self._bidding.survivor
+        arrived_ns = None if survivor is None else self._approach.arrived_ns.get(survivor)
+        if survivor is None or arrived_ns is None or now_ns - arrived_ns < _LOOKED_NS:
+            return
+        known = self._survivors.by_id[survivor]
+        if known.filter.is_seen:
+            return
+        place = place_in_building(known, self._map, self._approach.look_around.has_looked_at)
+        if place is not None:
+            self._announcing.place_inside(survivor, place, now_ns)
+            self._bidding.close(survivor, now_ns=now_ns)
+
     # --- received messages ----------------------------------------------------------------------------------------
 
     def hello(self, origin: int, motion: Motion, *, now_ns: int) -> None:
@@ -260,7 +279,7 @@ class Searcher:
             self._announcing.decided(found.survivor, now_ns)
             if is_person(found.survivor):
                 return
-            if found.standing is Standing.CONFIRMED:
+            if found.standing in (Standing.CONFIRMED, Standing.INSIDE):
                 self._bidding.close(found.survivor, now_ns=now_ns)
             else:
                 self._bidding.reopen(found.survivor)

@@ -67,6 +67,8 @@ class Standing(IntEnum):
     CONFIRMED = 1
     REFUTED = 2
     """Confirmations at this place are taken back, because later receptions contradict them."""
+    INSIDE = 3
+    """The survivor is most probably inside the building at this place, where no camera shows anybody."""
 
 
 class Found(NamedTuple):
@@ -94,7 +96,7 @@ class Found(NamedTuple):
     def checked(cls, fields: tuple[Any, ...]) -> Self:
         """The estimate of these fields; raises MalformedFrameError."""
         *values, standing, version = fields
-        refuse_unless(version == VERSION and standing <= Standing.REFUTED, f"a find of standing {standing}")
+        refuse_unless(version == VERSION and standing <= Standing.INSIDE, f"a find of standing {standing}")
         found = cls._make((*values, Standing(standing)))
         refuse_unless(
             (0 < found.survivor <= MOST_SURVIVORS or _is_of_a_node(found))
@@ -116,4 +118,5 @@ class Found(NamedTuple):
 
 def _is_of_a_node(found: Found) -> bool:
     """True for the verdict on a person without a phone, whose number is one of those of a node."""
-    return found.standing is not Standing.ESTIMATED and person_id(1, 0) <= found.survivor < person_id(ANY_NODE, 0)
+    of_a_node = person_id(1, 0) <= found.survivor < person_id(ANY_NODE, 0)
+    return of_a_node and found.standing in (Standing.CONFIRMED, Standing.REFUTED)

@@ -33,6 +33,7 @@ from fanet_mw.trace import (
     Detected,
     FlightModeChanged,
     MissionModeChanged,
+    PlacedInside,
     Posed,
     ProcessEnded,
     Record,
@@ -93,6 +94,14 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
         "persons_false": false_persons,
         "reopened": found.reopened,
         "time_to_confirm_s": sorted(round(one.t_ns / S, 3) for one in right),
+        "inside": len({r.survivor for r in records_of(records, PlacedInside)}),
+        "inside_error_m": _median(
+            [
+                math.hypot(truth[r.survivor - 1].east - r.east_m, truth[r.survivor - 1].north - r.north_m)
+                for r in records_of(records, PlacedInside)
+                if 1 <= r.survivor <= len(truth)
+            ]
+        ),
         "wait_s": _waits([(one.t_ns - heard[one.survivor]) / S for one in right if one.survivor in heard]),
         "uavs_approaching": len(first),
         "time_to_approach_s": sorted(round(t_ns / S, 3) for t_ns in first.values()),

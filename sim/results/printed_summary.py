@@ -152,6 +152,8 @@ def _mission_rows(mission: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if mission["persons"] > mission["confirmed"] or mission["persons_false"]:
         without = mission["persons"] - mission["confirmed"]
         yield "persons", f"{without} more found without a phone, {mission['persons_false']} finds of nobody else"
+    if mission["inside"]:
+        yield "inside", f"{mission['inside']} in buildings, median error {mission['inside_error_m']:.0f} m"
     if mission["wait_s"]["p50"] is not None:
         wait = mission["wait_s"]
         yield "waited", f"from heard to confirmed: median {wait['p50']:.0f} s, longest {wait['max']:.0f} s"

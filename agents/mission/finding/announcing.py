@@ -13,7 +13,7 @@ from agents.mission.finding.identities import paired
 from agents.mission.finding.known_survivors import KnownSurvivors, estimate_of
 from agents.mission.finding.phone_localization import Estimate
 from agents.mission.outbox import Outbox, OutgoingPacket
-from fanet_mw.trace import Confirmed, Refuted
+from fanet_mw.trace import Confirmed, PlacedInside, Refuted
 from fanet_mw.units import US, NodeId, S
 from fanet_mw.wire.survivors import Found, Standing, Survivor, person_id
 
@@ -65,6 +65,10 @@ class Announcing:
         refuted = mistaken._replace(t_us=now_ns // US, node=self._node, standing=Standing.REFUTED)
         self._decide(refuted, Refuted, now_ns)
 
+    def place_inside(self, survivor: int, place: Estimate, now_ns: int) -> None:
+        """A survivor is inside a building: flood that, and where."""
+        self._decide(Found(now_ns // US, survivor, *place, self._node, Standing.INSIDE), PlacedInside, now_ns)
+
     def report_person(self, place: Estimate, now_ns: int) -> None:
         """Somebody was seen who carries no phone that fits: flood that a person is there."""
         person = person_id(self._node, self._persons)
@@ -99,7 +103,7 @@ class Announcing:
         if not people or paired([place], people, steady_m2=steady_m2) == [None]:
             self.report_person(place, now_ns)
 
-    def _decide(self, verdict: Found, record: type[Confirmed | Refuted], now_ns: int) -> None:
+    def _decide(self, verdict: Found, record: type[Confirmed | Refuted | PlacedInside], now_ns: int) -> None:
         """Record a verdict of this UAV, and flood it from now on."""
         survivor, east_m, north_m = verdict.survivor, round(verdict.east_m, 2), round(verdict.north_m, 2)
         self._survivors.on_found(verdict, now_ns=now_ns)

@@ -48,14 +48,16 @@ class KnownSurvivor:
     """The instant at which this UAV first heard of the survivor."""
     announced: Found | None = None
     """The most exact estimate that another node has announced."""
+    inside: Found | None = None
+    """The most exact verdict that the survivor is inside a building; nobody need fly there any more."""
     confirmed: Found | None = None
     refuted: list[Found] = field(default_factory=list)
     """The refutations of this survivor, each with the place that was confirmed by mistake, oldest first."""
 
     @property
     def verdict(self) -> Found | None:
-        """The confirmation that holds, otherwise the latest refutation; None when nobody has announced either."""
-        return self.confirmed or (self.refuted[-1] if self.refuted else None)
+        """The confirmation that holds, otherwise the building, otherwise the latest refutation; None without any."""
+        return self.confirmed or self.inside or (self.refuted[-1] if self.refuted else None)
 
     def is_refuted(self, found: Found) -> bool:
         """True for a confirmation that a known refutation takes back."""
@@ -144,6 +146,11 @@ class KnownSurvivors:
                 if reopened:
                     self._calibrate()
                 return reopened
+            case Standing.INSIDE:
+                first = known.inside is None
+                if known.inside is None or estimate_of(found).sigma_m < estimate_of(known.inside).sigma_m:
+                    known.inside = found
+                return first and known.confirmed is None
             case Standing.ESTIMATED:
                 outdated = any(found.t_us <= refuted.t_us for refuted in known.refuted)
                 best = known.announced
@@ -199,10 +206,19 @@ class KnownSurvivors:
         """The survivors without a confirmation that holds, in order of id."""
         return sorted([survivor for survivor, known in self.by_id.items() if known.confirmed is None])
 
+    def sought(self) -> list[int]:
+        """The unconfirmed survivors to whom UAVs fly: not those who are inside a building."""
+        return [survivor for survivor in self.unconfirmed() if self.by_id[survivor].inside is None]
+
     def is_confirmed(self, survivor: int) -> bool:
         """True if the survivor has a confirmation that holds."""
         known = self.by_id.get(survivor)
         return known is not None and known.confirmed is not None
+
+    def is_found(self, survivor: int) -> bool:
+        """True if nobody need fly to the survivor any more, who is confirmed or inside a building."""
+        known = self.by_id.get(survivor)
+        return known is not None and (known.confirmed is not None or known.inside is not None)
 
     def recent_reports(self, *, now_ns: int) -> list[Survivor]:
         """The reports of unconfirmed survivors to pass on with the next hello, newest first."""

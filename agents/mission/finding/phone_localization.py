@@ -28,7 +28,7 @@ from fanet_mw.units import Enu
 
 REFERENCE_LOSS_DB: Final = 40.05
 """Free-space loss at 1 m and 2.4 GHz."""
-_CELL_M: Final = 20.0
+CELL_M: Final = 20.0
 _HALF_CELLS: Final = 16
 """The grid reaches this many cells to each side of its middle, which is at most `_OFF_CENTER_M` away from the place of
 the strongest received power."""
@@ -235,8 +235,8 @@ class PhoneFilter:
         self._catch_up()
         if self._middle is None or not self._totals:
             return 0.0
-        i = round((east_m - self._middle.east) / _CELL_M) + _HALF_CELLS
-        j = round((north_m - self._middle.north) / _CELL_M) + _HALF_CELLS
+        i = round((east_m - self._middle.east) / CELL_M) + _HALF_CELLS
+        j = round((north_m - self._middle.north) / CELL_M) + _HALF_CELLS
         if not (0 <= i <= 2 * _HALF_CELLS and 0 <= j <= 2 * _HALF_CELLS):
             return math.inf
         return self._best - self._totals[j * _WIDTH + i]
@@ -248,11 +248,11 @@ class PhoneFilter:
         self._catch_up()
         if self._middle is None:
             return
-        west, south = self._middle.east - _HALF_CELLS * _CELL_M, self._middle.north - _HALF_CELLS * _CELL_M
-        possible = _inside(self._middle, self._model.half_m + _CELL_M / 2)
+        west, south = self._middle.east - _HALF_CELLS * CELL_M, self._middle.north - _HALF_CELLS * CELL_M
+        possible = _inside(self._middle, self._model.half_m + CELL_M / 2)
         for cell, (total, inside) in enumerate(zip(self._totals, possible, strict=False)):
             if inside and self._best - total <= most:
-                yield west + cell % _WIDTH * _CELL_M, south + cell // _WIDTH * _CELL_M, self._best - total
+                yield west + cell % _WIDTH * CELL_M, south + cell // _WIDTH * CELL_M, self._best - total
 
     def near(self, place: Enu, *, within_m: float) -> bool:
         """True if the middle of the grid is within a distance of a place, or if the phone was not received yet.
@@ -291,7 +291,7 @@ class PhoneFilter:
             for s, q, silence in zip(self._sums, self._squares, self._scores, strict=True)
         ]
         self._totals = scores
-        possible = _inside(self._middle, model.half_m + _CELL_M / 2)
+        possible = _inside(self._middle, model.half_m + CELL_M / 2)
         self._best = best = max(compress(scores, possible))
         exp, least = math.exp, best - 40.0
         likely = [score >= least for score in scores]
@@ -304,11 +304,11 @@ class PhoneFilter:
         mean_i, mean_j = _sum(by_column) / total, _sum(by_row) / total
         ii, ij = _sum(map(mul, by_column, columns)), _sum(map(mul, by_column, rows))
         jj = _sum(map(mul, by_row, rows))
-        cell2 = _CELL_M * _CELL_M
+        cell2 = CELL_M * CELL_M
         quantized = 1 / 12
         return Estimate(
-            self._middle.east + (mean_i - _HALF_CELLS) * _CELL_M,
-            self._middle.north + (mean_j - _HALF_CELLS) * _CELL_M,
+            self._middle.east + (mean_i - _HALF_CELLS) * CELL_M,
+            self._middle.north + (mean_j - _HALF_CELLS) * CELL_M,
             (max(0.0, ii / total - mean_i * mean_i) + quantized) * cell2,
             (ij / total - mean_i * mean_j) * cell2,
             (max(0.0, jj / total - mean_j * mean_j) + quantized) * cell2,
@@ -320,10 +320,10 @@ def _inside(middle: Enu, half_m: float) -> Sequence[bool]:
     """For each cell of the grid around `middle`, True if it lies no farther than `half_m` to the east, west, north and
     south of the origin; all cells are taken if none does.
     """
-    if max(abs(middle.east), abs(middle.north)) + _HALF_CELLS * _CELL_M <= half_m:
+    if max(abs(middle.east), abs(middle.north)) + _HALF_CELLS * CELL_M <= half_m:
         return _EVERY_CELL
-    east = [abs(middle.east + (i - _HALF_CELLS) * _CELL_M) <= half_m for i in range(_WIDTH)]
-    north = [abs(middle.north + (j - _HALF_CELLS) * _CELL_M) <= half_m for j in range(_WIDTH)]
+    east = [abs(middle.east + (i - _HALF_CELLS) * CELL_M) <= half_m for i in range(_WIDTH)]
+    north = [abs(middle.north + (j - _HALF_CELLS) * CELL_M) <= half_m for j in range(_WIDTH)]
     found = tuple(row and column for row in north for column in east)
     return found if any(found) else _EVERY_CELL
 
@@ -345,11 +345,11 @@ def _is_sampled(position: Enu, sampled: Iterable[Enu]) -> bool:
 
 def _squared_distances_m2(middle: Enu, position: Enu, up2: float) -> list[float]:
     """The squared distance of every cell of the grid around `middle` from a position whose squared height is `up2`."""
-    west = middle.east - _HALF_CELLS * _CELL_M - position.east
-    south = middle.north - _HALF_CELLS * _CELL_M - position.north
+    west = middle.east - _HALF_CELLS * CELL_M - position.east
+    south = middle.north - _HALF_CELLS * CELL_M - position.north
     span = range(_WIDTH)
-    east2 = [(west + i * _CELL_M) ** 2 for i in span]
-    return [squared + rest for rest in [(south + j * _CELL_M) ** 2 + up2 for j in span] for squared in east2]
+    east2 = [(west + i * CELL_M) ** 2 for i in span]
+    return [squared + rest for rest in [(south + j * CELL_M) ** 2 + up2 for j in span] for squared in east2]
 
 
 def _calibrated(model: PhoneModel, offset: PhoneOffset) -> PhoneModel:

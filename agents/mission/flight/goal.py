@@ -75,7 +75,7 @@ class Goal:
         if pattern is None or not formation.searches or not formation.is_taken_up(now_ns):
             return None
         best: tuple[float, int] | None = None
-        for survivor in self._survivors.unconfirmed():
+        for survivor in self._survivors.sought():
             known = self._survivors.by_id[survivor]
             estimate = known.place() if known.filter.near(here, within_m=FAR_M) else None
             if estimate is None or estimate.sigma_m > VAGUE_M:

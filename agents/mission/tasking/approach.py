@@ -53,7 +53,7 @@ class Approach:
         self._outbox = outbox
         self._arrival_m = arrival_m
         self._along_m_s = _SPEED_SHARE * speed_m_s
-        self._look_around = LookAround(look_m)
+        self.look_around = LookAround(look_m)
         self.arrived_ns: dict[int, int] = {}
         """The instant at which this UAV came to the estimated place of each survivor."""
 
@@ -81,7 +81,7 @@ class Approach:
                 self._outbox.records.append(Arrived(now_ns, self._node, survivor))
         phone = self._survivors.by_id[survivor].filter
         seen = phone.is_seen
-        looked_for = None if seen else self._look_around.next_place(survivor, phone, self._own_motion.position, now_ns)
+        looked_for = None if seen else self.look_around.next_place(survivor, phone, self._own_motion.position, now_ns)
         if looked_for is not None:
             return looked_for
         searched_s = (now_ns - arrived_ns) / S

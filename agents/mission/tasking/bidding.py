@@ -76,12 +76,12 @@ class Bidding:
 
     def merge(self, bids: Iterable[Bid], *, now_ns: int) -> None:
         """A neighbor has passed on bids."""
-        open_bids = (bid for bid in bids if not self._survivors.is_confirmed(bid.survivor))
+        open_bids = (bid for bid in bids if not self._survivors.is_found(bid.survivor))
         self._auction.merge(open_bids, now_ns=now_ns)
 
     def bids_to_tell(self, *, now_ns: int) -> list[Bid]:
         """The bids to put into the next hello."""
-        return self._auction.bids_to_tell(self._survivors.unconfirmed(), now_ns=now_ns)
+        return self._auction.bids_to_tell(self._survivors.sought(), now_ns=now_ns)
 
     def close(self, survivor: int, *, now_ns: int) -> None:
         """Forget the bids for a survivor that needs no UAV any more."""
@@ -96,7 +96,7 @@ class Bidding:
 
     def hand_on(self, now_ns: int) -> None:
         """Withdraw all bids of this UAV, so that the next best bidders fly instead."""
-        for survivor in self._survivors.unconfirmed():
+        for survivor in self._survivors.sought():
             self._auction.withdraw(survivor, now_ns=now_ns)
         self.survivor = None
 
@@ -105,7 +105,7 @@ class Bidding:
 
         `delay_s`: the time after which this UAV can leave, because it takes off.
         """
-        for survivor in self._survivors.unconfirmed():
+        for survivor in self._survivors.sought():
             known = self._survivors.by_id[survivor]
             if self._auction.has_bid(survivor) or not known.filter.near(self._own_motion.position, within_m=FAR_M):
                 continue
@@ -126,7 +126,7 @@ class Bidding:
         if self.survivor is None:
             won = [
                 (self._distance_m(survivor), survivor)
-                for survivor in self._survivors.unconfirmed()
+                for survivor in self._survivors.sought()
                 if self._wins(survivor, self._survivors.by_id[survivor], now_ns)
             ]
             if won:

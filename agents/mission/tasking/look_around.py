@@ -47,6 +47,10 @@ class LookAround:
             self._next, self._chosen_ns = self._choose(phone, here), now_ns
         return self._next
 
+    def has_looked_at(self, east_m: float, north_m: float) -> bool:
+        """True if the camera has shown a place since this UAV began to look for the present survivor."""
+        return _cell(east_m, north_m) in self._looked
+
     def _look(self, here: Enu) -> None:
         """Note the cells whose middles the camera shows from here."""
         column, row, reach = *_cell(here.east, here.north), math.floor(self._look_m / _CELL_M)

@@ -18,6 +18,7 @@ from sim.cli import figures, replay, runs, scenario_files, single_services, swar
 from sim.cli.air import app as air_app
 from sim.cli.command_groups import OPTIONS
 from sim.cli.console import Console, nobody_reads
+from sim.cli.memory import require_for
 
 app = App(
     name="fanet",
@@ -81,6 +82,7 @@ def main() -> None:
     """The console script."""
     interrupts.install()
     try:
+        require_for(sys.argv[1:])
         with interrupts.undisguised():
             code = app(changes_last(sys.argv[1:]), result_action="return_value")
         sys.stdout.flush()

@@ -17,6 +17,7 @@ from cyclopts.validators import Number
 from sim.cli.command_groups import RUN
 from sim.cli.completion import ScenarioName
 from sim.cli.console import Console
+from sim.cli.memory import COMPILING_MB, require
 from sim.cli.options import OutputFlags, ScenarioFlags, print_notes, warn_of
 
 if TYPE_CHECKING:
@@ -59,6 +60,7 @@ def simulate(
     output.prepare()
     print_notes(chosen)
     if must_compile():
+        require(COMPILING_MB, what="compiling the kernel")
         _err.print(COMPILING_NOTICE, highlight=False)
         warm_up()
     signals: list[int] = []

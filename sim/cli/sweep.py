@@ -16,6 +16,7 @@ from cyclopts.validators import Number
 from fanet_mw.errors import ConfigError
 from sim.cli.command_groups import STUDY
 from sim.cli.console import Console
+from sim.cli.memory import COMPILING_MB, require
 
 if TYPE_CHECKING:
     from pyarrow import Table
@@ -207,6 +208,7 @@ def _compile() -> None:
     from emulator.kernel.compile import COMPILING_NOTICE, must_compile, warm_up
 
     if must_compile():
+        require(COMPILING_MB, what="compiling the kernel")
         _say(COMPILING_NOTICE)
         warm_up()
 

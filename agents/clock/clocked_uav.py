@@ -97,7 +97,7 @@ class ClockedUav(Actor):
         """The swarm time that was last given to the UAV; it never goes back."""
         self._sample_ns = 0
         self._withheld = 0
-        """The number of schedules that were received before the node had swarm time."""
+        """The number of schedules that were received before the node had swarm time, and of hellos that were old."""
 
     # --- the actor contract ---------------------------------------------------------------------------------------
 
@@ -197,7 +197,10 @@ class ClockedUav(Actor):
             ended_ns = self._stamped_ns(message.end_ns)
             kind = wire.peek_kind(message.frame)
             if kind == Kind.HELLO:
-                self._time.on_hello(message.frame, ended_ns=ended_ns, local_ns=self._clock.local_ns(now_ns))
+                local_ns = self._clock.local_ns(now_ns)
+                if not self._time.on_hello(message.frame, message.src, ended_ns=ended_ns, local_ns=local_ns):
+                    self._withheld += 1
+                    return None
             elif kind == Kind.SCHEDULE and not self._time.synced:
                 self._withheld += 1
                 return None

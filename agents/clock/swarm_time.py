@@ -9,24 +9,31 @@ sends no fixes.
 
 import math
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Mapping
 from typing import Final
 
 from fanet_mw.bus.messages import TxOutcome, TxStatus
 from fanet_mw.errors import MalformedFrameError
+from fanet_mw.node.duplicates import DELIVERED, DuplicateSet, hash_of
 from fanet_mw.node.node import AnnouncedHello
 from fanet_mw.node.reader import decoded, packet_of
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Clock, Scenario
 from fanet_mw.timesync.clock_fit import EXACT, ClockFit, Line, Oscillator, Pair
 from fanet_mw.timesync.ftsp import Settings, TimeSync
-from fanet_mw.units import LIGHT_M_PER_S, NodeId, S, seconds_to_ns
+from fanet_mw.units import LIGHT_M_PER_S, MS, US, NodeId, S, seconds_to_ns
 from fanet_mw.wire.hello.time_beacon import TimeBeacon
 
 _SIGMAS: Final = 4
 """The error bound of a GPS fix, in standard deviations."""
 _HELLOS: Final = 8
 """The greatest number of announced hellos that are remembered until the radio reports when they ended."""
+_REMEMBERED: Final = 4096
+"""The number of hellos that are remembered at least, so that none counts twice."""
+OLD_NS: Final = 150 * MS
+"""A hello that ended so long after the instant for which it was announced was recorded and sent again, if this node's
+time is supported. Contention seldom defers a hello by a third of that."""
 _PPM: Final = 1e-6
 
 
@@ -72,8 +79,9 @@ class SwarmTime(ABC):
     def fix(self, local_ns: int, gps_ns: int) -> None:  # noqa: B027
         """GPS has given the time `gps_ns` at the instant `local_ns` of the node's own clock."""
 
-    def on_hello(self, frame: bytes, *, ended_ns: int, local_ns: int) -> None:  # noqa: B027
-        """A neighbor's hello was received, which ended at `ended_ns`."""
+    def on_hello(self, frame: bytes, src: NodeId, *, ended_ns: int, local_ns: int) -> bool:
+        """A hello was received from this node, which ended at `ended_ns`; returns False if it was sent long ago."""
+        return True
 
     def hello_frames(self, local_ns: int) -> bytes:
         """The inner frames to put into the hello that this node sends now."""
@@ -158,7 +166,7 @@ class BeaconTime(SwarmTime):
 
     def __init__(self, scenario: Scenario, node: NodeId) -> None:
         clock, radio = scenario.clock, scenario.radio
-        self._node = node
+        self._node, self._clock = node, clock
         self._sync = TimeSync(
             Settings(
                 node=node,
@@ -173,7 +181,8 @@ class BeaconTime(SwarmTime):
         self._announced: dict[int, int] = {}
         """The sequence numbers of the hellos of this node whose end the radio has not reported yet, by the number of
         their transmit requests."""
-        self._malformed = 0
+        self._refused: Counter[str] = Counter()
+        self._heard = DuplicateSet(_REMEMBERED)
 
     @property
     def line(self) -> Line:
@@ -214,21 +223,40 @@ class BeaconTime(SwarmTime):
             self._sync.hello_sent(hello, ended_ns=ended_ns)
         return hello is not None
 
-    def on_hello(self, frame: bytes, *, ended_ns: int, local_ns: int) -> None:
-        """A neighbor's hello was received, which ended at `ended_ns`.
-
-        The sender is read from the frame, because not every radio says from which node it has received a frame.
+    def on_hello(self, frame: bytes, src: NodeId, *, ended_ns: int, local_ns: int) -> bool:
+        """A hello was received, which ended at `ended_ns`; the first copy of one that its own transmitter has made, and
+        just now, tells the time. Returns False for one that was recorded and sent again later.
         """
         try:
             header = packet_of(frame).header
             beacon = decoded(frame, TimeBeacon.in_hello)
         except MalformedFrameError:
-            self._malformed += 1
-            return
-        self._sync.on_hello(NodeId(header.prev_hop), header.seq, beacon, ended_ns=ended_ns, local_ns=local_ns)
+            self._refused["malformed"] += 1
+            return True
+        if not header.origin == header.prev_hop == src:
+            self._refused["relayed"] += 1
+            return True
+        if self._heard.bits(packet_hash := hash_of(frame)):
+            self._refused["repeated"] += 1
+            return True
+        self._heard.put(packet_hash, DELIVERED)
+        age_ns = self.line.swarm_ns(ended_ns) - header.origin_us * US
+        if age_ns > OLD_NS + self._apart_ns(local_ns):
+            self._refused["old"] += 1
+            return False
+        self._sync.on_hello(src, header.seq, beacon, ended_ns=ended_ns, local_ns=local_ns)
+        return True
+
+    def _apart_ns(self, local_ns: int) -> float:
+        """How far this node's time may be from a neighbor's: not at all if others support it; before it has any, as far
+        as two clocks may be from each other that were set before take-off. Any time may be wrong that nobody supports.
+        """
+        if self.synced:
+            return 0 if self._sync.supported(local_ns) else math.inf
+        return 2 * self._clock.unsynchronized_error_ns(max(0, local_ns))
 
     def report(self) -> Mapping[str, object]:
-        return {**self._sync.report(), "malformed": self._malformed}
+        return {**self._sync.report(), **{why: self._refused[why] for why in ("malformed", *sorted(self._refused))}}
 
 
 def oscillator(clock: Clock, *, others: int) -> Oscillator:

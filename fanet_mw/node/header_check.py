@@ -9,7 +9,9 @@ any effect.
     sequence number                     not greater than a node had time to reach since swarm instant 0
 
 Frames that cannot be decoded (`reader.py`) are counted as `malformed` by the node (`node.py`). A packet that was
-recorded and is sent again is a copy (`duplicates.py`), or has outlived its lifetime (`expired`, `node.py`).
+recorded and is sent again is a copy (`duplicates.py`), or has outlived its lifetime (`expired`, `node.py`); a hello is
+old after the lifetime of frames in the radio and one hello interval, and with time beacons after 150 ms by a supported
+swarm time (`agents/clock/swarm_time.py`).
 
 Origins are not proved: a relay may still invent a packet in the name of another node. But it cannot keep out that
 node's own packets, because duplicates are found by a hash of the whole packet, and not by origin and sequence number
@@ -21,7 +23,7 @@ from typing import Final
 
 from fanet_mw.errors import DropReason
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import BROADCAST, MS, US, NodeId, S
+from fanet_mw.units import BROADCAST, MS, US, NodeId, S, seconds_to_ns
 from fanet_mw.wire import MOST_HOPS, Fields, Kind
 
 RESTART_STEP_NS: Final = 100 * US
@@ -54,9 +56,13 @@ class HeaderCheck:
         self._node = node
         self._count = scenario.nodes.count
         error_ns = clock.unsynchronized_error_ns(scenario.duration_ns)
-        self._youngest_ns = -_AHEAD_NS - (2 * error_ns + S if clock.modelled else 0)
+        apart_ns = 2 * error_ns + S if clock.modelled else 0
+        self._youngest_ns = -_AHEAD_NS - apart_ns
         """The least age of a packet. It is negative, because clocks differ: a packet from further in the future is a
         lie."""
+        hello_ns = seconds_to_ns(scenario.routing.hello_interval_s)
+        self.oldest_hello_ns: Final = scenario.mac_lifetime_ns + hello_ns + _AHEAD_NS + apart_ns
+        """The greatest age of a hello, which waits in the queue of the radio and no longer than for the next one."""
 
     def why_not(self, fields: Fields, before: int, src: NodeId, age_ns: int) -> DropReason | None:
         """The reason why the header of a frame that `src` sent is rejected; None if it is accepted.

@@ -282,6 +282,9 @@ class Node:
             return _NONE
         if kind == _HELLO:
             self._duplicates.put(packet_hash, bits)
+            if age_ns > self._header_check.oldest_hello_ns:
+                self.port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+                return _NONE
             self._protocol.on_hello(packet, reception, now_ns=now_ns)
             self.hellos.append(packet)
             return _NONE

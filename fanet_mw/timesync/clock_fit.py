@@ -166,12 +166,22 @@ class ClockFit:
         self._against.append(pair)
         together = [other for other in self._against if alike(other, pair, self._oscillator)]
         for_it = [old for old in self._pairs if old.local_ns >= horizon_ns]
-        if len(together) < _AGREEING or len(together) <= len(for_it) or _is_one_against_others(together, for_it):
+        if len(together) < _AGREEING or not (self._outvotes(together, for_it) or self._is_ahead(together, pair)):
             return False
         self.steps += 1
         self._against.clear()
         self._keep(together)
         return True
+
+    @staticmethod
+    def _outvotes(together: list[Pair], for_it: list[Pair]) -> bool:
+        return len(together) > len(for_it) and not _is_one_against_others(together, for_it)
+
+    def _is_ahead(self, together: list[Pair], pair: Pair) -> bool:
+        """True if several sources state a later time than the line, which nobody can do who repeats old frames."""
+        assert self.line is not None, "only a line can be contradicted"
+        several = len({other.source for other in together}) >= _AGREEING
+        return several and pair.offset_ns > self.line.offset_at(pair.local_ns)
 
     def _keep(self, pairs: list[Pair]) -> None:
         self._pairs = deque(pairs, maxlen=PAIRS)

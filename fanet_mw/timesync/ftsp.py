@@ -46,6 +46,9 @@ _HASTY: Final = 4
 """Pairs of one neighbor that are closer together than a hello interval divided by this are not counted."""
 _DOUBT_HELLOS: Final = 1.5
 """How long a node without a time waits for a second neighbor to state the same; each states it once per hello."""
+_SUPPORT_HELLOS: Final = 3
+"""How long a statement of a neighbor supports this node's time."""
+_SUPPORTERS: Final = 2
 _STAMPS: Final = 4
 """The number of hellos of each neighbor whose ends are remembered."""
 _NEIGHBORS: Final = 256
@@ -126,6 +129,8 @@ class TimeSync:
         self._worst: tuple[int, int] = (0, 0)
         """The greatest error known of any node, and when it was stated."""
         self.counts: Counter[str] = Counter()
+        self._agreed: dict[int, int] = {}
+        """When a neighbor last stated a time that agrees with this node's."""
 
     # --- the state of synchronization -----------------------------------------------------------------------------
 
@@ -143,6 +148,12 @@ class TimeSync:
         if self.reference is None:
             return None
         return 0 if self.is_reference else self.line.error_ns(local_ns, self._own.oscillator)
+
+    def supported(self, local_ns: int) -> bool:
+        """True if two neighbors, or the reference itself, lately stated this node's time."""
+        horizon_ns = local_ns - int(_SUPPORT_HELLOS * self._own.hello_ns)
+        fresh = [node for node, agreed_ns in self._agreed.items() if agreed_ns >= horizon_ns]
+        return len(fresh) >= _SUPPORTERS or self.reference in fresh
 
     def worst_ns(self, local_ns: int) -> int:
         """The greatest bound that any node is known to state, including this node."""
@@ -239,6 +250,7 @@ class TimeSync:
             if len(self._neighbors) >= _NEIGHBORS:
                 silent = min(sorted(self._neighbors), key=lambda node: self._neighbors[node].heard_ns)
                 del self._neighbors[silent]
+                self._agreed.pop(silent, None)
             found = self._neighbors[src] = _LastBeacon(local_ns)
         found.heard_ns = local_ns
         return found
@@ -280,6 +292,8 @@ class TimeSync:
             self.reference = beacon.reference
             self._note_news(neighbor, local_ns)
         if beacon.reference == self.reference:
+            if self._fit.line is None or self._fit.agrees(pair):
+                self._agreed[beacon.node] = local_ns
             if not self.is_reference:
                 self._follow(neighbor, pair, local_ns)
             self._learn_worst(beacon.worst_ns, stated_at_ns=local_ns - beacon.worst_age_s * S)

@@ -100,3 +100,15 @@ def test_a_source_that_bore_out_a_line_alone_may_overthrow_it() -> None:
     """A neighbor whose own line was overthrown, of a node that has no other."""
     fit = fit_of(pair(0, source=3), pair(1, source=3))
     assert [fit.add(pair(2 + second, start_us=9000, source=3)) for second in range(3)] == [False, False, True]
+
+
+def test_two_sources_that_state_a_later_time_are_followed_however_many_state_the_earlier_one() -> None:
+    """Who repeats frames is always late; an earlier time needs more pairs than the line has."""
+    for ahead_ns, followed in ((MS, True), (-MS, False)):
+        fit = ClockFit(OSCILLATOR)
+        for second in range(8):
+            fit.add(Pair(second * S, 0, US, source=3 + second % 4))
+        assert [fit.add(Pair(8 * S, ahead_ns, US, source=1)), fit.add(Pair(9 * S, ahead_ns, US, source=1))] == [
+            False
+        ] * 2
+        assert fit.add(Pair(9 * S, ahead_ns, US, source=2)) is followed

@@ -70,7 +70,9 @@ _DEPLOY: Final = 0.9
 
 
 class Searcher:
-    """The parts of one UAV's search, and the order in which they get its inputs."""
+    """The parts of one UAV's search, and the order in which they get its inputs: its attributes are these parts, so
+    there are as many as the search has.
+    """
 
     def __init__(
         self, scenario: Scenario, node: NodeId, *, position: Enu, outbox: Outbox, onboard_map: OnboardMap

@@ -42,7 +42,8 @@ class HelloSchedule:
     def start(self, now_ns: int) -> None:
         """Choose the instant of the first hello, at random within the first interval."""
         if self._interval_ns:
-            self._next_ns = now_ns + self._lead_ns + int(self._random() * self._interval_ns)
+            first_ns = now_ns + self._lead_ns + int(self._random() * self._interval_ns)
+            self._next_ns = self._node.hello_due_ns(first_ns)
 
     def due_ns(self) -> int | None:
         """The instant at which the next hello must be announced to the radio."""
@@ -58,7 +59,7 @@ class HelloSchedule:
             time.announced(self._node.say_hello(inner, start_ns=start_ns, now_ns=now_ns, time=time.frames()))
         vary = 1 + _JITTER * (2 * self._random() - 1)
         step_ns = int(self._interval_ns * vary * self._node.hello_share(now_ns))
-        self._next_ns = max(self._next_ns + step_ns, now_ns)
+        self._next_ns = self._node.hello_due_ns(max(self._next_ns + step_ns, now_ns))
 
     def on_hello(self, sender: NodeId, now_ns: int) -> None:
         """A neighbor's hello was received."""

@@ -377,6 +377,8 @@ MAVLINK_MSG_ID_FANET_MESSAGE = 53012
 MAVLINK_MSG_ID_FANET_RECEIPT = 53013
 MAVLINK_MSG_ID_FANET_TARGETS = 53014
 MAVLINK_MSG_ID_FANET_LOADS = 53015
+MAVLINK_MSG_ID_FANET_HEARD = 53016
+MAVLINK_MSG_ID_FANET_HELD = 53017
 MAVLINK_MSG_ID_FANET_SEARCH = 53020
 MAVLINK_MSG_ID_FANET_STATUS = 53021
 MAVLINK_MSG_ID_FANET_BIDS = 53022
@@ -1134,6 +1136,93 @@ class MAVLink_fanet_loads_message(MAVLink_message):
 setattr(MAVLink_fanet_loads_message, "name", mavlink_msg_deprecated_name_property())
 
 
+class MAVLink_fanet_heard_message(MAVLink_message):
+    """
+    Which nodes hear which others, as they have stated in one of the
+    latest hello intervals; sent in turns of rounds. An entry has the
+    node (2 bytes, the low one first), the number of the interval
+    modulo 256 (1 byte), and one bit per node of the swarm, node 1 in
+    the lowest bit of the first byte.
+    """
+
+    id = MAVLINK_MSG_ID_FANET_HEARD
+    msgname = "FANET_HEARD"
+    fieldnames = ["entries", "count", "length", "version"]
+    ordered_fieldnames = ["entries", "count", "length", "version"]
+    fieldtypes = ["uint8_t", "uint8_t", "uint8_t", "uint8_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {}
+    native_format = bytearray(b"<BBBB")
+    orders = [0, 1, 2, 3]
+    lengths = [64, 1, 1, 1]
+    array_lengths = [64, 0, 0, 0]
+    crc_extra = 200
+    unpacker = struct.Struct("<64BBBB")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, entries: Sequence[int], count: int, length: int, version: int):
+        MAVLink_message.__init__(self, MAVLink_fanet_heard_message.id, MAVLink_fanet_heard_message.msgname)
+        self._fieldnames = MAVLink_fanet_heard_message.fieldnames
+        self._instance_field = MAVLink_fanet_heard_message.instance_field
+        self._instance_offset = MAVLink_fanet_heard_message.instance_offset
+        self.entries = entries
+        self.count = count
+        self.length = length
+        self.version = version
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.entries[0], self.entries[1], self.entries[2], self.entries[3], self.entries[4], self.entries[5], self.entries[6], self.entries[7], self.entries[8], self.entries[9], self.entries[10], self.entries[11], self.entries[12], self.entries[13], self.entries[14], self.entries[15], self.entries[16], self.entries[17], self.entries[18], self.entries[19], self.entries[20], self.entries[21], self.entries[22], self.entries[23], self.entries[24], self.entries[25], self.entries[26], self.entries[27], self.entries[28], self.entries[29], self.entries[30], self.entries[31], self.entries[32], self.entries[33], self.entries[34], self.entries[35], self.entries[36], self.entries[37], self.entries[38], self.entries[39], self.entries[40], self.entries[41], self.entries[42], self.entries[43], self.entries[44], self.entries[45], self.entries[46], self.entries[47], self.entries[48], self.entries[49], self.entries[50], self.entries[51], self.entries[52], self.entries[53], self.entries[54], self.entries[55], self.entries[56], self.entries[57], self.entries[58], self.entries[59], self.entries[60], self.entries[61], self.entries[62], self.entries[63], self.count, self.length, self.version), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_fanet_heard_message, "name", mavlink_msg_deprecated_name_property())
+
+
+class MAVLink_fanet_held_message(MAVLink_message):
+    """
+    Packets that the sender holds and a neighbor has sent again; sent
+    in turns of rounds.
+    """
+
+    id = MAVLINK_MSG_ID_FANET_HELD
+    msgname = "FANET_HELD"
+    fieldnames = ["seqs", "origins", "count", "version"]
+    ordered_fieldnames = ["seqs", "origins", "count", "version"]
+    fieldtypes = ["uint32_t", "uint16_t", "uint8_t", "uint8_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {}
+    native_format = bytearray(b"<IHBB")
+    orders = [0, 1, 2, 3]
+    lengths = [16, 16, 1, 1]
+    array_lengths = [16, 16, 0, 0]
+    crc_extra = 58
+    unpacker = struct.Struct("<16I16HBB")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, seqs: Sequence[int], origins: Sequence[int], count: int, version: int):
+        MAVLink_message.__init__(self, MAVLink_fanet_held_message.id, MAVLink_fanet_held_message.msgname)
+        self._fieldnames = MAVLink_fanet_held_message.fieldnames
+        self._instance_field = MAVLink_fanet_held_message.instance_field
+        self._instance_offset = MAVLink_fanet_held_message.instance_offset
+        self.seqs = seqs
+        self.origins = origins
+        self.count = count
+        self.version = version
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.seqs[0], self.seqs[1], self.seqs[2], self.seqs[3], self.seqs[4], self.seqs[5], self.seqs[6], self.seqs[7], self.seqs[8], self.seqs[9], self.seqs[10], self.seqs[11], self.seqs[12], self.seqs[13], self.seqs[14], self.seqs[15], self.origins[0], self.origins[1], self.origins[2], self.origins[3], self.origins[4], self.origins[5], self.origins[6], self.origins[7], self.origins[8], self.origins[9], self.origins[10], self.origins[11], self.origins[12], self.origins[13], self.origins[14], self.origins[15], self.count, self.version), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_fanet_held_message, "name", mavlink_msg_deprecated_name_property())
+
+
 class MAVLink_fanet_search_message(MAVLink_message):
     """
     The plan of a search: a formation, when it sweeps, and which node
@@ -1388,6 +1477,8 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_FANET_RECEIPT: MAVLink_fanet_receipt_message,
     MAVLINK_MSG_ID_FANET_TARGETS: MAVLink_fanet_targets_message,
     MAVLINK_MSG_ID_FANET_LOADS: MAVLink_fanet_loads_message,
+    MAVLINK_MSG_ID_FANET_HEARD: MAVLink_fanet_heard_message,
+    MAVLINK_MSG_ID_FANET_HELD: MAVLink_fanet_held_message,
     MAVLINK_MSG_ID_FANET_SEARCH: MAVLink_fanet_search_message,
     MAVLINK_MSG_ID_FANET_STATUS: MAVLink_fanet_status_message,
     MAVLINK_MSG_ID_FANET_BIDS: MAVLink_fanet_bids_message,
@@ -2360,6 +2451,64 @@ class MAVLink(object):
 
         """
         self.send(self.fanet_loads_encode(loads, count, version), force_mavlink1=force_mavlink1)
+
+    def fanet_heard_encode(self, entries: Sequence[int], count: int, length: int, version: int) -> MAVLink_fanet_heard_message:
+        """
+        Which nodes hear which others, as they have stated in one of the
+        latest hello intervals; sent in turns of rounds. An entry has
+        the node (2 bytes, the low one first), the number of the
+        interval modulo 256 (1 byte), and one bit per node of the
+        swarm, node 1 in the lowest bit of the first byte.
+
+        entries                   : Entries of equal length. (type:uint8_t)
+        count                     : How many entries there are. (type:uint8_t)
+        length                    : Length of an entry. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        return MAVLink_fanet_heard_message(entries, count, length, version)
+
+    def fanet_heard_send(self, entries: Sequence[int], count: int, length: int, version: int, force_mavlink1: bool = False) -> None:
+        """
+        Which nodes hear which others, as they have stated in one of the
+        latest hello intervals; sent in turns of rounds. An entry has
+        the node (2 bytes, the low one first), the number of the
+        interval modulo 256 (1 byte), and one bit per node of the
+        swarm, node 1 in the lowest bit of the first byte.
+
+        entries                   : Entries of equal length. (type:uint8_t)
+        count                     : How many entries there are. (type:uint8_t)
+        length                    : Length of an entry. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        self.send(self.fanet_heard_encode(entries, count, length, version), force_mavlink1=force_mavlink1)
+
+    def fanet_held_encode(self, seqs: Sequence[int], origins: Sequence[int], count: int, version: int) -> MAVLink_fanet_held_message:
+        """
+        Packets that the sender holds and a neighbor has sent again; sent in
+        turns of rounds.
+
+        seqs                      : Sequence numbers. (type:uint32_t)
+        origins                   : Node ids. (type:uint16_t)
+        count                     : How many entries are used. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        return MAVLink_fanet_held_message(seqs, origins, count, version)
+
+    def fanet_held_send(self, seqs: Sequence[int], origins: Sequence[int], count: int, version: int, force_mavlink1: bool = False) -> None:
+        """
+        Packets that the sender holds and a neighbor has sent again; sent in
+        turns of rounds.
+
+        seqs                      : Sequence numbers. (type:uint32_t)
+        origins                   : Node ids. (type:uint16_t)
+        count                     : How many entries are used. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        self.send(self.fanet_held_encode(seqs, origins, count, version), force_mavlink1=force_mavlink1)
 
     def fanet_search_encode(self, start_us: int, half_width: float, first: float, last: float, height: float, speed: float, deploy_ds: int, revision: int, planner: int, nodes: Sequence[int], lanes: int, relays: int, followers: int, shape: int, teams: int, version: int) -> MAVLink_fanet_search_message:
         """

@@ -33,7 +33,9 @@ class Port(Protocol):
     def transmit(self, frame: bytes, dst: NodeId, start_ns: int, wants_status: bool = False) -> int:
         """Announce a transmission to the radio; returns the sequence number of the request."""
 
-    def transmit_together(self, packets: Sequence[Packet], *, flags: int, at_ns: Sequence[int]) -> None:
+    def transmit_together(
+        self, packets: Sequence[Packet], *, flags: int, at_ns: Sequence[int], wants_status: bool = False
+    ) -> None:
         """Begin a phase of several packets: broadcast them at each of these instants, in as few frames as possible.
         Copies that come back in that phase count as duplicates.
         """
@@ -112,6 +114,14 @@ class RoutingProtocol(ABC):
         """The earliest instant at which a hello, due at `start_ns`, may be sent."""
         return start_ns
 
+    def send_hello(self, packet: Packet, *, start_ns: int, wants_status: bool, now_ns: int) -> int:
+        """Transmit a hello of this node; returns the sequence number of the transmit request."""
+        return self._port.transmit(packet.frame, BROADCAST, start_ns=start_ns, wants_status=wants_status)
+
+    def hello_due_ns(self, start_ns: int) -> int:
+        """The instant, at or after `start_ns`, for which the node's next hello is to be made."""
+        return start_ns
+
     def on_hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:  # noqa: B027
         """A neighbor's hello was received."""
 
@@ -120,8 +130,9 @@ class RoutingProtocol(ABC):
         it goes no further.
         """
 
-    def on_copy(self, key: int, *, now_ns: int) -> None:  # noqa: B027
-        """Another copy of a packet (`duplicates.key_of`) was received, in a phase in which it was handled before.
+    def on_copy(self, key: int, src: NodeId, *, now_ns: int) -> None:  # noqa: B027
+        """Another copy of a packet (`duplicates.key_of`) was received from a neighbor, in a phase in which it was
+        handled before.
 
         The protocol may cancel what it has planned. It must not plan anything sooner, because the node does not ask
         again.

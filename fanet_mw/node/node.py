@@ -199,8 +199,12 @@ class Node:
             hop_limit=1,
             born_ns=start_ns,
         )
-        request = self.port.transmit(packet.frame, BROADCAST, start_ns=start_ns, wants_status=time is not None)
+        request = self._protocol.send_hello(packet, start_ns=start_ns, wants_status=time is not None, now_ns=now_ns)
         return AnnouncedHello(request, packet.header.seq)
+
+    def hello_due_ns(self, start_ns: int) -> int:
+        """The instant, at or after `start_ns`, for which the next hello is to be made."""
+        return self._protocol.hello_due_ns(start_ns)
 
     def hello_share(self, now_ns: int) -> float:
         """The part of the hello interval after which the next hello should go."""
@@ -218,7 +222,7 @@ class Node:
         if known & phase:
             self._copies += 1
             if self._on_copy is not None:
-                self._on_copy(reader.key, now_ns=now_ns)
+                self._on_copy(reader.key, reception.src, now_ns=now_ns)
             return True
         self._others += 1
         if phase == BUNDLE:
@@ -258,7 +262,7 @@ class Node:
         if known & reader.phase:
             self.port.dropped[DropReason.DUPLICATE] += 1
             if self._on_copy is not None:
-                self._on_copy(reader.key, now_ns=now_ns)
+                self._on_copy(reader.key, reception.src, now_ns=now_ns)
             return _NONE
         try:
             return self._first_copy(reader.packet or reader.read(), reception, known, now_ns)

@@ -13,7 +13,7 @@ from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.flooding import FloodingProtocol
 from fanet_mw.routing.random_assessment_delay import Assessment
-from fanet_mw.units import MS
+from fanet_mw.units import MS, NodeId
 
 
 class CounterBased(FloodingProtocol):
@@ -31,7 +31,7 @@ class CounterBased(FloodingProtocol):
         self._assessment.first_copy(packet, due_ns=now_ns + int(self._random() * self._assess_ns))
         return ()
 
-    def on_copy(self, key: int, *, now_ns: int) -> None:
+    def on_copy(self, key: int, src: NodeId, *, now_ns: int) -> None:
         self._assessment.on_copy(key, now_ns=now_ns)
 
     def next_wake_ns(self) -> int | None:

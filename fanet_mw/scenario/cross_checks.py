@@ -41,6 +41,10 @@ _MOST_LINKS_MESSAGES: Final = 4
 """The number of FANET_LINKS messages in one frame."""
 _TELLS_NEIGHBORS: Final = ("heads", "cds", "mpr", "claimed")
 """The relay rules with which a hello states which nodes its sender hears."""
+_MOST_IN_ROUNDS: Final = 488
+"""The nodes about which one FANET_HEARD can tell (64 bytes, of which 3 for node and epoch)."""
+_HELLO_IN_TURN: Final = 36 + 61 + 255
+"""A hello with positions and one message of its digest."""
 _RIVAL_FRAME_BYTES: Final = 256
 """Control messages of a fixed length must fit a frame of this length; longer ones are divided."""
 
@@ -81,6 +85,7 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
     ]
     found += _impossible_places(scenario)
     found += _wrong_for_rivals(scenario)
+    found += _impossible_rounds(scenario)
     if scenario.routing.protocol == "clustered":
         clusters = scenario.clusters
         if not scenario.routing.hello_interval_s:
@@ -123,6 +128,26 @@ def _no_claimed_turns(scenario: Scenario) -> Iterator[str]:
             f"clusters.contention_ms = {clusters.contention_ms:g} must be <= {most_ms:g}, the period less one turn of "
             f"{turn_ns / MS:g} ms: the period is the lesser of clusters.flooding_period_s = "
             f"{clusters.flooding_period_s:g} and routing.hello_interval_s / 2 = {hello_s / 2:g}"
+        )
+
+
+def _impossible_rounds(scenario: Scenario) -> Iterator[str]:
+    """Rounds without hellos, of too many nodes, or with turns too short for what must go in them."""
+    count, turn_bytes = scenario.nodes.count, scenario.rounds.turn_bytes
+    if scenario.routing.protocol != "rounds":
+        return
+    if not scenario.routing.hello_interval_s:
+        yield 'routing.protocol = "rounds" needs hellos: routing.hello_interval_s > 0'
+    if count > _MOST_IN_ROUNDS:
+        yield f'routing.protocol = "rounds" has turns for at most {_MOST_IN_ROUNDS} nodes: nodes.count = {count}'
+    in_turns = (each for each in scenario.traffic_classes.values() if each.priority != "bulk")
+    every = in_turns if scenario.rounds.bulk_share else scenario.traffic_classes.values()
+    reports = [scenario.mission.report_bytes] if scenario.mission.survivors else []
+    least = max(_HELLO_IN_TURN, *reports, *(each.longest_bytes for each in every), 0)
+    if turn_bytes < least:
+        yield (
+            f"rounds.turn_bytes = {turn_bytes} must be >= {least}: hellos, reports and all packets that are not bulk "
+            "must fit a turn (with rounds.bulk_share = 0 bulk, too)"
         )
 
 

@@ -20,6 +20,7 @@ from fanet_mw.scenario.tables.mission import Mission
 from fanet_mw.scenario.tables.mobility import Mobility
 from fanet_mw.scenario.tables.nodes import Nodes
 from fanet_mw.scenario.tables.radio import Radio
+from fanet_mw.scenario.tables.rounds import Rounds
 from fanet_mw.scenario.tables.routing import Routing
 from fanet_mw.scenario.tables.sections import Duration, Section, SomeTime
 from fanet_mw.scenario.tables.sensors import Sensors
@@ -56,6 +57,7 @@ class Scenario(Section):
     traffic: Traffic = Traffic()
     routing: Routing = Routing()
     clusters: Clusters = Clusters()
+    rounds: Rounds = Rounds()
     radio: Radio = Radio()
     mobility: Mobility = Mobility()
     clock: Clock = Clock()
@@ -125,6 +127,11 @@ class Scenario(Section):
         longest = max(traffic.longest_bytes for traffic in self.traffic_classes.values())
         least = max(longest, self.mission.report_bytes if self.mission.survivors else 0, _LEAST_TURN_BYTES)
         return max(least, self.radio.max_frame_bytes) if self.routing.aggregate else least
+
+    @property
+    def longest_bulk_bytes(self) -> int:
+        """The longest packet of the traffic classes that are bulk; 0 if there are none."""
+        return max((each.longest_bytes for each in self.traffic_classes.values() if each.priority == "bulk"), default=0)
 
     @property
     def repair_ns(self) -> int:

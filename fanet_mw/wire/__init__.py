@@ -6,6 +6,7 @@ a module of its own:
     `hello/`                            the parts of a hello: beacon, digest, claims, time beacon
     `join.py`, `links.py`               a node asks for a place in a cluster, and reports the quality of its links
     `schedule.py`, `places.py`, `loads.py`    the leader's division into clusters; positions and loads for a timetable
+    `rounds.py`                         who hears whom, and packets that are held, in turns of rounds
     `application_message.py`            messages of applications: pieces, targets, receipts
     `search_messages.py`                messages of a search: `search_plan.py`, `survivors.py`, `bids.py`,
                                         `searched_cells.py`
@@ -28,6 +29,8 @@ from fanet_mw.wire.frame import (
     FLAG_TO_HEAD,
     FOUND,
     HEADER_BYTES,
+    HEARD,
+    HELD,
     INNER_ID,
     JOIN,
     LATEST_US,
@@ -93,6 +96,8 @@ __all__ = [
     "FLAG_TO_HEAD",
     "COVERED",
     "FOUND",
+    "HEARD",
+    "HELD",
     "Content",
     "Fields",
     "HEADER_BYTES",

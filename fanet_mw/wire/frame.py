@@ -64,6 +64,8 @@ class Kind(IntEnum):
     TIME = 4
     LINKS = 5
     """The leader's links of an assignment."""
+    ROUND = 6
+    """What a node tells its neighbors in its turn of a round (`rounds.py`)."""
     ROUTING = 8
     """A control message of a rival protocol (`fanet_mw.routing.rival_control_messages`)."""
 
@@ -356,6 +358,8 @@ MESSAGE: Final = Spec(53012, 170, struct.Struct("<QIIIIHHHBBBB"))
 RECEIPT: Final = Spec(53013, 26, struct.Struct("<QIBB"))
 TARGETS: Final = Spec(53014, 54, struct.Struct("<32HBB"))
 LOADS: Final = Spec(53015, 190, struct.Struct("<56HBB"))
+HEARD: Final = Spec(53016, 200, struct.Struct("<64BBBB"))
+HELD: Final = Spec(53017, 58, struct.Struct("<16I16HBB"))
 SEARCH: Final = Spec(53020, 44, struct.Struct("<QfffffHHH79HBBBBBB"))
 STATUS: Final = Spec(53021, 199, struct.Struct("<QfffHHBB"))
 BIDS: Final = Spec(53022, 212, struct.Struct("<12H12H12H12HH12BBB"))
@@ -363,7 +367,7 @@ FOUND: Final = Spec(53023, 195, struct.Struct("<QIfffffHBB"))
 COVERED: Final = Spec(53024, 57, struct.Struct("<128BB"))
 SPECS: Final = (
     ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES, CLAIMS, ROUTING, LINKS,
-    MESSAGE, RECEIPT, TARGETS, LOADS, SEARCH, STATUS, BIDS, FOUND,
+    MESSAGE, RECEIPT, TARGETS, LOADS, HEARD, HELD, SEARCH, STATUS, BIDS, FOUND,
     COVERED,
 )  # fmt: skip
 _OURS: Final = {spec.msgid: spec for spec in SPECS}

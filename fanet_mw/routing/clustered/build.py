@@ -22,7 +22,6 @@ from fanet_mw.routing.clustered.clustered import Clustered, Parts
 from fanet_mw.routing.clustered.contract import HearsCopies, ScheduledAccess
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
-from fanet_mw.routing.clustered.forwarding.packet_repair import Repair
 from fanet_mw.routing.clustered.forwarding.uplink import Uplink
 from fanet_mw.routing.clustered.relaying.claimed import ClaimedRelaying
 from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
@@ -62,6 +61,7 @@ from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesI
 from fanet_mw.routing.clustered.timetable.timetabling import FromPlaces, NoTimetable, Timetabling
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.routing.clustered.timetable.turn_allocation import leader_load
+from fanet_mw.routing.packet_repair import Repair
 from fanet_mw.units import MS, seconds_to_ns
 
 _STORE_PACKETS: Final = 4096

@@ -23,11 +23,11 @@ from fanet_mw.node.reader import decoded
 from fanet_mw.routing.clustered.contract import Access, HearsCopies, Relaying, Roles, TwoHops
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
-from fanet_mw.routing.clustered.forwarding.packet_repair import Repair
 from fanet_mw.routing.clustered.forwarding.uplink import MOST_TRIES, Uplink
 from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
 from fanet_mw.routing.clustered.timetable.heard_load import HeardLoads
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
+from fanet_mw.routing.packet_repair import Repair
 from fanet_mw.units import BROADCAST, US, NodeId
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, HEADER_BYTES, Kind
 from fanet_mw.wire.hello.beacon import Beacon
@@ -122,7 +122,7 @@ class Clustered(RoutingProtocol):
     def least_interval_ns(self, deadline_ns: int) -> int | None:
         return None if self.parts.delays is None else self.parts.delays.least_interval_ns(deadline_ns)
 
-    def on_copy(self, key: int, *, now_ns: int) -> None:
+    def on_copy(self, key: int, src: NodeId, *, now_ns: int) -> None:
         for pending, on_copy in self._hear_copies:
             if key in pending:
                 on_copy(key, now_ns=now_ns)

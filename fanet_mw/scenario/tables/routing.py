@@ -26,7 +26,7 @@ HelloInterval = Annotated[Duration, AfterValidator(_none_or_interval)]
 
 
 PROTOCOLS: Final = (
-    "direct", "flooding", "clustered", "aodv", "olsr", "dsdv", "gossip", "counter", "geographic",
+    "direct", "flooding", "rounds", "clustered", "aodv", "olsr", "dsdv", "gossip", "counter", "geographic",
 )  # fmt: skip
 
 

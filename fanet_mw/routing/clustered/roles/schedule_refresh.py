@@ -10,9 +10,9 @@ from collections.abc import Callable
 
 from fanet_mw.node.duplicates import key_of_packet
 from fanet_mw.node.packet import Packet
-from fanet_mw.routing.clustered.forwarding.packet_repair import AGAIN_NS, ASSESS_NS, FLOOD_OVER_NS
 from fanet_mw.routing.clustered.roles.leader_election import Authority
 from fanet_mw.routing.clustered.roles.membership import EPOCH_BITS
+from fanet_mw.routing.packet_repair import AGAIN_NS, ASSESS_NS, FLOOD_OVER_NS
 from fanet_mw.serial_number import newer
 from fanet_mw.wire.hello.beacon import Beacon
 

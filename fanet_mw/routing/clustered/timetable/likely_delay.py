@@ -6,8 +6,8 @@ delay = longest wait for a turn + flood + one turn + time until repair begins
 
 from typing import Final
 
-from fanet_mw.routing.clustered.forwarding.packet_repair import RIPE_NS
 from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
+from fanet_mw.routing.packet_repair import RIPE_NS
 from fanet_mw.units import NodeId
 
 LIKELY_SHARE: Final = 0.99

@@ -49,8 +49,12 @@ class _Kept(NamedTuple):
 class Repair:
     """The store of packets of one node, and the repairs that it plans."""
 
-    def __init__(self, *, window_ns: int, capacity: int, random: Callable[[], float]) -> None:
+    def __init__(
+        self, *, window_ns: int, capacity: int, random: Callable[[], float], flood_over_ns: int = FLOOD_OVER_NS
+    ) -> None:
+        """`flood_over_ns`: the time after which a received flood is taken to be over everywhere."""
         self._window_ns = window_ns
+        self._flood_over_ns = flood_over_ns
         self._capacity = capacity
         self._random = random
         self._holdings: dict[int, Holding] = {}
@@ -73,7 +77,7 @@ class Repair:
         origin, seq = header.origin, header.seq
         holding = self._holdings.get(origin)
         self._holdings[origin] = Holding(origin, seq, 0) if holding is None else holding.with_(seq)
-        ripe_ns = now_ns + FLOOD_OVER_NS if flooded else expect_ns
+        ripe_ns = now_ns + self._flood_over_ns if flooded else expect_ns
         of_origin = self._store.get(origin)
         if of_origin is None:
             of_origin = self._store[origin] = {}

@@ -3,7 +3,7 @@
 from fanet_mw import wire
 from fanet_mw.node.duplicates import key_of
 from fanet_mw.node.packet import Packet
-from fanet_mw.routing.clustered.forwarding.packet_repair import Repair
+from fanet_mw.routing.packet_repair import Repair
 from fanet_mw.units import BROADCAST, MS, NodeId, S
 from fanet_mw.wire import Header, Kind
 from fanet_mw.wire.hello.digest import Digest, Holding

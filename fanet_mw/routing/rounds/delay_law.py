@@ -1,0 +1,60 @@
+"""The delay bound of packets in turns: rounds x hops, with what surrounds each hop.
+
+    hop = period + turn + lead + handover
+    D   = (h + margin) * hop + ceil(B / room) * period
+
+A packet that was heard is announced one lead before the next own turn, at most one period later; its frame ends within
+the turn, and is handed over. `h` is the greatest distance that the node knows to another; `margin` is for a topology
+that changes meanwhile. All urgent packets that are under way together, `B` bytes, delay each other once: every node
+serves them at the same rate, one frame of `room` bytes per round, so what waited for one node's turn does not wait
+again for the next one's (tandem of equal servers; Le Boudec and Thiran, Network Calculus, 1.4.3).
+Assumed: no frame is lost. No bound is stated while more than B bytes were heard in the time that they take, nor while a
+node has been out of reach for less than the silence by which it is known to be gone; nodes gone for longer are not
+among those to which a bound applies.
+"""
+
+from collections import deque
+from typing import Final
+
+from fanet_mw.routing.rounds.round_timing import RoundTiming
+from fanet_mw.routing.rounds.topology import Topology
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import S, seconds_to_ns
+
+MARGIN_HOPS: Final = 2
+MOST_HOPS: Final = 32
+"""The hops for which a statement about links lives at least."""
+_SILENT_HELLOS: Final = 1.6
+
+
+class DelayLaw:
+    """The bound that one node states."""
+
+    def __init__(self, timing: RoundTiming, scenario: Scenario) -> None:
+        self._timing = timing
+        self._burst_bytes = scenario.rounds.burst_bytes
+        self._burst_ns = -(-self._burst_bytes // timing.turn_bytes) * timing.period_ns
+        self.hop_ns = timing.period_ns + timing.turn_ns + scenario.radio.lead_ns + scenario.radio.handover_ns
+        if scenario.clock.sync == "beacons":
+            self.hop_ns += timing.period_ns  # hellos have turns of their own
+        hello_ns = seconds_to_ns(scenario.routing.hello_interval_s) or S
+        self.silent_ns = round(_SILENT_HELLOS * hello_ns) + self.hop_ns
+        """A neighbor that was not heard for so long is none."""
+        self.epoch_ns = max(hello_ns // 4, 1)
+        self._recent: deque[tuple[int, int]] = deque()
+        """(instant, size) of the urgent packets that came lately."""
+        self._recent_bytes = 0
+
+    def count(self, size: int, *, now_ns: int) -> None:
+        """An urgent packet came, own or another node's."""
+        self._recent.append((now_ns, size))
+        self._recent_bytes += size
+
+    def bound_ns(self, topology: Topology, *, now_ns: int) -> int | None:
+        """The bound for a packet that is handed over now; None if none can be stated."""
+        while self._recent and self._recent[0][0] < now_ns - self._burst_ns:
+            self._recent_bytes -= self._recent.popleft()[1]
+        if self._recent_bytes > self._burst_bytes or topology.absent(now_ns, doubt_ns=self.silent_ns) is None:
+            return None
+        hops = topology.hops(now_ns)
+        return (max(hops.values()) + MARGIN_HOPS) * self.hop_ns + self._burst_ns if len(hops) > 1 else None

@@ -1,0 +1,382 @@
+"""Rounds: a protocol whose delays do not depend on the topology. Each node has one turn in every round, by its number.
+
+    urgent packet   waits for the own turn; whoever hears it first sends it in the own next turn
+    bulk            contends for the rest of the round, as long as a neighbor is not known to have it
+    topology        each node states its neighbors when they change, and all pass that on in turns (`topology.py`)
+    hello           goes in a turn; holds a digest, so that neighbors send what was missed (`packet_repair.py`)
+
+One hop takes at most one round, one turn, the lead and the handover, whatever moves, as long as the two nodes hear each
+other meanwhile; `delay_law.py` states the bound that follows. After slotted flooding in rounds (Glossy, Ferrari et al.,
+IPSN 2011; LWB, SenSys 2012), without their synchronous transmissions, which 802.11 does not have. Not modeled: two
+nodes that use the same turn far apart.
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar, Final
+
+from fanet_mw.bus.messages import Reception, TxStatus
+from fanet_mw.errors import DropReason
+from fanet_mw.node.contract import Port, RoutingProtocol
+from fanet_mw.node.duplicates import key_of, key_of_packet, origin_and_seq
+from fanet_mw.node.hop_limit import is_used_up
+from fanet_mw.node.packet import Packet
+from fanet_mw.node.reader import decoded
+from fanet_mw.routing.packet_repair import FLOOD_OVER_NS, Repair
+from fanet_mw.routing.rounds.bulk_pacing import BulkPacing
+from fanet_mw.routing.rounds.delay_law import MOST_HOPS, DelayLaw
+from fanet_mw.routing.rounds.round_timing import RoundTiming
+from fanet_mw.routing.rounds.spreading import Spreading
+from fanet_mw.routing.rounds.topology import Topology
+from fanet_mw.trace import BoundStated
+from fanet_mw.units import BROADCAST, US, NodeId, seconds_to_ns
+from fanet_mw.wire import FLAG_FLOOD, HEADER_BYTES, PRIORITY_BULK, Kind
+from fanet_mw.wire.hello.digest import MESSAGE_BYTES, Digest, capacity
+from fanet_mw.wire.rounds import (
+    CAPACITY,
+    HEARD_BYTES,
+    HELD_BYTES,
+    HeldPacket,
+    decode_heard,
+    decode_held,
+    encode_heard,
+    encode_held,
+    heard_capacity,
+)
+
+_DATA: Final = int(Kind.DATA)
+_STORE_PACKETS: Final = 4096
+"""The most packets that a node keeps for repair."""
+_MOST_HELD: Final = 64
+_BEFORE_TURN_NS: Final = 1 * US
+"""A hello is made just before the turn in which it goes is filled."""
+_PATIENT_TURNS: Final = 2
+"""A hello that found no room in so many turns goes before urgent packets."""
+
+
+class Rounds(RoutingProtocol):
+    """One node of a swarm that floods in rounds."""
+
+    origin_flags: ClassVar[int] = FLAG_FLOOD
+
+    def __init__(self, port: Port) -> None:
+        super().__init__(port)
+        scenario = port.scenario
+        rounds, radio = scenario.rounds, scenario.radio
+        self._timing = timing = RoundTiming.of(scenario)
+        self._lead_ns = radio.lead_ns
+        self._law = DelayLaw(timing, scenario)
+        self._topology = Topology(
+            port.node,
+            count=scenario.nodes.count,
+            epoch_ns=self._law.epoch_ns,
+            lifetime_ns=self._law.silent_ns + MOST_HOPS * self._law.hop_ns,
+        )
+        self._spreading = Spreading(
+            capacity=scenario.routing.queue_frames, repeats=rounds.repeats, patience_ns=self._law.hop_ns,
+            neighbors_of=self._topology.neighbors_of,
+        )  # fmt: skip
+        self._random = port.stream("rounds").random
+        self._repair = None
+        if rounds.repair_s:
+            self._repair = Repair(
+                window_ns=seconds_to_ns(rounds.repair_s), capacity=_STORE_PACKETS,
+                random=port.stream("repair").random, flood_over_ns=max(4 * FLOOD_OVER_NS, 16 * self._law.hop_ns),
+            )  # fmt: skip
+        self._pacing = BulkPacing(timing, self._random)
+        self._bulk_ns: int | None = None
+        """The next instant at which this node contends with bulk; None if it has none."""
+        self._clock_hellos: set[int] = set()
+        """The requests of hellos of which the clock wants to know when they ended."""
+        self._held: dict[HeldPacket, None] = {}
+        """Packets of which a neighbor should be told that this node holds them."""
+        self._hello: Packet | None = None
+        self._hello_waits = 0
+        """The number of turns in which the hello found no room."""
+        self._heard_ns: dict[NodeId, int] = {}
+        """The instant at which each neighbor was last heard."""
+        self._turn_ns = 0
+        """The next own turn that may still be filled."""
+        self._stated = 0
+        self._now_ns = 0
+
+    def start(self, now_ns: int) -> None:
+        self._topology.state((), now_ns=now_ns)
+        self._turn_ns = self._timing.turn_start_ns(self._port.node, from_ns=now_ns + self._lead_ns)
+
+    # --- packets --------------------------------------------------------------------------------------------------
+
+    def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
+        self._hold(packet, now_ns)
+        if self._in_turns(packet):
+            self._state_bound(packet, now_ns)
+            self._take(packet, src=None, now_ns=now_ns)
+        else:
+            self._take_bulk(packet, src=None, from_ns=due_ns, now_ns=now_ns)
+
+    def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+        src, header = reception.src, packet.header
+        self._heard_ns[src] = now_ns
+        if header.kind == Kind.ROUND:
+            self._on_round(packet, src, now_ns)
+            return
+        if header.kind == _DATA:
+            self._hold(packet, now_ns)
+        if header.destination == self._port.node:
+            return
+        if is_used_up(header):
+            self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
+        elif self._in_turns(packet):
+            self._take(packet, src=src, now_ns=now_ns)
+        else:
+            self._tell_held(packet.header.seq, packet.header.origin)
+            self._take_bulk(packet, src=src, from_ns=now_ns + self._lead_ns, now_ns=now_ns)
+
+    def on_copy(self, key: int, src: NodeId, *, now_ns: int) -> None:
+        self._heard_ns[src] = now_ns
+        if self._repair is not None and key in self._repair.pending:
+            self._repair.on_copy(key, now_ns=now_ns)
+        if self._spreading.on_copy(key, src, now_ns=now_ns):
+            origin, seq = origin_and_seq(key)
+            self._tell_held(seq, origin)
+
+    def _state_bound(self, packet: Packet, now_ns: int) -> None:
+        """State by when all nodes have an own packet, if that is known."""
+        bound_ns = self._law.bound_ns(self._topology, now_ns=now_ns)
+        header = packet.header
+        if bound_ns is not None and bound_ns <= self._port.scenario.routing.lifetime_ns(header.priority):
+            self._stated += 1
+            self._port.record(BoundStated(header.origin_us * US, self._port.node, header.seq, bound_ns))
+
+    def _in_turns(self, packet: Packet) -> bool:
+        """True for a packet that travels in turns; bulk does only where no window is left to it."""
+        return packet.header.priority < PRIORITY_BULK or not self._timing.window_ns
+
+    def _hold(self, packet: Packet, now_ns: int) -> None:
+        if self._repair is not None and packet.header.destination == BROADCAST and self._in_turns(packet):
+            self._repair.hold(packet, flooded=True, expect_ns=now_ns, now_ns=now_ns)
+
+    def _tell_held(self, seq: int, origin: int) -> None:
+        """Tell the neighbors in the next turns that this node has a packet."""
+        if len(self._held) < _MOST_HELD:
+            self._held[HeldPacket(seq, origin)] = None
+
+    # --- turns ----------------------------------------------------------------------------------------------------
+
+    def _take(self, packet: Packet, *, src: int | None, now_ns: int) -> None:
+        """A packet is to go in the node's next turn."""
+        self._law.count(len(packet.frame), now_ns=now_ns)
+        evicted = self._spreading.take(packet, src=src, now_ns=now_ns)
+        if evicted is not None:
+            self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
+        self._reach_turn(now_ns)
+
+    def _reach_turn(self, now_ns: int) -> None:
+        """Something waits: the next turn that can still be announced in time is the one to fill."""
+        if self._turn_ns < now_ns + self._lead_ns:
+            self._turn_ns = self._timing.turn_start_ns(self._port.node, from_ns=now_ns + self._lead_ns)
+
+    def _fill(self, turn_ns: int, now_ns: int) -> None:
+        """Announce the frame of a turn: urgent packets, what neighbors are told, then the hello, as they fit."""
+        room, together = self._timing.turn_bytes, list[Packet]()
+        hello = self._hello
+        if hello is not None and self._hello_waits >= _PATIENT_TURNS:
+            room -= self._add_hello(together)
+        for packet in self._spreading.wanted(self._neighbors(now_ns), start_ns=turn_ns):
+            if self._expired(packet, turn_ns):
+                continue
+            size = len(packet.frame)
+            if size <= room:
+                room -= size
+                together.append(packet)
+                self._spreading.sent(packet, start_ns=turn_ns)
+        told = self._told(room, now_ns)
+        if told is not None:
+            room -= len(told.frame)
+            together.append(told)
+        if self._hello is not None:
+            if len(self._hello.frame) <= room:
+                room -= self._add_hello(together)
+            else:
+                self._hello_waits += 1
+        if together:
+            self._port.transmit_together(together, flags=FLAG_FLOOD, at_ns=(turn_ns,))
+
+    def _add_hello(self, together: list[Packet]) -> int:
+        """Put the hello into the frame; returns its size."""
+        hello, self._hello, self._hello_waits = self._hello, None, 0
+        assert hello is not None, "somebody has looked whether there is one"
+        together.append(hello)
+        return len(hello.frame)
+
+    def _expired(self, packet: Packet, at_ns: int) -> bool:
+        """True, and the packet is forgotten, if it is older than its lifetime at an instant."""
+        header = packet.header
+        if at_ns - header.origin_us * US <= self._port.scenario.routing.lifetime_ns(header.priority):
+            return False
+        if self._spreading.forget(packet):
+            self._port.drop(DropReason.EXPIRED, packet, now_ns=at_ns)
+        return True
+
+    def _told(self, room: int, now_ns: int) -> Packet | None:
+        """What this node tells its neighbors of links and held packets, if there is anything and room for it."""
+        room -= HEADER_BYTES
+        inner = b""
+        if self._held and room >= HELD_BYTES:
+            told = list(self._held)[:CAPACITY]
+            for each in told:
+                del self._held[each]
+            inner += encode_held(told, self._port.node)
+            room -= HELD_BYTES
+        if self._topology.has_news and room >= HEARD_BYTES:
+            count = self._port.scenario.nodes.count
+            most = room // HEARD_BYTES * heard_capacity(count)
+            inner += encode_heard(self._topology.take_news(most), self._port.node, count=count)
+        if not inner:
+            return None
+        return self._port.announce(Kind.ROUND, inner, now_ns=now_ns, flags=FLAG_FLOOD, hop_limit=1)
+
+    def _on_round(self, packet: Packet, src: NodeId, now_ns: int) -> None:
+        """A neighbor tells of links and of packets that it holds."""
+        if packet.header.origin != src:
+            return
+        for seq, origin in decoded(packet.frame, decode_held):
+            self._spreading.on_held(key_of(origin, seq), src)
+        self._topology.hear(decoded(packet.frame, decode_heard), now_ns=now_ns)
+        if self._topology.has_news:
+            self._reach_turn(now_ns)
+
+    # --- bulk -----------------------------------------------------------------------------------------------------
+
+    def _take_bulk(self, packet: Packet, *, src: int | None, from_ns: int, now_ns: int) -> None:
+        """A bulk packet may be sent from an instant on."""
+        start_ns = self._pacing.start_ns(from_ns, windows=0.5)
+        evicted = self._spreading.take(packet, src=src, now_ns=now_ns, bulk_from_ns=start_ns)
+        if evicted is not None:
+            self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
+        if self._bulk_ns is None or start_ns < self._bulk_ns:
+            self._bulk_ns = start_ns
+
+    def _send_bulk(self, now_ns: int) -> None:
+        """Announce the bulk whose start was drawn, and see later who still lacks it."""
+        start_ns = self._bulk_ns
+        assert start_ns is not None, "bulk is sent when it is due"
+        room, together = self._timing.bulk_bytes, list[Packet]()
+        for packet, again in self._spreading.bulk_wanted(self._neighbors(now_ns), start_ns=start_ns, now_ns=now_ns):
+            if self._expired(packet, start_ns):
+                continue
+            size = len(packet.frame)
+            if size > room or (not together and not self._pacing.take(start_ns)):
+                next_ns = start_ns + self._timing.period_ns - self._timing.in_window_ns(start_ns)
+                self._spreading.look_again(packet, from_ns=self._pacing.start_ns(next_ns, windows=1 + again))
+                continue
+            room -= size
+            together.append(packet)
+            times = self._spreading.sent(packet, start_ns=start_ns)
+            again_ns = self._pacing.start_ns(start_ns + 2 * self._law.hop_ns, windows=1 << times)
+            self._spreading.look_again(packet, from_ns=again_ns)
+        if together:
+            self._port.transmit_together(together, flags=FLAG_FLOOD, at_ns=(start_ns,), wants_status=True)
+        self._bulk_ns = self._spreading.bulk_due_ns()
+
+    def on_status(self, status: TxStatus, *, now_ns: int) -> None:
+        if status.seq in self._clock_hellos:
+            self._clock_hellos.discard(status.seq)
+        else:
+            self._pacing.ended(status.end_ns)
+
+    def _neighbors(self, now_ns: int) -> set[NodeId]:
+        """The nodes that were heard lately."""
+        horizon_ns = now_ns - self._law.silent_ns
+        return {node for node, heard_ns in self._heard_ns.items() if heard_ns >= horizon_ns}
+
+    # --- hellos ---------------------------------------------------------------------------------------------------
+
+    def hello_due_ns(self, start_ns: int) -> int:
+        return self._timing.turn_start_ns(self._port.node, from_ns=start_ns) - _BEFORE_TURN_NS
+
+    def hello_inner(self, room: int, *, now_ns: int) -> bytes:
+        """The digest of recent packets, as far as the frame of one turn has room."""
+        room -= self._port.scenario.radio.max_frame_bytes - self._timing.turn_bytes
+        if self._repair is None or room < MESSAGE_BYTES:
+            return b""
+        return self._repair.digest(most=capacity(room), now_ns=now_ns).encode_frames(self._port.node)
+
+    def send_hello(self, packet: Packet, *, start_ns: int, wants_status: bool, now_ns: int) -> int:
+        """Put the hello into the turn; one whose end the clock must know goes in a frame of its own."""
+        turn_ns = self._timing.turn_start_ns(self._port.node, from_ns=start_ns)
+        if not wants_status:
+            self._hello = packet
+            self._turn_ns = max(self._turn_ns, turn_ns)
+            return -1
+        self._turn_ns = max(self._turn_ns, self._timing.turn_start_ns(self._port.node, from_ns=turn_ns + 1))
+        request = self._port.transmit(packet.frame, BROADCAST, turn_ns, wants_status=True)
+        self._clock_hellos.add(request)
+        return request
+
+    def on_hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+        self._heard_ns[reception.src] = now_ns
+        digest = decoded(packet.frame, Digest.decode_frames) if self._repair else None
+        if self._repair and digest:
+            self._repair.on_digest(digest, now_ns=now_ns)
+
+    # --- time -----------------------------------------------------------------------------------------------------
+
+    def next_wake_ns(self) -> int | None:
+        first_ns = self._topology.next_epoch_ns()
+        if self._spreading.has_urgent or self._hello is not None or self._held or self._topology.has_news:
+            first_ns = min(first_ns, self._turn_ns - self._lead_ns)
+        if self._bulk_ns is not None and self._bulk_ns - self._lead_ns < first_ns:
+            first_ns = self._bulk_ns - self._lead_ns
+        due_ns = None if self._repair is None else self._repair.next_wake_ns()
+        if due_ns is not None and due_ns < first_ns:
+            first_ns = due_ns
+        return first_ns
+
+    def wake(self, now_ns: int) -> None:
+        self._now_ns = now_ns
+        if now_ns >= self._topology.next_epoch_ns():
+            self._topology.state(self._neighbors(now_ns), now_ns=now_ns)
+        self._repair_due(now_ns)
+        if self._bulk_ns is not None and self._bulk_ns - self._lead_ns <= now_ns:
+            self._send_bulk(now_ns)
+        turn_ns = self._turn_ns
+        if turn_ns - self._lead_ns > now_ns:
+            return
+        if turn_ns + self._timing.turn_ns // 2 >= now_ns:
+            self._fill(turn_ns, now_ns)
+        self._turn_ns = self._timing.turn_start_ns(self._port.node, from_ns=max(turn_ns + 1, now_ns + self._lead_ns))
+
+    def _repair_due(self, now_ns: int) -> None:
+        """Send again what a neighbor's hello has shown to be missing there."""
+        if self._repair is None:
+            return
+        for due_ns, packet in self._repair.due(now_ns=now_ns):
+            if is_used_up(packet.header) and packet.header.origin != self._port.node:
+                continue
+            if key_of_packet(packet) in self._spreading:
+                continue
+            if self._in_turns(packet):
+                self._take(packet, src=None, now_ns=now_ns)
+            else:
+                self._take_bulk(packet, src=None, from_ns=due_ns + self._lead_ns, now_ns=now_ns)
+
+    # --- what is known --------------------------------------------------------------------------------------------
+
+    def bound_ns(self) -> int | None:
+        return self._law.bound_ns(self._topology, now_ns=self._now_ns)
+
+    def most_packet_bytes(self, priority: int) -> int:
+        if priority < PRIORITY_BULK or not self._timing.window_ns:
+            return self._timing.turn_bytes
+        return self._port.scenario.radio.max_frame_bytes
+
+    def waiting(self) -> int:
+        return self._spreading.waiting()
+
+    def report(self) -> Mapping[str, object]:
+        return {
+            "waiting": self.waiting(),
+            "repaired": self._repair.repaired if self._repair else 0,
+            "repeated": self._spreading.repeated,
+            "bounds_stated": self._stated,
+        }

@@ -1,0 +1,81 @@
+"""Swarms in rounds: the same delays at rest and in motion, bounds that hold beside any bulk, and nobody left out."""
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
+
+import pytest
+
+from fanet_mw.scenario import config
+from sim.results.files import finish
+from sim.run.virtual import simulate
+
+BASE: dict[str, Any] = {
+    "name": "rounds", "duration_s": 16, "warmup_s": 4, "drain_s": 4,
+    "nodes": {"count": 15, "layout": "grid", "columns": 5, "spacing_m": 200, "telemetry_hz": 0},
+    "traffic": {"payload_bytes": 100, "interval_s": 1, "arrivals": "cbr", "sources": 14, "priority": "report"},
+    "routing": {"protocol": "rounds"},
+    "rounds": {"turn_bytes": 500},
+    "radio": {"channel": "range", "range_m": 250, "cw_min": 7, "lead_ms": 0},
+}  # fmt: skip
+
+
+def flown(**tables: Any) -> Mapping[str, Any]:
+    tree = {key: {**value, **tables.pop(key, {})} if isinstance(value, dict) else value for key, value in BASE.items()}
+    return finish(simulate(config.build({**tree, **tables})), out=None)
+
+
+@lru_cache
+def formation(speed_m_s: float) -> Mapping[str, Any]:
+    return flown(mobility={"model": "formation", "speed_m_s": speed_m_s})
+
+
+@pytest.mark.parametrize("speed_m_s", [0.0, 10.0, 20.0])
+def test_a_formation_keeps_its_bound_at_any_speed(speed_m_s: float) -> None:
+    summary = formation(speed_m_s)
+    assert summary["pdr"] == 1.0
+    bound = summary["bound"]
+    assert bound["stated_share"] == bound["within_share"] == 1.0
+    assert bound["violations"] == 0
+    assert bound["worst_ms"] <= 1.3 * formation(0.0)["bound"]["worst_ms"]
+
+
+def test_no_frame_collides_where_all_is_urgent() -> None:
+    summary = formation(10.0)
+    assert summary["frames"]["closes"]
+    assert not summary["copies"]["lost"]
+
+
+@lru_cache
+def overloaded() -> Mapping[str, Any]:
+    """Urgent packets beside more bulk than the air can carry."""
+    bulk = {"name": "bulk", "payload_bytes": 1024, "interval_s": 0.1, "arrivals": "cbr", "sources": 14}
+    return flown(further_traffic=[bulk], traffic={"name": "finds"}, duration_s=12)
+
+
+def test_bulk_beyond_what_the_air_carries_leaves_the_bounds_alone() -> None:
+    summary = overloaded()
+    assert summary["classes"]["bulk"]["pdr"] < 0.9, "it was to be more than the air carries"
+    finds = summary["bound"]["classes"]["finds"]
+    assert finds["stated_share"] == 1.0
+    assert finds["violations"] == 0
+    assert finds["within_share"] == 1.0
+    assert summary["frames"]["closes"]
+
+
+def test_bulk_within_what_the_air_carries_reaches_everybody() -> None:
+    summary = flown(traffic={"payload_bytes": 1024, "priority": "bulk"})
+    assert summary["pdr"] == 1.0
+
+
+@pytest.mark.parametrize("loss", [0.1, 0.3])
+def test_who_missed_a_packet_gets_it_from_a_neighbor(loss: float) -> None:
+    summary = flown(faults=[{"kind": "degrade", "at_s": 1, "loss_share": loss}])
+    assert summary["pdr"] >= 0.999
+
+
+def test_a_partition_that_ends_leaves_nobody_without_a_packet() -> None:
+    """The middle column is cut off for three seconds; packets live for 30."""
+    cuts = [{"kind": "cut", "at_s": 6, "for_s": 3, "node": node} for node in (3, 8, 13)]
+    summary = flown(faults=cuts, drain_s=6, duration_s=18)
+    assert summary["pdr"] >= 0.999

@@ -1,0 +1,126 @@
+"""Laws of rounds: turns never overlap, bulk ends in its window, messages survive the air, links need both ends."""
+
+import contextlib
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fanet_mw import wire
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.routing.rounds.round_timing import RoundTiming
+from fanet_mw.routing.rounds.topology import Topology
+from fanet_mw.scenario import config
+from fanet_mw.units import BROADCAST, MS, NodeId, S
+from fanet_mw.wire import Header, Kind
+from fanet_mw.wire.rounds import (
+    HeardNodes,
+    HeldPacket,
+    decode_heard,
+    decode_held,
+    encode_heard,
+    encode_held,
+)
+
+INSTANTS = st.integers(0, 10**13)
+
+
+@st.composite
+def timings(draw: st.DrawFn) -> RoundTiming:
+    return RoundTiming.of(
+        config.build(
+            {
+                "nodes": {"count": draw(st.integers(2, 200))},
+                "routing": {"protocol": "rounds"},
+                "traffic": {"payload_bytes": 300},
+                "radio": {"rate_mbps": draw(st.sampled_from([1, 11, 54])), "standard": "g"},
+                "rounds": {
+                    "turn_bytes": draw(st.integers(400, 1400)),
+                    "bulk_share": draw(st.sampled_from([0.0, 0.1, 0.7, 0.95])),
+                    "least_period_ms": draw(st.sampled_from([0, 50, 5000])),
+                },
+            }
+        )
+    )
+
+
+@given(timings(), INSTANTS, st.data())
+def test_turns_of_two_nodes_never_overlap(timing: RoundTiming, from_ns: int, data: st.DataObject) -> None:
+    one, other = data.draw(st.permutations(range(1, timing.nodes + 1)))[:2]
+    start_ns = timing.turn_start_ns(one, from_ns=from_ns)
+    assert from_ns <= start_ns < from_ns + timing.period_ns
+    around = (
+        timing.turn_start_ns(other, from_ns=start_ns),
+        timing.turn_start_ns(other, from_ns=start_ns - timing.period_ns),
+    )
+    assert all(abs(turn_ns - start_ns) >= timing.turn_ns for turn_ns in around)
+
+
+@given(timings().filter(lambda timing: timing.window_ns > 0), INSTANTS, st.integers(0, 10 * S))
+def test_bulk_that_waits_for_one_other_frame_ends_before_the_next_turn(
+    timing: RoundTiming, from_ns: int, wait_ns: int
+) -> None:
+    start_ns = timing.window_start_ns(from_ns, wait_ns=wait_ns)
+    assert start_ns >= from_ns
+    assert timing.in_window_ns(start_ns) + 2 * timing.bulk_ns <= timing.window_ns
+
+
+@given(timings().filter(lambda timing: timing.window_ns > 0), INSTANTS)
+def test_the_wait_for_bulk_is_of_windows_and_not_of_turns(timing: RoundTiming, from_ns: int) -> None:
+    usable_ns = timing.window_ns - 2 * timing.bulk_ns
+    first_ns = timing.window_start_ns(from_ns, wait_ns=0)
+    assert timing.window_start_ns(from_ns, wait_ns=3 * usable_ns) - first_ns == 3 * timing.period_ns
+
+
+def on_air(inner: bytes) -> bytes:
+    header = Header(0, 1, NodeId(3), BROADCAST, NodeId(3), Kind.ROUND, 1, 0, wire.PRIORITY_CONTROL, wire.FLAG_FLOOD)
+    return header.encode() + inner
+
+
+@given(st.integers(1, 488), st.data())
+def test_links_survive_the_air(count: int, data: st.DataObject) -> None:
+    entry = st.builds(HeardNodes, st.integers(1, count), st.integers(0, 255), st.integers(0, 2**count - 1))
+    entries = data.draw(st.lists(entry, min_size=1, max_size=40))
+    assert decode_heard(on_air(encode_heard(entries, 3, count=count))) == entries
+
+
+@given(st.lists(st.builds(HeldPacket, st.integers(0, 2**32 - 1), st.integers(1, 65534)), max_size=40))
+def test_held_packets_survive_the_air(packets: list[HeldPacket]) -> None:
+    assert decode_held(on_air(encode_held(packets, 3))) == packets
+
+
+@given(st.binary(max_size=90), st.sampled_from([wire.HEARD, wire.HELD]))
+def test_any_bytes_decode_to_values_or_are_malformed(noise: bytes, spec: wire.Spec) -> None:
+    frame = on_air(wire.encode_inner(spec, noise.ljust(spec.layout.size, b"\x01")[: spec.layout.size], node=3))
+    for decode in (decode_heard, decode_held):
+        with contextlib.suppress(MalformedFrameError):
+            decode(frame)
+
+
+def told_by(nodes: dict[int, set[int]], *, epoch: int) -> list[HeardNodes]:
+    return [HeardNodes(n, epoch % 256, sum(1 << (m - 1) for m in heard)) for n, heard in nodes.items()]
+
+
+@given(st.sets(st.tuples(st.integers(1, 12), st.integers(1, 12)), max_size=50), st.integers(2, 10_000))
+def test_a_link_counts_if_both_its_ends_state_it(heard: set[tuple[int, int]], epoch: int) -> None:
+    topology = Topology(NodeId(1), count=12, epoch_ns=250 * MS, lifetime_ns=10 * S)
+    now_ns = epoch * 250 * MS + 1
+    states = {n: {b for a, b in heard if a == n and b != n} for n in range(1, 13)}
+    topology.state([NodeId(n) for n in states[1]], now_ns=now_ns)
+    topology.hear(told_by(states, epoch=epoch), now_ns=now_ns)
+    hops = topology.hops(now_ns)
+    reached, ring, far = {1: 0}, [1], 0
+    while ring:
+        far += 1
+        ring = sorted({m for n in ring for m in states[n] if n in states[m]} - set(reached))
+        reached.update(dict.fromkeys(ring, far))
+    assert hops == reached
+
+
+@given(st.integers(0, 255), st.integers(300, 10_000))
+def test_a_statement_from_the_future_or_too_old_is_not_believed(short: int, epoch: int) -> None:
+    topology = Topology(NodeId(1), count=3, epoch_ns=250 * MS, lifetime_ns=2 * S)
+    now_ns = epoch * 250 * MS
+    topology.state([NodeId(2)], now_ns=now_ns)
+    topology.hear([HeardNodes(2, short, 0b1)], now_ns=now_ns)
+    age = (epoch + 1 - short) % 256 - 1
+    assert (NodeId(2) in topology.hops(now_ns)) is (age <= 8)

@@ -14,7 +14,7 @@ Maker = Callable[[Port], RoutingProtocol]
 MAKERS: Final[Mapping[str, str]] = {
     "direct": "fanet_mw.routing.direct:Direct",
     "flooding": "fanet_mw.routing.flooding:Flooding",
-    "rounds": "fanet_mw.routing.rounds.rounds:Rounds",
+    "rounds": "fanet_mw.routing.rounds.rounds:RoundFlooding",
     "clustered": "fanet_mw.routing.clustered.build:make_clustered",
     "aodv": "fanet_mw.routing.aodv:Aodv",
     "olsr": "fanet_mw.routing.olsr:Olsr",

@@ -6,7 +6,7 @@
 Packets are kept in a bounded store, so parts of a swarm that were separated for a while learn each other's packets when
 they meet. A packet is repaired only when its own flood should be over. After epidemic routing (Vahdat and Becker,
 2000), with suppression as in Trickle (RFC 6206). A packet stays lost if it is older than `window_s`, or if its origin
-has sent 32 packets since. A way to the head that broke is found again by hellos (`gradient.py`).
+has sent 32 packets since. A way to the head that broke is found again by hellos (`Gradient`).
 """
 
 import heapq

@@ -26,8 +26,11 @@ from sim.run.outcome import Outcome
 from sim.run.virtual import actors_of, simulate
 
 MULTIHOP = sorted(set(PROTOCOLS) - {"direct"})
-ROUTED = [name for name in MULTIHOP if name not in ("clustered", "flooding", "gossip", "counter")]
+ROUTED = [name for name in MULTIHOP if name not in ("clustered", "rounds", "flooding", "gossip", "counter")]
 """Those that send a unicast packet along one way."""
+
+MOST_PASSES = {"rounds": 4}
+"""In rounds a node sends a packet again, at most `rounds.repeats` times, that a neighbor is not known to have."""
 
 LEAST = {"gossip": 0.8, "clustered": 0.87}
 """What else than nearly all is enough: relays drawn by lot fail a packet now and then in a thin swarm, and floods from
@@ -140,7 +143,7 @@ def transmissions(scenario: Scenario) -> Counter[tuple[int, int, int]]:
 def test_no_packet_passes_a_node_twice(protocol: str) -> None:
     sent = transmissions(scenario_of(protocol, destination=1, moving=True))
     assert len(sent) > 40
-    assert max(sent.values()) == 1
+    assert max(sent.values()) <= MOST_PASSES.get(protocol, 1)
 
 
 @pytest.mark.parametrize("protocol", sorted(PROTOCOLS))

@@ -25,7 +25,7 @@ from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
-from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Header, Kind, filler
+from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, PRIORITY_REPORT, Header, Kind, filler
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "fanet_mw"
@@ -78,12 +78,12 @@ def way(call: Callable[[], object]) -> Way:
     return found
 
 
-def send(node: Node, now_ns: int) -> None:
-    node.send(INNER, destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=now_ns, now_ns=now_ns)
+def send(node: Node, now_ns: int, *, priority: int = PRIORITY_BULK) -> None:
+    node.send(INNER, destination=BROADCAST, priority=priority, app="test", born_ns=now_ns, now_ns=now_ns)
 
 
-def hear(node: Node, at_ns: int, *, origin: int) -> None:
-    header = Header(at_ns // 1000 - 5000, 7, origin, BROADCAST, origin, Kind.DATA, 9, 0, PRIORITY_BULK, FLAG_FLOOD)
+def hear(node: Node, at_ns: int, *, origin: int, priority: int = PRIORITY_BULK) -> None:
+    header = Header(at_ns // 1000 - 5000, 7, origin, BROADCAST, origin, Kind.DATA, 9, 0, priority, FLAG_FLOOD)
     node.hear(Reception(header.encode() + INNER, NodeId(origin), at_ns, -60.0), at_ns)
 
 
@@ -96,6 +96,16 @@ def node_of(node: int, scenario: Scenario) -> Node:
 def flooded() -> dict[str, Way]:
     node = node_of(2, config.build({"nodes": {"count": 5}, "routing": {"protocol": "flooding"}}))
     return {"handed over": way(lambda: send(node, 0)), "heard": way(lambda: hear(node, S, origin=3))}
+
+
+def in_rounds() -> dict[str, Way]:
+    """A survivor report at the second of five nodes."""
+    node = node_of(2, config.build({"nodes": {"count": 5}, "routing": {"protocol": "rounds"}}))
+    over = way(lambda: send(node, 0, priority=PRIORITY_REPORT))
+    heard = way(lambda: hear(node, 10 * MS, origin=3, priority=PRIORITY_REPORT))
+    wake_ns = node.next_wake_ns()
+    assert wake_ns is not None
+    return {"handed over": over, "heard": heard, "let out": way(lambda: node.wake(wake_ns))}
 
 
 def scheduled() -> dict[str, Way]:
@@ -139,7 +149,7 @@ def claimed() -> dict[str, Way]:
     return {"handed over": over, "let out": out, "heard": way(lambda: hear(node, wake_ns + S, origin=1))}
 
 
-WAYS = {"flooded": flooded, "scheduled": scheduled, "claimed": claimed}
+WAYS = {"flooded": flooded, "in rounds": in_rounds, "scheduled": scheduled, "claimed": claimed}
 
 
 def rows(ways: dict[str, dict[str, Way]]) -> Iterable[str]:

@@ -235,7 +235,7 @@ def test_a_right_crc_around_any_header_gives_a_header_that_encodes_to_the_same_o
 @pytest.mark.parametrize(
     "change",
     [
-        {"origin": 0}, {"origin": 0xFFFF}, {"prev_hop": 0}, {"prev_hop": 0xFFFF}, {"destination": 0}, {"kind": 6},
+        {"origin": 0}, {"origin": 0xFFFF}, {"prev_hop": 0}, {"prev_hop": 0xFFFF}, {"destination": 0}, {"kind": 7},
         {"origin_us": wire.LATEST_US + 1},
     ],
     ids=str,

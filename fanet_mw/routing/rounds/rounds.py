@@ -3,7 +3,7 @@
     urgent packet   waits for the own turn; whoever hears it first sends it in the own next turn
     bulk            contends for the rest of the round, as long as a neighbor is not known to have it
     topology        each node states its neighbors when they change, and all pass that on in turns (`topology.py`)
-    hello           goes in a turn; holds a digest, so that neighbors send what was missed (`packet_repair.py`)
+    hello           goes in a turn; holds a digest, so that neighbors send what was missed (`Repair`)
 
 One hop takes at most one round, one turn, the lead and the handover, whatever moves, as long as the two nodes hear each
 other meanwhile; `delay_law.py` states the bound that follows. After slotted flooding in rounds (Glossy, Ferrari et al.,
@@ -53,7 +53,7 @@ _PATIENT_TURNS: Final = 2
 """A hello that found no room in so many turns goes before urgent packets."""
 
 
-class Rounds(RoutingProtocol):
+class RoundFlooding(RoutingProtocol):
     """One node of a swarm that floods in rounds."""
 
     origin_flags: ClassVar[int] = FLAG_FLOOD
@@ -261,7 +261,7 @@ class Rounds(RoutingProtocol):
         start_ns = self._bulk_ns
         assert start_ns is not None, "bulk is sent when it is due"
         room, together = self._timing.bulk_bytes, list[Packet]()
-        for packet, again in self._spreading.bulk_wanted(self._neighbors(now_ns), start_ns=start_ns, now_ns=now_ns):
+        for packet, again in self._spreading.bulk_wanted(self._neighbors(now_ns), start_ns=start_ns):
             if self._expired(packet, start_ns):
                 continue
             size = len(packet.frame)
@@ -368,7 +368,7 @@ class Rounds(RoutingProtocol):
     def most_packet_bytes(self, priority: int) -> int:
         if priority < PRIORITY_BULK or not self._timing.window_ns:
             return self._timing.turn_bytes
-        return self._port.scenario.radio.max_frame_bytes
+        return self._timing.bulk_bytes
 
     def waiting(self) -> int:
         return self._spreading.waiting()

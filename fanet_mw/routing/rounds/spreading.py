@@ -14,7 +14,7 @@ round must have passed in which nobody else sent it, so that mostly one node rep
 from collections.abc import Callable, Collection
 from typing import Final
 
-from fanet_mw.node.duplicates import key_of_packet
+from fanet_mw.node.duplicates import key_of
 from fanet_mw.node.packet import Packet
 
 NeighborsOf = Callable[[int, int], Collection[int]]
@@ -23,7 +23,11 @@ _WAY_ROUND: Final = 2
 """The hops that a flood may need to reach a neighbor by relays that this node does not hear."""
 
 
-class _Entry:
+def _key(packet: Packet) -> int:
+    return key_of(packet.header.origin, packet.header.seq)
+
+
+class _Spread:
     """A packet, and what is known of it."""
 
     __slots__ = ("copy_ns", "from_ns", "having", "packet", "rank", "reached", "sent", "sent_ns")
@@ -56,12 +60,12 @@ class Spreading:
         self._repeats = repeats
         self._patience_ns = patience_ns
         self._neighbors_of = neighbors_of
-        self._entries: dict[int, _Entry] = {}
-        self._urgent: dict[int, _Entry] = {}
+        self._entries: dict[int, _Spread] = {}
+        self._urgent: dict[int, _Spread] = {}
         """The urgent ones among them."""
         self._waiting: set[int] = set()
         """The urgent ones that wait for a turn."""
-        self._bulk: dict[int, _Entry] = {}
+        self._bulk: dict[int, _Spread] = {}
         self._order = 0
         self.repeated = 0
 
@@ -87,8 +91,8 @@ class Spreading:
         evicted for it.
         """
         self._order += 1
-        key = key_of_packet(packet)
-        entry = self._entries[key] = _Entry(packet, (packet.header.priority, self._order), src, bulk_from_ns or 0)
+        key = _key(packet)
+        entry = self._entries[key] = _Spread(packet, (packet.header.priority, self._order), src, bulk_from_ns or 0)
         if bulk_from_ns is None:
             self._urgent[key] = entry
             self._waiting.add(key)
@@ -118,7 +122,7 @@ class Spreading:
         entry.having.add(src)
         return again
 
-    def _reach(self, entry: _Entry, src: int | None, now_ns: int) -> None:
+    def _reach(self, entry: _Spread, src: int | None, now_ns: int) -> None:
         """A neighbor was heard to send a bulk packet, which those that hear the neighbor have, too."""
         if src is not None and entry.reached is not None:
             entry.reached.add(src)
@@ -151,7 +155,7 @@ class Spreading:
 
     def sent(self, packet: Packet, *, start_ns: int) -> int:
         """The packet is transmitted at `start_ns`; returns how often it has been."""
-        key = key_of_packet(packet)
+        key = _key(packet)
         entry = self._entries[key]
         self.repeated += entry.sent > 0
         entry.sent += 1
@@ -161,12 +165,12 @@ class Spreading:
 
     def forget(self, packet: Packet) -> bool:
         """Forget a packet that has expired; True if it was never sent."""
-        key = key_of_packet(packet)
+        key = _key(packet)
         fresh = not self._entries[key].sent
         self._remove(key)
         return fresh
 
-    def bulk_wanted(self, neighbors: Collection[int], *, start_ns: int, now_ns: int) -> list[tuple[Packet, bool]]:
+    def bulk_wanted(self, neighbors: Collection[int], *, start_ns: int) -> list[tuple[Packet, bool]]:
         """The bulk for a frame that starts at `start_ns`, what is new first, each with whether it is sent again.
 
         What nobody lacks is forgotten.
@@ -180,7 +184,7 @@ class Spreading:
                 done.append(key)
             elif entry.reached and entry.reached.issuperset(neighbors):
                 entry.reached, entry.from_ns = None, start_ns + _WAY_ROUND * self._patience_ns
-            elif not first and entry.copy_ns > now_ns - self._patience_ns:
+            elif not first and entry.copy_ns > start_ns - self._patience_ns:
                 entry.from_ns = entry.copy_ns + self._patience_ns  # somebody else is at it
             else:
                 chosen.append(entry)
@@ -191,7 +195,7 @@ class Spreading:
 
     def look_again(self, packet: Packet, *, from_ns: int) -> None:
         """Look at a bulk packet again from an instant on: does a neighbor still lack it?"""
-        self._bulk[key_of_packet(packet)].from_ns = from_ns
+        self._bulk[_key(packet)].from_ns = from_ns
 
     def bulk_due_ns(self) -> int | None:
         """The instant before which no bulk need be looked at; None if there is none."""

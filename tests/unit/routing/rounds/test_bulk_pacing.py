@@ -1,4 +1,4 @@
-"""The pace of bulk: it grows while frames end in their windows, and is halved once for a window in which one did not."""
+"""The pace of bulk: it grows while frames end in their windows, and is halved for a window in which one did not."""
 
 from fanet_mw.routing.rounds.bulk_pacing import BulkPacing
 from fanet_mw.routing.rounds.round_timing import RoundTiming

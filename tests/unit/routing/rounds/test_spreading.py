@@ -1,4 +1,4 @@
-"""What one node passes on, as timelines: urgent packets once per turn, bulk where a neighbor is not known to have it."""
+"""What one node passes on, as timelines: urgent packets in turns, bulk where a neighbor is not known to have it."""
 
 from fanet_mw import wire
 from fanet_mw.node.duplicates import key_of_packet
@@ -84,7 +84,7 @@ def bulk(seq: int) -> Packet:
 
 
 def bulk_sent(made: Spreading, at_ns: int, *, neighbors: tuple[int, ...] = (2, 3)) -> list[int]:
-    chosen = made.bulk_wanted(neighbors, start_ns=at_ns, now_ns=at_ns)
+    chosen = made.bulk_wanted(neighbors, start_ns=at_ns)
     for each, _ in chosen:
         made.sent(each, start_ns=at_ns)
         made.look_again(each, from_ns=at_ns + 2 * ROUND)

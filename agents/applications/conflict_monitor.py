@@ -3,6 +3,7 @@
     own fixes, others' hellos     -> the closest approach is too near and soon -> warn the other UAV, change height
     a warning that names this UAV -> the same, even if no hello of the other UAV is received
     far enough apart, sideways    -> back to the course
+    still side by side after long -> the one with the higher id flies to the middle of the area
 
 No agreement about heights is needed, because the ids decide: of two UAVs the one with the lower id goes one level up
 for the other, the other one level down. So any two part, no two of three that are in conflict with each other share a
@@ -30,6 +31,10 @@ _CLEAR: Final = 1.5
 """A conflict is over when the two will pass each other sideways at this many times the distance to be kept."""
 _PAST_NS: Final = 3 * S
 """If the other UAV is only known by its warning, the conflict is over this long after the closest approach."""
+_LONG_NS: Final = 20 * S
+"""Two UAVs that have been in conflict for longer than this fly side by side, or stand at the geofence."""
+_LEAVES_M_S: Final = 5.0
+"""The least speed with which one of them then leaves the other."""
 _CLIMB_M_S: Final = 4.0
 """A comfortable climb rate for a small multirotor."""
 _LEVELS: Final = 2
@@ -53,6 +58,8 @@ class Alert(NamedTuple):
 class _Threat:
     """Another UAV that this UAV avoids."""
 
+    since_ns: int
+    """The instant from which it avoids the other UAV."""
     until_ns: int
     """The instant at which the conflict will be over, if no hello of the other UAV is received any more."""
     warned_ns: int | None = None
@@ -75,6 +82,8 @@ class ConflictMonitor:
         self._node = node
         self._horizon_s = mission.collision_horizon_s
         self._distance_m = mission.collision_distance_m
+        self._floor_m = scenario.nodes.altitude_m - _LEVELS * mission.collision_distance_m
+        """The height below which it does not descend, however often it begins anew before it is back at its height."""
         self._clear_m = _CLEAR * mission.collision_distance_m
         self._repeat_ns = seconds_to_ns(mission.collision_repeat_s)
         self._lifetime_ns = neighbor_lifetime_ns(scenario.routing.hello_interval_s)
@@ -191,7 +200,7 @@ class ConflictMonitor:
     def _avoid(self, node: NodeId, own: Motion, until_ns: int) -> _Threat:
         if self._avoidance is None:
             self._avoidance = _Avoidance(own.position.up, _level(own.velocity))
-        threat = self._threats[node] = _Threat(until_ns)
+        threat = self._threats[node] = _Threat(own.at_ns, until_ns)
         return threat
 
     def _fly(self, own: Motion) -> None:
@@ -205,10 +214,24 @@ class ConflictMonitor:
             return
         levels = sum(1 if node > self._node else -1 for node in self._threats)
         level_m = before.up_m + max(-_LEVELS, min(_LEVELS, levels)) * self._distance_m
+        level_m = max(level_m, self._floor_m)
         climb_m_s = max(-_CLIMB_M_S, min(_CLIMB_M_S, (level_m - own.position.up) / _SOON_S))
-        velocity = (self._sideways(own.position) or before.velocity)._replace(up=climb_m_s)
+        sideways = self._leaving(own, before.velocity) or self._sideways(own.position) or before.velocity
+        velocity = sideways._replace(up=climb_m_s)
         ahead = Motion(own.position, velocity, 0).position_at(round(_AHEAD_S * S))
         self.course = Course(ahead, max(_LEAST_M_S, velocity.norm()))
+
+    def _leaving(self, own: Motion, velocity: Enu) -> Enu | None:
+        """The horizontal velocity towards the middle of the area, if this UAV has long been in conflict with one that
+        has a lower id; that one keeps its velocity, so that the two part.
+        """
+        if not any(
+            node < self._node and own.at_ns - threat.since_ns > _LONG_NS for node, threat in self._threats.items()
+        ):
+            return None
+        way = _level(own.position)
+        scale = -max(_LEAVES_M_S, velocity.norm()) / max(way.norm(), 1e-9)
+        return Enu(way.east * scale, way.north * scale, 0.0)
 
     def _sideways(self, here: Enu) -> Enu | None:
         """The horizontal velocity towards the mission's goal; None if there is no goal."""

@@ -13,10 +13,11 @@ All that a UAV knows it has sensed itself or received over the air. At each posi
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final, assert_never
 
 from agents.mission.finding.announcing import Announcing
+from agents.mission.finding.camera_view import CameraView
 from agents.mission.finding.coverage_map import CoverageMap
 from agents.mission.finding.in_building import place_in_building
 from agents.mission.finding.known_survivors import KnownSurvivors
@@ -63,6 +64,8 @@ _MOST_DECADES: Final = 12.0
 _OFFSET_DB: Final = 1.0
 """The standard deviation that is assumed for the difference between one phone's power and the mean of all phones."""
 _REVIEW_NS: Final = 1 * S
+_LEAST_RECOGNIZED: Final = 0.1
+"""The least share of the people in an image that a camera must recognize from the height of the search."""
 _LOOKED_NS: Final = 10 * S
 """How long a UAV looks for a survivor before the verdict that the survivor is inside a building."""
 _DEPLOY: Final = 0.9
@@ -339,6 +342,26 @@ def formation(scenario: Scenario, count: int) -> Pattern | None:
     search = scenario.mission.search
     shape = ShapeName.LINES if search == "none" else ShapeName[search.upper()]
     return fitted(count, demands, shape=shape, sectors_wanted=scenario.clusters.count)
+
+
+def unflyable(scenario: Scenario) -> Iterator[str]:
+    """Why a planned search cannot be flown as a scenario wants it: one sentence for each reason."""
+    least_m_s, _ = scenario.mission.approach_speeds_m_s
+    if scenario.mobility.speed_m_s > least_m_s:
+        yield (
+            f"mobility.speed_m_s = {scenario.mobility.speed_m_s:g}, at which lanes are flown, must be <= "
+            f"mission.approach_speed_m_s = {least_m_s:g}, the greatest speed of a UAV: it would never reach their ends"
+        )
+    if not scenario.sensors.camera_hz:
+        return
+    height_m = scenario.nodes.altitude_m
+    recognized = CameraView(scenario).recognized(height_m)
+    if recognized < _LEAST_RECOGNIZED:
+        yield (
+            f"nodes.altitude_m = {height_m:g}: from there a camera with sensors.camera_pixels = "
+            f"{list(scenario.sensors.camera_pixels)} and camera_fov_deg = {scenario.sensors.camera_fov_deg:g} "
+            f"recognizes {recognized:.1%} of the people in an image, which must be >= {_LEAST_RECOGNIZED:.0%}"
+        )
 
 
 def coverage_map(scenario: Scenario) -> CoverageMap | None:

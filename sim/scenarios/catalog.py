@@ -32,8 +32,10 @@ def _searchable(scenario: Scenario, source: str) -> Scenario:
     search = scenario.mission.search
     if search == "none":
         return scenario
-    from agents.mission.searcher import formation, least_nodes
+    from agents.mission.searcher import formation, least_nodes, unflyable
 
+    for problem in unflyable(scenario):
+        raise ConfigError(f"{source}: {problem}")
     count, area_m = scenario.nodes.count, scenario.world.area_m
     if formation(scenario, count) is None:
         least = least_nodes(scenario)

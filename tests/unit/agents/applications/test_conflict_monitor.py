@@ -153,3 +153,37 @@ def test_who_is_near_but_flies_away_is_no_conflict(monitor) -> None:
     uav.on_fix(at(0, 50, WEST))
     assert uav.records == []
     assert uav.warnings == []
+
+
+def side_by_side(uav: ConflictMonitor, *, seconds: int) -> Enu:
+    """The velocity that a UAV has chosen after flying this long beside another one, in the northeast."""
+    for second in range(seconds + 1):
+        now_ns = second * S
+        velocity = EAST if second else Enu(10, -2, 0)
+        uav.on_hello(OTHER, Motion(Enu(300, 310, 50), velocity, now_ns), now_ns=now_ns)
+        uav.on_fix(Motion(Enu(300, 300, 50), EAST, now_ns))
+    assert uav.course is not None
+    way = uav.course.position.minus(Enu(300, 300, 50))
+    return Enu(way.east / 10, way.north / 10, 0)
+
+
+@pytest.mark.parametrize(("node", "seconds", "leaves"), [(9, 19, False), (9, 21, True), (3, 60, False)])
+def test_of_two_that_fly_side_by_side_for_long_the_one_with_the_higher_id_leaves_for_the_middle(
+    monitor, node: int, seconds: int, leaves: bool
+) -> None:
+    velocity = side_by_side(monitor(node), seconds=seconds)
+    assert velocity.norm() == pytest.approx(10)
+    assert (velocity.east, velocity.north) == pytest.approx((-7.07, -7.07) if leaves else (10, 0), abs=0.01)
+
+
+def test_who_begins_to_avoid_before_it_is_back_at_its_height_descends_no_farther_than_before(monitor) -> None:
+    uav = monitor(9)  # the lower id is above, so this one goes down
+    uav.on_hello(OTHER, at(200, 24, WEST), now_ns=0)
+    uav.on_fix(at(0, 24, EAST))
+    assert uav.course is not None
+    assert uav.course.position.up == pytest.approx(24 - 10 * 2.0), "at 2 m/s, to two levels below 50 m in 2 s"
+    lower = monitor(9)
+    lower.on_hello(OTHER, at(200, 19, WEST), now_ns=0)
+    lower.on_fix(at(0, 19, EAST))
+    assert lower.course is not None
+    assert lower.course.position.up > 19, "and up to them from below"

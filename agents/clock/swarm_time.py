@@ -21,7 +21,7 @@ from fanet_mw.node.reader import decoded, packet_of
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Clock, Scenario
 from fanet_mw.timesync.clock_fit import EXACT, ClockFit, Line, Oscillator, Pair
-from fanet_mw.timesync.ftsp import Settings, TimeSync
+from fanet_mw.timesync.ftsp import MOST_STATED_NS, WORST_LIFE_NS, Settings, TimeSync
 from fanet_mw.units import LIGHT_M_PER_S, MS, US, NodeId, S, seconds_to_ns
 from fanet_mw.wire.hello.time_beacon import TimeBeacon
 
@@ -34,6 +34,8 @@ _REMEMBERED: Final = 4096
 OLD_NS: Final = 150 * MS
 """A hello that ended so long after the instant for which it was announced was recorded and sent again, if this node's
 time is supported. Contention seldom defers a hello by a third of that."""
+_QUEUED_NS: Final = S
+"""A hello may wait this long at its sender."""
 _PPM: Final = 1e-6
 
 
@@ -124,9 +126,20 @@ class OwnTime(SwarmTime):
 class GpsTime(SwarmTime):
     """`clock.sync = "gps"`: the line is fitted to the latest fixes. It also gives swarm time between fixes and during
     an outage, with an error bound that grows.
+
+    Hellos carry no time, but the instant at which they were made. A neighbor whose hellos are from another time has
+    refused that of GPS; who hears such a neighbor tells the swarm that some clock has a greater error than any that
+    hellos state, and so do all who are told.
     """
 
+    in_hellos = True
+
     def __init__(self, clock: Clock, *, seed: int, node: NodeId) -> None:
+        self._node = node
+        self._announced: list[int] = []
+        """The transmit requests of the latest hellos."""
+        self._apart_ns: int | None = None
+        """The last instant at which a node was known to be out of step."""
         self._sigma_ns = clock.gps_sigma_ns
         self._gauss = stream(seed, "gps_time", node).gauss
         self._oscillator = oscillator(clock, others=0)
@@ -152,6 +165,42 @@ class GpsTime(SwarmTime):
         stated_ns = gps_ns + round(self._gauss(0.0, self._sigma_ns))
         error_ns = math.ceil(_SIGMAS * self._sigma_ns) + self._oscillator.stamp_ns
         self._fit.add(Pair(local_ns, stated_ns - local_ns, error_ns))
+
+    def worst_ns(self, local_ns: int) -> int:
+        own_ns = min(self.error_ns(local_ns) or 0, MOST_STATED_NS)
+        return MOST_STATED_NS if self._alarmed(local_ns) else own_ns
+
+    def _alarmed(self, local_ns: int) -> bool:
+        return self._apart_ns is not None and local_ns - self._apart_ns < WORST_LIFE_NS
+
+    def on_hello(self, frame: bytes, *, ended_ns: int, local_ns: int) -> None:
+        try:
+            header = packet_of(frame).header
+            told = decoded(frame, TimeBeacon.in_hello)
+        except MalformedFrameError:
+            return  # the node counts it
+        if not self.synced:
+            return
+        late_ns = self.line.swarm_ns(ended_ns) - header.origin_us * US
+        found_ns = [local_ns] if late_ns > max(self._limit_ns, _QUEUED_NS) or late_ns < -self._limit_ns // 2 else []
+        if told is not None and told.worst_ns >= MOST_STATED_NS:
+            found_ns.append(local_ns - told.worst_age_s * S)
+        self._apart_ns = max([*found_ns, *([] if self._apart_ns is None else [self._apart_ns])], default=None)
+
+    def announced(self, hello: AnnouncedHello) -> None:
+        self._announced = [*self._announced[1 - _HELLOS :], hello.request]
+
+    def on_status(self, status: TxStatus, *, ended_ns: int) -> bool:
+        return status.seq in self._announced
+
+    def hello_frames(self, local_ns: int) -> bytes:
+        """Nothing, unless some node is out of step."""
+        if not self.synced or self._apart_ns is None or not self._alarmed(local_ns):
+            return b""
+        age_s, now_ns = math.ceil((local_ns - self._apart_ns) / S), max(0, self.line.swarm_ns(local_ns))
+        return TimeBeacon(now_ns, 0, 0, MOST_STATED_NS, 0, 0, self._node, self._node, min(255, age_s), 0).encode_frame(
+            self._node
+        )
 
     def report(self) -> Mapping[str, object]:
         return {"fixes": len(self._fit), "outlier": self._fit.outliers, "implausible": self._implausible}

@@ -98,7 +98,8 @@ def evaluate(
     cut_off = tuple(reachability.problems(judged.cut_off))
     uplinks_ns = contention_window.uplinks_ns(scenario, found.through, classes)
     crowded = tuple(contention_window.too_short(scenario, site.adjacency, uplinks_ns)) if site.timetable else ()
-    apart = tuple(problems_and_notes.clocks_apart(scenario)) if site.timetable else ()
+    clocks = problems_and_notes.clocks_apart if site.timetable else problems_and_notes.refused_time
+    apart = tuple(clocks(scenario))
     unheard = tuple(_unheard(scenario, fitted)) if isinstance(fitted, FittedTimetable) else ()
     out_of_hops = () if judged.unfit or judged.cut_off else tuple(_out_of_hops(site, fitted, judged.clusters))
     if out_of_hops:

@@ -94,7 +94,10 @@ def problems(
 
 
 def clocks_apart(scenario: Scenario) -> Iterator[str]:
-    """A sentence about clocks that are not synchronized and that differ by more than the slack of a turn."""
+    """Sentences about clocks that nothing brings together: they differ by more than the slack of a turn and are not
+    synchronized, or by more than nodes accept.
+    """
+    yield from refused_time(scenario)
     clock, slack_ns = scenario.clock, turn_slack_ns(scenario)
     needed_ns = unsynchronized_slack_ns(scenario)
     if needed_ns > slack_ns:
@@ -103,6 +106,21 @@ def clocks_apart(scenario: Scenario) -> Iterator[str]:
             f"clocks may be {most_us:g} us off by the end, and clusters.turn_slack_us = {slack_ns / US:g} has to be at "
             f'least {needed_ns / US:g}: with clock.sync = "{clock.sync}" nothing brings them together '
             f"(clock.offset_ms = {clock.offset_ms:g}, clock.drift_ppm = {clock.drift_ppm:g})"
+        )
+
+
+def refused_time(scenario: Scenario) -> Iterator[str]:
+    """A sentence about clocks that may be further apart than the time that nodes accept."""
+    clock = scenario.clock
+    if clock.sync == "none":
+        return
+    # a node compares the time with its own clock: that of another node, or the true one
+    apart_ns = (2 if clock.sync == "beacons" else 1) * clock.unsynchronized_error_ns(scenario.duration_ns)
+    if apart_ns > clock.limit_ns:
+        yield (
+            f"clocks may be {apart_ns / S:g} s apart, and a node accepts no time that differs by more than "
+            f"clock.limit_s = {clock.limit_s:g} from its own clock: it would have no turns, and while one has none "
+            f"no node states a bound (clock.offset_ms = {clock.offset_ms:g}, clock.drift_ppm = {clock.drift_ppm:g})"
         )
 
 

@@ -83,7 +83,7 @@ def _tree(data: bytes) -> Any:  # noqa: ANN401  (JSON)
     except json.JSONDecodeError:
         lines = [line.strip("\x1e \r") for line in text.split("\n")]
         lines = [line for line in lines if line]
-        if len(lines) < 2 or not all(line.startswith("{") and line.endswith("}") for line in lines):
+        if not lines or not all(line.startswith("{") and line.endswith("}") for line in lines):
             raise
         return {"type": "FeatureCollection", "features": [json.loads(line) for line in lines]}
     if isinstance(tree, dict) and "elements" in tree:

@@ -38,7 +38,7 @@ def sentence(item: dict[str, Any]) -> str:
         return f"{key}: unknown key{_suggestion(path)}"
     message = str(item["msg"]).removeprefix("Value error, ")
     if item["type"] == NO_TRUTH:
-        return ".".join([*path, message])
+        return f"{key}.{message}" if item["loc"] else message
     if item["type"] == "value_error":
         return message
     value = repr(item["input"])

@@ -55,7 +55,9 @@ _NEIGHBORS: Final = 256
 MOST_STATED_NS: Final = 20 * MS
 """The greatest error that hellos state. A greater one means a node without a time, or nonsense, and guard times do not
 allow for it."""
-_WORST_LIFE_NS: Final = 20 * S
+WORST_LIFE_NS: Final = 20 * S
+_APART_HELLOS: Final = 9
+"""A neighbor that for this long has stated no time, or one that cannot be followed, is out of step."""
 _PPB: Final = 1e9
 _U32: Final = 0xFFFF_FFFF
 
@@ -98,6 +100,8 @@ class _LastBeacon:
     trusted: bool = True
     """True if its last pair was accepted."""
     paired_ns: int | None = None
+    in_step_ns: int = 0
+    """The last instant at which it stated the time of this node's reference, or was new."""
     stamps: dict[int, int] = field(default_factory=dict)
 
 
@@ -159,7 +163,7 @@ class TimeSync:
         """The greatest bound that any node is known to state, including this node."""
         own_ns = min(self.error_ns(local_ns) or 0, MOST_STATED_NS)
         value_ns, stated_at_ns = self._worst
-        return value_ns if value_ns > own_ns and local_ns - stated_at_ns < _WORST_LIFE_NS else own_ns
+        return value_ns if value_ns > own_ns and local_ns - stated_at_ns < WORST_LIFE_NS else own_ns
 
     def hops(self, local_ns: int) -> int | None:
         """The hops from the reference; None when no neighbor knows the reference."""
@@ -243,6 +247,17 @@ class TimeSync:
         neighbor.stamps[hello] = ended_ns
         if beacon is not None and pair is not None:
             self._on_pair(neighbor, beacon, pair, local_ns)
+        self._watch_step(neighbor, beacon, local_ns)
+
+    def _watch_step(self, neighbor: _LastBeacon, beacon: TimeBeacon | None, local_ns: int) -> None:
+        """A neighbor without the swarm's time relays nothing in its turns, and disturbs those of others: it counts as a
+        clock with a greater error than any that hellos state, of which the whole swarm learns.
+        """
+        if self.reference is None or (beacon is not None and beacon.reference == self.reference and neighbor.trusted):
+            neighbor.in_step_ns = local_ns
+        elif local_ns - neighbor.in_step_ns > _APART_HELLOS * self._own.hello_ns:
+            self.counts["apart"] += 1
+            self._learn_worst(MOST_STATED_NS, stated_at_ns=local_ns)
 
     def _neighbor(self, src: NodeId, local_ns: int) -> _LastBeacon:
         found = self._neighbors.get(src)
@@ -251,7 +266,7 @@ class TimeSync:
                 silent = min(sorted(self._neighbors), key=lambda node: self._neighbors[node].heard_ns)
                 del self._neighbors[silent]
                 self._agreed.pop(silent, None)
-            found = self._neighbors[src] = _LastBeacon(local_ns)
+            found = self._neighbors[src] = _LastBeacon(local_ns, in_step_ns=local_ns)
         found.heard_ns = local_ns
         return found
 
@@ -328,7 +343,8 @@ class TimeSync:
 
     def _learn_worst(self, value_ns: int, *, stated_at_ns: int) -> None:
         value_ns = min(value_ns, MOST_STATED_NS)
-        if value_ns > self._worst[0] or stated_at_ns - self._worst[1] >= _WORST_LIFE_NS:
+        worst_ns, at_ns = self._worst
+        if value_ns > worst_ns or stated_at_ns - at_ns >= (0 if value_ns == worst_ns else WORST_LIFE_NS):
             self._worst = (value_ns, stated_at_ns)
 
     def _consider(self, reference: int, pair: Pair, local_ns: int) -> None:

@@ -2,9 +2,10 @@
 
     within_share = deliveries within the bound of their packet / (all packets x the nodes for which each was meant)
 
-The share is lowered by packets that never arrive, that arrive too late, or for which no bound was stated. Only a packet
-that arrives too late is a violation. Packets of users' applications, whose targets the trace does not tell, are judged
-but are in no share. The result is empty if no origin has stated any bound.
+The share is lowered by packets that never arrive, that arrive too late, or for which no bound was stated. A promise is
+broken at each target at which a packet with a bound arrives too late, or never, if the bound was over before the run.
+Packets of users' applications, whose targets the trace does not tell, are in no share, and only what arrives too late
+is a violation of theirs. The result is empty if no origin has stated any bound.
 """
 
 from collections.abc import Mapping
@@ -17,14 +18,16 @@ from sim.results.packets import AppPackets
 from sim.run.collecting.delivery_columns import Column
 
 
-def against_bounds(applications: Mapping[str, AppPackets]) -> dict[str, Any]:
-    """The table `bound` of `summary.json`: for all applications together, and for each."""
+def against_bounds(applications: Mapping[str, AppPackets], *, ended_ns: int) -> dict[str, Any]:
+    """The table `bound` of `summary.json`: for all applications together, and for each; the run ended
+    at `ended_ns`.
+    """
     promised = {name: app for name, app in applications.items() if _promises(app)}
     if not promised:
         return {}
     return {
-        **_judged([app for app in applications.values() if app.sent]),
-        "classes": {name: _judged([app]) for name, app in promised.items()},
+        **_judged([app for app in applications.values() if app.sent], ended_ns),
+        "classes": {name: _judged([app], ended_ns) for name, app in promised.items()},
     }
 
 
@@ -60,26 +63,36 @@ def _promises(app: AppPackets) -> bool:
     return any(sent.bound_ns is not None for sent in app.sent.values())
 
 
-def _judged(apps: list[AppPackets]) -> dict[str, Any]:
+def _judged(apps: list[AppPackets], ended_ns: int) -> dict[str, Any]:
     bounds = [sent.bound_ns for app in apps for sent in app.sent.values()]
     stated = [bound_ns for bound_ns in bounds if bound_ns is not None]
     wanted = sum(app.wanted for app in apps)
-    deliveries = within = within_wanted = longest_ns = 0
+    deliveries = within_wanted = broken = longest_ns = 0
     for app in apps:
         delays_ns, bounds_ns = delays_under_bound(app)
         deliveries += len(delays_ns)
         in_time = int((delays_ns <= bounds_ns).sum())
-        within += in_time
+        broken += len(delays_ns) - in_time + _never_there(app, ended_ns)
         within_wanted += in_time if app.wanted else 0
         longest_ns = max(longest_ns, int(delays_ns.max(initial=0)))
     return {
         "within_share": round(within_wanted / wanted, 6) if wanted else None,
-        "violations": deliveries - within,
+        "violations": broken,
         "deliveries": deliveries,
         "stated_share": round(len(stated) / len(bounds), 6),
         "worst_ms": round(max(stated) / MS, 3),
         "observed_max_ms": round(longest_ns / MS, 3),
     }
+
+
+def _never_there(app: AppPackets, ended_ns: int) -> int:
+    """The number of targets that a packet never reached although the bound that was stated for it is over."""
+    arrived = np.bincount(app.deliveries.packet, minlength=len(app.sent)).tolist()
+    return sum(
+        max(0, sent.targets - count)
+        for sent, count in zip(app.sent.values(), arrived, strict=True)
+        if sent.bound_ns is not None and sent.born_ns + sent.bound_ns < ended_ns
+    )
 
 
 def delays_under_bound(app: AppPackets) -> tuple[Column, Column]:

@@ -66,7 +66,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "disturbance": {
             name: {"value": round(measure.value, 6), "limit": measure.limit} for name, measure in disturbance.items()
         },
-        "bound": against_bounds(sent),
+        "bound": against_bounds(sent, ended_ns=outcome.simulated_ns),
         "likely": likely(sent),
         "clock": clock_errors(outcome),
         "admission": _admission(outcome),

@@ -35,6 +35,8 @@ class SentPacket(NamedTuple):
     """The delay bound that the origin stated when it accepted the packet; None if it stated none."""
     likely: tuple[int, float] | None = None
     """The likely delay, and the share of copies that the origin stated to arrive within it; None if it stated none."""
+    targets: int = 0
+    """The number of nodes for which it was meant; 0 if the trace does not tell."""
 
 
 class Deliveries(NamedTuple):
@@ -89,11 +91,9 @@ def packets_of(outcome: Outcome) -> Mapping[str, AppPackets]:
         app = found.setdefault(app_name, AppPackets())
         row = row_of.get((app_name, name[0]), _EVERYONE)
         packets[name] = _Known(app_name, len(app.sent), sent.born_ns, row)
-        app.sent[name] = sent
-        if row != _EVERYONE:
-            app.wanted += len(targets[row])
-        elif app_name in OTHER_APPS:
-            app.wanted += len(everyone) - 1
+        copies = len(targets[row]) if row != _EVERYONE else len(everyone) - 1 if app_name in OTHER_APPS else 0
+        app.sent[name] = sent._replace(targets=copies)
+        app.wanted += copies
     counting = _DeliveryCount(packets, list(found), targets, exact=not outcome.scenario.clock.modelled)
     for columns in delivery_columns(outcome.records):
         counting.take(columns)

@@ -112,7 +112,7 @@ def swarm_row(name: str, case: Case) -> list[str]:
             record.bound_ns / MS for record in records_of(outcome.records, BoundStated) if record.t_ns >= late_ns
         ]
         pdr.append(sum(len(app.deliveries) for app in found.values()) / sum(app.wanted for app in found.values()))
-        bounds.append(against_bounds(found))
+        bounds.append(against_bounds(found, ended_ns=outcome.simulated_ns))
     stated = statistics.fmean(bound.get("stated_share", 0.0) for bound in bounds)
     within = statistics.fmean(bound.get("within_share", 0.0) for bound in bounds)
     broken = sum(bound.get("violations", 0) for bound in bounds)

@@ -1,4 +1,4 @@
-"""Bounds that are broken are counted, one by one, and what never comes is no proof of a bound: traces by hand."""
+"""Bounds that are broken are counted, one by one, by what comes too late and by what never comes: traces by hand."""
 
 import io
 from typing import Any
@@ -59,9 +59,19 @@ def test_each_packet_is_held_against_its_own_promise(scenario: Scenario) -> None
     assert bound["within_share"] == 0.5
 
 
-def test_what_never_arrives_breaks_no_bound_but_keeps_none_either(scenario: Scenario) -> None:
+def test_what_never_arrives_breaks_its_bound_at_each_target_as_what_arrives_too_late(scenario: Scenario) -> None:
     bound = bound_of(scenario, packet(1, bound_ms=100, delays_ms={}), packet(2, bound_ms=100, delays_ms={2: 10}))
-    assert (bound["violations"], bound["within_share"]) == (0, 0.25)
+    assert (bound["violations"], bound["deliveries"], bound["within_share"]) == (3, 1, 0.25)
+    late = bound_of(scenario, packet(1, bound_ms=100, delays_ms={2: 101}))
+    assert (late["violations"], late["deliveries"]) == (2, 1), "one came too late, one never"
+
+
+def test_a_bound_that_was_not_over_by_the_end_is_not_broken_yet(scenario: Scenario) -> None:
+    last_s = int(scenario.duration_s) - 1
+    records = packet(last_s, bound_ms=1500, delays_ms={2: 10})
+    assert bound_of(scenario, packet(1, bound_ms=100, delays_ms={2: 10, 3: 10}), records)["violations"] == 0
+    records = packet(last_s, bound_ms=500, delays_ms={2: 10})
+    assert bound_of(scenario, packet(1, bound_ms=100, delays_ms={2: 10, 3: 10}), records)["violations"] == 1
 
 
 def test_a_packet_without_a_promise_counts_for_the_share_and_not_as_broken(scenario: Scenario) -> None:

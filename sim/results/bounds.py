@@ -67,17 +67,19 @@ def _judged(apps: list[AppPackets], ended_ns: int) -> dict[str, Any]:
     bounds = [sent.bound_ns for app in apps for sent in app.sent.values()]
     stated = [bound_ns for bound_ns in bounds if bound_ns is not None]
     wanted = sum(app.wanted for app in apps)
-    deliveries = within_wanted = broken = longest_ns = 0
+    deliveries = within_wanted = late = never = longest_ns = 0
     for app in apps:
         delays_ns, bounds_ns = delays_under_bound(app)
         deliveries += len(delays_ns)
         in_time = int((delays_ns <= bounds_ns).sum())
-        broken += len(delays_ns) - in_time + _never_there(app, ended_ns)
+        late += len(delays_ns) - in_time
+        never += _never_there(app, ended_ns)
         within_wanted += in_time if app.wanted else 0
         longest_ns = max(longest_ns, int(delays_ns.max(initial=0)))
     return {
         "within_share": round(within_wanted / wanted, 6) if wanted else None,
-        "violations": broken,
+        "violations": late + never,
+        "never": never,
         "deliveries": deliveries,
         "stated_share": round(len(stated) / len(bounds), 6),
         "worst_ms": round(max(stated) / MS, 3),

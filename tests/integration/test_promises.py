@@ -53,10 +53,10 @@ def test_new_timetables_break_no_promise() -> None:
     """A swarm that moves gets another timetable every few seconds, while packets are promised all the time."""
     keys = ('mobility.model="random_waypoint"', "mobility.speed_m_s=5", "clusters.reassign_s=2", "duration_s=36")
     bound = summary_of(*keys)["bound"]
-    assert bound["violations"] == 0
     assert bound["deliveries"] > 1000
     assert bound["stated_share"] > 0.5
-    assert bound["within_share"] < 1, "nodes out of reach are no violation, and no success"
+    assert bound["violations"] == bound["never"], "nothing that comes is late"
+    assert 0 < bound["never"] < bound["deliveries"] / 20, "nodes out of reach, who are promised what they do not get"
 
 
 def test_reports_that_are_sent_as_bulk_and_longer_than_the_traffic_are_carried() -> None:

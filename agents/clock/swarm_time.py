@@ -173,19 +173,20 @@ class GpsTime(SwarmTime):
     def _alarmed(self, local_ns: int) -> bool:
         return self._apart_ns is not None and local_ns - self._apart_ns < WORST_LIFE_NS
 
-    def on_hello(self, frame: bytes, *, ended_ns: int, local_ns: int) -> None:
+    def on_hello(self, frame: bytes, src: NodeId, *, ended_ns: int, local_ns: int) -> bool:
         try:
             header = packet_of(frame).header
             told = decoded(frame, TimeBeacon.in_hello)
         except MalformedFrameError:
-            return  # the node counts it
-        if not self.synced:
-            return
+            return True  # the node counts it
+        if not self.synced or not header.origin == header.prev_hop == src:
+            return True
         late_ns = self.line.swarm_ns(ended_ns) - header.origin_us * US
         found_ns = [local_ns] if late_ns > max(self._limit_ns, _QUEUED_NS) or late_ns < -self._limit_ns // 2 else []
         if told is not None and told.worst_ns >= MOST_STATED_NS:
             found_ns.append(local_ns - told.worst_age_s * S)
         self._apart_ns = max([*found_ns, *([] if self._apart_ns is None else [self._apart_ns])], default=None)
+        return True
 
     def announced(self, hello: AnnouncedHello) -> None:
         self._announced = [*self._announced[1 - _HELLOS :], hello.request]
@@ -292,6 +293,7 @@ class BeaconTime(SwarmTime):
         age_ns = self.line.swarm_ns(ended_ns) - header.origin_us * US
         if age_ns > OLD_NS + self._apart_ns(local_ns):
             self._refused["old"] += 1
+            self._sync.on_old_hello(src, local_ns)
             return False
         self._sync.on_hello(src, header.seq, beacon, ended_ns=ended_ns, local_ns=local_ns)
         return True

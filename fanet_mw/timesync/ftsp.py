@@ -249,6 +249,10 @@ class TimeSync:
             self._on_pair(neighbor, beacon, pair, local_ns)
         self._watch_step(neighbor, beacon, local_ns)
 
+    def on_old_hello(self, src: NodeId, local_ns: int) -> None:
+        """A hello in a neighbor's name is of another time: the neighbor is out of step, unless others of it are not."""
+        self._watch_step(self._neighbor(src, local_ns), None, local_ns)
+
     def _watch_step(self, neighbor: _LastBeacon, beacon: TimeBeacon | None, local_ns: int) -> None:
         """A neighbor without the swarm's time relays nothing in its turns, and disturbs those of others: it counts as a
         clock with a greater error than any that hellos state, of which the whole swarm learns.

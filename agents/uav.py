@@ -33,11 +33,12 @@ from fanet_mw.bus.messages import (
 from fanet_mw.bus.topics import Topics
 from fanet_mw.extensions import load
 from fanet_mw.mavlink import Geodetic
+from fanet_mw.motion import Motion
 from fanet_mw.node.node import Node
 from fanet_mw.node.reader import Reader
 from fanet_mw.routing import make_protocol
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import Enu, NodeId, earliest
+from fanet_mw.units import Enu, NodeId, earliest, seconds_to_ns
 
 
 class NodeState(NamedTuple):
@@ -91,6 +92,7 @@ class Uav(Actor):
             origin=Geodetic(*scenario.world.origin_deg, 0.0),
         )
         self._reckoning = DeadReckoning()
+        self._delay_ns = seconds_to_ns(scenario.sensors.gps_delay_s)
         self._fixes = SteadyFix(sigma_m=scenario.world.gps_sigma_m, range_m=scenario.radio.range_m)
         asked_for = _asked_for(scenario, node, self._streams, position, onboard_map)
         self._built_in = tuple(application.name for application in asked_for)
@@ -135,8 +137,9 @@ class Uav(Actor):
         if isinstance(message, TxStatus):
             self._node.on_status(message, now_ns=now_ns)
         elif isinstance(message, Gps):
-            self._reckoning.fix(message)
-            self._fix(message, now_ns)
+            fix = message._replace(position=Motion(message.position, message.velocity, 0).position_at(self._delay_ns))
+            self._reckoning.fix(fix)
+            self._fix(fix, now_ns)
         elif isinstance(message, SensorReading):
             reckoned = self._reckoning.velocity(message) if isinstance(message, Inertial) else None
             if reckoned is not None:

@@ -142,7 +142,7 @@ def test_random_waypoints_keep_the_speed_and_the_area() -> None:
 
 
 def test_shadowing_of_a_place_is_the_same_every_time_and_power_falls_with_distance() -> None:
-    scenario = catalog.find("rescue", ["mission.survivors=1"])
+    scenario = catalog.find("rescue", ["mission.survivors=1", "mission.phone_rice_db=100", "mission.rssi_sigma_db=0"])
     phone = place(scenario)[0]
     sensor = PhoneSensor(scenario)
     above = np.array([phone.east, phone.north, 50.0])

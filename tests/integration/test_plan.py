@@ -45,7 +45,9 @@ def without_capacity(*settings: str) -> ScenarioPlan:
     ],
 )
 def test_the_bound_that_is_planned_is_the_one_that_the_nodes_compute_in_flight(settings: tuple[str, ...]) -> None:
-    scenario = catalog.find("clusters", ["duration_s=15", "warmup_s=12", "world.gps_sigma_m=0", *settings])
+    scenario = catalog.find(
+        "clusters", ["duration_s=15", "warmup_s=12", "world.gps_sigma_m=0", "sensors.gps_bias_m=0", *settings]
+    )
     _, plan, feasible = judge(scenario, deadline_s=None, search=False)
     assert feasible
     assert plan["proven"]
@@ -72,7 +74,7 @@ def test_where_gps_errs_the_plan_has_the_greatest_bound_of_all_its_draws() -> No
     """Nodes compute the timetable from positions that err, so its floods begin in another order."""
     scenario = catalog.find("clusters", ["duration_s=15", "warmup_s=12", *LINE, "seed=2"])
     text, plan, feasible = judge(scenario, change=False)
-    _, exact, _ = judge(catalog.find("clusters", [*LINE, "world.gps_sigma_m=0"]), change=False)
+    _, exact, _ = judge(catalog.find("clusters", [*LINE, "world.gps_sigma_m=0", "sensors.gps_bias_m=0"]), change=False)
     assert feasible
     assert (exact["confidence"], plan["confidence"]) == (1.0, pytest.approx(20 / 21))
     assert exact["classes"][0]["bound_ms"] < greatest_stated_ms(scenario) <= plan["classes"][0]["bound_ms"]
@@ -88,7 +90,7 @@ def test_floods_that_miss_nodes_with_reported_positions_are_a_problem(channel: s
     _, plan, feasible = planned(*settings)
     assert not feasible
     assert "floods that miss others" in plan["problems"][0]
-    assert planned(*settings, "world.gps_sigma_m=0")[2]
+    assert planned(*settings, "world.gps_sigma_m=0", "sensors.gps_bias_m=0")[2]
 
 
 @pytest.mark.parametrize("spacing_m", [pytest.param(250, marks=pytest.mark.slow), 245])

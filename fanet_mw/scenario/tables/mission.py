@@ -83,7 +83,12 @@ class Mission(Section):
     detection_dbm: Level = -90.0
     """The weakest phone signal that the receiver detects."""
     shadowing_db: Annotated[float, Field(ge=0, le=30)] = 4.0
-    """Standard deviation of the shadowing of a phone's signal."""
+    """Standard deviation of the shadowing of a phone's signal, which is correlated over `radio.shadowing_corr_m`."""
+    phone_rice_db: Annotated[float, Field(ge=-100, le=100)] = 10.0
+    """Rician K of the fading of a phone's signal: the power of the direct path over that of all others; it is new for
+    each scan."""
+    rssi_sigma_db: Annotated[float, Field(ge=0, le=30)] = 1.5
+    """Standard deviation of the noise of a phone's measured power, which is told in steps of 1 dB."""
     approach_speed_m_s: ApproachSpeed | tuple[ApproachSpeed, ApproachSpeed] = 10.0
     """Speed at which a UAV approaches a survivor. With [least, greatest] each UAV has a speed of its own, drawn by the
     seed."""

@@ -59,6 +59,10 @@ class Sensors(Section):
     """Rate at which a microphone array listens for voices."""
     voice_level_db: Level = 88.0
     """Sound pressure level of a call at 1 m [dB re 20 uPa]."""
+    voice_loudness_db: Decibels = 5.0
+    """Standard deviation of the level among survivors, of whom each keeps their own."""
+    voice_error_db: Decibels = 2.0
+    """Standard deviation of a measured level."""
     voice_share: Annotated[float, Field(ge=0, le=1)] = 0.5
     """Share of the time in which a survivor calls."""
     voice_rotor_db: Level = 80.0
@@ -105,10 +109,20 @@ class Sensors(Section):
     """Readings per second of the battery's voltage, current and charge."""
     map_share: Annotated[float, Field(ge=0, le=1)] = 1.0
     """Share of the buildings on the map that each UAV of a planned search carries; the map has all hills."""
-    gps_bias_m: Length = 0.0
-    """Standard deviation of a receiver's slow error along each axis."""
+    gps_common_m: Length = 2.0
+    """Standard deviation of the slow GPS error along each horizontal axis that all receivers have in common."""
+    gps_common_time_s: SomeTime = 1800.0
+    """Correlation time of the common error."""
+    gps_bias_m: Length = 0.6
+    """Standard deviation of each receiver's own slow error along each horizontal axis."""
     gps_bias_time_s: SomeTime = 300.0
-    """Correlation time of that error."""
+    """Correlation time of a receiver's own error."""
+    gps_vertical: Annotated[float, Field(ge=0, le=10)] = 2.0
+    """How many times greater vertical errors of GPS are than those along a horizontal axis."""
+    gps_velocity_m_s: Length = 0.05
+    """Standard deviation of a fix's velocity along each axis."""
+    gps_delay_s: Annotated[float, Field(ge=0, le=1)] = 0.11
+    """How old the position of a fix is when it arrives; UAVs know it and make up for it by their velocity."""
     gps_outages: tuple[Outage, ...] = ()
     """Areas and times without GPS, each as [east, north, radius, from, until] in metres and seconds."""
     burial_phone_db: Decibels = 20.0

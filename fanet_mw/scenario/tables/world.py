@@ -94,8 +94,9 @@ class World(Section):
     """No-fly areas, each as [east, north, radius]; the world counts entries."""
     gps_hz: Annotated[float, Field(ge=1e-6, le=1000)] = 5.0
     """Position fixes of each UAV per second, at most one a tick; one a second while nothing moves."""
-    gps_sigma_m: Annotated[float, Field(ge=0, le=1000)] = 1.5
-    """Standard deviation of a fix along each axis."""
+    gps_sigma_m: Annotated[float, Field(ge=0, le=1000)] = 0.3
+    """Standard deviation of the noise of each fix along each horizontal axis; slow errors come on top (table
+    `[sensors]`)."""
 
     @model_validator(mode="before")
     @classmethod

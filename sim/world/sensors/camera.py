@@ -8,7 +8,8 @@
 N50 is the number of line pairs with which half of the observers recognize what they see (Johnson, "Analysis of image
 forming systems", 1958). The curve around it is the target transfer probability function of the Night Vision
 Laboratory's static performance model (Ratches et al., ECOM-7043, 1975). Each image is a new trial. A person who is
-buried, or hidden from the camera by anything solid, is not seen. A gimbal keeps the image's width along east; angular
+buried, or hidden from the camera by anything solid, is not seen. The pixels that a detector
+counts are off by a tenth (assumed). A gimbal keeps the image's width along east; angular
 errors are Gaussian. False alarms are a Poisson process, anywhere in the image. Not modeled: light, motion blur, and
 that successive images are alike.
 """
@@ -29,6 +30,8 @@ from sim.world.environment.survivors import Survivors
 from sim.world.sensors.contract import Sensor, Truth, angles, generator, shaken
 
 PERSON_M: Final = math.sqrt(1.7 * 0.5)
+SIZE_SIGMA: Final = 0.1
+"""Relative error of the size of a person in an image."""
 _EYE_M: Final = 0.3
 """The height above ground of the part of a person that a ray must reach."""
 
@@ -87,7 +90,7 @@ class CameraSensor(Sensor):
         seen = self._random.random(len(found)) < recognized_share(pixels, cycles_for_half=self._cycles)
         for index, across in zip(found[seen].tolist(), pixels[seen].tolist(), strict=True):
             direction = offset[index] / np.linalg.norm(offset[index])
-            yield Person(*angles(shaken(self._random, direction, self._sigma_rad)), across)
+            yield Person(*angles(shaken(self._random, direction, self._sigma_rad)), self._counted(across))
 
     def _false_people(self, at: Values) -> Iterator[Person]:
         if not self._false_per_image:
@@ -97,5 +100,9 @@ class CameraSensor(Sensor):
             depth_m = np.array([max(0.1, float(at[2]))])
             yield Person(
                 *angles(np.array([x * self._tan_half_fov, y * self._tan_half_fov_height, -1.0])),
-                float(self.pixels(depth_m)[0]),
+                self._counted(float(self.pixels(depth_m)[0])),
             )
+
+    def _counted(self, pixels: float) -> float:
+        """The pixels that the detector says."""
+        return float(max(1.0, round(pixels * (1 + self._random.normal(0.0, SIZE_SIGMA)))))

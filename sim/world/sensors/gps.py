@@ -1,9 +1,16 @@
-"""GPS: the true position and velocity, with noise that is new for each fix and a slow bias; in some areas there are no
-fixes.
+"""GPS: the true position and velocity with errors, of which the greater part is slow and common to the whole swarm; in
+some areas there are no fixes.
 
-Noise and bias are Gaussian along each axis, with the standard deviations `world.gps_sigma_m` and `sensors.gps_bias_m`;
-the bias is a Gauss-Markov process. The velocity, which a receiver derives from Doppler shifts, is exact. Not modeled:
-the geometry of satellites, and reflections by walls.
+    position   truth - velocity x delay + common (Gauss-Markov) + own (Gauss-Markov) + noise of each fix
+    velocity   truth + noise of each fix
+
+Most of the budget of errors is common to receivers that are near each other: orbits and clocks of the satellites,
+ionosphere and troposphere; reflections and noise are each receiver's own (Parkinson and Spilker, GPS: Theory and
+Applications, 1996, vol. 1, ch. 11: 4.9 m of 5.3 m). The defaults add up to 2.1 m along each horizontal axis, the 2.5 m
+CEP of a u-blox NEO-M8 (data sheet, as its 0.05 m/s). Correlation times: 1800 s for the ionosphere (Rankin, IEEE PLANS,
+1994). The vertical error is twice as great (GPS SPS Performance Standard, 5th ed., 2020: 13 m and 8 m at 95 %). The
+delay is the 0.11 s that PX4 assumes (EKF2_GPS_DELAY). Not modeled: reflections that depend on walls, and satellites
+that set.
 """
 
 from collections.abc import Iterator, Sequence
@@ -13,7 +20,7 @@ import numpy as np
 from fanet_mw.bus.messages import Gps, Message
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import Enu, S, seconds_to_ns
-from sim.world.engines.contract import Flags
+from sim.world.engines.contract import Flags, Rows
 from sim.world.sensors.contract import Drift, Sensor, Truth, generator
 
 
@@ -25,26 +32,38 @@ class GpsReceiver(Sensor):
 
     def __init__(self, scenario: Scenario) -> None:
         self.period_ns = round(S / scenario.world.gps_hz)
-        self._sigma_m = scenario.world.gps_sigma_m
         self._noise = generator(scenario.seed, "gps")
-        sensors, shape = scenario.sensors, (scenario.nodes.count, 3)
-        slow = generator(scenario.seed, "gps_bias")
-        self._bias = (
-            Drift(slow, shape, sigma=sensors.gps_bias_m, tau_s=sensors.gps_bias_time_s) if sensors.gps_bias_m else None
+        config, count = scenario.sensors, scenario.nodes.count
+        self._sigma_m = np.array([1.0, 1.0, config.gps_vertical]) * scenario.world.gps_sigma_m
+        self._velocity_m_s, self._delay_s = config.gps_velocity_m_s, config.gps_delay_s
+        self._common = Drift(
+            generator(scenario.seed, "gps_common"), (1, 3), sigma=config.gps_common_m, tau_s=config.gps_common_time_s
         )
+        self._own = Drift(
+            generator(scenario.seed, "gps_bias"), (count, 3), sigma=config.gps_bias_m, tau_s=config.gps_bias_time_s
+        )
+        self._slow = np.array([1.0, 1.0, config.gps_vertical])
+        self._last: tuple[int, Rows, Rows, Flags] | None = None
         self._outages = [
             (np.array([east, north]), radius, seconds_to_ns(begin_s), seconds_to_ns(end_s))
-            for east, north, radius, begin_s, end_s in sensors.gps_outages
+            for east, north, radius, begin_s, end_s in config.gps_outages
         ]
 
     def read(self, truth: Truth, rows: Sequence[int]) -> Iterator[tuple[int, Message]]:
-        noisy = truth.at + self._noise.normal(0.0, self._sigma_m, truth.at.shape)
-        if self._bias is not None:
-            noisy += self._bias.at(truth.now_ns)
-        out = self._out(truth) if self._outages else None
+        position, velocity, out = self.fixes(truth)
         for row in rows:
-            if out is None or not out[row]:
-                yield row, Gps(truth.now_ns, Enu(*noisy[row].tolist()), Enu(*truth.velocity[row].tolist()))
+            if not out[row]:
+                yield row, Gps(truth.now_ns, Enu(*position[row].tolist()), Enu(*velocity[row].tolist()))
+
+    def fixes(self, truth: Truth) -> tuple[Rows, Rows, Flags]:
+        """Positions and velocities of all receivers, and which of them have no fix; the same ones when asked again."""
+        if self._last is None or self._last[0] != truth.now_ns:
+            noise, shape, now_ns = self._noise, truth.at.shape, truth.now_ns
+            slow = (self._common.at(now_ns) + self._own.at(now_ns)) * self._slow
+            position = truth.at - truth.velocity * self._delay_s + slow + noise.normal(0.0, 1.0, shape) * self._sigma_m
+            velocity = truth.velocity + noise.normal(0.0, self._velocity_m_s, shape)
+            self._last = now_ns, position, velocity, self._out(truth)
+        return self._last[1:]
 
     def _out(self, truth: Truth) -> Flags:
         """The UAVs that get no fix now."""

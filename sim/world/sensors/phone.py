@@ -1,14 +1,18 @@
 """The Wi-Fi receiver that detects survivors' phones.
 
-    RSSI = power - 40.05 dB - 10 n log10(d / 1 m) + shadowing - loss through rubble     [dBm]
+    RSSI = power - 40.05 dB - 10 n log10(d / 1 m) + shadowing + fading + noise - loss through rubble     [dBm]
 
-This is log-distance path loss with log-normal shadowing (Rappaport, 2002, ch. 4.9), above a detection threshold. The
-loss through a collapsed building was measured from 50 MHz to 1.8 GHz by Holloway et al. (IEEE Antennas and Propagation
-Magazine 56(3), 2014: some 20 to 80 dB). It grows with the frequency, by 10 to 100 dB for each metre of reinforced
-concrete (Oestges, EMTS 2013). Not modeled: fading in time, and the phone's own interval of probe requests.
+This is log-distance path loss with log-normal shadowing (Rappaport, 2002, ch. 4.9), above a detection threshold, told
+in steps of 1 dB as receivers do (IEEE 802.11-2020, 9.4.2.37: RCPI, right within 5 dB in 95 %). Shadowing is a Gaussian
+field over the places of both ends, whose correlation falls as exp(-d / d_corr) when either moves (Gudmundson, 1991), as
+that of the swarm's own radio (`emulator/channel/shadowing.py`). Fading is Rician and new for each scan, because a UAV
+moves many wavelengths in between; Matolak and Sun (IEEE Trans. Veh. Technol. 66(8), 2017) measured K of 12 dB and more
+over suburbs in the L band, and a phone lies on the ground. The loss through a collapsed building was measured from 50
+MHz to 1.8 GHz by Holloway et al. (IEEE Antennas and Propagation Magazine 56(3), 2014: some 20 to 80 dB). It grows with
+the frequency, by 10 to 100 dB for each metre of reinforced concrete (Oestges, EMTS 2013). Not modeled: the phone's own
+interval of probe requests.
 """
 
-import hashlib
 import math
 from collections.abc import Iterator, Sequence
 from typing import Final
@@ -17,19 +21,16 @@ import numpy as np
 import numpy.typing as npt
 
 from fanet_mw.bus.messages import Message, WifiScan
-from fanet_mw.rng import stream_seed
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import seconds_to_ns
+from sim.world.engines.contract import Values
 from sim.world.environment.survivors import Survivors
-from sim.world.sensors.contract import Sensor, Truth
+from sim.world.sensors.contract import Sensor, Truth, generator
 
 REFERENCE_LOSS_DB: Final = 40.05
 """Free-space loss at 1 m and 2.4 GHz."""
-KEPT_VALUES: Final = 8192
-"""The number of cached values of shadowing (about 1.5 MB), those of the places where UAVs are now."""
-_CELL_M: Final = 25.0
-"""Shadowing is one value per survivor and ground cell of this size, so it is the same each time a
-UAV comes to a place."""
+_WAVES: Final = 256
+"""The plane waves of which shadowing is made; within one seed the correlation differs from the law by 1 / sqrt(2 N)."""
 
 
 class PhoneSensor(Sensor):
@@ -45,8 +46,11 @@ class PhoneSensor(Sensor):
         self._power_dbm = scenario.mission.phone_power_dbm - np.where(
             survivors.buried, scenario.sensors.burial_phone_db, 0.0
         )
-        self._seed = stream_seed(scenario.seed, "shadowing")
-        self._shadow: dict[tuple[int, int, int], float] = {}
+        random = generator(scenario.seed, "phone_shadowing")
+        self._waves = _wave_vectors(random) / scenario.radio.shadowing_corr_m
+        self._phases = self._places @ _wave_vectors(random) / scenario.radio.shadowing_corr_m
+        self._phases += random.uniform(0.0, 2 * math.pi, _WAVES)
+        self._random = generator(scenario.seed, "phone_readings")
 
     def read(self, truth: Truth, rows: Sequence[int]) -> Iterator[tuple[int, Message]]:
         for row in rows:
@@ -61,19 +65,27 @@ class PhoneSensor(Sensor):
             return ()
         distance = np.maximum(1.0, np.linalg.norm(self._places - at, axis=1))
         mean_dbm = self._power_dbm - REFERENCE_LOSS_DB - 10 * mission.phone_exponent * np.log10(distance)
-        near = np.flatnonzero(mean_dbm >= mission.detection_dbm - 4 * mission.shadowing_db)
-        heard = [(int(i) + 1, float(mean_dbm[i]) + self._shadowing_db(int(i), at)) for i in near]
+        near = np.flatnonzero(mean_dbm >= mission.detection_dbm - 5 * max(mission.shadowing_db, 2.0))
+        told_dbm = np.round(mean_dbm[near] + self._shadowing_db(near, at) + self._reading_db(len(near)))
+        heard = [(int(i) + 1, float(dbm)) for i, dbm in zip(near, told_dbm, strict=True)]
         return tuple(sorted((h for h in heard if h[1] >= mission.detection_dbm), key=lambda h: (-h[1], h[0])))
 
-    def _shadowing_db(self, survivor: int, at: npt.NDArray[np.float64]) -> float:
-        """The fixed shadowing between a survivor and a ground cell."""
-        key = survivor, math.floor(at[0] / _CELL_M), math.floor(at[1] / _CELL_M)
-        value = self._shadow.get(key)
-        if value is None:
-            digest = hashlib.sha256(f"{self._seed}/{key}".encode()).digest()
-            u, v = (int.from_bytes(digest[i : i + 6], "big") + 1 for i in (0, 6))
-            gauss = math.sqrt(-2 * math.log(u / 2**48)) * math.cos(2 * math.pi * v / 2**48)  # Box and Muller, 1958
-            if len(self._shadow) >= KEPT_VALUES:
-                self._shadow.clear()  # each value will be computed again, and be the same
-            value = self._shadow[key] = max(-3.5, min(3.5, gauss)) * self._mission.shadowing_db
-        return value
+    def _shadowing_db(self, survivors: npt.NDArray[np.intp], at: npt.NDArray[np.float64]) -> Values:
+        """The shadowing between these survivors and a place, which is the same each time."""
+        waves = np.cos(self._phases[survivors] + at @ self._waves).sum(axis=1)
+        return np.asarray(self._mission.shadowing_db * math.sqrt(2 / _WAVES) * waves)
+
+    def _reading_db(self, count: int) -> Values:
+        """Fading and noise of each reading: the power of a direct wave with scattered ones, whose mean is 1."""
+        k = math.pow(10.0, self._mission.phone_rice_db / 10)
+        scattered = self._random.normal(0.0, math.sqrt(1 / (2 * (k + 1))), (2, count))
+        power = (math.sqrt(k / (k + 1)) + scattered[0]) ** 2 + scattered[1] ** 2
+        noise_db = self._random.normal(0.0, self._mission.rssi_sigma_db, count)
+        return np.asarray(10 * np.log10(np.maximum(power, 1e-9)) + noise_db)
+
+
+def _wave_vectors(random: np.random.Generator) -> Values:
+    """Wave vectors [3, _WAVES] for a correlation distance of 1 m: multivariate Cauchy, a normal vector over an
+    independent normal number.
+    """
+    return np.asarray(random.normal(size=(3, _WAVES)) / np.abs(random.normal(size=_WAVES)))

@@ -2,12 +2,13 @@
 
     SNR          Pt Gt Gr lambda^2 sigma T / ((4 pi)^3 R^4 k T0 F)          (the radar equation; Skolnik, 2008, ch. 1)
     P(detected)  Pfa^(1 / (1 + SNR))                                       (a Swerling 1 target, one look)
-    errors       range: cell / sqrt(2 SNR);  angles: beam / (1.6 sqrt(2 SNR))
+    errors       range: cell / sqrt(2 SNR);  angles: beam / (1.6 sqrt(2 SNR));  speed: lambda / (2 T) / sqrt(2 SNR)
 
 The default SNR, 21.6 dB from 1 m2 at 100 m, is that of a 77 GHz single-chip radar: 12 dBm, 10.5 dBi each way, twelve
 virtual channels, 10 ms of integration, noise figure 15 dB (Texas Instruments AWR1843). A UAV's mean cross section at 24
 GHz is -8 to -19 dBsm (IEICE Communications Express 9(7), 2020: Phantom 3, 3DR Solo and others); 0.03 m2 is -15 dBsm.
-The return of a target fluctuates exponentially from scan to scan (Swerling 1), and so does the SNR of each reading. For
+The return of a target fluctuates exponentially from scan to scan (Swerling 1), and so does the SNR of each reading. The
+speed is resolved to lambda / (2 T) = 0.19 m/s (77 GHz, T = 10 ms) up to 20 m/s; noise has any speed. For
 walls and hillsides one ray is cast for each beam, at -10, 0 and +10 degrees; returns of the flat ground are removed by
 the height above ground. Noise is taken for an echo with probability Pfa in each cell: that is the clutter. Not modeled:
 multiple paths, sidelobes, interference among the swarm's radars, and targets right behind a nearer one.
@@ -29,6 +30,8 @@ from sim.world.sensors.contract import Sensor, Truth, angles, generator
 ELEVATION_RAD: Final = math.radians(20)
 """The greatest angle up and down that a scan covers."""
 RAY_ELEVATIONS_DEG: Final = (-10.0, 0.0, 10.0)
+SPEED_CELL_M_S: Final = 0.19
+MOST_SPEED_M_S: Final = 20.0
 _BOLTZMANN: Final = 1.380649e-23
 _T0_K: Final = 290.0
 
@@ -104,7 +107,7 @@ class RadarSensor(Sensor):
         config, random = self._config, self._random
         mean_db = config.radar_snr_db + 10 * math.log10(area_m2) - 40 * np.log10(np.maximum(distance, 1.0) / 100)
         power = (1 + 10 ** (mean_db / 10)) * random.exponential(1.0, len(distance))
-        errors = random.normal(0.0, 1.0, (len(distance), 3))
+        errors = random.normal(0.0, 1.0, (len(distance), 4))
         for index in np.flatnonzero(power > self._threshold).tolist():
             snr = float(power[index]) - 1
             fine = 1 / math.sqrt(2 * snr)
@@ -114,18 +117,18 @@ class RadarSensor(Sensor):
                 max(0.0, float(distance[index] + errors[index, 0] * config.radar_resolution_m * fine)),
                 (bearing + float(errors[index, 1]) * across) % (2 * math.pi),
                 elevation + float(errors[index, 2]) * across,
-                float(closing[index]),
+                float(closing[index]) + float(errors[index, 3]) * SPEED_CELL_M_S * fine,
                 10 * math.log10(snr),
             )
 
     def _clutter(self) -> Iterator[Echo]:
         for _ in range(int(self._random.poisson(self._false_per_scan))):
-            share, bearing, elevation = self._random.random(3).tolist()
+            share, bearing, elevation, speed = self._random.random(4).tolist()
             snr = self._threshold - 1 + float(self._random.exponential(1.0))  # an exponential above its threshold
             yield Echo(
                 share * self._config.radar_range_m,
                 2 * math.pi * bearing,
                 ELEVATION_RAD * (2 * elevation - 1),
-                0.0,
+                MOST_SPEED_M_S * (2 * speed - 1),
                 10 * math.log10(snr),
             )

@@ -11,7 +11,9 @@ has 82 dB at 1 m by ANSI S3.5-1997, and up to 90 dB if it is as loud as possible
 airspeed V: Strasberg, J. Acoust. Soc. Am. 83(2), 1988. A call is detected if its SNR exceeds a threshold. The error of
 its direction is Gaussian along each of two axes, and falls with the square root of the SNR, as the Cramer-Rao bound
 does. Arrays of 12 to 16 microphones were flown on multirotors by Hoshiba et al., Sensors 17(11), 2017. A survivor calls
-in a share of the instants, drawn anew each time. Not modeled: echoes, and calls that mask each other.
+in a share of the instants, drawn anew each time. People differ in how loud they shout (Pearsons et al.,
+EPA-600/1-77-025, 1977: men louder than women and children; the standard deviation is assumed), and a level is measured
+in turbulent air. Not modeled: echoes, and calls that mask each other.
 """
 
 import math
@@ -36,7 +38,7 @@ _LEAST_WIND_M_S: Final = 0.1
 _WORST_SIGMA_RAD: Final = 1.0
 
 
-def level_db(distance_m: Values, *, at_1_m_db: float) -> Values:
+def level_db(distance_m: Values, *, at_1_m_db: float | Values) -> Values:
     """Sound pressure level at a distance, in the open [dB re 20 uPa]."""
     distance_m = np.maximum(distance_m, 1.0)
     return np.asarray(at_1_m_db - 20 * np.log10(distance_m) - AIR_DB_PER_M * distance_m)
@@ -65,6 +67,9 @@ class VoiceSensor(Sensor):
         self._survivors, self._solids = survivors, solids
         self._buried_db = np.where(survivors.buried, self._config.burial_voice_db, 0.0)
         self._random = generator(scenario.seed, "voice")
+        self._loudness_db = generator(scenario.seed, "loudness").normal(
+            0.0, self._config.voice_loudness_db, len(survivors.places)
+        )
 
     def read(self, truth: Truth, rows: Sequence[int]) -> Iterator[tuple[int, Message]]:
         config, places = self._config, self._survivors.places
@@ -73,7 +78,10 @@ class VoiceSensor(Sensor):
         for row in rows:
             calling = self._random.random(len(places)) < config.voice_share
             offset = places - truth.at[row]
-            level = level_db(np.linalg.norm(offset, axis=1), at_1_m_db=config.voice_level_db) - self._buried_db
+            loud_db = (
+                config.voice_level_db + self._loudness_db + self._random.normal(0.0, config.voice_error_db, len(places))
+            )
+            level = level_db(np.linalg.norm(offset, axis=1), at_1_m_db=loud_db) - self._buried_db
             snr = level - noise_db[row] + config.voice_gain_db
             near = np.flatnonzero(calling & (snr >= config.voice_snr_db))
             if not len(near):

@@ -42,7 +42,8 @@ def steer(made: WorldActor, node: int, place: Enu, *, speed_m_s: float = 8.0, no
 
 
 def test_fixes_are_as_noisy_as_the_scenario_says(make_scenario: MakeScenario) -> None:
-    said = advance(world(make_scenario, **{"world.gps_sigma_m": 3.0, "world.gps_hz": 1}), 200 * S)
+    white = {"sensors.gps_bias_m": 0.0, "sensors.gps_common_m": 0.0, "sensors.gps_vertical": 1.0}
+    said = advance(world(make_scenario, **{"world.gps_sigma_m": 3.0, "world.gps_hz": 1, **white}), 200 * S)
     fixes = np.array([message.position for _, topic, message in said if topic == NAMES.sensor(2, "gps")])
     poses = next(message for _, _, message in said if isinstance(message, Poses))
     truth = np.array(poses.states[6:9])

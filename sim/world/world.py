@@ -19,7 +19,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Collided, FlightModeChanged, Posed
 from fanet_mw.units import NodeId, S
 from sim.world.engines.battery_drain import BatteryDrain
-from sim.world.engines.contract import Engine
+from sim.world.engines.contract import Engine, Rows
 from sim.world.engines.kinematic import Kinematic
 from sim.world.engines.rotors.rigid_body import Rotors
 from sim.world.engines.rotors.vehicle_types import VEHICLES
@@ -31,7 +31,9 @@ from sim.world.flight_recorder import SwarmFlight
 from sim.world.incidents.incidents import Incidents
 from sim.world.mobility.guidance import Guidance, makes_sense
 from sim.world.mobility.layout import positions
+from sim.world.mobility.position_estimate import PositionEstimate
 from sim.world.sensors.contract import Truth
+from sim.world.sensors.gps import GpsReceiver
 from sim.world.sensors.suite import Suite, sensors_of
 from sim.world.ticks import Ticks
 
@@ -96,7 +98,9 @@ class WorldActor(Actor):
         drained = scenario.sensors.battery_hz > 0 or scenario.world.engine == "rotors"
         self._drain = BatteryDrain(scenario) if drained else None
         survivors = Survivors(scenario, solids.ground_m)
-        self._suite = Suite(scenario, sensors_of(scenario, survivors, solids, self._drain, solid), topics)
+        gps = GpsReceiver(scenario)
+        self._suite = Suite(scenario, sensors_of(scenario, survivors, solids, self._drain, solid, gps), topics)
+        self._estimate = PositionEstimate(scenario, gps) if scenario.world.navigation == "estimated" else None
         self._flies = np.ones(len(self._ids), bool)
         """The UAVs that have not crashed."""
         if flight is not None and scenario.world.crash == "falls":
@@ -119,7 +123,12 @@ class WorldActor(Actor):
         else:
             if self._guidance.still:
                 self._ticks.resume(now_ns, tick_ns=self._scenario.world.tick_ns)
-            self._guidance.obey(node, message, at=self._engine.positions()[node - 1], t_s=now_ns / S)
+            here = self._engine.positions()[node - 1]
+            if self._estimate is not None:
+                if not self._guidance.flown:
+                    self._estimate.advance(self._truth(now_ns))
+                here = here + self._estimate.off_m[node - 1]
+            self._guidance.obey(node, message, at=here, t_s=now_ns / S)
 
     def wake(self, now_ns: int) -> None:
         due_ns, before_ns = self._ticks.next_ns, self._ticks.last_ns
@@ -167,7 +176,7 @@ class WorldActor(Actor):
             t_s = last_ns / S + step * elapsed_s / steps
             before = engine.positions().copy()
             engine.stand(self._guidance.grounded(before))
-            engine.advance(elapsed_s / steps, self._guidance.wanted(t_s, before, engine.velocities()))
+            engine.advance(elapsed_s / steps, self._wanted(t_s, before))
             self._incidents.separation.watch(before, engine.positions())
             self._incidents.no_fly.watch(before, engine.positions())
         if self._drain is not None:
@@ -176,9 +185,26 @@ class WorldActor(Actor):
                 self._crash(row + 1, radio_dies=True)
             for row in np.flatnonzero(motors & (self._drain.batteries.charge <= _EMERGENCY_CHARGE)).tolist():
                 self._guidance.land_at_once(row + 1)
+        if self._estimate is not None and self._guidance.flown:
+            self._estimate.advance(self._truth(now_ns))
+            flying = self._guidance.commanded(len(self._ids)) & ~self._guidance.grounded(engine.positions())
+            for row in np.flatnonzero(self._estimate.lost(now_ns) & flying & self._flies).tolist():
+                self._guidance.land_at_once(row + 1)
         self._record_modes(now_ns)
         for first, second in engine.contacts():
             self._contact(first, second, now_ns)
+
+    def _wanted(self, t_s: float, at: Rows) -> Rows:
+        """The velocities that flight controllers ask for, as they really are."""
+        estimate, guidance = self._estimate, self._guidance
+        if estimate is None or not guidance.flown:
+            return guidance.wanted(t_s, at, self._engine.velocities())
+        wish = guidance.wanted(t_s, at, self._engine.velocities(), estimate.off_m)
+        flown = ~guidance.grounded(at) & guidance.commanded(len(at))
+        return wish - estimate.off_m_s * flown[:, None]
+
+    def _truth(self, now_ns: int) -> Truth:
+        return Truth(now_ns, self._engine.positions(), self._engine.velocities())
 
     def _record_modes(self, now_ns: int) -> None:
         changes, self._guidance.changes = self._guidance.changes, []
@@ -227,4 +253,4 @@ class WorldActor(Actor):
             for node, (east, north, up) in zip(self._ids, at.tolist(), strict=True):
                 if self._flies[node - 1]:
                     self.records.append(Posed(now_ns, node, round(east, 2), round(north, 2), round(up, 2)))
-        self.outbox.extend(self._suite.readings(Truth(now_ns, at, velocity), self._flies, before_ns=before_ns))
+        self.outbox.extend(self._suite.readings(self._truth(now_ns), self._flies, before_ns=before_ns))

@@ -38,6 +38,10 @@ class World(Section):
     charge: tuple[Annotated[float, Field(gt=0, le=1)], Annotated[float, Field(gt=0, le=1)]] = (1.0, 1.0)
     """The least and the greatest charge of a battery at the start, as a share of its capacity; each is drawn by the
     seed."""
+    navigation: Literal["estimated", "perfect"] = "estimated"
+    """Where flight controllers that carry out setpoints believe their UAVs to be: `estimated` by GPS, barometer and
+    inertial sensors with their errors, so that a UAV without any fix or optical flow for 5 s lands; or `perfect`, at
+    the true place. The tracks of mobility models are flown exactly."""
     wind_m_s: tuple[WindSpeed, WindSpeed] = (0.0, 0.0)
     """`rotors`: velocity of the mean wind, to the east and to the north."""
     gusts_m_s: Annotated[float, Field(ge=0, le=50)] = 0.0

@@ -136,6 +136,11 @@ class Guidance:
         """True when nothing moves and no setpoint is in force."""
         return self._model is None and not self._onboard and not self._commands
 
+    @property
+    def flown(self) -> bool:
+        """True while any UAV flies by the commands of a setpoint, or may be asked to at once."""
+        return self._onboard or bool(self._commands)
+
     def obey(self, node: int, setpoint: Setpoint, *, at: Values, t_s: float) -> None:
         """Carry out a setpoint for a UAV that is at the place `at` [3] at the instant `t_s`."""
         here = Enu(*at.tolist())
@@ -175,7 +180,9 @@ class Guidance:
             assert_never(kind)
 
     def land_at_once(self, node: int) -> None:
-        """Land a UAV where it is, because its battery is nearly empty; it obeys no further setpoint."""
+        """Land a UAV where it is, because its battery is nearly empty or it has lost its position; it obeys no further
+        setpoint.
+        """
         row = node - 1
         if self._obeys(row):
             self._command(row, _Land(_FORCED_M_S))
@@ -218,6 +225,12 @@ class Guidance:
         off[[*landing, *self._waiting()]] = True
         return np.asarray(off & (at[:, 2] - self._surface_m(at) <= _ON_GROUND_M))
 
+    def commanded(self, count: int) -> Flags:
+        """Which of so many UAVs carry out a command, other than those that follow the mobility model."""
+        found = np.zeros(count, bool)
+        found[[*self._commands]] = True
+        return found
+
     def _stands(self, row: int, here: Enu) -> bool:
         """True if the UAV of a row, which is at a place, stands on the ground with its motors off."""
         off = isinstance(self._commands.get(row), _Land) or row in self._waiting()
@@ -241,14 +254,22 @@ class Guidance:
         """Where the mobility model wants all UAVs to be; setpoints do not count here."""
         return self._model.track(t_s) if self._model else Track(self._starts, np.zeros_like(self._starts))
 
-    def wanted(self, t_s: float, at: Rows, velocity: Rows) -> Rows:
-        """The velocity that each UAV should fly now [m/s], given the places and velocities of all."""
+    def wanted(self, t_s: float, true: Rows, velocity: Rows, off: Rows | None = None) -> Rows:
+        """The velocity that each UAV should fly now [m/s], given the places and velocities of all.
+
+        `off`: by how much flight controllers are mistaken about where they are [n, 3]; None means not at all. The track
+        of a mobility model is where UAVs really fly, and the ground is felt, whatever they believe.
+        """
+        at = true
+        if off is not None and self.flown:
+            at = true.copy()
+            at += off * self.commanded(len(at))[:, None]
         places, feed = self.track(t_s)
         places, feed = places.copy(), feed.copy()
         limit = np.linalg.norm(feed, axis=1) + 5.0
         self._expire(t_s, at)
         if self._returns.watches:
-            self._begin_returns(t_s, at)
+            self._begin_returns(t_s, at, self.grounded(true))
         for row, command in [*self._commands.items()]:
             if isinstance(command, Homeward):
                 goal = command.goal(Enu(*at[row].tolist()))
@@ -268,8 +289,8 @@ class Guidance:
             wish[rows] = asked if self._returns.at_fence else self._fence.brake(asked, at[rows])
         landings = {row: command.speed_m_s for row, command in self._commands.items() if isinstance(command, _Land)}
         if landings or self._grounded:
-            self._near_the_ground(wish, at, landings)
-        return kept_clear(wish, at, self._see_m) if len(at) > 1 and self._see_m else wish
+            self._near_the_ground(wish, true, landings)
+        return kept_clear(wish, true, self._see_m) if len(at) > 1 and self._see_m else wish
 
     def _expire(self, t_s: float, at: Rows) -> None:
         """Let every UAV hold its position whose velocity setpoint was not renewed in time."""
@@ -278,9 +299,8 @@ class Guidance:
             self._hold(row, Enu(*at[row].tolist()))
             self._enter(row, FlightMode.FAILSAFE)
 
-    def _begin_returns(self, t_s: float, at: Rows) -> None:
+    def _begin_returns(self, t_s: float, at: Rows, stands: Flags) -> None:
         """Send those UAVs home that fly without having heard from their computers, or are beyond the geofence."""
-        stands = self.grounded(at)
         self._returns.from_fence -= set(np.flatnonzero(stands).tolist())
         able = [
             row for row in range(len(at))

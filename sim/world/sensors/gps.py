@@ -35,7 +35,7 @@ class GpsReceiver(Sensor):
         self._noise = generator(scenario.seed, "gps")
         config, count = scenario.sensors, scenario.nodes.count
         self._sigma_m = np.array([1.0, 1.0, config.gps_vertical]) * scenario.world.gps_sigma_m
-        self._velocity_m_s, self._delay_s = config.gps_velocity_m_s, config.gps_delay_s
+        self._velocity_m_s, self.delay_s = config.gps_velocity_m_s, config.gps_delay_s
         self._common = Drift(
             generator(scenario.seed, "gps_common"), (1, 3), sigma=config.gps_common_m, tau_s=config.gps_common_time_s
         )
@@ -60,7 +60,7 @@ class GpsReceiver(Sensor):
         if self._last is None or self._last[0] != truth.now_ns:
             noise, shape, now_ns = self._noise, truth.at.shape, truth.now_ns
             slow = (self._common.at(now_ns) + self._own.at(now_ns)) * self._slow
-            position = truth.at - truth.velocity * self._delay_s + slow + noise.normal(0.0, 1.0, shape) * self._sigma_m
+            position = truth.at - truth.velocity * self.delay_s + slow + noise.normal(0.0, 1.0, shape) * self._sigma_m
             velocity = truth.velocity + noise.normal(0.0, self._velocity_m_s, shape)
             self._last = now_ns, position, velocity, self._out(truth)
         return self._last[1:]

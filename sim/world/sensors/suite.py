@@ -30,16 +30,17 @@ def sensors_of(
     solids: Solids,
     drain: BatteryDrain | None = None,
     obstacles: Obstacles | None = None,
+    gps: GpsReceiver | None = None,
 ) -> list[Sensor]:
     """The sensors that a scenario asks for, in the order in which their readings are sent.
 
     `drain`: the batteries; None if UAVs have none. `obstacles`: the same obstacles as in `solids`, for rendered
-    images; None if there are none.
+    images; None if there are none. `gps`: receivers that flight controllers use, too.
     """
     config = scenario.sensors
     found: list[Sensor] = []
     if uses_fixes(scenario):
-        found.append(GpsReceiver(scenario))
+        found.append(gps or GpsReceiver(scenario))
     if scenario.mission.survivors:
         found.append(PhoneSensor(scenario, survivors))
     if config.camera_hz and scenario.mission.survivors:

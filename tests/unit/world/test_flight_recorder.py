@@ -40,7 +40,8 @@ class Ear:
 def scenario(request: pytest.FixtureRequest, make_scenario: Any) -> Scenario:
     scenario: Scenario = make_scenario(
         **{"nodes.count": 4, "nodes.spacing_m": 30, "mobility.model": "formation", "mobility.speed_m_s": 8,
-           "world.engine": request.param, "world.tick_ms": 100, "duration_s": 60}
+           "world.engine": request.param, "world.tick_ms": 100, "duration_s": 60,
+           "world.navigation": "perfect"}
     )  # fmt: skip
     return scenario
 

@@ -83,7 +83,7 @@ def test_a_setpoint_that_is_none_is_counted_and_nobody_moves(
 
 def test_who_flies_into_the_ground_collides_once_and_it_is_counted(make_scenario: MakeScenario) -> None:
     """Two sent to one place, which do not see each other."""
-    made = world(make_scenario, **{"mobility.see_m": 0, "nodes.count": 2})
+    made = world(make_scenario, **{"mobility.see_m": 0, "nodes.count": 2, "world.navigation": "perfect"})
     for node in (1, 2):
         steer(made, node, Enu(0.0, 0.0, 50.0))
     advance(made, 30 * S)

@@ -24,7 +24,8 @@ class Flying:
     """A world, its clock, and what it has said."""
 
     def __init__(self, make_scenario: MakeScenario, **keys: Any) -> None:
-        given = {"nodes.count": 2, "nodes.spacing_m": 100, "mobility.model": "onboard", "world.area_m": 1000}
+        given = {"nodes.count": 2, "nodes.spacing_m": 100, "mobility.model": "onboard", "world.area_m": 1000,
+                 "world.navigation": "perfect"}  # fmt: skip
         self.world = WorldActor(make_scenario(**given | keys), "m")
         self.said: list[tuple[str, Message]] = []
         self.now_ns = 0

@@ -109,6 +109,13 @@ class Solids:
             after[stopped, 2] = np.maximum(after[stopped, 2], self.ground_m(after[stopped]))
         return stopped
 
+    def nearest_walls(self, at: Values) -> Rows:
+        """The place on each building that is nearest to a place [3]."""
+        local = np.clip(self._local(at[None])[0], -self._half, self._half)
+        east = self._cos * local[:, 0] - self._sin * local[:, 1]
+        north = self._sin * local[:, 0] + self._cos * local[:, 1]
+        return np.stack([east, north, local[:, 2]], axis=1) + self._middle
+
     def blocked(self, first: Rows, second: Rows) -> Flags:
         """True where something stands between `first` and `second` [n, 3]."""
         way = second - first

@@ -8,9 +8,9 @@ The default SNR, 21.6 dB from 1 m2 at 100 m, is that of a 77 GHz single-chip rad
 virtual channels, 10 ms of integration, noise figure 15 dB (Texas Instruments AWR1843). A UAV's mean cross section at 24
 GHz is -8 to -19 dBsm (IEICE Communications Express 9(7), 2020: Phantom 3, 3DR Solo and others); 0.03 m2 is -15 dBsm.
 The return of a target fluctuates exponentially from scan to scan (Swerling 1), and so does the SNR of each reading. The
-speed is resolved to lambda / (2 T) = 0.19 m/s (77 GHz, T = 10 ms) up to 20 m/s; noise has any speed. For
-walls and hillsides one ray is cast for each beam, at -10, 0 and +10 degrees; returns of the flat ground are removed by
-the height above ground. Noise is taken for an echo with probability Pfa in each cell: that is the clutter. Not modeled:
+speed is resolved to lambda / (2 T) = 0.19 m/s (77 GHz, T = 10 ms) up to 20 m/s; noise has any speed. For walls and
+hillsides one ray is cast for each beam, at -10, 0 and +10 degrees, and one to the nearest place of each building, which
+may stand between them; returns of the flat ground are removed by the height above ground. Noise is taken for an echo with probability Pfa in each cell: that is the clutter. Not modeled:
 multiple paths, sidelobes, interference among the swarm's radars, and targets right behind a nearer one.
 """
 
@@ -23,7 +23,7 @@ import numpy as np
 from fanet_mw.bus.messages import Echo, Message, Radar
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import S
-from sim.world.engines.contract import Values
+from sim.world.engines.contract import Rows, Values
 from sim.world.environment.solids import Solids
 from sim.world.sensors.contract import Sensor, Truth, angles, generator
 
@@ -94,11 +94,25 @@ class RadarSensor(Sensor):
     def _walls(self, truth: Truth, row: int) -> Iterator[Echo]:
         if not self._solids.any:
             return
-        origin = np.broadcast_to(truth.at[row], self._rays.shape)
-        distance = self._solids.first_hit_m(origin, self._rays, self._config.radar_range_m)
+        rays = np.vstack([self._rays, self._between_rays(truth.at[row])])
+        distance = self._solids.first_hit_m(
+            np.broadcast_to(truth.at[row], rays.shape), rays, self._config.radar_range_m
+        )
+        for aimed in range(len(self._rays), len(rays)):
+            ray = int((self._rays @ rays[aimed]).argmax())
+            if distance[aimed] < distance[ray]:
+                rays[ray], distance[ray] = rays[aimed], distance[aimed]
+        rays, distance = rays[: len(self._rays)], distance[: len(self._rays)]
         met = np.flatnonzero(np.isfinite(distance) & (distance > 0))
-        closing = self._rays[met] @ truth.velocity[row]
-        yield from self._echoes(distance[met], self._rays[met], closing, self._config.radar_wall_m2)
+        yield from self._echoes(distance[met], rays[met], rays[met] @ truth.velocity[row], self._config.radar_wall_m2)
+
+    def _between_rays(self, at: Values) -> Rows:
+        """Directions to the nearest place of each building in range, which may stand between two rays of the scan."""
+        way = self._solids.nearest_walls(at) - at
+        away = np.linalg.norm(way, axis=1)
+        found = (away > 0) & (away <= self._config.radar_range_m)
+        found &= np.abs(way[:, 2]) <= math.sin(ELEVATION_RAD) * away
+        return np.asarray(way[found] / away[found, None] * (1 + 1e-9))
 
     def _echoes(self, distance: Values, direction: Values, closing: Values, area_m2: float) -> Iterator[Echo]:
         """The returns of targets with one cross section that exceed the threshold, with the errors that follow from

@@ -262,6 +262,17 @@ def test_walls_are_met_where_they_stand_and_hide_what_is_behind(make_scenario: M
     assert all(e.range_m < 50 for scan in found for e in scan), "nothing from behind the wall"
 
 
+@pytest.mark.parametrize("bearing_deg", [5, 7, 94, 231])
+def test_a_tower_between_two_rays_is_met(make_scenario: MakeScenario, bearing_deg: float) -> None:
+    """6 m wide, 100 m away, where the rays of two beams are 17 m apart."""
+    east, north = (100 * f(math.radians(bearing_deg)) for f in (math.sin, math.cos))
+    tower = Solids(Obstacles(None, (Box(east, north, 6, 6, 90),)))
+    found = scans(make_scenario, [], 60, tower, **{"sensors.radar_false_alarm": 1e-9})
+    echoes = [echo for scan in found for echo in scan]
+    assert len(echoes) > 50
+    assert np.mean([echo.range_m for echo in echoes]) == pytest.approx(97, abs=1.5)
+
+
 def test_clutter_comes_as_often_as_the_false_alarm_rate_says(make_scenario: MakeScenario) -> None:
     found = scans(make_scenario, [], 1000, **{"sensors.radar_false_alarm": 1e-5})
     expected = 1000 * 36 * 240 * 1e-5

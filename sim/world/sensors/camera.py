@@ -8,10 +8,9 @@
 N50 is the number of line pairs with which half of the observers recognize what they see (Johnson, "Analysis of image
 forming systems", 1958). The curve around it is the target transfer probability function of the Night Vision
 Laboratory's static performance model (Ratches et al., ECOM-7043, 1975). Each image is a new trial. A person who is
-buried, or hidden from the camera by anything solid, is not seen. The pixels that a detector
-counts are off by a tenth (assumed). A gimbal keeps the image's width along east; angular
-errors are Gaussian. False alarms are a Poisson process, anywhere in the image. Not modeled: light, motion blur, and
-that successive images are alike.
+buried, or hidden from the camera by anything solid, is not seen. The pixels that a detector counts are off by a tenth
+(assumed). A gimbal keeps the image's width along east; angular errors are Gaussian. False alarms are a Poisson process,
+anywhere in the image. Not modeled: light, motion blur, and that successive images are alike.
 """
 
 import math

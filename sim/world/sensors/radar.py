@@ -10,8 +10,9 @@ GHz is -8 to -19 dBsm (IEICE Communications Express 9(7), 2020: Phantom 3, 3DR S
 The return of a target fluctuates exponentially from scan to scan (Swerling 1), and so does the SNR of each reading. The
 speed is resolved to lambda / (2 T) = 0.19 m/s (77 GHz, T = 10 ms) up to 20 m/s; noise has any speed. For walls and
 hillsides one ray is cast for each beam, at -10, 0 and +10 degrees, and one to the nearest place of each building, which
-may stand between them; returns of the flat ground are removed by the height above ground. Noise is taken for an echo with probability Pfa in each cell: that is the clutter. Not modeled:
-multiple paths, sidelobes, interference among the swarm's radars, and targets right behind a nearer one.
+may stand between them; returns of the flat ground are removed by the height above ground. Noise is taken for an echo
+with probability Pfa in each cell: that is the clutter. Not modeled: multiple paths, sidelobes, interference among the
+swarm's radars, and targets right behind a nearer one.
 """
 
 import math

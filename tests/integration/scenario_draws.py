@@ -41,8 +41,8 @@ WAKES_A_SECOND: Final = 60_000
 _KEPT: Final = {
     "name", "description", "faults", "time_scale", "duration_s", "seed", "traffic.interval_s",
     "routing.options", "clusters.options", "radio.options", "mobility.options",
-    "world.heightmap", "world.buildings_geojson", "world.heightmap_sha256", "world.buildings_sha256", "world.physics_hz", "traffic.name", "traffic.packets_csv",
-    "applications", "further_traffic",
+    "world.heightmap", "world.buildings_geojson", "world.heightmap_sha256", "world.buildings_sha256",
+    "world.physics_hz", "traffic.name", "traffic.packets_csv", "applications", "further_traffic",
 }  # fmt: skip
 """Keys that are set below, mean nothing in virtual time, belong to parts of other packages, or name files."""
 _SMALL: Final = {

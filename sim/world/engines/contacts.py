@@ -62,6 +62,19 @@ class Contacts:
         self._new += sorted(now - self._touching)
         self._touching = frozenset(now)
 
+    def possible(self, before: Rows, after: Rows, *, margin_m: float) -> bool:
+        """False if nothing comes nearer to anything in a step than touching and this margin; then nothing touches."""
+        within_m = self._radius_m + margin_m
+        if self._solids is None:
+            gap = np.minimum(before[:, 2], after[:, 2])
+        else:
+            gap = self._solids.least_gap_m(before, after, within_m=within_m)
+        pairs, _, _ = approaches(before, after, within_m=self._radius_m + within_m)
+        found = bool(len(pairs)) or float(gap.min(initial=np.inf)) <= within_m
+        if not found:
+            self._touching = frozenset()
+        return found
+
     def take(self) -> list[tuple[int, int]]:
         """The contacts that began since the last call."""
         new, self._new = self._new, []

@@ -31,6 +31,8 @@ _DRAG_N_S_M: Final = 0.25
 _GAIN: Final = 2.5
 """The gain of the velocity loop [1/s]."""
 _CONTROL_HZ: Final = 60
+_MARGIN_M: Final = 2.0
+"""Contacts are looked for while bodies are nearer to something than this: more than any manoeuvre changes in 0.1 s."""
 _OBSTACLE_GROUP: Final = 64
 """The collision group of hills and buildings: they collide with bodies, but not with the ground or each other."""
 _BODY_GROUP: Final = 1
@@ -46,7 +48,9 @@ class Physics(Engine):
         self._substeps = max(1, round(physics_hz / _CONTROL_HZ))
         self._obstacles = obstacles
         self._solids = Solids(obstacles)
-        self._contacts = Contacts(IRIS.reach_m, self._solids)
+        self._contacts = Contacts(IRIS.reach_m, self._solids if self._solids.any else None)
+        self._watches = True
+        """True if anything may touch anything in the steps of this `advance`."""
         self._left_s = 0.0
         self._bodies: list[int] = []
         self._node_of: dict[int, int] = {}
@@ -115,6 +119,7 @@ class Physics(Engine):
 
     def advance(self, dt_s: float, wanted_m_s: Rows) -> None:
         self._left_s += dt_s
+        self._watches = self._contacts.possible(self._at, self._at + self._velocity * dt_s, margin_m=_MARGIN_M)
         while self._left_s >= 1 / _CONTROL_HZ - 1e-9:
             self._left_s -= 1 / _CONTROL_HZ
             self._step(wanted_m_s)
@@ -129,9 +134,10 @@ class Physics(Engine):
         for i, body in enumerate(self._bodies):
             self._at[i] = pybullet.getBasePositionAndOrientation(body, physicsClientId=client)[0]
             self._velocity[i] = pybullet.getBaseVelocity(body, physicsClientId=client)[0]
-        self._lift_out()
-        # where they would have flown: bodies that bounce within a step are apart again at its end
-        self._contacts.notice(before, free, self._touching())
+        if self._watches:
+            self._lift_out()
+            # where they would have flown: bodies that bounce within a step are apart again at its end
+            self._contacts.notice(before, free, self._touching())
 
     def _force(self, wanted_m_s: Rows) -> Rows:
         """Thrust within its limits, plus drag [N]."""

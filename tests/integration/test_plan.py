@@ -83,11 +83,13 @@ def test_where_gps_errs_the_plan_has_the_greatest_bound_of_all_its_draws() -> No
 
 @pytest.mark.parametrize("channel", ["range", "log_distance"])
 def test_floods_that_miss_nodes_with_reported_positions_are_a_problem(channel: str) -> None:
-    """In the middle of the line two nodes are 2 m too far from each other, and another node is a way around."""
+    """In the middle of the line two nodes are 2 m too far from each other, and another node is a way around; GPS
+    errs by 1.5 m.
+    """
     places = [[0, 0, 50], [200, 0, 50], [452, 0, 50], [650, 0, 50], [326, 150, 50]]
     settings = (f"nodes.positions_m={places}", "nodes.layout=explicit", "nodes.count=5", "clusters.count=4",
                 "traffic.sources=4", f"radio.channel={channel}", "clusters.links=places")  # fmt: skip
-    _, plan, feasible = planned(*settings)
+    _, plan, feasible = planned(*settings, "world.gps_sigma_m=1.5")
     assert not feasible
     assert "floods that miss others" in plan["problems"][0]
     assert planned(*settings, "world.gps_sigma_m=0", "sensors.gps_bias_m=0")[2]
@@ -98,7 +100,7 @@ def test_links_that_gps_may_take_for_none_are_a_problem_and_a_greater_distance_o
     spacing_m: float,
 ) -> None:
     """Each node of a line hears only the next ones. Without one of these links the swarm is in parts."""
-    settings = (*LINE, f"nodes.spacing_m={spacing_m}")
+    settings = (*LINE, f"nodes.spacing_m={spacing_m}", "world.gps_sigma_m=1.5")
     _, plan, feasible = planned(*settings, change=True)
     assert not feasible
     assert "draws of the positions that GPS gives" in plan["problems"][0]

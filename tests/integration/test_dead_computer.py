@@ -70,9 +70,10 @@ def test_who_loses_its_computer_flies_home_by_itself_and_the_others_search_on(
         assert returns_s == pytest.approx(DIES_S + 5, abs=1.2), "5 s after its last setpoint"
         posed = [r for r in records if isinstance(r, Posed) and r.node == node]
         pad, end = posed[0], posed[-1]
-        assert (end.east_m, end.north_m, end.up_m) == pytest.approx((pad.east_m, pad.north_m, 0.0), abs=2.0)
+        assert (end.east_m, end.north_m) == pytest.approx((pad.east_m, pad.north_m), abs=6.0), "as well as GPS knows"
+        assert end.up_m < 0.5
         dies_at = next(r for r in posed if r.t_ns >= DIES_S * S)
         assert abs(dies_at.east_m - pad.east_m) > 50, "it was on its way"
-        assert max(r.up_m for r in posed) == pytest.approx(70 + 3 * (node - 1), abs=1), "a height of its own"
+        assert max(r.up_m for r in posed) == pytest.approx(70 + 3 * (node - 1), abs=2.5), "a height of its own"
     assert not [r for r in records if isinstance(r, Collided)]
     assert {r.revision for r in records if isinstance(r, Planned)} >= {1, 2}, "the others plan without them"

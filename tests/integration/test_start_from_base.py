@@ -12,7 +12,7 @@ from fanet_mw.units import S
 from sim.run.virtual import simulate
 
 KEYS = {
-    "nodes.count": 6, "nodes.on_ground": True, "nodes.altitude_m": 40, "duration_s": 50, "warmup_s": 1, "drain_s": 1,
+    "nodes.count": 6, "nodes.on_ground": True, "nodes.altitude_m": 40, "duration_s": 60, "warmup_s": 1, "drain_s": 1,
     "mission.survivors": 1, "mission.search": "spiral", "mobility.model": "onboard", "world.area_m": 600,
     "world.base_m": [-350, 0], "world.crash": "falls", "radio.range_m": 250, "traffic.arrivals": "none",
     "nodes.telemetry_hz": 0,

@@ -16,15 +16,23 @@ fanet/<swarm>/report/<id>            Report                 <id> is the actor's 
 fanet/<swarm>/clock                  Clock
 """
 
+import re
 from typing import Final
 
+from fanet_mw.errors import ConfigError
+
 ROOT: Final = "fanet"
+_NAME: Final = re.compile(r"[^\s/*$#?]{1,128}")
 
 
 class Topics:
     """The key expressions of one swarm."""
 
     def __init__(self, swarm: str) -> None:
+        if not _NAME.fullmatch(swarm):
+            raise ConfigError(
+                f"the name of a swarm, {swarm!r}, is part of topics: at most 128 characters, none of / * $ # ? or space"
+            )
         self.swarm = swarm
         self._base = f"{ROOT}/{swarm}"
         self.pose = f"{self._base}/world/pose"

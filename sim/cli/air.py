@@ -137,8 +137,11 @@ def _do(control: Control, where: SwarmFlags) -> int:
     from sim.run.bus.air_control import change
 
     if not isinstance(control, Restore) and (why := wrong(control, count=MAX_NODES)):
-        bound = "node ids from 1" if nodes_of(control) else "see `fanet air --help`"
-        raise ConfigError(f"{control}: {why.removeprefix('fault_').replace('_', ' ')} out of bounds ({bound})")
+        kind, what = type(control).__name__.lower(), why.removeprefix("fault_").replace("_", " ")
+        if isinstance(control, Degrade) and control.src == control.dst:
+            raise ConfigError(f"{kind} {control.src} {control.dst}: a link has two different ends")
+        bound = f"node ids from 1 to {MAX_NODES}" if nodes_of(control) else "see `fanet air --help`"
+        raise ConfigError(f"{kind} {control.label}: {what} out of bounds ({bound})")
     console = Console(highlight=False)
     for fault in change(*where.located(), control, zenoh_config=where.zenoh_config):
         console.print(f"{fault.label}: {fault.kind} {'since' if fault.active else 'ended at'} {fault.t_ns / S:.3f} s")

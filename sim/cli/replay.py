@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
+from fanet_mw.errors import ConfigError
 from sim.cli.command_groups import RUN
 from sim.cli.console import Console
 
@@ -37,6 +38,8 @@ def replay(folder: Path, *, out: Path | None = None, at: Annotated[float | None,
 
     found = Replay.read(folder, *REPLAYED)
     if at is not None:
+        if not 0 <= at <= found.scenario.duration_s:
+            raise ConfigError(f"--at {at:g}: must be within 0 and duration_s = {found.scenario.duration_s:g}")
         _show(found, at)
         return 0
     path = out or folder / REPLAY

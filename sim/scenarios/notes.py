@@ -2,20 +2,30 @@
 something else. No run is refused for it.
 """
 
+import re
 from collections.abc import Iterator
-from typing import Final
+from typing import Final, get_args
+
+from pydantic.fields import FieldInfo
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
+from fanet_mw.scenario.tables.routing import PROTOCOLS
+from fanet_mw.scenario.tables.sections import Section
 from fanet_mw.units import S
 
 _NAMED: Final = 3
 """A note names at most this many things, and gives the number of the others."""
 
 
+_ONLY_WITH: Final = re.compile(r"`\w+`(?:(?:, | and |, and )`\w+`)*: ")
+_WORDS: Final = re.compile(r"`(\w+)`")
+_CLUSTERED: Final = frozenset({"clustered"})
+
+
 def notes(scenario: Scenario) -> list[str]:
     """One sentence for each."""
-    return [*_after_the_end(scenario), *_guessed(scenario)]
+    return [*_after_the_end(scenario), *_without_effect(scenario), *_guessed(scenario)]
 
 
 def _after_the_end(scenario: Scenario) -> Iterator[str]:
@@ -32,6 +42,32 @@ def _after_the_end(scenario: Scenario) -> Iterator[str]:
                 f"{name}: {len(late)} of {len(traffic.packets)} packets come too late to be sent, from "
                 f"{start_s + min(late):g} s on; duration_s - drain_s = {ends_s:g}"
             )
+
+
+def _without_effect(scenario: Scenario) -> Iterator[str]:
+    """Keys that were set for something else than what was chosen, by the first words of their documentation."""
+    protocol = scenario.routing.protocol
+    if protocol in PROTOCOLS and protocol not in _CLUSTERED and scenario.mission.formation == "none":
+        unused = [key for key, _ in _changed(scenario.clusters)]
+        if unused:
+            yield f"clusters.{', clusters.'.join(unused)}: no effect with routing.protocol = {protocol!r}"
+    for table in ("nodes", "routing", "radio", "mobility", "clock", "world", "traffic"):
+        section = getattr(scenario, table)
+        for key, field in _changed(section):
+            said = _ONLY_WITH.match(field.description or "")
+            wanted = set(_WORDS.findall(said[0])) if said else set()
+            for other, choice in type(section).model_fields.items():
+                known = {*get_args(choice.annotation), *(n for m in choice.metadata for n in getattr(m, "ours", ()))}
+                value = getattr(section, other)
+                if other != key and wanted and wanted <= known and value in known and value not in wanted:
+                    yield f"{table}.{key}: no effect with {table}.{other} = {value!r}"
+
+
+def _changed(section: Section) -> Iterator[tuple[str, FieldInfo]]:
+    """The keys of a table with another value than by default."""
+    for key, field in type(section).model_fields.items():
+        if getattr(section, key) != field.get_default(call_default_factory=True):
+            yield key, field
 
 
 def _guessed(scenario: Scenario) -> Iterator[str]:

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import json
 import re
+import time
 from array import array
 from collections.abc import AsyncIterator
 
@@ -132,3 +133,13 @@ async def test_links_are_shown_as_they_are_told(capsys: pytest.CaptureFixture[st
     out = capsys.readouterr().out
     assert re.search(r"air-test at \d+ s: 1 links in 1 s", out)
     assert re.search(r"\b1 +2 +\d+ +100% +30\.0", out)
+
+
+async def test_a_node_that_the_swarm_does_not_have_is_named_at_once() -> None:
+    async with emulator("air-test", []) as (endpoint, _):
+        with Bus.join(endpoint) as keeper:
+            keeper.answer(Topics("air-test").scenario, lambda: b'{"nodes": {"count": 9}}')
+            began = time.monotonic()
+            with pytest.raises(FanetError, match="node 99: the nodes of swarm air-test are 1 to 9"):
+                await asyncio.to_thread(air_control.change, endpoint, "air-test", Cut("x", NodeId(99)))
+            assert time.monotonic() - began < air_control.CONFIRM_TIMEOUT_S

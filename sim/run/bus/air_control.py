@@ -4,6 +4,7 @@ A change is one message on `fanet/<swarm>/radio/control`. The emulator's trace s
 that it was refused (the emulator's report counts why), or that no emulator serves that swarm.
 """
 
+import json
 import threading
 import time
 from collections.abc import Callable
@@ -12,7 +13,7 @@ from typing import Final
 
 from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import TraceBatch
-from fanet_mw.bus.radio_control import Control
+from fanet_mw.bus.radio_control import Control, Restore, nodes_of
 from fanet_mw.bus.topics import ROOT, Topics
 from fanet_mw.errors import FanetError, MalformedFrameError
 from fanet_mw.hosts.bus import Bus, config_of
@@ -52,6 +53,10 @@ def change(endpoint: str, swarm: str | None, control: Control, *, zenoh_config: 
     """
     with Bus.join(endpoint, config_of(zenoh_config, OPERATOR)) as bus:
         names = Topics(swarm or find_swarm(bus))
+        count = _count(bus, names)
+        unknown = [] if count is None or isinstance(control, Restore) else [n for n in nodes_of(control) if n > count]
+        if unknown:
+            raise FanetError(f"node {unknown[0]}: the nodes of swarm {names.swarm} are 1 to {count}")
         done: list[RadioFault] = []
         confirmed = threading.Event()
         bus.subscribe(names.trace("emulator"), _watch(control, done, confirmed))
@@ -62,6 +67,24 @@ def change(endpoint: str, swarm: str | None, control: Control, *, zenoh_config: 
                 f"or no emulator on {names.radio_control}"
             )
         return list(done)
+
+
+def _count(bus: Bus, names: Topics) -> int | None:
+    """The number of nodes of a swarm, by the keeper of its clock; None if nobody says it at once."""
+    answers: list[bytes] = []
+    came = threading.Event()
+
+    def on_answer(_topic: str, payload: bytes) -> None:
+        answers.append(payload)
+        came.set()
+
+    bus.ask(names.scenario, on_answer)
+    came.wait(_DISCOVER_S)
+    try:
+        count = json.loads(answers[0])["nodes"]["count"] if answers else None
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return None
+    return count if isinstance(count, int) else None
 
 
 def _watch(control: Control, done: list[RadioFault], confirmed: threading.Event) -> Callable[[str, bytes], None]:

@@ -9,6 +9,7 @@ from fanet_mw.scenario import config
 from sim.cli.app import app
 from sim.results.files import finish
 from sim.run.virtual import simulate
+from sim.scenarios import catalog
 from sim.scenarios.notes import notes
 
 SHORT = {
@@ -50,6 +51,28 @@ CUTS = [{"kind": "cut", "node": 1, "at_s": 5}, {"kind": "cut", "node": 1, "at_s"
 def test_what_comes_after_the_end_is_noted(changes: dict[str, object], said: list[str]) -> None:
     found = notes(config.build({**SHORT, **changes}))
     assert [text.partition(": after the end")[0] for text in found] == said
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (
+            ["routing.protocol=aodv", "clusters.relay=scheduled"],
+            "clusters.relay: no effect with routing.protocol = 'aodv'",
+        ),
+        (["nodes.layout=line", "nodes.radius_m=5"], "nodes.radius_m: no effect with nodes.layout = 'line'"),
+        (["routing.gossip_p=0.3"], "routing.gossip_p: no effect with routing.protocol = 'flooding'"),
+        (["radio.exponent=4"], "radio.exponent: no effect with radio.channel = 'range'"),
+        (["radio.channel=log_distance", "radio.exponent=4"], None),
+        (["routing.protocol=gossip", "routing.gossip_p=0.3"], None),
+    ],
+)
+def test_a_key_that_has_no_effect_under_what_was_chosen_is_noted(changes: list[str], said: str | None) -> None:
+    assert notes(catalog.find("flooding", changes)) == ([said] if said else [])
+
+
+def test_no_shipped_scenario_sets_what_has_no_effect() -> None:
+    assert {entry.name: found for entry in catalog.shipped() if (found := notes(catalog.find(entry.name)))} == {}
 
 
 def test_a_guessed_height_is_noted_before_the_run_and_in_its_summary(

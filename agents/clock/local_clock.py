@@ -3,14 +3,15 @@
     local = true + offset + sum over seconds of rate x time,   the rate a bounded random walk, constant within a second
 
 Only the simulation knows it; the node itself does not. The first and the last rate of the walk continue before and
-after it. Not modeled: temperature, voltage, aging, and jumps of the counter.
+after it. From the instant of a jump (`clock.jumps`) on, the clock shows more or less by its length. Not modeled:
+temperature, voltage and aging.
 """
 
 from typing import Final, NamedTuple
 
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Clock
-from fanet_mw.units import NodeId, S
+from fanet_mw.units import MS, NodeId, S, seconds_to_ns
 
 _PPM: Final = 1e-6
 _AHEAD_NS: Final = 60 * S
@@ -35,10 +36,13 @@ class LocalClock:
         self._wander = clock.wander_ppm * _PPM
         rate = random.uniform(-self._bound, self._bound)
         self._random = random
+        self._jumps = _added_up(clock, node)
+        self._now_ns = 0
         self._walk = [_Second(0, self._offset_ns, rate)]
 
     def pass_time(self, true_ns: int, *, until_ns: int) -> None:
         """Extend the walk over all instants that may be asked for from now on, at most up to `until_ns`."""
+        self._now_ns = true_ns
         if not self._wander:
             return
         while self._walk[-1].true_ns < min(true_ns, until_ns) + _AHEAD_NS:
@@ -49,11 +53,34 @@ class LocalClock:
 
     def local_ns(self, true_ns: int) -> int:
         """The instant that the clock shows at a true instant."""
+        by_ns = next(by for at, by in reversed(self._jumps) if at is None or at <= true_ns)
+        return self._smooth_ns(true_ns) + by_ns
+
+    def true_ns(self, local_ns: int) -> int:
+        """The true instant at which the clock shows `local_ns`. If it does so twice, that is the first one that is not
+        past; if a jump has left it out, the instant of the jump.
+        """
+        shown = None
+        for index, (at_ns, by_ns) in enumerate(self._jumps):
+            until_ns = self._jumps[index + 1][0] if index + 1 < len(self._jumps) else None
+            found_ns = self._smooth_true_ns(local_ns - by_ns)
+            if until_ns is not None and found_ns >= until_ns:
+                shown = until_ns if shown is None else shown  # unless a later part shows it
+                continue
+            if at_ns is None or found_ns >= at_ns:
+                shown = found_ns
+                if found_ns >= self._now_ns:
+                    break
+        assert shown is not None, "the last part has no end, and the first one no beginning"
+        return shown
+
+    def _smooth_ns(self, true_ns: int) -> int:
+        """The instant that the clock would show without jumps."""
         index = max(0, min(len(self._walk) - 1, true_ns // S))
         return _shown(self._walk[index], true_ns)
 
-    def true_ns(self, local_ns: int) -> int:
-        """The true instant at which the clock shows `local_ns`."""
+    def _smooth_true_ns(self, local_ns: int) -> int:
+        """The true instant at which the clock would show this without jumps."""
         index = max(0, min(len(self._walk) - 1, (local_ns - self._offset_ns) // S))
         while index and self._walk[index].local_ns > local_ns:
             index -= 1
@@ -62,6 +89,14 @@ class LocalClock:
         part = self._walk[index]
         elapsed_ns = local_ns - part.local_ns
         return part.true_ns + elapsed_ns - round(elapsed_ns * (part.rate / (1 + part.rate)))
+
+
+def _added_up(clock: Clock, node: NodeId) -> list[tuple[int | None, int]]:
+    """The parts of the time between the jumps of this node's clock: since when, and the sum of the jumps so far."""
+    parts: list[tuple[int | None, int]] = [(None, 0)]
+    for at_s, by_ms in sorted((at_s, by_ms) for jumper, at_s, by_ms in clock.jumps if jumper == node):
+        parts.append((seconds_to_ns(at_s), parts[-1][1] + round(by_ms * MS)))
+    return parts
 
 
 def _shown(part: _Second, true_ns: int) -> int:

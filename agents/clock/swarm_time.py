@@ -294,7 +294,10 @@ class BeaconTime(SwarmTime):
         if age_ns > OLD_NS + self._apart_ns(local_ns):
             self._refused["old"] += 1
             self._sync.on_old_hello(src, local_ns)
+            self._sync.contradicted(src, local_ns)
             return False
+        if age_ns < -OLD_NS and self.synced:
+            self._sync.contradicted(src, local_ns)
         self._sync.on_hello(src, header.seq, beacon, ended_ns=ended_ns, local_ns=local_ns)
         return True
 
@@ -304,6 +307,8 @@ class BeaconTime(SwarmTime):
         """
         if self.synced:
             return 0 if self._sync.supported(local_ns) else math.inf
+        if self._sync.counts["lost"]:
+            return math.inf
         return 2 * self._clock.unsynchronized_error_ns(max(0, local_ns))
 
     def report(self) -> Mapping[str, object]:

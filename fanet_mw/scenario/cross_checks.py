@@ -68,6 +68,11 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
     strangers = sorted(node for node in scenario.sensors.image_nodes if node > count)
     if strangers:
         found.append(f"sensors.image_nodes: {', '.join(map(str, strangers))} must be <= nodes.count = {count}")
+    found += [
+        f"clock.jumps names node {node}, which must be <= nodes.count = {count}"
+        for node, _, _ in scenario.clock.jumps
+        if node > count
+    ]
     found += _too_frequent_readings(scenario)
     found += _too_small_frames(scenario)
     found += _unkept_deadline(scenario)

@@ -48,7 +48,9 @@ def sentence(item: dict[str, Any]) -> str:
 
 def _path(item: dict[str, Any]) -> list[str]:
     """The keys on the way to a mistake; an unknown key is kept however it is spelt."""
-    *path, last = map(str, item["loc"] or ("scenario",))
+    if not item["loc"]:
+        return []
+    *path, last = map(str, item["loc"])
     kept = item["type"] == "extra_forbidden" or not _is_branch(last)
     return [*(part for part in path if not _is_branch(part)), *([last] if kept else [])]
 

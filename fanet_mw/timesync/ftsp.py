@@ -49,6 +49,11 @@ _DOUBT_HELLOS: Final = 1.5
 _SUPPORT_HELLOS: Final = 3
 """How long a statement of a neighbor supports this node's time."""
 _SUPPORTERS: Final = 2
+_QUESTION_HELLOS: Final = 0.75
+"""A node that several neighbors contradict while none has agreed for this long states the greatest error."""
+_LOST_HELLOS: Final = 1.5
+"""After this long its own clock must have jumped: it gives up its time and learns it anew."""
+_CONTRADICTING: Final = 2
 _STAMPS: Final = 4
 """The number of hellos of each neighbor whose ends are remembered."""
 _NEIGHBORS: Final = 256
@@ -135,6 +140,9 @@ class TimeSync:
         self.counts: Counter[str] = Counter()
         self._agreed: dict[int, int] = {}
         """When a neighbor last stated a time that agrees with this node's."""
+        self._contradicting: set[int] = set()
+        """The neighbors that have contradicted this node's time since the last one agreed."""
+        self._agreed_ns = 0
 
     # --- the state of synchronization -----------------------------------------------------------------------------
 
@@ -161,6 +169,8 @@ class TimeSync:
 
     def worst_ns(self, local_ns: int) -> int:
         """The greatest bound that any node is known to state, including this node."""
+        if self._is_contradicted(local_ns, hellos=_QUESTION_HELLOS):
+            return MOST_STATED_NS
         own_ns = min(self.error_ns(local_ns) or 0, MOST_STATED_NS)
         value_ns, stated_at_ns = self._worst
         return value_ns if value_ns > own_ns and local_ns - stated_at_ns < WORST_LIFE_NS else own_ns
@@ -223,6 +233,8 @@ class TimeSync:
         takes_over = self.reference is not None and self._own.node <= self.reference and len(self._fit) >= needed
         if local_ns >= self._claim_ns or takes_over:
             self._become_reference()
+            self._agreed_ns = local_ns
+            self._contradicting.clear()
 
     def _become_reference(self) -> None:
         """Become the reference: from now on swarm time is this node's line, without error."""
@@ -295,6 +307,10 @@ class TimeSync:
         offset_ns = beacon.t_ns - ended_ns
         if abs(offset_ns) > self._own.limit_ns:
             self.counts["implausible"] += 1
+            if beacon.reference == self.reference or self.reference is None:
+                self.contradicted(src, local_ns)
+            if not self._own.leads:
+                self._arm(local_ns, hellos=_FIRST_HELLOS)  # the swarm has a time, which this clock cannot have
             return None
         neighbor.paired_ns = ended_ns
         return Pair(
@@ -312,12 +328,47 @@ class TimeSync:
             self._note_news(neighbor, local_ns)
         if beacon.reference == self.reference:
             if self._fit.line is None or self._fit.agrees(pair):
-                self._agreed[beacon.node] = local_ns
-            if not self.is_reference:
+                self._agreed[beacon.node] = self._agreed_ns = local_ns
+                self._contradicting.clear()
+            else:
+                self.contradicted(beacon.node, local_ns)
+            if self.reference is not None and not self.is_reference:
                 self._follow(neighbor, pair, local_ns)
             self._learn_worst(beacon.worst_ns, stated_at_ns=local_ns - beacon.worst_age_s * S)
         elif beacon.reference < self.reference or (not self.is_reference and self._is_stale(self._news_ns, local_ns)):
             self._consider(beacon.reference, pair, local_ns)
+
+    def contradicted(self, src: int, local_ns: int) -> None:
+        """A neighbor has stated another time. If several have that agreed before, and nobody agrees now, this clock has
+        jumped. Nodes that never agreed do not count: a station may repeat what is sent far away.
+        """
+        if src in self._agreed:
+            self._contradicting.add(src)
+        if self.reference is not None and self._is_contradicted(local_ns, hellos=_LOST_HELLOS):
+            self._lose(local_ns)
+
+    def _is_contradicted(self, local_ns: int, *, hellos: float) -> bool:
+        alone_ns = abs(local_ns - self._agreed_ns)  # the clock may have jumped back
+        needed = min(_CONTRADICTING, len(self._agreed)) or _CONTRADICTING
+        return len(self._contradicting) >= needed and alone_ns > hellos * self._own.hello_ns
+
+    def _lose(self, local_ns: int) -> None:
+        """Give up the time, and all that was noted by the clock before it jumped."""
+        self.counts["lost"] += 1
+        self.reference, self.is_reference, self._rival = None, False, None
+        self._fit = ClockFit(self._own.oscillator)
+        self._first = InitialSync(
+            self._own.oscillator,
+            leader=self._own.leader,
+            wait_ns=self._doubt_ns,
+            memory_ns=int(_FRESH_HELLOS * self._own.hello_ns),
+        )
+        self._neighbors.clear()
+        self._agreed.clear()
+        self._contradicting.clear()
+        self._agreed_ns = local_ns
+        self._worst = (0, local_ns)
+        self._arm(local_ns, hellos=_FIRST_HELLOS)
 
     def _follow(self, neighbor: _LastBeacon, pair: Pair, local_ns: int) -> None:
         """Use a pair from a neighbor that follows the same reference."""

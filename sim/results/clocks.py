@@ -53,6 +53,8 @@ def clock_errors(outcome: Outcome) -> dict[str, Any]:
         "bound_us": round(max(bounds), 3) if bounds else None,
         "beyond_bound": sum(error > sample.bound_ns >= 0 for sample, error in measured),
         "samples": len(measured),
+        "lost": sum(report.get("clock", {}).get("lost", 0) for report in outcome.reports.values()),
+        "without_time": _without_time(samples) if outcome.scenario.clock.sync != "none" else 0,
         "synced_after_s": _synced_after_s(samples, outcome.scenario.nodes.count),
     }
 
@@ -60,6 +62,12 @@ def clock_errors(outcome: Outcome) -> dict[str, Any]:
 def _quantiles(values: npt.NDArray[np.float64]) -> dict[str, float]:
     p50, p99 = np.percentile(values, (50, 99))
     return {"p50": round(float(p50), 3), "p99": round(float(p99), 3), "max": round(float(values.max()), 3)}
+
+
+def _without_time(samples: Sequence[ClockSampled]) -> int:
+    """The number of nodes that have no swarm time at the end."""
+    last = {sample.node: sample.bound_ns for sample in samples}
+    return sum(bound_ns < 0 for bound_ns in last.values())
 
 
 def _synced_after_s(samples: Sequence[ClockSampled], nodes: int) -> float | None:

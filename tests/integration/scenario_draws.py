@@ -43,6 +43,7 @@ _KEPT: Final = {
     "routing.options", "clusters.options", "radio.options", "mobility.options",
     "world.heightmap", "world.buildings_geojson", "world.heightmap_sha256", "world.buildings_sha256",
     "world.physics_hz", "traffic.name", "traffic.packets_csv", "applications", "further_traffic",
+    "clock.jumps",
 }  # fmt: skip
 """Keys that are set below, mean nothing in virtual time, belong to parts of other packages, or name files."""
 _SMALL: Final = {

@@ -2,6 +2,7 @@
 
     local = true + offset + (1 + rate) x elapsed        the rate within `drift_ppm`, wandering by `wander_ppm`
 
+A clock may also jump (`jumps`).
 Without any of these keys a node's clock is that of its host, and exact. Not modeled: aging, and temperature other than
 as a wander.
 """
@@ -11,7 +12,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from fanet_mw.scenario.tables.sections import Milliseconds, Section, SomeTime
+from fanet_mw.scenario.tables.sections import Id, Milliseconds, Section, SomeTime
 from fanet_mw.units import MS, US, seconds_to_ns
 
 
@@ -36,6 +37,10 @@ class Clock(Section):
     limit_s: SomeTime = 5.0
     """A swarm time that differs from the own clock by more than this is not accepted, whichever node states it."""
 
+    jumps: tuple[tuple[Id, SomeTime, Annotated[float, Field(ge=-60_000, le=60_000)]], ...] = ()
+    """Clocks that jump, as a step of NTP lets them: node, instant [s] and by how much [ms], for example
+    `[[8, 50.0, 300.0]]`."""
+
     @model_validator(mode="after")
     def _a_walk_has_bounds(self) -> Self:
         if self.wander_ppm and not self.drift_ppm:
@@ -45,7 +50,7 @@ class Clock(Section):
     @property
     def modelled(self) -> bool:
         """True if a node's clock is not simply that of its host."""
-        return self.sync != "none" or bool(self.offset_ms or self.drift_ppm)
+        return self.sync != "none" or bool(self.offset_ms or self.drift_ppm or self.jumps)
 
     @property
     def offset_ns(self) -> int:

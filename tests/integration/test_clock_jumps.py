@@ -1,0 +1,57 @@
+"""The clock of one node jumps in flight: it knows before anybody relies on it, and has the swarm's time again."""
+
+from collections import defaultdict
+
+import pytest
+
+from agents.clock.local_clock import LocalClock
+from fanet_mw.errors import ConfigError
+from fanet_mw.scenario import Clock
+from fanet_mw.trace import ClockSampled
+from fanet_mw.units import MS, US, NodeId, S
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
+
+AT_S = 40
+KEYS = (
+    "clock.sync=beacons", "nodes.count=15", "clusters.count=14", "traffic.sources=6", "clusters.turn_slack_us=400",
+    "warmup_s=34", "clock.offset_ms=5", "clock.drift_ppm=20", "duration_s=60",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("by_ms", [-10_000, -300.0, 0.25, 1.0, 5_000])
+def test_a_clock_that_jumps_shows_each_instant_back(by_ms: float) -> None:
+    clock = LocalClock(Clock(offset_ms=5, drift_ppm=20, jumps=((3, 40.0, by_ms),)), seed=1, node=NodeId(3))
+    still = LocalClock(Clock(offset_ms=5, drift_ppm=20), seed=1, node=NodeId(3))
+    for true_ns in (0, 39 * S, 40 * S - 1, 40 * S, 41 * S, 90 * S):
+        jumped = round(by_ms * MS) if true_ns >= 40 * S else 0
+        assert clock.local_ns(true_ns) == still.local_ns(true_ns) + jumped
+        clock.pass_time(true_ns, until_ns=100 * S)
+        assert abs(clock.true_ns(clock.local_ns(true_ns)) - true_ns) <= 1
+    if by_ms > 0:
+        assert clock.true_ns(still.local_ns(40 * S) + round(by_ms * MS) // 2) == 40 * S, "a time that is left out"
+
+
+def test_a_jump_of_a_node_that_is_not_there_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"clock\.jumps names node 16, which must be <= nodes\.count = 15"):
+        catalog.find("clusters", [*KEYS, "clock.jumps=[[16, 1.0, 1.0]]"])
+
+
+@pytest.mark.parametrize(
+    ("node", "by_ms"), [(8, 300.0), (8, -2_000.0), (8, 5.0), (1, 300.0), (1, -20.0), (15, 1_000.0), (8, 10_000.0)]
+)
+def test_no_bound_is_broken_and_the_swarm_is_together_again_or_says_who_is_not(node: int, by_ms: float) -> None:
+    outcome = simulate(catalog.find("clusters", [*KEYS, f"clock.jumps=[[{node}, {AT_S}.0, {by_ms}]]"]))
+    summary = finish(outcome, out=None)
+    assert summary["bound"]["violations"] == 0
+    left_out = by_ms > 5_000
+    assert (summary["clock"]["lost"], summary["clock"]["without_time"]) == (1, int(left_out))
+    ahead: dict[int, list[int]] = defaultdict(list)
+    for record in outcome.records:
+        if isinstance(record, ClockSampled) and not (left_out and record.node == node):
+            ahead[record.t_ns].append(record.ahead_ns)
+    for t_ns, values in ahead.items():
+        if t_ns >= (AT_S + 8) * S or 34 * S <= t_ns < AT_S * S:
+            assert max(values) - min(values) < 100 * US, t_ns
+    assert left_out or summary["pdr"] > 0.85

@@ -194,7 +194,7 @@ class TimeSync:
     def start(self, local_ns: int) -> None:
         """The node has started."""
         self._news_ns = local_ns
-        self._arm(local_ns, hellos=_FIRST_HELLOS)
+        self._wait(local_ns)
         if self._own.leads:
             self._claim_ns = local_ns + int(_LISTEN_HELLOS * self._own.hello_ns)
 
@@ -245,6 +245,10 @@ class TimeSync:
     def _arm(self, local_ns: int, *, hellos: int = _SILENT_HELLOS) -> None:
         staggered = hellos + _STAGGER_HELLOS * (self._own.node % _STAGGERED)
         self._claim_ns = local_ns + int(staggered * self._own.hello_ns)
+
+    def _wait(self, local_ns: int) -> None:
+        """Leave the swarm the time to tell this node its own."""
+        self._arm(local_ns, hellos=_FIRST_HELLOS)
 
     # --- receiving ------------------------------------------------------------------------------------------------
 
@@ -310,7 +314,7 @@ class TimeSync:
             if beacon.reference == self.reference or self.reference is None:
                 self.contradicted(src, local_ns)
             if not self._own.leads:
-                self._arm(local_ns, hellos=_FIRST_HELLOS)  # the swarm has a time, which this clock cannot have
+                self._wait(local_ns)  # the swarm has a time, which this clock cannot have
             return None
         neighbor.paired_ns = ended_ns
         return Pair(
@@ -368,7 +372,7 @@ class TimeSync:
         self._contradicting.clear()
         self._agreed_ns = local_ns
         self._worst = (0, local_ns)
-        self._arm(local_ns, hellos=_FIRST_HELLOS)
+        self._wait(local_ns)
 
     def _follow(self, neighbor: _LastBeacon, pair: Pair, local_ns: int) -> None:
         """Use a pair from a neighbor that follows the same reference."""

@@ -1,13 +1,13 @@
 """The clock of one node jumps in flight: it knows before anybody relies on it, and has the swarm's time again."""
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 
 import pytest
 
 from agents.clock.local_clock import LocalClock
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Clock
-from fanet_mw.trace import ClockSampled
+from fanet_mw.trace import ClockSampled, Delivered, Generated
 from fanet_mw.units import MS, US, NodeId, S
 from sim.results.files import finish
 from sim.run.virtual import simulate
@@ -41,10 +41,10 @@ def test_a_jump_of_a_node_that_is_not_there_is_refused() -> None:
 @pytest.mark.parametrize(
     ("node", "by_ms"), [(8, 300.0), (8, -2_000.0), (8, 5.0), (1, 300.0), (1, -20.0), (15, 1_000.0), (8, 10_000.0)]
 )
-def test_no_bound_is_broken_and_the_swarm_is_together_again_or_says_who_is_not(node: int, by_ms: float) -> None:
+def test_nothing_comes_late_and_the_swarm_is_together_again_or_says_who_is_not(node: int, by_ms: float) -> None:
     outcome = simulate(catalog.find("clusters", [*KEYS, f"clock.jumps=[[{node}, {AT_S}.0, {by_ms}]]"]))
     summary = finish(outcome, out=None)
-    assert summary["bound"]["violations"] == 0
+    assert summary["bound"]["violations"] == summary["bound"]["never"], "what a frozen node held back is lost, not late"
     left_out = by_ms > 5_000
     assert (summary["clock"]["lost"], summary["clock"]["without_time"]) == (1, int(left_out))
     ahead: dict[int, list[int]] = defaultdict(list)
@@ -54,4 +54,7 @@ def test_no_bound_is_broken_and_the_swarm_is_together_again_or_says_who_is_not(n
     for t_ns, values in ahead.items():
         if t_ns >= (AT_S + 8) * S or 34 * S <= t_ns < AT_S * S:
             assert max(values) - min(values) < 100 * US, t_ns
-    assert left_out or summary["pdr"] > 0.85
+    heard = Counter((record.origin, record.seq) for record in outcome.records if isinstance(record, Delivered))
+    for record in outcome.records:
+        if isinstance(record, Generated) and (AT_S + 5) * S <= record.t_ns < 58 * S and not left_out:
+            assert heard[record.node, record.seq] == 14, "everything arrives again"

@@ -9,7 +9,7 @@ from fanet_mw.units import NodeId
 
 
 class ModeRecord:
-    """The mode of one UAV: takeoff, wait, deploy, search, respond, return, lost_link or land."""
+    """The mode of one UAV: takeoff, wait, deploy, search, respond, return, done, lost_link or land."""
 
     def __init__(
         self, node: NodeId, place: FormationPlace, flight: Flight, return_home: ReturnHome, outbox: Outbox

@@ -136,6 +136,7 @@ class Searcher:
         )
         self._mode = ModeRecord(node, place, self._flight, self._return_home, outbox)
         self._node = node
+        self._sweeps = mission.sweeps
         self._next_review_ns: int | None = None
 
     # --- time -----------------------------------------------------------------------------------------------------
@@ -153,6 +154,9 @@ class Searcher:
         self._next_review_ns = now_ns + _REVIEW_NS
         if self._return_home.loses_link(now_ns):
             self._leave(now_ns)
+        if not self._return_home.leaves and self._is_over(now_ns):
+            self._return_home.end()
+            self._give_up(now_ns)
         self._reception.review(now_ns)
         for survivor in self._sightings.contradicted():
             self._announcing.keep_person(survivor, now_ns, steady_m2=self._sightings.steady_m2)
@@ -193,10 +197,20 @@ class Searcher:
 
     def _leave(self, now_ns: int) -> None:
         """Give up the place and the task, tell all, and fly home."""
+        self._give_up(now_ns)
+        self._plans.say_status(self._return_home.percent, now_ns)
+
+    def _give_up(self, now_ns: int) -> None:
         self._bidding.hand_on(now_ns)
         self._plans.leave()
-        self._plans.say_status(self._return_home.percent, now_ns)
         self._mode.review(self._bidding.survivor, now_ns)
+
+    def _is_over(self, now_ns: int) -> bool:
+        """True once the area was swept often enough, and nobody is sought or it was swept once more."""
+        sweeps, place = self._sweeps, self._place
+        if not sweeps or not place.is_swept(now_ns, times=sweeps):
+            return False
+        return not self._survivors.sought() or place.is_swept(now_ns, times=sweeps + 1)
 
     def scan(self, heard: Sequence[tuple[int, float]], *, now_ns: int) -> None:
         """The receiver detects these phones with these powers [dBm], and no others."""

@@ -45,7 +45,7 @@ from sim.run.collecting.record_kinds import records_of
 from sim.world.environment.survivors import place
 from sim.world.sensors.phone import REFERENCE_LOSS_DB
 
-_HOMEWARD: Final = frozenset({"return", "land"})
+_HOMEWARD: Final = frozenset({"return", "done", "land"})
 """The mission modes of a UAV that has left the search."""
 _WRECKED: Final = "fallen"
 _RETURNING: Final = "return"

@@ -1,6 +1,6 @@
-"""The return of a UAV whose battery runs low, or that hears nobody any more: it flies home above all UAVs that search,
-then lands straight down. Its task and its place in the formation are handed on before (`agents/mission/searcher.py`,
-`agents/mission/search_formation/formation_planner.py`).
+"""The return of a UAV whose battery runs low, that hears nobody any more, or whose search is over: it flies home above
+all UAVs that search, then lands straight down. Its task and its place in the formation are handed on before
+(`agents/mission/searcher.py`, `agents/mission/search_formation/formation_planner.py`).
 """
 
 from enum import StrEnum
@@ -27,6 +27,8 @@ class ReturnReason(StrEnum):
     """Its battery is only enough for the way home."""
     LOST_LINK = "lost_link"
     """It has received nothing from anybody for too long."""
+    DONE = "done"
+    """The search is over."""
 
 
 class ReturnHome:
@@ -80,6 +82,10 @@ class ReturnHome:
             return False
         self.reason = ReturnReason.LOST_LINK
         return True
+
+    def end(self) -> None:
+        """The search is over: the UAV leaves now."""
+        self.reason = self.reason or ReturnReason.DONE
 
     @property
     def leaves(self) -> bool:

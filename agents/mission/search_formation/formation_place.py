@@ -156,6 +156,11 @@ class FormationPlace:
             for ahead_s in (within_s, within_s + 5.0)
         )
 
+    def is_swept(self, now_ns: int, *, times: int) -> bool:
+        """True once the formation has swept the area so often; the way back is a sweep, too."""
+        pattern, swept_s = self.pattern, self.swept_s(now_ns)
+        return pattern is not None and swept_s is not None and swept_s >= times * pattern.shape.sweep_s
+
     def swept_s(self, now_ns: int) -> float | None:
         """How long the formation has been sweeping; None before all UAVs have had time to take it up."""
         plan = self.plan

@@ -66,6 +66,9 @@ class Mission(Section):
     """`search`: a UAV that has received no hello and no message of the search for this long flies home and lands; if it
     hears somebody again before it lands, it takes part again. 0: it searches on, however long it hears nobody. Needs
     hellos."""
+    sweeps: Annotated[int, Field(ge=0, le=1000)] = 0
+    """`search`: after the area was swept this often, UAVs fly home and land as soon as no survivor is sought any more,
+    at the latest after one more sweep. 0: they search until their batteries take them home."""
     responders: Annotated[int, Field(ge=1, le=1000)] = 3
     """`search`: the number of UAVs that fly to each survivor, chosen by auction; the others go on searching."""
     report_interval_s: Interval = 5.0

@@ -135,7 +135,7 @@ class Status(NamedTuple):
     """The least interval between messages that the network can deliver in time; None if it is unknown."""
 
 
-Destination = NodeId | Collection[NodeId]
+Destination = int | Collection[int]
 """One node, several, or BROADCAST."""
 
 

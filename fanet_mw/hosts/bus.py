@@ -70,8 +70,7 @@ def exposure(endpoint: str, *, listens: bool) -> str | None:
     who = "whoever reaches it" if listens else "whoever is on the way"
     return (
         f"{endpoint} is neither on the loopback interface nor encrypted: {who} can stop the clock, move UAVs, change "
-        f"the air and forge results. See docs/how-to/security.md for tls/ with access lists (fanet keys, "
-        f"--zenoh-config)"
+        f"the air and forge results. tls/ with access lists keeps them out: `fanet keys` makes both, for --zenoh-config"
     )
 
 

@@ -123,10 +123,12 @@ def launch(
     import asyncio
 
     from sim.results.files import begun
+    from sim.run.launcher.leads import fitted
     from sim.run.launcher.swarm import launch as run
 
-    chosen = choice.realtime_scenario(scenario)
+    chosen = choice.realtime_scenario(scenario) if no_world else choice.scenario(scenario)
     output.prepare()
+    chosen, leads = (chosen, None) if no_world else fitted(chosen, _say)  # another's world has the scenario as it is
     print_notes(chosen)
     warn_of(listen, listens=True)
     warn_of(connect, listens=False)
@@ -145,6 +147,7 @@ def launch(
                 spool_folder=output.out,
                 on_progress=tell,
                 on_event=_say,
+                leads=leads,
             )
         )
     return _finish(outcome, output)

@@ -52,6 +52,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "slowed": [{"t_s": round(t_ns / S, 3), "time_scale": round(scale, 6)} for t_ns, scale in outcome.slowed],
         "paces": _paces(outcome),
         "pauses": dict(outcome.pauses),
+        "leads": dict(outcome.leads),
         "wall_s": round(outcome.wall_s, 3),
         **packets[classes[0]],
         "classes": {name: packets[name] for name in classes} if len(classes) > 1 else {},

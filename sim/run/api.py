@@ -8,6 +8,7 @@ from pathlib import Path
 from agents.program.attached import Emulated
 from fanet_mw.scenario import Scenario
 from sim.run.arguments import OfUser, by_node, known_nodes, scenario_of
+from sim.run.launcher.leads import fitted
 from sim.run.launcher.swarm import READY_TIMEOUT_S, SwarmRun
 from sim.run.launcher.swarm import launch as launch_processes
 from sim.run.result import Result
@@ -58,16 +59,18 @@ async def launch(
 ) -> AsyncIterator[Launched]:
     """Run a scenario as real processes while the block lasts; afterwards `result` is what was collected.
 
-    The nodes of `leave_out` are joined by the program: the swarm's time begins when all are there. When the block ends
+    The nodes of `leave_out` are joined by the program, with the scenario of what the block is given: it has a lead that
+    fits the machine if the scenario states none. The swarm's time begins when all are there. When the block ends
     before the scenario's time, the run is ended; raises BusError when the swarm does not come up.
     """
-    known = scenario_of(scenario, seed=seed, overrides=overrides)
-    known_nodes("leave_out", leave_out, known)
+    stated = scenario_of(scenario, seed=seed, overrides=overrides)
+    known_nodes("leave_out", leave_out, stated)
+    known, leads = await asyncio.to_thread(fitted, stated, lambda _: None)
     started: asyncio.Future[SwarmRun] = asyncio.get_running_loop().create_future()
     task = asyncio.ensure_future(
         launch_processes(
             known, swarm=known.name, listen=listen, respawn=respawn, leave_out=leave_out, heed_signals=False,
-            on_started=started.set_result,
+            on_started=started.set_result, leads=leads,
         )
     )  # fmt: skip
     try:

@@ -45,6 +45,8 @@ class Outcome:
     [ns] and the scale from then on; in real time only."""
     pauses: Mapping[str, Any] = field(default_factory=dict)
     """The pauses of the machine as the launcher saw them, in real time only."""
+    leads: Mapping[str, Any] = field(default_factory=dict)
+    """What was chosen for a scenario that states no lead, and the pause that was measured; in real time only."""
     stall_ms: float = 0.0
     """The longest time for which the launcher, and with it the bus, could do nothing; in real time only."""
 

@@ -36,6 +36,7 @@ from sim.run.launcher import limits
 from sim.run.launcher.child_processes import Processes, describe, end_if_imported_by_a_child
 from sim.run.launcher.clock_governor import ClockGovernor, Instant
 from sim.run.launcher.deaths import Deaths
+from sim.run.launcher.leads import Leads
 from sim.run.launcher.pauses import PauseWatch, processors
 from sim.run.launcher.progress import Progress
 from sim.run.launcher.services import Services
@@ -79,10 +80,12 @@ class SwarmRun:
         tell: Tell,
         spool_folder: Path | None = None,
         slow_down_to: float | None = None,
+        leads: Leads | None = None,
     ) -> None:
         scenario, self.address = services.scenario, services.address
         names = Topics(self.address.swarm)
         self._services = services
+        self._leads = leads
         self._tell = tell
         self._collector = Collector(scenario, bus.subscribe, names, now_ns=time.monotonic_ns, folder=spool_folder)
         self._recorder = FlightRecorder(scenario, bus.subscribe, names) if respawn else None
@@ -152,6 +155,7 @@ class SwarmRun:
             slowed=self._governor.steps,
             stall_ms=self._pauses.longest_ns / MS,
             pauses=self._pauses.summary(),
+            leads=self._leads._asdict() if self._leads else {},
         )
 
     def interrupt(self, number: int) -> None:
@@ -330,6 +334,7 @@ async def launch(
     on_started: Callable[[SwarmRun], None] = lambda _: None,
     leave_out: Collection[int] = (),
     heed_signals: bool = True,
+    leads: Leads | None = None,
 ) -> Outcome:
     """Run a scenario as real processes. `on_started` receives the swarm while it runs, for tests and tools.
 
@@ -337,6 +342,7 @@ async def launch(
     and speeds up again afterwards.
     The nodes of `leave_out` are waited for and not started: a program of the user's own joins in their place.
     Without `own_world` the swarm waits for a foreign world, which declares the liveliness token of `world`.
+    `leads`: what was chosen for the scenario's lead and handover, for the outcome.
     `zenoh_config` is Zenoh's own configuration: a file for all processes, or a folder with one file for each. What is
     collected waits in temporary files in `spool_folder`, by default where the system keeps such files.
 
@@ -355,8 +361,9 @@ async def launch(
         address = SwarmAddress(swarm, endpoint, zenoh_config, READY_TIMEOUT_S)
         services = Services(scenario, address, own_world, frozenset(leave_out), emulator_options or {})
         run = SwarmRun(
-            services, bus, respawn=respawn, tell=on_event, spool_folder=spool_folder, slow_down_to=slow_down_to
-        )
+            services, bus, respawn=respawn, tell=on_event, spool_folder=spool_folder, slow_down_to=slow_down_to,
+            leads=leads,
+        )  # fmt: skip
         loop = asyncio.get_running_loop()
         signals = interrupts.heeded() if heed_signals else ()
         for number in signals:

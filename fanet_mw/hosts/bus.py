@@ -5,9 +5,13 @@ dropped under congestion, because late ones are worse than lost ones, and gaps a
 reliable.
 """
 
+import base64
 import contextlib
 import json
 import os
+import re
+import socket
+import ssl
 import time
 from collections.abc import Callable
 from ipaddress import ip_address
@@ -18,6 +22,7 @@ from typing import Any, Final, Protocol, Self
 import zenoh
 
 from fanet_mw.errors import BusError, ConfigError
+from fanet_mw.hosts.timebase import THIS_MACHINE
 
 JOIN_PATIENCE_S: Final = 2.5
 """How long a process waits for a router by default; it is short, so that a mistyped endpoint is soon reported."""
@@ -35,6 +40,8 @@ _ONE_RUNTIME: Final = (
 """A client's receiving and sending share one thread, where by default five threads wake each other for each message:
 with 45 sessions on two cores, a quarter fewer switches between threads (17,000 of 23,000 each second). A router keeps
 Zenoh's own threads: what it receives from one session may have to wait until it has sent to another."""
+_ROOT: Final = re.compile(r"""root_ca_certificate(_base64)?["']?\s*:\s*["']([^"']+)""")
+"""The certificate by which others are checked, in a configuration file; Zenoh itself does not tell it again."""
 OnSample = Callable[[str, bytes], None]
 """A callback with topic and payload; Zenoh calls it on a thread of its own."""
 
@@ -60,7 +67,9 @@ def config_of(path: Path | None, name: str) -> Path | None:
 
 def exposure(endpoint: str, *, listens: bool) -> str | None:
     """A warning if others can reach or forge messages on an endpoint; None for the loopback interface, TLS and QUIC."""
-    protocol, _, address = endpoint.partition("/")
+    protocol, slash, address = endpoint.partition("/")
+    if not slash:
+        return None  # it is refused before anything is opened
     host = address.partition("#")[0].partition("?")[0].rpartition(":")[0].strip("[]")
     if protocol in ("tls", "quic", "unixsock-stream", "unixpipe") or host == "localhost":
         return None
@@ -72,6 +81,31 @@ def exposure(endpoint: str, *, listens: bool) -> str | None:
         f"{endpoint} is neither on the loopback interface nor encrypted: {who} can stop the clock, move UAVs, change "
         f"the air and forge results. tls/ with access lists keeps them out: `fanet keys` makes both, for --zenoh-config"
     )
+
+
+def with_port(endpoint: str) -> str:
+    """The endpoint to listen on, with a port that is free now in place of port 0; others must be told which it is."""
+    head, _, rest = endpoint.partition("#")
+    address, port, number = head.rpartition(":")
+    if not port or number != "0":
+        return endpoint
+    host = address.partition("/")[2].strip("[]")
+    try:
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        with socket.socket(family) as probe:
+            probe.bind((host, 0))
+            free = probe.getsockname()[1]
+    except OSError as error:
+        raise BusError(f"cannot serve on {endpoint}: {error.strerror}") from error
+    return f"{address}:{free}" + (f"#{rest}" if rest else "")
+
+
+def _require_endpoint(endpoint: str) -> None:
+    """Raise ConfigError for what is no endpoint; what a protocol makes of the address, Zenoh says."""
+    protocol, slash, address = endpoint.partition("/")
+    if not (protocol and slash and address):
+        example = f"tcp/{endpoint}" if endpoint and not slash else "tcp/127.0.0.1:7447"
+        raise ConfigError(f"endpoint {endpoint!r}: must be PROTOCOL/ADDRESS, for example {example}")
 
 
 def _config(
@@ -120,6 +154,7 @@ class Bus:
 
         Raises BusError when it cannot listen on the endpoint, ConfigError when the file cannot be used.
         """
+        _require_endpoint(endpoint)
         settings = _config(mode="router", listen=endpoint, connect=None, file=config)
         try:
             return cls(zenoh.open(settings), endpoint)
@@ -134,11 +169,14 @@ class Bus:
         A process of a launched swarm, whose router is known to exist, has more patience: on a busy machine a handshake
         may take seconds. Raises ConfigError when the file cannot be used.
         """
+        _require_endpoint(endpoint)
         os.environ.setdefault(_RUNTIME_VARIABLE, _ONE_RUNTIME)
         settings = _config(mode="client", listen=None, connect=endpoint, file=config, patience_s=patience_s)
         try:
             return cls(zenoh.open(settings), endpoint)
         except zenoh.ZError as error:
+            if (off := _clock_outside_certificate(config)) is not None:
+                raise BusError(f"no Zenoh router at {endpoint}: {off}") from error
             why = "no answer" if "onnect" in str(error) else _first_sentence(error)
             raise BusError(
                 f"no Zenoh router at {endpoint} ({why} within {patience_s:g} s); "
@@ -230,6 +268,25 @@ class Bus:
             self._away_since_s = now_s
         if now_s - self._away_since_s >= LOST_AFTER_S:
             raise BusError(f"the Zenoh router at {self._endpoint} is gone")
+
+
+def _clock_outside_certificate(config: Path | None) -> str | None:
+    """Why no handshake can succeed at the time that this machine's clock shows; None if its certificates are valid now.
+
+    Zenoh reports a refused certificate like a router that does not answer.
+    """
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    with contextlib.suppress(OSError, ValueError):
+        for base64_, given in _ROOT.findall(config.read_text(encoding="utf-8") if config else ""):
+            content = base64.b64decode(given).decode("ascii") if base64_ else Path(given).read_text("ascii")
+            context.load_verify_locations(cadata=content)
+    now_s = THIS_MACHINE.unix_ns() / 1e9
+    for certificate in context.get_ca_certs():
+        since, until = str(certificate["notBefore"]), str(certificate["notAfter"])
+        if not ssl.cert_time_to_seconds(since) <= now_s <= ssl.cert_time_to_seconds(until):
+            now = time.strftime("%b %d %H:%M:%S %Y GMT", time.gmtime(now_s))
+            return f"the clock of this machine says {now}, and its certificates are valid from {since} to {until}"
+    return None
 
 
 def _first_sentence(error: Exception) -> str:

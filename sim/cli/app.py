@@ -17,7 +17,7 @@ from fanet_mw.hosts import interrupts
 from sim.cli import figures, replay, runs, scenario_files, single_services, swarms, sweep, tool_files
 from sim.cli.air import app as air_app
 from sim.cli.command_groups import OPTIONS
-from sim.cli.console import Console, nobody_reads
+from sim.cli.console import Console, discard_output, nobody_reads, open_closed_streams
 from sim.cli.memory import require_for
 
 app = App(
@@ -81,6 +81,9 @@ def _printable(line: str) -> str:
 def main() -> None:
     """The console script."""
     interrupts.install()
+    open_closed_streams()
+    if sys.flags.optimize >= 2 and (not sys.argv[1:] or "--help" in sys.argv or "-h" in sys.argv):
+        sys.stderr.write("fanet: python -OO has removed what the commands and options mean; without -OO it is shown\n")
     try:
         require_for(sys.argv[1:])
         with interrupts.undisguised():
@@ -94,6 +97,8 @@ def main() -> None:
         if error.errno not in _NO_ROOM:
             raise
         code = refused(f"{error.filename or 'standard output'}: cannot be written: {error.strerror}")
+        if error.filename is None:
+            discard_output()
     except MemoryError:
         code = refused("not enough memory, or the limit of this shell is too low (ulimit -v)")
     except ModuleNotFoundError as error:

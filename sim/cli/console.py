@@ -2,7 +2,7 @@
 
 import os
 import sys
-from typing import Final, NoReturn
+from typing import Any, Final, NoReturn
 
 import rich.console
 
@@ -11,18 +11,46 @@ CLOSED: Final = 128 + 13
 
 
 class Console(rich.console.Console):
-    """The console of rich, except that writing to a closed pipe raises an error; `main` then ends the command."""
+    """The console of rich, except that writing to a closed pipe raises an error, with which `main` ends the command,
+    and that brackets are brackets: the names of files may contain some.
+    """
+
+    def __init__(self, **options: Any) -> None:  # noqa: ANN401  (they are those of rich)
+        super().__init__(markup=False, **options)
 
     def on_broken_pipe(self) -> None:
         self.quiet = True
         raise
 
 
+def open_closed_streams() -> None:
+    """Give a command that was started with a standard stream closed (`>&-`) one that leads nowhere.
+
+    Otherwise the first file that it opens would become its standard output, and receive what others print there.
+    """
+    closed = []
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # gets the lowest free number, which is this one
+            closed.append(name)
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(number, "r" if number == 0 else "w", closefd=False))
+    if "stdout" in closed:
+        sys.stderr.write("fanet: standard output is closed: what would be printed there is lost\n")
+
+
 def nobody_reads() -> NoReturn:
     """End the command without a message. The default handling of SIGPIPE would also end a service whose peer closes a
     socket.
     """
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    for stream in (sys.stdout, sys.stderr):  # what is buffered would fail once more at exit
-        os.dup2(nowhere, stream.fileno())
+    discard_output()
     sys.exit(CLOSED)
+
+
+def discard_output() -> None:
+    """Let what is buffered, and whatever is printed from now on, go nowhere; at exit it would fail once more."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (sys.stdout, sys.stderr):
+        os.dup2(nowhere, stream.fileno())

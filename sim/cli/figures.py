@@ -9,6 +9,7 @@ from typing import Annotated
 from cyclopts import App, Parameter
 from cyclopts.validators import Number
 from rich.table import Table
+from rich.text import Text
 
 from fanet_mw.errors import ConfigError
 from sim.cli.command_groups import STUDY
@@ -100,7 +101,7 @@ def figures(
     for name, claim in verdicts:
         table.add_row(name, claim.claim if claim.figure else f"{BEYOND}{claim.claim}", claim.verdict.value)
         for statement in claim.statements:
-            table.add_row("", f"[dim]{statement.text()}[/]", "")
+            table.add_row("", Text(statement.text(), style="dim"), "")
     console.print(table)
     for notice in notices:
         console.print(notice, highlight=False, soft_wrap=True)

@@ -239,7 +239,7 @@ def _finish(outcome: "Outcome", output: OutputFlags) -> int:
         console = Console()
         printed_summary.show(summary, console)
         if output.out is not None:
-            console.print(f"written to {output.out}")
+            console.print(f"written to {output.out}", highlight=False, soft_wrap=True)
     for name, why in summary["unwritten"].items():
         _err.print(f"{name} in --out {output.out} ends early or is missing: {why}", highlight=False, soft_wrap=True,
                    markup=False)  # fmt: skip

@@ -187,7 +187,7 @@ def _announcement(name: str, wanted: "Sweep", plan: "RemainingRuns", workers: in
 
 def _warn_of_codes(codes: Mapping[str, int], what_follows: str) -> None:
     if others := runs_of_other_code(codes):
-        _say(f"[bold]{others}: {what_follows}[/]")
+        _say(f"{others}: {what_follows}", style="bold")
 
 
 def runs_of_other_code(codes: Mapping[str, int]) -> str:
@@ -213,13 +213,13 @@ def _compile() -> None:
         warm_up()
 
 
-def _say(text: str) -> None:
-    _err.print(text, highlight=False, soft_wrap=True)
+def _say(text: str, *, style: str | None = None) -> None:
+    _err.print(text, style=style, highlight=False, soft_wrap=True)
 
 
 def _say_failures(table: "Table") -> None:
     rows = [row for row in table.select(["status", "error", "command"]).to_pylist() if row["status"] == "failed"]
-    _say(f"[bold red]{len(rows)} runs failed[/]:")
+    _say(f"{len(rows)} runs failed:", style="bold red")
     for row in rows[:5]:
         _err.print(
             f"  {row['error'].splitlines()[0]}\n    {row['command']}", markup=False, highlight=False, soft_wrap=True

@@ -67,10 +67,17 @@ def dialect(folder: Path | None = None, *, definitions: Annotated[bool, Paramete
     """
     from fanet_mw.dialect.export_xml import write
 
-    data = os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share"
-    path = write(folder or Path(data) / "fanet-mw" / "message_definitions")
+    path = write(folder or _data() / "fanet-mw" / "message_definitions")
     sys.stdout.write(f"{path.parents[1] if definitions else path}\n")
     return 0
+
+
+def _data() -> Path:
+    """The user's folder of data; raises ConfigError if the user has none."""
+    try:
+        return Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share")
+    except RuntimeError as error:
+        raise ConfigError("the user has no home folder (HOME is not set): say in which folder to write") from error
 
 
 def dissector(folder: Path) -> int:

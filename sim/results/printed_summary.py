@@ -5,6 +5,7 @@ from typing import Any
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 
 def show(summary: Mapping[str, Any], console: Console) -> None:
@@ -14,19 +15,22 @@ def show(summary: Mapping[str, Any], console: Console) -> None:
     pace = summary["simulated_s"] / summary["wall_s"] if summary["wall_s"] else 0.0
     length = f"{summary['duration_s']:g} s"
     if summary["simulated_s"] < summary["duration_s"]:
-        length = f"[bold red]partial[/], {summary['simulated_s']:g} of {length}"
-    console.print(
-        f"\n[bold]{summary['scenario']}[/], {summary['nodes']} nodes, seed {summary['seed']}, {mode}: "
-        f"{length} in {summary['wall_s']:.1f} s ({pace:.1f} x real time)"
+        length = f"partial, {summary['simulated_s']:g} of {length}"
+    heading = Text.assemble(
+        ("\n" + summary["scenario"], "bold"),
+        f", {summary['nodes']} nodes, seed {summary['seed']}, {mode}: {length} in {summary['wall_s']:.1f} s "
+        f"({pace:.1f} x real time)",
     )
+    heading.highlight_words(["partial"], "bold red")
+    console.print(heading)
     table = Table(show_header=False, box=None, pad_edge=False, padding=(0, 2, 0, 0))
     table.add_column(style="bold")
     table.add_column()
     for name, text in _rows(summary):
-        table.add_row(name, text)
+        table.add_row(name, Text(text))
     console.print(table)
     for warning in _warnings(summary):
-        console.print(f"[bold red]{warning}[/]")
+        console.print(Text(warning, style="bold red"))
 
 
 def clock_sentence(summary: Mapping[str, Any]) -> str:

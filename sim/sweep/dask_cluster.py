@@ -4,6 +4,7 @@ If a worker dies, the scheduler gives its runs to others. A run that kills sever
 """
 
 from collections.abc import Iterator, Sequence
+from typing import Final
 
 from distributed import Client, KilledWorker, as_completed
 
@@ -11,6 +12,9 @@ from fanet_mw.errors import ConfigError, HostError
 from sim.sweep.one_run import Finished, carry_out
 from sim.sweep.provenance import code
 from sim.sweep.tasks import Task
+
+_WORKERS_S: Final = 30
+"""The time in which the first worker must be there."""
 
 
 class DaskCluster:
@@ -32,7 +36,13 @@ class DaskCluster:
         """The number of workers; raises ConfigError if their code or packages differ, because then
         rows might differ.
         """
-        self._client.wait_for_workers(1, timeout=30)
+        try:
+            self._client.wait_for_workers(1, timeout=_WORKERS_S)
+        except TimeoutError as error:
+            raise HostError(
+                f"--scheduler {self._address}: no worker within {_WORKERS_S} s; start some: "
+                f"dask worker {self._address} --nthreads 1"
+            ) from error
         workers = self._client.scheduler_info(n_workers=-1)["workers"]
         for name, worker in workers.items():
             if worker["nthreads"] != 1:

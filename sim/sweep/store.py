@@ -113,6 +113,17 @@ class Store:
         write_whole(self.folder / TABLE, table)
         return table
 
+    def _lock(self, lock: int) -> None:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise ConfigError(f"--out {self.folder}: another sweep writes there now") from error
+        except OSError as error:
+            raise ConfigError(
+                f"--out {self.folder}: its file system cannot lock files (flock: {error.strerror}), so that two sweeps "
+                "might write there at the same time: choose a folder on another one"
+            ) from error
+
     @contextlib.contextmanager
     def alone(self) -> Iterator[None]:
         """Lock the folder against other processes; raises ConfigError if another one has locked it."""
@@ -122,10 +133,8 @@ class Store:
         except OSError as error:
             raise ConfigError(f"--out {self.folder}: cannot be written: {error.strerror}") from error
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self._lock(lock)
             yield
-        except BlockingIOError as error:
-            raise ConfigError(f"--out {self.folder}: another sweep writes there now") from error
         finally:
             os.close(lock)
 

@@ -32,6 +32,7 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError, ConfigError
 from fanet_mw.hosts.bus import Bus, exposure
 from fanet_mw.hosts.clock import ClockKeeper, ClockListener
+from fanet_mw.hosts.timebase import THIS_MACHINE
 from fanet_mw.units import BROADCAST, Enu, NodeId, S
 from sim.run.bus.certificates import make
 from sim.run.launcher.swarm import free_endpoint, launch
@@ -165,6 +166,19 @@ def test_who_has_no_key_of_this_swarm_is_not_let_in(keys: Path, tmp_path: Path) 
                 pass
         with pytest.raises(BusError), Bus.join(endpoint.replace("tls/", "tcp/"), patience_s=1):
             pass
+
+
+@pytest.mark.parametrize(("off_s", "said"), [(-3600, True), (0, False), (400 * 86_400, True)])
+def test_a_clock_by_which_the_certificates_are_not_valid_is_named(
+    keys: Path, monkeypatch: pytest.MonkeyPatch, off_s: int, *, said: bool
+) -> None:
+    """Zenoh says of a refused certificate what it says of a router that does not answer."""
+    off = THIS_MACHINE._replace(unix_ns=lambda: time.time_ns() + off_s * S)
+    monkeypatch.setattr("fanet_mw.hosts.bus.THIS_MACHINE", off)
+    with pytest.raises(BusError) as caught:
+        Bus.join(free_endpoint("tls"), keys / "agent-1.json5", patience_s=0.2)
+    assert ("its certificates are valid from" in str(caught.value)) is said
+    assert "no Zenoh router at tls/127.0.0.1:" in str(caught.value)
 
 
 async def test_an_agent_cannot_answer_for_the_keeper_of_the_clock(keys: Path) -> None:

@@ -11,7 +11,7 @@ from typing import Final
 
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError
-from fanet_mw.hosts.bus import Bus, config_of
+from fanet_mw.hosts.bus import Bus, config_of, with_port
 from fanet_mw.hosts.clock import START_PATIENCE_S, ClockKeeper, SwarmClock
 from fanet_mw.scenario import Scenario
 from sim.run.bus.running_swarms import registered
@@ -46,6 +46,7 @@ async def serve(
     Returns the exit code: 0, or 1 when a result was asked for and may not be used. Raises BusError when it cannot
     listen on the endpoint.
     """
+    listen = with_port(listen)
     with contextlib.ExitStack() as held:
         bus = held.enter_context(Bus.serve(listen, config_of(zenoh_config, ROUTER)))
         held.enter_context(registered(swarm, listen))

@@ -50,7 +50,7 @@ def _ours(folder: Path) -> bool:
 def _started(pid: int) -> str:
     """The time at which a process began; empty when it is gone or a zombie."""
     try:
-        fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+        fields = Path(f"/proc/{pid}/stat").read_text(encoding="latin-1").rpartition(")")[2].split()
     except OSError:
         return ""
     return "" if fields[0] in "ZX" else fields[_START_TIME]

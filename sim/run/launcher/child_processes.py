@@ -12,6 +12,7 @@ import multiprocessing
 import os
 import signal
 import sys
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.context import ForkServerContext, ForkServerProcess
@@ -120,6 +121,11 @@ def _start_server() -> None:
         resource_tracker.ensure_running()  # otherwise the server starts the tracker, which unblocks SIGINT
         signal.pthread_sigmask(signal.SIG_BLOCK, _FOR_THE_LAUNCHER)
         forkserver.ensure_running()
+    except OSError as error:
+        raise HostError(
+            f"the server of the swarm's processes cannot be started: {error}; its socket is in the folder for "
+            f"temporary files, TMPDIR = {tempfile.gettempdir()}, whose path may have 70 characters"
+        ) from error
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 

@@ -23,7 +23,7 @@ from emulator.kernel.compile import COMPILING_NOTICE, must_compile
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError
 from fanet_mw.hosts import interrupts
-from fanet_mw.hosts.bus import Bus, config_of
+from fanet_mw.hosts.bus import Bus, config_of, with_port
 from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
 from fanet_mw.hosts.realtime import SwarmAddress
 from fanet_mw.routing import module_of
@@ -313,7 +313,7 @@ def _bus(listen: str | None, connect: str | None, zenoh_config: Path | None) -> 
     if connect is not None:
         return Bus.join(connect, config), connect
     keys_for_all = zenoh_config is not None and zenoh_config.is_dir()
-    endpoint = listen or free_endpoint("tls" if keys_for_all else "tcp")
+    endpoint = with_port(listen) if listen else free_endpoint("tls" if keys_for_all else "tcp")
     return Bus.serve(endpoint, config), endpoint
 
 

@@ -1,6 +1,7 @@
 """All work of a client's Zenoh session is done by the threads of one runtime, or by those that the user asks for."""
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -8,13 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from fanet_mw.hosts.bus import Bus
+from fanet_mw.errors import BusError, ConfigError
+from fanet_mw.hosts.bus import Bus, exposure, with_port
 from sim.run.launcher.swarm import free_endpoint
 
 CLIENT = """
 import sys, time
 from pathlib import Path
-from fanet_mw.hosts.bus import Bus
+from fanet_mw.errors import BusError, ConfigError
+from fanet_mw.hosts.bus import Bus, exposure, with_port
 def runtimes():
     names = {(task / "comm").read_text().strip().rpartition("-")[0] for task in Path("/proc/self/task").iterdir()}
     return " ".join(sorted(names & {"app", "rx", "tx", "net", "acc"}))
@@ -44,3 +47,20 @@ def test_a_client_does_not_switch_between_threads_unless_the_user_asks_for_it(
             env=others | environment, capture_output=True, text=True, timeout=60, check=True,
         )  # fmt: skip
     assert client.stdout.strip() == runtimes
+
+
+@pytest.mark.parametrize("endpoint", ["127.0.0.1:7447", "localhost:7447", "tcp", "", "/127.0.0.1:7447", "tcp/"])
+def test_what_is_no_endpoint_is_said_with_one_that_is(endpoint: str) -> None:
+    for opened in (Bus.serve, Bus.join):
+        with pytest.raises(ConfigError, match=r"must be PROTOCOL/ADDRESS, for example tcp/\S+:7447$|example tcp/tcp$"):
+            opened(endpoint)
+    assert exposure("127.0.0.1:7447", listens=True) is None, "no warning of what is refused anyway"
+
+
+def test_port_0_becomes_one_that_is_free() -> None:
+    assert re.fullmatch(r"tcp/127\.0\.0\.1:[1-9]\d{3,4}", with_port("tcp/127.0.0.1:0"))
+    assert re.fullmatch(r"tls/0\.0\.0\.0:[1-9]\d{3,4}#so_rcvbuf=65000", with_port("tls/0.0.0.0:0#so_rcvbuf=65000"))
+    for other in ("tcp/127.0.0.1:7447", "tcp/127.0.0.1:70", "unixsock-stream//tmp/x"):
+        assert with_port(other) == other
+    with pytest.raises(BusError, match=r"cannot serve on tcp/192\.0\.2\.1:0"):
+        with_port("tcp/192.0.2.1:0")

@@ -1,5 +1,6 @@
 """Sweeps that are cut short and taken up again: the table is that of an uninterrupted one, and nothing runs twice."""
 
+import errno
 import json
 import os
 import shutil
@@ -249,3 +250,21 @@ def test_a_folder_that_leads_elsewhere_or_holds_no_results_of_runs_is_refused(tm
     (out / "finished" / "000001.parquet").write_bytes(b"PAR1")
     with pytest.raises(ConfigError, match=r"000001\.parquet"):
         Store(out).read()
+
+
+def test_a_file_system_that_cannot_lock_is_one_sentence_and_nothing_of_it_stays_open(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_locks(*_: object) -> None:
+        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
+
+    monkeypatch.setattr("fcntl.flock", no_locks)
+    opened = len(list(Path("/proc/self/fd").iterdir()))
+    with pytest.raises(ConfigError, match="its file system cannot lock files"), Store(tmp_path).alone():
+        pass
+    assert len(list(Path("/proc/self/fd").iterdir())) == opened
+
+
+def test_an_error_in_a_sweep_is_not_taken_for_one_of_its_lock(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="disk"), Store(tmp_path).alone():
+        raise OSError(errno.ENOSPC, "disk")

@@ -118,3 +118,27 @@ def test_running_swarms_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
         assert app(["swarms", "--json"], result_action="return_value") == 0
     (row,) = json.loads(capsys.readouterr().out)
     assert row == {"swarm": "rescue", "endpoint": "tcp/127.0.0.1:1", "pid": os.getpid()}
+
+
+def test_a_swarm_of_a_program_whose_name_is_no_ascii_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Linux cuts the name after 15 bytes, in the middle of a character."""
+    program = (
+        "import ctypes, sys\n"
+        "from sim.run.bus.running_swarms import registered\n"
+        "from sim.run.launcher.process_title import entitle\n"
+        "ctypes.CDLL(None).prctl(15, sys.argv[1].encode())\n"
+        "entitle(sys.argv[1], 'fanet')\n"
+        "entitle(sys.argv[1], 'fanet ' + sys.argv[1])\n"
+        "with registered('rescue', 'tcp/127.0.0.1:1'):\n    print('there', flush=True); sys.stdin.read()"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", program, "\u0440\u043e\u0439-\u0434\u0440\u043e\u043d\u043e\u0432"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "there\n"
+    assert [entry.swarm for entry in running()] == ["rescue"]
+    process.communicate("")
+    assert process.returncode == 0

@@ -44,6 +44,7 @@ from agents.mission.search_formation.formation_planner import FormationPlanner
 from agents.mission.search_formation.missed_cells import MissedCells
 from agents.mission.search_formation.pattern import Pattern, fitted
 from agents.mission.search_formation.plan_exchange import PlanExchange
+from agents.mission.search_formation.roll_call import RollCall
 from agents.mission.search_formation.shapes.contract import Demands, ShapeName
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import Bidding
@@ -54,6 +55,7 @@ from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.bids import Bids, encode_bids
+from fanet_mw.wire.roll import Roll
 from fanet_mw.wire.search_messages import Told
 from fanet_mw.wire.search_plan import MOST_PLACES, Search, SearchStatus
 from fanet_mw.wire.searched_cells import Covered
@@ -87,15 +89,18 @@ class Searcher:
         own_motion = OwnMotion(position, obstacles)
         self._neighbors = neighbors = NeighborMotions(hello_interval_s=scenario.routing.hello_interval_s)
         self._radar = RadarWatch(own_motion, obstacles, neighbors, mission.avoid_by)
-        self._place = place = FormationPlace(node, own_motion, reach_m=reach_m, look_m=_view_m(scenario)[0])
+        aside_m, ahead_m = _view_m(scenario)
+        look_m = min(aside_m, ahead_m) if mission.search == "ring" else aside_m  # its lanes lead east and west as well
+        self._place = place = FormationPlace(node, own_motion, reach_m=reach_m, look_m=look_m)
         least_m_s, _ = mission.approach_speeds_m_s
         nodes = scenario.nodes
+        roll_call = RollCall(node, hello_interval_s=scenario.routing.hello_interval_s)
         planner = FormationPlanner(
-            node, expected=nodes.count, deploy_speed_m_s=_DEPLOY * least_m_s,
+            node, roll_call, expected=nodes.count, deploy_speed_m_s=_DEPLOY * least_m_s,
             take_off_ns=take_off_ns(nodes.altitude_m) if nodes.on_ground else 0,
         )  # fmt: skip
         self._plans = PlanExchange(
-            node, planner, place, own_motion, outbox,
+            node, planner, roll_call, place, own_motion, outbox,
             pattern=formation(scenario, nodes.count), random=self._random,
         )  # fmt: skip
         coverage = coverage_map(scenario)
@@ -289,6 +294,8 @@ class Searcher:
                 self._on_found(message, now_ns)
             case Covered():
                 self._reception.on_covered(message)
+            case Roll():
+                self._plans.on_roll(message, now_ns=now_ns)
             case _:
                 assert_never(message)
 
@@ -315,7 +322,8 @@ class Searcher:
         bids = self._bidding.bids_to_tell(now_ns=now_ns)
         if bids:
             frames += encode_bids(bids, node=self._node)
-        return frames + self._announcing.hello_frames(now_ns) + self._reception.hello_frames(now_ns)
+        frames += self._announcing.hello_frames(now_ns) + self._reception.hello_frames(now_ns)
+        return frames + self._plans.hello_frames(now_ns)
 
 
 def phone_model(scenario: Scenario) -> PhoneModel:

@@ -384,6 +384,7 @@ MAVLINK_MSG_ID_FANET_STATUS = 53021
 MAVLINK_MSG_ID_FANET_BIDS = 53022
 MAVLINK_MSG_ID_FANET_FOUND = 53023
 MAVLINK_MSG_ID_FANET_COVERED = 53024
+MAVLINK_MSG_ID_FANET_ROLL = 53025
 
 
 class MAVLink_fanet_route_message(MAVLink_message):
@@ -1229,7 +1230,8 @@ class MAVLink_fanet_search_message(MAVLink_message):
     takes which place of it. Lines: two teams abreast begin beside the
     middle of the area and part, a chain of relays lies between them.
     Spiral: teams abreast turn about the middle, or a single one winds
-    outward. Sectors: each team sweeps its own. Followers fly behind.
+    outward. Sectors: each team sweeps its own. Ring: one team on a
+    square that grows. Followers fly behind.
     """
 
     id = MAVLINK_MSG_ID_FANET_SEARCH
@@ -1460,6 +1462,49 @@ class MAVLink_fanet_covered_message(MAVLink_message):
 setattr(MAVLink_fanet_covered_message, "name", mavlink_msg_deprecated_name_property())
 
 
+class MAVLink_fanet_roll_message(MAVLink_message):
+    """
+    When each UAV of the plan was last heard by anybody, as far as the
+    sender knows, and which of them are lost.
+    """
+
+    id = MAVLINK_MSG_ID_FANET_ROLL
+    msgname = "FANET_ROLL"
+    fieldnames = ["at_half_s", "planner", "revision", "entries", "version"]
+    ordered_fieldnames = ["at_half_s", "planner", "revision", "entries", "version"]
+    fieldtypes = ["uint32_t", "uint16_t", "uint16_t", "uint8_t", "uint8_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {}
+    native_format = bytearray(b"<IHHBB")
+    orders = [0, 1, 2, 3, 4]
+    lengths = [1, 1, 1, 79, 1]
+    array_lengths = [0, 0, 0, 79, 0]
+    crc_extra = 30
+    unpacker = struct.Struct("<IHH79BB")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, at_half_s: int, planner: int, revision: int, entries: Sequence[int], version: int):
+        MAVLink_message.__init__(self, MAVLink_fanet_roll_message.id, MAVLink_fanet_roll_message.msgname)
+        self._fieldnames = MAVLink_fanet_roll_message.fieldnames
+        self._instance_field = MAVLink_fanet_roll_message.instance_field
+        self._instance_offset = MAVLink_fanet_roll_message.instance_offset
+        self.at_half_s = at_half_s
+        self.planner = planner
+        self.revision = revision
+        self.entries = entries
+        self.version = version
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.at_half_s, self.planner, self.revision, self.entries[0], self.entries[1], self.entries[2], self.entries[3], self.entries[4], self.entries[5], self.entries[6], self.entries[7], self.entries[8], self.entries[9], self.entries[10], self.entries[11], self.entries[12], self.entries[13], self.entries[14], self.entries[15], self.entries[16], self.entries[17], self.entries[18], self.entries[19], self.entries[20], self.entries[21], self.entries[22], self.entries[23], self.entries[24], self.entries[25], self.entries[26], self.entries[27], self.entries[28], self.entries[29], self.entries[30], self.entries[31], self.entries[32], self.entries[33], self.entries[34], self.entries[35], self.entries[36], self.entries[37], self.entries[38], self.entries[39], self.entries[40], self.entries[41], self.entries[42], self.entries[43], self.entries[44], self.entries[45], self.entries[46], self.entries[47], self.entries[48], self.entries[49], self.entries[50], self.entries[51], self.entries[52], self.entries[53], self.entries[54], self.entries[55], self.entries[56], self.entries[57], self.entries[58], self.entries[59], self.entries[60], self.entries[61], self.entries[62], self.entries[63], self.entries[64], self.entries[65], self.entries[66], self.entries[67], self.entries[68], self.entries[69], self.entries[70], self.entries[71], self.entries[72], self.entries[73], self.entries[74], self.entries[75], self.entries[76], self.entries[77], self.entries[78], self.version), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_fanet_roll_message, "name", mavlink_msg_deprecated_name_property())
+
+
 mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_FANET_ROUTE: MAVLink_fanet_route_message,
     MAVLINK_MSG_ID_FANET_BEACON: MAVLink_fanet_beacon_message,
@@ -1484,6 +1529,7 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_FANET_BIDS: MAVLink_fanet_bids_message,
     MAVLINK_MSG_ID_FANET_FOUND: MAVLink_fanet_found_message,
     MAVLINK_MSG_ID_FANET_COVERED: MAVLink_fanet_covered_message,
+    MAVLINK_MSG_ID_FANET_ROLL: MAVLink_fanet_roll_message,
 }
 
 
@@ -2517,7 +2563,7 @@ class MAVLink(object):
         the middle of the area and part, a chain of relays lies
         between them. Spiral: teams abreast turn about the middle, or
         a single one winds outward. Sectors: each team sweeps its own.
-        Followers fly behind.
+        Ring: one team on a square that grows. Followers fly behind.
 
         start_us                  : When everyone leaves for its place. [us] (type:uint64_t)
         half_width                : Lines: how far the outermost lanes are from the middle; others: half the width of the area. [m] (type:float)
@@ -2532,7 +2578,7 @@ class MAVLink(object):
         lanes                     : Places of each team. (type:uint8_t)
         relays                    : Places of the chain. (type:uint8_t)
         followers                 : Places behind the teams. (type:uint8_t)
-        shape                     : 0: lines, 1: spiral, 2: sectors. (type:uint8_t)
+        shape                     : 0: lines, 1: spiral, 2: sectors, 3: ring. (type:uint8_t)
         teams                     : Lines abreast; 2 for lines. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
@@ -2546,7 +2592,7 @@ class MAVLink(object):
         the middle of the area and part, a chain of relays lies
         between them. Spiral: teams abreast turn about the middle, or
         a single one winds outward. Sectors: each team sweeps its own.
-        Followers fly behind.
+        Ring: one team on a square that grows. Followers fly behind.
 
         start_us                  : When everyone leaves for its place. [us] (type:uint64_t)
         half_width                : Lines: how far the outermost lanes are from the middle; others: half the width of the area. [m] (type:float)
@@ -2561,7 +2607,7 @@ class MAVLink(object):
         lanes                     : Places of each team. (type:uint8_t)
         relays                    : Places of the chain. (type:uint8_t)
         followers                 : Places behind the teams. (type:uint8_t)
-        shape                     : 0: lines, 1: spiral, 2: sectors. (type:uint8_t)
+        shape                     : 0: lines, 1: spiral, 2: sectors, 3: ring. (type:uint8_t)
         teams                     : Lines abreast; 2 for lines. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
@@ -2695,3 +2741,31 @@ class MAVLink(object):
 
         """
         self.send(self.fanet_covered_encode(cells, version), force_mavlink1=force_mavlink1)
+
+    def fanet_roll_encode(self, at_half_s: int, planner: int, revision: int, entries: Sequence[int], version: int) -> MAVLink_fanet_roll_message:
+        """
+        When each UAV of the plan was last heard by anybody, as far as the
+        sender knows, and which of them are lost.
+
+        at_half_s                 : Swarm time of the sender, in half seconds. (type:uint32_t)
+        planner                   : The node that made the plan. (type:uint16_t)
+        revision                  : Of the plan whose places these are. (type:uint16_t)
+        entries                   : Of each place: how many half seconds before that time its UAV was last heard, 127: longer ago or never; plus 128 if it is lost. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        return MAVLink_fanet_roll_message(at_half_s, planner, revision, entries, version)
+
+    def fanet_roll_send(self, at_half_s: int, planner: int, revision: int, entries: Sequence[int], version: int, force_mavlink1: bool = False) -> None:
+        """
+        When each UAV of the plan was last heard by anybody, as far as the
+        sender knows, and which of them are lost.
+
+        at_half_s                 : Swarm time of the sender, in half seconds. (type:uint32_t)
+        planner                   : The node that made the plan. (type:uint16_t)
+        revision                  : Of the plan whose places these are. (type:uint16_t)
+        entries                   : Of each place: how many half seconds before that time its UAV was last heard, 127: longer ago or never; plus 128 if it is lost. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        self.send(self.fanet_roll_encode(at_half_s, planner, revision, entries, version), force_mavlink1=force_mavlink1)

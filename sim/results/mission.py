@@ -3,7 +3,10 @@ swarm.
 
     coverage    share of the area that came within the nominal range of the phone receiver of a UAV, cell by cell
     connected   share of the time in which all searching UAVs were one connected component at the radio's reach; UAVs
-                that have crashed, fly home or stand there do not count
+                that have crashed, fly home or stand there, or whose radio is off, do not count
+    biconnected share of the time in which they would have remained so after the loss of any one of them
+    diameter    the most hops between two of them, median and greatest over time
+    cut_vertices those whose loss would separate others, likewise
     confirmed   survivors whom a UAV announced within 25 m of their true place and did not take back; farther ones are
                 mistaken. The error is that of the first announced place, for both
     reopened    confirmations that were taken back, because later receptions contradicted them
@@ -36,17 +39,21 @@ from fanet_mw.trace import (
     PlacedInside,
     Posed,
     ProcessEnded,
+    RadioFault,
     Record,
     Refuted,
 )
 from fanet_mw.units import Enu, S
 from fanet_mw.wire.survivors import is_person
+from sim.results.coherence import Coherence, coherence
 from sim.run.collecting.record_kinds import records_of
 from sim.world.environment.survivors import place
 from sim.world.sensors.phone import REFERENCE_LOSS_DB
 
 _HOMEWARD: Final = frozenset({"return", "done", "land"})
 """The mission modes of a UAV that has left the search."""
+_OFF_AIR: Final = frozenset({"cut", "mute", "deaf"})
+"""The faults of a radio that take its UAV out of the network."""
 _WRECKED: Final = "fallen"
 _RETURNING: Final = "return"
 """The flight mode of a UAV that its flight controller brings home."""
@@ -186,13 +193,12 @@ def _median(values: list[float]) -> float | None:
 def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
     """Coverage and coherence; None if the trace has no positions."""
     covered = OverflownCells(scenario)
-    together = instants = 0
+    graphs: list[Coherence] = []
     nearly_all_ns: int | None = None
     nearest: list[Values] = []
     for t_ns, at, searching in _instants(records):
-        instants += 1
         apart = np.linalg.norm(at[:, None] - at[None], axis=2)
-        together += _is_one(apart[np.ix_(searching, searching)] <= scenario.radio.range_m)
+        graphs.append(coherence(apart[np.ix_(searching, searching)] <= scenario.radio.range_m))
         if len(at) > 1:
             np.fill_diagonal(apart, math.inf)
             nearest.append(apart.min(axis=0))
@@ -200,9 +206,12 @@ def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
         if nearly_all_ns is None and covered.share >= _NEARLY_ALL:
             nearly_all_ns = t_ns
     return {
-        "coverage": round(covered.share, 6) if instants else None,
+        "coverage": round(covered.share, 6) if graphs else None,
         "covered_95_s": None if nearly_all_ns is None else round(nearly_all_ns / S, 3),
-        "connected": round(together / instants, 6) if instants else None,
+        "connected": round(statistics.fmean(graph.connected for graph in graphs), 6) if graphs else None,
+        "biconnected": round(statistics.fmean(graph.biconnected for graph in graphs), 6) if graphs else None,
+        "diameter": _usual([graph.diameter for graph in graphs]) if graphs else None,
+        "cut_vertices": _usual([graph.cut_vertices for graph in graphs]) if graphs else None,
         "nearest_m": _spread(np.concatenate(nearest)) if nearest else None,
     }
 
@@ -213,6 +222,11 @@ def _spread(distances_m: Values) -> dict[str, float]:
     return {"least": round(least, 2), "p1": round(hundredth, 2), "p50": round(median, 2)}
 
 
+def _usual(values: list[int]) -> dict[str, float]:
+    """The median over time, and the most."""
+    return {"p50": statistics.median(values), "most": max(values)}
+
+
 def _instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows, Flags]]:
     """The instants with positions in the trace, the positions of the UAVs alive then, and which of
     these UAVs search.
@@ -220,13 +234,17 @@ def _instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows, Flags]]:
     dead: set[int] = set()
     wrecked: set[int] = set()
     homeward: set[int] = set()
+    off_air: dict[str, int] = {}
     returning: set[int] = set()
     rows: list[tuple[float, float, float]] = []
     searching: list[bool] = []
     t_ns = 0
-    for record in records_of(records, ProcessEnded, MissionModeChanged, FlightModeChanged, Posed):
+    for record in records_of(records, ProcessEnded, RadioFault, MissionModeChanged, FlightModeChanged, Posed):
         if type(record) is ProcessEnded:
             dead.add(record.node)
+        elif type(record) is RadioFault and record.kind in _OFF_AIR:
+            off_air.pop(record.label, None)
+            off_air.update({record.label: record.node} if record.active else {})
         elif type(record) is FlightModeChanged:
             wrecked |= {record.node} if record.mode == _WRECKED else set()
             returning = returning | {record.node} if record.mode == _RETURNING else returning - {record.node}
@@ -239,22 +257,9 @@ def _instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows, Flags]]:
             t_ns = record.t_ns
             if record.node not in dead:
                 rows.append((record.east_m, record.north_m, record.up_m))
-                searching.append(record.node not in homeward | wrecked | returning)
+                searching.append(record.node not in homeward | wrecked | returning | set(off_air.values()))
     if rows:
         yield t_ns, np.array(rows), np.array(searching)
-
-
-def _is_one(near: Flags) -> bool:
-    """True if all UAVs are connected over hops, given which pairs reach each other; also True without any UAV."""
-    if not len(near):
-        return True
-    reached = np.zeros(len(near), bool)
-    reached[0] = True
-    while True:
-        further: Flags = np.asarray(near[reached].any(axis=0))
-        if (further == reached).all():
-            return bool(reached.all())
-        reached = further
 
 
 class OverflownCells:

@@ -42,6 +42,7 @@ from fanet_mw.wire.join import Join
 from fanet_mw.wire.links import Links
 from fanet_mw.wire.loads import Loads
 from fanet_mw.wire.places import Places
+from fanet_mw.wire.roll import Roll
 from fanet_mw.wire.schedule import Schedule
 from fanet_mw.wire.search_plan import Search, SearchStatus
 from fanet_mw.wire.searched_cells import Covered
@@ -111,6 +112,7 @@ def _of_the_air(found: Corpus) -> Iterator[Decoder]:
         (SearchStatus, wire.STATUS),
         (FoundMessage, wire.FOUND),
         (Covered, wire.COVERED),
+        (Roll, wire.ROLL),
     ):
         yield Decoder(kind.__name__, _there_and_back(kind.decode_frame, _encode_frame), of(spec.msgid))
     yield Decoder("Bids", lambda data: checked_bids(wire.decode_first(wire.BIDS, data)), of(wire.BIDS.msgid))

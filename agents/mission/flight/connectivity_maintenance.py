@@ -8,6 +8,7 @@ from agents.mission.navigation.half_planes import HalfPlane, Velocity
 from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.search_formation.formation_place import FormationPlace
+from agents.mission.search_formation.pattern import Pattern
 from fanet_mw.units import Enu
 
 _TETHER: Final = 0.95
@@ -33,7 +34,7 @@ class ConnectivityMaintenance:
         if plan is None or pattern is None or place is None or not self._formation.is_taken_up(now_ns):
             return []
         planes = []
-        for other in pattern.shape.tethers(place) or self._nearest(pattern.line(place), now_ns):
+        for other in self._tied_to(pattern, place, now_ns):
             motion = self._neighbors.motion(plan.nodes[other], now_ns=now_ns)
             if motion is None:
                 continue
@@ -46,6 +47,15 @@ class ConnectivityMaintenance:
             if plane is not None:
                 planes.append(plane)
         return planes
+
+    def _tied_to(self, pattern: Pattern, place: int, now_ns: int) -> tuple[int, ...]:
+        """The places within whose reach this UAV stays: those to which its place is tied, past a UAV that may leave its
+        own; for a UAV that may leave its place itself, the nearest UAV of its team.
+        """
+        swept_s = self._formation.swept_s(now_ns) or 0.0
+        if pattern.may_leave(place, swept_s):
+            return self._nearest(pattern.line(place), now_ns)
+        return pattern.tethers(place, swept_s)
 
     def _nearest(self, places: range, now_ns: int) -> tuple[int, ...]:
         """Of these places, the one whose holder is nearest to this UAV; empty if no holder was received recently."""

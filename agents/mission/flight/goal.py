@@ -39,7 +39,7 @@ class Goal:
         formation = self._formation
         lane, moves = formation.lane(now_ns)  # before the sweep, on the way to it
         survivor = task
-        leaves = formation.is_free or not formation.is_taken_up(now_ns)
+        leaves = formation.is_free(now_ns) or not formation.is_taken_up(now_ns)
         if not leaves:
             place = None if task is None else self._survivors.by_id[task].place()
             if task is None or not formation.leads_by(place, lane, moves):
@@ -52,11 +52,11 @@ class Goal:
         look = Enu(east, north, lane.up)
         if self._listening is not None:
             seen = self._survivors.by_id[survivor].filter.is_seen
-            misses_m = 0.0 if leaves else formation.misses_m(place, lane, moves)
+            misses_m = 0.0 if leaves else formation.misses_m(place, lane, moves, now_ns)
             look = self._listening.goal(survivor, place, look, seen=seen, misses_m=misses_m, now_ns=now_ns)
         if leaves:
             return look, STILL
-        goal, feed = formation.bounded(look.east, look.north, lane, moves)
+        goal, feed = formation.bounded(look.east, look.north, lane, moves, now_ns)
         return goal._replace(up=look.up), feed
 
     def _missed_place(self, now_ns: int) -> tuple[float, float] | None:
@@ -64,7 +64,7 @@ class Goal:
         missed.
         """
         formation = self._formation
-        if self._missed_cells is None or not formation.is_free or formation.place is None:
+        if self._missed_cells is None or not formation.is_free(now_ns) or formation.place is None:
             return None
         return self._missed_cells.nearest(self._own_motion.position, now_ns)
 

@@ -6,6 +6,7 @@ lane, team, relay and follower.
 """
 
 import math
+from collections.abc import Collection
 from typing import Final
 
 from agents.mission.finding.phone_localization import Estimate
@@ -38,7 +39,7 @@ class FormationPlace:
         """`look_m`: how far to the side of the UAV its camera shows people on the ground."""
         self._node = node
         self._own_motion = own_motion
-        self._most_m = _FREE_REACH * reach_m
+        self._reach_m, self._most_m = reach_m, _FREE_REACH * reach_m
         self._aside_m = min(_ASIDE_M, _LOOK_SHARE * look_m)
         self.plan: Search | None = None
         self.pattern: Pattern | None = None
@@ -52,10 +53,22 @@ class FormationPlace:
     def adopt(self, plan: Search, now_ns: int) -> None:
         """Follow a plan from now on."""
         first = self.place is None
-        self.plan, self.pattern = plan, pattern_of(plan)
+        self.plan, self.pattern = plan, pattern_of(plan, reach_m=self._reach_m)
         self.place = plan.nodes.index(self._node) if self._node in plan.nodes else None
         if first:
             self.depart(now_ns)
+
+    def close_ranks(self, lost: Collection[int]) -> None:
+        """Fly on without these UAVs: the others of a row share its length."""
+        if self.plan is None or self.pattern is None:
+            return
+        vacant = frozenset(
+            place for place, node in enumerate(self.plan.nodes) if node != self._node and (not node or node in lost)
+        )
+        if len(vacant) >= len(self.plan.nodes) - 1:
+            vacant = frozenset()  # it is alone, and waits for the others at its place
+        if vacant != self.pattern.vacant:
+            self.pattern = self.pattern.closed(vacant)
 
     def depart(self, now_ns: int) -> None:
         """Fly to the place from here, and not before the plan begins."""
@@ -68,10 +81,10 @@ class FormationPlace:
 
     # --- where the plan wants the UAV ----------------------------------------------------------------------------
 
-    @property
-    def is_free(self) -> bool:
-        """True for a follower and for a UAV without a place: the swarm stays connected without them."""
-        return self.pattern is None or self.place is None or self.pattern.kind(self.place) == "follower"
+    def is_free(self, now_ns: int) -> bool:
+        """True for a UAV whose place the swarm does not need now to stay connected, and for one without a place."""
+        pattern, place = self.pattern, self.place
+        return pattern is None or place is None or pattern.may_leave(place, self.swept_s(now_ns) or 0.0)
 
     @property
     def searches(self) -> bool:
@@ -114,11 +127,11 @@ class FormationPlace:
         ahead_m, aside_m = along(moves, estimate.east_m - lane.east, estimate.north_m - lane.north)
         return abs(aside_m) <= _LEASH_M + self._aside_m and -_LAG_M <= ahead_m <= _AHEAD_M
 
-    def misses_m(self, estimate: Estimate, lane: Enu, moves: Enu) -> float:
+    def misses_m(self, estimate: Estimate, lane: Enu, moves: Enu, now_ns: int) -> float:
         """How far from an estimated place this UAV has to stay, wherever its moving place takes it; 0 if it can get
         there, or if its lane turns and may come nearer again.
         """
-        if self.is_free or self.pattern is None or self.pattern.dimensions.turns:
+        if self.is_free(now_ns) or self.pattern is None or self.pattern.dimensions.turns:
             return 0.0
         ahead_m, aside_m = along(moves, estimate.east_m - lane.east, estimate.north_m - lane.north)
         beyond_m = max(0.0, -_LAG_M - ahead_m)
@@ -126,9 +139,9 @@ class FormationPlace:
             beyond_m = ahead_m
         return math.hypot(beyond_m, max(0.0, abs(aside_m) - _LEASH_M))
 
-    def bounded(self, east: float, north: float, lane: Enu, moves: Enu) -> tuple[Enu, Enu]:
+    def bounded(self, east: float, north: float, lane: Enu, moves: Enu, now_ns: int) -> tuple[Enu, Enu]:
         """The permitted position nearest to a wanted one, and its velocity."""
-        if self.is_free:
+        if self.is_free(now_ns):
             return Enu(east, north, lane.up), STILL
         ahead_m, aside_m = along(moves, east - lane.east, north - lane.north)
         aside_m = max(-_LEASH_M, min(_LEASH_M, aside_m))
@@ -136,8 +149,7 @@ class FormationPlace:
             return _beside(lane, moves, 0.0, aside_m), moves
         if ahead_m < -_LAG_M:
             return _beside(lane, moves, -_LAG_M, aside_m), moves
-        beside = _beside(lane, moves, 0.0, aside_m)
-        return (beside._replace(east=east) if _leads_east_or_west(moves) else beside._replace(north=north)), STILL
+        return _beside(lane, moves, ahead_m, aside_m), STILL
 
     def holds_together(self, estimate: Estimate | None, now_ns: int, *, within_s: float) -> bool:
         """True if a UAV at a survivor would be within reach of this UAV's team `within_s` from now, and 5 s later."""
@@ -168,27 +180,22 @@ class FormationPlace:
 
 
 def along(moves: Enu, east_m: float, north_m: float) -> tuple[float, float]:
-    """An offset as metres ahead and metres to the right of a place that moves with velocity `moves`.
-
-    Ahead is the direction of the axis nearest to the velocity; north for a place that stands still. The lanes of lines
-    and sectors are parallel to an axis, those of a spiral nearly so; the inner lanes of a winding arm are not.
+    """An offset as metres ahead and metres to the right of a place that moves with velocity `moves`; north is ahead of
+    a place that stands still.
     """
-    if _leads_east_or_west(moves):
-        return (east_m, -north_m) if moves.east > 0 else (-east_m, north_m)
-    return (north_m, east_m) if moves.north >= 0 else (-north_m, -east_m)
+    east, north = _heading(moves)
+    return east_m * east + north_m * north, east_m * north - north_m * east
 
 
-def _leads_east_or_west(moves: Enu) -> bool:
-    return abs(moves.east) > abs(moves.north)
+def _heading(moves: Enu) -> tuple[float, float]:
+    speed = moves.horizontal()
+    return (moves.east / speed, moves.north / speed) if speed > 1e-9 else (0.0, 1.0)
 
 
 def _beside(lane: Enu, moves: Enu, ahead_m: float, aside_m: float) -> Enu:
     """The position this far ahead and to the right of a place (`along`)."""
-    if _leads_east_or_west(moves):
-        sign = 1 if moves.east > 0 else -1
-        return Enu(lane.east + sign * ahead_m, lane.north - sign * aside_m, lane.up)
-    sign = 1 if moves.north >= 0 else -1
-    return Enu(lane.east + sign * aside_m, lane.north + sign * ahead_m, lane.up)
+    east, north = _heading(moves)
+    return Enu(lane.east + ahead_m * east + aside_m * north, lane.north + ahead_m * north - aside_m * east, lane.up)
 
 
 def _taken_up_ns(plan: Search) -> int:

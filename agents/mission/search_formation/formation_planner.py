@@ -3,8 +3,10 @@
     every node: sends its status at once, and then every STATUS_S
     planner:    the lowest id that was received recently; it plans when all nodes have been received, or after
                 _PATIENCE_NS
-    lost nodes: a UAV that was not received for _LOST_NS loses its place; a follower takes over a place of a team or of
-                a relay, because those places keep the swarm connected and sweep the area
+    lost nodes: the others close ranks by themselves (`roll_call.py`), and the plan remains, so that a UAV that only
+                seemed to be lost has its place still; a follower exchanges its place for one of a team or of a relay
+                that is vacant, because those places keep the swarm connected and sweep the area
+    newcomers:  a node that has no place gets one that nobody has, or that of a node that was not received for _LOST_NS
     take-off:   the first plan of UAVs on the ground begins when they have had time to climb
     leavers:    a node whose status says that its battery is only enough for the way home is replaced at once
     alone:      a node that has received nobody takes the place with its own number, and keeps it; others that are
@@ -17,11 +19,12 @@ instants, their ways then do not cross, and UAVs that were near each other remai
 follower are explained in `shapes/contract.py`; how the area is split into lanes is in `shapes/`.
 """
 
-from itertools import zip_longest
+from collections.abc import Collection
 from typing import Final, NamedTuple
 
 from agents.mission.hungarian import assign
 from agents.mission.search_formation.pattern import Pattern
+from agents.mission.search_formation.roll_call import RollCall
 from agents.mission.search_formation.shapes.contract import Dimensions, ShapeName
 from fanet_mw.serial_number import following, newer
 from fanet_mw.units import US, Enu, NodeId, S
@@ -30,7 +33,9 @@ from fanet_mw.wire.search_plan import Search, SearchStatus
 STATUS_S: Final = 12.0
 """The interval at which a UAV sends its status."""
 _LOST_NS: Final = 70 * S
-"""A UAV from which nothing was received for this time is taken to be lost."""
+"""A UAV from which nothing was received for this time has no right to its place any more."""
+_SETTLED_NS: Final = 10 * S
+"""How long a plan is followed, at least, before it is mended: news of who is lost have reached everyone by then."""
 _PATIENCE_NS: Final = 14 * S
 """How long the first plan waits for UAVs that have not been received."""
 _NOTICE_NS: Final = 7 * S
@@ -61,9 +66,12 @@ class _HeardUav(NamedTuple):
 class FormationPlanner:
     """The planning at one node. Any node can be the planner; all others only listen."""
 
-    def __init__(self, node: NodeId, *, expected: int, deploy_speed_m_s: float, take_off_ns: int = 0) -> None:
+    def __init__(
+        self, node: NodeId, roll_call: RollCall, *, expected: int, deploy_speed_m_s: float, take_off_ns: int = 0
+    ) -> None:
         """`take_off_ns`: the time that UAVs need for their take-off, before which the first plan does not begin."""
         self._node = node
+        self._roll_call = roll_call
         self._take_off_ns = take_off_ns
         self._expected = expected
         self._deploy_speed = deploy_speed_m_s
@@ -123,7 +131,7 @@ class FormationPlanner:
                 if pattern is not None and self._may_plan(now_ns - self._began_ns):
                     self._adopt(self._first(pattern, now_ns), now_ns)
                     return True
-            elif now_ns > self.plan.start_us * US:
+            elif now_ns > self.plan.start_us * US and now_ns - self._followed_ns > _SETTLED_NS:
                 mended = self._mended(self.plan, now_ns)
                 if mended is not None:
                     self._adopt(mended, now_ns)
@@ -137,7 +145,11 @@ class FormationPlanner:
         """
         me = self._members.get(self._node)
         return not (me is not None and me.leaves) and all(
-            node >= self._node or member.leaves or now_ns - member.heard_ns > _LOST_NS or self._lacks_plan(member)
+            node >= self._node
+            or member.leaves
+            or node in self._roll_call.lost
+            or now_ns - member.heard_ns > _LOST_NS
+            or self._lacks_plan(member)
             for node, member in self._members.items()
         )
 
@@ -193,7 +205,7 @@ class FormationPlanner:
         holders = [0] * pattern.places
         for node, column in zip(nodes, chosen, strict=True):
             holders[places[column]] = node
-        holders = _filled(holders, pattern)
+        exchange_followers(holders, (), pattern)
         assert self._began_ns is not None, "a plan is made in a review"
         start_ns = max(now_ns + _NOTICE_NS, self._began_ns + self._take_off_ns)
         farthest_m = max(costs[row][column] for row, column in enumerate(chosen)) ** 0.5
@@ -206,23 +218,31 @@ class FormationPlanner:
         )._replace(revision=_next(self._newest_revision()))
 
     def _mended(self, plan: Search, now_ns: int) -> Search | None:
-        """The plan without lost UAVs and with new ones; None if nothing has changed."""
-        pattern = pattern_of(plan)
-        alive = {
-            node for node, member in self._members.items() if now_ns - member.heard_ns <= _LOST_NS and not member.leaves
-        }
-        alive.add(self._node)
-        if 2 * len(alive) <= sum(1 for node in plan.nodes if node):
-            return None  # this is the smaller part of a separated swarm, which will meet the others again
-        holders = [node if node in alive else 0 for node in plan.nodes]
-        newcomers = sorted(alive - set(holders))
-        for place, holder in enumerate(holders):
-            if not holder and newcomers:
-                holders[place] = newcomers.pop(0)
-        holders = _filled(holders, pattern)
+        """The plan with followers in vacant places and with new UAVs; None if nothing has changed."""
+        pattern = pattern_of(plan, reach_m=0.0)
+        gone = self.leavers
+        holders = [0 if node in gone else node for node in plan.nodes]
+        absent = {node for node in holders if node in self._roll_call.lost} - {self._node}
+        for node, member in sorted(self._members.items()):
+            vacant = [place for place, holder in enumerate(holders) if self._is_up_for_grabs(holder, now_ns)]
+            if vacant and node not in holders and not member.leaves and now_ns - member.heard_ns <= _LOST_NS:
+                holders[min(vacant, key=lambda place: _distance2(pattern.at(place, 0.0), member.position))] = node
+        exchange_followers(holders, absent, pattern)
         if tuple(holders) == plan.nodes:
             return None
         return plan._replace(revision=_next(plan.revision), planner=self._node, nodes=tuple(holders))
+
+    def _is_up_for_grabs(self, holder: int, now_ns: int) -> bool:
+        """True for a place that nobody holds, or a UAV that has been lost for long."""
+        member = self._members.get(holder)
+        return holder == 0 or (
+            holder in self._roll_call.lost and (member is None or now_ns - member.heard_ns > _LOST_NS)
+        )
+
+    @property
+    def leavers(self) -> set[int]:
+        """The nodes that fly home."""
+        return {node for node, member in self._members.items() if member.leaves}
 
     def _newest_revision(self) -> int:
         """The number of the newest plan that a status has named; 0 if none has named any."""
@@ -254,40 +274,37 @@ def plan_of(pattern: Pattern, nodes: tuple[int, ...], *, planner: int, start_us:
     )  # fmt: skip
 
 
-def pattern_of(plan: Search) -> Pattern:
-    """The formation that a plan describes."""
+def pattern_of(plan: Search, *, reach_m: float) -> Pattern:
+    """The formation that a plan describes; `reach_m`: the reach of the radios."""
     return Pattern(
         Dimensions(
             plan.lanes, plan.relays, plan.followers, plan.half_width_m, plan.first_m, plan.last_m, plan.height_m,
             plan.speed_m_s, ShapeName(plan.shape), plan.teams,
-        )
+        ),
+        reach_m=reach_m,
     )  # fmt: skip
 
 
-def _filled(holders: list[int], pattern: Pattern) -> list[int]:
-    """Fill the vacant places of teams and relays, each with the nearest follower.
+def exchange_followers(holders: list[int], absent: Collection[int], pattern: Pattern) -> None:
+    """Let the nearest follower take each place of a team or of a relay that is vacant, or whose UAV is `absent`; that
+    one gets the follower's place.
 
-    If there are no followers left, the UAVs farther out in the team move up, so that the team stays connected and
-    becomes shorter; in `sectors` the UAVs farther out in the whole row do so. The place of a relay then stays vacant.
-    A UAV that is alone has no team, and keeps its place.
+    A UAV that is alone keeps its place.
     """
-    if sum(holder != 0 for holder in holders) == 1:
-        return holders
-    filled = list(holders)
+    if sum(holder != 0 and holder not in absent for holder in holders) <= 1:
+        return
     for place in range(pattern.dimensions.fixed):
-        if filled[place]:
+        if holders[place] and holders[place] not in absent:
             continue
         goal = pattern.at(place, 0.0)
-        spare = [(_distance2(pattern.at(other, 0.0), goal), other) for other in pattern.followers if filled[other]]
+        spare = [
+            (_distance2(pattern.at(other, 0.0), goal), other)
+            for other in pattern.followers
+            if holders[other] and holders[other] not in absent
+        ]
         if spare:
             _, other = min(spare)
-            filled[place], filled[other] = filled[other], 0
-        else:
-            outward = pattern.shape.outward(place)
-            left = [filled[other] for other in outward if filled[other]]
-            for other, node in zip_longest(outward, left, fillvalue=0):
-                filled[other] = node
-    return filled
+            holders[place], holders[other] = holders[other], holders[place]
 
 
 def _distance2(a: Enu, b: Enu) -> float:

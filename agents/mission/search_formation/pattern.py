@@ -6,9 +6,10 @@ The words place, team, lane, relay and follower are explained in `shapes/contrac
 from collections.abc import Callable, Mapping
 from typing import Final, assert_never
 
-from agents.mission.search_formation.shapes import lines, sectors, spiral
+from agents.mission.search_formation.shapes import lines, ring, sectors, spiral
 from agents.mission.search_formation.shapes.contract import Demands, Dimensions, Shape, ShapeName
 from agents.mission.search_formation.shapes.lines import Lines
+from agents.mission.search_formation.shapes.ring import Ring
 from agents.mission.search_formation.shapes.sectors import Sectors
 from agents.mission.search_formation.shapes.spiral import Spiral
 from fanet_mw.units import STILL, Enu
@@ -18,17 +19,35 @@ _SHAPES: Final[Mapping[ShapeName, Callable[[Dimensions], Shape]]] = {
     ShapeName.LINES: Lines,
     ShapeName.SPIRAL: Spiral,
     ShapeName.SECTORS: Sectors,
+    ShapeName.RING: Ring,
 }
 _STEP_S: Final = 0.05
 """The time step over which the velocity of a place is computed."""
 
 
+_HOP: Final = 0.93
+"""Neighbors in a row that has closed ranks are at most this share of the radio's reach apart."""
+
+
 class Pattern:
     """A formation, and the position of each of its places over time."""
 
-    def __init__(self, dimensions: Dimensions) -> None:
+    def __init__(self, dimensions: Dimensions, *, reach_m: float, vacant: frozenset[int] = frozenset()) -> None:
+        """`vacant`: the places whose UAVs are lost; the others of the same row close ranks, and the formation becomes
+        no larger than they can span within the `reach_m` of their radios.
+        """
         self.dimensions = dimensions
-        self.shape = _SHAPES[dimensions.shape](dimensions)
+        self.vacant = vacant
+        whole = _SHAPES[dimensions.shape](dimensions)
+        self._reach_m, self._hop_m = reach_m, _HOP * reach_m
+        self._left = tuple(len(row.places) - len(vacant.intersection(row.places)) for row in whole.rows())
+        self._flown = {place: at for row in whole.rows() for place, at in row.shared(vacant).items()}
+        """Where on its row each UAV flies whose row has closed ranks."""
+        self.shape: Shape = whole.drawn_in(self._left, self._hop_m) if vacant else whole
+
+    def closed(self, vacant: frozenset[int]) -> "Pattern":
+        """The same formation without the UAVs of these places."""
+        return Pattern(self.dimensions, reach_m=self._reach_m, vacant=vacant)
 
     @property
     def places(self) -> int:
@@ -52,7 +71,33 @@ class Pattern:
 
     def at(self, place: int, swept_s: float) -> Enu:
         """The position of a place after this time of sweeping; before 0, where the sweep begins."""
-        return self.shape.at(place, swept_s)
+        return self.shape.at(self._flown.get(place, place), swept_s)
+
+    def tethers(self, place: int, swept_s: float) -> tuple[int, ...]:
+        """The places that must stay within radio reach of this one to keep the swarm connected, past those that are
+        vacant or whose UAV may leave; none for a follower.
+        """
+        found: set[int] = set()
+        passed, waiting = {place}, [place]
+        while waiting:
+            for other in self.shape.tethers(waiting.pop()):
+                if other not in passed:
+                    passed.add(other)
+                    passes = other in self.vacant or self.may_leave(other, swept_s)
+                    (waiting.append if passes else found.add)(other)
+        return tuple(sorted(found))
+
+    def may_leave(self, place: int, swept_s: float) -> bool:
+        """True for a place whose UAV may leave it at this instant, because the swarm stays connected without it: that
+        of a follower, and many of a ring that is small.
+        """
+        if self.kind(place) == "follower":
+            return True
+        if not isinstance(self.shape, Ring):
+            return False
+        rank = place - sum(other < place for other in self.vacant)
+        at = self._flown.get(place, place)
+        return rank % 2 == 1 and self.shape.may_leave(at, swept_s, reach_m=self._hop_m, left=self._left[0])
 
     def velocity(self, place: int, swept_s: float) -> Enu:
         """The velocity of a place after this time of sweeping."""
@@ -77,6 +122,8 @@ def fitted(
             made = spiral.fitted(count, demands)
         case ShapeName.SECTORS:
             made = sectors.fitted(count, sectors_wanted, demands)
+        case ShapeName.RING:
+            made = ring.fitted(count, demands) or lines.fitted(count, demands)
         case _:
             assert_never(shape)
-    return None if made is None else Pattern(made)
+    return None if made is None else Pattern(made, reach_m=demands.reach_m)

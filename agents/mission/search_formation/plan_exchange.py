@@ -10,8 +10,10 @@ from agents.mission.outbox import Outbox, OutgoingPacket
 from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.formation_planner import STATUS_S, FormationPlanner
 from agents.mission.search_formation.pattern import Pattern
+from agents.mission.search_formation.roll_call import RollCall
 from fanet_mw.trace import Planned
 from fanet_mw.units import US, Enu, NodeId, S
+from fanet_mw.wire.roll import Roll
 from fanet_mw.wire.search_plan import Search, SearchStatus
 
 _FIRST_STATUS_S: Final = 2
@@ -25,6 +27,7 @@ class PlanExchange:
         self,
         node: NodeId,
         planner: FormationPlanner,
+        roll_call: RollCall,
         place: FormationPlace,
         own_motion: OwnMotion,
         outbox: Outbox,
@@ -34,11 +37,13 @@ class PlanExchange:
     ) -> None:
         """`pattern`: the formation to plan, if this UAV has to; None if the UAVs are too few for one."""
         self._node = node
-        self._planner, self._place = planner, place
+        self._planner, self._place, self._roll_call = planner, place, roll_call
         self._own_motion, self._outbox = own_motion, outbox
         self._pattern = pattern
         self._random = random
         self._next_status_ns = 0
+        self._adopted_ns = 0
+        """The instant at which this UAV began to follow its plan."""
         self._flies_home = False
         """True if this UAV takes no place any more, whatever the plan says."""
 
@@ -52,6 +57,9 @@ class PlanExchange:
             self.say_status(percent, now_ns)
         if self._planner.review(self._pattern, now_ns=now_ns):
             self._adopt(now_ns)
+        if self._place.plan is not None:
+            self._roll_call.review(self._place.plan, since_ns=self._adopted_ns, now_ns=now_ns)
+            self._place.close_ranks(self._roll_call.lost | self._planner.leavers)
         plans, self._planner.to_tell = self._planner.to_tell, []
         self._outbox.packets += [OutgoingPacket(plan.encode_frame(self._node)) for plan in plans]
 
@@ -82,6 +90,16 @@ class PlanExchange:
     def on_hello(self, node: int, position: Enu, *, now_ns: int) -> None:
         """A neighbor's hello states its position."""
         self._planner.on_neighbor(node, position, now_ns=now_ns)
+        self._roll_call.on_hello(node, now_ns=now_ns)
+
+    def on_roll(self, roll: Roll, *, now_ns: int) -> None:
+        """A neighbor tells who was heard when."""
+        self._roll_call.on_roll(roll, self._place.plan, now_ns=now_ns)
+
+    def hello_frames(self, now_ns: int) -> bytes:
+        """The inner frame for the next hello that tells who was heard when; empty without a plan."""
+        plan = self._place.plan
+        return b"" if plan is None else self._roll_call.roll(plan, now_ns=now_ns).encode_frame(self._node)
 
     def on_status(self, status: SearchStatus, *, now_ns: int) -> None:
         """The status of another UAV was received."""
@@ -95,6 +113,7 @@ class PlanExchange:
     def _adopt(self, now_ns: int) -> None:
         plan = self._planner.plan
         assert plan is not None, "there is a plan to adopt"
+        self._adopted_ns = now_ns
         self._place.adopt(plan, now_ns)
         if self._flies_home:
             self._place.leave()

@@ -158,7 +158,7 @@ class Bidding:
         formation, here = self._formation, self._own_motion.position
         if not formation.is_taken_up(now_ns):
             return formation.lane(now_ns)[0].minus(here).horizontal() <= _ASTRAY_M
-        if formation.is_free:
+        if formation.is_free(now_ns):
             return formation.holds_together(known.place(), now_ns, within_s=-5.0)
         return formation.leads_by(known.place(), *formation.lane(now_ns))
 
@@ -202,9 +202,9 @@ class Bidding:
         if not formation.is_taken_up(now_ns):
             lane, _ = formation.lane(now_ns + round(eta_s * S))
             return eta_s if place.distance_m(lane) <= _ASTRAY_M else None
-        if place.sigma_m > VAGUE_M and not formation.is_free:
+        if place.sigma_m > VAGUE_M and not formation.is_free(now_ns):
             return None
-        if formation.is_free:
+        if formation.is_free(now_ns):
             return eta_s if formation.holds_together(place, now_ns, within_s=eta_s) else None
         lane, moves = formation.lane(now_ns)
         if not formation.leads_by(place, lane, moves):

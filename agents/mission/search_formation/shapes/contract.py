@@ -1,4 +1,4 @@
-"""What a search formation is: its places and their kinds, and the contract of the three shapes in which it is flown.
+"""What a search formation is: its places and their kinds, and the contract of the shapes in which it is flown.
 
     place      the moving position that the plan assigns to one UAV, and its number
     team       UAVs that sweep abreast: a line, an arm of a spiral, or the team of a sector
@@ -9,6 +9,7 @@
     lines      two lines abreast part from the middle of the area; a chain of relays keeps the swarm connected
     spiral     arms turn about the middle, or one arm winds outward from it; any number of UAVs will do
     sectors    one team sweeps each sector; more UAVs are free for survivors, but the swarm does not stay connected
+    ring       one team on a square that grows from the middle to the edge; no single loss separates anybody
 
 In all of them places of teams come first (team 0 lane by lane, team 1, ...), then relays, then followers. No place
 jumps. The sweep is the flight out to the edge of the area; it ends with a turn, and is repeated after the way back.
@@ -18,7 +19,7 @@ Everything here is geometry, in metres and seconds.
 import math
 from collections.abc import Iterable
 from enum import IntEnum
-from typing import Final, NamedTuple, Protocol
+from typing import Final, NamedTuple, Protocol, Self
 
 from fanet_mw.units import Enu
 
@@ -39,7 +40,7 @@ beginning: far enough for two teams not to be in each other's way, and near enou
 _TURN_S: Final = 10.0
 """How long lines and sectors' teams wait at the edge of the area before they fly back, so that a UAV that has fallen
 behind gets there, too."""
-_BACK: Final = 1.2
+BACK: Final = 1.2
 """The speed on the way back, as a multiple of the speed of the sweep; most phones have been received by then."""
 
 
@@ -49,6 +50,49 @@ class ShapeName(IntEnum):
     LINES = 0
     SPIRAL = 1
     SECTORS = 2
+    RING = 3
+
+
+class RowKind(IntEnum):
+    """How the UAVs of a row share its length when one of them is lost."""
+
+    SPAN = 0
+    """From its first place to its last one."""
+    BETWEEN = 1
+    """Between two others, as the relays of a chain do."""
+    AROUND = 2
+    """All around: the last place is beside the first one."""
+
+
+class RowOfPlaces(NamedTuple):
+    """Consecutive places whose UAVs close ranks when one of them is lost: they share the length of the row evenly."""
+
+    first: int
+    size: int
+    kind: RowKind
+
+    @property
+    def places(self) -> range:
+        return range(self.first, self.first + self.size)
+
+    def shared(self, vacant: frozenset[int]) -> dict[int, float]:
+        """Where on the row, as a number between those of its places, each UAV that is left flies; none if nobody is
+        lost. The order of places remains.
+        """
+        left = [place for place in self.places if place not in vacant]
+        if not left or len(left) == self.size:
+            return {}
+        if self.kind is RowKind.AROUND:
+            step = self.size / len(left)
+            turned = math.fsum(place - rank * step for rank, place in enumerate(left)) / len(left)
+            return {place: (turned + rank * step) % self.size for rank, place in enumerate(left)}
+        if self.kind is RowKind.BETWEEN:
+            step = (self.size + 1) / (len(left) + 1)
+            return {place: self.first - 1 + (rank + 1) * step for rank, place in enumerate(left)}
+        if len(left) == 1:
+            return {left[0]: self.first + (self.size - 1) / 2}
+        step = (self.size - 1) / (len(left) - 1)
+        return {place: self.first + rank * step for rank, place in enumerate(left)}
 
 
 class Demands(NamedTuple):
@@ -149,18 +193,20 @@ class Shape(Protocol):
         """The distance of two neighboring lanes; of a spiral, on the sides of the squares, not at the corners."""
         ...
 
-    def at(self, place: int, swept_s: float) -> Enu:
-        """The position of a place at an instant of the sweep."""
+    def at(self, place: float, swept_s: float) -> Enu:
+        """The position of a place at an instant of the sweep; of a number between two places of a row, between them."""
         ...
 
     def tethers(self, place: int) -> tuple[int, ...]:
         """The places that must stay within radio reach of this one to keep the swarm connected; none for a follower."""
         ...
 
-    def outward(self, place: int) -> range:
-        """The places from this one outward along its team, or along its row of teams in `sectors`. If a UAV is lost and
-        there is no follower, the UAVs of these places move up one by one.
-        """
+    def rows(self) -> tuple[RowOfPlaces, ...]:
+        """The rows in which UAVs close ranks; followers are in none."""
+        ...
+
+    def drawn_in(self, left: tuple[int, ...], hop_m: float) -> Self:
+        """The same formation, no larger than so many UAVs of each row can span with hops of `hop_m`."""
         ...
 
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
@@ -173,15 +219,15 @@ def nearest_m(places: Iterable[Enu], east_m: float, north_m: float) -> float:
     return min(math.hypot(place.east - east_m, place.north - north_m) for place in places)
 
 
-def swept_m(formation: Dimensions, swept_s: float) -> float:
+def swept_m(formation: Dimensions, swept_s: float, *, back: float = BACK) -> float:
     """The distance of a line from the middle, or of a sector's team from the side where its sweep begins.
 
-    The team flies out at the speed of the sweep, waits, flies back faster, and begins again.
+    The team flies out at the speed of the sweep, waits, flies back `back` times as fast, and begins again.
     """
     if swept_s <= 0:
         return formation.first_m
     out_s = (formation.last_m - formation.first_m) / formation.speed_m_s
-    along_s = swept_s % (out_s + _TURN_S + out_s / _BACK)
+    along_s = swept_s % (out_s + _TURN_S + out_s / back)
     if along_s <= out_s:
         return formation.first_m + along_s * formation.speed_m_s
-    return formation.last_m - max(0.0, along_s - out_s - _TURN_S) * formation.speed_m_s * _BACK
+    return formation.last_m - max(0.0, along_s - out_s - _TURN_S) * formation.speed_m_s * back

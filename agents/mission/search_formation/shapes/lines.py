@@ -26,6 +26,8 @@ from agents.mission.search_formation.shapes.contract import (
     FOLLOWER_HIGHER_M,
     Demands,
     Dimensions,
+    RowKind,
+    RowOfPlaces,
     swept_m,
 )
 from fanet_mw.units import Enu
@@ -47,8 +49,10 @@ _LEAST_LANES: Final = 2
 class Lines:
     """The positions of the places of two lines, their chain and their followers."""
 
-    def __init__(self, formation: Dimensions) -> None:
+    def __init__(self, formation: Dimensions, *, most_m: float = math.inf) -> None:
+        """`most_m`: how far from the middle the lines may be for the relays that are left."""
         self._formation = formation
+        self._most_m = most_m
 
     @property
     def sweep_s(self) -> float:
@@ -58,17 +62,17 @@ class Lines:
     def lane_m(self) -> float:
         return 2 * self._formation.half_width_m / (self._formation.lanes - 1)
 
-    def at(self, place: int, swept_s: float) -> Enu:
+    def at(self, place: float, swept_s: float) -> Enu:
         formation = self._formation
-        north, lanes = swept_m(formation, swept_s), formation.lanes
-        if place < 2 * lanes:
+        north, lanes = self._north_m(swept_s), formation.lanes
+        if place <= 2 * lanes - 1:
             line, lane = divmod(place, lanes)
             return Enu(self._lane(lane), north if line == 0 else -north, formation.height_m)
         if place < formation.fixed:
             share = 1 - 2 * (place - 2 * lanes + 1) / (formation.relays + 1)
             east = -_BUNCHED_M * share * max(0.0, 1 - (north - formation.first_m) / _STRAIGHT_M)
             return Enu(self._lane(lanes // 2) + east, share * north, formation.height_m + _CHAIN_HIGHER_M)
-        line, share = formation.follower(place)
+        line, share = formation.follower(round(place))
         behind = max(north - FOLLOW_M, formation.first_m * 0.5)
         east = formation.half_width_m * (2 * share - 1)
         return Enu(east, behind if line == 0 else -behind, formation.height_m + FOLLOWER_HIGHER_M)
@@ -89,19 +93,25 @@ class Lines:
             found.append(place + 1 if place < 2 * lanes + relays - 1 else lanes + middle)
         return tuple(found)
 
-    def outward(self, place: int) -> range:
-        lanes = self._formation.lanes
-        if place >= 2 * lanes:
-            return range(place, place + 1)
-        first = place // lanes * lanes
-        return range(place, first + lanes) if place - first >= lanes // 2 else range(place, first - 1, -1)
+    def rows(self) -> tuple[RowOfPlaces, ...]:
+        lanes, relays = self._formation.lanes, self._formation.relays
+        two = tuple(RowOfPlaces(first, lanes, RowKind.SPAN) for first in (0, lanes))
+        return (*two, RowOfPlaces(2 * lanes, relays, RowKind.BETWEEN))
+
+    def drawn_in(self, left: tuple[int, ...], hop_m: float) -> "Lines":
+        formation = self._formation
+        half_width_m = min(formation.half_width_m, max(1, min(left[:2]) - 1) * hop_m / 2)
+        return Lines(formation._replace(half_width_m=half_width_m), most_m=(left[2] + 1) * hop_m / 2)
 
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
         """The distance of a point from a line to the north or south; a line is taken to be as wide as the area."""
-        north = swept_m(self._formation, swept_s)
+        north = self._north_m(swept_s)
         return abs(north_m - (north if team == 0 else -north))
 
-    def _lane(self, lane: int) -> float:
+    def _north_m(self, swept_s: float) -> float:
+        return min(self._most_m, swept_m(self._formation, swept_s))
+
+    def _lane(self, lane: float) -> float:
         """East of a lane [m]."""
         return self._formation.half_width_m * (2 * lane / (self._formation.lanes - 1) - 1)
 

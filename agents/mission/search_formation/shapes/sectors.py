@@ -23,6 +23,8 @@ from agents.mission.search_formation.shapes.contract import (
     FOLLOWER_HIGHER_M,
     Demands,
     Dimensions,
+    RowKind,
+    RowOfPlaces,
     ShapeName,
     nearest_m,
     swept_m,
@@ -48,13 +50,13 @@ class Sectors:
     def sweep_s(self) -> float:
         return (self._formation.last_m - self._formation.first_m) / self._formation.speed_m_s
 
-    def at(self, place: int, swept_s: float) -> Enu:
+    def at(self, place: float, swept_s: float) -> Enu:
         formation = self._formation
         if place < formation.fixed:
             team, lane = divmod(place, formation.lanes)
             share = (lane + 0.5) / formation.lanes
-            return self._at(team, share, swept_m(formation, swept_s), formation.height_m)
-        team, share = formation.follower(place)
+            return self._at(int(team), share, swept_m(formation, swept_s), formation.height_m)
+        team, share = formation.follower(round(place))
         behind_m = max(swept_m(formation, swept_s) - FOLLOW_M, formation.first_m * 0.5)
         return self._at(team, share, behind_m, formation.height_m + FOLLOWER_HIGHER_M)
 
@@ -75,12 +77,14 @@ class Sectors:
         found += [place + 1] if lane < formation.lanes - 1 or column < self._columns - 1 else []
         return tuple(found)
 
-    def outward(self, place: int) -> range:
-        if place >= self._formation.fixed:
-            return range(place, place + 1)
-        row = self._columns * self._formation.lanes
-        first = place // row * row
-        return range(place, first + row) if 2 * (place - first) >= row else range(place, first - 1, -1)
+    def rows(self) -> tuple[RowOfPlaces, ...]:
+        formation = self._formation
+        return tuple(
+            RowOfPlaces(formation.line(team).start, formation.lanes, RowKind.SPAN) for team in range(formation.teams)
+        )
+
+    def drawn_in(self, left: tuple[int, ...], hop_m: float) -> "Sectors":
+        return self
 
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
         return nearest_m((self.at(place, swept_s) for place in self._formation.line(team)), east_m, north_m)

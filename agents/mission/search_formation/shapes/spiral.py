@@ -21,7 +21,15 @@ slower.
 import math
 from typing import Final
 
-from agents.mission.search_formation.shapes.contract import FOLLOWER_HIGHER_M, Demands, Dimensions, ShapeName, nearest_m
+from agents.mission.search_formation.shapes.contract import (
+    FOLLOWER_HIGHER_M,
+    Demands,
+    Dimensions,
+    RowKind,
+    RowOfPlaces,
+    ShapeName,
+    nearest_m,
+)
 from fanet_mw.units import Enu
 
 _BEHIND_S: Final = 15.0
@@ -55,13 +63,13 @@ class Spiral:
             return 8 * self._outer_m / (self._formation.teams * self._formation.speed_m_s)
         return self._way_m(self._winds + 2) / self._formation.speed_m_s
 
-    def at(self, place: int, swept_s: float) -> Enu:
+    def at(self, place: float, swept_s: float) -> Enu:
         formation = self._formation
         swept_s = max(0.0, swept_s)
         if place < formation.fixed:
             team, lane = divmod(place, formation.lanes)
-            return self._at(team, lane, swept_s, formation.height_m)
-        team, share = formation.follower(place)
+            return self._at(int(team), lane, swept_s, formation.height_m)
+        team, share = formation.follower(round(place))
         higher_m = formation.height_m + FOLLOWER_HIGHER_M
         return self._at(team, share * formation.lanes - 0.5, max(0.0, swept_s - _BEHIND_S), higher_m)
 
@@ -77,9 +85,14 @@ class Spiral:
             found += sorted(other * formation.lanes for other in around)
         return tuple(found)
 
-    def outward(self, place: int) -> range:
-        lanes = self._formation.lanes
-        return range(place, (place // lanes + 1) * lanes if place < self._formation.fixed else place + 1)
+    def rows(self) -> tuple[RowOfPlaces, ...]:
+        formation = self._formation
+        return tuple(
+            RowOfPlaces(formation.line(team).start, formation.lanes, RowKind.SPAN) for team in range(formation.teams)
+        )
+
+    def drawn_in(self, left: tuple[int, ...], hop_m: float) -> "Spiral":
+        return self
 
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
         return nearest_m((self.at(place, swept_s) for place in self._formation.line(team)), east_m, north_m)

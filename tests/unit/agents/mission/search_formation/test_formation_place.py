@@ -25,17 +25,17 @@ def test_a_place_is_taken_up_on_a_straight_way_that_begins_and_ends_with_the_pla
 def test_a_uav_of_a_line_stays_near_its_lane_and_a_follower_goes_anywhere() -> None:
     lane, moves = Enu(0, 500, UP_M), Enu(0, 7.5, 0)
     line, follower = Board(LINE, lane).place, Board(FOLLOWER, lane).place
-    assert follower.bounded(300, 100, lane, moves)[0] == Enu(300, 100, UP_M)
-    assert line.bounded(300, 450, lane, moves)[0] == Enu(58, 450, UP_M), "aside by the leash"
-    assert line.bounded(0, 100, lane, moves)[0] == Enu(0, 360, UP_M), "behind by the lag"
-    assert line.bounded(20, 700, lane, moves) == (Enu(20, 500, UP_M), moves), "ahead: the line brings it there"
+    assert follower.bounded(300, 100, lane, moves, 0)[0] == Enu(300, 100, UP_M)
+    assert line.bounded(300, 450, lane, moves, 0)[0] == Enu(58, 450, UP_M), "aside by the leash"
+    assert line.bounded(0, 100, lane, moves, 0)[0] == Enu(0, 360, UP_M), "behind by the lag"
+    assert line.bounded(20, 700, lane, moves, 0) == (Enu(20, 500, UP_M), moves), "ahead: the line brings it there"
 
 
 def test_a_uav_knows_how_far_its_place_keeps_it_from_a_survivor_for_good() -> None:
     lane, moves, middle_relay = Enu(0, 500, UP_M), Enu(0, 7.5, 0), NodeId(35)
 
     def misses_m(node: NodeId, east_m: float, north_m: float, velocity: Enu = moves) -> float:
-        return Board(node, lane).place.misses_m(Estimate(east_m, north_m, 1.0, 0.0, 1.0), lane, velocity)
+        return Board(node, lane).place.misses_m(Estimate(east_m, north_m, 1.0, 0.0, 1.0), lane, velocity, 0)
 
     assert misses_m(LINE, 58, 900) == misses_m(LINE, -58, 360) == 0.0
     assert misses_m(LINE, 88, 320) == pytest.approx(50), "30 m beyond the leash, 40 m beyond the lag"

@@ -8,6 +8,7 @@ import pytest
 
 from agents.mission.search_formation.formation_planner import FormationPlanner, plan_of
 from agents.mission.search_formation.pattern import Pattern, fitted
+from agents.mission.search_formation.roll_call import RollCall
 from agents.mission.search_formation.shapes.contract import Demands, ShapeName
 from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire import HEADER_BYTES
@@ -46,7 +47,7 @@ def test_tied_places_stay_in_reach_of_each_other_once_the_chain_is_straight() ->
     pattern = formation()
     for second in range(45, round(pattern.shape.sweep_s) + 120, 5):
         for place in range(pattern.places):
-            for other in pattern.shape.tethers(place):
+            for other in pattern.tethers(place, second):
                 apart = pattern.at(place, second).minus(pattern.at(other, second)).norm()
                 assert apart <= 0.95 * REACH_M, (second, place, other)
 
@@ -66,8 +67,14 @@ def test_too_few_have_no_formation() -> None:
     assert fitted(20, DEMANDS) is None
 
 
-def planner_with(nodes: int, *, node: int = 1) -> FormationPlanner:
-    made = FormationPlanner(NodeId(node), expected=nodes, deploy_speed_m_s=9)
+def planner_of(node: int, *, expected: int, lost: Collection[int] = (), take_off_ns: int = 0) -> FormationPlanner:
+    roll_call = RollCall(NodeId(node), hello_interval_s=1.0)
+    roll_call.lost.update(lost)
+    return FormationPlanner(NodeId(node), roll_call, expected=expected, deploy_speed_m_s=9, take_off_ns=take_off_ns)
+
+
+def planner_with(nodes: int, *, node: int = 1, lost: Collection[int] = ()) -> FormationPlanner:
+    made = planner_of(node, expected=nodes, lost=lost)
     for other in range(1, nodes + 1):
         place = Enu(200.0 * ((other - 1) % 9 - 4), 200.0 * ((other - 1) // 9 - 2), 50)
         made.status(SearchStatus(0, place, other, 0, 100), now_ns=0)
@@ -92,7 +99,7 @@ def test_a_plan_gives_everyone_a_place_and_the_swarm_stays_in_one_piece_on_the_w
 def test_uavs_that_hear_nobody_take_different_places_and_keep_them() -> None:
     pattern, places = formation(), []
     for node in range(1, 46):
-        planner = FormationPlanner(NodeId(node), expected=45, deploy_speed_m_s=9)
+        planner = planner_of(node, expected=45)
         for second in range(40):
             planner.on_neighbor(node, Enu(10.0 * node, 0.0, 50.0), now_ns=second * S)
             planner.review(pattern, now_ns=second * S)
@@ -105,7 +112,7 @@ def test_uavs_that_hear_nobody_take_different_places_and_keep_them() -> None:
 def test_the_first_plan_begins_when_all_have_had_time_to_take_off() -> None:
     begins_s = []
     for take_off_s in (0, 5, 30):
-        planner = FormationPlanner(NodeId(1), expected=45, deploy_speed_m_s=9, take_off_ns=take_off_s * S)
+        planner = planner_of(1, expected=45, take_off_ns=take_off_s * S)
         planner.review(None, now_ns=S)
         for other in range(1, 46):
             planner.status(SearchStatus(0, Enu(15.0 * other, 0.0, 0.1), other, 0, 100), now_ns=0)
@@ -115,51 +122,53 @@ def test_the_first_plan_begins_when_all_have_had_time_to_take_off() -> None:
     assert begins_s == [10, 10, 31], "from the notice of 7 s, or from the first review"
 
 
-def test_the_place_of_a_lost_uav_in_a_line_goes_to_a_follower() -> None:
+def planned(lost_place: int) -> tuple[FormationPlanner, Search, int]:
+    """A planner that has followed its plan for 20 s when the UAV of this place is lost: with the plan and that UAV."""
     planner, pattern = planner_with(45), formation()
     planner.review(pattern, now_ns=S)
-    before = planner.plan
-    assert before is not None
-    lost, later_ns = before.nodes[3], 90 * S
-    for node in range(1, 46):
-        if node != lost:
-            planner.status(SearchStatus(later_ns // US, Enu(0, 0, 50), node, 1, 100), now_ns=later_ns)
-    assert planner.review(pattern, now_ns=later_ns)
+    planner.review(pattern, now_ns=2 * S)
+    assert planner.plan is not None
+    return planner, planner.plan, planner.plan.nodes[lost_place]
+
+
+def test_a_follower_exchanges_its_place_for_that_of_a_lost_uav_in_a_line() -> None:
+    planner, before, lost = planned(3)
+    planner._roll_call.lost.add(lost)
+    assert not planner.review(formation(), now_ns=9 * S), "news of other losses are on their way"
+    assert planner.review(formation(), now_ns=20 * S)
     after = planner.plan
     assert after is not None
-    assert lost not in after.nodes
     assert after.revision == before.revision + 1
-    assert after.nodes[3] in before.nodes[pattern.followers.start :]
+    followers = formation().followers.start
+    assert after.nodes[3] in before.nodes[followers:]
+    assert lost in after.nodes[followers:], "it has a place if it comes back"
+    assert not planner.review(formation(), now_ns=40 * S), "nothing else changes"
 
 
-@pytest.mark.parametrize(
-    ("shape", "count", "lost", "line_after"),
-    [
-        (ShapeName.SPIRAL, 5, [1], [0, 2, 3, 4, None]),
-        (ShapeName.SPIRAL, 5, [0, 1], [2, 3, 4, None, None]),
-        (ShapeName.SPIRAL, 5, [4], [0, 1, 2, 3, None]),
-        (ShapeName.LINES, 38, [3], [None, 0, 1, 2, 4]),
-        (ShapeName.LINES, 38, [7], [0, 1, 2, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, None]),
-        (ShapeName.SECTORS, 28, [2], [None, 0, 1, 3]),
-        (ShapeName.SECTORS, 28, [9], [0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, None]),
-    ],
-)
-def test_without_followers_a_line_closes_up_from_its_end_and_stays_in_one_piece(
-    shape: ShapeName, count: int, lost: list[int], line_after: list[int | None]
-) -> None:
-    """`line_after`: who holds the first places of a line, named by the place held before."""
-    pattern = fitted(count, DEMANDS, shape=shape, sectors_wanted=4)
+@pytest.mark.parametrize("shape", [ShapeName.SPIRAL, ShapeName.RING])
+def test_without_followers_the_plan_remains_when_uavs_are_lost(shape: ShapeName) -> None:
+    pattern = fitted(45, DEMANDS, shape=shape)
     assert pattern is not None
-    assert not pattern.followers
-    left = [place + 1 for place in range(count) if place not in lost]
-    planner, later_ns = planner_with(count, node=left[0]), 90 * S
-    planner.on_plan(plan_of(pattern, tuple(range(1, count + 1)), planner=1, start_us=0, deploy_ds=10))
-    for node in left:
-        planner.status(SearchStatus(later_ns // US, Enu(0, 0, 50), node, 1, 100), now_ns=later_ns)
-    assert planner.review(pattern, now_ns=later_ns)
+    fixed = pattern.dimensions.fixed
+    planner = planner_with(fixed, lost=range(2, fixed))
+    plan = plan_of(pattern, tuple(range(1, fixed + 1)) + (0,) * (45 - fixed), planner=1, start_us=0, deploy_ds=10)
+    planner.on_plan(plan)
+    for second in (1, 20, 200):
+        planner.review(pattern, now_ns=second * S)
+    assert planner.plan == plan
+
+
+def test_a_newcomer_gets_the_place_of_a_uav_only_when_that_one_has_been_lost_for_long() -> None:
+    planner, before, lost = planned(20)
+    planner._roll_call.lost.add(lost)
+    planner.review(formation(), now_ns=20 * S)
     assert planner.plan is not None
-    assert list(planner.plan.nodes[: len(line_after)]) == [0 if before is None else before + 1 for before in line_after]
-    assert sorted(node for node in planner.plan.nodes if node) == left
+    assert lost in planner.plan.nodes
+    for now_ns, has_one in ((40 * S, False), (80 * S, True)):
+        planner.status(SearchStatus(now_ns // US, Enu(0, 0, 50), 99, 0, 100), now_ns=now_ns)
+        planner.review(formation(), now_ns=now_ns)
+        assert (99 in planner.plan.nodes, lost in planner.plan.nodes) == (has_one, not has_one)
+    assert set(before.nodes) - {lost} < set(planner.plan.nodes)
 
 
 def test_only_the_lowest_id_that_is_alive_plans() -> None:
@@ -171,6 +180,7 @@ def test_who_flies_home_holds_no_place_any_more_from_when_it_says_so() -> None:
     planner.review(pattern, now_ns=S)
     before = planner.plan
     assert before is not None
+    planner.review(pattern, now_ns=2 * S)
     leaver, later_ns = before.nodes[3], 20 * S
     planner.status(SearchStatus(later_ns // US, Enu(0, 0, 50), leaver, 1, 0), now_ns=later_ns)
     planner.on_neighbor(leaver, Enu(0, 0, 50), now_ns=later_ns)  # its hellos are heard still
@@ -192,17 +202,8 @@ def test_a_planner_that_flies_home_leaves_planning_to_the_next() -> None:
     assert 1 not in second.plan.nodes
 
 
-def test_the_smaller_part_of_a_swarm_that_came_apart_makes_no_plan_of_its_own() -> None:
-    planner, pattern = planner_with(45), formation()
-    planner.review(pattern, now_ns=S)
-    later_ns = 90 * S
-    for node in range(1, 20):
-        planner.status(SearchStatus(later_ns // US, Enu(0, 0, 50), node, 1, 100), now_ns=later_ns)
-    assert not planner.review(pattern, now_ns=later_ns)
-
-
 def test_of_two_plans_the_newer_one_counts_and_of_equal_ones_that_of_the_lower_id() -> None:
-    listener = FormationPlanner(NodeId(9), expected=9, deploy_speed_m_s=9)
+    listener = planner_of(9, expected=9)
 
     def plan(revision: int, planner: int) -> Search:
         return Search(1, 100.0, 10.0, 50.0, 50.0, 7.5, 10, revision, planner, (1, 2, 3, 4), 2, 0, 0)
@@ -215,7 +216,9 @@ def test_of_two_plans_the_newer_one_counts_and_of_equal_ones_that_of_the_lower_i
 def test_the_number_of_a_plan_wraps_as_a_forged_one_may_be_the_greatest() -> None:
     planner, pattern = planner_with(45), formation()
     planner.on_plan(plan_of(pattern, tuple(range(1, 46)), planner=1, start_us=0, deploy_ds=10)._replace(revision=65535))
+    planner.review(pattern, now_ns=S)
     later_ns = 90 * S
+    planner._roll_call.lost.add(5)
     for node in range(1, 45):
         planner.status(SearchStatus(later_ns // US, Enu(0, 0, 50), node, 65535, 100), now_ns=later_ns)
     assert planner.review(pattern, now_ns=later_ns)
@@ -234,15 +237,18 @@ class Swarm:
         self.pattern = fitted(count, DEMANDS, shape=ShapeName.SPIRAL)
         self.planners = {node: self.fresh(node, count) for node in range(1, count + 1)}
         self.second = 0
+        self.lost: set[int] = set()
 
     def fresh(self, node: int, count: int) -> FormationPlanner:
-        return FormationPlanner(NodeId(node), expected=count, deploy_speed_m_s=9)
+        return planner_of(node, expected=count)
 
     def fly(self, seconds: int, *, deaf: Collection[int] = ()) -> None:
         """Let time pass; those who are `deaf` receive no plan."""
         for _ in range(seconds):
             self.second += 1
             now_ns = self.second * S
+            for planner in self.planners.values():
+                planner._roll_call.lost.update(self.lost)
             for node, sender in self.planners.items():
                 plan, place = sender.plan, Enu(20.0 * node, 0.0, 50.0)
                 status = SearchStatus(now_ns // US, place, node, plan.revision if plan else 0, 100)
@@ -271,12 +277,14 @@ def test_a_planner_that_restarts_follows_the_plan_of_the_others() -> None:
     swarm.planners[1] = swarm.fresh(1, 5)
     swarm.fly(60)
     assert swarm.plans == {plan}
+    swarm.planners[6] = swarm.fresh(6, 5)
+    swarm.lost.add(4)
     del swarm.planners[4]
     swarm.fly(90)
     (mended,) = swarm.plans
     assert mended is not None
     assert mended.planner == 1, "it plans again"
-    assert 4 not in mended.nodes
+    assert sorted(mended.nodes) == [1, 2, 3, 5, 6], "the newcomer has the place of the lost one"
 
 
 def test_a_new_planner_tells_the_plan_to_whom_the_lost_one_could_not_reach() -> None:
@@ -287,8 +295,9 @@ def test_a_new_planner_tells_the_plan_to_whom_the_lost_one_could_not_reach() -> 
     assert swarm.planners[7].plan is None
     for lost in (1, 4, 5, 6):
         del swarm.planners[lost]
+        swarm.lost.add(lost)
     swarm.fly(150)
-    assert swarm.plans == {plan}, "they are the smaller part, which makes no new plan"
+    assert swarm.plans == {plan}, "a loss changes no plan"
 
 
 def test_a_restarted_planner_whom_nobody_tells_the_plan_makes_one_that_replaces_it() -> None:

@@ -1,0 +1,85 @@
+"""Which UAVs of the plan are lost, by what this UAV hears and what its neighbors say in their hellos.
+
+    heard     the latest instant at which anybody is known to have heard a UAV; each hello tells them all on
+    lost      said by a UAV that has heard it itself until lately, when nobody is known to have heard it for some time;
+              it is told on with the instant at which the UAV was last heard, and a later one takes it back
+    away      a UAV that this one never heard itself is lost only after much longer, because news take a second a hop:
+              then it is cut off with a part of the swarm
+
+So all UAVs of a part agree within a second a hop on who is lost, without a leader.
+"""
+
+from typing import Final
+
+from fanet_mw.node.neighbors import neighbor_lifetime_ns
+from fanet_mw.units import NodeId, S
+from fanet_mw.wire.roll import LONG_AGO, ROLL_NS, Roll
+from fanet_mw.wire.search_plan import Search
+
+_SILENT_NS: Final = 3 * S
+"""How long nobody may have heard a UAV until its neighbors say that it is lost, at least; with rare hellos it is as
+long as a neighbor lasts."""
+_NEIGHBOR_NS: Final = 15 * S
+"""A UAV was a neighbor until lately if it was heard within this time."""
+_AWAY_NS: Final = 40 * S
+"""A UAV that was not a neighbor is lost after this time; news from the far end of a swarm are fresher."""
+_AHEAD: Final = 2
+"""An instant this many units ahead of the own clock is not believed."""
+
+
+class RollCall:
+    """The UAVs of the plan as one UAV knows them."""
+
+    def __init__(self, node: NodeId, *, hello_interval_s: float) -> None:
+        self._node = node
+        self._silent_ns = max(_SILENT_NS, neighbor_lifetime_ns(hello_interval_s))
+        self._heard: dict[int, int] = {}
+        """The latest instant at which each UAV is known to have been heard, in units of `ROLL_NS`."""
+        self._neighbor_ns: dict[int, int] = {}
+        """The instant at which this UAV last heard each other one itself."""
+        self.lost: set[int] = set()
+        """The UAVs that are lost."""
+
+    def on_hello(self, node: int, *, now_ns: int) -> None:
+        """A neighbor was heard."""
+        self._neighbor_ns[node] = now_ns
+        self._take(node, now_ns // ROLL_NS, lost=False)
+
+    def on_roll(self, roll: Roll, plan: Search | None, *, now_ns: int) -> None:
+        """A neighbor tells on what it knows; of another plan than the own one it is not understood."""
+        if plan is None or (roll.planner, roll.revision) != (plan.planner, plan.revision):
+            return
+        if roll.at > now_ns // ROLL_NS + _AHEAD:
+            return
+        for place, node in enumerate(plan.nodes):
+            if node not in (0, self._node) and roll.ages[place] < LONG_AGO:
+                self._take(node, roll.at - roll.ages[place], lost=place in roll.lost)
+
+    def _take(self, node: int, heard: int, *, lost: bool) -> None:
+        known = self._heard.get(node)
+        if known is None or heard > known:
+            self._heard[node] = heard
+            (self.lost.add if lost else self.lost.discard)(node)
+        elif lost and heard == known:
+            self.lost.add(node)
+
+    def review(self, plan: Search, *, since_ns: int, now_ns: int) -> None:
+        """Find who is lost, to be called about once a second; `since_ns`: the instant at which this UAV began to follow
+        the plan, before which nobody need have been heard.
+        """
+        for node in plan.nodes:
+            if node in (0, self._node) or node in self.lost:
+                continue
+            silent_ns = now_ns - self._heard.get(node, since_ns // ROLL_NS) * ROLL_NS
+            near = now_ns - self._neighbor_ns.get(node, -_NEIGHBOR_NS) < _NEIGHBOR_NS
+            if silent_ns > (self._silent_ns if near else _AWAY_NS):
+                self.lost.add(node)
+                self._heard.setdefault(node, since_ns // ROLL_NS)
+
+    def roll(self, plan: Search, *, now_ns: int) -> Roll:
+        """What this UAV tells its neighbors in its next hello."""
+        at = now_ns // ROLL_NS
+        heard = {**self._heard, self._node: at}
+        ages = tuple(min(LONG_AGO, max(0, at - heard[node])) if node in heard else LONG_AGO for node in plan.nodes)
+        lost = frozenset(place for place, node in enumerate(plan.nodes) if node in self.lost)
+        return Roll(at, plan.planner, plan.revision, ages, lost)

@@ -1,0 +1,121 @@
+"""The formation `ring`: all UAVs on a square about the middle of the area that grows to its edges, and back, and again.
+
+    o---o---o---o---o     neighbors along the square stay within radio reach, so any two UAVs are connected by two ways:
+    |               |     the loss of any one of them separates nobody
+    o               o
+    |               |     while the square is small, every second UAV far from a corner may leave it for a survivor, as
+    o               o     those beside it reach each other; one near a corner would not catch up with it
+    |               |
+    o---o---o---o---o     every side has the same number of UAVs; up to three that are left over fly behind the ring
+
+The words place, lane, team, relay and follower are explained in `contract.py`; a ring is one team, and has no relays.
+"""
+
+import math
+from typing import Final
+
+from agents.mission.search_formation.shapes.contract import (
+    FOLLOW_M,
+    FOLLOWER_HIGHER_M,
+    Demands,
+    Dimensions,
+    RowKind,
+    RowOfPlaces,
+    ShapeName,
+    swept_m,
+)
+from fanet_mw.units import Enu
+
+_EDGE_M: Final = 60.0
+"""The distance from the edge of the area at which the ring turns, at most a quarter of half the area's side."""
+_FIRST_M: Final = 45.0
+"""The distance of two neighbors along the square when it begins to grow, if it is no larger than `_INNER` then."""
+_INNER: Final = 0.8
+"""At first the middle is within this share of the radio's reach from the ring, so that UAVs may leave it for survivors
+there."""
+_BEHIND: Final = 0.4
+"""At first a follower is at this share of the ring's half-side, to receive what lies in the middle."""
+_CORNERS: Final = 4
+_CATCHES_UP: Final = 0.6
+"""A UAV within this share of half a side from its middle catches up with the ring when it has left it."""
+_SLOWER: Final = 1.27 / math.sqrt(2)
+"""The speed of the sides, as a multiple of the speed of the sweep; the corners are faster by the root of 2."""
+
+
+class Ring:
+    """The positions of the places of one ring."""
+
+    def __init__(self, formation: Dimensions, *, most_m: float = math.inf) -> None:
+        """`most_m`: the greatest half-side that the UAVs that are left can span."""
+        self._formation = formation
+        self._most_m = most_m
+        self._followers = range(formation.fixed, formation.places)
+
+    @property
+    def sweep_s(self) -> float:
+        return (self._formation.last_m - self._formation.first_m) / (self._formation.speed_m_s * _SLOWER)
+
+    @property
+    def lane_m(self) -> float:
+        return 8 * self._formation.last_m / self._formation.lanes
+
+    def at(self, place: float, swept_s: float) -> Enu:
+        formation = self._formation
+        half_m, up_m = self._half_m(swept_s), formation.height_m
+        along = float(place)
+        if place in self._followers:
+            half_m = max(half_m - FOLLOW_M, _BEHIND * formation.first_m)
+            along, up_m = formation.follower(int(place))[1] * formation.lanes, up_m + FOLLOWER_HIGHER_M
+        side, share = self._side(along)
+        east, north = ((1.0, share), (-share, 1.0), (-1.0, -share), (share, -1.0))[side]
+        return Enu(half_m * east, half_m * north, up_m)
+
+    def _side(self, place: float) -> tuple[int, float]:
+        """The side of a place, and where on it the place is, from -1 to 1."""
+        side, on_side = divmod(place, self._formation.lanes / _CORNERS)
+        return int(side) % _CORNERS, 2 * on_side * _CORNERS / self._formation.lanes - 1
+
+    def tethers(self, place: int) -> tuple[int, ...]:
+        lanes = self._formation.lanes
+        if place >= lanes:
+            return ()
+        return tuple(sorted({(place - 1) % lanes, (place + 1) % lanes} - {place}))
+
+    def rows(self) -> tuple[RowOfPlaces, ...]:
+        return (RowOfPlaces(0, self._formation.lanes, RowKind.AROUND),)
+
+    def drawn_in(self, left: tuple[int, ...], hop_m: float) -> "Ring":
+        return Ring(self._formation, most_m=left[0] * hop_m / 8)
+
+    def may_leave(self, place: float, swept_s: float, *, reach_m: float, left: int) -> bool:
+        """True while a UAV at this place may leave the ring if those beside it do not, with so many that are left."""
+        _, share = self._side(place)
+        return abs(share) <= _CATCHES_UP and self._half_m(swept_s) <= left * reach_m / 16
+
+    def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
+        half_m = self._half_m(swept_s)
+        off_e, off_n = abs(east_m) - half_m, abs(north_m) - half_m
+        if off_e <= 0 and off_n <= 0:
+            return -max(off_e, off_n)
+        return math.hypot(max(off_e, 0.0), max(off_n, 0.0))
+
+    def _half_m(self, swept_s: float) -> float:
+        formation = self._formation
+        slower = formation._replace(speed_m_s=formation.speed_m_s * _SLOWER)
+        return min(self._most_m, swept_m(slower, swept_s, back=1.0))
+
+
+def fitted(count: int, demands: Demands) -> Dimensions | None:
+    """The ring of this number of UAVs; None if they are too few to span the edge of the area."""
+    half = demands.area_m / 2
+    edge = min(_EDGE_M, half / 4, demands.seen_m / 2)
+    last = half - edge
+    apart_m = min(demands.hop_m, 2 * math.sqrt(demands.seen_m**2 - edge**2))
+    of_side = count // _CORNERS
+    if of_side < 2 or of_side * apart_m < 2 * last:
+        return None
+    lanes = of_side * _CORNERS
+    first = min(lanes * _FIRST_M / 8, _INNER * demands.reach_m, last / 2)
+    return Dimensions(
+        lanes, 0, count - lanes, half, first, last, demands.height_m, demands.speed_m_s, ShapeName.RING, 1
+    )

@@ -3,7 +3,8 @@
     degraded   power x 10^(-loss_db / 10); below the sensitivity the link is gone; a share of what is received is lost
     jammed     the noise at receivers inside is higher, or nothing is received there; a jammer is not sensed (the clear
                channel assessment of 802.11-2020, 16.3.8.5, mode 2 looks for signals, not for energy)
-    cut        no power to or from the node
+    cut        no power to or from the node; if it is only mute or deaf, in one direction
+    partition  no power between stations on different sides
 
 A link that would be audible without its faults is marked with the gravest of them, and frames that it loses because
 they are too weak count as lost to that fault. Frames in flight keep the power with which they started. Not modeled:
@@ -20,13 +21,24 @@ import numpy.typing as npt
 
 from emulator.channel.propagation import LinkTable, milliwatt, noise_mw
 from emulator.kernel import state as s
-from fanet_mw.bus.radio_control import EVERY, Control, Cut, Degrade, Fault, Jam, Restore, wrong
+from fanet_mw.bus.radio_control import (
+    EVERY,
+    Control,
+    Cut,
+    Degrade,
+    Fault,
+    Jam,
+    Mishap,
+    Partition,
+    Restore,
+    kind_of,
+    wrong,
+)
 from fanet_mw.scenario import Radio
 from fanet_mw.trace import RadioFault
 
 MAX_FAULTS: Final = 1024
 """The greatest number of faults in force at the same time; further ones are refused."""
-_KINDS: Final = {Degrade: "degrade", Jam: "jam", Cut: "cut"}
 
 
 class _FaultInForce(NamedTuple):
@@ -49,10 +61,6 @@ class Faults:
         for at_ns, control in planned:
             self._push(at_ns, control)
         self.records: list[RadioFault] = []
-
-    def cut_off(self) -> frozenset[int]:
-        """The stations whose radio is off."""
-        return frozenset(item.fault.node - 1 for item in self._standing.values() if isinstance(item.fault, Cut))
 
     def next_ns(self) -> int | None:
         """The instant at which the next fault begins or ends by itself; None if there is none."""
@@ -105,9 +113,9 @@ class Faults:
         return self._number
 
     def _note(self, fault: Fault, now_ns: int, *, active: bool) -> None:
-        node = fault.node if isinstance(fault, Cut) else fault.src if isinstance(fault, Degrade) else 0
+        node = fault.node if isinstance(fault, Cut | Mishap) else fault.src if isinstance(fault, Degrade) else 0
         other = fault.dst if isinstance(fault, Degrade) else 0
-        self.records.append(RadioFault(now_ns, node, other, _KINDS[type(fault)], fault.label, active))
+        self.records.append(RadioFault(now_ns, node, other, kind_of(fault), fault.label, active))
 
     # --- the effect on links and noise ----------------------------------------------------------------------------
 
@@ -125,9 +133,11 @@ class Faults:
         for fault in faults:
             if isinstance(fault, Jam):
                 noise += self._jam(links, at, fault)
-        cut = self.cut_off()
-        if cut:
-            self._cut(links, sorted(cut))
+        for fault in faults:
+            if isinstance(fault, Cut):
+                self._cut(links, fault)
+            elif isinstance(fault, Partition):
+                self._part(links, at, fault)
         if faults:
             links.sort_dead_last()
         return noise
@@ -161,13 +171,27 @@ class Faults:
             return np.zeros(self._stations)
         return np.where(inside, milliwatt(fault.noise_dbm), 0.0)
 
-    def _cut(self, links: LinkTable, cut: list[int]) -> None:
-        off = np.zeros(self._stations, bool)
-        off[cut] = True
-        count = links.count
-        hit = off[links.ints[s.LINK_SRC, :count]] | off[links.ints[s.LINK_DST, :count]]
-        audible = hit & ((links.ints[s.AUDIBLE, :count] == 1) | (links.ints[s.FAULT, :count] != 0))
-        links.ints[s.FAULT, :count][audible] = s.FATE_CUT
-        links.ints[s.AUDIBLE, :count][hit] = 0
-        links.reals[s.LINK_POWER, :count][hit] = 0.0
-        links.reals[s.SPARED, :count][hit] = 0.0
+    def _cut(self, links: LinkTable, fault: Cut) -> None:
+        src, dst = (links.ints[row, : links.count] == fault.node - 1 for row in (s.LINK_SRC, s.LINK_DST))
+        _silence(links, (src & (not fault.sends)) | (dst & (not fault.hears)))
+
+    def _part(self, links: LinkTable, at: npt.NDArray[np.float64], fault: Partition) -> None:
+        if fault.group:
+            side = np.zeros(self._stations, bool)
+            side[[node - 1 for node in fault.group]] = True
+        else:
+            east, north, other_east, other_north = fault.line_m
+            with np.errstate(invalid="ignore"):  # a station of unknown position has no links
+                cross = (other_east - east) * (at[:, 1] - north) - (other_north - north) * (at[:, 0] - east)
+            side = cross > 0
+        _silence(links, side[links.ints[s.LINK_SRC, : links.count]] != side[links.ints[s.LINK_DST, : links.count]])
+
+
+def _silence(links: LinkTable, hit: npt.NDArray[np.bool_]) -> None:
+    """Let no power pass over these links of the table."""
+    count = links.count
+    audible = hit & ((links.ints[s.AUDIBLE, :count] == 1) | (links.ints[s.FAULT, :count] != 0))
+    links.ints[s.FAULT, :count][audible] = s.FATE_CUT
+    links.ints[s.AUDIBLE, :count][hit] = 0
+    links.reals[s.LINK_POWER, :count][hit] = 0.0
+    links.reals[s.SPARED, :count][hit] = 0.0

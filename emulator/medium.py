@@ -18,7 +18,7 @@ from emulator.pcap import Capture
 from emulator.requests import NUMBER_MASK, FrameSlots, RequestNumbers
 from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import Message, Obstructions, Poses, Reception, TxOutcome, TxRequest, TxStatus
-from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
+from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Mishap, Partition, Restore
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import DropReason
 from fanet_mw.scenario import Scenario
@@ -86,7 +86,9 @@ class Medium(Actor):
             self._place(message)
         elif isinstance(message, Obstructions):
             self._obstruct(message)
-        elif topic == self._topics.radio_control and isinstance(message, Degrade | Jam | Cut | Restore):
+        elif topic == self._topics.radio_control and isinstance(
+            message, Degrade | Jam | Cut | Partition | Mishap | Restore
+        ):
             self.wake(now_ns)
             why = self._kernel.faults.obey(message, self._now_ns)
             self._counters.controls += why is None

@@ -38,7 +38,7 @@ from fanet_mw.bus.messages import (
     Voice,
     WifiScan,
 )
-from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
+from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Mishap, MishapKind, Partition, Restore
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.units import Enu, NodeId
 
@@ -54,7 +54,9 @@ _CLOCK = struct.Struct("<qdBqQIq")
 _INSTANT = struct.Struct("<q")
 _DEGRADE = struct.Struct("<HHBddq")
 _JAM = struct.Struct("<5dq")
-_CUT = struct.Struct("<Hq")
+_CUT = struct.Struct("<Hq2B")
+_PARTITION = struct.Struct("<4dqH")
+_MISHAP = struct.Struct("<HB3dq")
 _LINKS = struct.Struct("<qqI")
 
 
@@ -178,12 +180,35 @@ def _decode_jam(body: bytes) -> Jam:
 
 
 def _encode_cut(m: Cut) -> bytes:
-    return _CUT.pack(m.node, m.for_ns) + m.label.encode()
+    return _CUT.pack(m.node, m.for_ns, m.sends, m.hears) + m.label.encode()
 
 
 def _decode_cut(body: bytes) -> Cut:
-    node, for_ns = _CUT.unpack_from(body)
-    return Cut(body[_CUT.size :].decode(), NodeId(node), for_ns)
+    node, for_ns, sends, hears = _CUT.unpack_from(body)
+    return Cut(body[_CUT.size :].decode(), NodeId(node), for_ns, bool(sends), bool(hears))
+
+
+def _encode_partition(m: Partition) -> bytes:
+    return _PARTITION.pack(*m.line_m, m.for_ns, len(m.group)) + array("H", m.group).tobytes() + m.label.encode()
+
+
+def _decode_partition(body: bytes) -> Partition:
+    *line_m, for_ns, count = _PARTITION.unpack_from(body)
+    group, end = array("H"), _PARTITION.size + 2 * count
+    if len(body) < end:
+        raise ValueError("length")
+    group.frombytes(body[_PARTITION.size : end])
+    east, north, other_east, other_north = line_m
+    return Partition(body[end:].decode(), tuple(map(NodeId, group)), (east, north, other_east, other_north), for_ns)
+
+
+def _encode_mishap(m: Mishap) -> bytes:
+    return _MISHAP.pack(m.node, m.what, *m.value, m.for_ns) + m.label.encode()
+
+
+def _decode_mishap(body: bytes) -> Mishap:
+    node, what, east, north, up, for_ns = _MISHAP.unpack_from(body)
+    return Mishap(body[_MISHAP.size :].decode(), NodeId(node), MishapKind(what), Enu(east, north, up), for_ns)
 
 
 def _encode_restore(m: Restore) -> bytes:
@@ -238,11 +263,14 @@ _CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[byte
     22: (Inertial, sensor_codecs.encode_inertial, sensor_codecs.decode_inertial),
     23: (Battery, sensor_codecs.encode_battery, sensor_codecs.decode_battery),
     24: (CameraImage, sensor_codecs.encode_image, sensor_codecs.decode_image),
+    25: (Partition, _encode_partition, _decode_partition),
+    26: (Mishap, _encode_mishap, _decode_mishap),
 }
 HEADS: Final[dict[type[Any], tuple[struct.Struct, ...]]] = {
     TxRequest: (_TX,), Reception: (_RX,), TxStatus: (_STATUS,), Poses: (_POSES,), Setpoint: (_SETPOINT,),
     MavlinkTap: (_INSTANT,), TraceBatch: (), ClockEpoch: (_CLOCK,), Report: (_INSTANT,), Degrade: (_DEGRADE,),
-    Jam: (_JAM,), Cut: (_CUT,), Restore: (), LinkStats: (_LINKS,), Obstructions: (_OBSTRUCTIONS,),
+    Jam: (_JAM,), Cut: (_CUT,), Partition: (_PARTITION,),
+    Mishap: (_MISHAP,), Restore: (), LinkStats: (_LINKS,), Obstructions: (_OBSTRUCTIONS,),
     **sensor_codecs.HEADS,
 }  # fmt: skip
 """The structs of each kind: that of its head, and that of each row for kinds with rows."""

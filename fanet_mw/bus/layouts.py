@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 from fanet_mw.bus import messages as m
 from fanet_mw.bus.codecs import CODES, HEADS
 from fanet_mw.bus.link_stats import COUNTS, LOSSES, LinkStats
-from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
+from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Mishap, Partition, Restore
 
 TYPES: Final = {
     "B": "uint8", "H": "uint16", "I": "uint32", "Q": "uint64", "q": "int64", "f": "float32", "d": "float64",
@@ -59,7 +59,12 @@ NAMED: Final[dict[type[Any], Names]] = {
     m.Report: Names("report/<name>", "t_ns", "UTF-8: the name, a line feed, a JSON object"),
     Degrade: Names("radio/control", "src dst both loss_db loss_share for_ns", "the label, UTF-8"),
     Jam: Names("radio/control", f"{_VECTOR} radius_m noise_dbm for_ns", "the label, UTF-8"),
-    Cut: Names("radio/control", "node for_ns", "the label, UTF-8"),
+    Cut: Names("radio/control", "node for_ns sends hears", "the label, UTF-8"),
+    Partition: Names(
+        "radio/control", "east_m north_m other_east_m other_north_m for_ns count",
+        "`count` x uint16: the nodes on one side; the label, UTF-8",
+    ),
+    Mishap: Names("radio/control", f"node what {_VECTOR} for_ns", "the label, UTF-8"),
     Restore: Names("radio/control", "", "the label, UTF-8; empty: all faults"),
     LinkStats: Names(
         "radio/links", "t_ns span_ns count",

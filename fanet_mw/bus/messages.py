@@ -12,7 +12,7 @@ from enum import IntEnum
 from typing import Final, NamedTuple
 
 from fanet_mw.bus.link_stats import LinkStats
-from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
+from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Mishap, Partition, Restore
 from fanet_mw.trace import Record
 from fanet_mw.units import STILL, Enu, NodeId, S
 
@@ -310,6 +310,8 @@ Message = (
     | Degrade
     | Jam
     | Cut
+    | Partition
+    | Mishap
     | Restore
     | LinkStats
 )

@@ -1,13 +1,15 @@
-"""Faults of the air that can be set while a swarm runs: a degraded link, a jammed area, a node that is cut off.
+"""Faults that can be set while a swarm runs: a degraded link, a jammed area, a partition, a node that is cut off, mute
+or deaf, and a UAV that crashes, loses charge, is told wrong positions, or whose program stops.
 
 Each fault has a label. A new fault replaces one with the same label, and `Restore` ends one fault or all. A fault lasts
 for `for_ns` from the instant at which the medium receives it; 0 means until it is restored. The same types are the
-messages on `fanet/<s>/radio/control` and the entries of a scenario's `[[faults]]`; the medium checks each with `wrong`.
-Not modeled: faults of the bus, and of a node's processor.
+messages on `fanet/<s>/radio/control` and the entries of a scenario's `[[faults]]`; the medium checks each with `wrong`,
+and records it. What befalls a UAV (`Mishap`) the world or its host brings about. Not modeled: faults of the bus.
 """
 
 import math
-from typing import Final, NamedTuple
+from enum import IntEnum
+from typing import Final, NamedTuple, assert_never
 
 from fanet_mw.units import Enu, NodeId, S
 
@@ -54,10 +56,51 @@ class Jam(NamedTuple):
 
 
 class Cut(NamedTuple):
-    """The radio of a node is off: it neither sends nor receives, and no station senses it."""
+    """The radio of a node is off: it neither sends nor receives, and no station senses it; or only one of the two."""
 
     label: str
     node: NodeId
+    for_ns: int = 0
+    sends: bool = False
+    """True if it is deaf only: others receive what it sends."""
+    hears: bool = False
+    """True if it is mute only: it receives what others send."""
+
+
+class Partition(NamedTuple):
+    """Stations on different sides of a line, or inside and outside of a group, do not receive or sense each other."""
+
+    label: str
+    group: tuple[NodeId, ...]
+    """The nodes on one side; none if a line on the map parts them."""
+    line_m: tuple[float, float, float, float]
+    """East and north of two points of that line, wherever the UAVs are at each instant."""
+    for_ns: int = 0
+
+
+class MishapKind(IntEnum):
+    """What can befall a UAV; in lower case the kinds of `[[faults]]`, but for `GPS_OFF`."""
+
+    CRASH = 0
+    """Its motors stop; its radio dies when it hits the ground."""
+    BATTERY = 1
+    """Its battery has no more than this share of its charge left."""
+    GPS = 2
+    """Its receiver is wrong by an offset."""
+    GPS_OFF = 3
+    """Its receiver gives no position."""
+    STOP = 4
+    """Its program has ended; it is started anew when the fault ends."""
+
+
+class Mishap(NamedTuple):
+    """Something befalls a UAV other than on the air."""
+
+    label: str
+    node: NodeId
+    what: MishapKind
+    value: Enu
+    """East, north and up of an offset [m], or the share of the charge as `east`."""
     for_ns: int = 0
 
 
@@ -67,8 +110,25 @@ class Restore(NamedTuple):
     label: str
 
 
-Fault = Degrade | Jam | Cut
-Control = Degrade | Jam | Cut | Restore
+Fault = Degrade | Jam | Cut | Partition | Mishap
+Control = Fault | Restore
+
+
+def kind_of(fault: Fault) -> str:
+    """The kind of a fault in the trace, which is that of `[[faults]]`."""
+    match fault:
+        case Degrade():
+            return "degrade"
+        case Jam():
+            return "jam"
+        case Partition():
+            return "partition"
+        case Mishap():
+            return "gps" if fault.what is MishapKind.GPS_OFF else fault.what.name.lower()
+        case Cut():
+            return "deaf" if fault.sends else "mute" if fault.hears else "cut"
+        case _:
+            assert_never(fault)
 
 
 def link_label(src: int, dst: int) -> str:
@@ -83,13 +143,17 @@ def node_label(node: int) -> str:
 
 JAM_LABEL: Final = "jam"
 """The default label of a jammed area."""
+PARTITION_LABEL: Final = "partition"
+"""The default label of a partition."""
 
 
 def nodes_of(fault: Fault) -> tuple[int, ...]:
     """The nodes that a fault names."""
     if isinstance(fault, Degrade):
         return () if fault.src == fault.dst == EVERY else (fault.src, fault.dst)
-    return (fault.node,) if isinstance(fault, Cut) else ()
+    if isinstance(fault, Partition):
+        return fault.group
+    return (fault.node,) if isinstance(fault, Cut | Mishap) else ()
 
 
 def wrong(fault: Fault, *, count: int) -> str | None:
@@ -111,6 +175,14 @@ def wrong(fault: Fault, *, count: int) -> str | None:
             and all(abs(value) <= MAX_RADIUS_M for value in fault.center)
             and (-MAX_LOSS_DB <= noise_dbm <= MAX_NOISE_DBM or noise_dbm == math.inf)
         )
+    elif isinstance(fault, Partition):
+        east, north, other_east, other_north = fault.line_m
+        fine = bool(fault.group) or (
+            all(abs(value) <= MAX_RADIUS_M for value in fault.line_m) and (east, north) != (other_east, other_north)
+        )
+    elif isinstance(fault, Mishap):
+        share = fault.what is not MishapKind.BATTERY or 0 <= fault.value.east <= 1
+        fine = share and all(abs(value) <= MAX_RADIUS_M for value in fault.value)
     else:
-        fine = True
+        fine = not (fault.sends and fault.hears)
     return None if fine else "fault_value"

@@ -2,7 +2,7 @@
 
 fanet/<swarm>/radio/<id>/tx          TxRequest              node -> medium
 fanet/<swarm>/radio/<id>/rx          Reception | TxStatus   medium -> node
-fanet/<swarm>/radio/control          Degrade | Jam | Cut | Restore   anyone -> medium
+fanet/<swarm>/radio/control          Degrade | Jam | Cut | Partition | Mishap | Restore   anyone -> medium, world
 fanet/<swarm>/radio/links            LinkStats              medium -> observers
 fanet/<swarm>/world/pose             Poses
 fanet/<swarm>/world/obstruction      Obstructions

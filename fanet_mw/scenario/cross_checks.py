@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
 from fanet_mw import airtime  # whole: it imports this package, and may be the first to be imported
-from fanet_mw.bus.radio_control import EVERY, Degrade, Restore, nodes_of
+from fanet_mw.bus.radio_control import EVERY, Degrade, Mishap, MishapKind, Partition, Restore, nodes_of
 from fanet_mw.units import MS, US
 
 if TYPE_CHECKING:
@@ -334,4 +334,9 @@ def _impossible_faults(scenario: Scenario) -> Sequence[str]:
             found.append(f"faults.{index} names node {unknown[0]}, which must be <= nodes.count = {count}")
         if isinstance(control, Degrade) and control.src == control.dst != EVERY:
             found.append(f"faults.{index}: src = dst = {control.src} is no link")
+        if isinstance(control, Partition) and set(control.group) >= set(scenario.node_ids):
+            found.append(f"faults.{index}: nodes names all {count} nodes, which leaves nobody on the other side")
+        drains = scenario.sensors.battery_hz > 0 or scenario.world.engine == "rotors"
+        if isinstance(control, Mishap) and control.what is MishapKind.BATTERY and not drains:
+            found.append(f'faults.{index}: kind = "battery" needs sensors.battery_hz > 0')
     return found

@@ -8,10 +8,14 @@ from cyclopts import App, Parameter
 
 from fanet_mw.bus.radio_control import (
     JAM_LABEL,
+    PARTITION_LABEL,
     Control,
     Cut,
     Degrade,
     Jam,
+    Mishap,
+    MishapKind,
+    Partition,
     Restore,
     link_label,
     node_label,
@@ -19,7 +23,7 @@ from fanet_mw.bus.radio_control import (
     wrong,
 )
 from fanet_mw.errors import ConfigError
-from fanet_mw.units import MAX_NODES, Enu, NodeId, S, seconds_to_ns
+from fanet_mw.units import MAX_NODES, STILL, Enu, NodeId, S, seconds_to_ns
 from sim.cli.command_groups import RUNNING
 from sim.cli.console import Console
 from sim.cli.options import SwarmFlags
@@ -27,7 +31,8 @@ from sim.cli.options import SwarmFlags
 app = App(
     name="air",
     group=RUNNING,
-    help="Change the air of a swarm that runs: degrade a link, jam an area, cut a node off, restore.",
+    help="Change the air of a swarm that runs, or let something befall a UAV: degrade a link, jam an area, part the "
+    "swarm, cut a node off, let one crash, restore.",
 )
 
 
@@ -118,6 +123,111 @@ def cut(node: int, *, life: Life = Life(), where: SwarmFlags = SwarmFlags()) -> 
 
     """
     return _do(Cut(life.label or node_label(node), NodeId(node), life.for_ns), where)
+
+
+@app.command
+def mute(node: int, *, life: Life = Life(), where: SwarmFlags = SwarmFlags()) -> int:
+    """Let a node's radio receive, and send nothing.
+
+    Parameters
+    ----------
+    node
+        Node id.
+
+    """
+    return _do(Cut(life.label or node_label(node), NodeId(node), life.for_ns, hears=True), where)
+
+
+@app.command
+def deaf(node: int, *, life: Life = Life(), where: SwarmFlags = SwarmFlags()) -> int:
+    """Let a node's radio send, and receive nothing.
+
+    Parameters
+    ----------
+    node
+        Node id.
+
+    """
+    return _do(Cut(life.label or node_label(node), NodeId(node), life.for_ns, sends=True), where)
+
+
+@app.command
+def partition(
+    east_m: float,
+    north_m: float,
+    other_east_m: float,
+    other_north_m: float,
+    *,
+    life: Life = Life(),
+    where: SwarmFlags = SwarmFlags(),
+) -> int:
+    """Let no frame pass a line on the map.
+
+    Parameters
+    ----------
+    east_m
+        East of one point of the line [m].
+    north_m
+        North of that point [m].
+    other_east_m
+        East of another point of the line [m].
+    other_north_m
+        North of that point [m].
+
+    """
+    line = (east_m, north_m, other_east_m, other_north_m)
+    return _do(Partition(life.label or PARTITION_LABEL, (), line, life.for_ns), where)
+
+
+@app.command
+def crash(node: int, *, where: SwarmFlags = SwarmFlags()) -> int:
+    """Let a UAV's motors stop for good; its radio dies on the ground.
+
+    Parameters
+    ----------
+    node
+        Node id.
+
+    """
+    return _do(Mishap(node_label(node), NodeId(node), MishapKind.CRASH, STILL), where)
+
+
+@app.command
+def battery(node: int, charge: float, *, where: SwarmFlags = SwarmFlags()) -> int:
+    """Take charge from a UAV's battery.
+
+    Parameters
+    ----------
+    node
+        Node id.
+    charge
+        Share of the capacity that is left, at most.
+
+    """
+    return _do(Mishap(node_label(node), NodeId(node), MishapKind.BATTERY, Enu(charge, 0.0, 0.0)), where)
+
+
+@app.command
+def gps(
+    node: int,
+    *,
+    offset_m: tuple[float, float, float] | None = None,
+    life: Life = Life(),
+    where: SwarmFlags = SwarmFlags(),
+) -> int:
+    """Let a UAV's GPS receiver give no position, or a wrong one.
+
+    Parameters
+    ----------
+    node
+        Node id.
+    offset_m
+        By how much it is wrong: east, north, up [m]; by default it gives no position.
+
+    """
+    what = MishapKind.GPS_OFF if offset_m is None else MishapKind.GPS
+    value = STILL if offset_m is None else Enu(*offset_m)
+    return _do(Mishap(life.label or node_label(node), NodeId(node), what, value, life.for_ns), where)
 
 
 @app.command

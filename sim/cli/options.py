@@ -55,6 +55,8 @@ class ScenarioFlags:
     """Seed of every random stream of the run."""
     duration: Annotated[float | None, Parameter(converter=_seconds)] = None
     """Simulated time to run [s]; or with a unit, for example 2min."""
+    faults: str | None = None
+    """random:N lets N UAVs crash, fall mute, or lose their program, drawn by the seed; added to the scenario's."""
 
     def scenario(self, name: str) -> "Scenario":
         """The scenario with these changes."""
@@ -65,7 +67,12 @@ class ScenarioFlags:
             overrides.append(f"seed={self.seed}")
         if self.duration is not None:
             overrides.append(f"duration_s={self.duration}")
-        return catalog.find(name, overrides)
+        found = catalog.find(name, overrides)
+        if self.faults is None:
+            return found
+        from fanet_mw.scenario.drawn_faults import with_drawn_faults
+
+        return with_drawn_faults(found, self.faults)
 
     def realtime_scenario(self, name: str) -> "Scenario":
         """The scenario for real processes. They cannot announce frames without a lead, so a lead of 0 is replaced."""

@@ -52,8 +52,8 @@ from sim.world.sensors.phone import REFERENCE_LOSS_DB
 
 _HOMEWARD: Final = frozenset({"return", "done", "land"})
 """The mission modes of a UAV that has left the search."""
-_OFF_AIR: Final = frozenset({"cut", "mute", "deaf"})
-"""The faults of a radio that take its UAV out of the network."""
+_OFF_AIR: Final = frozenset({"cut", "mute", "deaf", "stop", "crash"})
+"""The faults that take a UAV out of the network."""
 _WRECKED: Final = "fallen"
 _RETURNING: Final = "return"
 """The flight mode of a UAV that its flight controller brings home."""

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from signal import Signals
 from typing import Final
@@ -25,6 +26,7 @@ from sim.run.collecting.trace_log import TraceLog
 from sim.run.garbage import GARBAGE
 from sim.run.huge_pages import HugePages
 from sim.run.outcome import Outcome
+from sim.run.stoppable_uav import StoppableUav, planned_stops
 from sim.world.environment.map_on_board import map_on_board
 from sim.world.mobility.layout import positions
 from sim.world.world import WorldActor
@@ -54,18 +56,22 @@ def actors_of(
 ) -> list[Actor]:
     """All actors of a swarm: the world comes first, so that poses are known before any node transmits."""
     starts, onboard_map, reader = positions(scenario), map_on_board(scenario), Reader()
-    uavs = [
-        make_uav(
+
+    def uav(node: int) -> Actor:
+        return make_uav(
             scenario,
-            NodeId(n),
+            NodeId(node),
             swarm,
-            position=starts[n - 1],
-            applications=applications(n),
+            position=starts[node - 1],
+            applications=applications(node),
             onboard_map=onboard_map,
             reader=reader,
         )
-        for n in scenario.node_ids
-    ]
+
+    uavs = []
+    for n in scenario.node_ids:
+        stops = planned_stops(scenario, n)
+        uavs.append(StoppableUav(partial(uav, n), stops) if stops else uav(n))
     return [WorldActor(scenario, swarm), Medium(scenario, swarm, capture=capture), *uavs]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import Message, Poses, Setpoint
-from fanet_mw.bus.radio_control import Cut
+from fanet_mw.bus.radio_control import Cut, Mishap, MishapKind, Restore
 from fanet_mw.bus.topics import Topics, node_of
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Scenario
@@ -29,6 +29,7 @@ from sim.world.environment.survivors import Survivors
 from sim.world.environment.wind import Wind
 from sim.world.flight_recorder import SwarmFlight
 from sim.world.incidents.incidents import Incidents
+from sim.world.incidents.mishaps import Mishaps
 from sim.world.mobility.guidance import Guidance, makes_sense
 from sim.world.mobility.layout import positions
 from sim.world.mobility.position_estimate import PositionEstimate
@@ -79,7 +80,7 @@ class WorldActor(Actor):
     def __init__(self, scenario: Scenario, swarm: str, *, flight: SwarmFlight | None = None) -> None:
         """`flight`: the state in which an earlier world has ended; None if this is the first."""
         topics = Topics(swarm)
-        super().__init__("world", (topics.all_setpoints,))
+        super().__init__("world", (topics.all_setpoints, topics.radio_control))
         self._scenario = scenario
         self._topics = topics
         self._ids = array("H", scenario.node_ids)
@@ -98,11 +99,14 @@ class WorldActor(Actor):
         drained = scenario.sensors.battery_hz > 0 or scenario.world.engine == "rotors"
         self._drain = BatteryDrain(scenario) if drained else None
         survivors = Survivors(scenario, solids.ground_m)
-        gps = GpsReceiver(scenario)
+        self._mishaps = Mishaps(scenario)
+        gps = GpsReceiver(scenario, self._mishaps)
         self._suite = Suite(scenario, sensors_of(scenario, survivors, solids, self._drain, solid, gps), topics)
         self._estimate = PositionEstimate(scenario, gps) if scenario.world.navigation == "estimated" else None
         self._flies = np.ones(len(self._ids), bool)
         """The UAVs that have not crashed."""
+        self._falling: set[int] = set()
+        """The UAVs that fall by a fault, and whose radio works until they hit something."""
         if flight is not None and scenario.world.crash == "falls":
             self._find_wrecks(solids)
         self._ticks = Ticks()
@@ -117,6 +121,10 @@ class WorldActor(Actor):
         self._ticks.begin(now_ns, period_ns=self._period_ns)
 
     def receive(self, topic: str, message: Message, now_ns: int) -> None:
+        if topic == self._topics.radio_control:
+            if isinstance(message, Mishap | Restore):
+                self._mishaps.add(message, now_ns)
+            return
         node = node_of(topic)
         if not isinstance(message, Setpoint) or not 1 <= node <= len(self._ids) or not makes_sense(message):
             self._malformed += 1
@@ -134,7 +142,8 @@ class WorldActor(Actor):
         due_ns, before_ns = self._ticks.next_ns, self._ticks.last_ns
         if due_ns is None or now_ns < due_ns:
             return
-        if not self._guidance.still:
+        self._suffer(due_ns)
+        if not self._guidance.still or self._falling:
             self._move(before_ns, due_ns)
         self._ticks.last_ns = due_ns
         self._publish(due_ns, before_ns)
@@ -167,6 +176,16 @@ class WorldActor(Actor):
     def _period_ns(self) -> int:
         tick_ns = self._scenario.world.tick_ns
         return max(tick_ns, min(_STILL_NS, self._suite.shortest_ns)) if self._guidance.still else tick_ns
+
+    def _suffer(self, now_ns: int) -> None:
+        """Bring about the mishaps that are due."""
+        for mishap in self._mishaps.due(now_ns):
+            if mishap.what is MishapKind.CRASH and self._flies[mishap.node - 1]:
+                self._falling.add(mishap.node)
+                self._crash(mishap.node, radio_dies=False)
+            elif mishap.what is MishapKind.BATTERY and self._drain is not None:
+                charge = self._drain.batteries.charge
+                charge[mishap.node - 1] = min(charge[mishap.node - 1], mishap.value.east)
 
     def _move(self, last_ns: int, now_ns: int) -> None:
         engine = self._engine
@@ -223,6 +242,9 @@ class WorldActor(Actor):
 
     def _contact(self, first: int, second: int, now_ns: int) -> None:
         """Two bodies touch, where 0 stands for the ground and obstacles: this is a landing, a crash, or a collision."""
+        for node in self._falling.intersection((first, second)):
+            self._falling.discard(node)
+            self._cut(node)
         touching = [node for node in (first, second) if node and self._flies[node - 1]]
         if not touching or (first == 0 and self._guidance.may_touch_down(second)):
             return
@@ -240,7 +262,10 @@ class WorldActor(Actor):
         self._engine.fall(node - 1)
         self._guidance.fell(node)
         if radio_dies:
-            self.outbox.append((self._topics.radio_control, Cut(f"crash-{node}", NodeId(node))))
+            self._cut(node)
+
+    def _cut(self, node: int) -> None:
+        self.outbox.append((self._topics.radio_control, Cut(f"crash-{node}", NodeId(node))))
 
     def _publish(self, now_ns: int, before_ns: int) -> None:
         """Publish the poses, and the readings of sensors that have an instant in (before, now]."""

@@ -34,7 +34,7 @@ from fanet_mw.bus.messages import (
     TxRequest,
     Voice,
 )
-from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
+from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Mishap, MishapKind, Partition, Restore
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.hosts.virtual import VirtualHost
@@ -182,7 +182,9 @@ _BY_HAND: Final[tuple[Message, ...]] = (
     Obstructions(S, array("H", [1, 2, 3, 4])),
     Degrade("link", NodeId(1), NodeId(2), both=True, loss_db=10.0, loss_share=0.5, for_ns=S),
     Jam("jam", Enu(1.0, 2.0, 3.0), 100.0, -60.0, for_ns=S),
-    Cut("cut", NodeId(3), for_ns=S),
+    Cut("cut", NodeId(3), for_ns=S, sends=True),
+    Partition("part", (NodeId(3), NodeId(4)), (1.0, 2.0, 3.0, 4.0), for_ns=S),
+    Mishap("mishap", NodeId(3), MishapKind.GPS, Enu(1.0, 2.0, 3.0), for_ns=S),
     Restore("cut"),
     Setpoint(S, Enu(1.0, 2.0, 3.0), 5.0),
     Setpoint(S, Enu(1.0, 2.0, 3.0), 5.0, SetpointKind.VELOCITY, Enu(1.0, 0.0, -1.0)),

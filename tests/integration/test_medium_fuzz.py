@@ -24,7 +24,7 @@ from fanet_mw.bus.messages import (
     TxRequest,
     TxStatus,
 )
-from fanet_mw.bus.radio_control import Control, Cut, Degrade, Jam, Restore
+from fanet_mw.bus.radio_control import Control, Cut, Degrade, Jam, Mishap, MishapKind, Partition, Restore
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.inbox import Inbox
 from fanet_mw.trace import ProcessEnded
@@ -109,7 +109,9 @@ class Fuzz:
         kinds: list[Control] = [
             Degrade(label, a, b, rng.random() < 0.5, size, share, for_ns),
             Jam(label, Enu(0.0, 0.0, share), rng.choice((200.0, size)), rng.choice((-90.0, size)), for_ns),
-            Cut(label, a, for_ns),
+            Cut(label, a, for_ns, sends=rng.random() < 0.3, hears=rng.random() < 0.3),
+            Partition(label, rng.choice(((), (a, b))), (size, share, 0.0, size), for_ns),
+            Mishap(label, a, rng.choice(list(MishapKind)), Enu(share, size, 0.0), for_ns),
             Restore(label),
         ]
         return rng.choice(kinds)

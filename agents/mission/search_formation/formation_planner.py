@@ -35,7 +35,7 @@ STATUS_S: Final = 12.0
 _LOST_NS: Final = 70 * S
 """A UAV from which nothing was received for this time has no right to its place any more."""
 _SETTLED_NS: Final = 10 * S
-"""How long a plan is followed, at least, before it is mended: news of who is lost have reached everyone by then."""
+"""How long a plan is followed and a UAV is lost, at least, before a plan is mended: most are heard again soon."""
 _PATIENCE_NS: Final = 14 * S
 """How long the first plan waits for UAVs that have not been received."""
 _NOTICE_NS: Final = 7 * S
@@ -222,7 +222,8 @@ class FormationPlanner:
         pattern = pattern_of(plan, reach_m=0.0)
         gone = self.leavers
         holders = [0 if node in gone else node for node in plan.nodes]
-        absent = {node for node in holders if node in self._roll_call.lost} - {self._node}
+        lost = self._roll_call.lost
+        absent = {node for node in holders if now_ns - lost.get(node, now_ns) > _SETTLED_NS}
         for node, member in sorted(self._members.items()):
             vacant = [place for place, holder in enumerate(holders) if self._is_up_for_grabs(holder, now_ns)]
             if vacant and node not in holders and not member.leaves and now_ns - member.heard_ns <= _LOST_NS:

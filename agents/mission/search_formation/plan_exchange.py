@@ -59,7 +59,7 @@ class PlanExchange:
             self._adopt(now_ns)
         if self._place.plan is not None:
             self._roll_call.review(self._place.plan, since_ns=self._adopted_ns, now_ns=now_ns)
-            self._place.close_ranks(self._roll_call.lost | self._planner.leavers)
+            self._place.close_ranks({*self._roll_call.lost, *self._planner.leavers})
         plans, self._planner.to_tell = self._planner.to_tell, []
         self._outbox.packets += [OutgoingPacket(plan.encode_frame(self._node)) for plan in plans]
 

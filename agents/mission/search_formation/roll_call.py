@@ -37,13 +37,13 @@ class RollCall:
         """The latest instant at which each UAV is known to have been heard, in units of `ROLL_NS`."""
         self._neighbor_ns: dict[int, int] = {}
         """The instant at which this UAV last heard each other one itself."""
-        self.lost: set[int] = set()
-        """The UAVs that are lost."""
+        self.lost: dict[int, int] = {}
+        """The UAVs that are lost, each with the instant at which this UAV has learned it."""
 
     def on_hello(self, node: int, *, now_ns: int) -> None:
         """A neighbor was heard."""
         self._neighbor_ns[node] = now_ns
-        self._take(node, now_ns // ROLL_NS, lost=False)
+        self._take(node, now_ns // ROLL_NS, lost=False, now_ns=now_ns)
 
     def on_roll(self, roll: Roll, plan: Search | None, *, now_ns: int) -> None:
         """A neighbor tells on what it knows; of another plan than the own one it is not understood."""
@@ -53,15 +53,16 @@ class RollCall:
             return
         for place, node in enumerate(plan.nodes):
             if node not in (0, self._node) and roll.ages[place] < LONG_AGO:
-                self._take(node, roll.at - roll.ages[place], lost=place in roll.lost)
+                self._take(node, roll.at - roll.ages[place], lost=place in roll.lost, now_ns=now_ns)
 
-    def _take(self, node: int, heard: int, *, lost: bool) -> None:
+    def _take(self, node: int, heard: int, *, lost: bool, now_ns: int) -> None:
         known = self._heard.get(node)
         if known is None or heard > known:
             self._heard[node] = heard
-            (self.lost.add if lost else self.lost.discard)(node)
-        elif lost and heard == known:
-            self.lost.add(node)
+            if not lost:
+                self.lost.pop(node, None)
+        if lost and (known is None or heard >= known):
+            self.lost.setdefault(node, now_ns)
 
     def review(self, plan: Search, *, since_ns: int, now_ns: int) -> None:
         """Find who is lost, to be called about once a second; `since_ns`: the instant at which this UAV began to follow
@@ -73,7 +74,7 @@ class RollCall:
             silent_ns = now_ns - self._heard.get(node, since_ns // ROLL_NS) * ROLL_NS
             near = now_ns - self._neighbor_ns.get(node, -_NEIGHBOR_NS) < _NEIGHBOR_NS
             if silent_ns > (self._silent_ns if near else _AWAY_NS):
-                self.lost.add(node)
+                self.lost[node] = now_ns
                 self._heard.setdefault(node, since_ns // ROLL_NS)
 
     def roll(self, plan: Search, *, now_ns: int) -> Roll:

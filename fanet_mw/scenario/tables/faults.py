@@ -1,4 +1,4 @@
-"""The entries of a scenario's `[[faults]]`: changes of the air at an instant of the run."""
+"""The entries of a scenario's `[[faults]]`: what happens to the air or to a UAV at an instant of the run."""
 
 import math
 from typing import Annotated, Literal, Self
@@ -12,20 +12,24 @@ from fanet_mw.bus.radio_control import (
     MAX_LOSS_DB,
     MAX_NOISE_DBM,
     MAX_RADIUS_M,
+    PARTITION_LABEL,
     Control,
     Cut,
     Degrade,
     Jam,
+    Mishap,
+    MishapKind,
+    Partition,
     Restore,
     link_label,
     node_label,
 )
 from fanet_mw.scenario.tables.sections import Coordinate, Duration, Id, Section
-from fanet_mw.units import Enu, NodeId, seconds_to_ns
+from fanet_mw.units import STILL, Enu, NodeId, seconds_to_ns
 
 
 class FaultSection(Section):
-    """The base of the entries of `[[faults]]`: a change of the air at an instant of the run."""
+    """The base of the entries of `[[faults]]`: something that happens at an instant of the run."""
 
     at_s: Duration
     """The swarm time at which it begins."""
@@ -97,6 +101,106 @@ class CutFault(FaultSection):
         return Cut(self.label or node_label(self.node), NodeId(self.node), self.for_ns)
 
 
+class _NodeFault(FaultSection):
+    """The base of faults of one UAV."""
+
+    node: Id
+    """Id of that node."""
+
+    def _mishap(self, what: MishapKind, value: Enu = STILL) -> Control:
+        return Mishap(self.label or node_label(self.node), NodeId(self.node), what, value, self.for_ns)
+
+
+class MuteFault(_NodeFault):
+    """A node's radio does not send."""
+
+    kind: Literal["mute"]
+    """`mute`: a node's radio does not send; it receives."""
+
+    def control(self) -> Control:
+        return Cut(self.label or node_label(self.node), NodeId(self.node), self.for_ns, hears=True)
+
+
+class DeafFault(_NodeFault):
+    """A node's radio does not receive."""
+
+    kind: Literal["deaf"]
+    """`deaf`: a node's radio does not receive; it sends."""
+
+    def control(self) -> Control:
+        return Cut(self.label or node_label(self.node), NodeId(self.node), self.for_ns, sends=True)
+
+
+class PartitionFault(FaultSection):
+    """The swarm is parted: no frame passes from one side to the other."""
+
+    kind: Literal["partition"]
+    """`partition`: no frame passes from one side to the other."""
+    nodes: tuple[Id, ...] = ()
+    """Ids of the nodes on one side; or `line_m`."""
+    line_m: tuple[tuple[Coordinate, Coordinate], tuple[Coordinate, Coordinate]] | None = None
+    """Two points, each east and north, of a line that parts the map; which side a UAV is on changes as it flies."""
+
+    @model_validator(mode="after")
+    def _sides_are_given_once(self) -> Self:
+        if bool(self.nodes) == (self.line_m is not None):
+            raise ValueError("either nodes or line_m must be given")
+        if self.line_m is not None and self.line_m[0] == self.line_m[1]:
+            raise ValueError(f"line_m = {[list(point) for point in self.line_m]} must be two different points")
+        return self
+
+    def control(self) -> Control:
+        (east, north), (other_east, other_north) = self.line_m or ((0.0, 0.0), (0.0, 0.0))
+        group = tuple(NodeId(node) for node in self.nodes)
+        return Partition(self.label or PARTITION_LABEL, group, (east, north, other_east, other_north), self.for_ns)
+
+
+class CrashFault(_NodeFault):
+    """A UAV's motors stop."""
+
+    kind: Literal["crash"]
+    """`crash`: a UAV's motors stop for good; it falls, and its radio dies on the ground."""
+
+    def control(self) -> Control:
+        return self._mishap(MishapKind.CRASH)
+
+
+class BatteryFault(_NodeFault):
+    """A UAV's battery loses charge."""
+
+    kind: Literal["battery"]
+    """`battery`: a UAV's battery has less charge than it should; needs `sensors.battery_hz`."""
+    charge: Annotated[float, Field(ge=0, le=1)]
+    """The share of the capacity that is left, at most."""
+
+    def control(self) -> Control:
+        return self._mishap(MishapKind.BATTERY, Enu(self.charge, 0.0, 0.0))
+
+
+class GpsFault(_NodeFault):
+    """A UAV's GPS receiver is wrong, or gives no position."""
+
+    kind: Literal["gps"]
+    """`gps`: a UAV's receiver is wrong, or gives no position."""
+    offset_m: tuple[Coordinate, Coordinate, Coordinate] | None = None
+    """By which it is wrong: east, north, up; by default it gives no position."""
+
+    def control(self) -> Control:
+        if self.offset_m is None:
+            return self._mishap(MishapKind.GPS_OFF)
+        return self._mishap(MishapKind.GPS, Enu(*self.offset_m))
+
+
+class StopFault(_NodeFault):
+    """A UAV's program ends."""
+
+    kind: Literal["stop"]
+    """`stop`: a UAV's program ends; with `for_s` it is started again after that time, and knows nothing."""
+
+    def control(self) -> Control:
+        return self._mishap(MishapKind.STOP)
+
+
 class RestoreFault(Section):
     """The end of a fault, or of all faults (without a label)."""
 
@@ -111,4 +215,17 @@ class RestoreFault(Section):
         return Restore(self.label)
 
 
-AnyFault = Annotated[DegradeFault | JamFault | CutFault | RestoreFault, Field(discriminator="kind")]
+AnyFault = Annotated[
+    DegradeFault
+    | JamFault
+    | CutFault
+    | MuteFault
+    | DeafFault
+    | PartitionFault
+    | CrashFault
+    | BatteryFault
+    | GpsFault
+    | StopFault
+    | RestoreFault,
+    Field(discriminator="kind"),
+]

@@ -57,7 +57,9 @@ def rights(scenario: Scenario, names: Topics) -> dict[str, Rights]:
             (names.all_tx, names.pose, names.obstruction, names.radio_control),
         ),
         "world": actor(
-            "world", (names.pose, names.obstruction, names.all_sensors, names.radio_control), (names.all_setpoints,)
+            "world",
+            (names.pose, names.obstruction, names.all_sensors, names.radio_control),
+            (names.all_setpoints, names.radio_control),
         ),
         **{f"agent-{node}": agent(node) for node in scenario.node_ids},
         OPERATOR: Rights(

@@ -11,6 +11,7 @@ if either of them dies. With `respawn`, any process is started again, and contin
 
 import asyncio
 import contextlib
+import os
 import signal
 import socket
 import time
@@ -41,6 +42,7 @@ from sim.run.launcher.pauses import PauseWatch, processors
 from sim.run.launcher.progress import Progress
 from sim.run.launcher.services import Services
 from sim.run.outcome import Outcome
+from sim.run.stoppable_uav import planned_stops
 from sim.world.flight_recorder import FlightRecorder
 from sim.world.possible_world import require_possible
 
@@ -103,6 +105,16 @@ class SwarmRun:
         self.processes = Processes(self._process_ended, title=f"fanet {names.swarm}", preload=[protocol])
         self._deaths = Deaths(respawn=respawn)
         self._pauses = PauseWatch()
+        self._program_changes = sorted(
+            (at_ns, f"agent-{node}", starts)
+            for node in scenario.node_ids
+            for stop in planned_stops(scenario, node)
+            for at_ns, starts in zip(stop, (False, True), strict=True)
+            if at_ns is not None
+        )
+        """When the programs of UAVs end and are started again, by the scenario's faults."""
+        self._stopped: set[str] = set()
+        """The processes that do not run now because of that."""
         self._clock: SwarmClock | None = None
         self._over = asyncio.Event()
         self._ending = False
@@ -210,6 +222,22 @@ class SwarmRun:
             on_progress(self._progress(reports))
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._over.wait(), _PROGRESS_S)
+            self._change_programs()
+
+    def _change_programs(self) -> None:
+        """End the programs of UAVs, and start them again, as the scenario plans it."""
+        while self._program_changes and self._program_changes[0][0] <= self._now_ns() and not self._over.is_set():
+            _, name, starts = self._program_changes[0]
+            if starts and name in self._stopped and name in self.processes.names():
+                return  # it has not ended yet
+            del self._program_changes[0]
+            if not starts and name in self.processes.names():
+                self._stopped.add(name)
+                os.kill(self.processes.pid(name), signal.SIGKILL)
+            elif starts and name in self._stopped:
+                self._tell(f"{name} is started again at {self._now_ns() / S:.1f} s, as planned")
+                self._stopped.discard(name)
+                self.processes.restart(name)
 
     def _govern(self, reports: Mapping[str, Mapping[str, Any]]) -> None:
         """Fit the pace of the clock to what the reports say of the machine."""
@@ -252,7 +280,8 @@ class SwarmRun:
         """End all processes, by the clock or by a signal, and wait for last reports."""
         self._over.set()
         await self._end_processes()
-        dead = {name for name, _ in self._deaths.ended} | (set() if self._services.own_world else {"world"})
+        dead = {name for name, _ in self._deaths.ended} | self._stopped
+        dead |= set() if self._services.own_world else {"world"}
         end_s = time.monotonic() + _LAST_WORDS_S
         while self._collector.unfinished() - dead and time.monotonic() < end_s:  # noqa: ASYNC110  (other threads fill it)
             await asyncio.sleep(_LAST_WORDS_S / 20)
@@ -272,6 +301,9 @@ class SwarmRun:
         if self._clock is None and not self._over.is_set() and self._deaths.grant_late_start(name, exit_code):
             self._tell(f"{name} ended with {describe(exit_code)} before the start; started again")
             self.processes.restart(name)
+            return
+        if name in self._stopped:
+            self._tell(f"{name} is stopped at {self._now_ns() / S:.1f} s, as planned")
             return
         now_ns = self._now_ns()
         node = int(name.removeprefix("agent-")) if name.startswith("agent-") else 0

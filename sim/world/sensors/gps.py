@@ -21,6 +21,7 @@ from fanet_mw.bus.messages import Gps, Message
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import Enu, S, seconds_to_ns
 from sim.world.engines.contract import Flags, Rows
+from sim.world.incidents.mishaps import Mishaps
 from sim.world.sensors.contract import Drift, Sensor, Truth, generator
 
 
@@ -30,7 +31,7 @@ class GpsReceiver(Sensor):
     kind = "gps"
     spread = False
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, mishaps: Mishaps | None = None) -> None:
         self.period_ns = round(S / scenario.world.gps_hz)
         self._noise = generator(scenario.seed, "gps")
         config, count = scenario.sensors, scenario.nodes.count
@@ -44,6 +45,7 @@ class GpsReceiver(Sensor):
         )
         self._slow = np.array([1.0, 1.0, config.gps_vertical])
         self._last: tuple[int, Rows, Rows, Flags] | None = None
+        self._mishaps = mishaps
         self._outages = [
             (np.array([east, north]), radius, seconds_to_ns(begin_s), seconds_to_ns(end_s))
             for east, north, radius, begin_s, end_s in config.gps_outages
@@ -62,7 +64,11 @@ class GpsReceiver(Sensor):
             slow = (self._common.at(now_ns) + self._own.at(now_ns)) * self._slow
             position = truth.at - truth.velocity * self.delay_s + slow + noise.normal(0.0, 1.0, shape) * self._sigma_m
             velocity = truth.velocity + noise.normal(0.0, self._velocity_m_s, shape)
-            self._last = now_ns, position, velocity, self._out(truth)
+            out = self._out(truth)
+            if self._mishaps is not None:
+                position += self._mishaps.offset_m
+                out |= self._mishaps.silent
+            self._last = now_ns, position, velocity, out
         return self._last[1:]
 
     def _out(self, truth: Truth) -> Flags:

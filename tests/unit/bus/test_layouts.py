@@ -9,7 +9,7 @@ import pytest
 
 from fanet_mw.bus import codecs, layouts
 from fanet_mw.bus import messages as m
-from fanet_mw.bus.radio_control import Cut, Degrade
+from fanet_mw.bus.radio_control import Cut, Degrade, Mishap, MishapKind
 from fanet_mw.units import Enu, NodeId
 
 ROOT = Path(__file__).parents[3]
@@ -24,7 +24,8 @@ SAMPLES = [
     m.Altimeter(1, 50.0, 40.0),
     m.Battery(1, 15.2, 8.0, 0.5),
     Degrade("link", NodeId(1), NodeId(2), both=True, loss_db=3.0, loss_share=0.25, for_ns=9),
-    Cut("node", NodeId(4), 10),
+    Cut("node", NodeId(4), 10, hears=True),
+    Mishap("node", NodeId(4), MishapKind.GPS, Enu(1, 2, 3), 10),
 ]
 """Of each kind whose fields are its attributes."""
 

@@ -9,7 +9,7 @@ import pytest
 from test_medium_timelines import ACK_NS, FRAME_NS, NAMES, PAYLOAD, SIFS_NS, Air, receptions, statuses
 
 from fanet_mw.bus.messages import Poses, Reception, TxOutcome, TxRequest
-from fanet_mw.bus.radio_control import Control, Cut, Degrade, Jam, Restore
+from fanet_mw.bus.radio_control import Control, Cut, Degrade, Jam, Partition, Restore
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.trace import RadioFault
@@ -268,12 +268,63 @@ def test_a_scenarios_faults_come_at_their_instants(make_scenario: MakeScenario) 
         ({"at_s": 1, "kind": "degrade", "src": 2, "dst": 2}, "src = dst = 2 is no link"),
         ({"at_s": 1, "kind": "degrade", "src": 2}, "src and dst must both be given"),
         ({"at_s": 1, "kind": "degrade", "src": 1, "dst": 2, "loss_share": 2}, "faults.0.degrade.loss_share = 2"),
-        ({"at_s": 1, "kind": "storm"}, "'degrade', 'jam', 'cut', 'restore'"),
+        ({"at_s": 1, "kind": "mute", "node": 99}, "faults.0 names node 99, which must be <= nodes.count"),
+        ({"at_s": 1, "kind": "crash", "node": 10}, "faults.0 names node 10, which must be <= nodes.count"),
+        ({"at_s": 1, "kind": "battery", "node": 1, "charge": 0.2}, "needs sensors.battery_hz > 0"),
+        ({"at_s": 1, "kind": "battery", "node": 1, "charge": 2}, "faults.0.battery.charge = 2"),
+        ({"at_s": 1, "kind": "partition"}, "either nodes or line_m must be given"),
+        ({"at_s": 1, "kind": "partition", "nodes": [1], "line_m": [[0, 0], [1, 1]]}, "either nodes or line_m"),
+        ({"at_s": 1, "kind": "partition", "line_m": [[1, 1], [1, 1]]}, "must be two different points"),
+        ({"at_s": 1, "kind": "partition", "nodes": [1, 12]}, "faults.0 names node 12"),
+        ({"at_s": 1, "kind": "partition", "nodes": list(range(1, 10))}, "leaves nobody on the other side"),
+        (
+            {"at_s": 1, "kind": "storm"},
+            "'mute', 'deaf', 'partition', 'crash', 'battery', 'gps', 'stop', 'restore'",
+        ),
     ],
 )
 def test_a_fault_that_cannot_be_is_one_sentence(fault: dict[str, object], said: str) -> None:
     with pytest.raises(ConfigError, match=said.replace(".", r"\.")):
         config.build({"nodes": {"count": 9}, "faults": [fault]})
+
+
+# --- in one direction, and in parts -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("kind", "heard_by"),
+    [("mute", {(1, 2), (1, 3), (3, 1), (3, 2)}), ("deaf", {(1, 3), (2, 1), (2, 3), (3, 1)})],
+)
+def test_a_mute_node_hears_and_a_deaf_one_is_heard(
+    make_scenario: MakeScenario, kind: str, heard_by: set[tuple[int, int]]
+) -> None:
+    air = Air(make_scenario(**{"nodes.count": 3, "faults": [{"at_s": 0, "kind": kind, "node": 2}]}), [0, 100, 200])
+    for node in (1, 2, 3):
+        air.send(node, 10 * node * MS)
+    assert {(src, node) for node, src, _ in receptions(air.run())} == heard_by
+    assert air.medium.records == [RadioFault(0, 2, 0, kind, "node-2", active=True)]
+    assert lost(air) == {"station_down": 2}
+
+
+@pytest.mark.parametrize("how", [{"nodes": [3, 4]}, {"line_m": [[250, -10], [250, 70]]}])
+def test_no_frame_passes_a_partition_until_it_ends(make_scenario: MakeScenario, how: dict[str, object]) -> None:
+    fault = {"at_s": 0.001, "kind": "partition", "for_s": 0.05, **how}
+    air = Air(make_scenario(**{"nodes.count": 4, "faults": [fault]}), [0, 200, 300, 500])
+    for node in range(1, 5):
+        air.send(node, 10 * node * MS)
+    air.send(2, 60 * MS)
+    heard = [(src, node) for node, src, _ in receptions(air.run())]
+    assert sorted(heard) == [(1, 2), (2, 1), (2, 1), (2, 3), (3, 4), (4, 3)], "only the last frame passes"
+
+
+def test_who_has_crossed_the_line_is_on_the_other_side(make_scenario: MakeScenario) -> None:
+    fault = {"at_s": 0, "kind": "partition", "line_m": [[150, 0], [150, 1]]}
+    air = Air(make_scenario(**{"nodes.count": 3, "faults": [fault]}), [0, 100, 200])
+    states = array("d", [value for east in (0, 100, 120) for value in (east, 0.0, 0.0, 0.0, 0.0, 0.0)])
+    air.send(1, 1 * MS)
+    air.medium.receive(NAMES.pose, Poses(5 * MS, array("H", [1, 2, 3]), states), 5 * MS)
+    air.send(1, 10 * MS)
+    assert [node for node, *_ in receptions(air.run())] == [2, 2, 3]
 
 
 @pytest.mark.parametrize("channel", ["range", "log_distance"])
@@ -335,7 +386,8 @@ def test_the_books_close_and_repeat_under_random_faults_moves_and_loads(
                 label, a, b = rng.choice("abcd"), NodeId(rng.randrange(1, 9)), NodeId(rng.randrange(1, 9))
                 for_ns = rng.choice((0, 30 * MS))
                 control(air, rng.choice((
-                    Restore(label), Cut(label, a, for_ns),
+                    Restore(label), Cut(label, a, for_ns), Cut(label, a, for_ns, hears=True),
+                    Partition(label, (a, b), (0.0,) * 4, for_ns), Partition(label, (), (300.0, 0.0, 300.0, 9.0)),
                     Degrade(label, a, b, rng.random() < 0.5, rng.choice((0, 10, 200)), rng.random(), for_ns),
                     Jam(label, Enu(rng.uniform(0, 600), 0, 0), 300, rng.choice((math.inf, -90.0)), for_ns),
                 )), now_ns=now_ns)  # fmt: skip

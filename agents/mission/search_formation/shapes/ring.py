@@ -15,6 +15,7 @@ import math
 from typing import Final
 
 from agents.mission.search_formation.shapes.contract import (
+    BACK,
     FOLLOW_M,
     FOLLOWER_HIGHER_M,
     Demands,
@@ -38,8 +39,9 @@ _BEHIND: Final = 0.4
 _CORNERS: Final = 4
 _CATCHES_UP: Final = 0.6
 """A UAV within this share of half a side from its middle catches up with the ring when it has left it."""
-_SLOWER: Final = 1.27 / math.sqrt(2)
-"""The speed of the sides, as a multiple of the speed of the sweep; the corners are faster by the root of 2."""
+_SLOWER: Final = BACK / math.sqrt(2)
+"""The speed of the sides, as a multiple of the speed of the sweep: the corners, which are faster by the root of 2, fly
+no faster than others on a way back, so that whoever has fallen behind can catch up."""
 
 
 class Ring:

@@ -69,7 +69,7 @@ def test_too_few_have_no_formation() -> None:
 
 def planner_of(node: int, *, expected: int, lost: Collection[int] = (), take_off_ns: int = 0) -> FormationPlanner:
     roll_call = RollCall(NodeId(node), hello_interval_s=1.0)
-    roll_call.lost.update(lost)
+    roll_call.lost.update(dict.fromkeys(lost, 0))
     return FormationPlanner(NodeId(node), roll_call, expected=expected, deploy_speed_m_s=9, take_off_ns=take_off_ns)
 
 
@@ -133,8 +133,8 @@ def planned(lost_place: int) -> tuple[FormationPlanner, Search, int]:
 
 def test_a_follower_exchanges_its_place_for_that_of_a_lost_uav_in_a_line() -> None:
     planner, before, lost = planned(3)
-    planner._roll_call.lost.add(lost)
-    assert not planner.review(formation(), now_ns=9 * S), "news of other losses are on their way"
+    planner._roll_call.lost[lost] = 3 * S
+    assert not planner.review(formation(), now_ns=13 * S), "it may be heard again"
     assert planner.review(formation(), now_ns=20 * S)
     after = planner.plan
     assert after is not None
@@ -160,7 +160,7 @@ def test_without_followers_the_plan_remains_when_uavs_are_lost(shape: ShapeName)
 
 def test_a_newcomer_gets_the_place_of_a_uav_only_when_that_one_has_been_lost_for_long() -> None:
     planner, before, lost = planned(20)
-    planner._roll_call.lost.add(lost)
+    planner._roll_call.lost[lost] = 3 * S
     planner.review(formation(), now_ns=20 * S)
     assert planner.plan is not None
     assert lost in planner.plan.nodes
@@ -218,7 +218,7 @@ def test_the_number_of_a_plan_wraps_as_a_forged_one_may_be_the_greatest() -> Non
     planner.on_plan(plan_of(pattern, tuple(range(1, 46)), planner=1, start_us=0, deploy_ds=10)._replace(revision=65535))
     planner.review(pattern, now_ns=S)
     later_ns = 90 * S
-    planner._roll_call.lost.add(5)
+    planner._roll_call.lost[5] = 3 * S
     for node in range(1, 45):
         planner.status(SearchStatus(later_ns // US, Enu(0, 0, 50), node, 65535, 100), now_ns=later_ns)
     assert planner.review(pattern, now_ns=later_ns)
@@ -248,7 +248,7 @@ class Swarm:
             self.second += 1
             now_ns = self.second * S
             for planner in self.planners.values():
-                planner._roll_call.lost.update(self.lost)
+                planner._roll_call.lost.update(dict.fromkeys(self.lost, 0))
             for node, sender in self.planners.items():
                 plan, place = sender.plan, Enu(20.0 * node, 0.0, 50.0)
                 status = SearchStatus(now_ns // US, place, node, plan.revision if plan else 0, 100)

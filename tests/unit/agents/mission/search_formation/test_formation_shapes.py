@@ -53,10 +53,10 @@ anyone = st.builds(
 
 
 @given(anyone, st.floats(0, 2000))
-def test_nobody_jumps_and_whoever_sweeps_flies_little_faster_than_a_sweep(pattern: Pattern, swept_s: float) -> None:
+def test_nobody_jumps_and_whoever_sweeps_flies_no_faster_than_a_way_back(pattern: Pattern, swept_s: float) -> None:
     for place in range(pattern.places):
         step = pattern.at(place, swept_s + 0.1).minus(pattern.at(place, swept_s)).norm()
-        most_m_s = SPEED_M_S * (1.27 if pattern.kind(place) == "line" else 3.0)
+        most_m_s = SPEED_M_S * (1.2 if pattern.kind(place) == "line" else 3.0)
         assert step <= 0.1 * most_m_s + 1e-6, (place, pattern.kind(place))
 
 

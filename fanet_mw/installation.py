@@ -19,6 +19,7 @@ _EXTRAS: Final = {
     "pyarrow": "sweep",
     "distributed": "dask",
     "matplotlib": "figures",
+    "rasterio": "maps",
 }
 """The extra with which each module is installed."""
 _REMEDY: Final = (

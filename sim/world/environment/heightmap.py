@@ -193,9 +193,10 @@ def _require_area(found: Heightmap, path: Path, origin_deg: tuple[float, float],
         for axis, side, count in ((0, "east", columns), (1, "north", rows)):
             cell_m = 1 / float(found.per_m[axis, axis])
             if (count - 1) * cell_m < area_m - cell_m:
+                degrees = "; if its cells are degrees: gdalwarp -t_srs EPSG:... -tr 30 30" if cell_m < 1 else ""
                 raise ConfigError(
                     f"world.heightmap: {path} covers {(count - 1) * cell_m:g} m to the {side}, "
-                    f"which must be >= world.area_m = {area_m:g}"
+                    f"which must be >= world.area_m = {area_m:g}{degrees}"
                 )
         return
     corners = np.array([-area_m / 2, area_m / 2])

@@ -169,6 +169,13 @@ def test_an_ascii_grid_in_degrees_lies_where_it_belongs(tmp_path: Path) -> None:
         ground(path, (0, 0), origin_deg=(10, 10))
 
 
+def test_a_grid_that_may_be_in_degrees_or_not_is_refused_with_the_way_to_make_it_clear(tmp_path: Path) -> None:
+    path = tmp_path / "world.asc"
+    path.write_text(grid("xllcorner 2\nyllcorner 48\ncellsize 0.25", hill()))
+    with pytest.raises(ConfigError, match=r"covers 2\.5 m to the east, .*; if its cells are degrees: gdalwarp"):
+        ground(path, (0, 0))
+
+
 def test_a_tile_of_srtm_lies_where_its_name_says_and_its_voids_are_refused(tmp_path: Path) -> None:
     side = 1201
     lat, lon = np.meshgrid(np.linspace(49, 48, side), np.linspace(2, 3, side), indexing="ij")

@@ -60,6 +60,7 @@ CORNER = "xllcorner 448000\nyllcorner 5411000\ncellsize 10"
         (grid(CORNER, hill()).replace("\n", "\r\n"), "lines of Windows"),
         (grid(CORNER, hill(), between=";"), "semicolons"),
         (grid(CORNER, hill(), between=","), "commas between"),
+        (grid(CORNER, [[int(v) for v in row] for row in hill()], between=","), "commas between whole numbers"),
         (grid(CORNER, hill(), between=", "), "commas and spaces between"),
         (grid(CORNER, [[f"{v:.3f}".replace(".", ",") for v in row] for row in hill()]), "decimal commas"),
         (grid(CORNER, [[f"{v:.3f}".replace(".", ",") for v in row] for row in hill()], between=";"), "both"),
@@ -93,7 +94,13 @@ def test_a_void_that_the_header_does_not_declare_is_refused_with_its_place(tmp_p
 
 @pytest.mark.parametrize(
     ("declared", "written"),
-    [("-3.4028234663852886e+38", "-3.402823e+38"), ("-9999", "-9999.000"), ("-9999.0", "-9999"), ("0", "0.00")],
+    [
+        ("-3.4028234663852886e+38", "-3.402823e+38"),
+        ("-9999", "-9999.000"),
+        ("-9999.0", "-9999"),
+        ("0", "0.00"),
+        ("-99.9000015258789", "-99.9"),
+    ],
 )
 def test_a_declared_void_is_recognized_in_other_digits_and_counts_for_nothing_outside_the_area(
     tmp_path: Path, declared: str, written: str

@@ -51,6 +51,9 @@ class Nodes(Section):
                 f"nodes.positions_m has {len(self.positions_m)} entries; "
                 f'layout = "explicit" needs nodes.count = {self.count}'
             )
+        for index, (_, _, up_m) in enumerate(self.positions_m):
+            if up_m < 0:
+                raise ValueError(f"nodes.positions_m.{index}: up = {up_m:g} must be >= 0, the ground")
         return self
 
 

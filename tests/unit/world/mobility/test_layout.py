@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
+from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from sim.world.mobility.layout import positions
 
@@ -36,3 +37,8 @@ def test_the_leader_may_stand_in_the_middle_and_the_others_take_the_rest_in_orde
     first, middle = positions(make_scenario(**keys)), positions(make_scenario(**keys, **{"nodes.leader_at": "middle"}))
     assert (middle[0].east, middle[0].north) == (0, -1750)
     assert middle[1:] == [place for place in first if place != middle[0]]
+
+
+def test_a_start_below_the_ground_is_refused(make_scenario: MakeScenario) -> None:
+    with pytest.raises(ConfigError, match=r"nodes.positions_m.1: up = -5 must be >= 0, the ground"):
+        make_scenario(**{"nodes.count": 2, "nodes.layout": "explicit", "nodes.positions_m": ((0, 0, 5), (9, 0, -5))})

@@ -73,6 +73,20 @@ def test_a_person_has_the_pixels_and_the_place_that_the_resolution_on_the_ground
     assert row == pytest.approx(HEIGHT / 2 - 3.0 / pixel_m, abs=1.5), "north is above"
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_people_on_slopes_are_seen_from_30_m_above(make_scenario: MakeScenario, seed: int) -> None:
+    """They lie along the ground, which is the same one in the picture."""
+    random = np.random.default_rng(seed)
+    axis = np.linspace(-200, 200, 41)
+    east, north = np.meshgrid(axis, axis)
+    waves = np.cos(east / random.uniform(18, 40) + random.uniform(0, 6)) + np.cos(north / random.uniform(18, 40))
+    hills = Hills(5.0 * (waves + 2.0), 10.0)
+    place = [*random.uniform(-8, 8, 2).tolist(), 0.0]
+    place[2] = hills.height_m(*place[:2])
+    found = orange(shown(make_scenario, place, up=place[2] + 30, obstacles=Obstacles(hills, ())))
+    assert len(found) > 0.5 * 1.7 * 0.5 / ground_per_pixel_m(30) ** 2
+
+
 def test_nobody_is_seen_under_a_roof_or_rubble_or_behind_a_hill(make_scenario: MakeScenario) -> None:
     inside = Obstacles(None, (Box(5.0, 3.0, 8.0, 8.0, 6.0),))
     assert not len(orange(shown(make_scenario, (5.0, 3.0, 0.0), obstacles=inside)))

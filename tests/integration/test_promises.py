@@ -16,8 +16,10 @@ def summary_of(*settings: str) -> dict[str, Any]:
 
 
 def test_reports_take_nothing_from_the_bound_of_bulk_and_have_one_of_their_own() -> None:
-    summary = summary_of("mission.survivors=30", "mission.report_interval_s=0.7")
+    weak = ("mission.phone_power_dbm=11", "seed=3")  # no phone is received by so many that they fly there
+    summary = summary_of("mission.survivors=30", "mission.report_interval_s=0.7", *weak)
     bound = summary["bound"]
+    assert summary["mission"]["uavs_approaching"] == 0
     assert bound["violations"] == 0
     assert bound["classes"]["traffic"]["within_share"] == 1.0
     assert summary["reports"]["generated"] >= 50

@@ -42,7 +42,7 @@ from agents.mission.outbox import Outbox
 from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.formation_planner import FormationPlanner
 from agents.mission.search_formation.missed_cells import MissedCells
-from agents.mission.search_formation.pattern import Pattern, fitted
+from agents.mission.search_formation.pattern import Pattern, fastest, fitted
 from agents.mission.search_formation.plan_exchange import PlanExchange
 from agents.mission.search_formation.roll_call import RollCall
 from agents.mission.search_formation.shapes.contract import Demands, ShapeName
@@ -362,6 +362,8 @@ def formation(scenario: Scenario, count: int) -> Pattern | None:
         speed_m_s=scenario.mobility.speed_m_s,
     )
     search = scenario.mission.search
+    if search == "fastest":
+        return fastest(count, demands)
     shape = ShapeName.LINES if search == "none" else ShapeName[search.upper()]
     return fitted(count, demands, shape=shape, sectors_wanted=scenario.clusters.count)
 

@@ -108,6 +108,19 @@ class Pattern:
         return Enu((b.east - a.east) / _STEP_S, (b.north - a.north) / _STEP_S, (b.up - a.up) / _STEP_S)
 
 
+def fastest(count: int, demands: Demands) -> Pattern | None:
+    """The formation of any shape in which this number of UAVs sweeps the area once in the shortest time; None if they
+    are too few for any. More UAVs are never slower: those for whom there is no use become followers.
+    """
+    count = min(count, MOST_PLACES)
+    found = [lines.fitted(count, demands), *(sectors.fitted(count, teams, demands) for teams in range(1, count + 1))]
+    for some in range(1, count + 1):
+        arms = spiral.fitted(some, demands)
+        found.append(arms._replace(followers=arms.followers + count - some))
+    patterns = [Pattern(made, reach_m=demands.reach_m) for made in found if made is not None]
+    return min(patterns, key=lambda pattern: pattern.shape.sweep_s, default=None)
+
+
 def fitted(
     count: int, demands: Demands, *, shape: ShapeName = ShapeName.LINES, sectors_wanted: int = 1
 ) -> Pattern | None:

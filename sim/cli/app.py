@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from typing import Final
 
-from cyclopts import App
+from cyclopts import App, CycloptsError
 
 from fanet_mw import __version__
 from fanet_mw.errors import FanetError
@@ -87,12 +87,13 @@ def main() -> None:
     try:
         require_for(sys.argv[1:])
         with interrupts.undisguised():
-            code = app(changes_last(sys.argv[1:]), result_action="return_value")
+            words = changes_last(sys.argv[1:])
+            code = app(words, result_action="return_value", exit_on_error=False, print_error=False)
         sys.stdout.flush()
     except BrokenPipeError:
         nobody_reads()
-    except FanetError as error:
-        code = refused(str(error))
+    except (FanetError, CycloptsError) as error:
+        code = refused(" ".join(str(error).split()) if isinstance(error, CycloptsError) else str(error))
     except OSError as error:
         if error.errno not in _NO_ROOM:
             raise

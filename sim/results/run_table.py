@@ -58,7 +58,9 @@ def read_parquet(path: Path, *, follow: bool = False) -> "Table":
             size = sum(found.metadata.row_group(i).total_byte_size for i in range(found.metadata.num_row_groups))
             if not 0 <= size <= _MOST_BYTES:
                 raise ConfigError(f"{path}: cannot be read: {size} bytes when unpacked, at most {_MOST_BYTES}")
-            return found.read()
+            table = found.read()
+            table.validate(full=True)  # for example that text is UTF-8
+            return table
         except (OSError, pa.ArrowException) as error:
             raise ConfigError(f"{path}: cannot be read: {str(error)[:200]}") from error
 

@@ -140,11 +140,18 @@ class Store:
 
 
 def write_whole(path: Path, table: pa.Table) -> None:
-    """Write a table so that the file is either complete or missing, even if the process or the machine dies."""
+    """Write a table so that the file is either complete or missing, even if the process or the machine dies.
+
+    Raises ConfigError.
+    """
     fresh = path.with_name(f"{path.stem}-{os.getpid()}.tmp")
-    fresh.unlink(missing_ok=True)
-    with fresh.open("xb") as file:  # with the mode that the umask gives, so that colleagues may read it
-        pq.write_table(table, file, compression="zstd")
-        file.flush()
-        os.fsync(file.fileno())
-    fresh.replace(path)
+    try:
+        fresh.unlink(missing_ok=True)
+        with fresh.open("xb") as file:  # with the mode that the umask gives, so that colleagues may read it
+            pq.write_table(table, file, compression="zstd")
+            file.flush()
+            os.fsync(file.fileno())
+        fresh.replace(path)
+    except OSError as error:
+        fresh.unlink(missing_ok=True)
+        raise ConfigError(f"{path}: cannot be written: {error.strerror or error}") from error

@@ -42,6 +42,15 @@ class BoundStated(NamedTuple):
     """The delay from the hand-over by one application to the receipt by the other."""
 
 
+class BoundExcludes(NamedTuple):
+    """The bound that the origin promised for a packet does not hold for this node, which it takes to be gone."""
+
+    t_ns: int
+    node: int
+    seq: int
+    other: int
+
+
 class LikelyStated(NamedTuple):
     """The origin stated, when it accepted a packet, a delay within which at least this share of its copies arrive.
 
@@ -299,6 +308,7 @@ Record = (
     Generated
     | LetOut
     | BoundStated
+    | BoundExcludes
     | LikelyStated
     | Delivered
     | Dropped
@@ -329,6 +339,7 @@ _KINDS: Final[dict[str, type[Any]]] = {
     "generated": Generated,
     "let_out": LetOut,
     "bound_stated": BoundStated,
+    "bound_excludes": BoundExcludes,
     "likely_stated": LikelyStated,
     "delivered": Delivered,
     "dropped": Dropped,
@@ -422,8 +433,8 @@ def parse(text: str) -> Record:
 
 
 __all__ = [
-    "Approaching", "Arrived", "BoundStated", "ClockSampled", "Collided", "Confirmed", "ConflictForeseen",
-    "ConflictOver", "DeadlineLost", "DeadlineMet", "Delivered", "Detected", "DropReason", "Dropped",
+    "Approaching", "Arrived", "BoundExcludes", "BoundStated", "ClockSampled", "Collided", "Confirmed",
+    "ConflictForeseen", "ConflictOver", "DeadlineLost", "DeadlineMet", "Delivered", "Detected", "DropReason", "Dropped",
     "FlightModeChanged", "Generated", "LetOut", "LikelyStated", "MissionModeChanged", "Planned", "Posed",
     "PlacedInside", "ProcessEnded", "RadioFault", "Record", "Refuted", "RoleChanged", "Sighted", "Warned", "kind_of",
     "line", "name_of", "parse",

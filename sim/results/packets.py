@@ -5,6 +5,7 @@ same node is `repeated`: the node's process was restarted, and has forgotten the
 if no node sent it at the instant that its header states: it is forged, or its origin's record is lost.
 """
 
+from collections import Counter
 from collections.abc import Mapping
 from typing import Final, NamedTuple
 
@@ -12,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from agents.applications.traffic import targets_of
-from fanet_mw.trace import BoundStated, Generated, LetOut, LikelyStated
+from fanet_mw.trace import BoundExcludes, BoundStated, Generated, LetOut, LikelyStated
 from sim.run.collecting.delivery_columns import Column, DeliveryColumns, delivery_columns
 from sim.run.collecting.record_kinds import records_of
 from sim.run.outcome import Outcome
@@ -87,12 +88,13 @@ def packets_of(outcome: Outcome) -> Mapping[str, AppPackets]:
             row_of[traffic_class, node] = len(targets)
             targets.append(meant)
     packets: dict[Name, _Known] = {}
+    excluded = Counter((record.node, record.seq) for record in records_of(outcome.records, BoundExcludes))
     for name, app_name, sent in _sent(outcome):
         app = found.setdefault(app_name, AppPackets())
         row = row_of.get((app_name, name[0]), _EVERYONE)
         packets[name] = _Known(app_name, len(app.sent), sent.born_ns, row)
         copies = len(targets[row]) if row != _EVERYONE else len(everyone) - 1 if app_name in OTHER_APPS else 0
-        app.sent[name] = sent._replace(targets=copies)
+        app.sent[name] = sent._replace(targets=max(0, copies - excluded[name]))
         app.wanted += copies
     counting = _DeliveryCount(packets, list(found), targets, exact=not outcome.scenario.clock.modelled)
     for columns in delivery_columns(outcome.records):

@@ -14,12 +14,13 @@ among those to which a bound applies.
 """
 
 from collections import deque
+from collections.abc import Sequence
 from typing import Final
 
 from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.routing.rounds.topology import Topology
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import S, seconds_to_ns
+from fanet_mw.units import NodeId, S, seconds_to_ns
 
 MARGIN_HOPS: Final = 2
 MOST_HOPS: Final = 32
@@ -54,7 +55,11 @@ class DelayLaw:
         """The bound for a packet that is handed over now; None if none can be stated."""
         while self._recent and self._recent[0][0] < now_ns - self._burst_ns:
             self._recent_bytes -= self._recent.popleft()[1]
-        if self._recent_bytes > self._burst_bytes or topology.absent(now_ns, doubt_ns=self.silent_ns) is None:
+        if self._recent_bytes > self._burst_bytes or self.absent(topology, now_ns=now_ns) is None:
             return None
         hops = topology.hops(now_ns)
         return (max(hops.values()) + MARGIN_HOPS) * self.hop_ns + self._burst_ns if len(hops) > 1 else None
+
+    def absent(self, topology: Topology, *, now_ns: int) -> Sequence[NodeId] | None:
+        """The nodes to which a bound does not apply, because they are gone; None while some may just have gone."""
+        return topology.absent(now_ns, doubt_ns=self.silent_ns)

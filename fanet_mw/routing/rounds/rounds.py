@@ -27,7 +27,7 @@ from fanet_mw.routing.rounds.delay_law import MOST_HOPS, DelayLaw
 from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.routing.rounds.spreading import Spreading
 from fanet_mw.routing.rounds.topology import Topology
-from fanet_mw.trace import BoundStated
+from fanet_mw.trace import BoundExcludes, BoundStated
 from fanet_mw.units import BROADCAST, US, NodeId, seconds_to_ns
 from fanet_mw.wire import FLAG_FLOOD, HEADER_BYTES, PRIORITY_BULK, Kind
 from fanet_mw.wire.hello.digest import MESSAGE_BYTES, Digest, capacity
@@ -145,7 +145,10 @@ class RoundFlooding(RoutingProtocol):
         header = packet.header
         if bound_ns is not None and bound_ns <= self._port.scenario.routing.lifetime_ns(header.priority):
             self._stated += 1
-            self._port.record(BoundStated(header.origin_us * US, self._port.node, header.seq, bound_ns))
+            stated = header.origin_us * US, self._port.node, header.seq
+            self._port.record(BoundStated(*stated, bound_ns))
+            for other in self._law.absent(self._topology, now_ns=now_ns) or ():
+                self._port.record(BoundExcludes(*stated, other))
 
     def _in_turns(self, packet: Packet) -> bool:
         """True for a packet that travels in turns; bulk does only where no window is left to it."""

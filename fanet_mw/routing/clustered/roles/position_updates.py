@@ -12,7 +12,7 @@ from fanet_mw.motion import Motion
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, S, seconds_to_ns
 
-_SHARE: Final = 0.1
+STRAYED: Final = 0.1
 """The share of the radio range by which the extrapolated position may be wrong."""
 _LEAST_NS: Final = 5 * S
 """The shortest time between two updates, because each is a flood."""
@@ -42,7 +42,7 @@ class PositionUpdates:
     """The leader's belief about the motion of one node, as that node knows it."""
 
     def __init__(self, *, range_m: float) -> None:
-        self._off_m = _SHARE * range_m
+        self._off_m = STRAYED * range_m
         self._told: Motion | None = None
         """The motion that the node's last join has stated; None before the first one."""
         self._flooded_ns = 0

@@ -3,6 +3,7 @@
 import math
 from typing import Final
 
+from fanet_mw.routing.clustered.roles.position_updates import STRAYED
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_ns
 from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
 from fanet_mw.routing.clustered.timetable.reserved_room import bulk_report_bytes, reserved
@@ -69,10 +70,21 @@ def links(scenario: Scenario, turns: Turns) -> Geometry:
     return Geometry(
         link_m=clusters.link_m or radio.range_m,
         interference_m=clusters.interference_m
-        or (radio.range_m + distance_error_m(scenario) if radio.channel == "range" else 2 * radio.range_m),
+        or (_disturbed_m(scenario) if radio.channel == "range" else 2 * radio.range_m),
         turns=turns.per_superframe,
         hop_turns=1 + -(-wait_ns // turns.turn_ns),
     )
+
+
+def _disturbed_m(scenario: Scenario) -> float:
+    """The greatest reported distance at which nodes may disturb each other with `radio.channel = "range"`.
+
+    The error of GPS is added to the range, and in a swarm that moves the distance by which both nodes may have strayed
+    from the positions that the leader extrapolates (`STRAYED`).
+    """
+    range_m = scenario.radio.range_m
+    strayed_m = 0.0 if scenario.mobility.model == "static" else 2 * STRAYED * (scenario.clusters.link_m or range_m)
+    return range_m + distance_error_m(scenario) + strayed_m
 
 
 def distance_error_m(scenario: Scenario) -> float:

@@ -59,13 +59,15 @@ async def launch(
 ) -> AsyncIterator[Launched]:
     """Run a scenario as real processes while the block lasts; afterwards `result` is what was collected.
 
-    The nodes of `leave_out` are joined by the program, with the scenario of what the block is given: it has a lead that
-    fits the machine if the scenario states none. The swarm's time begins when all are there. When the block ends
+    The nodes of `leave_out` are joined by others, who have the scenario as it is; without any, a scenario that states
+    no `radio.lead_ms` gets one that fits the machine. The swarm's time begins when all are there. When the block ends
     before the scenario's time, the run is ended; raises BusError when the swarm does not come up.
     """
     stated = scenario_of(scenario, seed=seed, overrides=overrides)
     known_nodes("leave_out", leave_out, stated)
-    known, leads = await asyncio.to_thread(fitted, stated, lambda _: None)
+    known, leads = stated, None
+    if not leave_out:
+        known, leads = await asyncio.to_thread(fitted, stated, lambda _: None)
     started: asyncio.Future[SwarmRun] = asyncio.get_running_loop().create_future()
     task = asyncio.ensure_future(
         launch_processes(

@@ -13,7 +13,7 @@ from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.duplicates import key_of
 from fanet_mw.node.packet import Packet
-from fanet_mw.units import BROADCAST, MS
+from fanet_mw.units import BROADCAST, MS, NodeId
 from fanet_mw.wire import FLAG_FLOOD
 
 
@@ -64,7 +64,7 @@ class Gossip3(RoutingProtocol):
         self._silent[key] = now_ns + round(self._options.patience_ms * MS), packet
         self._copies[key] = 0
 
-    def on_copy(self, key: int, *, now_ns: int) -> None:
+    def on_copy(self, key: int, src: NodeId, *, now_ns: int) -> None:
         if key in self._copies:
             self._copies[key] += 1
 

@@ -1,8 +1,9 @@
 """The faults in force on the air, and the planned ones. They change only links and noise.
 
     degraded   power x 10^(-loss_db / 10); below the sensitivity the link is gone; a share of what is received is lost
-    jammed     the noise at receivers inside is higher, or nothing is received there; a jammer is not sensed (the clear
-               channel assessment of 802.11-2020, 16.3.8.5, mode 2 looks for signals, not for energy)
+    jammed     the noise at receivers inside is higher, or nothing is received there; a jammer is sensed as energy from
+               `radio.energy_detection_dbm` upwards: -62 dBm with OFDM (802.11-2020, 17.3.10.6), while DSSS looks for
+               signals only (16.3.8.5, mode 2)
     cut        no power to or from the node; if it is only mute or deaf, in one direction
     partition  no power between stations on different sides
 
@@ -19,8 +20,9 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from emulator.channel.propagation import LinkTable, milliwatt, noise_mw
+from emulator.channel.propagation import LinkTable, audible_mw, milliwatt, noise_mw
 from emulator.kernel import state as s
+from emulator.kernel.state import Reals
 from fanet_mw.bus.radio_control import (
     EVERY,
     Control,
@@ -119,9 +121,11 @@ class Faults:
 
     # --- the effect on links and noise ----------------------------------------------------------------------------
 
-    def apply(self, links: LinkTable, at: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Apply the faults to the links of stations at `at` [m, n x 3]; returns the noise at each station [mW]."""
-        noise = np.full(self._stations, noise_mw(self._radio))
+    def apply(self, links: LinkTable, at: Reals) -> tuple[Reals, Reals]:
+        """Apply the faults to the links of stations at `at` [m, n x 3]; returns the noise at each station [mW], and the
+        energy of jammers there, which is infinite where nothing can be received.
+        """
+        noise, energy = np.full(self._stations, noise_mw(self._radio)), np.zeros(self._stations)
         faults = [item.fault for item in self._standing.values()]
         for fault in faults:
             if isinstance(fault, Degrade) and fault.src == EVERY:
@@ -132,7 +136,9 @@ class Faults:
                     self._degrade(links, fault.dst - 1, fault.src - 1, fault)
         for fault in faults:
             if isinstance(fault, Jam):
-                noise += self._jam(links, at, fault)
+                jamming = self._jam(links, at, fault)
+                energy += jamming
+                noise += np.where(np.isfinite(jamming), jamming, 0.0)
         for fault in faults:
             if isinstance(fault, Cut):
                 self._cut(links, fault)
@@ -140,7 +146,7 @@ class Faults:
                 self._part(links, at, fault)
         if faults:
             links.sort_dead_last()
-        return noise
+        return noise, energy
 
     def _degrade(self, links: LinkTable, src: int, dst: int, fault: Degrade) -> None:
         """Degrade the link between two stations, if they are within reach of each other."""
@@ -151,7 +157,7 @@ class Faults:
         """Degrade these links of the table."""
         power_mw = links.reals[s.LINK_POWER, chosen] * milliwatt(-fault.loss_db)
         heard = links.ints[s.AUDIBLE, chosen] != 0
-        audible = heard & ((fault.loss_db == 0) | (power_mw >= milliwatt(self._radio.sensitivity_dbm)))
+        audible = heard & ((fault.loss_db == 0) | (power_mw >= audible_mw(self._radio)))
         if self._radio.channel == "range":  # in this model any overlap destroys a frame
             power_mw[heard & ~audible] = 0.0
         links.reals[s.LINK_POWER, chosen] = power_mw
@@ -159,8 +165,8 @@ class Faults:
         links.ints[s.FAULT, chosen[heard]] = s.FATE_DEGRADED
         links.reals[s.SPARED, chosen[heard]] *= 1 - fault.loss_share
 
-    def _jam(self, links: LinkTable, at: npt.NDArray[np.float64], fault: Jam) -> npt.NDArray[np.float64]:
-        """Mark the links into the jammed area; returns the additional noise at each station [mW]."""
+    def _jam(self, links: LinkTable, at: Reals, fault: Jam) -> Reals:
+        """Mark the links into the jammed area; returns the power of the jammer at each station [mW]."""
         with np.errstate(invalid="ignore"):  # a station of unknown position is infinitely far away
             inside = np.hypot(at[:, 0] - fault.center.east, at[:, 1] - fault.center.north) <= fault.radius_m
         count = links.count
@@ -168,7 +174,6 @@ class Faults:
         links.ints[s.FAULT, :count][hit] = s.FATE_JAMMED
         if fault.noise_dbm == math.inf or self._radio.channel == "range":
             links.reals[s.SPARED, :count][hit] = 0.0
-            return np.zeros(self._stations)
         return np.where(inside, milliwatt(fault.noise_dbm), 0.0)
 
     def _cut(self, links: LinkTable, fault: Cut) -> None:

@@ -1,5 +1,6 @@
 """Makes the kernel's arrays for a scenario: parameters, stations, and room for frames and events."""
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
@@ -7,13 +8,20 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from emulator.channel.error_rate import header_rates, log_success_per_bit
-from emulator.channel.fading import law_of, seeds
-from emulator.channel.propagation import LinkTable, milliwatt, noise_mw
+from emulator.channel.error_rate import SHORT_BYTES, header_rates, log_success_per_bit
+from emulator.channel.fading import WAVE_COLUMNS, law_of, tables
+from emulator.channel.propagation import (
+    LinkTable,
+    carrier_sense_mw,
+    energy_mw,
+    milliwatt,
+    noise_mw,
+    sensitivities_mw,
+)
 from emulator.kernel import state as s
 from emulator.kernel.entry import KernelEntry
 from emulator.kernel.random_numbers import MODULUS
-from fanet_mw.airtime import DETECT_NS, Timing
+from fanet_mw.airtime import DETECT_NS, Timing, airtime_ns
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Radio, Scenario
 
@@ -37,6 +45,8 @@ class Arrays:
     lk: s.Ints
     lp: s.Reals
     ptr: s.Ints
+    wv: s.Reals
+    tb: s.Reals
     hs: s.Ints
     hr: s.Ints
     asked: s.Ints
@@ -46,8 +56,8 @@ class Arrays:
     def entry(self) -> KernelEntry:
         """The entry to `kernel.advance`; it is valid until an array is replaced."""
         return KernelEntry(
-            self.g, self.p, self.pf, self.st, self.sf, self.fr, self.lk, self.lp, self.ptr, self.hs, self.hr,
-            self.asked, self.out, self.err,
+            self.g, self.p, self.pf, self.st, self.sf, self.fr, self.lk, self.lp, self.ptr, self.wv, self.tb,
+            self.hs, self.hr, self.asked, self.out, self.err,
         )  # fmt: skip
 
     def use(self, links: LinkTable) -> None:
@@ -73,11 +83,15 @@ def arrays_of(scenario: Scenario, links: LinkTable, *, stations: int, capture: b
         lk=links.ints,
         lp=links.reals,
         ptr=links.ptr,
+        wv=np.zeros((stations, WAVE_COLUMNS)),
+        tb=tables(radio),
         hs=np.zeros((8 * stations + 2 * _SLOTS + 64, 5), np.int64),
         hr=np.zeros((64, 5), np.int64),
         asked=np.zeros((MOST_ASKED, s.ASKED_COLUMNS), np.int64),
         out=np.zeros((2 * radio.queue_frames + 1024, s.OUT_COLUMNS), np.int64),
-        err=_error_table(radio.rate_mbps, radio.ack_rate_mbps) if radio.channel != "range" else np.zeros((3, 1)),
+        err=_error_table(radio.rate_mbps, radio.ack_rate_mbps, radio.ofdm_errors)
+        if radio.channel != "range"
+        else np.zeros((4, 1)),
     )
 
 
@@ -90,22 +104,29 @@ def _parameters(scenario: Scenario, *, capture: bool) -> s.Ints:
         timing.slot_ns, timing.sifs_ns, timing.difs_ns, timing.eifs_extra_ns, timing.ack_ns,
         timing.ack_timeout_ns, timing.header_ns, DETECT_NS, radio.cw_min, radio.cw_max, radio.max_attempts,
         radio.queue_frames, scenario.mac_lifetime_ns,
-        "difs" in as_ns3, "eifs" in as_ns3, sinr and "sums" in as_ns3, sinr and "onset" in as_ns3, "window" in as_ns3,
-        sinr, capture, timing.extension_ns, radio.capture, fading,
+        "difs" in as_ns3, "eifs" in as_ns3, sinr and energy_mw(radio) < math.inf, sinr and "onset" in as_ns3,
+        "window" in as_ns3, sinr, capture, timing.extension_ns, radio.capture, fading,
+        airtime_ns(SHORT_BYTES - 1, radio, rate_mbps=radio.rate_mbps),
     )  # fmt: skip
     return p
 
 
 def _real_parameters(radio: Radio) -> s.Reals:
     _, shape = law_of(radio)
+    data_mw, ack_mw = sensitivities_mw(radio)
     return np.array(
         [
             milliwatt(radio.preamble_snr_db),
             header_rates(radio.rate_mbps)[1],
             radio.rate_mbps * 1e-3,
             radio.ack_rate_mbps * 1e-3,
+            radio.rate_mbps * 1e-3,
+            data_mw,
+            ack_mw,
+            data_mw,
             milliwatt(radio.capture_db),
-            milliwatt(radio.sensitivity_dbm),
+            carrier_sense_mw(radio),
+            energy_mw(radio),
             shape,
         ]
     )
@@ -120,9 +141,6 @@ def _stations(scenario: Scenario, stations: int) -> s.Ints:
     ):  # fmt: skip
         st[row] = value
     st[s.RANDOM] = [stream_seed(seed, "backoff", i + 1) % (MODULUS - 1) + 1 for i in range(stations)]
-    st[s.FADE_A], st[s.FADE_B] = np.array(
-        [seeds(stream_seed(seed, "fading", i + 1)) for i in range(stations)], np.int64
-    ).T
     st[s.FAULT_RANDOM] = [stream_seed(seed, "fault", i + 1) % (MODULUS - 1) + 1 for i in range(stations)]
     return st
 
@@ -134,6 +152,12 @@ def _station_reals(radio: Radio, stations: int) -> s.Reals:
 
 
 @lru_cache(maxsize=8)
-def _error_table(rate_mbps: float, ack_rate_mbps: float) -> npt.NDArray[np.float64]:
-    """The rows of the kernel's `err`: PLCP header, data, ACK (see `emulator.kernel.state.LOCK_RATE`)."""
-    return np.stack([log_success_per_bit(rate) for rate in (header_rates(rate_mbps)[0], rate_mbps, ack_rate_mbps)])
+def _error_table(rate_mbps: float, ack_rate_mbps: float, model: str) -> npt.NDArray[np.float64]:
+    """The rows of the kernel's `err`: PLCP header, data, ACK, short data (see `emulator.kernel.state.LOCK_RATE`)."""
+    rows = (
+        (header_rates(rate_mbps)[0], True),
+        (rate_mbps, False),
+        (ack_rate_mbps, True),
+        (rate_mbps, True),
+    )
+    return np.stack([log_success_per_bit(rate, model, short=short) for rate, short in rows])

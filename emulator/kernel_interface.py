@@ -9,8 +9,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from emulator.channel.fading import Waves
 from emulator.faults import Faults
-from emulator.kernel import kernel
+from emulator.kernel import carrier_sense, kernel
 from emulator.kernel import state as s
 from emulator.kernel_arrays import MOST_ASKED, arrays_of
 from emulator.link_counters import LinkCounters
@@ -34,6 +35,7 @@ class KernelInterface:
         self.faults = faults
         self.link_counters = LinkCounters(stations)
         self._placement = Placement(scenario, stations=stations)
+        self._waves = Waves(scenario.radio, seed=scenario.seed) if scenario.radio.fading != "none" else None
         self.arrays = arrays_of(scenario, self._placement.links(spare=0), stations=stations, capture=capture)
         # These views share memory with numpy arrays; a few numbers are read faster through the buffer protocol.
         self._counts = self.arrays.g.data
@@ -50,19 +52,29 @@ class KernelInterface:
         """Set the pairs of stations [n, 2] with something solid between them; it takes effect at the next `place`."""
         self._placement.obstruct(pairs)
 
-    def place(self, at: npt.NDArray[np.float64]) -> None:
-        """Take over new positions [m], one row per station; frames in flight are carried over to the new links."""
+    def place(self, at: npt.NDArray[np.float64], velocity: npt.NDArray[np.float64], t_ns: int) -> None:
+        """Take over positions [m] and velocities [m/s] of an instant, one row per station; frames in flight are carried
+        over to the new links.
+        """
+        if self._waves is not None:
+            self.arrays.wv[:] = self._waves.of(at, velocity, t_ns)
+            self.arrays.g[s.WAVES_FROM_NS] = t_ns
         if self._placement.place(at):
             self.relink()
+
+    @property
+    def at(self) -> npt.NDArray[np.float64]:
+        """The positions in force [m]; infinite where a station's place is unknown."""
+        return self._placement.at
 
     def relink(self) -> None:
         """Compute the links anew, because stations have moved or faults have changed."""
         a = self.arrays
         self._take_in()
-        self.link_counters.take(a.lk)
+        self.link_counters.take(a.lk, a.lp)
         spare = int(a.lk[s.UNDERWAY].sum())
         links = self._placement.links(spare=spare)
-        a.sf[s.NOISE] = self.faults.apply(links, self._placement.at)
+        a.sf[s.NOISE], jamming = self.faults.apply(links, self._placement.at)
         a.g[s.REACH_NS] = max(a.g[s.REACH_NS] if spare else 0, links.longest_ns)
         room = 4 * (links.ints.shape[1] + a.st.shape[1]) + 64
         if a.hr.shape[0] < room + a.g[s.HR_N]:
@@ -71,12 +83,17 @@ class KernelInterface:
             kernel.scatter(a.g, a.p, a.lk, a.hr)
             kernel.relink(a.hr, a.g, a.lk, a.lp, a.ptr, a.st[s.LOCK], links.ints, links.reals, links.ptr)
         a.use(links)
+        if not np.array_equal(jamming, a.sf[s.JAMMING]):
+            a.sf[s.JAMMING] = jamming
+            if a.g[s.HS_N] + a.st.shape[1] + kernel.MARGIN > len(a.hs):
+                self._more_starts(len(a.hs) + a.st.shape[1])
+            carrier_sense.sense_jamming(a.g, a.p, a.pf, a.st, a.sf, a.hs)
         self._entry = a.entry()
         self.next_output_ns = int(kernel.next_output(a.g, a.p, a.st, a.fr, a.hs))
 
     def links(self, now_ns: int) -> LinkStats | None:
         """The traffic of all links since the previous call; None if there was none."""
-        self.link_counters.take(self.arrays.lk)
+        self.link_counters.take(self.arrays.lk, self.arrays.lp)
         return self.link_counters.close(now_ns)
 
     def copies_under_way(self) -> int:

@@ -1,4 +1,4 @@
-"""The traffic of each link since the last report: received and lost frames, and the sum of their RSSI.
+"""The traffic of each link since the last report: received and lost frames, and the mean power of the received ones.
 
 The kernel counts frames in its array of links. New poses of the stations replace that array, so its counts are moved
 here before (`take`). For a report, `close` adds up all counts that were moved here since the report before. Each of the
@@ -10,12 +10,12 @@ from array import array
 import numpy as np
 
 from emulator.kernel import state as s
-from emulator.kernel.state import Ints
+from emulator.kernel.state import Ints, Reals
 from fanet_mw.bus.link_stats import COUNTS, LinkStats
 from fanet_mw.units import S
 
-_ROWS = slice(s.RSSI_SUM, s.N_CUT + 1)
-"""The rows of a link that are counters: the sum of RSSI, then one for each name in COUNTS."""
+_ROWS = slice(s.N_RECEIVED, s.N_CUT + 1)
+"""The rows of a link that are counters, one for each name in COUNTS."""
 
 
 class LinkCounters:
@@ -37,12 +37,16 @@ class LinkCounters:
         """Plan the next report for the next full second."""
         self.next_ns = (now_ns // S + 1) * S
 
-    def take(self, lk: Ints) -> None:
-        """Move the counts of these links here, and leave zeros there."""
-        used = np.flatnonzero(lk[s.N_RECEIVED : s.N_CUT + 1].any(axis=0))
+    def take(self, lk: Ints, lp: Reals) -> None:
+        """Move the counts of these links here, and leave zeros there.
+
+        The power is that without fading: fading would raise the mean of those that were received.
+        """
+        used = np.flatnonzero(lk[_ROWS].any(axis=0))
         if len(used):
             self._keys.append(lk[s.LINK_SRC, used] * self._stations + lk[s.LINK_DST, used])
-            self._counts.append(lk[_ROWS, used])
+            millidbm = np.rint(10_000.0 * np.log10(np.maximum(lp[s.LINK_POWER, used], 1e-30))).astype(np.int64)
+            self._counts.append(np.vstack([millidbm * lk[s.N_RECEIVED, used], lk[_ROWS, used]]))
             lk[_ROWS, used] = 0
 
     def close(self, now_ns: int) -> LinkStats | None:

@@ -22,8 +22,9 @@ class Sample(NamedTuple):
 class Measurement:
     """The difference of two samples."""
 
-    def __init__(self, window_ns: tuple[int, int]) -> None:
+    def __init__(self, window_ns: tuple[int, int], *, max_attempts: int) -> None:
         """`window_ns`: the instants at which the measurement begins and ends."""
+        self._max_attempts = max_attempts
         self._begins_ns: int | None = window_ns[0]
         self._ends_ns: int | None = window_ns[1]
         self._first = Sample(np.zeros(s.GLOBALS, np.int64), 0, 0, 0)
@@ -40,7 +41,7 @@ class Measurement:
         if self._ends_ns is not None and self._ends_ns <= due_ns:
             self._last, self._ends_ns = now, None
 
-    def report(self, now: Sample, *, stations: int) -> dict[str, float | None]:
+    def report(self, now: Sample, *, stations: int) -> dict[str, float | int | None]:
         """The statistics from the beginning to the end of the measurement, or until now if it has not ended."""
         first, last = self._first, self._last or now
         d = (last.g - first.g).tolist()
@@ -50,10 +51,25 @@ class Measurement:
         return {
             "pdr": _ratio(d[s.RECEIVED_COPIES], landed),
             "busy": round((last.busy_ns - first.busy_ns) / (span_ns * stations), 6),
-            "mean_retries": _ratio(d[s.RETRIES], d[s.UNICASTS_ENDED]),
+            "mean_retries": self._mean_retries(d),
             "attempt_failure": _ratio(d[s.ATTEMPTS_FAILED], d[s.ATTEMPTS_MADE]),
+            "late_acks": d[s.LATE_ACKS],
             "throughput_mbps": round(payload_bits / (span_ns / S) / 1e6, 6),
         }
+
+    def _mean_retries(self, d: list[int]) -> float | None:
+        """How often a unicast is repeated that is not dropped for its age: the estimate of E. L. Kaplan and P. Meier,
+        J. Am. Stat. Assoc. 53, 1958, from all attempts. A frame that expires counts for the attempts that it made.
+        """
+        if not d[s.MADE_BY]:
+            return None
+        mean, failed = 0.0, 1.0
+        for retry in range(min(self._max_attempts - 1, 255)):
+            row = min(retry, s.ATTEMPT_ROWS - 1)
+            made = d[s.MADE_BY + row]
+            failed *= min(1.0, d[s.FAILED_BY + row] / made) if made else 0.0
+            mean += failed
+        return round(mean, 6)
 
 
 def _ratio(part: int, whole: int) -> float | None:

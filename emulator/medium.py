@@ -62,7 +62,7 @@ class Medium(Actor):
         self._capture = capture
         self._kernel = KernelInterface(scenario, stations=self._count, faults=faults, capture=capture is not None)
         self._counters = MediumCounters(time_scale=scenario.time_scale)
-        self._measurement = Measurement(scenario.traffic_window_ns)
+        self._measurement = Measurement(scenario.traffic_window_ns, max_attempts=radio.max_attempts)
         self._numbers = RequestNumbers(self._count)
         self._slots = FrameSlots(self._kernel.slots(), nodes, most_held=radio.queue_frames + ANNOUNCED)
         self._due_ns = self._next_due_ns()
@@ -304,10 +304,14 @@ class Medium(Actor):
             return
         states = np.frombuffer(poses.states, np.float64).reshape(-1, 6)
         known = (ids >= 1) & (ids <= self._count)
-        if not known.all() or not (np.abs(states[:, :3]) <= FARTHEST_M).all():  # also false for NaN
+        sound = (np.abs(states[:, :3]) <= FARTHEST_M).all(axis=1)  # also false for NaN
+        wrong = ids[known & ~sound] - 1
+        if (known & sound).all():
+            self._counters.poses += 1
+        else:  # the sound rows count all the same
             self._counters.refused["poses"] += 1
-            return
-        self._counters.poses += 1
-        at = np.full((self._count, 3), np.inf)
-        at[ids - 1] = states[:, :3]
-        self._kernel.place(at)
+        at, velocity = np.full((self._count, 3), np.inf), np.zeros((self._count, 3))
+        at[wrong] = self._kernel.at[wrong]  # it stays where it was last known to be
+        at[ids[known & sound] - 1] = states[known & sound, :3]
+        velocity[ids[known & sound] - 1] = states[known & sound, 3:]
+        self._kernel.place(at, velocity, poses.t_ns)

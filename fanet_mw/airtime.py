@@ -66,6 +66,7 @@ class Timing(NamedTuple):
         extension_ns = SIGNAL_EXTENSION_NS if ofdm and radio.standard == "g" else 0
         sifs_ns = 16 * US if radio.standard == "a" else 10 * US  # tables 17-21, 15-5, 18-5 (aSIFSTime)
         slot_ns = 9 * US if radio.standard == "a" or radio.slot == "short" else 20 * US  # tables as above (aSlotTime)
+        slot_ns += 3 * US * radio.coverage_class  # aAirPropagationTime, table 9-101
         header_ns = OFDM_HEADER_NS if ofdm else plcp_ns(short=short)
         if radio.standard == "a":
             lowest_ack_ns = ofdm_frame_ns(ACK_BYTES, rate_mbps=6)

@@ -1,4 +1,5 @@
-"""Bit error rates under noise and interference: DSSS DBPSK, DQPSK, CCK at 5.5 and 11 Mb/s (OFDM: `ofdm_error_rate`).
+"""Bit error rates under noise and interference: DSSS DBPSK, DQPSK, CCK at 5.5 and 11 Mb/s (OFDM: `ofdm_error_rate`,
+`ofdm_error_tables`).
 
 DBPSK     1/2 exp(-Eb/N0)                                               Proakis, Digital Communications, 4th ed., 5.2.8
 DQPSK     (1+sqrt2)/sqrt(8 pi sqrt2 x) exp(-(2-sqrt2) x), x = Eb/N0        (tight approximation of the same section)
@@ -15,30 +16,35 @@ import numpy as np
 import numpy.typing as npt
 
 from emulator.channel.ofdm_error_rate import bit_error
-from emulator.channel.propagation import DSSS_BANDWIDTH_HZ
+from emulator.channel.ofdm_error_tables import SHORT_BYTES, TABLED_MBPS, log_success
 from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
-from fanet_mw.scenario.tables.radio import is_ofdm
+from fanet_mw.scenario.tables.radio import DSSS_BANDWIDTH_HZ, is_ofdm
 
 _TOP_DB: Final = 35.0
 _SYMBOLS_PER_S: Final = 1.375e6
 """Rate of CCK symbols: 11 Mchip/s in symbols of 8 chips."""
 
 Reals = npt.NDArray[np.float64]
+__all__ = ["SHORT_BYTES", "header_rates", "log_success_per_bit"]
 
 
 @cache
-def log_success_per_bit(rate_mbps: float) -> Reals:
+def log_success_per_bit(rate_mbps: float, ofdm_errors: str = "nist", *, short: bool = False) -> Reals:
     """ln(1 - bit error rate) at each step of the SINR axis; read-only. It is kept, because it takes a third of a second
     for CCK.
+
+    `ofdm_errors` is `radio.ofdm_errors`; its tables differ for frames shorter than SHORT_BYTES.
     """
-    found = _log_success_per_bit(rate_mbps)
+    found = _log_success_per_bit(rate_mbps, tabled=ofdm_errors == "tables" and rate_mbps in TABLED_MBPS, short=short)
     found.setflags(write=False)
     return found
 
 
-def _log_success_per_bit(rate_mbps: float) -> Reals:
+def _log_success_per_bit(rate_mbps: float, *, tabled: bool, short: bool) -> Reals:
     sinr_db = np.arange(ERROR_FLOOR_DB, _TOP_DB, 1 / ERROR_STEPS_PER_DB)
     sinr = np.power(10.0, sinr_db / 10)
+    if tabled:
+        return log_success(sinr_db, rate_mbps, short=short)
     if is_ofdm(rate_mbps):
         return np.asarray(np.log(np.maximum(1.0 - bit_error(sinr, rate_mbps), 1e-300)), dtype=np.float64)
     if rate_mbps == 1:

@@ -1,27 +1,52 @@
-"""Small-scale fading: one power gain per frame and receiver, of mean 1, drawn when the frame starts.
+"""Small-scale fading: a power gain of mean 1 that follows from where two stations are and how they move.
 
-    nakagami   gamma distributed with shape m and mean 1                           m = 1 is Rayleigh
-    rician     |sqrt(K / (K + 1)) + complex normal of variance 1 / (K + 1)|^2      K: direct over scattered power
+    h(t)     = sum over N waves of exp(j 2 pi (k_n . x_lo(t) + l_n . x_hi(t) + f_n t + phase_n)) / sqrt(N)
+    nakagami   |h|^2 mapped to a gamma distribution of shape m and mean 1          m = 1 is Rayleigh
+    rician     |sqrt(K / (K + 1)) exp(j 2 pi d(t) / lambda) + h / sqrt(K + 1)|^2     K: direct over scattered power
 
-Each transmitter has a generator of its own (named stream `fading`) and draws from it in the order of its links, so that
-the same frames at the same instants meet the same gains. The gain of a frame is constant over its band and its length,
-and independent of the gain of the next frame. Not modeled: coherence time, Doppler, frequency selectivity, and that
-both directions of a link fade alike.
+The waves leave and arrive in directions that are spread over the horizon (R. H. Clarke, Bell Syst. Tech. J. 47, 1968),
+so h keeps the correlation J0(2 pi v t / lambda) while one station moves horizontally at v, and the product of both
+factors while both move (A. S. Akki, F. Haber, IEEE Trans. Veh. Technol. 35(1), 1986). Vertical motion has a spread of
+its own with the same law. The lower station number comes first, so that both directions of a link fade alike. Places
+alone determine the gain: between poses x(t) goes on with the pose's velocity, and stations at rest keep their gain,
+unless `radio.scatterer_speed_m_s` moves the surroundings (f_n).
+
+The sum of N waves is not quite normal, so its amplitude is mapped by its own distribution (J. C. Kluyver's random
+walk); the correlation of powers is lower by 1 / N than the law. Not modeled: frequency selectivity, change within a
+frame, and directions that depend on the place.
 """
 
 import math
+from functools import cache
 from typing import Final
 
+import numpy as np
+
+from emulator.channel.path_loss import SPEED_OF_LIGHT_M_S
 from emulator.kernel.jit import jit
-from emulator.kernel.state import FADE_A, FADE_B, FADING, FADING_SHAPE, Ints, Reals
+from emulator.kernel.state import FADING, FADING_SHAPE, WAVES_FROM_NS, Ints, Reals
+from fanet_mw.rng import stream_seed
 from fanet_mw.scenario.tables.radio import Radio
+from fanet_mw.units import S
 
 NONE: Final = 0
 NAKAGAMI: Final = 1
 RICIAN: Final = 2
-_MODULUS_A = 2_147_483_563
-_MODULUS_B = 2_147_483_399
-_TWO_PI = 2.0 * math.pi
+WAVES: Final = 32
+TABLE: Final = 4096  # a power of two: see `gain`
+COSINE, SHAPED = 0, 1
+"""The rows of the table: cos(2 pi i / TABLE), and by |h| the gain (Rician: what scales h to be normal)."""
+_MASK = TABLE - 1
+_QUARTER = TABLE // 4
+_ROOT = math.sqrt(WAVES)
+_PER_AMPLITUDE = (TABLE - 1) / _ROOT
+_K, _K_RATE, _L, _L_RATE, _AT = 0, WAVES, 2 * WAVES, 3 * WAVES, 4 * WAVES
+WAVE_COLUMNS: Final = 4 * WAVES + 6
+"""Of a station: phases as the lower end and their change per ns [turns], the same as the higher end, position and
+velocity per ns [wavelengths]."""
+_TWO_PI: Final = 2.0 * math.pi
+RARE: Final = 0.001
+"""The share of frames on a link of which fading may lift none, for the link to carry no copies."""
 
 
 def law_of(radio: Radio) -> tuple[int, float]:
@@ -33,51 +58,126 @@ def law_of(radio: Radio) -> tuple[int, float]:
     return NONE, 0.0
 
 
-def seeds(seed: int) -> tuple[int, int]:
-    """The two initial states of a generator, made of 63 random bits."""
-    return seed % (_MODULUS_A - 1) + 1, (seed >> 31) % (_MODULUS_B - 1) + 1
+def lift(radio: Radio) -> float:
+    """The gain that one frame in a thousand exceeds; 1 without fading."""
+    return _lift(*law_of(radio))
+
+
+@cache
+def _lift(law: int, shape: float) -> float:
+    if law == NAKAGAMI:
+        return float(gamma_quantile(np.array([-math.log(RARE)]), shape)[0])
+    if law == RICIAN:
+        rayleigh = np.sqrt(-np.log((np.arange(2000) + 0.5) / 2000) / (shape + 1))
+        angle = math.pi * (np.arange(180) + 0.5) / 180
+        x = math.sqrt(shape / (shape + 1)) + np.outer(rayleigh, np.cos(angle))
+        return float(np.quantile(x * x + np.outer(rayleigh, np.sin(angle)) ** 2, 1 - RARE))
+    return 1.0
+
+
+def gamma_quantile(exponent: Reals, shape: float) -> Reals:
+    """Where a gamma variate of mean 1 is exceeded with probability exp(-`exponent`)."""
+    log_gain = np.linspace(-45.0 / min(1.0, shape), math.log(60.0 / min(1.0, shape)), 60_000)
+    step = log_gain[1] - log_gain[0]
+    density = np.exp(
+        shape * math.log(shape) - math.lgamma(shape) + shape * log_gain - shape * np.exp(log_gain)
+    )  # of log_gain
+    below = np.cumsum(density) * step - density * step / 2
+    above = np.cumsum(density[::-1])[::-1] * step - density * step / 2
+    lower = np.log(np.maximum(below, 1e-300)), log_gain
+    upper = -np.log(np.maximum(above, 1e-300)), log_gain
+    share = -np.expm1(-exponent)
+    small, large = np.interp(np.log(np.maximum(share, 1e-300)), *lower), np.interp(exponent, *upper)
+    return np.asarray(np.exp(np.where(share < 0.5, small, large)), dtype=np.float64)
+
+
+def random_walk_exponent(amplitude: Reals) -> Reals:
+    """-ln P(the mean of N unit phasors, times sqrt N, is longer than this): the square of the amplitude, nearly."""
+    t, weight = np.polynomial.legendre.leggauss(240)
+    t, weight = 2.25 * (t + 1), 2.25 * weight  # beyond 4.5 less than 1e-12 is left of J0^32
+    sine = np.sin(_TWO_PI / 4 * (np.arange(96) + 0.5) / 96)  # Bessel's integrals over a quarter turn
+    spectrum = weight * np.cos(np.outer(t, sine)).mean(axis=1) ** WAVES
+    length = _ROOT * amplitude
+    j1 = [(np.sin(r * np.outer(t, sine)) * sine).mean(axis=1) for r in length]
+    return np.asarray(-np.log1p(-np.clip(length * (np.array(j1) @ spectrum), 0.0, 1 - 1e-12)), dtype=np.float64)
+
+
+def tables(radio: Radio) -> Reals:
+    """The table of the kernel, for the law of the scenario; zeros without fading."""
+    return _tables(*law_of(radio)).copy()
+
+
+@cache
+def _tables(law: int, shape: float) -> Reals:
+    if law == NONE:
+        return np.zeros((2, 1))
+    coarse = np.linspace(0.02, _ROOT, 400)
+    amplitude = np.linspace(0.0, _ROOT, TABLE)
+    ratio = np.interp(amplitude, coarse, random_walk_exponent(coarse) / coarse**2)
+    exponent = amplitude**2 * ratio
+    shaped = np.sqrt(ratio) if law == RICIAN else gamma_quantile(exponent, shape)
+    return np.stack([np.cos(_TWO_PI * np.arange(TABLE) / TABLE), shaped])
+
+
+class Waves:
+    """The directions of the waves, drawn from the scenario's seed, and the phases of each station in them."""
+
+    def __init__(self, radio: Radio, *, seed: int) -> None:
+        random = np.random.Generator(np.random.PCG64(stream_seed(seed, "fading")))
+        self._wavelength_m = SPEED_OF_LIGHT_M_S / (radio.frequency_mhz * 1e6)
+
+        def spread() -> Reals:
+            """Cosines and sines of angles, one in each N-th of a turn, in random order."""
+            angle = _TWO_PI * (random.permutation(WAVES) + random.random(WAVES)) / WAVES
+            return np.stack([np.cos(angle), np.sin(angle)])
+
+        self._k, self._l = (np.concatenate([spread(), spread()[:1]]) / self._wavelength_m for _ in "kl")
+        self._phase = random.random(WAVES)
+        self._turns_per_s = spread()[0] * radio.scatterer_speed_m_s / self._wavelength_m
+
+    def of(self, at: Reals, velocity: Reals, t_ns: int) -> Reals:
+        """A row for each station at `at` [m] with `velocity` [m/s] at this instant; zeros if its place is unknown."""
+        known = np.isfinite(at).all(axis=1, keepdims=True)
+        at = np.where(known, at, 0.0)
+        velocity = np.where(known & np.isfinite(velocity), velocity, 0.0)
+        drift = self._phase + self._turns_per_s * (t_ns / S)
+        return np.concatenate(
+            [
+                (at @ self._k + drift) % 1.0,
+                (velocity @ self._k + self._turns_per_s) / S,
+                (at @ self._l) % 1.0,
+                velocity @ self._l / S,
+                at / self._wavelength_m,
+                velocity / self._wavelength_m / S,
+            ],
+            axis=1,
+        )
 
 
 @jit
-def uniform(st: Ints, s: int) -> float:
-    """The next value in (0, 1) of a station's fading generator (P. L'Ecuyer, CACM 31(6), 1988, figure 3)."""
-    a = st[FADE_A, s] * 40014 % _MODULUS_A
-    b = st[FADE_B, s] * 40692 % _MODULUS_B
-    st[FADE_A, s] = a
-    st[FADE_B, s] = b
-    z = a - b
-    if z < 1:
-        z += _MODULUS_A - 1
-    return float(z / _MODULUS_A)
-
-
-@jit
-def gamma(st: Ints, s: int, shape: float) -> float:
-    """A gamma variate of scale 1 (G. Marsaglia, W. W. Tsang, ACM Trans. Math. Softw. 26(3), 2000)."""
-    boost = 1.0
-    if shape < 1.0:
-        boost = math.pow(uniform(st, s), 1.0 / shape)
-        shape += 1.0
-    d = shape - 1.0 / 3.0
-    c = 1.0 / math.sqrt(9.0 * d)
-    while True:
-        x = math.sqrt(-2.0 * math.log(uniform(st, s))) * math.cos(_TWO_PI * uniform(st, s))
-        v = 1.0 + c * x
-        if v <= 0.0:
-            continue
-        v = v * v * v
-        if math.log(uniform(st, s)) < 0.5 * x * x + d - d * v + d * math.log(v):
-            return float(boost * d * v)
-
-
-@jit
-def gain(p: Ints, pf: Reals, st: Ints, s: int) -> float:
-    """The power gain of one frame of station `s` at one receiver."""
-    shape = pf[FADING_SHAPE]
+def gain(g: Ints, p: Ints, pf: Reals, wv: Reals, tb: Reals, a: int, b: int, t: int) -> float:
+    """The power gain between two stations at an instant."""
+    lo, hi = min(a, b), max(a, b)
+    since = float(t - g[WAVES_FROM_NS])
+    x = 0.0
+    y = 0.0
+    for n in range(WAVES):
+        turns = wv[lo, _K + n] + wv[hi, _L + n] + (wv[lo, _K_RATE + n] + wv[hi, _L_RATE + n]) * since
+        at = int(turns * TABLE)
+        x += tb[COSINE, at & _MASK]
+        y += tb[COSINE, (at - _QUARTER) & _MASK]
+    place = math.sqrt(x * x + y * y) / _ROOT * _PER_AMPLITUDE
+    i = min(int(place), TABLE - 2)
+    shaped = tb[SHAPED, i] + (place - i) * (tb[SHAPED, i + 1] - tb[SHAPED, i])
     if p[FADING] == NAKAGAMI:
-        return float(gamma(st, s, shape) / shape)
-    scatter = math.sqrt(-math.log(uniform(st, s)) / (shape + 1.0))  # Rayleigh amplitude
-    phase = _TWO_PI * uniform(st, s)
-    x = math.sqrt(shape / (shape + 1.0)) + scatter * math.cos(phase)
-    y = scatter * math.sin(phase)
+        return float(shaped)
+    square = 0.0
+    for axis in range(3):
+        apart = wv[lo, _AT + axis] - wv[hi, _AT + axis] + (wv[lo, _AT + 3 + axis] - wv[hi, _AT + 3 + axis]) * since
+        square += apart * apart
+    at = int(math.sqrt(square) * TABLE)
+    k = pf[FADING_SHAPE]
+    direct, scattered = math.sqrt(k / (k + 1.0)), shaped / _ROOT / math.sqrt(k + 1.0)
+    x = direct * tb[COSINE, at & _MASK] + scattered * x
+    y = direct * tb[COSINE, (at - _QUARTER) & _MASK] + scattered * y
     return float(x * x + y * y)

@@ -4,7 +4,8 @@
     log_distance   L(1 m) + 10 n log10 d
     two_ray        friis up to the crossover 4 pi h1 h2 f / c, beyond 40 log10 d - 20 log10(h1 h2)
     air_to_air     friis at 1 m + 20.5 log10 d
-    air_to_ground  friis + P eta_LoS + (1 - P) eta_NLoS, P from the elevation angle (Al-Hourani et al. 2014)
+    air_to_ground  friis + P eta_LoS + (1 - P) eta_NLoS, P from the elevation angle (Al-Hourani et al. 2014), and over
+                   into air_to_air as the lower end rises above the roofs
     uma_av         P L_LoS + (1 - P) L_NLoS, P from height and distance (3GPP TR 36.777, annex B)
 
 Distances and heights are in metres, frequencies in MHz, losses in dB between isotropic antennas. Below 1 m the loss is
@@ -36,13 +37,15 @@ class Environment(NamedTuple):
     b: float
     los_db: float
     nlos_db: float
+    roofs_m: float
+    """The scale gamma of roof heights, which have a Rayleigh distribution (ITU-R P.1410)."""
 
 
 ENVIRONMENTS: Final = {
-    "suburban": Environment(4.88, 0.43, 0.1, 21.0),
-    "urban": Environment(9.61, 0.16, 1.0, 20.0),
-    "dense_urban": Environment(12.08, 0.11, 1.6, 23.0),
-    "highrise": Environment(27.23, 0.08, 2.3, 34.0),
+    "suburban": Environment(4.88, 0.43, 0.1, 21.0, 8.0),
+    "urban": Environment(9.61, 0.16, 1.0, 20.0, 15.0),
+    "dense_urban": Environment(12.08, 0.11, 1.6, 23.0, 20.0),
+    "highrise": Environment(27.23, 0.08, 2.3, 34.0, 50.0),
 }
 """A. Al-Hourani, S. Kandeepan, S. Lardner, "Optimal LAP altitude for maximum coverage", IEEE Wireless Commun. Lett.
 3(6), 2014; excess losses at 2 GHz from their "Modeling air-to-ground path loss for low altitude platforms in urban
@@ -92,6 +95,11 @@ def air_to_ground_db(distance_m: Reals, rise_m: Reals, environment: Environment,
     sight = sight_probability(elevation_deg, environment)
     excess = sight * environment.los_db + (1 - sight) * environment.nlos_db
     return np.asarray(friis_db(distance_m, frequency_mhz=frequency_mhz) + excess, dtype=np.float64)
+
+
+def share_of_lower_roofs(height_m: Reals, environment: Environment) -> Reals:
+    """The share of roofs below a height."""
+    return np.asarray(-np.expm1(-(np.maximum(height_m, 0.0) ** 2) / (2 * environment.roofs_m**2)), dtype=np.float64)
 
 
 def uma_av_sight_probability(along_m: Reals, height_m: Reals) -> Reals:

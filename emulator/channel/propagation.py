@@ -14,6 +14,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
+from emulator.channel.fading import lift
 from emulator.channel.pairs_in_reach import neighbors
 from emulator.channel.path_loss import (
     AIR_TO_AIR_EXPONENT,
@@ -23,6 +24,7 @@ from emulator.channel.path_loss import (
     air_to_ground_db,
     friis_db,
     log_distance_db,
+    share_of_lower_roofs,
     two_ray_db,
     uma_av_db,
 )
@@ -41,11 +43,8 @@ from emulator.kernel.state import (
 )
 from fanet_mw.airtime import Timing
 from fanet_mw.extensions import load
-from fanet_mw.scenario.tables.radio import CHANNELS, Radio, is_ofdm
+from fanet_mw.scenario.tables.radio import CHANNELS, UMA_ANTENNA_M, Radio, default_sensitivity_dbm, noise_dbm
 
-THERMAL_DBM_PER_HZ: Final = -174.0
-DSSS_BANDWIDTH_HZ: Final = 22e6
-OFDM_BANDWIDTH_HZ: Final = 20e6
 _ROUNDING_DB: Final = 1e-9
 """A tolerance, so that rounding does not remove a link exactly as long as the reach."""
 
@@ -56,8 +55,31 @@ def milliwatt(dbm: float) -> float:
 
 def noise_mw(radio: Radio) -> float:
     """Thermal noise in the channel, raised by the receiver's noise figure."""
-    bandwidth_hz = OFDM_BANDWIDTH_HZ if is_ofdm(radio.rate_mbps) else DSSS_BANDWIDTH_HZ
-    return milliwatt(THERMAL_DBM_PER_HZ + 10 * math.log10(bandwidth_hz) + radio.noise_figure_db)
+    return milliwatt(noise_dbm(radio.rate_mbps, radio.noise_figure_db))
+
+
+def sensitivities_mw(radio: Radio) -> tuple[float, float]:
+    """The weakest frame that is received: of data, and of ACKs, whose rate may be lower."""
+    by_rate = radio.sensitivity_dbm == default_sensitivity_dbm(radio, radio.rate_mbps)
+    ack_dbm = default_sensitivity_dbm(radio, radio.ack_rate_mbps) if by_rate else radio.sensitivity_dbm
+    return milliwatt(radio.sensitivity_dbm), milliwatt(ack_dbm)
+
+
+def carrier_sense_mw(radio: Radio) -> float:
+    """The weakest signal that is sensed."""
+    return 0.0 if radio.channel == "range" else milliwatt(radio.carrier_sense_dbm)
+
+
+def energy_mw(radio: Radio) -> float:
+    """The least energy that is sensed, whatever it consists of; infinite if only signals are."""
+    if "sums" in radio.as_ns3:
+        return milliwatt(radio.carrier_sense_dbm)
+    return math.inf if radio.energy_detection_dbm is None else milliwatt(radio.energy_detection_dbm)
+
+
+def audible_mw(radio: Radio) -> float:
+    """The mean power from which frames count as copies: fading must lift one in a thousand to the sensitivity."""
+    return milliwatt(radio.sensitivity_dbm) / lift(radio)
 
 
 _MOST_DECADES: Final = 12.0
@@ -68,7 +90,15 @@ def reach_m(radio: Radio) -> float:
     """The distance beyond which no station can interfere, by the most favorable path loss and 2 sigma of shadowing."""
     if radio.channel == "range":
         return radio.range_m
-    budget_db = radio.tx_power_dbm - radio.interference_floor_dbm + 2 * radio.shadowing_db
+    return _distance_m(radio, radio.tx_power_dbm - radio.interference_floor_dbm + 2 * radio.shadowing_db)
+
+
+def heard_m(radio: Radio) -> float:
+    """The distance up to which frames are received without shadowing and fading, by the most favorable path loss."""
+    return radio.range_m if radio.channel == "range" else _distance_m(radio, radio.tx_power_dbm - radio.sensitivity_dbm)
+
+
+def _distance_m(radio: Radio, budget_db: float) -> float:
     if radio.channel not in CHANNELS:
         return _foreign(radio).reach_m(budget_db)
     at_1_m = float(friis_db(np.ones(1), frequency_mhz=radio.frequency_mhz)[0])
@@ -109,11 +139,14 @@ def _loss_db(distance_m: Reals, from_m: Reals, to_m: Reals, radio: Radio) -> Rea
     low, high = np.minimum(from_m[:, 2], to_m[:, 2]), np.maximum(from_m[:, 2], to_m[:, 2])
     if radio.channel == "air_to_ground":
         environment = ENVIRONMENTS[radio.environment]
+        clear = share_of_lower_roofs(low, environment)
         to_ground = air_to_ground_db(distance_m, high - low, environment, frequency_mhz=mhz)
     else:
+        clear = np.clip((low - UMA_ANTENNA_M) / (radio.airborne_m - UMA_ANTENNA_M), 0.0, 1.0)
         along_m = np.hypot(*(from_m - to_m)[:, :2].T)
-        to_ground = uma_av_db(distance_m, along_m, high, frequency_mhz=mhz)
-    return np.where(low >= radio.airborne_m, in_the_air, to_ground)
+        user_m = np.where(high > UMA_ANTENNA_M, high, low)
+        to_ground = uma_av_db(distance_m, along_m, user_m, frequency_mhz=mhz)
+    return np.asarray(clear * in_the_air + (1 - clear) * to_ground, dtype=np.float64)
 
 
 class Channel(Protocol):
@@ -179,13 +212,18 @@ class LinkTable:
         self.ints[LINK_DST, :count] = found[:, 1]
         delay_ns = np.rint(distance / SPEED_OF_LIGHT_M_S * 1e9)
         self.ints[DELAY, :count] = np.minimum(delay_ns, longest_delay_ns(radio))
-        audible = power_dbm >= radio.sensitivity_dbm if radio.channel != "range" else np.ones(count, bool)
+        power_mw = np.power(10.0, power_dbm / 10)
+        if radio.channel == "range":
+            audible = matters = np.ones(count, bool)
+        else:
+            audible = power_mw >= audible_mw(radio)
+            matters = audible | (power_mw >= carrier_sense_mw(radio))
         self.ints[AUDIBLE, :count] = audible
-        only_audible = radio.fading == "none" and "sums" not in radio.as_ns3
-        self.longest_ns = int((self.ints[DELAY] * (self.ints[AUDIBLE] if only_audible else 1)).max())
-        """The delay of the longest link that matters: of an audible one, or of any if fading or sums can make it
-        audible."""
-        self.reals[LINK_POWER, :count] = np.power(10.0, power_dbm / 10)
+        only_those = radio.fading == "none" and energy_mw(radio) == math.inf
+        self.longest_ns = int((self.ints[DELAY, :count] * (matters if only_those else 1)).max(initial=0))
+        """The delay of the longest link that matters: of one that is heard or sensed, or of any if fading or sums can
+        raise it."""
+        self.reals[LINK_POWER, :count] = power_mw
         self.reals[SPARED, :count] = 1.0
         self.ptr = np.searchsorted(found[:, 0], np.arange(stations + 1)).astype(np.int64)
 

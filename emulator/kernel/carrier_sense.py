@@ -1,14 +1,15 @@
 """Carrier sense: whether a station takes its medium for busy (clear channel assessment, CCA), over its state.
 
 The medium is busy for as many reasons as CS counts: each frame that is sensed, from its detection to its end, and, if
-SENSES_SUMS = 1, the energy of all signals together while it is above the sensitivity. What follows from a medium that
+SENSES_SUMS = 1, the energy of all signals and jammers together while it is above ENERGY_MW (802.11-2020, 17.3.10.6:
+-62 dBm with OFDM). What follows from a medium that
 becomes busy or idle is in `channel_access.py`. The virtual carrier sense (NAV) is an instant until which a station has
 no access to the medium there; `phy.py` sets it at the end of a frame for another station.
 """
 
 from emulator.kernel.channel_access import on_busy, on_idle
 from emulator.kernel.jit import jit
-from emulator.kernel.state import CS, ENERGY, NOTHING, POWER, SENSES_SUMS, SENSITIVITY_MW, TX_KIND, Ints, Reals
+from emulator.kernel.state import CS, ENERGY, ENERGY_MW, JAMMING, NOTHING, NOW, POWER, SENSES_SUMS, TX_KIND, Ints, Reals
 
 
 @jit
@@ -29,8 +30,8 @@ def quieter(g: Ints, p: Ints, st: Ints, hs: Ints, r: int, t: int) -> None:
 
 @jit
 def energy_rose(p: Ints, pf: Reals, st: Ints, sf: Reals, r: int, t: int) -> None:
-    """Call the medium busy for the energy of all signals together, if that is enough to be sensed."""
-    if p[SENSES_SUMS] == 1 and st[ENERGY, r] == 0 and sf[POWER, r] >= pf[SENSITIVITY_MW]:
+    """Call the medium busy for all energy together, if that is enough to be sensed."""
+    if p[SENSES_SUMS] == 1 and st[ENERGY, r] == 0 and sf[POWER, r] + sf[JAMMING, r] >= pf[ENERGY_MW]:
         st[ENERGY, r] = 1
         busier(p, st, r, t)
 
@@ -38,6 +39,14 @@ def energy_rose(p: Ints, pf: Reals, st: Ints, sf: Reals, r: int, t: int) -> None
 @jit
 def energy_fell(g: Ints, p: Ints, pf: Reals, st: Ints, sf: Reals, hs: Ints, r: int, t: int) -> None:
     """Call the medium busy for that energy no longer, if it is not enough any more."""
-    if st[ENERGY, r] == 1 and sf[POWER, r] < pf[SENSITIVITY_MW]:
+    if st[ENERGY, r] == 1 and sf[POWER, r] + sf[JAMMING, r] < pf[ENERGY_MW]:
         st[ENERGY, r] = 0
         quieter(g, p, st, hs, r, t)
+
+
+@jit
+def sense_jamming(g: Ints, p: Ints, pf: Reals, st: Ints, sf: Reals, hs: Ints) -> None:
+    """Sense the energy at all stations anew, because jamming has changed; the heap of starts has room for each."""
+    for r in range(st.shape[1]):
+        energy_rose(p, pf, st, sf, r, g[NOW])
+        energy_fell(g, p, pf, st, sf, hs, r, g[NOW])

@@ -1,4 +1,4 @@
-"""The entry to the compiled kernel, used once per wake-up of the medium: one argument in place of fourteen.
+"""The entry to the compiled kernel, used once per wake-up of the medium: one argument in place of sixteen.
 
 At every call numba determines type, address and shape of each array argument, which takes longer than the kernel needs
 for a frame. So a table holds the addresses, and the arrays are put together inside. Without compilation there is no
@@ -16,7 +16,7 @@ from emulator.kernel.jit import COMPILED, jit_views
 from emulator.kernel.kernel import advance
 from emulator.kernel.state import Ints
 
-_ARRAYS: Final = 14
+_ARRAYS: Final = 16
 Array = npt.NDArray[np.int64] | npt.NDArray[np.float64]
 
 
@@ -66,6 +66,6 @@ if COMPILED:
         return advance(
             line(table, 0, ints), line(table, 1, ints), line(table, 2, reals), rows(table, 3, ints),
             rows(table, 4, reals), rows(table, 5, ints), rows(table, 6, ints), rows(table, 7, reals),
-            line(table, 8, ints), rows(table, 9, ints), rows(table, 10, ints), rows(table, 11, ints),
-            rows(table, 12, ints), rows(table, 13, reals), until,
+            line(table, 8, ints), rows(table, 9, reals), rows(table, 10, reals), rows(table, 11, ints),
+            rows(table, 12, ints), rows(table, 13, ints), rows(table, 14, ints), rows(table, 15, reals), until,
         )  # fmt: skip

@@ -8,7 +8,6 @@ from emulator.kernel.state import (
     DEAF,
     DEGRADED,
     DELIVERED,
-    DONE_ACKED,
     DONE_EXPIRED,
     DONE_FULL,
     DONE_RETRY,
@@ -33,7 +32,6 @@ from emulator.kernel.state import (
     RECEIVED_COPIES,
     SRC,
     TARGETS,
-    UNICASTS_ENDED,
     WANTS_STATUS,
     WEAK,
     Ints,
@@ -87,8 +85,6 @@ def verdict(fr: Ints, f: int) -> int:
 def done(g: Ints, fr: Ints, out: Ints, f: int, outcome: int, t: int) -> None:
     """Record that the MAC has finished with a frame."""
     fr[OUTCOME, f] = outcome
-    if outcome in (DONE_ACKED, DONE_RETRY):
-        g[UNICASTS_ENDED] += 1
     if fr[WANTS_STATUS, f] == 1:
         put(g, out, OUT_DONE, f, fr[SRC, f], t, outcome, fr[ATTEMPTS, f])
     release(g, fr, out, f, t)

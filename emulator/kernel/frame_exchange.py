@@ -31,6 +31,7 @@ from emulator.kernel.state import (
     ALL_DETECT,
     ALL_END,
     ALL_START,
+    ATTEMPT_ROWS,
     ATTEMPTS,
     ATTEMPTS_FAILED,
     ATTEMPTS_MADE,
@@ -40,6 +41,7 @@ from emulator.kernel.state import (
     BO,
     BORN,
     CAPTURE,
+    CARRIER_SENSE_MW,
     COPY,
     CS,
     DATA,
@@ -56,6 +58,7 @@ from emulator.kernel.state import (
     ENDS,
     EVERYONE,
     FADING,
+    FAILED_BY,
     FATE,
     FATE_HALF_DUPLEX,
     FATE_OPEN,
@@ -73,6 +76,7 @@ from emulator.kernel.state import (
     LINK_POWER,
     LOCK,
     LOCK_HEADER_END,
+    MADE_BY,
     MAX_ATTEMPTS,
     NAV,
     NEXT,
@@ -87,10 +91,8 @@ from emulator.kernel.state import (
     QUEUE_LIMIT,
     REACH_NS,
     RESUME_FROM,
-    RETRIES,
     SCHEDULED,
     SENSED,
-    SENSITIVITY_MW,
     SLOT_NS,
     SRC,
     TAIL,
@@ -198,6 +200,8 @@ def access(
     lk: Ints,
     lp: Reals,
     ptr: Ints,
+    wv: Reals,
+    tb: Reals,
     hs: Ints,
     hr: Ints,
     out: Ints,
@@ -216,7 +220,7 @@ def access(
     if f < 0:
         return
     fr[ATTEMPTS, f] += 1
-    begin_tx(g, p, pf, st, fr, lk, lp, ptr, hr, s, f, DATA, t)
+    begin_tx(g, p, pf, st, fr, lk, lp, ptr, wv, tb, hr, s, f, DATA, t)
     targets = 0
     for link in range(ptr[s], ptr[s + 1]):
         if fr[DST, f] == EVERYONE or fr[DST, f] == lk[LINK_DST, link]:
@@ -229,6 +233,7 @@ def access(
     g[ON_AIR_COPIES] += targets
     if fr[DST, f] != EVERYONE:
         g[ATTEMPTS_MADE] += 1
+        g[MADE_BY - 1 + min(fr[ATTEMPTS, f], ATTEMPT_ROWS)] += 1
     if p[CAPTURE] == 1:
         put(g, out, OUT_START, f, s, t, DATA, fr[ATTEMPTS, f])
 
@@ -243,6 +248,8 @@ def begin_tx(
     lk: Ints,
     lp: Reals,
     ptr: Ints,
+    wv: Reals,
+    tb: Reals,
     hr: Ints,
     s: int,
     f: int,
@@ -266,12 +273,10 @@ def begin_tx(
         last -= 1  # links without power come last and carry nothing
     for link in range(first, last):
         lp[ON_AIR, link] = lp[LINK_POWER, link]
-        lk[SENSED, link] = lk[AUDIBLE, link]
-        lk[COPY, link] = lk[AUDIBLE, link]
         if p[FADING] != 0:
-            lp[ON_AIR, link] *= gain(p, pf, st, s)
-            lk[SENSED, link] = 1 if lp[ON_AIR, link] >= pf[SENSITIVITY_MW] else 0
-            lk[COPY, link] = max(lk[AUDIBLE, link], lk[SENSED, link])
+            lp[ON_AIR, link] *= gain(g, p, pf, wv, tb, s, lk[LINK_DST, link], t)
+        lk[SENSED, link] = 1 if lp[ON_AIR, link] >= pf[CARRIER_SENSE_MW] else 0
+        lk[COPY, link] = lk[AUDIBLE, link]
         lk[FATE, link] = FATE_OPEN
         lk[LINK_FRAME, link] = f
         lk[LINK_KIND, link] = kind
@@ -341,14 +346,13 @@ def ack_timeout(g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, hs: Ints, out: I
     st[WAITING, s] = -1
     st[RESUME_FROM, s] = t
     g[ATTEMPTS_FAILED] += 1
+    g[FAILED_BY - 1 + min(fr[ATTEMPTS, f], ATTEMPT_ROWS)] += 1
     widen_window(p, st, s)
     if fr[ATTEMPTS, f] >= p[MAX_ATTEMPTS]:
         if p[KEEPS_WINDOW] == 0:
             reset_window(p, st, s)
         take_head(st, fr, s)
         done(g, fr, out, f, DONE_RETRY, t)
-    else:
-        g[RETRIES] += 1
     draw(st, s)
     arm(g, p, st, hs, s)
 
@@ -363,6 +367,8 @@ def send_ack(
     lk: Ints,
     lp: Reals,
     ptr: Ints,
+    wv: Reals,
+    tb: Reals,
     hs: Ints,
     hr: Ints,
     out: Ints,
@@ -375,7 +381,7 @@ def send_ack(
     if st[TX_KIND, s] == NOTHING:
         if p[CAPTURE] == 1:
             put(g, out, OUT_START, f, s, t, ACK, 0)
-        begin_tx(g, p, pf, st, fr, lk, lp, ptr, hr, s, f, ACK, t)
+        begin_tx(g, p, pf, st, fr, lk, lp, ptr, wv, tb, hr, s, f, ACK, t)
         release(g, fr, out, f, t)
         return
     release(g, fr, out, f, t)

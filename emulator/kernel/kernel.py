@@ -164,8 +164,8 @@ def earliest_end(g: Ints, p: Ints, st: Ints, fr: Ints, t: int, kind: int, a: int
 
 @jit
 def advance(  # noqa: C901  (one dispatch; splitting it would only move the branches)
-    g: Ints, p: Ints, pf: Reals, st: Ints, sf: Reals, fr: Ints, lk: Ints, lp: Reals, ptr: Ints, hs: Ints, hr: Ints,
-    asked: Ints, out: Ints, err: Reals, until: int,
+    g: Ints, p: Ints, pf: Reals, st: Ints, sf: Reals, fr: Ints, lk: Ints, lp: Reals, ptr: Ints, wv: Reals,
+    tb: Reals, hs: Ints, hr: Ints, asked: Ints, out: Ints, err: Reals, until: int,
 ) -> int:  # fmt: skip
     """Take in what was asked for, and process every event up to and including `until`; returns `next_output`.
 
@@ -193,11 +193,11 @@ def advance(  # noqa: C901  (one dispatch; splitting it would only move the bran
             kind, a, b = hs[0, 2], hs[0, 3], hs[0, 4]
             pop(hs, g, HS_N)
             if kind == ACCESS:
-                access(g, p, pf, st, fr, lk, lp, ptr, hs, hr, out, a, starts)
+                access(g, p, pf, st, fr, lk, lp, ptr, wv, tb, hs, hr, out, a, starts)
             elif kind == ARRIVE:
                 arrive(g, p, st, fr, hs, out, a, starts)
             elif kind == SEND_ACK:
-                send_ack(g, p, pf, st, fr, lk, lp, ptr, hs, hr, out, a, b, starts)
+                send_ack(g, p, pf, st, fr, lk, lp, ptr, wv, tb, hs, hr, out, a, b, starts)
             elif kind == ACK_TIMEOUT:
                 ack_timeout(g, p, st, fr, lk, hs, out, a, b, starts)
         else:
@@ -206,7 +206,7 @@ def advance(  # noqa: C901  (one dispatch; splitting it would only move the bran
             if kind == RX_START:
                 rx_start(p, pf, st, sf, lk, lp, err, a, ends)
             elif kind == RX_DETECT:
-                rx_detect(p, pf, st, sf, lk, lp, a, ends)
+                rx_detect(p, pf, st, sf, fr, lk, lp, a, ends)
             elif kind == RX_END:
                 rx_end(g, p, pf, st, sf, fr, lk, lp, hs, out, err, a, ends)
             elif kind == TX_DONE:
@@ -229,7 +229,7 @@ def spread(
         if kind == ALL_START:
             rx_start(p, pf, st, sf, lk, lp, err, link, t)
         elif kind == ALL_DETECT:
-            rx_detect(p, pf, st, sf, lk, lp, link, t)
+            rx_detect(p, pf, st, sf, fr, lk, lp, link, t)
         else:
             rx_end(g, p, pf, st, sf, fr, lk, lp, hs, out, err, link, t)
         link += 1

@@ -21,6 +21,7 @@ from emulator.kernel.state import (
     ACK,
     ACK_NS,
     ACK_TO,
+    AIRTIME,
     BAD_UNTIL,
     BEFORE_SEEKING,
     BEGINS,
@@ -46,6 +47,7 @@ from emulator.kernel.state import (
     HEADER_NS,
     HS_N,
     INTERFERENCE,
+    LATE_ACKS,
     LINK_DST,
     LINK_FRAME,
     LINK_KIND,
@@ -73,12 +75,14 @@ from emulator.kernel.state import (
     RANDOM,
     RECEIVED,
     RECEIVED_COPIES,
-    RSSI_SUM,
     SEEKING_UNTIL,
     SEND_ACK,
     SENSED,
+    SENSITIVITY_MW,
+    SHORT_NS,
     SIFS_NS,
     SPARED,
+    SRC,
     TAKE_OVER,
     TAKE_OVER_RATIO,
     TX_KIND,
@@ -93,6 +97,13 @@ ERROR_STEPS_PER_DB = 20.0
 
 
 @jit
+def sinr_step(err: Reals, sinr: float) -> int:
+    """The column of the table of error rates for an SINR above 0."""
+    at = int((10.0 * math.log10(sinr) - ERROR_FLOOR_DB) * ERROR_STEPS_PER_DB)
+    return int(max(0, min(err.shape[1] - 1, at)))
+
+
+@jit
 def close_segment(p: Ints, pf: Reals, st: Ints, sf: Reals, lp: Reals, err: Reals, r: int, t: int) -> None:
     """Account for the part of the locked frame that has passed since the interference last changed."""
     begin = st[LOCK_FROM, r]
@@ -101,9 +112,7 @@ def close_segment(p: Ints, pf: Reals, st: Ints, sf: Reals, lp: Reals, err: Reals
         return
     wanted = lp[ON_AIR, st[LOCK, r]]
     unwanted = max(0.0, sf[POWER, r] - wanted - sf[OVERLOOKED, r])
-    sinr_db = 10.0 * math.log10(wanted / (unwanted + sf[NOISE, r]))
-    at = int((sinr_db - ERROR_FLOOR_DB) * ERROR_STEPS_PER_DB)
-    at = max(0, min(err.shape[1] - 1, at))
+    at = sinr_step(err, wanted / (unwanted + sf[NOISE, r]))
     until = min(t, st[LOCK_DATA_END, r])
     header_ns = max(0, min(until, st[LOCK_HEADER_END, r]) - begin)
     sf[LOG_OK, r] += header_ns * pf[HEADER_BITS_PER_NS] * err[0, at]
@@ -140,7 +149,7 @@ def seek(p: Ints, st: Ints, sf: Reals, r: int, t: int) -> None:
 
 
 @jit
-def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link: int, t: int) -> None:
+def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, fr: Ints, lk: Ints, lp: Reals, link: int, t: int) -> None:
     """The preamble of a frame has been present long enough to be detected, and its energy to be sensed."""
     r = lk[LINK_DST, link]
     audible = lk[SENSED, link] == 1
@@ -149,22 +158,23 @@ def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link
     energy_rose(p, pf, st, sf, r, t)
     wanted = lp[ON_AIR, link]
     if p[INTERFERENCE] == 0:
-        clear = st[NSIG, r] == 1
+        clear, alone = st[NSIG, r] == 1, True
     else:
         clear = wanted >= pf[DETECT_RATIO] * (max(0.0, sf[POWER, r] - wanted) + sf[NOISE, r])
+        alone = clear or wanted >= pf[DETECT_RATIO] * sf[NOISE, r]
     if st[TX_KIND, r] != NOTHING:
         lk[FATE, link] = FATE_HALF_DUPLEX
-    elif not audible:
+    elif not audible or not alone:
         lk[FATE, link] = FATE_WEAK
     elif not clear or (st[LOCK, r] >= 0 and not captures(p, pf, st, lp, r, wanted)):
-        lk[FATE, link] = FATE_COLLISION if st[NSIG, r] > 1 else FATE_WEAK
+        lk[FATE, link] = FATE_COLLISION
     else:
         if st[LOCK, r] >= 0:
             lk[FATE, st[LOCK, r]] = FATE_COLLISION
         st[LOCK, r] = link
         st[LOCK_FROM, r] = t
         st[LOCK_HEADER_END, r] = t - p[DETECT_NS] + p[HEADER_NS]
-        st[LOCK_RATE, r] = 2 if lk[LINK_KIND, link] == ACK else 1
+        st[LOCK_RATE, r] = rate_row(p, fr, lk, link)
         st[LOCK_DATA_END, r] = NEVER
         if p[EXTENSION_NS] > 0:
             st[LOCK_DATA_END, r] = lk[ENDS, link] - p[EXTENSION_NS]
@@ -182,13 +192,41 @@ def captures(p: Ints, pf: Reals, st: Ints, lp: Reals, r: int, wanted: float) -> 
 
 
 @jit
-def survived(p: Ints, st: Ints, sf: Reals, r: int) -> bool:
-    """True if the locked frame is received without error."""
+def rate_row(p: Ints, fr: Ints, lk: Ints, link: int) -> int:
+    """Which error rates the frame on a link has, as LOCK_RATE says it."""
+    if lk[LINK_KIND, link] == ACK:
+        return 2
+    return 3 if fr[AIRTIME, lk[LINK_FRAME, link]] <= p[SHORT_NS] else 1
+
+
+@jit
+def decoded(p: Ints, pf: Reals, st: Ints, sf: Reals, lp: Reals, err: Reals, r: int, link: int, t: int) -> int:
+    """The fate of the locked frame: FATE_OPEN if it is received without error.
+
+    One draw decides with and without the interference, so a frame that noise alone would have spoiled is no collision.
+    """
     if p[INTERFERENCE] == 0:
-        return bool(st[OVERLAPPED, r] == 0)
+        return FATE_OPEN if st[OVERLAPPED, r] == 0 else FATE_COLLISION
+    if lp[ON_AIR, link] < pf[SENSITIVITY_MW - 1 + st[LOCK_RATE, r]]:
+        return FATE_WEAK
     if sf[LOG_OK, r] > -1e-9:
-        return True
-    return bool(uniform(st, RANDOM, r) / MODULUS < math.exp(sf[LOG_OK, r]))
+        return FATE_OPEN
+    drawn = uniform(st, RANDOM, r) / MODULUS
+    if drawn < math.exp(sf[LOG_OK, r]):
+        return FATE_OPEN
+    if st[OVERLAPPED, r] == 1 and drawn < math.exp(log_ok_alone(p, pf, st, sf, lp, err, r, link, t)):
+        return FATE_COLLISION
+    return FATE_WEAK
+
+
+@jit
+def log_ok_alone(p: Ints, pf: Reals, st: Ints, sf: Reals, lp: Reals, err: Reals, r: int, link: int, t: int) -> float:
+    """What LOG_OK of the frame that ends at `t` would be without interference."""
+    at = sinr_step(err, lp[ON_AIR, link] / sf[NOISE, r])
+    rate = st[LOCK_RATE, r]
+    data_ns = min(t, st[LOCK_DATA_END, r]) - st[LOCK_HEADER_END, r]
+    header = (p[HEADER_NS] - p[DETECT_NS]) * pf[HEADER_BITS_PER_NS] * err[0, at]
+    return float(header + data_ns * pf[HEADER_BITS_PER_NS + rate] * err[rate, at])
 
 
 @jit
@@ -225,9 +263,10 @@ def rx_end(
     st[CHANGED_AT, r] = t
     if st[LOCK, r] == link:
         st[LOCK, r] = -1
-        whole = survived(p, st, sf, r)
+        fate = decoded(p, pf, st, sf, lp, err, r, link, t)
+        whole = fate == FATE_OPEN
         if not whole:
-            lk[FATE, link] = FATE_COLLISION if st[OVERLAPPED, r] == 1 else FATE_WEAK
+            lk[FATE, link] = fate
         elif lk[FAULT, link] != 0 and not spared(st, lp, r, link):
             whole = False
             lk[FATE, link] = lk[FAULT, link]
@@ -237,8 +276,10 @@ def rx_end(
     lk[UNDERWAY, link] = 0
     if lk[LINK_KIND, link] == DATA:
         data_end(g, p, st, fr, lk, lp, hs, out, link, whole, t)
-    elif whole and lk[LINK_KIND, link] == ACK and st[WAITING, r] == lk[LINK_FRAME, link]:
+    elif whole and st[WAITING, r] == lk[LINK_FRAME, link]:
         acknowledged(g, p, st, fr, out, r, t)
+    elif whole and fr[SRC, lk[LINK_FRAME, link]] == r:
+        g[LATE_ACKS] += 1
     if lk[SENSED, link] == 1:
         quieter(g, p, st, hs, r, t)
     energy_fell(g, p, pf, st, sf, hs, r, t)
@@ -272,7 +313,6 @@ def data_end(
     millidbm = int(10_000.0 * math.log10(lp[ON_AIR, link]))
     g[RECEIVED_COPIES] += 1
     lk[N_RECEIVED, link] += 1
-    lk[RSSI_SUM, link] += millidbm
     if fr[DST, f] == EVERYONE or fr[RECEIVED, f] == 0:
         fr[RECEIVED, f] += 1
         st[HANDED, r] += 1

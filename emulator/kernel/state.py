@@ -3,6 +3,7 @@
     st  int64   [station rows, stations]      sf  float64 [station rows, stations]
     fr  int64   [frame rows, frame slots]
     lk  int64   [link rows, links]            lp  float64 [link rows, links]      ptr int64 [stations + 1]
+    wv  float64 [stations, columns]           tb  float64 [rows, entries]         fading (emulator/channel/fading.py)
     hs, hr int64 [capacity, 5]                heaps of (t_ns, seq, kind, a, b): starts (hs), receptions (hr)
     g   int64   [globals]                     p int64, pf float64: parameters
     asked, out int64 [capacity, 6]            requests handed to the kernel, results handed back; emptied at each call
@@ -31,13 +32,13 @@ Reals = npt.NDArray[np.float64]
     TX_KIND,  # NOTHING, DATA, ACK
     TX_END,  # instant at which the frame on the air ends
     CS,  # number of signals sensed, plus one if ENERGY
-    ENERGY,  # 1: all signals together are sensed (only with SENSES_SUMS)
+    ENERGY,  # 1: all energy together is sensed (only with SENSES_SUMS)
     NSIG,  # signals present, sensed or not
     LOCK,  # link being received, -1 none
     LOCK_FROM,  # start of the current interference segment
     LOCK_HEADER_END,  # end of the PLCP preamble and header of the locked frame
     LOCK_DATA_END,  # instant from which only signal extension follows, which carries no bits; NEVER if there is none
-    LOCK_RATE,  # 1: the locked frame is data, 2: it is an ACK; the row of `err`, and an offset into pf
+    LOCK_RATE,  # 1: the locked frame is data, 2: an ACK, 3: short data; the row of `err`, and an offset into pf
     OVERLAPPED,  # 1: another signal overlapped the locked frame
     SEEKING_UNTIL,  # end of the last detection window that a signal has opened
     CHANGED_AT,  # instant at which the power last changed
@@ -55,20 +56,19 @@ Reals = npt.NDArray[np.float64]
     RANDOM,  # state of the generator for backoff and reception
     FAULT_RANDOM,  # state of the generator that says which frames a fault destroys
     HANDED,  # number of receptions handed to the station
-    FADE_A,  # first state of the generator for the fading of what the station transmits
-    FADE_B,  # its second state
     ON_AIR_LIST,  # not indexed by station: the first ON_AIR_N entries are the stations that transmit
     STATION_ROWS,
-) = range(38)
+) = range(36)
 NOTHING: Final = 0
 DATA: Final = 1
 ACK: Final = 2
 
 # --- stations (sf) ------------------------------------------------------------------------------------------------
-POWER, LOG_OK, NOISE, BEFORE_SEEKING, OVERLOOKED, STATION_REALS = range(6)
+POWER, LOG_OK, NOISE, BEFORE_SEEKING, OVERLOOKED, JAMMING, STATION_REALS = range(7)
 """POWER: sum of the signals present [mW]. LOG_OK: log of the probability that the locked frame has no error so far.
-NOISE: noise at the receiver [mW]. Only with OVERLOOKS: BEFORE_SEEKING is POWER before the first signal of a run of
-detection windows, OVERLOOKED is the part of the interference that does not count against the locked frame [mW]."""
+NOISE: noise at the receiver [mW]. JAMMING: power of jammers there, as carrier sense meets it [mW]. Only with OVERLOOKS:
+BEFORE_SEEKING is POWER before the first signal of a run of detection windows, OVERLOOKED is the part of the
+interference that does not count against the locked frame [mW]."""
 
 # --- frames (fr) --------------------------------------------------------------------------------------------------
 (
@@ -98,18 +98,17 @@ EVERYONE: Final = -1
     LINK_SRC,
     LINK_DST,
     DELAY,  # propagation delay
-    AUDIBLE,  # 1: strong enough to sense and decode; 0: it only interferes
+    AUDIBLE,  # 1: frames on the link count as copies: they can be received, by a fade at least; 0: they only interfere
     FAULT,  # FATE_DEGRADED, FATE_JAMMED or FATE_CUT while a fault lies on a link that is otherwise audible, else 0
-    RSSI_SUM,  # sum over the copies received [1/1000 dBm]; this and the counts are since the links were made
-    N_RECEIVED,  # copies received; the next six rows count copies lost, by fate
+    N_RECEIVED,  # copies received since the links were made; the next six rows count copies lost, by fate
     N_COLLISION,
     N_HALF_DUPLEX,
     N_WEAK,
     N_DEGRADED,
     N_JAMMED,
     N_CUT,
-    SENSED,  # 1: the frame on the link is sensed (AUDIBLE, changed by fading); this and later rows are of that frame
-    COPY,  # 1: the frame counts as a copy for this receiver: audible on average, or raised by fading
+    SENSED,  # 1: the frame on the link is sensed; this and later rows are of that frame
+    COPY,  # 1: the frame counts as a copy for this receiver
     FATE,
     LINK_FRAME,  # frame slot; for an ACK, of the frame that it acknowledges
     LINK_KIND,
@@ -117,7 +116,7 @@ EVERYONE: Final = -1
     BEGINS,  # instant of its first bit at the receiver
     ENDS,  # instant of its last bit at the receiver
     LINK_ROWS,
-) = range(22)
+) = range(21)
 LINK_POWER, ON_AIR, SPARED, LINK_REALS = range(4)
 """LINK_POWER: received power [mW]; at 0 the link carries nothing, and is sorted behind the others of its transmitter.
 ON_AIR: the power of the frame now on the link, as it was at its start. SPARED: the share of frames that the FAULT of
@@ -148,6 +147,8 @@ DONE_SENT, DONE_ACKED, DONE_RETRY, DONE_FULL, DONE_EXPIRED = range(5)
 DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED, DEGRADED, JAMMED, CUT_OFF = range(11)
 """Verdicts: how a frame ended for its receivers."""
 
+ATTEMPT_ROWS: Final = 16
+
 # --- globals (g) --------------------------------------------------------------------------------------------------
 (
     NOW,
@@ -165,14 +166,16 @@ DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED, DEGRAD
     CUT_COPIES,
     ATTEMPTS_MADE,
     ATTEMPTS_FAILED,
-    UNICASTS_ENDED,
-    RETRIES,
     ON_AIR_N,  # number of stations that transmit
     LAST_END,  # instant at which the last frame to leave its antenna has ended at its last receiver
-    REACH_NS,  # longest delay of an audible link
+    REACH_NS,  # longest delay of a link that is sensed
     ASKED_N,  # rows of `asked` in use
+    WAVES_FROM_NS,  # instant of the phases in `wv`
+    LATE_ACKS,  # ACKs received after their timeout
+    MADE_BY,  # the first of ATTEMPT_ROWS rows: unicasts by attempt, first ones here; the last row also has later ones
+    FAILED_BY,  # likewise: those of them without an ACK
     GLOBALS,
-) = range(22)
+) = (*range(22), 21 + ATTEMPT_ROWS, 21 + 2 * ATTEMPT_ROWS)
 
 # --- parameters (p, pf) -------------------------------------------------------------------------------------------
 (
@@ -191,7 +194,7 @@ DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED, DEGRAD
     LIFETIME_NS,
     DIFS_FIRST,  # 1, as ns-3: a frame waits one DIFS after it is queued, and draws nothing if it is interrupted
     EIFS_FROM_FRAME,  # 1, as ns-3: EIFS begins at the end of a bad frame, not when the medium is idle after it
-    SENSES_SUMS,  # 1, as ns-3: signals that are too weak alone are sensed by the sum of their powers
+    SENSES_SUMS,  # 1: energy above ENERGY_MW is sensed, whatever it consists of
     OVERLOOKS,  # 1, as ns-3: interference that begins within a detection window is overlooked
     KEEPS_WINDOW,  # 1, as ns-3: CW is reset at the failure after MAX_ATTEMPTS in a row, not when a frame is given up
     INTERFERENCE,  # 0: any overlap destroys a frame; 1: loss by SINR and error rate
@@ -199,15 +202,21 @@ DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED, DEGRAD
     EXTENSION_NS,  # signal extension at the end of each frame (OFDM at 2.4 GHz)
     TAKE_OVER,  # 1: a later frame that is TAKE_OVER_RATIO times as strong as the locked one takes the receiver
     FADING,  # 0 none, else the number of the law (fading.py)
+    SHORT_NS,  # airtime up to which a frame of data has the error rates of short frames
     PARAMETERS,
-) = range(24)
+) = range(25)
 (
     DETECT_RATIO,
     HEADER_BITS_PER_NS,
     PAYLOAD_BITS_PER_NS,
     ACK_BITS_PER_NS,
+    SHORT_BITS_PER_NS,  # of short data frames, as of others
+    SENSITIVITY_MW,  # of data; the next two rows: of ACKs and of short data frames
+    ACK_SENSITIVITY_MW,
+    SHORT_SENSITIVITY_MW,
     TAKE_OVER_RATIO,
-    SENSITIVITY_MW,
+    CARRIER_SENSE_MW,  # the weakest signal that is sensed
+    ENERGY_MW,  # the least energy that is sensed (only with SENSES_SUMS)
     FADING_SHAPE,  # m of Nakagami fading, or K of Rician fading as a ratio
     REALS,
-) = range(8)
+) = range(13)

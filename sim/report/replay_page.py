@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from emulator.channel.propagation import heard_m
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import (
@@ -75,7 +76,7 @@ def content(replay: Replay) -> dict[str, Any]:
         "end_s": end_s,
         "step_s": step_s,
         "half_m": scenario.world.area_m / 2,
-        "reach_m": scenario.radio.range_m,
+        "reach_m": round(heard_m(scenario.radio)),
         "searches": scenario.mission.survivors > 0 or scenario.mission.search != "none",
         "nodes": nodes,
         "at": _positions(replay, nodes, end_s, step_s),

@@ -11,6 +11,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
+from emulator.channel.propagation import heard_m
 from fanet_mw.trace import LetOut
 from fanet_mw.units import MS, S
 from sim.figures.colors import BLUE, DARK, RED, SHADE
@@ -110,7 +111,7 @@ def links(run: RunRecords, counted: Sequence[Mapping[str, Any]]) -> RunPicture |
     known = [link for link in counted if link["copies"] and {link["src"], link["dst"]} <= places.at.keys()]
     if not known:
         return None
-    reach_m = run.scenario.radio.range_m
+    reach_m = heard_m(run.scenario.radio)
     ends = [(places.at[link["src"]], places.at[link["dst"]]) for link in known]
     shown = [
         index
@@ -135,8 +136,8 @@ def links(run: RunRecords, counted: Sequence[Mapping[str, Any]]) -> RunPicture |
     caption = f"Links by the share of copies received in the whole run; nodes {places.said}."
     if places.moved:
         caption += (
-            f" Drawn are the {len(shown):,} directed links between nodes that were within radio.range_m = {reach_m:g} "
-            f"m of each other there; {len(known) - len(shown):,} other pairs were in range at other times."
+            f" Drawn are the {len(shown):,} directed links between nodes that were within {reach_m:.0f} m of each "
+            f"other there, the radio's reach; {len(known) - len(shown):,} other pairs were in range at other times."
         )
     return RunPicture(figure, caption)
 

@@ -195,6 +195,11 @@ def _warnings(summary: Mapping[str, Any]) -> Iterator[str]:
     if heard and heard["malformed"]:
         what = ", ".join(f"{why} {count}" for why, count in heard["why"].items())
         yield f"Heard on the bus and refused: {what}"
+    if late := summary["air"].get("late_acks"):
+        yield (
+            f"{late:,} acknowledgments came after the timeout: some links are longer than radio.coverage_class allows "
+            "for (3 km, or 1.35 km with short slots; 450 m more per class)"
+        )
     for reason in summary["invalid_because"]:
         yield f"NOT VALID: {reason}"
     if any(item["value"] > item["limit"] for item in summary["disturbance"].values()):

@@ -10,7 +10,6 @@ import pytest
 from emulator.channel import fading
 from emulator.channel.shadowing import Shadowing
 from emulator.kernel import state
-from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Radio, config
 
 FAR_M = 5000.0
@@ -73,16 +72,95 @@ def test_close_ends_have_the_same_standard_deviation() -> None:
 
 
 DRAWS = 20_000
+WAVELENGTH_M = 299_792_458 / 2.412e9
+
+
+def bessel_j0(x: Any) -> Any:
+    turn = 2 * np.pi * (np.arange(400) + 0.5) / 400
+    return np.cos(np.multiply.outer(np.asarray(x, dtype=float), np.cos(turn))).mean(axis=-1)
+
+
+def gains_at(at: Any, velocity: Any, instants_ns: Any, pairs: Any, *, seed: int = 3, **keys: Any) -> Any:
+    """Power gains [instant, pair] of stations at `at` [n, 3] [m], as the kernel has them."""
+    radio_keys = radio(**keys)
+    law, shape = fading.law_of(radio_keys)
+    p, pf = np.zeros(state.PARAMETERS, np.int64), np.zeros(state.REALS)
+    p[state.FADING], pf[state.FADING_SHAPE] = law, shape
+    g = np.zeros(state.GLOBALS, np.int64)
+    waves = fading.Waves(radio_keys, seed=seed).of(np.asarray(at, float), np.asarray(velocity, float), 0)
+    table = fading.tables(radio_keys)
+    return np.array([[fading.gain(g, p, pf, waves, table, a, b, t) for a, b in pairs] for t in instants_ns])
 
 
 def gains(**keys: Any) -> Any:
-    """Power gains of one transmitter, as the kernel draws them."""
-    law, shape = fading.law_of(radio(**keys))
-    p, pf = np.zeros(state.PARAMETERS, np.int64), np.zeros(state.REALS)
-    p[state.FADING], pf[state.FADING_SHAPE] = law, shape
-    rows = np.zeros((state.STATION_ROWS, 1), np.int64)
-    rows[[state.FADE_A, state.FADE_B], 0] = fading.seeds(stream_seed(3, "fading", 1))
-    return np.array([fading.gain(p, pf, rows, 0) for _ in range(DRAWS)])
+    """Power gains of pairs of stations at rest all over an area."""
+    random = np.random.Generator(np.random.PCG64(1))
+    at = random.uniform(0, 5000, (DRAWS // 100, 3))
+    pairs = [(a, (a + lag) % len(at)) for a in range(len(at)) for lag in range(1, 101)]
+    return gains_at(at, np.zeros_like(at), [0], pairs, **keys)[0]
+
+
+RAYLEIGH = {"fading": "nakagami", "nakagami_m": 1}
+LAGS_M = np.array([0.0, 0.1, 0.2, 0.3, 0.383, 0.6, 1.0, 1.6]) * WAVELENGTH_M
+
+
+def power_correlation(speed: Any, **keys: Any) -> Any:
+    """The correlation of the gain with that of the first instant, over LAGS_M of way at 1 m/s in all, of many seeds."""
+    random = np.random.Generator(np.random.PCG64(2))
+    found = []
+    for seed in range(60):
+        at = random.uniform(0, 5000, (40, 3))
+        velocity = np.zeros_like(at)
+        velocity[::2], velocity[1::2] = speed
+        pairs = [(i, i + 1) for i in range(0, 40, 2)]
+        found.append(gains_at(at, velocity, np.rint(LAGS_M * 1e9).astype(int).tolist(), pairs, seed=seed, **keys))
+    drawn = np.concatenate(found, axis=1) - 1
+    return (drawn * drawn[0]).mean(axis=1) / (drawn[0] ** 2).mean()
+
+
+@pytest.mark.parametrize("way", [(1.0, 0, 0), (0, -1.0, 0), (0, 0, 1.0)])
+def test_while_one_end_moves_the_power_of_rayleigh_fading_has_the_correlation_of_clarke(way: Any) -> None:
+    """The square of J0(2 pi v t / lambda) (R. H. Clarke, 1968; W. C. Jakes, 1974, 1.3-9): the first zero at 0.383."""
+    expected = bessel_j0(2 * np.pi * LAGS_M / WAVELENGTH_M) ** 2
+    assert expected[4] == pytest.approx(0, abs=1e-4)
+    assert power_correlation((way, (0, 0, 0)), **RAYLEIGH) == pytest.approx(expected, abs=0.08)
+
+
+def test_while_both_ends_move_it_is_the_product_of_both() -> None:
+    """A. S. Akki, F. Haber, 1986: also in a formation that keeps its distances."""
+    one = bessel_j0(2 * np.pi * LAGS_M / WAVELENGTH_M)
+    found = power_correlation(((1.0, 0, 0), (1.0, 0, 0)), **RAYLEIGH)
+    assert found == pytest.approx(one**4, abs=0.08)
+
+
+def test_at_rest_a_link_keeps_its_gain_and_scatterers_that_move_change_it() -> None:
+    still = power_correlation(((0, 0, 0), (0, 0, 0)), **RAYLEIGH)
+    assert still == pytest.approx(1.0, abs=1e-9)
+    moved = power_correlation(((0, 0, 0), (0, 0, 0)), scatterer_speed_m_s=1, **RAYLEIGH)
+    assert moved == pytest.approx(bessel_j0(2 * np.pi * LAGS_M / WAVELENGTH_M) ** 2, abs=0.08)
+
+
+def test_both_directions_of_a_link_fade_alike() -> None:
+    random = np.random.Generator(np.random.PCG64(4))
+    at, velocity = random.uniform(0, 900, (9, 3)), random.uniform(-20, 20, (9, 3))
+    there = [(a, b) for a in range(9) for b in range(a)]
+    for keys in (RAYLEIGH, {"fading": "rician", "rician_k_db": 6}):
+        found = gains_at(at, velocity, [0, 10**7], there, **keys)
+        assert (found == gains_at(at, velocity, [0, 10**7], [(b, a) for a, b in there], **keys)).all()
+        assert len(np.unique(found)) == found.size
+
+
+def test_a_pose_that_continues_the_last_one_continues_the_fading() -> None:
+    """Station 1 flies at 15 m/s; the gain after 3 ms is the same from the pose before and from one at that instant."""
+    at, velocity = np.array([[0.0, 0, 50], [300, 0, 50]]), np.array([[15.0, 3, 1], [0, 0, 0]])
+    keys = radio(scatterer_speed_m_s=2, **RAYLEIGH)
+    p, pf, g = np.zeros(state.PARAMETERS, np.int64), np.zeros(state.REALS), np.zeros(state.GLOBALS, np.int64)
+    p[state.FADING], pf[state.FADING_SHAPE] = fading.law_of(keys)
+    waves, table, t_ns = fading.Waves(keys, seed=1), fading.tables(keys), 3_000_000
+    before = fading.gain(g, p, pf, waves.of(at, velocity, 0), table, 0, 1, t_ns)
+    g[state.WAVES_FROM_NS] = t_ns
+    after = fading.gain(g, p, pf, waves.of(at + velocity * t_ns / 1e9, velocity, t_ns), table, 0, 1, t_ns)
+    assert after == pytest.approx(before, rel=0.02)
 
 
 def gamma_share(shape: int, x: Any) -> Any:

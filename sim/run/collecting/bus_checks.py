@@ -102,6 +102,7 @@ class _AirReport(_Checked):
     busy: Number
     mean_retries: Number | None
     attempt_failure: Share | None
+    late_acks: Count
     throughput_mbps: Number
 
 

@@ -17,7 +17,8 @@ WEAK_NS = 944
 
 
 def air(make_scenario: MakeScenario, access: str | list[str], places_m: list[float], *, seed: int = 1) -> Air:
-    keys = {"nodes.count": len(places_m), "radio.channel": "log_distance", "radio.access": access, "seed": seed}
+    keys = {"nodes.count": len(places_m), "radio.channel": "log_distance", "radio.access": access, "seed": seed,
+            "radio.sensitivity_dbm": -82, "radio.preamble_snr_db": 4}  # fmt: skip
     return Air(make_scenario(**keys), places_m)
 
 

@@ -168,7 +168,8 @@ def test_an_ack_is_spoilt_as_often_as_its_own_rate_says(make_scenario: MakeScena
     outcomes = {}
     for ack_rate in (6, 54):
         keys = {"radio.standard": "a", "radio.rate_mbps": 6, "radio.ack_rate_mbps": ack_rate}
-        more = {"radio.channel": "log_distance", "radio.tx_power_dbm": 30, "radio.sensitivity_dbm": -95}
+        more = {"radio.channel": "log_distance", "radio.tx_power_dbm": 30, "radio.sensitivity_dbm": -95,
+                "radio.reference_loss_db": 40.05}  # fmt: skip
         air = Air(make_scenario(**{"nodes.count": 2, **keys, **more}), [0, 400])
         air.send(1, 1 * MS, dst=2)
         heard = air.run()

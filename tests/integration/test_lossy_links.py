@@ -11,7 +11,8 @@ from sim.run.virtual import simulate
 from sim.scenarios.catalog import find
 
 SMALL = ("nodes.count=12", "clusters.count=11", "traffic.sources=11", "duration_s=40", "warmup_s=24", "drain_s=8")
-LOSSY = ('radio.channel="log_distance"', 'radio.fading="rician"')
+STIRRED = "radio.scatterer_speed_m_s=100"  # the swarm is at rest: without it links would keep their fades
+LOSSY = ('radio.channel="log_distance"', 'radio.fading="rician"', STIRRED)
 
 
 def scenario(*overrides: str) -> Scenario:
@@ -29,7 +30,7 @@ def test_links_are_measured_where_frames_fade_unless_places_are_wanted() -> None
 
 @pytest.mark.parametrize("loss", ['radio.fading="rician"', "radio.shadowing_db=4"])
 def test_each_packet_over_lossy_links_arrives_within_what_was_stated_for_it(loss: str) -> None:
-    outcome = simulate(scenario('radio.channel="log_distance"', loss))
+    outcome = simulate(scenario('radio.channel="log_distance"', loss, STIRRED))
     born = {(r.node, r.seq): r.t_ns for r in outcome.records if isinstance(r, Generated)}
     stated = {(r.node, r.seq): r for r in outcome.records if isinstance(r, LikelyStated)}
     assert stated.keys() == born.keys(), "a packet behind others has a longer delay stated, not none"
@@ -50,7 +51,7 @@ def test_the_same_swarm_with_places_leaves_out_a_part() -> None:
 
 
 def test_no_delay_is_stated_that_is_longer_than_packets_live() -> None:
-    lossy = ('radio.channel="log_distance"', 'radio.fading="rician"', "routing.lifetime_s=0.8")
+    lossy = ('radio.channel="log_distance"', 'radio.fading="rician"', STIRRED, "routing.lifetime_s=0.8")
     outcome = simulate(scenario(*lossy, "duration_s=36"))
     assert any(isinstance(record, Generated) for record in outcome.records)
     stated = [record for record in outcome.records if isinstance(record, LikelyStated)]

@@ -94,7 +94,13 @@ def test_links_are_measured_and_a_timetable_made_of_them_by_real_processes() -> 
     wherever the machine was on time, which the verdict says.
     """
     keys = ["nodes.count=6", "nodes.layout=grid", "nodes.columns=3", "clusters.count=5", "traffic.sources=5"]
-    lossy = ["radio.channel=log_distance", "radio.fading=rician", "routing.hello_interval_s=0.4", "radio.lead_ms=100"]
+    lossy = [
+        "radio.channel=log_distance",
+        "radio.fading=rician",
+        "radio.scatterer_speed_m_s=100",
+        "routing.hello_interval_s=0.4",
+        "radio.lead_ms=100",
+    ]
     times = ["duration_s=25", "warmup_s=17", "drain_s=5", "traffic.payload_bytes=200", "seed=3"]
     outcome, _ = run(catalog.find("clusters", [*keys, *lossy, *times]))
     summary = finish(outcome, out=None)

@@ -57,7 +57,7 @@ _DISTURBED: Final = (
     ("radio.lead_ms=40", "radio.handover_ms=20"),
     ("clusters.repair_s=20",),
     ("radio.channel=log_distance", "radio.shadowing_db=4"),
-    ("radio.channel=log_distance", "radio.fading=rician"),
+    ("radio.channel=log_distance", "radio.fading=rician", "radio.scatterer_speed_m_s=100"),
 )
 
 
@@ -101,7 +101,7 @@ def lossy() -> Rows:
     rows = [[*head, "stated: share / at worst [s]", "within"]]
     for key in ("radio.shadowing_db=4", "radio.fading=rician"):
         for seed in _SEEDS:
-            keys = ("radio.channel=log_distance", key, f"seed={seed}")
+            keys = ("radio.channel=log_distance", key, "radio.scatterer_speed_m_s=100", f"seed={seed}")
             found = summarized("clusters", "duration_s=60", *keys)
             places = summarized("clusters", "duration_s=30", "clusters.links=places", *keys)
             delay_ms, likely = found["delay_ms"], found["likely"]

@@ -38,6 +38,8 @@ LEAST_SNR_DB: Final = {
 """The SINR [dB] at which one of a hundred frames of 128 bytes arrives, by `ofdm_errors` and rate, by the emulator's
 error rates (emulator/channel/error_rate.py)."""
 _FLOOR_DBM: Final = -101.0
+_SENSED_DBM: Final = -82.0
+"""802.11-2020, 17.3.10.6: a preamble of this power must be sensed, whatever the rate of data."""
 ED_OFDM_DBM: Final = -62.0
 """802.11-2020, 17.3.10.6: any signal 20 dB above the least sensitivity of -82 dBm holds the medium busy."""
 UMA_ANTENNA_M: Final = 25.0
@@ -129,8 +131,8 @@ class Radio(Section):
     which one in a hundred with 128 bytes arrives, by the error rates of data and of acknowledgments; -82 with
     `access = "ns3"` and on `range`."""
     carrier_sense_dbm: Level = -82.0
-    """All channels but `range`: the weakest frame that is sensed. By default `sensitivity_dbm` if that is given, else
-    that of the rate of headers (1 or 6 Mb/s), or `interference_floor_dbm` if that is higher."""
+    """All channels but `range`: the weakest frame that is sensed. By default `sensitivity_dbm`, but -82 at most if that
+    is not given (802.11 17.3.10.6)."""
     energy_detection_dbm: Level | None = None
     """All channels but `range`: energy from which the medium is busy, whatever it consists of. By default -62 with OFDM
     (802.11 17.3.10.6); with DSSS unset: only signals are sensed."""
@@ -233,11 +235,9 @@ def _add_levels(keys: dict[str, Any], rate_mbps: float) -> None:
     if rate_mbps not in RATES_MBPS["g"] or not isinstance(figure_db, int | float) or model not in LEAST_SNR_DB:
         return
     header_mbps = 6.0 if is_ofdm(rate_mbps) else 1.0
-    weakest_dbm = _sensitivity_dbm(header_mbps, figure_db, model, access)
-    if isinstance(floor_dbm := keys.get("interference_floor_dbm"), int | float):
-        weakest_dbm = max(weakest_dbm, floor_dbm)
-    keys.setdefault("carrier_sense_dbm", keys.get("sensitivity_dbm", weakest_dbm))
-    keys.setdefault("sensitivity_dbm", _sensitivity_dbm(rate_mbps, figure_db, model, access))
+    weakest_dbm = _sensitivity_dbm(rate_mbps, figure_db, model, access)
+    keys.setdefault("carrier_sense_dbm", keys.get("sensitivity_dbm", min(weakest_dbm, _SENSED_DBM)))
+    keys.setdefault("sensitivity_dbm", weakest_dbm)
     if is_ofdm(rate_mbps):
         keys.setdefault("energy_detection_dbm", ED_OFDM_DBM)
     if access != "ns3":

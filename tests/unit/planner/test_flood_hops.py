@@ -65,8 +65,7 @@ def test_a_plan_whose_floods_end_early_has_no_bound(relay: str) -> None:
 
 
 def test_over_lossy_links_the_hop_limit_is_named_too() -> None:
-    lossy = (*LINE, 'radio.channel="log_distance"', 'radio.fading="rician"', "radio.sensitivity_dbm=-82",
-             "nodes.spacing_m=120")  # fmt: skip
+    lossy = (*LINE, 'radio.channel="log_distance"', 'radio.fading="rician"', "nodes.spacing_m=120")
     _, plan, _ = judge(catalog.find("clusters", [*lossy, "routing.hop_limit=1"]), change=False)
     assert any("and end after routing.hop_limit = 1" in problem for problem in plan["problems"])
     assert set(plan["draws"][0]["likely_ms"].values()) == {None}

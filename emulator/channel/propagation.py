@@ -94,8 +94,13 @@ def reach_m(radio: Radio) -> float:
 
 
 def heard_m(radio: Radio) -> float:
-    """The distance up to which frames are received without shadowing and fading, by the most favorable path loss."""
-    return radio.range_m if radio.channel == "range" else _distance_m(radio, radio.tx_power_dbm - radio.sensitivity_dbm)
+    """The distance up to which frames are received without shadowing and fading, by the most favorable path loss.
+
+    It is for pages about a run: a channel from another package is not loaded for them, and has `range_m`.
+    """
+    if radio.channel == "range" or radio.channel not in CHANNELS:
+        return radio.range_m
+    return _distance_m(radio, radio.tx_power_dbm - radio.sensitivity_dbm)
 
 
 def _distance_m(radio: Radio, budget_db: float) -> float:

@@ -21,7 +21,7 @@ from emulator.channel.path_loss import (
     uma_av_db,
     uma_av_sight_probability,
 )
-from emulator.channel.propagation import LinkTable, milliwatt, noise_mw, pair_codes, reach_m, received_dbm
+from emulator.channel.propagation import LinkTable, heard_m, milliwatt, noise_mw, pair_codes, reach_m, received_dbm
 from emulator.channel.shadowing import Shadowing
 from emulator.kernel.state import AUDIBLE, LINK_DST, LINK_POWER, LINK_SRC
 from fanet_mw.errors import ConfigError
@@ -212,6 +212,8 @@ def test_beyond_the_sensitivity_a_link_only_interferes() -> None:
     links = LinkTable(np.array([[0.0, 0, 50], [500, 0, 50]]), keys, spare=0)
     assert links.count == 2
     assert not links.ints[AUDIBLE].any()
+    assert heard_m(keys) < 500 < heard_m(radio(channel="friis", sensitivity_dbm=-75))
+    assert heard_m(radio()) == 250
 
 
 def test_defaults_follow_the_channel_and_the_standard() -> None:

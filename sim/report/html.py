@@ -75,7 +75,7 @@ class Rows:
 Block = Heading | Text | Quoted | Commands | Picture | Rows
 _FIRST: Final = re.compile(r"^(\d*)([-+=.)#>])")
 """The beginning of a line that Markdown would take for that of a list, a heading or a quotation."""
-_INSIDE: Final = re.compile(r"[\\`*_\[\]|~@]|:(?=//)|(?<=www)\.", re.IGNORECASE)
+_INSIDE: Final = re.compile(r"[\\`*_\[\]|~@]|(?<=\])\(|:(?=//)|(?<=www)\.", re.IGNORECASE)
 """The characters inside a line to which Markdown gives a meaning, among them those that make addresses links."""
 _VERDICTS: Final = ("agrees", "partly", "differs")
 

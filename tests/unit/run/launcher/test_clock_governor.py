@@ -89,6 +89,13 @@ def test_pauses_that_the_limit_allows_on_average_do_not() -> None:
     assert {swarm.second(late=0.03 if second % 5 == 0 else 0.0) for second in range(300)} == {1.0}
 
 
+def test_lateness_of_more_than_20_seconds_ago_is_forgotten() -> None:
+    swarm = Swarm()
+    assert {swarm.second(late=0.15), swarm.second(late=0.15)} == {1.0}
+    assert {swarm.second() for _ in range(20)} == {1.0}
+    assert swarm.second(late=0.15) == 1.0, "it is the third bad second, and the first of the last 20"
+
+
 def test_a_swarm_that_catches_up_is_given_the_time() -> None:
     swarm = Swarm()
     assert swarm.second(late=1.0, moments=40, by_ms=400) == 0.75

@@ -38,6 +38,8 @@ _2_GHZ: Final = 0x0080
 _5_GHZ: Final = 0x0100
 """Radiotap channel flags."""
 _RETRY: Final = 0x08
+_REMEMBERED: Final = 65_536
+"""Frames whose number on the air is kept for their later attempts and receptions."""
 _MAC_PREFIX: Final = b"\x02\xfaNE"
 _EVERYONE: Final = b"\xff" * 6
 _BSSID: Final = b"\x02\xfaNE\xff\xff"
@@ -99,6 +101,10 @@ class Pcap:
         that the file can be read meanwhile.
         """
         self.epoch_unix_ns = 0
+        self._last: dict[int, int] = {}
+        self._numbers: dict[tuple[int, int], int] = {}
+        self._attempts: dict[int, int] = {}
+        """The attempt of the frame that each node sent last."""
         self._flush = flush
         self._flush_ns = S
         self.failure: Callable[[], str | None] = flush
@@ -124,7 +130,17 @@ class Pcap:
             0, 0, _RADIOTAP.size, _SENT, self._data_flags, self._rate, *self._channel,
             self._power_dbm, min(255, attempt - 1),
         )  # fmt: skip
-        self._put(t_ns, tap, self._data(src, dst, seq, frame, retry=attempt > 1))
+        if attempt == 1:
+            self._last[src] = self._last.get(src, -1) + 1
+            self._numbers[src, seq] = self._last[src]
+            if len(self._numbers) > _REMEMBERED:
+                del self._numbers[next(iter(self._numbers))]
+        self._attempts[src] = attempt
+        self._put(t_ns, tap, self._data(src, dst, self._number(src, seq), frame, retry=attempt > 1))
+
+    def _number(self, src: int, seq: int) -> int:
+        """The sequence number on the air, given at the first transmission (802.11-2020, 10.3.2.14)."""
+        return self._numbers.get((src, seq), seq)
 
     def acknowledged(self, t_ns: int, src: int, dst: int) -> None:
         """Record that an ACK leaves an antenna."""
@@ -149,7 +165,8 @@ class Pcap:
             0, 0, _RADIOTAP.size, _HEARD, self._data_flags, self._rate, *self._channel,
             max(-128, min(127, round(rssi_dbm))), station & 0xFF,
         )  # fmt: skip
-        self._put(t_ns, tap, self._data(src, dst, seq, frame, retry=False))
+        retry = self._attempts.get(src, 1) > 1
+        self._put(t_ns, tap, self._data(src, dst, self._number(src, seq), frame, retry=retry))
 
     def _put(self, t_ns: int, tap: bytes, frame: bytes) -> None:
         seconds, rest_ns = divmod(self.epoch_unix_ns + t_ns, S)

@@ -313,3 +313,18 @@ def test_tshark_reads_it_without_complaint(tmp_path: Path) -> None:
     lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
     assert len(lines) == len(list(read(path.read_bytes())))
     assert all(set(line.split("\t")[1:]) <= {"1", ""} for line in lines), "good, or not there (ACKs)"
+
+
+def test_sequence_numbers_are_given_at_the_first_transmission_and_kept_by_retries() -> None:
+    """802.11-2020, 10.3.2.14: one more for each new frame; a request that was made first may be sent later."""
+    written: list[bytes] = []
+    pcap = Pcap(written.append, Radio(), receptions=True)
+    pcap.transmitted(0, 1, 2, 7, PAYLOAD, 1)
+    pcap.transmitted(1, 1, 2, 7, PAYLOAD, 2)
+    pcap.received(2, 2, 1, 2, 7, PAYLOAD, -50.0)
+    pcap.transmitted(3, 1, BROADCAST, 5, PAYLOAD, 1)
+    pcap.transmitted(4, 3, BROADCAST, 9, PAYLOAD, 1)
+    frames = [record[16 + int.from_bytes(record[18:20], "little") :] for record in written[1:]]
+    numbers = [int.from_bytes(frame[22:24], "little") >> 4 for frame in frames]
+    assert numbers == [0, 0, 0, 1, 0]
+    assert [bool(frame[1] & 0x08) for frame in frames] == [False, True, True, False, False]

@@ -302,11 +302,11 @@ class BeaconTime(SwarmTime):
         return True
 
     def _apart_ns(self, local_ns: int) -> float:
-        """How far this node's time may be from a neighbor's: not at all if others support it; before it has any, as far
-        as two clocks may be from each other that were set before take-off. Any time may be wrong that nobody supports.
+        """How far this node's time may be from a neighbor's: not at all if others support it, otherwise as far as two
+        clocks may be from each other that were set before take-off; any distance once its own clock has jumped.
         """
-        if self.synced:
-            return 0 if self._sync.supported(local_ns) else math.inf
+        if self.synced and self._sync.supported(local_ns):
+            return 0
         if self._sync.counts["lost"]:
             return math.inf
         return 2 * self._clock.unsynchronized_error_ns(max(0, local_ns))

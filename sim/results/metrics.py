@@ -98,10 +98,9 @@ def _paces(outcome: Outcome) -> list[dict[str, float]]:
     changes = [(0, outcome.scenario.time_scale), *outcome.slowed, (outcome.simulated_ns, 0.0)]
     wall_s: dict[float, float] = {}
     for (since_ns, scale), (until_ns, _) in pairwise(changes):
-        wall_s[scale] = wall_s.get(scale, 0.0) + max(0, until_ns - since_ns) / scale / S
-    return [
-        {"time_scale": round(scale, 6), "wall_s": round(wall_s[scale], 3)} for scale in sorted(wall_s, reverse=True)
-    ]
+        pace = round(scale, 6)  # the same one is reached by different sums
+        wall_s[pace] = wall_s.get(pace, 0.0) + max(0, until_ns - since_ns) / scale / S
+    return [{"time_scale": pace, "wall_s": round(wall_s[pace], 3)} for pace in sorted(wall_s, reverse=True)]
 
 
 def _messages(outcome: Outcome) -> dict[str, int]:

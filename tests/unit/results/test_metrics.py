@@ -71,3 +71,13 @@ def test_a_bound_counts_whether_its_record_comes_before_or_after_the_packets_own
     after = summary_of(scenario, generated("traffic"), stated, *deliveries)["bound"]
     assert before == after
     assert (after["deliveries"], after["violations"]) == (3, 1)
+
+
+def test_the_paces_of_the_clock_say_for_how_many_wall_seconds_it_ran_at_each() -> None:
+    scenario = Scenario(duration_s=20)
+    changes = [(5 * S, 0.5), (6 * S, 0.6), (9 * S, 0.5), (10 * S, 0.1 + 0.2 + 0.3), (13 * S, 1.0)]
+    found = summarize(Outcome(scenario, "realtime", 32.0, [], {}, slowed=changes), trace_sha256="")
+    assert found["paces"] == [
+        {"time_scale": 1.0, "wall_s": 12.0}, {"time_scale": 0.6, "wall_s": 10.0}, {"time_scale": 0.5, "wall_s": 4.0},
+    ]  # fmt: skip
+    assert summarize(Outcome(scenario, "virtual", 1.0, [], {}), trace_sha256="")["paces"] == []

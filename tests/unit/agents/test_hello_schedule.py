@@ -7,8 +7,6 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-import pytest
-
 from agents.clock.clocked_uav import ClockedUav
 from fanet_mw import wire
 from fanet_mw.bus.messages import Reception, TxOutcome, TxRequest, TxStatus
@@ -123,9 +121,8 @@ def test_a_hello_without_room_for_the_time_goes_without_it(make_scenario: MakeSc
     assert all(hello.wants_status for hello in said), "a shorter hello may have room again"
 
 
-@pytest.mark.parametrize("sync", ["none", "gps"])
-def test_without_beacons_hellos_carry_no_time_and_ask_for_no_status(make_scenario: MakeScenario, sync: str) -> None:
-    sender = uav(make_scenario, LEADER, **{"clock.sync": sync})
+def test_with_exact_clocks_hellos_carry_no_time_and_ask_for_no_status(make_scenario: MakeScenario) -> None:
+    sender = uav(make_scenario, LEADER, **{"clock.sync": "none"})
     said = list(hellos(sender, until_ns=5 * S))
     assert said
     assert all(wire.TIME.msgid not in messages(hello.frame) and not hello.wants_status for hello in said)

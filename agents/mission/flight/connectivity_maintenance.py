@@ -9,6 +9,7 @@ from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.pattern import Pattern
+from fanet_mw.motion import Motion
 from fanet_mw.units import Enu
 
 _TETHER: Final = 0.95
@@ -17,9 +18,15 @@ _TETHER_S: Final = 4.0
 """A UAV may use up the rest of that distance in this time at the earliest."""
 
 
+_EARLY_TIES: Final = 2
+"""With so many of its nearest neighbors a UAV stays connected before the sweep; whoever leaves them before it has the
+plan may never hear it."""
+
+
 class ConnectivityMaintenance:
     """Constraints that keep a UAV of a team, or a relay, within radio reach of the places to which it is tied
-    (`Shape.tethers`), and a follower within reach of the nearest UAV of its team.
+    (`Shape.tethers`), and a follower within reach of the nearest UAV of its team; before the sweep, also without a
+    plan, everyone within reach of the nearest neighbors.
     """
 
     def __init__(
@@ -31,11 +38,18 @@ class ConnectivityMaintenance:
 
     def planes(self, now_ns: int) -> list[HalfPlane]:
         plan, pattern, place = self._formation.plan, self._formation.pattern, self._formation.place
-        if plan is None or pattern is None or place is None or not self._formation.is_taken_up(now_ns):
+        if plan is not None and place is None:
             return []
+        ties: list[Motion | None]
+        if plan is not None and pattern is not None and place is not None and self._formation.is_taken_up(now_ns):
+            ties = [
+                self._neighbors.motion(plan.nodes[other], now_ns=now_ns)
+                for other in self._tied_to(pattern, place, now_ns)
+            ]
+        else:
+            ties = self._nearest_motions(now_ns)
         planes = []
-        for other in self._tied_to(pattern, place, now_ns):
-            motion = self._neighbors.motion(plan.nodes[other], now_ns=now_ns)
+        for motion in ties:
             if motion is None:
                 continue
             plane = tether_plane(
@@ -47,6 +61,12 @@ class ConnectivityMaintenance:
             if plane is not None:
                 planes.append(plane)
         return planes
+
+    def _nearest_motions(self, now_ns: int) -> list[Motion | None]:
+        """The nearest neighbors of a UAV on the way to its place, within whose reach it stays when it responds."""
+        here = self._own_motion.position
+        heard = self._neighbors.all(now_ns=now_ns)
+        return [*sorted(heard, key=lambda motion: motion.offset_from(here, now_ns).norm())[:_EARLY_TIES]]
 
     def _tied_to(self, pattern: Pattern, place: int, now_ns: int) -> tuple[int, ...]:
         """The places within whose reach this UAV stays: those to which its place is tied, past a UAV that may leave its

@@ -26,3 +26,14 @@ def test_a_uav_of_a_line_is_tied_to_those_beside_it_and_a_follower_to_the_neares
                 board.neighbors.on_hello(other, Motion(lane_of(other, now_ns), Enu(0, 0, 0), now_ns))
         tied = ConnectivityMaintenance(board.own_motion, board.neighbors, board.place, reach_m=REACH_M)
         assert len(tied.planes(now_ns)) == ties
+
+
+def test_who_is_on_the_way_to_its_place_stays_within_reach_of_the_two_nearest() -> None:
+    now_ns = 20 * S
+    board = Board(LINE, Enu(0.0, 0.0, 65.0))
+    tied = ConnectivityMaintenance(board.own_motion, board.neighbors, board.place, reach_m=REACH_M)
+    assert tied.planes(now_ns) == []
+    for other, east in ((1, 230.0), (2, -200.0), (3, 240.0)):
+        board.neighbors.on_hello(other, Motion(Enu(east, 0.0, 65.0), Enu(0, 0, 0), now_ns))
+    assert sorted(plane.east for plane in tied.planes(now_ns)) == [-1.0, 1.0]
+    assert not board.place.is_taken_up(now_ns)

@@ -73,21 +73,26 @@ def json_of(text: bytes, *, source: str) -> Any:  # noqa: ANN401  (whatever JSON
     return value
 
 
+_LONGEST_NAME: Final = 64
+"""The part of a key's name that an error repeats."""
+
+
 def require_plain(value: object, *, source: str, finite: bool = False) -> None:
     """Raises ConfigError for values nested deeply, integers beyond 64 bits and, with `finite`, infinite numbers."""
-    level: list[object] = [value]
+    level: list[tuple[str, object]] = [("", value)]
     for _ in range(_DEEPEST + 1):
-        inner: list[object] = []
-        for item in level:
+        inner: list[tuple[str, object]] = []
+        for name, item in level:
             if isinstance(item, dict):
-                inner += item.values()
+                inner += ((f"{name}.{str(key)[:_LONGEST_NAME]}".lstrip("."), held) for key, held in item.items())
             elif isinstance(item, list | tuple):
-                inner += item
+                inner += ((name, held) for held in item)
             elif isinstance(item, int):
                 if not -(2**63) <= item < 2**63:
-                    raise ConfigError(f"{source}: holds an integer of {item.bit_length()} bits, at most 64")
+                    at = f"{name} " if name else ""
+                    raise ConfigError(f"{source}: {at}holds an integer of {item.bit_length()} bits, at most 64")
             elif finite and isinstance(item, float) and not math.isfinite(item):
-                raise ConfigError(f"{source}: holds the number {item}, which must be finite")
+                raise ConfigError(f"{source}: {name} holds the number {item}, which must be finite")
         if not inner:
             return
         level = inner

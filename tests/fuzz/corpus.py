@@ -45,6 +45,7 @@ from fanet_mw.trace import Record
 from fanet_mw.units import BROADCAST, Enu, NodeId, S
 from fanet_mw.wire.application_message import DELIVERED, MISSING, Head, Receipt, encode_piece, encode_receipts
 from fanet_mw.wire.bids import Bid, encode_bids
+from fanet_mw.wire.roll import Roll
 from fanet_mw.wire.search_plan import Search, SearchStatus
 from fanet_mw.wire.searched_cells import Covered
 from fanet_mw.wire.survivors import Found, Standing
@@ -52,6 +53,7 @@ from sim.run.virtual import actors_of
 from sim.scenarios import catalog
 
 SETTINGS: Final[dict[str, tuple[str, ...]]] = {
+    "rounds": ("routing.protocol=rounds",),
     "direct": ("routing.protocol=direct", "nodes.spacing_m=60"),
     "flooding": ("routing.protocol=flooding",),
     "gossip": ("routing.protocol=gossip",),
@@ -73,7 +75,7 @@ SETTINGS: Final[dict[str, tuple[str, ...]]] = {
     "cds": ("clusters.relay=cds", "mobility.model=crossing"),
     "mpr": ("clusters.relay=mpr", "clusters.method=wca", "clusters.reassign_s=1", "clock.sync=beacons"),
 }
-"""Fifteen swarms: every routing protocol, and of `clustered` every way to relay, repair and keep time but one."""
+"""Sixteen swarms: every routing protocol, and of `clustered` every way to relay, repair and keep time but one."""
 SMALL: Final = (
     "nodes.count=9", "clusters.count=2", "nodes.spacing_m=120", "world.engine=kinematic", "mobility.model=static",
     "mission.survivors=3", "clusters.flooding_period_s=0.5", "traffic.interval_s=0.5", "traffic.payload_bytes=128",
@@ -170,6 +172,7 @@ def _not_recorded() -> list[bytes]:
         encode_bids([Bid(3, 4, 200, 7), Bid(5, 6, 0xFFFF, 8, 2)], node=4),
         Found(7, 3, 10.0, 20.0, node=4, standing=Standing.ESTIMATED, **covariance).encode_frame(4),
         Covered(0x8001 << 1000 | 5).encode_frame(4),
+        Roll(77, 3, 2, (0, 5, 127, 60), frozenset((1, 2))).encode_frame(4),
         encode_piece(head, bytes(range(200)), node=3),
         encode_piece(head._replace(piece=1), bytes(100), node=3, targets=range(1, 40)),
         encode_piece(head._replace(size=len(text), port=0, pieces=1, stride=1000), text, node=3, targets=(4,)),

@@ -33,6 +33,7 @@ from fanet_mw.routing.dsdv import messages as dsdv
 from fanet_mw.routing.geographic import messages as geographic
 from fanet_mw.routing.olsr import messages as olsr
 from fanet_mw.wire import application_message as pieces
+from fanet_mw.wire import rounds
 from fanet_mw.wire.bids import checked_bids
 from fanet_mw.wire.hello.beacon import Beacon
 from fanet_mw.wire.hello.claims import Claims
@@ -115,6 +116,14 @@ def _of_the_air(found: Corpus) -> Iterator[Decoder]:
         (Roll, wire.ROLL),
     ):
         yield Decoder(kind.__name__, _there_and_back(kind.decode_frame, _encode_frame), of(spec.msgid))
+    yield Decoder(
+        "links in rounds",
+        _there_and_back(rounds.decode_heard, lambda m: rounds.encode_heard(m, 3, count=rounds.MOST_NODES)),
+        of(wire.HEARD.msgid),
+    )
+    yield Decoder(
+        "held packets", _there_and_back(rounds.decode_held, lambda m: rounds.encode_held(m, 3)), of(wire.HELD.msgid)
+    )
     yield Decoder("Bids", lambda data: checked_bids(wire.decode_first(wire.BIDS, data)), of(wire.BIDS.msgid))
     yield Decoder("Loads", _there_and_back(Loads.decode_frames, lambda m: m.encode_frames(3)), of(wire.LOADS.msgid))
     yield Decoder("Places", Places.decode_frames, of(wire.PLACES.msgid))

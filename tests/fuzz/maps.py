@@ -148,7 +148,7 @@ def town(random: Random) -> Sample:
 
 def trace(random: Random) -> Sample:
     """Lines of packets; its meaning is the packets."""
-    packets = [(round(random.uniform(0, 60), 3), random.randrange(64, 2304)) for _ in range(random.randrange(1, 9))]
+    packets = [(round(random.uniform(0, 60), 3), random.randrange(64, 2268)) for _ in range(random.randrange(1, 9))]
     between, comma = random.choice(
         ((",", False), (", ", False), (";", False), (";", True), ("\t", False), ("\t", True))
     )

@@ -18,7 +18,7 @@ from fanet_mw.errors import MalformedFrameError
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("fanet_mw", "agents", "emulator", "sim")
 INPUTS = 300
-TELLING = ("aodv", "olsr", "dsdv", "geographic", "all", "relay-counter", "measured", "claimed")
+TELLING = ("rounds", "aodv", "olsr", "dsdv", "geographic", "all", "relay-counter", "measured", "claimed")
 """Swarms that say, together, every kind of message."""
 
 

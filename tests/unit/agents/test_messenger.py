@@ -248,7 +248,7 @@ def test_what_is_refused_for_its_length_leaves_no_trace(make_scenario: MakeScena
 
 @pytest.mark.parametrize(
     ("packet", "to_one", "confirmed_to_all"),
-    [(256, 10_112, 5_120), (512, 25_472, 20_480), (1024, 56_192, 51_200), (2304, 132_992, 128_000)],
+    [(256, 10_112, 5_120), (512, 25_472, 20_480), (1024, 56_192, 51_200), (2268, 130_688, 125_696)],
 )
 def test_the_page_about_messages_states_how_long_they_may_be(
     make_scenario: MakeScenario, packet: int, to_one: int, confirmed_to_all: int

@@ -114,7 +114,9 @@ def test_links_are_drawn_between_the_places_of_a_stated_window(make_scenario: Ma
     (nodes,) = (one for one in drawing.figure.axes[0].collections if one.get_label() == "node")
     assert np.asarray(nodes.get_offsets()).tolist() == [[-70, 40], [-70, 80]]
     assert "at their mean places from 0 to 6 s" in drawing.caption
-    assert "1 directed links between nodes that were within radio.range_m = 50 m" in drawing.caption
+    assert (
+        "1 directed links between nodes that were within 50 m of each other there, the radio's reach" in drawing.caption
+    )
 
 
 def test_packets_are_held_against_the_slots_of_their_heads(make_scenario: MakeScenario) -> None:

@@ -130,12 +130,12 @@ def test_a_broadcast_reaches_everyone_else_unchanged_and_not_before_its_instant(
     run: Callable[[Requests], Heard],
 ) -> None:
     began_ns = time.monotonic_ns()
-    heard = run([(1, request_of(0, at_ms=100, size=2304))])
+    heard = run([(1, request_of(0, at_ms=100, size=2268))])
     took_ns = time.monotonic_ns() - began_ns
     assert receptions(heard, 1) == []
     for node in (2, 3):
         (reception,) = receptions(heard, node)
-        assert reception.frame == bytes(2304)
+        assert reception.frame == bytes(2268)
         assert reception.src == 1
         assert 100 * MS <= reception.end_ns <= max(250 * MS, took_ns)
 

@@ -241,6 +241,8 @@ def at_start(number: int, *, services: bool, after_s: float = 0.0) -> tuple[int,
     assert process.stderr is not None
     wait_until_signals_are_handled(process.pid)
     begun = process.stderr.readline() if services else ""
+    while begun.startswith("the scenario states no radio.lead_ms"):
+        begun = process.stderr.readline()
     assert begun.startswith("swarm quick on") is services
     time.sleep(after_s)
     os.killpg(process.pid, number)

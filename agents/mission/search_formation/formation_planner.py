@@ -4,8 +4,7 @@
     planner:    the lowest id that was received recently; it plans when all nodes have been received, or after
                 _PATIENCE_NS
     lost nodes: the others close ranks by themselves (`roll_call.py`), and the plan remains, so that a UAV that only
-                seemed to be lost has its place still; a follower exchanges its place for one of a team or of a relay
-                that is vacant, because those places keep the swarm connected and sweep the area
+                seemed to be lost has its place still
     newcomers:  a node that has no place gets one that nobody has, or that of a node that was not received for _LOST_NS
     take-off:   the first plan of UAVs on the ground begins when they have had time to climb
     leavers:    a node whose status says that its battery is only enough for the way home is replaced at once
@@ -19,7 +18,6 @@ instants, their ways then do not cross, and UAVs that were near each other remai
 follower are explained in `shapes/contract.py`; how the area is split into lanes is in `shapes/`.
 """
 
-from collections.abc import Collection
 from typing import Final, NamedTuple
 
 from agents.mission.hungarian import assign
@@ -35,7 +33,7 @@ STATUS_S: Final = 12.0
 _LOST_NS: Final = 70 * S
 """A UAV from which nothing was received for this time has no right to its place any more."""
 _SETTLED_NS: Final = 10 * S
-"""How long a plan is followed and a UAV is lost, at least, before a plan is mended: most are heard again soon."""
+"""How long a plan is followed, at least, before it is mended."""
 _PATIENCE_NS: Final = 14 * S
 """How long the first plan waits for UAVs that have not been received."""
 _NOTICE_NS: Final = 7 * S
@@ -205,7 +203,7 @@ class FormationPlanner:
         holders = [0] * pattern.places
         for node, column in zip(nodes, chosen, strict=True):
             holders[places[column]] = node
-        exchange_followers(holders, (), pattern)
+        _fill(holders, pattern)
         assert self._began_ns is not None, "a plan is made in a review"
         start_ns = max(now_ns + _NOTICE_NS, self._began_ns + self._take_off_ns)
         farthest_m = max(costs[row][column] for row, column in enumerate(chosen)) ** 0.5
@@ -218,17 +216,17 @@ class FormationPlanner:
         )._replace(revision=_next(self._newest_revision()))
 
     def _mended(self, plan: Search, now_ns: int) -> Search | None:
-        """The plan with followers in vacant places and with new UAVs; None if nothing has changed."""
+        """The plan without those who fly home, with followers in their places and with new UAVs; None if nothing has
+        changed.
+        """
         pattern = pattern_of(plan, reach_m=0.0)
         gone = self.leavers
         holders = [0 if node in gone else node for node in plan.nodes]
-        lost = self._roll_call.lost
-        absent = {node for node in holders if now_ns - lost.get(node, now_ns) > _SETTLED_NS}
         for node, member in sorted(self._members.items()):
             vacant = [place for place, holder in enumerate(holders) if self._is_up_for_grabs(holder, now_ns)]
             if vacant and node not in holders and not member.leaves and now_ns - member.heard_ns <= _LOST_NS:
                 holders[min(vacant, key=lambda place: _distance2(pattern.at(place, 0.0), member.position))] = node
-        exchange_followers(holders, absent, pattern)
+        _fill(holders, pattern)
         if tuple(holders) == plan.nodes:
             return None
         return plan._replace(revision=_next(plan.revision), planner=self._node, nodes=tuple(holders))
@@ -286,26 +284,18 @@ def pattern_of(plan: Search, *, reach_m: float) -> Pattern:
     )  # fmt: skip
 
 
-def exchange_followers(holders: list[int], absent: Collection[int], pattern: Pattern) -> None:
-    """Let the nearest follower take each place of a team or of a relay that is vacant, or whose UAV is `absent`; that
-    one gets the follower's place.
-
-    A UAV that is alone keeps its place.
+def _fill(holders: list[int], pattern: Pattern) -> None:
+    """Let the nearest follower take each place of a team or of a relay that nobody holds, because those places keep the
+    swarm connected and sweep the area. A UAV that is alone keeps its place.
     """
-    if sum(holder != 0 and holder not in absent for holder in holders) <= 1:
+    if sum(holder != 0 for holder in holders) <= 1:
         return
     for place in range(pattern.dimensions.fixed):
-        if holders[place] and holders[place] not in absent:
-            continue
         goal = pattern.at(place, 0.0)
-        spare = [
-            (_distance2(pattern.at(other, 0.0), goal), other)
-            for other in pattern.followers
-            if holders[other] and holders[other] not in absent
-        ]
-        if spare:
+        spare = [(_distance2(pattern.at(other, 0.0), goal), other) for other in pattern.followers if holders[other]]
+        if spare and not holders[place]:
             _, other = min(spare)
-            holders[place], holders[other] = holders[other], holders[place]
+            holders[place], holders[other] = holders[other], 0
 
 
 def _distance2(a: Enu, b: Enu) -> float:

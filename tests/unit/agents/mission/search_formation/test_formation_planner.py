@@ -131,27 +131,12 @@ def planned(lost_place: int) -> tuple[FormationPlanner, Search, int]:
     return planner, planner.plan, planner.plan.nodes[lost_place]
 
 
-def test_a_follower_exchanges_its_place_for_that_of_a_lost_uav_in_a_line() -> None:
-    planner, before, lost = planned(3)
-    planner._roll_call.lost[lost] = 3 * S
-    assert not planner.review(formation(), now_ns=13 * S), "it may be heard again"
-    assert planner.review(formation(), now_ns=20 * S)
-    after = planner.plan
-    assert after is not None
-    assert after.revision == before.revision + 1
-    followers = formation().followers.start
-    assert after.nodes[3] in before.nodes[followers:]
-    assert lost in after.nodes[followers:], "it has a place if it comes back"
-    assert not planner.review(formation(), now_ns=40 * S), "nothing else changes"
-
-
-@pytest.mark.parametrize("shape", [ShapeName.SPIRAL, ShapeName.RING])
-def test_without_followers_the_plan_remains_when_uavs_are_lost(shape: ShapeName) -> None:
+@pytest.mark.parametrize("shape", [ShapeName.LINES, ShapeName.SPIRAL, ShapeName.RING])
+def test_the_plan_remains_when_uavs_are_lost(shape: ShapeName) -> None:
     pattern = fitted(45, DEMANDS, shape=shape)
     assert pattern is not None
-    fixed = pattern.dimensions.fixed
-    planner = planner_with(fixed, lost=range(2, fixed))
-    plan = plan_of(pattern, tuple(range(1, fixed + 1)) + (0,) * (45 - fixed), planner=1, start_us=0, deploy_ds=10)
+    planner = planner_with(45, lost=range(2, 40))
+    plan = plan_of(pattern, tuple(range(1, 46)), planner=1, start_us=0, deploy_ds=10)
     planner.on_plan(plan)
     for second in (1, 20, 200):
         planner.review(pattern, now_ns=second * S)
@@ -188,6 +173,7 @@ def test_who_flies_home_holds_no_place_any_more_from_when_it_says_so() -> None:
     after = planner.plan
     assert after is not None
     assert leaver not in after.nodes
+    assert sorted(node for node in after.nodes if node) == [node for node in range(1, 46) if node != leaver]
     assert after.nodes[3] in before.nodes[pattern.followers.start :]
 
 
@@ -218,9 +204,9 @@ def test_the_number_of_a_plan_wraps_as_a_forged_one_may_be_the_greatest() -> Non
     planner.on_plan(plan_of(pattern, tuple(range(1, 46)), planner=1, start_us=0, deploy_ds=10)._replace(revision=65535))
     planner.review(pattern, now_ns=S)
     later_ns = 90 * S
-    planner._roll_call.lost[5] = 3 * S
-    for node in range(1, 45):
-        planner.status(SearchStatus(later_ns // US, Enu(0, 0, 50), node, 65535, 100), now_ns=later_ns)
+    for node in range(1, 46):
+        charge = 0 if node == 5 else 100
+        planner.status(SearchStatus(later_ns // US, Enu(0, 0, 50), node, 65535, charge), now_ns=later_ns)
     assert planner.review(pattern, now_ns=later_ns)
     assert planner.plan is not None
     told = Search.decode_frame(bytes(HEADER_BYTES) + planner.plan.encode_frame(1))

@@ -75,14 +75,13 @@ class RoundFlooding(RoutingProtocol):
             capacity=scenario.routing.queue_frames, repeats=rounds.repeats, patience_ns=self._law.hop_ns,
             neighbors_of=self._topology.neighbors_of,
         )  # fmt: skip
-        self._random = port.stream("rounds").random
         self._repair = None
         if rounds.repair_s:
             self._repair = Repair(
                 window_ns=seconds_to_ns(rounds.repair_s), capacity=_STORE_PACKETS,
                 random=port.stream("repair").random, flood_over_ns=max(4 * FLOOD_OVER_NS, 16 * self._law.hop_ns),
             )  # fmt: skip
-        self._pacing = BulkPacing(timing, self._random)
+        self._pacing = BulkPacing(timing, port.stream("rounds").random)
         self._bulk_ns: int | None = None
         """The next instant at which this node contends with bulk; None if it has none."""
         self._clock_hellos: set[int] = set()

@@ -47,6 +47,11 @@ class _Spread:
         self.from_ns = from_ns
         """Bulk: the instant before which it need not be looked at."""
 
+    @property
+    def again(self) -> bool:
+        """Bulk: True if it was sent, or left to others, before."""
+        return self.reached is None or self.sent > 0
+
 
 class Spreading:
     """The packets that one node passes on."""
@@ -179,19 +184,18 @@ class Spreading:
         for key, entry in self._bulk.items():
             if entry.from_ns > start_ns:
                 continue
-            first = entry.reached is not None and not entry.sent
             if entry.sent > self._repeats or (entry.having and entry.having.issuperset(neighbors)):
                 done.append(key)
             elif entry.reached and entry.reached.issuperset(neighbors):
                 entry.reached, entry.from_ns = None, start_ns + _WAY_ROUND * self._patience_ns
-            elif not first and entry.copy_ns > start_ns - self._patience_ns:
+            elif entry.again and entry.copy_ns > start_ns - self._patience_ns:
                 entry.from_ns = entry.copy_ns + self._patience_ns  # somebody else is at it
             else:
                 chosen.append(entry)
         for key in done:
             self._remove(key)
-        chosen.sort(key=lambda entry: (entry.reached is None or entry.sent > 0, entry.rank))  # what is new first
-        return [(entry.packet, entry.reached is None or entry.sent > 0) for entry in chosen]
+        chosen.sort(key=lambda entry: (entry.again, entry.rank))
+        return [(entry.packet, entry.again) for entry in chosen]
 
     def look_again(self, packet: Packet, *, from_ns: int) -> None:
         """Look at a bulk packet again from an instant on: does a neighbor still lack it?"""

@@ -190,6 +190,10 @@ class Messenger:
         """The applications that listen to a message, by its port or by the id of its MAVLink frame."""
         return self._listeners.of_message(_message_id(data)) if port == MAVLINK_PORT else self._listeners.of_port(port)
 
+    @property
+    def owes_receipts(self) -> bool:
+        return self._receiver.owes_receipts
+
     def has_news(self) -> bool:
         """True if there is a message to hand over, or news of a message that was sent."""
         return bool(self._receiver.arrived or self._sender.told or self._statuses.waiting or self._node.watch.news)

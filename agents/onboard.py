@@ -67,6 +67,11 @@ class Onboard:
     def hears_hellos(self) -> bool:
         return bool(self._callbacks.on_hello)
 
+    @property
+    def owes_receipts(self) -> bool:
+        """True while a message that was received has yet to be acknowledged."""
+        return self._messenger.owes_receipts
+
     def start(self, now_ns: int) -> None:
         self._call(now_ns)
         self._messenger.start(now_ns)

@@ -48,6 +48,8 @@ class NodeState(NamedTuple):
     bound_ns: int | None
     clusters: Mapping[NodeId, tuple[NodeId, ...]]
     """The nodes of each cluster by its head, the head first, as far as the node knows."""
+    owing: bool
+    """True while receipts, or packets of this node, have not been let out."""
 
 
 class _OutTopics(NamedTuple):
@@ -176,7 +178,8 @@ class Uav(Actor):
 
     def state(self, now_ns: int) -> NodeState:
         """The state of the network, as the node knows it."""
-        return NodeState(self._hellos.neighbors(now_ns), self._node.bound_ns(), self._node.clusters())
+        owing = self._onboard.owes_receipts or self._node.holds_own
+        return NodeState(self._hellos.neighbors(now_ns), self._node.bound_ns(), self._node.clusters(), owing)
 
     def know_clock_error(self, error_ns: int) -> None:
         """The greatest error of any clock in the swarm, as far as this node knows; 0 if all clocks are exact."""

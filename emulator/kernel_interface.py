@@ -33,7 +33,7 @@ class KernelInterface:
     def __init__(self, scenario: Scenario, *, stations: int, faults: Faults, capture: bool = False) -> None:
         self._radio = scenario.radio
         self.faults = faults
-        self.link_counters = LinkCounters(stations)
+        self.link_counters = LinkCounters(stations, has_powers=scenario.radio.channel != "range")
         self._placement = Placement(scenario, stations=stations)
         self._waves = Waves(scenario.radio, seed=scenario.seed) if scenario.radio.fading != "none" else None
         self.arrays = arrays_of(scenario, self._placement.links(spare=0), stations=stations, capture=capture)

@@ -21,8 +21,10 @@ _ROWS = slice(s.N_RECEIVED, s.N_CUT + 1)
 class LinkCounters:
     """The traffic of all links since the last report."""
 
-    def __init__(self, stations: int) -> None:
+    def __init__(self, stations: int, *, has_powers: bool) -> None:
+        """`has_powers`: the channel knows the powers at which frames arrive."""
         self._stations = stations
+        self._has_powers = has_powers
         self._keys: list[Ints] = []
         self._counts: list[Ints] = []
         self._since_ns = 0
@@ -45,7 +47,8 @@ class LinkCounters:
         used = np.flatnonzero(lk[_ROWS].any(axis=0))
         if len(used):
             self._keys.append(lk[s.LINK_SRC, used] * self._stations + lk[s.LINK_DST, used])
-            millidbm = np.rint(10_000.0 * np.log10(np.maximum(lp[s.LINK_POWER, used], 1e-30))).astype(np.int64)
+            milliwatt = np.maximum(lp[s.LINK_POWER, used], 1e-30) if self._has_powers else np.ones(len(used))
+            millidbm = np.rint(10_000.0 * np.log10(milliwatt)).astype(np.int64)
             self._counts.append(np.vstack([millidbm * lk[s.N_RECEIVED, used], lk[_ROWS, used]]))
             lk[_ROWS, used] = 0
 

@@ -2,8 +2,8 @@
 
 There is one record per transmission attempt, stamped with the instant of its first bit: data (with the retry bit and
 the number of retries so far) and ACKs. On request there is also one per frame handed to a station, stamped with the
-instant of its last bit; a reception has an RSSI where a transmission has a transmit power. Instants are swarm time plus
-the epoch.
+instant of its last bit; where a transmission has a transmit power, a reception has an RSSI if the channel knows powers.
+Instants are swarm time plus the epoch.
 
     pcap        libpcap's file format, magic 0xA1B23C4D, link type 127 (IEEE802_11_RADIOTAP)
     radiotap    radiotap.org: flags, rate, channel, signal or power, antenna, data retries
@@ -32,6 +32,8 @@ _SENT: Final = 1 << 1 | 1 << 2 | 1 << 3 | 1 << 10 | 1 << 17
 """Radiotap fields of a transmission: flags, rate, channel, transmit power, data retries."""
 _HEARD: Final = 1 << 1 | 1 << 2 | 1 << 3 | 1 << 5 | 1 << 11
 """Radiotap fields of a reception: flags, rate, channel, antenna signal, antenna (the receiver's id, modulo 256)."""
+_HEARD_WITHOUT_POWER: Final = _HEARD & ~(1 << 5)
+"""The same where the channel knows no powers."""
 _CCK: Final = 0x0020
 _OFDM: Final = 0x0040
 _2_GHZ: Final = 0x0080
@@ -48,6 +50,7 @@ _SNAP_IP: Final = b"\xaa\xaa\x03\x00\x00\x00\x08\x00"
 _FILE = struct.Struct("<IHHiIII")
 _RECORD = struct.Struct("<IIII")
 _RADIOTAP = struct.Struct("<BBHIBBHHbB")
+_RADIOTAP_WITHOUT_POWER = struct.Struct("<BBHIBBHHB")
 _DATA = struct.Struct("<BBH6s6s6sH")
 _ACK = struct.Struct("<BBH6s")
 _FCS = struct.Struct("<I")
@@ -119,6 +122,7 @@ class Pcap:
         self._channel = min(0xFFFF, round(radio.frequency_mhz)), band | (_OFDM if ofdm else _CCK)
         self._rate = round(2 * radio.rate_mbps)  # in 500 kb/s
         self._ack_rate = round(2 * radio.ack_rate_mbps)
+        self._has_powers = radio.channel != "range"
         self._power_dbm = max(-128, min(127, round(radio.tx_power_dbm)))
         timing = Timing.of(radio)
         self._duration_us = -(-(timing.sifs_ns + timing.ack_ns) // US)
@@ -161,10 +165,14 @@ class Pcap:
         """Record that a station has decoded a frame."""
         if not self._receptions:
             return
-        tap = _RADIOTAP.pack(
-            0, 0, _RADIOTAP.size, _HEARD, self._data_flags, self._rate, *self._channel,
-            max(-128, min(127, round(rssi_dbm))), station & 0xFF,
-        )  # fmt: skip
+        known = self._data_flags, self._rate, *self._channel
+        antenna = station & 0xFF
+        if self._has_powers:
+            signal_dbm = max(-128, min(127, round(rssi_dbm)))
+            tap = _RADIOTAP.pack(0, 0, _RADIOTAP.size, _HEARD, *known, signal_dbm, antenna)
+        else:
+            size = _RADIOTAP_WITHOUT_POWER.size
+            tap = _RADIOTAP_WITHOUT_POWER.pack(0, 0, size, _HEARD_WITHOUT_POWER, *known, antenna)
         retry = self._attempts.get(src, 1) > 1
         self._put(t_ns, tap, self._data(src, dst, self._number(src, seq), frame, retry=retry))
 

@@ -16,6 +16,7 @@ input is counted as malformed; any other exception ends the node.
 from collections.abc import Collection, Mapping
 from enum import StrEnum
 from random import Random
+from types import ModuleType
 from typing import Any, Final, NamedTuple, Protocol
 
 from fanet_mw.bus.messages import Gps, SensorReading
@@ -73,15 +74,16 @@ class Received(NamedTuple):
         """The content: bytes, or MAVLink frames."""
         return self.frame[HEADER_BYTES:] if self.content is None else self.content
 
-    def mavlink(self) -> list[Any]:
+    def mavlink(self, dialect: ModuleType | None = None) -> list[Any]:
         """The MAVLink messages in it, as objects of pymavlink; none if it was sent to a port.
 
-        Raises MalformedFrameError, which `on_message` need not catch.
+        `dialect`: a module that pymavlink has generated, for messages of your own. Raises
+        MalformedFrameError, which `on_message` need not catch.
         """
         # imported only here, because pymavlink takes long to load and most messages are read without it
         from fanet_mw.mavlink import decode
 
-        return decode(self.data) if self.content is None else []
+        return decode(self.data, dialect) if self.content is None else []
 
 
 class Data(NamedTuple):

@@ -9,8 +9,9 @@ headings refer to north and east at the origin: 0.1 degrees off at 10 km).
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property, lru_cache, partial
+from types import ModuleType
 from typing import Any, Final, NamedTuple
 
 from pymavlink.dialects.v20 import common
@@ -333,16 +334,28 @@ def _boot_ms(now_ns: int) -> int:
 # --- decoding -----------------------------------------------------------------------------------------------------
 
 
-def decode(data: bytes) -> list[Any]:
+def decode(data: bytes, dialect: ModuleType | None = None) -> list[Any]:
     """Every message in some bytes, native or of this dialect; raises MalformedFrameError unless all frames are whole.
 
-    Signatures are not verified: pymavlink's check refuses the reordering that flooding always has. A message that
-    neither dialect defines comes as UNKNOWN_<id>, with its CRC unchecked.
+    `dialect`: a module that pymavlink has generated, whose messages are decoded by it. Signatures are not verified:
+    pymavlink's check refuses the reordering that flooding always has. A message that no dialect defines comes as
+    UNKNOWN_<id>, with its CRC unchecked.
     """
     parser = common.MAVLink(None)
+    errors: tuple[type[Exception], ...] = (common.MAVError, ValueError, TypeError)
+    theirs: tuple[Any, Mapping[int, Any]] = (parser, {})
+    if dialect is not None:
+        try:
+            theirs, errors = (dialect.MAVLink(None), dialect.mavlink_map), (*errors, dialect.MAVError)
+        except (AttributeError, TypeError) as error:
+            raise LocalProtocolError(f"dialect = {dialect!r} must be a module that pymavlink has generated") from error
+    their_parser, their_ids = theirs
     try:
-        return [parser.decode(bytearray(frame)) for frame in frames(data)]
-    except (common.MAVError, ValueError, TypeError) as error:
+        return [
+            (their_parser if int.from_bytes(frame[7:10], "little") in their_ids else parser).decode(bytearray(frame))
+            for frame in frames(data)
+        ]
+    except errors as error:
         raise MalformedFrameError(f"not MAVLink: {error}") from error
 
 

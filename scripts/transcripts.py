@@ -18,7 +18,8 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGES = ROOT / "docs" / "tutorial"
 BLOCK = re.compile(r"^```(console|python|toml)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 TIMES = re.compile(
-    r"in \d+(?:\.\d+)? s \((?:\d+(?:\.\d+)? x real time|\d+ s of CPU)\)|^\w+: \d+ of \d+ runs, about .* left\n",
+    r"in \d+(?:\.\d+)? s \((?:\d+(?:\.\d+)? x real time|\d+ s of CPU)\)|^\w+: \d+ of \d+ runs, about .* left\n"
+    r"|; about .* with \d+ process",
     re.MULTILINE,
 )
 

@@ -32,6 +32,8 @@ _POLL_S: Final = 0.01
 _PATIENCE_S: Final = 10.0
 """A program waits longer for the router than a person at a terminal would; on a busy machine a handshake may take
 seconds."""
+_LEAVING_S: Final = 5.0
+"""A program that leaves waits no longer for what its node has yet to send; a flooding period of the paper."""
 _ORIGIN: Final = Enu(0.0, 0.0, 0.0)
 
 
@@ -85,6 +87,20 @@ class _RealTime:
     def report(self) -> Mapping[str, Any]:
         return self._uav.report()
 
+    async def let_out(self, lead_ns: int) -> None:
+        """Wait until receipts and packets of this node are on the air; a medium that is always taken is not waited for.
+
+        A frame is announced one lead before it is on the air.
+        """
+        ends_s = self._now_s() + _LEAVING_S
+        while self._host.running and self.state().owing and self._now_s() < ends_s:
+            await asyncio.wait((self._task,), timeout=_POLL_S)
+        if self._host.running:
+            await asyncio.wait((self._task,), timeout=lead_ns / S + _POLL_S)
+
+    def _now_s(self) -> float:
+        return asyncio.get_running_loop().time()
+
     async def wait(self, future: asyncio.Future[T]) -> T:
         try:
             await asyncio.wait((future, self._task), return_when=asyncio.FIRST_COMPLETED)
@@ -109,7 +125,9 @@ async def _running(uav: Uav | ClockedUav, host: RealtimeHost, scenario: Scenario
                 task.result()
                 raise NodeClosedError("the swarm's time was over before the node had joined")
             await asyncio.wait((task,), timeout=_POLL_S)
-        yield _RealTime(uav, host, task)
+        drive = _RealTime(uav, host, task)
+        yield drive
+        await drive.let_out(scenario.radio.lead_ns)  # not if the program has raised, or was canceled
     finally:
         task.cancel()
         with contextlib.suppress(asyncio.CancelledError, BusError):

@@ -169,7 +169,8 @@ async def join(
 
     The node is given all that is sent to ports, and MAVLink messages whose ids are in `messages` (or ANY). Yields when
     the node takes part. Raises ConfigError for a scenario or an id that is wrong, and BusError when the router cannot
-    be had. Leaving the block, or being cancelled in it, ends the node.
+    be had. Leaving the block ends the node once its receipts and packets are on the air, 5 s later at most; being
+    cancelled in it ends it at once.
     """
     known = scenario if isinstance(scenario, Scenario) else fanet_mw.load_scenario(scenario)
     if node not in known.node_ids:

@@ -7,6 +7,7 @@ a message        ->  got      ->  node.receive()
 import asyncio
 from collections import deque
 from collections.abc import Callable, Collection
+from types import ModuleType
 from typing import Any, Final, NamedTuple
 
 from fanet_mw import mavlink
@@ -53,12 +54,13 @@ class Message(NamedTuple):
     delay_ms: float
     """The time since the other application handed it over, as exact as the clocks of the two nodes agree."""
 
-    def mavlink(self) -> list[Any]:
+    def mavlink(self, dialect: ModuleType | None = None) -> list[Any]:
         """The MAVLink messages that it consists of, as objects of pymavlink; none if it was sent to a port.
 
-        Raises MalformedFrameError for frames that make no sense.
+        `dialect`: a module that pymavlink has generated, for messages of your own. Raises
+        MalformedFrameError for frames that make no sense.
         """
-        return mavlink.decode(self.data) if self.port is None else []
+        return mavlink.decode(self.data, dialect) if self.port is None else []
 
 
 class Mailbox(Application):

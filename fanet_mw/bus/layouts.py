@@ -69,7 +69,7 @@ NAMED: Final[dict[type[Any], Names]] = {
     LinkStats: Names(
         "radio/links", "t_ns span_ns count",
         f"`count` x 2 uint16: source, destination; `count` x {COUNTS} uint32: received, then lost by "
-        f"{', '.join(LOSSES)}; `count` x int64: sum of RSSI [1/1000 dBm]",
+        f"{', '.join(LOSSES)}; `count` x int64: sum of RSSI [1/1000 dBm], 0 where the channel knows no powers",
     ),
     m.Camera: Names("world/<id>/sensor/camera", "t_ns count", row="bearing_rad elevation_rad pixels"),
     m.CameraImage: Names(

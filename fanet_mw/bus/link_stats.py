@@ -35,7 +35,7 @@ class LinkRow(NamedTuple):
     lost: tuple[int, ...]
     """The number of lost copies for each reason, in the order of LOSSES."""
     rssi_sum_mdbm: int
-    """The sum of the RSSI over all received copies [1/1000 dBm]."""
+    """The sum of the RSSI over all received copies [1/1000 dBm]; 0 where the channel knows no powers."""
 
     @property
     def copies(self) -> int:
@@ -43,8 +43,8 @@ class LinkRow(NamedTuple):
 
     @property
     def rssi_dbm(self) -> float | None:
-        """The mean RSSI of the received copies [dBm]; None if there were none."""
-        return self.rssi_sum_mdbm / self.received / 1000 if self.received else None
+        """The mean RSSI of the received copies [dBm]; None if there were none, or the channel knows no powers."""
+        return self.rssi_sum_mdbm / self.received / 1000 if self.received and self.rssi_sum_mdbm else None
 
 
 class LinkStats(NamedTuple):

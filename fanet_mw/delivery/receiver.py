@@ -97,6 +97,10 @@ class Receiver:
     def kept_bytes(self) -> int:
         return sum(self._bytes.values())
 
+    @property
+    def owes_receipts(self) -> bool:
+        return self._receipts_ns is not None
+
     def hear(self, origin: NodeId, piece: Piece, frame: bytes, *, priority: int, now_ns: int) -> None:
         """A piece has arrived; raises MalformedFrameError if it contradicts another piece of its message."""
         head = piece.head

@@ -121,6 +121,11 @@ class Node:
         """The number of frames that were received."""
         return self._copies + self._others
 
+    @property
+    def holds_own(self) -> bool:
+        """True while a packet of an application of this node has not been let out."""
+        return bool(self._own.held)
+
     def moved(self, position: Enu, velocity: Enu) -> None:
         """Set the node's own position and velocity, as its navigation knows them."""
         self.port.position, self.port.velocity = position, velocity

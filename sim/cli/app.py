@@ -25,7 +25,7 @@ app = App(
     help="Middleware for swarms of UAVs, and the network emulator it is developed and proven on.",
     version=__version__,
     version_format="plaintext",  # Markdown would be rendered by a parser that takes long to import
-    console=Console(),
+    console=Console(wraps=True),
     suppress_keyboard_interrupt=False,
 )
 app.command(air_app)

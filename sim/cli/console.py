@@ -10,13 +10,29 @@ CLOSED: Final = 128 + 13
 """The exit code that a shell shows for a process that SIGPIPE ended."""
 
 
+_UNWRAPPED: Final = 10_000
+"""The width where no terminal limits it: nothing is this long."""
+
+
 class Console(rich.console.Console):
     """The console of rich, except that writing to a closed pipe raises an error, with which `main` ends the command,
-    and that brackets are brackets: the names of files may contain some.
+    that brackets are brackets, because the names of files may contain some, and that lines which no terminal shows are
+    neither wrapped nor padded.
     """
 
-    def __init__(self, **options: Any) -> None:  # noqa: ANN401  (they are those of rich)
+    def __init__(self, *, wraps: bool = False, **options: Any) -> None:  # noqa: ANN401  (they are those of rich)
+        """`wraps`: lines are wrapped in a pipe, too."""
         super().__init__(markup=False, **options)
+        if not (wraps or self.is_terminal or "COLUMNS" in os.environ):
+            self.width = _UNWRAPPED
+
+    def print(self, *objects: Any, **options: Any) -> None:  # noqa: ANN401  (they are those of rich)
+        if self.is_terminal:
+            super().print(*objects, **options)
+            return
+        with self.capture() as captured:
+            super().print(*objects, **options)
+        self.file.write("\n".join(line.rstrip() for line in captured.get().split("\n")))
 
     def on_broken_pipe(self) -> None:
         self.quiet = True

@@ -2,7 +2,7 @@
 
 import contextlib
 import queue
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Final
 
@@ -37,13 +37,24 @@ def watch(
     """
     with Bus.join(endpoint, config_of(zenoh_config, OPERATOR)) as bus:
         name = swarm or find_swarm(bus)
-        with Live(console=console, auto_refresh=False) as live, contextlib.suppress(KeyboardInterrupt):
+        with _screen(console) as show, contextlib.suppress(KeyboardInterrupt):
             for number, stats in enumerate(_reports(bus, Topics(name)), start=1):
                 rows = [row for row in stats.rows() if node is None or node in (row.src, row.dst)]
-                live.update(table(name, stats, rows, most=max(1, console.height - 4)), refresh=True)
+                most = max(1, console.height - 4) if console.is_terminal else len(rows)
+                show(table(name, stats, rows, most=most))
                 if number == reports:
                     break
     return 0
+
+
+@contextlib.contextmanager
+def _screen(console: Console) -> Iterator[Callable[[Table], None]]:
+    """Shows one table in the place of another, or without a terminal one below the other."""
+    if not console.is_terminal:
+        yield console.print
+        return
+    with Live(console=console, auto_refresh=False) as live:
+        yield lambda shown: live.update(shown, refresh=True)
 
 
 def _reports(bus: Bus, names: Topics) -> Iterator[LinkStats]:

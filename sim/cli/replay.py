@@ -1,6 +1,5 @@
 """`fanet replay`: a finished run again, as a page that plays in a browser, or as text for one instant."""
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -55,7 +54,7 @@ def _show(run: "Replay", t_s: float) -> None:
     from fanet_mw.units import S
 
     uavs = run.at(t_s)
-    console = Console(width=None if sys.stdout.isatty() else 100)
+    console = Console()
     console.print(f"{run.scenario.name}, seed {run.scenario.seed}, at {t_s:g} s: {len(uavs)} UAVs, "
                   f"{run.coverage(t_s):.1%} of the area covered", highlight=False)  # fmt: skip
     table = Table("UAV", "east [m]", "north [m]", "up [m]", "flight", "mission", "survivor", "role", "head", box=None,

@@ -112,7 +112,7 @@ def carry_out(
         store.read()
         plan = RemainingRuns(tasks, store, retry=retry, only_code=code() if rerun_older else None)
         workers = _workers(jobs, scheduler, plan, dry_run=dry_run)
-        _say(_announcement(name, wanted, plan, workers.workers))
+        _say(_announcement(name, wanted, plan, workers))
         _warn_of_codes(plan.codes, "they are run again" if rerun_older else _KEPT_NOTICE)
         if dry_run:
             return 0
@@ -173,7 +173,7 @@ def _workers(jobs: int | None, scheduler: str | None, plan: "RemainingRuns", *, 
     return DaskCluster(scheduler)
 
 
-def _announcement(name: str, wanted: "Sweep", plan: "RemainingRuns", workers: int) -> str:
+def _announcement(name: str, wanted: "Sweep", plan: "RemainingRuns", workers: "Workers") -> str:
     settings = plan.total // max(1, len(wanted.seed_list()))
     text = f"{name}: {plan.total} runs ({settings} settings x {len(wanted.seed_list())} seeds)"
     if len(plan.todo) < plan.total:
@@ -182,7 +182,9 @@ def _announcement(name: str, wanted: "Sweep", plan: "RemainingRuns", workers: in
         return f"{text}; nothing to do"
     from sim.sweep.cost import spoken
 
-    return f"{text}; about {spoken(plan.seconds(workers))} with {workers} process{'' if workers == 1 else 'es'}"
+    count = workers.workers
+    left_s = plan.time_left(workers=count, pace=workers.pace()).seconds()
+    return f"{text}; about {spoken(left_s)} with {count} process{'' if count == 1 else 'es'}"
 
 
 def _warn_of_codes(codes: Mapping[str, int], what_follows: str) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 from fanet_mw.whole_file import require_folder
 from sim.figures.style import applied, save
-from sim.report import mission_pictures, run_pictures, run_rows
+from sim.report import mission_pictures, run_pictures, run_rows, slot_pictures
 from sim.report.html import Block, Commands, Heading, Picture, Quoted, Text
 from sim.report.names import KINDS, PICTURES
 from sim.report.run_records import SHOWN, RunRecords
@@ -52,7 +52,7 @@ _TITLES = {
     "delays": "Delays",
     "delivery": "Delivery",
     "links": "Links",
-    "slots": "Slots",
+    "slots": "Slots and turns",
     "mission": "Mission over time",
     "tracks": "Tracks",
 }
@@ -66,7 +66,7 @@ def _drawings(
         partial(run_pictures.delays, run),
         partial(run_pictures.delivery, run),
         partial(run_pictures.links, run, links),
-        partial(run_pictures.slots, run, reports),
+        partial(slot_pictures.slots, run, reports),
         *(
             partial(draw, run) if run.searches else _nothing
             for draw in (mission_pictures.progress, mission_pictures.tracks)

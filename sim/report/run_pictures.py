@@ -1,7 +1,7 @@
-"""The pictures of one run's network: delays, delivery, links over the area, and the slots of the protocol."""
+"""The pictures of one run's network: delays, delivery, and links over the area."""
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 from matplotlib import colormaps
@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from emulator.channel.propagation import heard_m
-from fanet_mw.trace import LetOut
 from fanet_mw.units import MS, S
-from sim.figures.colors import BLUE, DARK, RED, SHADE
+from sim.figures.colors import BLUE, DARK, RED
 from sim.figures.style import canvas, legend_above
 from sim.report.run_records import RunRecords
 
@@ -27,8 +26,6 @@ _LONG_NS: Final = 10 * S
 """Delays are drawn in seconds if the longest is at least this long."""
 _NARROWEST: Final = 0.35
 """The least ratio of a map's sides."""
-_MOST_NAMED: Final = 12
-"""The greatest number of slots whose owners are named above them."""
 
 
 class RunPicture(NamedTuple):
@@ -158,136 +155,3 @@ def map_canvas(places: Sequence[tuple[float, float]]) -> tuple[Figure, Axes]:
     axes.set_xlabel("east [m]")
     axes.set_ylabel("north [m]")
     return figure, axes
-
-
-class _Own(NamedTuple):
-    """A span of the superframe that belongs to one node."""
-
-    node: int
-    start_ns: int
-    length_ns: int
-
-
-class _Frame(NamedTuple):
-    """The superframe in force at the end of a run."""
-
-    start_ns: int
-    period_ns: int
-    contention_ns: int
-    own: Sequence[_Own]
-    called: str
-    """What a span is called: `slot` or `turn`."""
-
-    def place_ns(self, one: LetOut) -> int:
-        """The place of an instant in the superframe."""
-        return (one.t_ns - self.start_ns) % self.period_ns
-
-
-def slots(run: RunRecords, reports: Mapping[int, Mapping[str, Any]]) -> RunPicture | None:
-    """The picture of the instants at which nodes let packets out, drawn over the slots or turns that the nodes own."""
-    frame = _frame(reports)
-    if run.scenario.routing.protocol != "clustered" or not run.let_out:
-        return None
-    heads = {head for head in run.heads.values() if head}
-    if frame is None:
-        frame = _Frame(0, run.scenario.clusters.period_ns, 0, (), "slot")
-    shown = [one for one in run.let_out if one.t_ns >= frame.start_ns]
-    figure, (axes,) = canvas(1, width=7.5, height=4.4)
-    _draw_owners(axes, frame)
-    owners = {own.node for own in frame.own}
-    words = ("nodes with turns", "other nodes") if frame.called == "turn" else ("heads", "members")
-    for wanted, label, color, marker in ((True, words[0], BLUE, "|"), (False, words[1], DARK, ".")):
-        chosen = [one for one in shown if (one.node in (owners or heads)) == wanted]
-        if chosen:
-            places = [frame.place_ns(one) / MS for one in chosen]
-            size = 16 if not wanted or frame.called == "turn" else 50
-            axes.scatter(places, [one.node for one in chosen], color=color, s=size, marker=marker, zorder=3,
-                         linewidths=1.2 if wanted else 0, label=f"packets of {label}")  # fmt: skip
-    axes.set_xlabel(f"place in the superframe of {frame.period_ns / MS:g} ms [ms]")
-    axes.set_ylabel("origin (node id)")
-    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_xlim(0, frame.period_ns / MS)
-    axes.set_ylim(0.2, run.scenario.nodes.count + 0.8)
-    if axes.get_legend_handles_labels()[0]:
-        legend_above(figure, axes)
-    by_lot = any(report.get("lots") for report in reports.values())
-    said = " Turns that nobody claims go to nodes by lot; they are not shaded." if by_lot else ""
-    return RunPicture(figure, _slots_said(frame, shown) + said)
-
-
-def _draw_owners(axes: Axes, frame: _Frame) -> None:
-    """Shade the spans of the superframe, each on the line of its owner, and slots over the whole height as well."""
-    if frame.contention_ns:
-        axes.axvspan(0, frame.contention_ns / MS, color="#eeeeee", zorder=0, label="contention window")
-    for index, own in enumerate(frame.own):
-        start_ms, length_ms = own.start_ns / MS, own.length_ns / MS
-        axes.barh(
-            own.node, length_ms, left=start_ms, height=0.8, color=SHADE, edgecolor=SHADE, zorder=1,
-            label=None if index else f"the owner's {frame.called}",
-        )  # fmt: skip
-        if frame.called == "slot":
-            axes.axvline(start_ms, color="#999999", linewidth=0.7, zorder=0)
-            if len(frame.own) <= _MOST_NAMED:
-                middle_ms = start_ms + length_ms / 2
-                axes.text(middle_ms, 1.0, f"head {own.node}", transform=axes.get_xaxis_transform(), ha="center",
-                          va="bottom", fontsize=8)  # fmt: skip
-
-
-def _slots_said(frame: _Frame, shown: Sequence[LetOut]) -> str:
-    """The caption: what is shaded, and how many packets of owners were let out in what belongs to them."""
-    if not frame.own:
-        return "When packets were let out first, by place in the flooding period."
-    spans: dict[int, list[_Own]] = defaultdict(list)
-    for own in frame.own:
-        spans[own.node].append(own)
-    owned = [one for one in shown if one.node in spans]
-    kept = sum(
-        any((frame.place_ns(one) - own.start_ns) % frame.period_ns < own.length_ns for own in spans[one.node])
-        for one in owned
-    )
-    if frame.called == "slot":
-        owner = "heads"
-        shaded = "each head's slot without its guard time; members send their packets to a head by contention"
-    else:
-        owner = "nodes with turns"
-        shaded = "the turns in which a node transmits packets of its own, on the line of that node"
-    return (
-        f"When packets were let out first, under the last schedule, which began at {frame.start_ns / S:.3g} s. "
-        f"Shaded: {shaded}. Of {len(owned):,} packets of {owner}, {kept:,} were let out in a {frame.called} of the "
-        "origin."
-    )
-
-
-def _frame(reports: Mapping[int, Mapping[str, Any]]) -> _Frame | None:
-    """The superframe of the last schedule, from the reports of its owners; None if nobody owns a slot or a turn."""
-    turns = {node: report["turns"] for node, report in reports.items() if report.get("turns")}
-    slots = {
-        node: report["slots"]
-        for node, report in reports.items()
-        if report.get("slots") and report.get("role") == "head"
-    }
-    told = turns or slots
-    if not told:
-        return None
-    newest = max(told.values(), key=lambda frame: float(frame["start_ms"]))
-    own = (
-        [one for node, frame in turns.items() for one in _turns_of(node, frame)]
-        if turns
-        else [
-            _Own(node, reports[node]["cluster"] * _ns(frame["slot_ms"]), _ns(frame["slot_ms"] - frame["guard_ms"]))
-            for node, frame in slots.items()
-        ]
-    )
-    own.sort(key=lambda one: one.start_ns)
-    contention_ns = _ns(newest.get("contention_ms", 0.0))
-    return _Frame(_ns(newest["start_ms"]), _ns(newest["period_ms"]), contention_ns, own, "turn" if turns else "slot")
-
-
-def _turns_of(node: int, frame: Mapping[str, Any]) -> Iterator[_Own]:
-    for offset in frame["own"]:
-        turn_ns = _ns(frame["turn_ms"])
-        yield _Own(node, (_ns(frame["contention_ms"]) + offset * turn_ns) % _ns(frame["period_ms"]), turn_ns)
-
-
-def _ns(value_ms: float) -> int:
-    return round(value_ms * MS)

@@ -56,6 +56,8 @@ class RunRecords:
     let_out: list[LetOut] = field(default_factory=list)
     heads: dict[int, int] = field(default_factory=dict)
     """The last head of each node."""
+    roles: dict[int, list[RoleChanged]] = field(default_factory=lambda: defaultdict(list))
+    """The roles of each node, in the order of time."""
     mission: list[Detected | Approaching | Arrived | Confirmed | Refuted] = field(default_factory=list)
     tracks: dict[int, list[Posed]] = field(default_factory=lambda: defaultdict(list))
     """The positions of each UAV, once a second."""
@@ -82,6 +84,7 @@ class RunRecords:
                     self.let_out.append(record)
                 case RoleChanged():
                     self.heads[record.node] = record.head
+                    self.roles[record.node].append(record)
                 case Detected() | Approaching() | Arrived() | Confirmed() | Refuted():
                     self.mission.append(record)
         targets = {node: set(self.targets(node)) for node in self.scenario.node_ids}

@@ -140,7 +140,7 @@ def _write(outcome: Outcome, out: Path, files: dict[str, dict[str, Any]], unwrit
     """Write all files but the summary, the smallest first, each as far as it can be written."""
     resolved = outcome.scenario.model_dump(mode="json", exclude_none=True)
     maps = _maps(resolved["world"])
-    rows = described(outcome.links.rows(), has_rssi=outcome.scenario.radio.channel != "range")
+    rows = described(outcome.links.rows())
     links = ",\n".join(json.dumps(row) for row in rows)  # one line per link
     writers: dict[str, Callable[[Path, Written], object]] = {
         SCENARIO_FILE: lambda path, held: write_items(path, [tomli_w.dumps(resolved).encode()], held),

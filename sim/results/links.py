@@ -47,7 +47,7 @@ class LinkTotals:
         np.add.at(self._sums, place.reshape(-1), np.concatenate(sums))
 
 
-def described(rows: Iterable[LinkRow], *, has_rssi: bool) -> list[dict[str, Any]]:
+def described(rows: Iterable[LinkRow]) -> list[dict[str, Any]]:
     """The rows of `links.json`: copies, received, lost by reason, and the mean RSSI of the received ones [dBm], if the
     channel knows any.
     """
@@ -58,7 +58,7 @@ def described(rows: Iterable[LinkRow], *, has_rssi: bool) -> list[dict[str, Any]
             "copies": row.copies,
             "received": row.received,
             "lost": {reason.value: count for reason, count in zip(LOSSES, row.lost, strict=True) if count},
-            "rssi_dbm": None if row.rssi_dbm is None or not has_rssi else round(row.rssi_dbm, 2),
+            "rssi_dbm": None if row.rssi_dbm is None else round(row.rssi_dbm, 2),
         }
         for row in rows
     ]

@@ -37,7 +37,8 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
     emulator = outcome.reports.get("emulator", {})
     frames, copies, lateness = ledger.frames(outcome), ledger.copies(outcome), _lateness(outcome, emulator)
     disturbance = validity.measures(outcome, frames=frames, late_share=lateness["share"])
-    reasons = validity.reasons(outcome, frames=frames, copies=copies, disturbance=disturbance)
+    bound = against_bounds(sent, ended_ns=outcome.simulated_ns)
+    reasons = validity.reasons(outcome, frames=frames, copies=copies, bound=bound, disturbance=disturbance)
     return {
         "valid": not reasons,
         "invalid_because": reasons,
@@ -67,7 +68,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "disturbance": {
             name: {"value": round(measure.value, 6), "limit": measure.limit} for name, measure in disturbance.items()
         },
-        "bound": against_bounds(sent, ended_ns=outcome.simulated_ns),
+        "bound": bound,
         "likely": likely(sent),
         "clock": clock_errors(outcome),
         "admission": _admission(outcome),

@@ -5,6 +5,7 @@ A result is valid, and the exit code 0, when all of this holds:
     the run ended by itself, and no process died before its end
     every actor has sent its last report, and no record of the trace was refused
     every frame is accounted for
+    no delay bound that a node stated was broken
     in real time: each measure of how the machine disturbed the run is within its limit
 
 In virtual time the machine cannot disturb a run. The limits come from runs in virtual time that were disturbed on
@@ -92,13 +93,19 @@ def measures(outcome: Outcome, *, frames: Mapping[str, Any], late_share: float) 
 
 
 def reasons(
-    outcome: Outcome, *, frames: Mapping[str, Any], copies: Mapping[str, Any], disturbance: Mapping[str, Measure]
+    outcome: Outcome,
+    *,
+    frames: Mapping[str, Any],
+    copies: Mapping[str, Any],
+    bound: Mapping[str, Any],
+    disturbance: Mapping[str, Measure],
 ) -> list[str]:
     """The reasons why the result may not be used, gravest first, one sentence each; empty if it may be used."""
     return [
         *_broken(outcome),
         *_incomplete(outcome),
         *_unaccounted(frames, copies),
+        *_promised(bound),
         *_disturbed(disturbance),
     ]
 
@@ -133,6 +140,12 @@ def _unaccounted(frames: Mapping[str, Any], copies: Mapping[str, Any]) -> Iterat
         yield f"the ledger of {frames['sent']} frames does not close"
     if not copies.get("closes", True):
         yield f"the ledger of {copies['on_air']} copies at receivers does not close"
+
+
+def _promised(bound: Mapping[str, Any]) -> Iterator[str]:
+    if broken := bound.get("violations"):
+        late, never = broken - bound["never"], bound["never"]
+        yield f"delay bounds that did not hold: {broken} ({late} too late, {never} never there), limit 0"
 
 
 def _disturbed(disturbance: Mapping[str, Measure]) -> Iterator[str]:

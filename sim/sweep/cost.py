@@ -1,11 +1,12 @@
 """Estimates how long a run will take, from the frames that its scenario will put on the air.
 
-Most of the time goes into the copies of frames at receivers. The estimate is right to a factor of about two. While runs
-of a sweep end, the estimate for the rest is corrected by how much the finished ones took.
+Most of the time goes into the copies of frames at receivers. The estimate of the processor time is right to a factor of
+about two. Workers share the cores with whatever else the machine does. While runs of a sweep end, the estimate for the
+rest is corrected by how much the finished ones took.
 """
 
 import math
-from collections.abc import Iterable
+import os
 from typing import Final
 
 from agents.applications.traffic import sources_of
@@ -31,6 +32,10 @@ _PER_HEADS_FRAME_S: Final = 60e-6
 """The same if heads queue packets for their slots."""
 _PER_TURN_S: Final = 85e-6
 """CPU seconds per packet and node with a timetable, whose turns, room and bounds are computed for each."""
+_WORKER_S: Final = 3.0
+"""CPU seconds until a worker process of this machine begins its first run."""
+_TRUSTED_S: Final = 10.0
+"""Finished runs count for the rest as much as the estimate once so many seconds of them were expected."""
 _MOST_FRAMES: Final = 80
 """The number of frames per node and second on a saturated channel: 11 Mb/s, shared by about nine nodes within reach."""
 
@@ -70,24 +75,38 @@ def launch_s(scenario: Scenario) -> float:
     return scenario.duration_s / scenario.time_scale + _START_UP_S + _PER_PROCESS_S * scenario.nodes.count
 
 
+def pace_of_workers(workers: int) -> float:
+    """The share of a core that each of some new processes gets, beside those that were running in the last minute."""
+    cores, others = len(os.sched_getaffinity(0)), os.getloadavg()[0]
+    return min(1.0, cores / (workers + others))
+
+
 class TimeLeft:
     """The remaining time of a sweep, estimated and corrected by what the finished runs took."""
 
-    def __init__(self, guesses_s: Iterable[float], *, workers: int) -> None:
-        self._left_s = math.fsum(guesses_s)
+    def __init__(self, virtual_s: float, realtime_s: float, *, workers: int, pace: float) -> None:
+        """`virtual_s`, `realtime_s`: the sums of the estimates; runs in real time come one after the other.
+        `pace`: the share of a core that a worker gets.
+        """
+        self._virtual_s, self._realtime_s = virtual_s, realtime_s
         self._workers = workers
-        self._guessed_s = self._took_s = 0.0
+        self._guessed_s, self._took_s = _TRUSTED_S, _TRUSTED_S / pace
+        self._start_s = _WORKER_S / pace if virtual_s else 0.0
 
-    def done(self, guess: float, took: float) -> None:
-        """A run has ended whose estimate was `guessed`."""
-        self._left_s -= guess
+    def done(self, guess: float, took: float, *, realtime: bool) -> None:
+        """A run has ended, for which `guess` was estimated and which took so many wall seconds."""
+        if realtime:
+            self._realtime_s -= guess
+            return
+        self._virtual_s -= guess
         self._guessed_s += guess
         self._took_s += took
+        self._start_s = 0.0
 
     def seconds(self) -> float:
         """The estimated wall seconds until the last run ends."""
-        off = self._took_s / self._guessed_s if self._guessed_s else 1.0
-        return max(0.0, self._left_s * off / self._workers)
+        virtual_s = max(0.0, self._virtual_s) * self._took_s / self._guessed_s / self._workers
+        return self._start_s + virtual_s + max(0.0, self._realtime_s)
 
 
 def spoken(seconds: float) -> str:

@@ -32,9 +32,12 @@ class RemainingRuns:
         ]
         self.guesses_s = {task.key: _guess_s(task) for task in self.todo}
 
-    def seconds(self, workers: int) -> float:
+    def time_left(self, *, workers: int, pace: float) -> TimeLeft:
         """The estimated time that the remaining runs will take."""
-        return TimeLeft(self.guesses_s.values(), workers=workers).seconds()
+        sums = dict.fromkeys((False, True), 0.0)
+        for task in self.todo:
+            sums[task.realtime] += self.guesses_s[task.key]
+        return TimeLeft(sums[False], sums[True], workers=workers, pace=pace)
 
 
 def _remains(done: Finished | None, *, retry: bool, only_code: str | None) -> bool:

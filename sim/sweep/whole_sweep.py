@@ -11,7 +11,6 @@ from typing import Final, Protocol
 
 import pyarrow as pa
 
-from sim.sweep.cost import TimeLeft
 from sim.sweep.one_run import Finished, carry_out
 from sim.sweep.remaining_runs import RemainingRuns
 from sim.sweep.store import Store
@@ -25,6 +24,9 @@ class Workers(Protocol):
     """Carries out runs, in processes of this machine or on a cluster."""
 
     workers: int
+
+    def pace(self) -> float:
+        """The share of a core that each worker gets, as it looks before they begin."""
 
     def carry_out(self, tasks: Sequence[Task]) -> Iterator[Finished]: ...
 
@@ -51,9 +53,9 @@ def run(
 
     However it ends, the table with the finished runs has been written.
     """
-    left = TimeLeft(plan.guesses_s.values(), workers=workers.workers)
+    left = plan.time_left(workers=workers.workers, pace=workers.pace())
     todo = sorted(plan.todo, key=lambda task: -plan.guesses_s[task.key])
-    waiting = {task.key for task in todo}
+    waiting = {task.key: task for task in todo}
     failed = sum(
         1
         for task in plan.tasks
@@ -67,7 +69,7 @@ def run(
             store.add(done)
             count += 1
             failed += done.failed
-            left.done(plan.guesses_s[done.key], done.wall_s)
+            left.done(plan.guesses_s[done.key], done.wall_s, realtime=waiting[done.key].realtime)
             on_progress(Progress(count, plan.total, failed, left.seconds()))
             if time.monotonic() - published > _PUBLISH_S:
                 store.publish(plan.tasks, varied)

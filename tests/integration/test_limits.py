@@ -34,3 +34,13 @@ def test_a_soft_limit_of_open_files_is_raised_as_far_as_needed(monkeypatch: pyte
     assert given[resource.RLIMIT_NOFILE] == (189, 189)
     with pytest.raises(ConfigError, match="48 processes need 192 open files"):
         limits.prepare(processes=48)
+
+
+def test_thousands_of_processes_are_announced_before_they_start() -> None:
+    shell = f"ulimit -n 4000; exec {sys.executable} -m sim.cli.app launch quick --set nodes.count=3000"
+    done = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    note, error = (line for line in done.stderr.splitlines() if "processes" in line)
+    assert note.startswith("3,002 processes will be started, one for each UAV, on ")
+    assert "3002 processes need 9054 open files" in error, "it says so also where it then refuses"
+    assert limits.many(processes=47) is None

@@ -4,10 +4,12 @@ import asyncio
 import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pytest
+from pymavlink.generator import mavgen
 
 import fanet_mw
 from fanet_mw.dialect import fanet
@@ -16,6 +18,12 @@ from fanet_mw.testing.plugin import MakeSwarm
 ROOT = Path(__file__).parents[2]
 
 SURVIVOR = 53003
+_DIALECT = """<?xml version="1.0"?>
+<mavlink><version>3</version><dialect>9</dialect><messages>
+<message id="54001" name="WATER_LEVEL"><description>A gauge.</description>
+<field type="uint16_t" name="gauge">Which one.</field><field type="float" name="level">Level.</field></message>
+</messages></mavlink>
+"""
 QUIET = [
     "traffic.arrivals=none",
     "nodes.telemetry_hz=0",
@@ -217,3 +225,26 @@ def test_importing_fanet_mw_loads_nothing_else_and_all_names_are_there() -> None
     )
     subprocess.run([sys.executable, "-c", code], check=True)
     assert set(fanet_mw.__all__) <= set(dir(fanet_mw))
+
+
+async def test_messages_of_a_dialect_of_ones_own_arrive_as_what_they_are(
+    swarm: MakeSwarm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mine.xml").write_text(_DIALECT, encoding="utf-8")
+    options = mavgen.Opts(str(tmp_path / "mine_of_test.py"), wire_protocol="2.0", language="Python3", validate=False)
+    assert mavgen.mavgen(options, [str(tmp_path / "mine.xml")])
+    monkeypatch.syspath_prepend(tmp_path)
+    mine = import_module("mine_of_test")
+
+    async with swarm("quick", overrides=QUIET) as s:
+        a, b = s.node(1), s.node(3, messages=[54001])
+        assert (await a.send(mine.MAVLink_water_level_message(42, 1.5), to=3)).ok
+        message = await b.receive()
+    ((known,), (unknown,)) = message.mavlink(mine), message.mavlink()
+    assert (known.get_type(), known.gauge, known.level) == ("WATER_LEVEL", 42, 1.5)
+    assert unknown.get_type() == "UNKNOWN_54001"
+    broken = message.data[:-1] + bytes([message.data[-1] ^ 1])
+    with pytest.raises(fanet_mw.MalformedFrameError, match="CRC"):
+        message._replace(data=broken).mavlink(mine)
+    with pytest.raises(fanet_mw.LocalProtocolError, match="must be a module that pymavlink has generated"):
+        message.mavlink(asyncio)

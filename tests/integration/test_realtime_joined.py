@@ -143,3 +143,25 @@ async def test_without_a_router_it_is_said_and_the_loss_of_one_ends_who_waits(tm
             router.close()
             with pytest.raises(fanet_mw.BusError, match="is gone"):
                 await asyncio.wait_for(node.receive(), 20)
+
+
+def test_a_program_that_leaves_straight_after_it_has_received_has_sent_its_receipt(
+    tmp_path: Path, real_swarm: LaunchSwarm
+) -> None:
+    scenario = config.load(_text(tmp_path / "letters.toml"), ["duration_s=6", "radio.lead_ms=150"])
+
+    async def leave_when_told(radio: fanet_mw.Emulated) -> bytes:
+        async with fanet_mw.join(scenario, node=3, radio=radio) as node:
+            return (await node.receive()).data
+
+    async def run() -> tuple[fanet_mw.Sent, bytes, float]:
+        async with real_swarm(scenario, leave_out=(1, 3)) as swarm:
+            leaving = asyncio.create_task(leave_when_told(swarm.radio))
+            async with fanet_mw.join(scenario, node=1, radio=swarm.radio) as node:
+                sent = await node.send(b"bye", port=7, to=3, lifetime_s=3)
+                data = await leaving
+                return sent, data, node.now_s
+
+    sent, data, ended_s = asyncio.run(run())
+    assert (sent.ok, data) == (True, b"bye")
+    assert ended_s < 4, "it does not wait for the end of the swarm's time"

@@ -3,6 +3,7 @@
 A limit that is too low would otherwise show as a traceback in the middle of a run, about a pipe, a thread or a mapping.
 """
 
+import os
 import resource
 from typing import Final
 
@@ -14,6 +15,21 @@ _FILES_PER_PROCESS: Final = 3
 """The number of files that the launcher needs for each child: a sentinel, a pipe and a connection of the bus."""
 _ADDRESS_SPACE_MIB: Final = 2048
 """The address space of each process; the launcher of 47 processes takes 1,440, mostly untouched memory."""
+
+
+_MANY_PER_CORE: Final = 100
+"""More UAVs for each core than this are beyond what was run in real time."""
+
+
+def many(*, processes: int) -> str | None:
+    """A sentence for those who start more processes than this machine is likely to carry; None if it is likely to."""
+    cores = len(os.sched_getaffinity(0))
+    if processes <= _MANY_PER_CORE * cores:
+        return None
+    return (
+        f"{processes:,} processes will be started, one for each UAV, on {cores} cores; "
+        "fanet simulate runs the same scenario in one, in virtual time"
+    )
 
 
 def prepare(*, processes: int) -> None:

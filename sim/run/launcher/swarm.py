@@ -384,7 +384,10 @@ async def launch(
     """
     end_if_imported_by_a_child()
     require_possible(scenario)
-    limits.prepare(processes=len(expected_names(scenario)))
+    processes = len(expected_names(scenario))
+    if (note := limits.many(processes=processes)) is not None:
+        on_event(note)
+    limits.prepare(processes=processes)
     if must_compile():
         on_event(COMPILING_NOTICE)
     bus, endpoint = _bus(listen, connect, zenoh_config)

@@ -225,7 +225,7 @@ def test_a_capture_changes_nothing_and_holds_every_frame_of_a_run() -> None:
     assert not {"mac_queue_full", "mac_lifetime", "late"} & set(dropped), "all were sent"
     first = [record for record in sent if not record.retry]
     assert abs(len(first) - report["frames"]["sent"]) <= report["frames"]["in_flight"]
-    assert sum("signal" in record.tap for record in seen) == sum(report["handed"].values())
+    assert sum("antenna" in record.tap for record in seen) == sum(report["handed"].values())
     assert any(record.is_ack for record in seen)
     instants = [record.t_ns for record in seen]
     assert instants == sorted(instants)
@@ -313,6 +313,18 @@ def test_tshark_reads_it_without_complaint(tmp_path: Path) -> None:
     lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
     assert len(lines) == len(list(read(path.read_bytes())))
     assert all(set(line.split("\t")[1:]) <= {"1", ""} for line in lines), "good, or not there (ACKs)"
+
+
+def test_a_channel_without_powers_gives_receptions_no_signal(make_scenario: MakeScenario) -> None:
+    scenario = make_scenario(**{"nodes.count": 2})
+    air = Air(scenario, [0, 50])
+    buffer = capture(air, scenario, receptions=True)
+    air.place([0, 50], 0)
+    air.send(1, 1 * MS)
+    air.run()
+    _, received = buffer.seen()
+    assert (received.tap["antenna"], "signal" in received.tap) == (2, False)
+    assert received.payload == PAYLOAD
 
 
 def test_sequence_numbers_are_given_at_the_first_transmission_and_kept_by_retries() -> None:

@@ -12,7 +12,7 @@ from matplotlib.patches import Rectangle
 
 from fanet_mw.trace import Confirmed, Detected, Generated, LetOut, Posed, Record, Refuted, RoleChanged
 from fanet_mw.units import MS, S
-from sim.report import mission_pictures, run_pictures, run_rows
+from sim.report import mission_pictures, run_pictures, run_rows, slot_pictures
 from sim.report.run_records import RunRecords
 from sim.results.mission import mission
 from sim.run.virtual import simulate
@@ -119,32 +119,54 @@ def test_links_are_drawn_between_the_places_of_a_stated_window(make_scenario: Ma
     )
 
 
-def test_packets_are_held_against_the_slots_of_their_heads(make_scenario: MakeScenario) -> None:
-    """Two slots of 500 ms in a superframe that began at 1.2 s. Head 3 keeps to its slot, head 2 once does not."""
+def test_packets_are_held_against_the_slots_of_their_heads_in_the_whole_run(make_scenario: MakeScenario) -> None:
+    """Two slots of 500 ms. Head 3 keeps to its slot, head 2 once does not; node 4 succeeds it as head of slot 1."""
     run = run_of(
         make_scenario(**{"nodes.count": 4, "clusters.count": 2, "clusters.flooding_period_s": 1}),
         *(RoleChanged(S, node, "head", cluster, node) for cluster, node in enumerate((2, 3))),
+        RoleChanged(3500 * MS, 4, "head", 0, 4),
+        RoleChanged(3600 * MS, 2, "member", 0, 4),
         *(Generated(S, node, seq, "traffic", 9) for node in (2, 3) for seq in (1, 2)),
         LetOut(1100 * MS, 2, 0),
         LetOut(2300 * MS, 2, 1),
         LetOut(2800 * MS, 2, 2),
         LetOut(2700 * MS, 3, 1),
-        LetOut(4100 * MS, 3, 2),
+        LetOut(4600 * MS, 3, 2),
         LetOut(2900 * MS, 4, 1),
+        LetOut(4499 * MS, 4, 1),
+        LetOut(4700 * MS, 2, 3),
     )
-    slots = {"start_ms": 1200.0, "period_ms": 1000.0, "slot_ms": 500.0, "guard_ms": 2.0}
-    reports = {node: {"slots": slots, "role": "head", "cluster": node - 2} for node in (2, 3)}
-    drawing = run_pictures.slots(run, {**reports, 4: {"slots": slots, "role": "member", "cluster": 0}})
+    slots = {"start_ms": 4000.0, "period_ms": 1000.0, "slot_ms": 500.0, "guard_ms": 2.0}
+    drawing = slot_pictures.slots(run, {3: {"slots": slots, "role": "head", "cluster": 1}})
     assert drawing is not None
-    assert "Of 4 packets of heads, 3 were let out in a slot of the origin." in drawing.caption
-    bars = [
-        (bar.get_x(), bar.get_width(), bar.get_y() + bar.get_height() / 2)
-        for bar in drawing.figure.axes[0].patches
-        if isinstance(bar, Rectangle)
-    ]
-    assert bars == [(0, 498, 2), (500, 498, 3)]
-    assert [text.get_text() for text in drawing.figure.axes[0].texts] == ["head 2", "head 3"]
-    assert legend(drawing.figure) == ["packets of heads", "packets of members", "the owner's slot"]
+    assert "Of 6 packets of heads, 4 were let out in the slot of their cluster" in drawing.caption, "499 is guard time"
+    assert [text.get_text() for text in drawing.figure.axes[0].texts] == ["slot 1", "slot 2"]
+    assert legend(drawing.figure) == ["packets of members", "of the head of slot 1", "of the head of slot 2"]
+    points = [np.asarray(marks.get_offsets()).tolist() for marks in drawing.figure.axes[0].collections]
+    assert points == [
+        [[900, 2.9], [700, 4.7]], [[100, 1.1], [300, 2.3], [800, 2.8], [499, 4.499]], [[700, 2.7], [600, 4.6]],
+    ]  # fmt: skip
+
+
+def test_packets_in_rounds_are_let_out_in_the_turn_of_their_origin_or_in_the_window(
+    make_scenario: MakeScenario,
+) -> None:
+    scenario = make_scenario(**{
+        "nodes.count": 4, "nodes.spacing_m": 50, "duration_s": 6, "warmup_s": 2, "drain_s": 1, "traffic.interval_s": 1,
+        "routing.protocol": "rounds", "radio.lead_ms": 0, "traffic.payload_bytes": 300,
+        "mission.survivors": 3, "mission.report_interval_s": 0.5,
+    })  # fmt: skip
+    drawing = slot_pictures.slots(run_of(scenario, *simulate(scenario).records), {})
+    assert drawing is not None
+    found = re.search(
+        r"Of (\d+) packets, (\d+) were let out in a turn of the origin, (\d+) in the window", drawing.caption
+    )
+    assert found is not None
+    whole, urgent, bulk = map(int, found.groups())
+    assert urgent > 5
+    assert bulk > 5
+    assert whole == urgent + bulk
+    assert set(legend(drawing.figure)) == {"packets", "window of bulk", "the owner's turn"}
 
 
 def test_claimed_turns_are_shaded_behind_the_contention_window_each_on_the_line_of_its_owner(
@@ -159,7 +181,7 @@ def test_claimed_turns_are_shaded_behind_the_contention_window_each_on_the_line_
         LetOut(1120 * MS, 1, 1),
         LetOut(1220 * MS, 2, 1),
     )
-    drawing = run_pictures.slots(run, reports)
+    drawing = slot_pictures.slots(run, reports)
     assert drawing is not None
     bars = [
         (bar.get_x(), bar.get_width(), bar.get_y() + bar.get_height() / 2)
@@ -178,7 +200,7 @@ def test_turns_that_nodes_claim_are_those_in_which_they_let_packets_out(make_sce
     })  # fmt: skip
     outcome = simulate(scenario)
     reports = {node: outcome.reports[f"agent-{node}"] for node in scenario.node_ids}
-    drawing = run_pictures.slots(run_of(scenario, *outcome.records), reports)
+    drawing = slot_pictures.slots(run_of(scenario, *outcome.records), reports)
     assert drawing is not None
     assert {len(report["turns"]["own"]) > 0 for report in reports.values()} == {True}
     owned, kept = (

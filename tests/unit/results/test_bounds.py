@@ -66,6 +66,15 @@ def test_what_never_arrives_breaks_its_bound_at_each_target_as_what_arrives_too_
     assert (late["violations"], late["deliveries"]) == (2, 1), "one came too late, one never"
 
 
+@pytest.mark.parametrize("delays_ms", [{2: 101, 3: 10}, {2: 10}])
+def test_a_run_in_which_a_bound_did_not_hold_is_not_valid(scenario: Scenario, delays_ms: dict[int, float]) -> None:
+    outcome = Outcome(scenario, "virtual", 1.0, packet(1, bound_ms=100, delays_ms=delays_ms), {})
+    (reason,) = summarize(outcome, trace_sha256="")["invalid_because"]
+    assert reason.startswith("delay bounds that did not hold: 1 (")
+    kept = Outcome(scenario, "virtual", 1.0, packet(1, bound_ms=100, delays_ms={2: 99, 3: 10}), {})
+    assert summarize(kept, trace_sha256="")["valid"]
+
+
 def test_a_bound_that_was_not_over_by_the_end_is_not_broken_yet(scenario: Scenario) -> None:
     last_s = int(scenario.duration_s) - 1
     records = packet(last_s, bound_ms=1500, delays_ms={2: 10})

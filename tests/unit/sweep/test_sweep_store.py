@@ -42,6 +42,9 @@ class OneByOne:
         self._dies_after = dies_after
         self._step = -1 if backwards else 1
 
+    def pace(self) -> float:
+        return 1.0
+
     def carry_out(self, tasks: Sequence[Task]) -> Iterator[Finished]:
         for task in tasks[:: self._step]:
             if len(self.ran) == self._dies_after:

@@ -1,0 +1,202 @@
+"""The pictures of when nodes let packets out, against what the protocol gives them: slots of heads, turns, rounds.
+
+slots of heads   place in the superframe over the time of the run: heads change, and a cluster keeps its slot
+turns            place in the superframe, a line for each node; under the last timetable
+rounds           place in the round, a line for each node; turns are those of the node ids, and never change
+"""
+
+from bisect import bisect_right
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from fanet_mw.routing.rounds.round_timing import RoundTiming
+from fanet_mw.trace import LetOut
+from fanet_mw.units import MS, S
+from sim.figures.colors import BLUE, DARK, GRAY, GREEN, ORANGE, PINK, RED, SHADE
+from sim.figures.style import canvas, legend_above
+from sim.report.run_pictures import RunPicture
+from sim.report.run_records import RunRecords
+
+_CLUSTERS: Final = (BLUE, RED, GREEN, PINK, ORANGE)
+"""The colors of clusters, in turn."""
+_MOST_NAMED: Final = 12
+"""The greatest number of slots that are named above them."""
+_WINDOW_COLOR: Final = "#eeeeee"
+
+
+class _Own(NamedTuple):
+    """A span of the superframe that belongs to one node."""
+
+    node: int
+    start_ns: int
+    length_ns: int
+
+
+class _Frame(NamedTuple):
+    """A superframe, or a round."""
+
+    start_ns: int
+    period_ns: int
+    window: tuple[int, int]
+    """Where nodes contend: start and length [ns]."""
+    own: Sequence[_Own]
+
+    def place_ns(self, one: LetOut) -> int:
+        """The place of an instant in the superframe."""
+        return (one.t_ns - self.start_ns) % self.period_ns
+
+    def in_own(self, one: LetOut) -> bool:
+        """True if a packet was let out in a span of its origin."""
+        return any(
+            (self.place_ns(one) - own.start_ns) % self.period_ns < own.length_ns
+            for own in self.own
+            if own.node == one.node
+        )
+
+
+def slots(run: RunRecords, reports: Mapping[int, Mapping[str, Any]]) -> RunPicture | None:
+    """The picture for the protocol of a run; None if it gives no time to anybody, or nothing was let out."""
+    if not run.let_out:
+        return None
+    if run.scenario.routing.protocol == "rounds":
+        return _in_rounds(run)
+    if run.scenario.routing.protocol != "clustered":
+        return None
+    turns = {node: report["turns"] for node, report in reports.items() if report.get("turns")}
+    return _in_turns(run, turns, reports) if turns else _in_slots(run, reports)
+
+
+def _in_slots(run: RunRecords, reports: Mapping[int, Mapping[str, Any]]) -> RunPicture:
+    """Superframes begin at multiples of the period, whichever schedule is in force, so all have the same places."""
+    told = [report["slots"] for report in reports.values() if report.get("slots")]
+    period_ns = _ns(told[0]["period_ms"]) if told else run.scenario.clusters.period_ns
+    slot_ns = min((_ns(one["slot_ms"]) for one in told), default=0)
+    guard_ns = _ns(told[0]["guard_ms"]) if told else 0
+    by_cluster: dict[int, list[LetOut]] = defaultdict(list)
+    others: list[LetOut] = []
+    for one in run.let_out:
+        cluster = _cluster_led_by(run, one)
+        (others if cluster is None else by_cluster[cluster]).append(one)
+    figure, (axes,) = canvas(1, width=7.5, height=4.8)
+    _scatter(axes, [(one.t_ns % period_ns / MS, one.t_ns / S) for one in others], GRAY, ".", "packets of members", 7)
+    named = len(by_cluster) <= len(_CLUSTERS)
+    kept = 0
+    for cluster, let_out in sorted(by_cluster.items()):
+        places = [(one.t_ns % period_ns / MS, one.t_ns / S) for one in let_out]
+        label = f"of the head of slot {cluster + 1}" if named else "of heads" if cluster == min(by_cluster) else None
+        _scatter(axes, places, _CLUSTERS[cluster % len(_CLUSTERS)], "|", label, 40)
+        kept += sum((one.t_ns % period_ns - cluster * slot_ns) % period_ns < slot_ns - guard_ns for one in let_out)
+    slots = period_ns // slot_ns if slot_ns else 0
+    for slot in range(slots):
+        axes.axvline(slot * slot_ns / MS, color="#999999", linewidth=0.7, zorder=0)
+        if slots <= _MOST_NAMED:
+            axes.text((slot + 0.5) * slot_ns / MS, 1.0, f"slot {slot + 1}", transform=axes.get_xaxis_transform(),
+                      ha="center", va="bottom", fontsize=8)  # fmt: skip
+    _frame_axes(axes, period_ns, "superframe")
+    axes.set_ylabel("swarm time [s]")
+    axes.set_ylim(0, run.end_s)
+    legend_above(figure, axes)
+    said = "When packets were let out first, by place in the flooding period."
+    if slots:
+        said += (
+            f" Each cluster has one slot. Of {len(run.let_out) - len(others):,} packets of heads, {kept:,} were let "
+            "out in the slot of their cluster; members send their packets to a head by contention."
+        )
+    return RunPicture(figure, said)
+
+
+def _cluster_led_by(run: RunRecords, one: LetOut) -> int | None:
+    """The cluster of which the origin of a packet was the head when it let it out; None if it was none."""
+    roles = run.roles.get(one.node, ())
+    index = bisect_right(roles, one.t_ns, key=lambda role: role.t_ns)
+    return roles[index - 1].cluster if index and roles[index - 1].role == "head" else None
+
+
+def _in_turns(
+    run: RunRecords, turns: Mapping[int, Mapping[str, Any]], reports: Mapping[int, Mapping[str, Any]]
+) -> RunPicture:
+    newest = max(turns.values(), key=lambda frame: float(frame["start_ms"]))
+    own = sorted((one for node, frame in turns.items() for one in _turns_of(node, frame)), key=lambda one: one.start_ns)
+    frame = _Frame(_ns(newest["start_ms"]), _ns(newest["period_ms"]), (0, _ns(newest.get("contention_ms", 0.0))), own)
+    shown = [one for one in run.let_out if one.t_ns >= frame.start_ns]
+    picture = _by_node(run, frame, shown, "superframe", ("nodes with turns", "other nodes"), "contention window")
+    owners = {one.node for one in own}
+    owned = [one for one in shown if one.node in owners]
+    kept = sum(map(frame.in_own, owned))
+    said = (
+        f"When packets were let out first, under the last timetable, which began at {frame.start_ns / S:.3g} s "
+        f"({len(shown):,} of {len(run.let_out):,} packets). Shaded: the turns in which a node transmits packets of its "
+        f"own, on the line of that node. Of {len(owned):,} packets of nodes with turns, {kept:,} were let out in a "
+        "turn of the origin."
+    )
+    if any(report.get("lots") for report in reports.values()):
+        said += " Turns that nobody claims go to nodes by lot; they are not shaded."
+    return RunPicture(picture, said)
+
+
+def _in_rounds(run: RunRecords) -> RunPicture:
+    timing = RoundTiming.of(run.scenario)
+    own = [_Own(node, (node - 1) * timing.turn_ns, timing.turn_ns) for node in run.scenario.node_ids]
+    frame = _Frame(0, timing.period_ns, (timing.nodes * timing.turn_ns, timing.window_ns), own)
+    kept = sum(map(frame.in_own, run.let_out))
+    bulk = sum(frame.place_ns(one) >= frame.window[0] for one in run.let_out)
+    window = (", and the window in which bulk is sent", f", {bulk:,} in the window") if timing.window_ns else ("", "")
+    said = (
+        f"When packets were let out first. Shaded: the turn of each node, on its line{window[0]}. Of "
+        f"{len(run.let_out):,} packets, {kept:,} were let out in a turn of the origin{window[1]}."
+    )
+    return RunPicture(_by_node(run, frame, run.let_out, "round", ("packets", ""), "window of bulk"), said)
+
+
+def _by_node(
+    run: RunRecords, frame: _Frame, shown: Sequence[LetOut], called: str, labels: tuple[str, str], window: str
+) -> Figure:
+    """A line for each node, with its own spans shaded. `labels`: of the packets of owners, and of others."""
+    figure, (axes,) = canvas(1, width=7.5, height=4.4)
+    start_ns, length_ns = frame.window
+    if length_ns:
+        axes.axvspan(start_ns / MS, (start_ns + length_ns) / MS, color=_WINDOW_COLOR, zorder=0, label=window)
+    for index, own in enumerate(frame.own):
+        axes.barh(
+            own.node, own.length_ns / MS, left=own.start_ns / MS, height=0.8, color=SHADE, edgecolor=SHADE, zorder=1,
+            label=None if index else "the owner's turn",
+        )  # fmt: skip
+    owners = {own.node for own in frame.own}
+    for wanted, label, color, marker in ((True, labels[0], BLUE, "|"), (False, labels[1], DARK, ".")):
+        places = [(frame.place_ns(one) / MS, one.node) for one in shown if (one.node in owners) == wanted]
+        _scatter(axes, places, color, marker, label if label == "packets" else f"packets of {label}", 16)
+    _frame_axes(axes, frame.period_ns, called)
+    axes.set_ylabel("origin (node id)")
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_ylim(0.2, run.scenario.nodes.count + 0.8)
+    legend_above(figure, axes)
+    return figure
+
+
+def _scatter(
+    axes: Axes, places: Sequence[tuple[float, float]], color: str, marker: str, label: str | None, size: int
+) -> None:
+    if places:
+        across, up = zip(*places, strict=True)
+        width = 1.2 if marker == "|" else 0
+        axes.scatter(across, up, color=color, s=size, marker=marker, zorder=3, label=label, linewidths=width)
+
+
+def _frame_axes(axes: Axes, period_ns: int, called: str) -> None:
+    axes.set_xlabel(f"place in the {called} of {period_ns / MS:.6g} ms [ms]")
+    axes.set_xlim(0, period_ns / MS)
+
+
+def _turns_of(node: int, frame: Mapping[str, Any]) -> Iterator[_Own]:
+    for offset in frame["own"]:
+        turn_ns = _ns(frame["turn_ms"])
+        yield _Own(node, (_ns(frame["contention_ms"]) + offset * turn_ns) % _ns(frame["period_ms"]), turn_ns)
+
+
+def _ns(value_ms: float) -> int:
+    return round(value_ms * MS)

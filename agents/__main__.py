@@ -39,7 +39,7 @@ async def _fly(scenario: Scenario, on_air: OnAir, node: NodeId) -> Mapping[str, 
 def main() -> int:
     """Parse the command line and run; returns the exit code."""
     flags = service.parser("agents", "Run one UAV against a router.")
-    flags.add_argument("--id", type=int, required=True, help="node id, from 1 to nodes.count")
+    flags.add_argument("--id", type=int, required=True, help="node id, from 1 to the number of nodes")
     flags.add_argument(
         "--at", type=float, nargs=3, default=(0.0, 0.0, 0.0), metavar=("E", "N", "U"),
         help="where it starts, until its first fix: east, north and up [m]",
@@ -53,7 +53,7 @@ def main() -> int:
     def start(scenario: Scenario, address: SwarmAddress) -> int:
         node, at = NodeId(given.id), Enu(*given.at)
         if node not in scenario.node_ids:
-            raise ConfigError(f"--id {node}: must be in [1, nodes.count = {scenario.nodes.count}]")
+            raise ConfigError(f"--id {node}: must be in [1, {scenario.last_id}]")
         if (given.radio_address is None) != (given.radio_broadcast is None):
             raise ConfigError("--radio-address and --radio-broadcast: both or none")
         if given.radio_address is None:

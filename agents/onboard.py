@@ -182,7 +182,7 @@ class _ApplicationPort:
     def __init__(self, onboard: Onboard, application: Application) -> None:
         self._onboard = onboard
         self._application = application
-        self._sending = Sending(onboard.node.node, onboard.node.scenario.nodes.count)
+        self._sending = Sending(onboard.node.node, onboard.node.scenario.node_count)
         self.node: NodeId = onboard.node.node
         self.scenario: Scenario = onboard.node.scenario
         self.record: Callable[[Record], None] = onboard.node.records.append

@@ -68,7 +68,7 @@ class Sending(NamedTuple):
             raise LocalProtocolError(f"destination = {destination!r} must be a node id, several, or BROADCAST")
         others = sorted({NodeId(node) for node in nodes} - {self.node})
         if not others or not 0 < others[0] <= others[-1] <= self.nodes:
-            known = f"BROADCAST, or ids in [1, {self.nodes}] (nodes.count) of nodes other than {self.node}"
+            known = f"BROADCAST, or ids in [1, {self.nodes}] of nodes other than {self.node}"
             raise LocalProtocolError(f"destination = {destination!r} must be {known}")
         return (others[0], ()) if len(others) == 1 else (BROADCAST, tuple(others))
 

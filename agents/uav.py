@@ -11,6 +11,7 @@ from agents.applications.collision_avoidance import CollisionAvoidance
 from agents.applications.telemetry import Telemetry
 from agents.applications.telemetry_streams import TelemetryStreams
 from agents.applications.traffic import Load
+from agents.ground.post import Post
 from agents.hello_schedule import HelloSchedule, HelloTime
 from agents.mission.applications import PlannedSearch, Rescue
 from agents.mission.formation_flight.application import FormationFlight
@@ -255,6 +256,8 @@ def _asked_for(
     mission = scenario.mission
     applications: list[Application]
     loads = [Load(scenario, node, name) for name in scenario.traffic_classes]
+    if node == scenario.post:
+        return [*loads, Post(scenario)]
     rescue = (
         PlannedSearch(scenario, node, position=position, onboard_map=onboard_map)
         if mission.search != "none"

@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from emulator.channel.propagation import LinkTable, pair_codes
+from emulator.channel.propagation import LinkTable, gains_dbi, pair_codes
 from emulator.channel.shadowing import Shadowing
 from fanet_mw.scenario import Scenario
 
@@ -13,6 +13,7 @@ class Placement:
 
     def __init__(self, scenario: Scenario, *, stations: int) -> None:
         self._radio = scenario.radio
+        self._gains = gains_dbi(scenario)
         self._shadowing = Shadowing(scenario.radio, seed=scenario.seed) if scenario.radio.shadowing_db else None
         self.at = np.full((stations, 3), np.inf)
         """The positions [m]."""
@@ -37,4 +38,6 @@ class Placement:
     def links(self, *, spare: int) -> LinkTable:
         """The links between the stations, with room for `spare` more."""
         at = np.ascontiguousarray(self.at)
-        return LinkTable(at, self._radio, spare=spare, shadowing=self._shadowing, blocked=self._blocked)
+        return LinkTable(
+            at, self._radio, spare=spare, shadowing=self._shadowing, blocked=self._blocked, gains=self._gains
+        )

@@ -149,6 +149,16 @@ class PlacedInside(NamedTuple):
     north_m: float
 
 
+class KnownOnGround(NamedTuple):
+    """The post on the ground learned of a survivor, or of a person without a phone, at this place."""
+
+    t_ns: int
+    node: int
+    survivor: int
+    east_m: float
+    north_m: float
+
+
 class Refuted(NamedTuple):
     """A UAV took a confirmation back, because what it heard of the survivor since contradicts the announced place."""
 
@@ -318,6 +328,7 @@ Record = (
     | Arrived
     | Confirmed
     | PlacedInside
+    | KnownOnGround
     | Refuted
     | Planned
     | Posed
@@ -349,6 +360,7 @@ _KINDS: Final[dict[str, type[Any]]] = {
     "arrived": Arrived,
     "confirmed": Confirmed,
     "placed_inside": PlacedInside,
+    "known_on_ground": KnownOnGround,
     "refuted": Refuted,
     "planned": Planned,
     "posed": Posed,
@@ -435,7 +447,7 @@ def parse(text: str) -> Record:
 __all__ = [
     "Approaching", "Arrived", "BoundExcludes", "BoundStated", "ClockSampled", "Collided", "Confirmed",
     "ConflictForeseen", "ConflictOver", "DeadlineLost", "DeadlineMet", "Delivered", "Detected", "DropReason", "Dropped",
-    "FlightModeChanged", "Generated", "LetOut", "LikelyStated", "MissionModeChanged", "Planned", "Posed",
-    "PlacedInside", "ProcessEnded", "RadioFault", "Record", "Refuted", "RoleChanged", "Sighted", "Warned", "kind_of",
-    "line", "name_of", "parse",
+    "FlightModeChanged", "Generated", "KnownOnGround", "LetOut", "LikelyStated", "MissionModeChanged", "Planned",
+    "PlacedInside", "Posed", "ProcessEnded", "RadioFault", "Record", "Refuted", "RoleChanged", "Sighted", "Warned",
+    "kind_of", "line", "name_of", "parse",
 ]  # fmt: skip

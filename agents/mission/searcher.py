@@ -140,7 +140,7 @@ class Searcher:
             own_motion, place, goal, velocity_choice, take_off=take_off, return_home=self._return_home
         )
         self._mode = ModeRecord(node, place, self._flight, self._return_home, outbox)
-        self._node = node
+        self._node, self._post = node, scenario.post
         self._sweeps = mission.sweeps
         self._next_review_ns: int | None = None
 
@@ -264,8 +264,11 @@ class Searcher:
     # --- received messages ----------------------------------------------------------------------------------------
 
     def hello(self, origin: int, motion: Motion, *, now_ns: int) -> None:
-        """A neighbor's hello states how it flies."""
+        """A neighbor's hello states how it flies, or that the post on the ground is in reach."""
         self._on_heard(now_ns)
+        if origin == self._post:
+            self._announcing.on_post(now_ns)
+            return
         self._neighbors.on_hello(origin, motion)
         self._plans.on_hello(origin, motion.position, now_ns=now_ns)
 

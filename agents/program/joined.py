@@ -34,7 +34,7 @@ class Node:
         """The id of the node in the swarm."""
         self.scenario = scenario
         """The scenario of the swarm."""
-        self._sending = Sending(node, scenario.nodes.count)
+        self._sending = Sending(node, scenario.node_count)
         self._drive = drive
         self._mailbox = mailbox
 
@@ -174,7 +174,7 @@ async def join(
     """
     known = scenario if isinstance(scenario, Scenario) else fanet_mw.load_scenario(scenario)
     if node not in known.node_ids:
-        raise ConfigError(f"node = {node}: must be in [1, nodes.count = {known.nodes.count}]")
+        raise ConfigError(f"node = {node}: must be in [1, {known.last_id}]")
     mailbox = Mailbox(messages)
     how = Emulated() if radio is None else radio
     async with how.attach(known, NodeId(node), [mailbox, *applications]) as drive:

@@ -5,11 +5,13 @@ mW.
 
 The channel `range` is not physics: every frame within `range_m` is received at the transmit power, nothing farther away
 (ns-3's range model), and nothing through an obstruction. Fading is drawn for each frame in the kernel (`fading.py`).
-Not modeled: antenna patterns, Doppler shift, interference over links below `interference_floor_dbm`, and delays of DIFS
+All antennas are isotropic but that of the post on the ground, whose gain strengthens its links both ways. Not modeled:
+antenna patterns, Doppler shift, interference over links below `interference_floor_dbm`, and delays of DIFS
 or more (`longest_delay_ns`).
 """
 
 import math
+from collections.abc import Mapping
 from typing import Final, Protocol
 
 import numpy as np
@@ -43,6 +45,7 @@ from emulator.kernel.state import (
 )
 from fanet_mw.airtime import Timing
 from fanet_mw.extensions import load
+from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.radio import CHANNELS, UMA_ANTENNA_M, Radio, default_sensitivity_dbm, noise_dbm
 
 _ROUNDING_DB: Final = 1e-9
@@ -91,6 +94,36 @@ def reach_m(radio: Radio) -> float:
     if radio.channel == "range":
         return radio.range_m
     return _distance_m(radio, radio.tx_power_dbm - radio.interference_floor_dbm + 2 * radio.shadowing_db)
+
+
+def gains_dbi(scenario: Scenario) -> Mapping[int, float]:
+    """The gain of each station whose antenna is not isotropic: of the post on the ground."""
+    gain_dbi, post = scenario.ground.gain_dbi, scenario.post
+    return {post - 1: gain_dbi} if post is not None and gain_dbi else {}
+
+
+def pairs_in_reach(at: Reals, radio: Radio, gains: Mapping[int, float]) -> tuple[Ints, Reals]:
+    """Ordered pairs of stations [n, 2] that may interfere, and their distances; `gains`: the gain in dBi of each
+    station whose antenna is not isotropic, which reaches farther.
+    """
+    found, distance = neighbors(at, reach_m(radio))
+    for station, gain_dbi in gains.items():
+        if not np.isfinite(at[station]).all():
+            continue
+        away = np.linalg.norm(at - at[station], axis=1)
+        far = np.flatnonzero((away > reach_m(radio)) & (away <= reach_with_gain_m(radio, gain_dbi)))
+        both_ways = np.column_stack([np.full_like(far, station), far])
+        found = np.concatenate([found, both_ways, both_ways[:, ::-1]])
+        distance = np.concatenate([distance, away[far], away[far]])
+    return found, distance
+
+
+def reach_with_gain_m(radio: Radio, gain_dbi: float) -> float:
+    """The same distance for the links of an antenna with a gain."""
+    if radio.channel == "range":
+        return radio.range_m * math.pow(10.0, gain_dbi / 20)
+    budget_db = radio.tx_power_dbm - radio.interference_floor_dbm + 2 * radio.shadowing_db
+    return _distance_m(radio, budget_db + gain_dbi)
 
 
 def heard_m(radio: Radio) -> float:
@@ -187,11 +220,22 @@ class LinkTable:
     """All links of one set of positions, as the kernel's arrays, with room for `spare` more."""
 
     def __init__(
-        self, at: Reals, radio: Radio, *, spare: int, shadowing: Shadowing | None = None, blocked: Ints | None = None
+        self,
+        at: Reals,
+        radio: Radio,
+        *,
+        spare: int,
+        shadowing: Shadowing | None = None,
+        blocked: Ints | None = None,
+        gains: Mapping[int, float] = {},
     ) -> None:
-        """`blocked`: the codes of the obstructed pairs (`pair_codes`), ascending."""
-        found, distance = neighbors(at, reach_m(radio))
+        """`blocked`: the codes of the obstructed pairs (`pair_codes`), ascending. `gains`: the gains in dBi of antennas
+        that are not isotropic, by station.
+        """
+        found, distance = pairs_in_reach(at, radio, gains)
         power_dbm = received_dbm(distance, at[found[:, 0]], at[found[:, 1]], radio)
+        for station, gain_dbi in gains.items() if radio.channel != "range" else ():
+            power_dbm = power_dbm + gain_dbi * (found == station).any(axis=1)
         if shadowing is not None:
             power_dbm = power_dbm - shadowing.loss_db(at, found, distance)
         obstructed = np.zeros(len(found), bool)

@@ -54,7 +54,7 @@ class HeaderCheck:
         clock = scenario.clock
         self._handed_on = handed_on
         self._node = node
-        self._count = scenario.nodes.count
+        self._count = scenario.node_count
         error_ns = clock.unsynchronized_error_ns(scenario.duration_ns)
         apart_ns = 2 * error_ns + S if clock.modelled else 0
         self._youngest_ns = -_AHEAD_NS - apart_ns

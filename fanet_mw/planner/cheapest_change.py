@@ -97,7 +97,7 @@ def _changes(site: Site, delivers_m: float | None) -> Iterator[Variant]:
 def _turn_options(site: Site, delivers_m: float | None) -> Iterator[dict[str, Value]]:
     scenario = site.scenario
     clusters, radio = scenario.clusters, scenario.radio
-    counts = dict.fromkeys((clusters.count, scenario.nodes.count - 1))
+    counts = dict.fromkeys((clusters.count, scenario.node_count - 1))
     windows = dict.fromkeys((radio.cw_min, *(w for w in WINDOWS if w < radio.cw_min)))
     periods = dict.fromkeys((clusters.flooding_period_s, *_TURN_PERIODS_S))
     others = product(_clock_options(scenario), _hello_options(site), _link_options(site, delivers_m))
@@ -175,7 +175,7 @@ def _claim_options(site: Site, delivers_m: float | None) -> Iterator[dict[str, V
 
 def _slot_options(site: Site, _: float | None) -> Iterator[dict[str, Value]]:
     scenario = site.scenario
-    clusters, nodes = scenario.clusters, scenario.nodes.count
+    clusters, nodes = scenario.clusters, scenario.node_count
     counts = dict.fromkeys((clusters.count, *(n for n in _COUNTS if n < max(2, nodes))))
     periods = dict.fromkeys(round(clusters.flooding_period_s * factor, 6) for factor in _PERIODS)
     for count, period_s in product(counts, periods):

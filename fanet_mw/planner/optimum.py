@@ -115,7 +115,7 @@ def _families(scenario: Scenario) -> Iterator[dict[str, Value]]:
     """All combinations of settings except the period. With fewer heads fewer turns are needed, but members send to
     heads.
     """
-    most = scenario.nodes.count - 1
+    most = scenario.node_count - 1
     windows = dict.fromkeys((scenario.radio.cw_min, *(w for w in WINDOWS if w < scenario.radio.cw_min)))
     for count in dict.fromkeys(max(1, round(most / share)) for share in (1, 2, 4, 10)):
         for window in windows:

@@ -52,7 +52,7 @@ def describe_lossy(found: LossyPlan) -> str:
     """A plan over links that lose frames, as text."""
     scenario = found.scenario
     lines = [
-        f"{'FEASIBLE' if found.feasible else 'NOT FEASIBLE'}  {scenario.name}: {scenario.nodes.count} nodes, "
+        f"{'FEASIBLE' if found.feasible else 'NOT FEASIBLE'}  {scenario.name}: {scenario.node_count} nodes, "
         "floods repeated over lossy links",
         *(item("problem", problem) for problem in found.problems),
         item("bound", "none: a packet may be lost for good"),
@@ -146,12 +146,12 @@ def _details(found: ScenarioPlan) -> Iterator[str]:
 def _shape(found: ScenarioPlan) -> str:
     scenario = found.scenario
     if found.claims is not None:
-        return f"{scenario.nodes.count} nodes, floods in claimed slots"
+        return f"{scenario.node_count} nodes, floods in claimed slots"
     relays = (
         "collision-free floods" if found.superframe else f"floods relayed by contention ({scenario.clusters.relay})"
     )
     return (
-        f"{scenario.nodes.count} nodes, {scenario.clusters.count} clusters, flooding period "
+        f"{scenario.node_count} nodes, {scenario.clusters.count} clusters, flooding period "
         f"{scenario.clusters.flooding_period_s:g} s, {relays}"
     )
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from fanet_mw import airtime  # whole: it imports this package, and may be the first to be imported
 from fanet_mw.bus.radio_control import EVERY, Degrade, Mishap, MishapKind, Partition, Restore, nodes_of
-from fanet_mw.units import MS, US
+from fanet_mw.units import MAX_NODES, MS, US
 
 if TYPE_CHECKING:
     from fanet_mw.scenario import Scenario, Traffic
@@ -30,6 +30,8 @@ _TAKEN: Final = frozenset(("report", "warning", "telemetry", "receipt", "joined"
 """The names that other applications have in a trace, which traffic classes may not use."""
 _FARTHEST_BASE: Final = 2.0
 """The greatest distance of the base from the middle of the area, along each axis, in widths of the area."""
+_FARTHEST_POST: Final = 10.0
+"""The greatest distance of the post on the ground from the middle of the area, likewise."""
 _RIVALS: Final = ("aodv", "olsr", "dsdv", "geographic")
 _MOST_CLUSTERS_ABREAST: Final = 7
 """The greatest number of clusters side by side: a circle around one head has room for six more heads."""
@@ -83,10 +85,10 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
     found += _never_taking_off(scenario)
     found += _impossible_faults(scenario)
     found += [
-        f"applications.{index}.nodes names node {node}, which must be <= nodes.count = {count}"
+        f"applications.{index}.nodes names node {node}, which must be <= {scenario.last_id}"
         for index, entry in enumerate(scenario.applications)
         for node in (() if entry.nodes == "all" else entry.nodes)
-        if node > count
+        if node > scenario.node_count
     ]
     found += _impossible_places(scenario)
     found += _wrong_for_rivals(scenario)
@@ -138,13 +140,13 @@ def _no_claimed_turns(scenario: Scenario) -> Iterator[str]:
 
 def _impossible_rounds(scenario: Scenario) -> Iterator[str]:
     """Rounds without hellos, of too many nodes, or with turns too short for what must go in them."""
-    count, turn_bytes = scenario.nodes.count, scenario.rounds.turn_bytes
+    count, turn_bytes = scenario.node_count, scenario.rounds.turn_bytes
     if scenario.routing.protocol != "rounds":
         return
     if not scenario.routing.hello_interval_s:
         yield 'routing.protocol = "rounds" needs hellos: routing.hello_interval_s > 0'
     if count > _MOST_IN_ROUNDS:
-        yield f'routing.protocol = "rounds" has turns for at most {_MOST_IN_ROUNDS} nodes: nodes.count = {count}'
+        yield f'routing.protocol = "rounds" has turns for at most {_MOST_IN_ROUNDS} nodes, and there are {count}'
     in_turns = (each for each in scenario.traffic_classes.values() if each.priority != "bulk")
     every = in_turns if scenario.rounds.bulk_share else scenario.traffic_classes.values()
     reports = [scenario.mission.report_bytes] if scenario.mission.survivors else []
@@ -159,13 +161,13 @@ def _impossible_rounds(scenario: Scenario) -> Iterator[str]:
 def _impossible_traffic(scenario: Scenario, traffic: Traffic) -> Iterator[str]:
     """Nodes that do not exist, packets that are too long, and classes for which a timetable has no room."""
     count, most = scenario.nodes.count, scenario.radio.max_frame_bytes
-    if traffic.destination != "all" and traffic.destination > count:
-        yield f"traffic.destination = {traffic.destination} must be <= nodes.count = {count}"
+    if traffic.destination != "all" and traffic.destination > scenario.node_count:
+        yield f"traffic.destination = {traffic.destination} must be <= {scenario.last_id}"
     if isinstance(traffic.sources, int) and traffic.sources > count:
         yield f"traffic.sources = {traffic.sources} must be <= nodes.count = {count}"
     for key, ids in (("sources", traffic.sources), ("targets", traffic.targets)):
-        if isinstance(ids, tuple) and any(i > count for i in ids):
-            yield f"traffic.{key} = {list(ids)} must be node ids <= nodes.count = {count}"
+        if isinstance(ids, tuple) and any(i > scenario.node_count for i in ids):
+            yield f"traffic.{key} = {list(ids)} must be node ids <= {scenario.last_id}"
     if isinstance(traffic.sources, tuple) and traffic.destination in traffic.sources:
         yield (
             f"traffic.sources = {list(traffic.sources)} must not name traffic.destination = {traffic.destination}: "
@@ -200,7 +202,7 @@ def _too_small_frames(scenario: Scenario) -> Iterator[str]:
         loads = size["FANET_LOADS"] if scenario.hears_load else 0
         least["schedules"] = size["FANET_SCHEDULE"] + places + loads
     if clustered and scenario.measures_links:
-        pairs = scenario.nodes.count * (scenario.nodes.count - 1) // 2
+        pairs = scenario.node_count * (scenario.node_count - 1) // 2
         least["links of timetables"] = min(_MOST_LINKS_MESSAGES, -(-pairs // _LINKS)) * size["FANET_LINKS"]
     if scenario.mission.survivors:
         padded = scenario.mission.report_bytes - size["FANET_ROUTE"]
@@ -312,6 +314,13 @@ def _impossible_places(scenario: Scenario) -> Iterator[str]:
         yield (
             f"world.base_m = [{east:g}, {north:g}] must be within +-{_FARTHEST_BASE:g} x world.area_m = {farthest_m:g}"
         )
+    if max(map(abs, scenario.ground.at_m), default=0.0) > _FARTHEST_POST * world.area_m:
+        yield (
+            f"ground.at_m = {list(scenario.ground.at_m)} must be within "
+            f"+-{_FARTHEST_POST:g} x world.area_m = {_FARTHEST_POST * world.area_m:g}"
+        )
+    if scenario.ground.at_m and scenario.node_count > MAX_NODES:
+        yield f"ground.at_m: nodes.count = {scenario.nodes.count} must be < {MAX_NODES} to leave an id for the post"
     for index, (east, north) in enumerate(mission.survivor_positions_m):
         if max(abs(east), abs(north)) > world.area_m / 2:
             yield (
@@ -329,13 +338,17 @@ def _impossible_faults(scenario: Scenario) -> Sequence[str]:
     found = []
     count = scenario.nodes.count
     for index, (_, control) in enumerate(scenario.planned_faults):
-        unknown = [] if isinstance(control, Restore) else [node for node in nodes_of(control) if node > count]
+        most = count if isinstance(control, Mishap) else scenario.node_count
+        unknown = [] if isinstance(control, Restore) else [node for node in nodes_of(control) if node > most]
         if unknown:
-            found.append(f"faults.{index} names node {unknown[0]}, which must be <= nodes.count = {count}")
+            bound = f"<= nodes.count = {count}" if isinstance(control, Mishap) else f"<= {scenario.last_id}"
+            found.append(f"faults.{index} names node {unknown[0]}, which must be {bound}")
         if isinstance(control, Degrade) and control.src == control.dst != EVERY:
             found.append(f"faults.{index}: src = dst = {control.src} is no link")
         if isinstance(control, Partition) and set(control.group) >= set(scenario.node_ids):
-            found.append(f"faults.{index}: nodes names all {count} nodes, which leaves nobody on the other side")
+            found.append(
+                f"faults.{index}: nodes names all {scenario.node_count} nodes, which leaves nobody on the other side"
+            )
         drains = scenario.sensors.battery_hz > 0 or scenario.world.engine == "rotors"
         if isinstance(control, Mishap) and control.what is MishapKind.BATTERY and not drains:
             found.append(f'faults.{index}: kind = "battery" needs sensors.battery_hz > 0')

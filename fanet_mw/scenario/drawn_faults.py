@@ -28,7 +28,7 @@ def with_drawn_faults(scenario: Scenario, asked: str) -> Scenario:
             "node": node,
             "at_s": round(random.uniform(first_s, _UNTIL * scenario.duration_s), 1),
         }
-        for node in random.sample(list(scenario.node_ids), int(found[1]))
+        for node in random.sample(list(scenario.uav_ids), int(found[1]))
     ]
     tree = scenario.model_dump(mode="json", exclude_none=True)
     return config.build({**tree, "faults": [*tree["faults"], *sorted(drawn, key=lambda fault: fault["at_s"])]})

@@ -16,6 +16,7 @@ from fanet_mw.scenario.tables.applications import ForeignApplication
 from fanet_mw.scenario.tables.clock import Clock
 from fanet_mw.scenario.tables.clusters import Clusters
 from fanet_mw.scenario.tables.faults import AnyFault
+from fanet_mw.scenario.tables.ground import Ground
 from fanet_mw.scenario.tables.mission import Mission
 from fanet_mw.scenario.tables.mobility import Mobility
 from fanet_mw.scenario.tables.nodes import Nodes
@@ -54,6 +55,7 @@ class Scenario(Section):
     time_scale: Annotated[float, Field(ge=1e-3, le=100)] = 1.0
     """Real time only: swarm seconds per wall-clock second."""
     nodes: Nodes = Nodes()
+    ground: Ground = Ground()
     traffic: Traffic = Traffic()
     routing: Routing = Routing()
     clusters: Clusters = Clusters()
@@ -164,7 +166,28 @@ class Scenario(Section):
         return [(seconds_to_ns(fault.at_s), fault.control()) for fault in self.faults]
 
     @property
+    def post(self) -> NodeId | None:
+        """The node of the post on the ground (`ground.at_m`); None if there is none."""
+        return NodeId(self.nodes.count + 1) if self.ground.at_m else None
+
+    @property
+    def node_count(self) -> int:
+        """The number of UAVs, and one for the post on the ground."""
+        return self.nodes.count + bool(self.ground.at_m)
+
+    @property
+    def last_id(self) -> str:
+        """The greatest node id, as sentences about a wrong one name it."""
+        count = self.nodes.count
+        return f"nodes.count = {count}" if self.post is None else f"{self.post}, the post on the ground"
+
+    @property
     def node_ids(self) -> range:
+        return range(1, self.node_count + 1)
+
+    @property
+    def uav_ids(self) -> range:
+        """The nodes that are UAVs."""
         return range(1, self.nodes.count + 1)
 
     @property

@@ -137,7 +137,7 @@ def agent(
     scenario
         The scenario of the swarm.
     id
-        Node id, from 1 to nodes.count.
+        Node id, from 1 to the number of nodes.
 
     """
     from agents.__main__ import run
@@ -147,6 +147,6 @@ def agent(
 
     chosen = choice.realtime_scenario(scenario)
     if id not in chosen.node_ids:
-        raise FanetError(f"--id {id}: must be in [1, nodes.count = {chosen.nodes.count}]")
+        raise FanetError(f"--id {id}: must be in [1, {chosen.last_id}]")
     start = positions(chosen)[id - 1]
     return run(chosen, join.address(chosen), node=NodeId(id), position=start, onboard_map=map_on_board(chosen))

@@ -55,7 +55,7 @@ def clock_errors(outcome: Outcome) -> dict[str, Any]:
         "samples": len(measured),
         "lost": sum(report.get("clock", {}).get("lost", 0) for report in outcome.reports.values()),
         "without_time": _without_time(samples) if outcome.scenario.clock.sync != "none" else 0,
-        "synced_after_s": _synced_after_s(samples, outcome.scenario.nodes.count),
+        "synced_after_s": _synced_after_s(samples, outcome.scenario.node_count),
     }
 
 

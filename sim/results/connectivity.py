@@ -27,7 +27,7 @@ def parts(places: Rows, range_m: float) -> npt.NDArray[np.int64]:
 
 def connectivity(scenario: Scenario) -> float:
     """The share of (source, target, second of the measured window) with a multi-hop path of `radio.range_m` links."""
-    guidance = Guidance(np.array(positions(scenario), dtype=np.float64), scenario)
+    guidance = Guidance(np.array(positions(scenario)[: scenario.nodes.count], dtype=np.float64), scenario)
     first_ns, end_ns = scenario.traffic_window_ns
     pairs = [(source, target) for source in sources_of(scenario) for target in targets_of(scenario, source)]
     if not pairs:

@@ -13,6 +13,8 @@ swarm.
     persons     survivors whom a UAV has told of by name, or as a person without a phone (within 25 m, each find of one)
     false       finds of persons where nobody is, or somebody of whom there is another find
     wait        time from the first reception of a survivor's phone by any UAV to the right confirmation
+    post_knows  time from the right confirmation to the instant at which the post on the ground learned of it
+    post_connected share of the time in which the post and all searching UAVs were one connected component
     nearest     distance of each living UAV to the nearest other one, once a second
 
 Positions are the true ones, once a second (`Posed`).
@@ -35,6 +37,7 @@ from fanet_mw.trace import (
     Confirmed,
     Detected,
     FlightModeChanged,
+    KnownOnGround,
     MissionModeChanged,
     PlacedInside,
     Posed,
@@ -48,6 +51,7 @@ from fanet_mw.wire.survivors import is_person
 from sim.results.coherence import Coherence, coherence
 from sim.run.collecting.record_kinds import records_of
 from sim.world.environment.survivors import place
+from sim.world.mobility.layout import positions
 from sim.world.sensors.phone import REFERENCE_LOSS_DB
 
 _HOMEWARD: Final = frozenset({"return", "done", "land"})
@@ -110,6 +114,7 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
             ]
         ),
         "wait_s": _waits([(one.t_ns - heard[one.survivor]) / S for one in right if one.survivor in heard]),
+        "post_knows_s": _known_after(_to_ground_s(right, records)),
         "uavs_approaching": len(first),
         "time_to_approach_s": sorted(round(t_ns / S, 3) for t_ns in first.values()),
         "localization_error_m": _median(errors),
@@ -179,6 +184,21 @@ def _takes_back(refuted: Refuted, confirmed: Confirmed) -> bool:
     return math.hypot(refuted.east_m - confirmed.east_m, refuted.north_m - confirmed.north_m) <= SAME_PLACE_M
 
 
+def _to_ground_s(right: Sequence[Confirmed], records: Collection[Record]) -> list[float]:
+    """For each survivor of whom the post on the ground knows, how long after the confirmation it learned that."""
+    learned: dict[int, list[int]] = {}
+    for known in records_of(records, KnownOnGround):
+        learned.setdefault(known.survivor, []).append(known.t_ns)
+    since = [[t_ns - one.t_ns for t_ns in learned.get(one.survivor, ()) if t_ns >= one.t_ns] for one in right]
+    return [min(waited_ns) / S for waited_ns in since if waited_ns]
+
+
+def _known_after(values_s: list[float]) -> dict[str, float | None]:
+    """How many times these are, the median, the 95th percentile and the greatest."""
+    p95 = round(float(np.quantile(values_s, 0.95)), 3) if values_s else None
+    return {"count": len(values_s), "p95": p95, **_waits(values_s)}
+
+
 def _waits(values_s: list[float]) -> dict[str, float | None]:
     """The median and the greatest of some times."""
     if not values_s:
@@ -194,11 +214,18 @@ def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
     """Coverage and coherence; None if the trace has no positions."""
     covered = OverflownCells(scenario)
     graphs: list[Coherence] = []
+    with_post: list[bool] = []
+    ground, range_m = scenario.ground, scenario.radio.range_m
+    post = np.array(positions(scenario)[-1]) if scenario.post is not None else None
     nearly_all_ns: int | None = None
     nearest: list[Values] = []
     for t_ns, at, searching in _instants(records):
         apart = np.linalg.norm(at[:, None] - at[None], axis=2)
-        graphs.append(coherence(apart[np.ix_(searching, searching)] <= scenario.radio.range_m))
+        linked = apart[np.ix_(searching, searching)] <= range_m
+        graphs.append(coherence(linked))
+        if post is not None:
+            heard = np.linalg.norm(at[searching] - post, axis=1) <= range_m * 10 ** (ground.gain_dbi / 20)
+            with_post.append(_all_reached(linked, heard))
         if len(at) > 1:
             np.fill_diagonal(apart, math.inf)
             nearest.append(apart.min(axis=0))
@@ -209,11 +236,22 @@ def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
         "coverage": round(covered.share, 6) if graphs else None,
         "covered_95_s": None if nearly_all_ns is None else round(nearly_all_ns / S, 3),
         "connected": round(statistics.fmean(graph.connected for graph in graphs), 6) if graphs else None,
+        "post_connected": round(statistics.fmean(with_post), 6) if with_post else None,
         "biconnected": round(statistics.fmean(graph.biconnected for graph in graphs), 6) if graphs else None,
         "diameter": _usual([graph.diameter for graph in graphs]) if graphs else None,
         "cut_vertices": _usual([graph.cut_vertices for graph in graphs]) if graphs else None,
         "nearest_m": _spread(np.concatenate(nearest)) if nearest else None,
     }
+
+
+def _all_reached(linked: Flags, first: Flags) -> bool:
+    """True if everyone is among the `first`, or linked with them over others."""
+    reached = first
+    while True:
+        further = reached | linked[reached].any(axis=0)
+        if (further == reached).all():
+            return bool(reached.all())
+        reached = further
 
 
 def _spread(distances_m: Values) -> dict[str, float]:

@@ -163,6 +163,13 @@ def _mission_rows(mission: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if mission["wait_s"]["p50"] is not None:
         wait = mission["wait_s"]
         yield "waited", f"from heard to confirmed: median {wait['p50']:.0f} s, longest {wait['max']:.0f} s"
+    if mission["post_knows_s"]["count"]:
+        knows = mission["post_knows_s"]
+        yield (
+            "post",
+            f"knows of {knows['count']} of {mission['confirmed']}, median {knows['p50']:.1f} s after the confirmation, "
+            f"longest {knows['max']:.1f} s; connected with all {mission['post_connected']:.1%} of the time",
+        )
     if mission["mistaken"] or mission["reopened"]:
         yield "mistaken", f"{mission['mistaken']} taken for somebody else, {mission['reopened']} taken back"
     if mission["coverage"] is not None:

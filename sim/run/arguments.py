@@ -53,4 +53,4 @@ def known_nodes(what: str, nodes: Collection[int], scenario: Scenario) -> None:
     """Raise ConfigError for a node that the scenario does not have."""
     for node in nodes:
         if node not in scenario.node_ids:
-            raise ConfigError(f"{what}: node {node} must be in [1, nodes.count = {scenario.nodes.count}]")
+            raise ConfigError(f"{what}: node {node} must be in [1, {scenario.last_id}]")

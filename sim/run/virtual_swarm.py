@@ -162,7 +162,7 @@ class VirtualSwarm:
         if self._time.observed is not None:
             raise ConfigError(f"node {node} must be joined before time passes; it is {self.now_s:g} s")
         if node not in self.scenario.node_ids:
-            raise ConfigError(f"node = {node}: must be in [1, nodes.count = {self.scenario.nodes.count}]")
+            raise ConfigError(f"node = {node}: must be in [1, {self.scenario.last_id}]")
         self._time.joined.setdefault(node, []).extend(applications)
         return _VirtualDrive(self._time, node)
 

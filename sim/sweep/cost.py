@@ -42,7 +42,7 @@ _MOST_FRAMES: Final = 80
 
 def guess_s(scenario: Scenario) -> float:
     """The CPU seconds that one run will take on a present core."""
-    count, clustered = scenario.nodes.count, scenario.routing.protocol == "clustered"
+    count, clustered = scenario.node_count, scenario.routing.protocol == "clustered"
     by_timetable = clustered and scenario.clusters.relay == "scheduled"
     classes = scenario.traffic_classes
     packets = math.fsum(_packets(scenario, name) for name in classes)
@@ -72,7 +72,7 @@ def _packets(scenario: Scenario, name: str) -> float:
 
 def launch_s(scenario: Scenario) -> float:
     """The seconds that one run in real time will take, including those in which its processes start."""
-    return scenario.duration_s / scenario.time_scale + _START_UP_S + _PER_PROCESS_S * scenario.nodes.count
+    return scenario.duration_s / scenario.time_scale + _START_UP_S + _PER_PROCESS_S * scenario.node_count
 
 
 def pace_of_workers(workers: int) -> float:

@@ -36,7 +36,8 @@ class FlightRecorder:
     """Receives the poses and setpoints of a swarm, and keeps the newest."""
 
     def __init__(self, scenario: Scenario, subscribe: Callable[[str, OnSample], None], names: Topics) -> None:
-        self._ids = list(scenario.node_ids)
+        self._ids = list(scenario.uav_ids)
+        self._all_ids = list(scenario.node_ids)
         self._lock = threading.Lock()  # the bus calls on threads of its own
         self._poses = b""
         self._setpoints: dict[int, bytes] = {}
@@ -58,9 +59,9 @@ class FlightRecorder:
         with self._lock:
             poses, setpoints = self._poses, dict(self._setpoints)
         heard = [message for message in _decoded(poses) if isinstance(message, Poses)]
-        if not heard or list(heard[-1].ids) != self._ids or len(heard[-1].states) != 6 * len(self._ids):
+        if not heard or list(heard[-1].ids) != self._all_ids or len(heard[-1].states) != 6 * len(self._all_ids):
             return None
-        states = np.array(heard[-1].states, dtype=np.float64).reshape(-1, 6)
+        states = np.array(heard[-1].states, dtype=np.float64).reshape(-1, 6)[: len(self._ids)]
         if not (np.abs(states) <= _FARTHEST).all():  # also false for NaN
             return None
         sent: dict[int, Setpoint] = {}

@@ -22,7 +22,7 @@ def require_possible(scenario: Scenario) -> None:
     starts = np.array(positions(scenario), dtype=np.float64)
     if world.has_obstacles:
         obstacles(scenario, starts)
-    NoFlyEntries(world.no_fly_m, starts)
+    NoFlyEntries(world.no_fly_m, starts[: scenario.nodes.count])
 
 
 class PossibleWorlds:
@@ -36,7 +36,8 @@ class PossibleWorlds:
         world = scenario.world
         drawn = scenario.nodes.layout == "disc" or world.terrain_m > 0 or isinstance(world.buildings, int)
         seed = scenario.seed if drawn else None
-        key = json.dumps([seed, world.model_dump(mode="json"), scenario.nodes.model_dump(mode="json")])
+        key = json.dumps([seed, world.model_dump(mode="json"), scenario.nodes.model_dump(mode="json"),
+                          scenario.ground.model_dump(mode="json")])  # fmt: skip
         if key not in self._built:
             require_possible(scenario)
             self._built.add(key)

@@ -83,9 +83,11 @@ class WorldActor(Actor):
         super().__init__("world", (topics.all_setpoints, topics.radio_control))
         self._scenario = scenario
         self._topics = topics
-        self._ids = array("H", scenario.node_ids)
-        starts = np.array(positions(scenario), dtype=np.float64)
-        solid = obstacles(scenario, starts) if scenario.world.has_obstacles else None
+        self._ids = array("H", scenario.uav_ids)
+        self._all_ids = array("H", scenario.node_ids)
+        places = np.array(positions(scenario), dtype=np.float64)
+        starts, self._on_ground = np.split(places, [len(self._ids)])
+        solid = obstacles(scenario, places) if scenario.world.has_obstacles else None
         solids = Solids(solid)
         self._engine = make_engine(scenario, solid)
         if flight is None:
@@ -270,10 +272,11 @@ class WorldActor(Actor):
     def _publish(self, now_ns: int, before_ns: int) -> None:
         """Publish the poses, and the readings of sensors that have an instant in (before, now]."""
         at, velocity = self._engine.positions(), self._engine.velocities()
+        every, still = np.vstack([at, self._on_ground]), np.zeros_like(self._on_ground)
         if self._sight is not None:  # before the poses, which bring it into force
-            self.outbox.append((self._topics.obstruction, self._sight.obstructions(at, now_ns)))
-        states = array("d", np.hstack([at, velocity]).astype(np.float64).tobytes())
-        self.outbox.append((self._topics.pose, Poses(now_ns, self._ids, states)))
+            self.outbox.append((self._topics.obstruction, self._sight.obstructions(every, now_ns)))
+        states = array("d", np.hstack([every, np.vstack([velocity, still])]).astype(np.float64).tobytes())
+        self.outbox.append((self._topics.pose, Poses(now_ns, self._all_ids, states)))
         if self._moves and now_ns // _TRACED_NS > before_ns // _TRACED_NS:
             for node, (east, north, up) in zip(self._ids, at.tolist(), strict=True):
                 if self._flies[node - 1]:

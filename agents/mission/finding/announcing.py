@@ -27,6 +27,8 @@ _USEFUL_M: Final = 60.0
 """An estimate with a greater standard deviation is not flooded."""
 _PASSED_ON_NS: Final = 12 * S
 """How long hellos pass on a verdict."""
+_POST_NS: Final = 5 * S
+"""How long the post on the ground is taken to be in reach after a hello of its."""
 _PASSED_ON: Final = 3
 """The greatest number of verdicts in one hello."""
 _TELLERS: Final = 4
@@ -50,6 +52,14 @@ class Announcing:
         self._heard_ns: dict[int, int] = {}
         """The instant at which this UAV learned or made the verdict on each survivor, or was last reminded of it by a
         UAV that did not seem to know it."""
+
+        self._post_ns: int | None = None
+        """The instant at which the post on the ground was last heard."""
+        self._told_post = 0
+
+    def on_post(self, now_ns: int) -> None:
+        """The post on the ground is in reach, and may not know yet what was found while it was not."""
+        self._post_ns = now_ns
 
     def confirm(self, survivor: int, now_ns: int) -> None:
         """The owner of this phone was seen and is certain: flood the confirmation."""
@@ -150,12 +160,19 @@ class Announcing:
             self._flood(verdict)
 
     def hello_frames(self, now_ns: int) -> bytes:
-        """The inner frames with recent verdicts for the next hello."""
-        recent = [
-            (heard_ns, survivor) for survivor, heard_ns in self._heard_ns.items() if now_ns - heard_ns < _PASSED_ON_NS
-        ]
-        latest = [self._survivors.verdict(survivor) for _, survivor in sorted(recent, reverse=True)[:_PASSED_ON]]
-        return b"".join(found.encode_frame(self._node) for found in latest if found is not None)
+        """The inner frames with recent verdicts for the next hello; while the post on the ground is in reach, with
+        the others in turn.
+        """
+        recent = [(t_ns, survivor) for survivor, t_ns in self._heard_ns.items() if now_ns - t_ns < _PASSED_ON_NS]
+        chosen = [survivor for _, survivor in sorted(recent, reverse=True)[:_PASSED_ON]]
+        if self._post_ns is not None and now_ns - self._post_ns < _POST_NS:
+            del chosen[_PASSED_ON - 1 :]
+            others = sorted(self._heard_ns.keys() - set(chosen))
+            turn = self._told_post % max(1, len(others))
+            chosen += [*others[turn:], *others[:turn]][: _PASSED_ON - len(chosen)]
+            self._told_post += 1
+        told = [self._survivors.verdict(survivor) for survivor in chosen]
+        return b"".join(found.encode_frame(self._node) for found in told if found is not None)
 
     def _tell_estimate(self, survivor: int, now_ns: int) -> None:
         """Flood the estimate of a responder if it has become clearly better."""

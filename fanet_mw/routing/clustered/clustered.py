@@ -171,7 +171,7 @@ class Clustered(RoutingProtocol):
         return inner
 
     def on_hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
-        parts, count = self.parts, self._port.scenario.nodes.count
+        parts, count = self.parts, self._port.scenario.node_count
         beacon = decoded(packet.frame, Beacon.decode_frame)
         if beacon.node != reception.src or beacon.head > count or beacon.leader > count:
             raise MalformedFrameError(f"beacon of {beacon.node}, head {beacon.head}, leader {beacon.leader}")

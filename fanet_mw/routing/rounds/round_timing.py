@@ -36,7 +36,7 @@ class RoundTiming(NamedTuple):
     @classmethod
     def of(cls, scenario: Scenario) -> "RoundTiming":
         """The rounds that a scenario asks for."""
-        rounds, nodes, radio = scenario.rounds, scenario.nodes.count, scenario.radio
+        rounds, nodes, radio = scenario.rounds, scenario.node_count, scenario.radio
         slack_ns = round(rounds.turn_slack_us * US)
         turn_bytes = min(rounds.turn_bytes, radio.max_frame_bytes)
         bulk_bytes = min(max(turn_bytes, scenario.longest_bulk_bytes), radio.max_frame_bytes)

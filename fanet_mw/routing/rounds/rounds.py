@@ -67,7 +67,7 @@ class RoundFlooding(RoutingProtocol):
         self._law = DelayLaw(timing, scenario)
         self._topology = Topology(
             port.node,
-            count=scenario.nodes.count,
+            count=scenario.node_count,
             epoch_ns=self._law.epoch_ns,
             lifetime_ns=self._law.silent_ns + MOST_HOPS * self._law.hop_ns,
         )
@@ -230,7 +230,7 @@ class RoundFlooding(RoutingProtocol):
             inner += encode_held(told, self._port.node)
             room -= HELD_BYTES
         if self._topology.has_news and room >= HEARD_BYTES:
-            count = self._port.scenario.nodes.count
+            count = self._port.scenario.node_count
             most = room // HEARD_BYTES * heard_capacity(count)
             inner += encode_heard(self._topology.take_news(most), self._port.node, count=count)
         if not inner:

@@ -23,6 +23,7 @@ from fanet_mw.trace import (
     Collided,
     Confirmed,
     FlightModeChanged,
+    KnownOnGround,
     MissionModeChanged,
     Posed,
     ProcessEnded,
@@ -53,7 +54,7 @@ _SPEAKERS: Final[dict[type[Any], str | None]] = {
 node that they name."""
 _ABOUT_NOBODY: Final = (MissionModeChanged, Sighted)
 """The kinds of records in which survivor 0 means none."""
-_ABOUT_PERSONS: Final = frozenset({Confirmed, Refuted})
+_ABOUT_PERSONS: Final = frozenset({Confirmed, KnownOnGround, Refuted})
 """The kinds of records that may be about a person without a phone, by a number of its own."""
 _ABOUT_NODES: Final = ("origin", "other", "reference")
 """The fields of records that hold the id of a node, or 0 for none."""
@@ -169,7 +170,7 @@ class BusChecks:
     """The checks for one scenario."""
 
     def __init__(self, scenario: Scenario) -> None:
-        self._nodes = scenario.nodes.count
+        self._nodes = scenario.node_count
         self._survivors = scenario.mission.survivors
         self._until_ns = scenario.duration_ns + _SLACK_NS
         self.node_of: Mapping[str, int] = {"emulator": 0, "world": 0, **{f"agent-{n}": n for n in scenario.node_ids}}

@@ -28,7 +28,7 @@ class BatteryDrain:
         world = scenario.world
         self._vehicle = VEHICLES[world.vehicle]
         random = stream(scenario.seed, "charge")
-        charge = np.array([random.uniform(*world.charge) for _ in scenario.node_ids])
+        charge = np.array([random.uniform(*world.charge) for _ in scenario.uav_ids])
         self.batteries = Batteries(self._vehicle.battery, charge)
         self._table = power_table(self._vehicle)
 

@@ -9,8 +9,7 @@ from array import array
 
 import numpy as np
 
-from emulator.channel.pairs_in_reach import neighbors
-from emulator.channel.propagation import reach_m
+from emulator.channel.propagation import gains_dbi, pairs_in_reach
 from fanet_mw.bus.messages import Obstructions
 from fanet_mw.scenario import Scenario
 from sim.world.engines.contract import Rows
@@ -21,12 +20,12 @@ class Sight:
     """The lines of sight between bodies."""
 
     def __init__(self, scenario: Scenario, solids: Solids) -> None:
-        self._reach_m = reach_m(scenario.radio)
+        self._radio, self._gains = scenario.radio, gains_dbi(scenario)
         self._solids = solids
 
     def obstructions(self, at: Rows, now_ns: int) -> Obstructions:
         """The blocked pairs among nodes at `at` [nodes, 3]."""
-        found, _ = neighbors(at, self._reach_m)
+        found, _ = pairs_in_reach(at, self._radio, self._gains)
         found = found[found[:, 0] < found[:, 1]]
         found = found[np.minimum(at[found[:, 0], 2], at[found[:, 1], 2]) < self._solids.top_m]
         if len(found):

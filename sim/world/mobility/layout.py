@@ -12,20 +12,29 @@ ON_GROUND_M: Final = 0.1
 
 
 def positions(scenario: Scenario) -> list[Enu]:
-    """The start of every node, in order of id: the layout about the base, in the air or on the ground."""
+    """The start of every node, in order of id: the layout about the base, in the air or on the ground, and the antenna
+    of the post on the ground.
+    """
     places = _with_leader(_layout(scenario), scenario)
     east, north = scenario.world.base_m
     if east or north:
         places = [Enu(at.east + east, at.north + north, at.up) for at in places]
-    if not scenario.nodes.on_ground:
-        return places
+    if scenario.nodes.on_ground:
+        places = _above_ground(places, ON_GROUND_M, scenario)
+    if scenario.ground.at_m:
+        east, north = scenario.ground.at_m
+        places += _above_ground([Enu(east, north, 0.0)], scenario.ground.antenna_m, scenario)
+    return places
+
+
+def _above_ground(places: list[Enu], height_m: float, scenario: Scenario) -> list[Enu]:
+    """These places, so high above the ground."""
     # imported here, because it brings numpy, which not every command needs
     from sim.world.environment.obstacles import terrain
 
     ground = terrain(scenario)
     return [
-        Enu(at.east, at.north, ground.height_m(at.east, at.north) + ON_GROUND_M if ground else ON_GROUND_M)
-        for at in places
+        Enu(at.east, at.north, ground.height_m(at.east, at.north) + height_m if ground else height_m) for at in places
     ]
 
 

@@ -14,7 +14,7 @@ class RandomWaypoint:
     def __init__(self, starts: Rows, scenario: Scenario) -> None:
         self._speed = scenario.mobility.speed_m_s
         self._half = scenario.world.area_m / 2
-        self._random = [stream(scenario.seed, "waypoint", node) for node in scenario.node_ids]
+        self._random = [stream(scenario.seed, "waypoint", node) for node in scenario.uav_ids]
         self._from = starts.copy()
         self._to = starts.copy()
         self._left_at = np.zeros(len(starts))

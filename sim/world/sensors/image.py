@@ -34,7 +34,7 @@ class ImageSensor(Sensor):
         self.period_ns = round(S / config.image_hz)
         self._tan_half_fov = math.tan(math.radians(config.camera_fov_deg) / 2)
         self._pixels = config.image_pixels
-        self._carriers = frozenset(config.image_nodes or scenario.node_ids)
+        self._carriers = frozenset(config.image_nodes or scenario.uav_ids)
         not_buried = survivors.places[~survivors.buried]
         self._scene = Scene(obstacles, not_buried, area_m=scenario.world.area_m, uavs=scenario.nodes.count)
 

@@ -79,7 +79,7 @@ class Suite:
 
     def __init__(self, scenario: Scenario, sensors: list[Sensor], topics: Topics) -> None:
         self._sensors = [
-            (sensor, [topics.sensor(node, sensor.kind) for node in scenario.node_ids]) for sensor in sensors
+            (sensor, [topics.sensor(node, sensor.kind) for node in scenario.uav_ids]) for sensor in sensors
         ]
         self._count = scenario.nodes.count
 

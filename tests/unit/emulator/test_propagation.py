@@ -104,6 +104,25 @@ def links_of(at: list[list[float]], keys: Radio, **more: Any) -> dict[tuple[int,
     return {(a, b): 10 * math.log10(mw) for (a, b), mw in zip(ends, links.reals[LINK_POWER].tolist(), strict=False)}
 
 
+def test_the_gain_of_an_antenna_strengthens_its_links_both_ways_and_makes_them_longer() -> None:
+    at, keys = (
+        [[0, 0, 50], [0, 900, 50], [0, 2000, 5]],
+        radio(channel="friis", frequency_mhz=2400, tx_power_dbm=5, interference_floor_dbm=-98),
+    )
+    plain, with_gain = links_of(at, keys), links_of(at, keys, gains={2: 15.0})
+    assert with_gain[0, 1] == plain[0, 1]
+    assert with_gain[1, 2] == with_gain[2, 1] == pytest.approx(plain[1, 2] + 15.0)
+    assert (0, 2) not in plain
+    free_space = 5 - 20 * math.log10(4 * math.pi * 2.4e9 / 299_792_458) - 20 * math.log10(math.hypot(2000, 45))
+    assert with_gain[0, 2] == with_gain[2, 0] == pytest.approx(free_space + 15.0)
+
+
+def test_with_the_channel_range_a_gain_of_twelve_decibels_means_four_times_the_reach() -> None:
+    keys = radio(channel="range", range_m=250)
+    found = links_of([[0, 0, 0], [995, 0, 0], [1005, 0, 0], [1100, 0, 0]], keys, gains={0: 20 * math.log10(4)})
+    assert set(found) == {(0, 1), (1, 0), (1, 2), (2, 1), (1, 3), (3, 1), (2, 3), (3, 2)}
+
+
 def test_two_uavs_are_air_to_air_and_a_station_on_the_ground_is_not() -> None:
     keys = radio(channel="air_to_ground", environment="urban", frequency_mhz=2000)
     found = links_of([[0, 0, 50], [0, 0, 250], [0, 0, 1]], keys)

@@ -11,6 +11,7 @@ from fanet_mw.trace import (
     Confirmed,
     Detected,
     FlightModeChanged,
+    KnownOnGround,
     MissionModeChanged,
     Posed,
     ProcessEnded,
@@ -28,8 +29,9 @@ KEYS: dict[str, Any] = {
 }  # fmt: skip
 
 
-def measured(records: Sequence[Record], **mission_keys: float) -> dict[str, Any]:
-    return mission(Scenario(**{**KEYS, "mission": {**KEYS["mission"], **mission_keys}}), records)
+def measured(records: Sequence[Record], ground: dict[str, Any] | None = None, **mission_keys: float) -> dict[str, Any]:
+    keys = {**KEYS, "mission": {**KEYS["mission"], **mission_keys}, "ground": ground or {}}
+    return mission(Scenario(**keys), records)
 
 
 def at(t_s: int, *easts: float) -> list[Record]:
@@ -88,6 +90,24 @@ def test_a_survivor_waits_from_the_first_reception_to_the_right_confirmation() -
     assert measured(heard)["wait_s"] == {"p50": None, "max": None}
     away = Confirmed(4 * S, 1, 1, -100.0, 0.0)
     assert measured([*heard, away, Refuted(6 * S, 1, 1, -100.0, 0.0), found[0]])["wait_s"]["max"] == 5.0
+
+
+def test_the_post_knows_of_a_survivor_once_it_has_learned_of_the_right_confirmation() -> None:
+    found = [Confirmed(7 * S, 1, 1, 103.0, 4.0), Confirmed(15 * S, 1, 2, -100.0, 0.0)]
+    learned = [KnownOnGround(9 * S, 4, 1, 103.0, 4.0), KnownOnGround(30 * S, 4, 1, 103.0, 4.0)]
+    assert measured([*found, *learned])["post_knows_s"] == {"count": 1, "p50": 2.0, "p95": 2.0, "max": 2.0}
+    assert measured(found)["post_knows_s"] == {"count": 0, "p50": None, "p95": None, "max": None}
+    early = KnownOnGround(5 * S, 4, 1, -100.0, 0.0)
+    assert measured([*found, early])["post_knows_s"]["count"] == 0, "it believed somebody else to be there"
+
+
+def test_the_post_is_connected_while_all_searching_uavs_reach_it_over_hops() -> None:
+    poses = [*at(1, 0, 240, 480), *at(2, 0, 240, 900), *at(3, 400, 600, 800)]
+    assert measured(poses)["post_connected"] is None
+    near = measured(poses, ground={"at_m": (-100.0, 0.0)})
+    assert near["post_connected"] == pytest.approx(1 / 3, abs=1e-4)
+    far = measured(poses, ground={"at_m": (-100.0, 0.0), "gain_dbi": 12.0})
+    assert far["post_connected"] == pytest.approx(2 / 3, abs=1e-4), "995 m: the one at 1,000 m is too far"
 
 
 def test_a_person_without_a_phone_is_a_survivor_once_and_otherwise_false() -> None:

@@ -118,7 +118,7 @@ class AssignedRoles:
 
     def _on_join(self, packet: Packet, join: Join, src: NodeId, now_ns: int) -> None:
         parts, header, born_ns = self.parts, packet.header, min(packet.header.origin_us * US, now_ns)
-        if join.node != header.origin or join.instead_of > self._port.scenario.nodes.count:
+        if join.node != header.origin or join.instead_of > self._port.scenario.node_count:
             raise MalformedFrameError(f"join of {join.node} instead of {join.instead_of} by {header.origin}")
         if self._leader is not None:
             told = decoded(packet.frame, Links.decode_frames) if parts.links is not None else None

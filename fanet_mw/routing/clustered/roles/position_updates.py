@@ -34,7 +34,7 @@ def lost_ns(scenario: Scenario) -> int:
     """
     routing, clusters = scenario.routing, scenario.clusters
     hello_ns = round(_HELLO_VARIES * seconds_to_ns(routing.hello_interval_s))
-    update_ns = _QUIET_NS + hello_ns + UPDATE_NS * (1 + scenario.nodes.count) + clusters.period_ns
+    update_ns = _QUIET_NS + hello_ns + UPDATE_NS * (1 + scenario.node_count) + clusters.period_ns
     return 2 * update_ns + _A_LITTLE_NS
 
 

@@ -108,7 +108,7 @@ class StatedDelays:
         """
         scenario, hops = self._port.scenario, timetable.table.hops
         limit = scenario.routing.hop_limit
-        incomplete = len(timetable.table.spans) < scenario.nodes.count
+        incomplete = len(timetable.table.spans) < scenario.node_count
         return hops.get(self._port.node, 0) > limit or (incomplete and max(hops.values(), default=0) >= limit)
 
     def _own_of(self, node: NodeId, timetable: NodeTimetable) -> RootTurns:
@@ -248,7 +248,7 @@ class StatedDelays:
             return None  # schedules go before the leader's own packets
         if self._ends_early(timetable):
             return None
-        if len(timetable.table.spans) < self._port.scenario.nodes.count:
+        if len(timetable.table.spans) < self._port.scenario.node_count:
             return None  # the swarm is separated or not complete: some node is in no turn of this timetable
         load = timetable.loads.get(self._port.node, AS_EXPECTED)
         found_ns = likely_delay_ns(

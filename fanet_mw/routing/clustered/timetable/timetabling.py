@@ -173,7 +173,7 @@ class FromPlaces:
         told = decoded(packet.frame, Links.decode_frames)
         if told is None or told.node != packet.header.origin:
             raise MalformedFrameError(f"links of an assignment by {packet.header.origin}")
-        if any(max(link.a, link.b) > self._port.scenario.nodes.count for link in told.links):
+        if any(max(link.a, link.b) > self._port.scenario.node_count for link in told.links):
             raise MalformedFrameError("links of nodes that are not there")
         version = _version_of(told)
         if version.authority != self._lease.authority:

@@ -50,7 +50,7 @@ def most_packet_bytes(scenario: Scenario, priority: int) -> int:
 
 def schedule_bytes(scenario: Scenario) -> int:
     """The size of a part of a schedule with its positions."""
-    members = min(scenario.nodes.count, CAPACITY)
+    members = min(scenario.node_count, CAPACITY)
     loads_bytes = LOADS.layout.size + OVERHEAD if scenario.hears_load else 0
     return HEADER_BYTES + _SCHEDULE_BYTES + _PLACES_BYTES * -(-members // PLACES_CAPACITY) + loads_bytes
 
@@ -108,7 +108,7 @@ def measured_period_ns(scenario: Scenario) -> int:
 
 def hello_bytes(scenario: Scenario) -> int:
     """The size of the largest hello with a digest."""
-    digests = min(_MOST_DIGESTS, -(-scenario.nodes.count // DIGEST_CAPACITY))
+    digests = min(_MOST_DIGESTS, -(-scenario.node_count // DIGEST_CAPACITY))
     return HEADER_BYTES + _HELLO_BYTES + digests * (DIGEST.layout.size + OVERHEAD)
 
 
@@ -120,4 +120,4 @@ def most_together(scenario: Scenario) -> int:
 
 def schedule_parts(scenario: Scenario) -> int:
     """The number of turns that the leader's schedules take in each superframe."""
-    return max(1, -(-(scenario.nodes.count - 1) // CAPACITY))
+    return max(1, -(-(scenario.node_count - 1) // CAPACITY))

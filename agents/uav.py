@@ -37,6 +37,7 @@ from fanet_mw.mavlink import Geodetic
 from fanet_mw.motion import Motion
 from fanet_mw.node.node import Node
 from fanet_mw.node.reader import Reader
+from fanet_mw.orders import Order
 from fanet_mw.routing import make_protocol
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, earliest, seconds_to_ns
@@ -81,7 +82,9 @@ class Uav(Actor):
         run share.
         """
         topics = Topics(swarm)
-        super().__init__(f"agent-{node}", (topics.radio_rx(node), topics.sensors(node)))
+        self._post = Post(scenario) if node == scenario.post else None
+        ordered = () if self._post is None else (topics.orders,)
+        super().__init__(f"agent-{node}", (topics.radio_rx(node), topics.sensors(node), *ordered))
         self.slack_ns = min(scenario.radio.handover_ns, scenario.radio.lead_ns // 2)  # the rest is for the bus
         self._topics = _OutTopics(topics.radio_tx(node), topics.setpoint(node), topics.mavlink(node))
         self._prompt_ns = scenario.radio.handover_ns + scenario.radio.lead_ns
@@ -97,7 +100,11 @@ class Uav(Actor):
         self._reckoning = DeadReckoning()
         self._delay_ns = seconds_to_ns(scenario.sensors.gps_delay_s)
         self._fixes = SteadyFix(sigma_m=scenario.world.gps_sigma_m, range_m=scenario.radio.range_m)
-        asked_for = _asked_for(scenario, node, self._streams, position, onboard_map)
+        asked_for = (
+            _asked_for(scenario, node, self._streams, position, onboard_map)
+            if self._post is None
+            else [*_loads(scenario, node), self._post]
+        )
         self._built_in = tuple(application.name for application in asked_for)
         """The applications whose counters are among those of the UAV itself in its report."""
         carried = (*_foreign(scenario, node), *applications)
@@ -148,6 +155,9 @@ class Uav(Actor):
             if reckoned is not None:
                 self._fix(reckoned, now_ns)
             self._onboard.sensor(message, now_ns)
+        elif isinstance(message, Order) and self._post is not None:
+            self._post.asked.append(message)
+            self._onboard.wake(now_ns)
         else:
             self._malformed += 1
         self._settle(now_ns)
@@ -252,23 +262,24 @@ class Uav(Actor):
 def _asked_for(
     scenario: Scenario, node: NodeId, streams: TelemetryStreams, position: Enu, onboard_map: OnboardMap
 ) -> Sequence[Application]:
-    """The applications that a scenario asks for, in the order in which they are called."""
+    """The applications of a UAV that a scenario asks for, in the order in which they are called."""
     mission = scenario.mission
     applications: list[Application]
-    loads = [Load(scenario, node, name) for name in scenario.traffic_classes]
-    if node == scenario.post:
-        return [*loads, Post(scenario)]
     rescue = (
         PlannedSearch(scenario, node, position=position, onboard_map=onboard_map)
         if mission.search != "none"
         else Rescue(scenario, node)
     )
-    applications = [Telemetry(streams), *loads, rescue]
+    applications = [Telemetry(streams), *_loads(scenario, node), rescue]
     if mission.formation != "none":
         applications.append(FormationFlight(scenario, node, position=position, onboard_map=onboard_map))
     if mission.collision_horizon_s:
         applications.append(CollisionAvoidance(scenario, node))
     return applications
+
+
+def _loads(scenario: Scenario, node: NodeId) -> Sequence[Application]:
+    return [Load(scenario, node, name) for name in scenario.traffic_classes]
 
 
 def _foreign(scenario: Scenario, node: NodeId) -> Sequence[Application]:

@@ -159,6 +159,20 @@ class KnownOnGround(NamedTuple):
     north_m: float
 
 
+class Ordered(NamedTuple):
+    """The post on the ground gave an order, or a UAV learned of it."""
+
+    t_ns: int
+    node: int
+    serial: int
+    order: str
+    other: int
+    """The UAV that is meant; 0: all."""
+    east_m: float
+    north_m: float
+    radius_m: float
+
+
 class Refuted(NamedTuple):
     """A UAV took a confirmation back, because what it heard of the survivor since contradicts the announced place."""
 
@@ -329,6 +343,7 @@ Record = (
     | Confirmed
     | PlacedInside
     | KnownOnGround
+    | Ordered
     | Refuted
     | Planned
     | Posed
@@ -361,6 +376,7 @@ _KINDS: Final[dict[str, type[Any]]] = {
     "confirmed": Confirmed,
     "placed_inside": PlacedInside,
     "known_on_ground": KnownOnGround,
+    "ordered": Ordered,
     "refuted": Refuted,
     "planned": Planned,
     "posed": Posed,
@@ -447,7 +463,7 @@ def parse(text: str) -> Record:
 __all__ = [
     "Approaching", "Arrived", "BoundExcludes", "BoundStated", "ClockSampled", "Collided", "Confirmed",
     "ConflictForeseen", "ConflictOver", "DeadlineLost", "DeadlineMet", "Delivered", "Detected", "DropReason", "Dropped",
-    "FlightModeChanged", "Generated", "KnownOnGround", "LetOut", "LikelyStated", "MissionModeChanged", "Planned",
-    "PlacedInside", "Posed", "ProcessEnded", "RadioFault", "Record", "Refuted", "RoleChanged", "Sighted", "Warned",
-    "kind_of", "line", "name_of", "parse",
+    "FlightModeChanged", "Generated", "KnownOnGround", "LetOut", "LikelyStated", "MissionModeChanged", "Ordered",
+    "PlacedInside", "Planned", "Posed", "ProcessEnded", "RadioFault", "Record", "Refuted", "RoleChanged", "Sighted",
+    "Warned", "kind_of", "line", "name_of", "parse",
 ]  # fmt: skip

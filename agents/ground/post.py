@@ -1,33 +1,62 @@
-"""The post on the ground as an application of its node: it takes in all that the swarm tells of survivors.
+"""The post on the ground as an application of its node: it takes in what the swarm tells, and gives orders.
 
-Finds reach it as floods where a chain of UAVs does, and in the hellos of UAVs that come within its reach later
-(`agents/mission/finding/announcing.py`).
+finds    reach it as floods where a chain of UAVs does, and in the hellos of UAVs that come within its reach later
+         (`agents/mission/finding/announcing.py`)
+orders   are flooded several times, and said in its hellos, all in turn; UAVs tell them on (`agents/mission/orders.py`)
 """
 
 from typing import Final
 
+from agents.ground.known_uavs import KnownUavs
 from agents.mission.finding.known_survivors import KnownSurvivors
 from agents.mission.finding.plausibility import Plausibility
+from agents.mission.orders import record_of
 from agents.mission.searcher import phone_model
 from fanet_mw.application import Application, Received
 from fanet_mw.node.reader import decoded
+from fanet_mw.orders import Order, is_told, wrong
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import KnownOnGround
-from fanet_mw.wire import BIDS, COVERED, FOUND, ROLL, SEARCH, STATUS, SURVIVOR
+from fanet_mw.units import US, S, seconds_to_ns
+from fanet_mw.wire import BIDS, COVERED, FOUND, ORDER, PRIORITY_SAFETY, ROLL, SEARCH, STATUS, SURVIVOR
 from fanet_mw.wire.search_messages import told_in
+from fanet_mw.wire.search_plan import Search, SearchStatus
 from fanet_mw.wire.survivors import Found, Standing
+from fanet_mw.wire.told_order import ToldOrder
+
+_TELLINGS: Final = 3
+"""The number of times that an order is flooded."""
+_AGAIN_NS: Final = 5 * S
+"""The time between two of these floods."""
+_IN_HELLO: Final = 2
+"""The greatest number of orders in one hello."""
+_MOST_ORDERS: Final = 1000
 
 
 class Post(Application):
-    """What the post knows of survivors."""
+    """What the post knows of survivors and UAVs, and its orders."""
 
     name: Final = "report"
-    listens = (SURVIVOR.msgid, SEARCH.msgid, STATUS.msgid, BIDS.msgid, FOUND.msgid, COVERED.msgid, ROLL.msgid)
+    listens = (
+        SURVIVOR.msgid, SEARCH.msgid, STATUS.msgid, BIDS.msgid, FOUND.msgid, COVERED.msgid, ROLL.msgid, ORDER.msgid,
+    )  # fmt: skip
 
     def __init__(self, scenario: Scenario) -> None:
         model = phone_model(scenario)
         self.survivors = KnownSurvivors(model)
+        self._uavs = KnownUavs(scenario)
         self._plausibility = Plausibility(model)
+        self._planned = sorted((seconds_to_ns(entry.at_s), index) for index, entry in enumerate(scenario.orders))
+        self._orders = [entry.what for entry in scenario.orders]
+        self.asked: list[Order] = []
+        """The orders of operators that are given at the next wake-up."""
+        self._refused = 0
+        self._given: list[ToldOrder] = []
+        self._tellings: list[tuple[int, int, ToldOrder]] = []
+        """When an order is flooded next, and how often it still is."""
+        self._in_hellos = 0
+
+    # --- what it learns -------------------------------------------------------------------------------------------
 
     def on_message(self, message: Received, now_ns: int) -> None:
         self._take(message.frame, now_ns)
@@ -38,8 +67,64 @@ class Post(Application):
 
     def _take(self, frame: bytes, now_ns: int) -> None:
         for told in decoded(frame, told_in):
-            if not isinstance(told, Found) or not self._plausibility.holds(told, now_ns=now_ns):
-                continue
-            if self.survivors.on_found(told, now_ns=now_ns) and told.standing is not Standing.REFUTED:
-                east_m, north_m = round(told.east_m, 2), round(told.north_m, 2)
-                self.port.record(KnownOnGround(now_ns, self.port.node, told.survivor, east_m, north_m))
+            if isinstance(told, SearchStatus):
+                self._uavs.on_status(told)
+            elif isinstance(told, Search):
+                self._uavs.on_plan(told)
+            elif isinstance(told, Found) and self._plausibility.holds(told, now_ns=now_ns):
+                self._on_found(told, now_ns)
+
+    def _on_found(self, found: Found, now_ns: int) -> None:
+        if self.survivors.on_found(found, now_ns=now_ns) and found.standing is not Standing.REFUTED:
+            east_m, north_m = round(found.east_m, 2), round(found.north_m, 2)
+            self.port.record(KnownOnGround(now_ns, self.port.node, found.survivor, east_m, north_m))
+
+    # --- what it orders -------------------------------------------------------------------------------------------
+
+    def give(self, order: Order, now_ns: int) -> str | None:
+        """Give an order; returns why that is not possible, or None."""
+        why = wrong(order, uavs=self.port.scenario.nodes.count)
+        if why is not None or len(self._given) >= _MOST_ORDERS:
+            return why or f"{_MOST_ORDERS} orders were given already"
+        if not is_told(order):
+            chosen = self._uavs.nearest(order.east_m, order.north_m)
+            if chosen is None:
+                return "no UAV that takes part has been heard"
+            order = order._replace(node=chosen)
+        told = ToldOrder(now_ns // US, self.port.node, len(self._given) + 1, order)
+        self._given.append(told)
+        self._tellings.append((now_ns, _TELLINGS, told))
+        self.port.record(record_of(told, self.port.node, now_ns))
+        self._tell(now_ns)
+        return None
+
+    def wake(self, now_ns: int) -> None:
+        while self._planned and self._planned[0][0] <= now_ns:
+            self.asked.append(self._orders[self._planned.pop(0)[1]])
+        asked, self.asked = self.asked, []
+        self._refused += sum(self.give(order, now_ns) is not None for order in asked)
+        self._tell(now_ns)
+
+    def next_wake_ns(self) -> int | None:
+        planned = [self._planned[0][0]] if self._planned else []
+        return min([*planned, *(due_ns for due_ns, _, _ in self._tellings)], default=None)
+
+    def _tell(self, now_ns: int) -> None:
+        """Flood the orders that are due."""
+        due = [telling for telling in self._tellings if telling[0] <= now_ns]
+        self._tellings = [telling for telling in self._tellings if telling[0] > now_ns]
+        for _, left, told in due:
+            self.port.send(told.encode_frame(self.port.node), priority=PRIORITY_SAFETY)
+            if left > 1:
+                self._tellings.append((now_ns + _AGAIN_NS, left - 1, told))
+
+    def report(self) -> dict[str, int]:
+        return {"orders_given": len(self._given), "orders_refused": self._refused}
+
+    def hello_frames(self, now_ns: int) -> bytes:
+        """The inner frames for the next hello: the newest order, and the others in turn."""
+        newest, others = self._given[-1:], self._given[:-1]
+        turn = self._in_hellos % max(1, len(others))
+        self._in_hellos += 1
+        chosen = [*newest, *others[turn : turn + _IN_HELLO - 1]]
+        return b"".join(told.encode_frame(self.port.node) for told in chosen)

@@ -21,10 +21,11 @@ from fanet_mw.mavlink import Geodetic
 from fanet_mw.node.reader import decoded
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId
-from fanet_mw.wire import BIDS, COVERED, FOUND, ROLL, SEARCH, STATUS, SURVIVOR
+from fanet_mw.wire import BIDS, COVERED, FOUND, ORDER, ROLL, SEARCH, STATUS, SURVIVOR
 from fanet_mw.wire.search_messages import Told, told_in
 from fanet_mw.wire.search_plan import Search, SearchStatus
 from fanet_mw.wire.survivors import Found, Standing, Survivor
+from fanet_mw.wire.told_order import ToldOrder
 
 
 class Rescue(Application):
@@ -66,7 +67,9 @@ class PlannedSearch(Application):
     """The planned search at one UAV: its inputs go to a searcher, and the searcher's decisions go out."""
 
     name: Final = "report"
-    listens = (SURVIVOR.msgid, SEARCH.msgid, STATUS.msgid, BIDS.msgid, FOUND.msgid, COVERED.msgid, ROLL.msgid)
+    listens = (
+        SURVIVOR.msgid, SEARCH.msgid, STATUS.msgid, BIDS.msgid, FOUND.msgid, COVERED.msgid, ROLL.msgid, ORDER.msgid,
+    )  # fmt: skip
 
     def __init__(self, scenario: Scenario, node: NodeId, *, position: Enu, onboard_map: OnboardMap = NO_MAP) -> None:
         """`onboard_map`: the map that the UAV carries."""
@@ -159,4 +162,6 @@ def _sole_origin(told: Told) -> int | None:
         return told.planner
     if isinstance(told, SearchStatus):
         return told.node
+    if isinstance(told, ToldOrder):
+        return told.post
     return None if not isinstance(told, Found) or told.standing is not Standing.ESTIMATED else told.node

@@ -2,6 +2,7 @@
 
 from agents.mission.flight.flight import Flight
 from agents.mission.flight.return_home import ReturnHome
+from agents.mission.orders import KnownOrders
 from agents.mission.outbox import Outbox
 from agents.mission.search_formation.formation_place import FormationPlace
 from fanet_mw.trace import MissionModeChanged
@@ -9,12 +10,18 @@ from fanet_mw.units import NodeId
 
 
 class ModeRecord:
-    """The mode of one UAV: takeoff, wait, deploy, search, respond, return, done, lost_link or land."""
+    """The mode of one UAV: takeoff, wait, deploy, search, respond, errand, return, done, recall, lost_link or land."""
 
     def __init__(
-        self, node: NodeId, place: FormationPlace, flight: Flight, return_home: ReturnHome, outbox: Outbox
+        self,
+        node: NodeId,
+        place: FormationPlace,
+        flight: Flight,
+        return_home: ReturnHome,
+        orders: KnownOrders,
+        outbox: Outbox,
     ) -> None:
-        self._node = node
+        self._node, self._orders = node, orders
         self._place, self._flight = place, flight
         self._return_home, self._outbox = return_home, outbox
         self._last: tuple[str, int] | None = None
@@ -34,6 +41,8 @@ class ModeRecord:
             return self._return_home.reason.value
         if self._flight.takes_off:
             return "takeoff"
+        if self._orders.errand is not None:
+            return "errand"
         if survivor:
             return "respond"
         if self._place.is_taken_up(now_ns):

@@ -26,10 +26,11 @@ from agents.mission.finding.phone_reception import PhoneReception
 from agents.mission.finding.sightings import Sightings
 from agents.mission.flight.approach_speed import approach_speed_m_s
 from agents.mission.flight.connectivity_maintenance import ConnectivityMaintenance
+from agents.mission.flight.errand import Errand
 from agents.mission.flight.flight import Flight
 from agents.mission.flight.goal import Goal
 from agents.mission.flight.reciprocal_avoidance import ReciprocalAvoidance
-from agents.mission.flight.return_home import ReturnHome
+from agents.mission.flight.return_home import ReturnHome, ReturnReason
 from agents.mission.flight.take_off import TakeOff, take_off_ns
 from agents.mission.flight.velocity_choice import VelocityChoice
 from agents.mission.mode_record import ModeRecord
@@ -38,6 +39,7 @@ from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.onboard_map import OnboardMap
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.navigation.radar_watch import RadarWatch
+from agents.mission.orders import KnownOrders, record_of
 from agents.mission.outbox import Outbox
 from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.formation_planner import FormationPlanner
@@ -51,6 +53,7 @@ from agents.mission.tasking.bidding import Bidding
 from agents.mission.tasking.voice_descent import VoiceDescent
 from fanet_mw.bus.messages import Echo
 from fanet_mw.motion import Motion
+from fanet_mw.orders import OrderKind
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S, seconds_to_ns
@@ -60,6 +63,7 @@ from fanet_mw.wire.search_messages import Told
 from fanet_mw.wire.search_plan import MOST_PLACES, Search, SearchStatus
 from fanet_mw.wire.searched_cells import Covered
 from fanet_mw.wire.survivors import Found, Standing, Survivor, is_person
+from fanet_mw.wire.told_order import ToldOrder
 
 _MOST_DECADES: Final = 12.0
 """The greatest range of a phone's receiver is 10^12 m, farther than anything is apart; its square is a number."""
@@ -131,7 +135,13 @@ class Searcher:
         missed_cells = None if coverage is None else MissedCells(coverage, place)
         heard = scenario.sensors.voice_hz > 0
         listening = VoiceDescent(scenario, node, own_motion, neighbors, speed_m_s=speed_m_s) if heard else None
-        goal = Goal(survivors, own_motion, place, approach, missed_cells, listening)
+        self._orders = orders = KnownOrders(node)
+        self._obstacles = obstacles
+        errand = Errand(
+            orders, own_motion,
+            height_m=nodes.altitude_m, speed_m_s=scenario.mobility.speed_m_s, look_m=min(_view_m(scenario)),
+        )  # fmt: skip
+        goal = Goal(survivors, own_motion, place, approach, missed_cells, listening, errand)
         take_off = TakeOff(
             node, position,
             own_motion=own_motion, neighbors=neighbors, outbox=outbox, height_m=nodes.altitude_m,
@@ -139,8 +149,9 @@ class Searcher:
         self._flight = Flight(
             own_motion, place, goal, velocity_choice, take_off=take_off, return_home=self._return_home
         )
-        self._mode = ModeRecord(node, place, self._flight, self._return_home, outbox)
+        self._mode = ModeRecord(node, place, self._flight, self._return_home, orders, outbox)
         self._node, self._post = node, scenario.post
+        self._outbox = outbox
         self._sweeps = mission.sweeps
         self._next_review_ns: int | None = None
 
@@ -159,7 +170,7 @@ class Searcher:
         self._next_review_ns = now_ns + _REVIEW_NS
         if self._return_home.loses_link(now_ns):
             self._leave(now_ns)
-        if not self._return_home.leaves and self._is_over(now_ns):
+        if not self._return_home.leaves and self._orders.errand is None and self._is_over(now_ns):
             self._return_home.end()
             self._give_up(now_ns)
         self._reception.review(now_ns)
@@ -167,14 +178,14 @@ class Searcher:
             self._announcing.keep_person(survivor, now_ns, steady_m2=self._sightings.steady_m2)
             self._announcing.refute(survivor, now_ns)
             self._bidding.reopen(survivor)
-        self._plans.review(self._return_home.percent, now_ns)
+        self._plans.review(self._percent, now_ns)
         self._identify(now_ns)
         for place in self._sightings.unreported(now_ns):
             self._announcing.report_person(place, now_ns)
         self._announcing.give_up_doubles(now_ns, steady_m2=self._sightings.steady_m2)
         self._place_inside(now_ns)
         self._announcing.tell(self._bidding.survivor, now_ns)
-        if not self._return_home.leaves:
+        if not self._return_home.leaves and self._orders.errand is None:
             self._bidding.bid(now_ns, delay_s=self._flight.take_off_s)
             self._bidding.choose(now_ns)
         self._mode.review(self._bidding.survivor, now_ns)
@@ -203,7 +214,7 @@ class Searcher:
     def _leave(self, now_ns: int) -> None:
         """Give up the place and the task, tell all, and fly home."""
         self._give_up(now_ns)
-        self._plans.say_status(self._return_home.percent, now_ns)
+        self._plans.say_status(self._percent, now_ns)
 
     def _give_up(self, now_ns: int) -> None:
         self._bidding.hand_on(now_ns)
@@ -274,8 +285,8 @@ class Searcher:
 
     def _on_heard(self, now_ns: int) -> None:
         """Another UAV was heard; a UAV that flew home because it heard nobody takes part again."""
-        if self._return_home.on_heard(now_ns):
-            self._plans.come_back(self._return_home.percent, now_ns)
+        if self._return_home.on_heard(now_ns) and self._orders.errand is None:
+            self._plans.come_back(self._percent, now_ns)
             self._mode.review(self._bidding.survivor, now_ns)
 
     def on_message(self, message: Told, *, now_ns: int) -> None:
@@ -299,8 +310,39 @@ class Searcher:
                 self._reception.on_covered(message)
             case Roll():
                 self._plans.on_roll(message, now_ns=now_ns)
+            case ToldOrder():
+                self._on_order(message, now_ns)
             case _:
                 assert_never(message)
+
+    def _on_order(self, told: ToldOrder, now_ns: int) -> None:
+        """The post on the ground has given an order, to this UAV or to others; nobody else may."""
+        if told.post != self._post or not self._orders.learn(told, now_ns):
+            return
+        self._outbox.records.append(record_of(told, self._node, now_ns))
+        if not self._orders.is_to_obey(told):
+            return
+        order = told.order
+        match order.kind:
+            case OrderKind.NO_FLY:
+                self._obstacles.close(order.east_m, order.north_m, order.radius_m)
+            case OrderKind.RECALL | OrderKind.END:
+                ends = order.kind is OrderKind.END
+                self._return_home.end(ReturnReason.DONE if ends else ReturnReason.RECALLED)
+                self._leave(now_ns)
+            case OrderKind.STAY | OrderKind.SEARCH:
+                self._leave(now_ns)
+            case OrderKind.RELEASE:
+                if self._return_home.release() or not self._return_home.leaves:
+                    self._plans.come_back(self._percent, now_ns)
+                    self._mode.review(self._bidding.survivor, now_ns)
+            case _:
+                assert_never(order.kind)
+
+    @property
+    def _percent(self) -> int:
+        """The percentage of its battery that this UAV may spend for the search; 0 if it has no part in it any more."""
+        return 0 if self._orders.errand is not None else self._return_home.percent
 
     def _on_found(self, found: Found, now_ns: int) -> None:
         """Another node states the place of a survivor: an estimate, a confirmation, or a refutation."""
@@ -318,15 +360,15 @@ class Searcher:
     # --- sent messages --------------------------------------------------------------------------------------------
 
     def hello_frames(self, now_ns: int) -> bytes:
-        """The inner frames for the next hello: the latest reports, the best bids, recent verdicts, and the map of
-        searched cells.
+        """The inner frames for the next hello: the latest reports, the best bids, recent verdicts and orders, and the
+        map of searched cells.
         """
         frames = b"".join(report.encode_frame(self._node) for report in self._survivors.recent_reports(now_ns=now_ns))
         bids = self._bidding.bids_to_tell(now_ns=now_ns)
         if bids:
             frames += encode_bids(bids, node=self._node)
         frames += self._announcing.hello_frames(now_ns) + self._reception.hello_frames(now_ns)
-        return frames + self._plans.hello_frames(now_ns)
+        return frames + self._orders.hello_frames(now_ns) + self._plans.hello_frames(now_ns)
 
 
 def phone_model(scenario: Scenario) -> PhoneModel:

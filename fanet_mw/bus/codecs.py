@@ -40,6 +40,7 @@ from fanet_mw.bus.messages import (
 )
 from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Mishap, MishapKind, Partition, Restore
 from fanet_mw.errors import MalformedFrameError
+from fanet_mw.orders import Order, OrderKind
 from fanet_mw.units import Enu, NodeId
 
 # --- bodies: one encoder and one decoder per message type, beside each other -------------------------------------
@@ -57,6 +58,7 @@ _JAM = struct.Struct("<5dq")
 _CUT = struct.Struct("<Hq2B")
 _PARTITION = struct.Struct("<4dqH")
 _MISHAP = struct.Struct("<HB3dq")
+_ORDER = struct.Struct("<BH3d")
 _LINKS = struct.Struct("<qqI")
 
 
@@ -219,6 +221,15 @@ def _decode_restore(body: bytes) -> Restore:
     return Restore(body.decode())
 
 
+def _encode_order(m: Order) -> bytes:
+    return _ORDER.pack(*m)
+
+
+def _decode_order(body: bytes) -> Order:
+    kind, *rest = _ORDER.unpack(body)
+    return Order(OrderKind(kind), *rest)
+
+
 def _encode_links(m: LinkStats) -> bytes:
     head = _LINKS.pack(m.t_ns, m.span_ns, len(m.rssi_sums_mdbm))
     return head + m.ends.tobytes() + m.counts.tobytes() + m.rssi_sums_mdbm.tobytes()
@@ -265,12 +276,13 @@ _CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[byte
     24: (CameraImage, sensor_codecs.encode_image, sensor_codecs.decode_image),
     25: (Partition, _encode_partition, _decode_partition),
     26: (Mishap, _encode_mishap, _decode_mishap),
+    27: (Order, _encode_order, _decode_order),
 }
 HEADS: Final[dict[type[Any], tuple[struct.Struct, ...]]] = {
     TxRequest: (_TX,), Reception: (_RX,), TxStatus: (_STATUS,), Poses: (_POSES,), Setpoint: (_SETPOINT,),
     MavlinkTap: (_INSTANT,), TraceBatch: (), ClockEpoch: (_CLOCK,), Report: (_INSTANT,), Degrade: (_DEGRADE,),
     Jam: (_JAM,), Cut: (_CUT,), Partition: (_PARTITION,),
-    Mishap: (_MISHAP,), Restore: (), LinkStats: (_LINKS,), Obstructions: (_OBSTRUCTIONS,),
+    Mishap: (_MISHAP,), Order: (_ORDER,), Restore: (), LinkStats: (_LINKS,), Obstructions: (_OBSTRUCTIONS,),
     **sensor_codecs.HEADS,
 }  # fmt: skip
 """The structs of each kind: that of its head, and that of each row for kinds with rows."""

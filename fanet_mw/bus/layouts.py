@@ -14,6 +14,7 @@ from fanet_mw.bus import messages as m
 from fanet_mw.bus.codecs import CODES, HEADS
 from fanet_mw.bus.link_stats import COUNTS, LOSSES, LinkStats
 from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Mishap, Partition, Restore
+from fanet_mw.orders import Order
 
 TYPES: Final = {
     "B": "uint8", "H": "uint16", "I": "uint32", "Q": "uint64", "q": "int64", "f": "float32", "d": "float64",
@@ -65,6 +66,7 @@ NAMED: Final[dict[type[Any], Names]] = {
         "`count` x uint16: the nodes on one side; the label, UTF-8",
     ),
     Mishap: Names("radio/control", f"node what {_VECTOR} for_ns", "the label, UTF-8"),
+    Order: Names("ground/order", "kind node east_m north_m radius_m"),
     Restore: Names("radio/control", "", "the label, UTF-8; empty: all faults"),
     LinkStats: Names(
         "radio/links", "t_ns span_ns count",

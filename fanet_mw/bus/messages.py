@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Mishap, Partition, Restore
+from fanet_mw.orders import Order
 from fanet_mw.trace import Record
 from fanet_mw.units import STILL, Enu, NodeId, S
 
@@ -312,6 +313,7 @@ Message = (
     | Cut
     | Partition
     | Mishap
+    | Order
     | Restore
     | LinkStats
 )

@@ -11,6 +11,7 @@ fanet/<swarm>/world/<id>/sensor/gps  Gps
 fanet/<swarm>/world/<id>/sensor/wifi WifiScan; camera: Camera, voice: Voice, radar: Radar, altimeter: Altimeter,
 inertial: Inertial, battery: Battery, image: CameraImage
 fanet/<swarm>/mavlink/<id>           MavlinkTap
+fanet/<swarm>/ground/order           Order                  anyone -> the post on the ground
 fanet/<swarm>/trace/<id>             TraceBatch             <id> is the actor's name
 fanet/<swarm>/report/<id>            Report                 <id> is the actor's name
 fanet/<swarm>/clock                  Clock
@@ -40,6 +41,7 @@ class Topics:
         self.clock = f"{self._base}/clock"
         self.all_tx = self.radio_tx("*")
         self.radio_control = f"{self._base}/radio/control"
+        self.orders = f"{self._base}/ground/order"
         self.radio_links = f"{self._base}/radio/links"
         self.all_setpoints = f"{self._base}/world/*/setpoint"
         self.all_sensors = f"{self._base}/world/*/sensor/*"

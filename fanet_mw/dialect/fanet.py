@@ -385,6 +385,7 @@ MAVLINK_MSG_ID_FANET_BIDS = 53022
 MAVLINK_MSG_ID_FANET_FOUND = 53023
 MAVLINK_MSG_ID_FANET_COVERED = 53024
 MAVLINK_MSG_ID_FANET_ROLL = 53025
+MAVLINK_MSG_ID_FANET_ORDER = 53026
 
 
 class MAVLink_fanet_route_message(MAVLink_message):
@@ -1505,6 +1506,52 @@ class MAVLink_fanet_roll_message(MAVLink_message):
 setattr(MAVLink_fanet_roll_message, "name", mavlink_msg_deprecated_name_property())
 
 
+class MAVLink_fanet_order_message(MAVLink_message):
+    """
+    An order of the post on the ground to one UAV or to all.
+    """
+
+    id = MAVLINK_MSG_ID_FANET_ORDER
+    msgname = "FANET_ORDER"
+    fieldnames = ["t_us", "east", "north", "radius", "serial", "post", "node", "kind", "version"]
+    ordered_fieldnames = ["t_us", "east", "north", "radius", "serial", "post", "node", "kind", "version"]
+    fieldtypes = ["uint64_t", "float", "float", "float", "uint16_t", "uint16_t", "uint16_t", "uint8_t", "uint8_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {"t_us": "us", "east": "m", "north": "m", "radius": "m"}
+    native_format = bytearray(b"<QfffHHHBB")
+    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8]
+    lengths = [1, 1, 1, 1, 1, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0, 0]
+    crc_extra = 213
+    unpacker = struct.Struct("<QfffHHHBB")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, t_us: int, east: float, north: float, radius: float, serial: int, post: int, node: int, kind: int, version: int):
+        MAVLink_message.__init__(self, MAVLink_fanet_order_message.id, MAVLink_fanet_order_message.msgname)
+        self._fieldnames = MAVLink_fanet_order_message.fieldnames
+        self._instance_field = MAVLink_fanet_order_message.instance_field
+        self._instance_offset = MAVLink_fanet_order_message.instance_offset
+        self.t_us = t_us
+        self.east = east
+        self.north = north
+        self.radius = radius
+        self.serial = serial
+        self.post = post
+        self.node = node
+        self.kind = kind
+        self.version = version
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.t_us, self.east, self.north, self.radius, self.serial, self.post, self.node, self.kind, self.version), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_fanet_order_message, "name", mavlink_msg_deprecated_name_property())
+
+
 mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_FANET_ROUTE: MAVLink_fanet_route_message,
     MAVLINK_MSG_ID_FANET_BEACON: MAVLink_fanet_beacon_message,
@@ -1530,6 +1577,7 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_FANET_FOUND: MAVLink_fanet_found_message,
     MAVLINK_MSG_ID_FANET_COVERED: MAVLink_fanet_covered_message,
     MAVLINK_MSG_ID_FANET_ROLL: MAVLink_fanet_roll_message,
+    MAVLINK_MSG_ID_FANET_ORDER: MAVLink_fanet_order_message,
 }
 
 
@@ -2769,3 +2817,37 @@ class MAVLink(object):
 
         """
         self.send(self.fanet_roll_encode(at_half_s, planner, revision, entries, version), force_mavlink1=force_mavlink1)
+
+    def fanet_order_encode(self, t_us: int, east: float, north: float, radius: float, serial: int, post: int, node: int, kind: int, version: int) -> MAVLink_fanet_order_message:
+        """
+        An order of the post on the ground to one UAV or to all.
+
+        t_us                      : Swarm time at which it was given. [us] (type:uint64_t)
+        east                      : Of a place. [m] (type:float)
+        north                     : Of a place. [m] (type:float)
+        radius                    : Around the place. [m] (type:float)
+        serial                    : Number of the order; each of a post has the next one. (type:uint16_t)
+        post                      : The node that gave it. (type:uint16_t)
+        node                      : The UAV; 0: all. (type:uint16_t)
+        kind                      : 1: fly home, 2: the search is over, 3: stay over the place, 4: search around it, 5: take part again, 6: keep out of the circle. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        return MAVLink_fanet_order_message(t_us, east, north, radius, serial, post, node, kind, version)
+
+    def fanet_order_send(self, t_us: int, east: float, north: float, radius: float, serial: int, post: int, node: int, kind: int, version: int, force_mavlink1: bool = False) -> None:
+        """
+        An order of the post on the ground to one UAV or to all.
+
+        t_us                      : Swarm time at which it was given. [us] (type:uint64_t)
+        east                      : Of a place. [m] (type:float)
+        north                     : Of a place. [m] (type:float)
+        radius                    : Around the place. [m] (type:float)
+        serial                    : Number of the order; each of a post has the next one. (type:uint16_t)
+        post                      : The node that gave it. (type:uint16_t)
+        node                      : The UAV; 0: all. (type:uint16_t)
+        kind                      : 1: fly home, 2: the search is over, 3: stay over the place, 4: search around it, 5: take part again, 6: keep out of the circle. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        self.send(self.fanet_order_encode(t_us, east, north, radius, serial, post, node, kind, version), force_mavlink1=force_mavlink1)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from fanet_mw import airtime  # whole: it imports this package, and may be the first to be imported
 from fanet_mw.bus.radio_control import EVERY, Degrade, Mishap, MishapKind, Partition, Restore, nodes_of
+from fanet_mw.orders import wrong
 from fanet_mw.units import MAX_NODES, MS, US
 
 if TYPE_CHECKING:
@@ -91,6 +92,7 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
         if node > scenario.node_count
     ]
     found += _impossible_places(scenario)
+    found += _impossible_orders(scenario)
     found += _wrong_for_rivals(scenario)
     found += _impossible_rounds(scenario)
     if scenario.routing.protocol == "clustered":
@@ -331,6 +333,17 @@ def _impossible_places(scenario: Scenario) -> Iterator[str]:
         yield 'mission.survivors_in = "buildings" needs world.buildings or world.buildings_geojson'
     if mission.survivors_in == "buildings" and mission.survivor_positions_m:
         yield 'mission.survivors_in = "buildings" and mission.survivor_positions_m exclude each other'
+
+
+def _impossible_orders(scenario: Scenario) -> Iterator[str]:
+    """Orders without a post, without a planned search, or to UAVs that do not exist."""
+    if scenario.orders and not scenario.ground.at_m:
+        yield "orders need a post on the ground that gives them: ground.at_m"
+    if scenario.orders and scenario.mission.search == "none":
+        yield 'orders need a planned search: mission.search other than "none"'
+    for index, entry in enumerate(scenario.orders):
+        if (why := wrong(entry.what, uavs=scenario.nodes.count)) is not None:
+            yield f"orders.{index}: {why}"
 
 
 def _impossible_faults(scenario: Scenario) -> Sequence[str]:

@@ -20,6 +20,7 @@ from fanet_mw.scenario.tables.ground import Ground
 from fanet_mw.scenario.tables.mission import Mission
 from fanet_mw.scenario.tables.mobility import Mobility
 from fanet_mw.scenario.tables.nodes import Nodes
+from fanet_mw.scenario.tables.orders import PlannedOrder
 from fanet_mw.scenario.tables.radio import Radio
 from fanet_mw.scenario.tables.rounds import Rounds
 from fanet_mw.scenario.tables.routing import Routing
@@ -70,6 +71,8 @@ class Scenario(Section):
     """Applications of other packages, called in this order, after those of fanet-mw."""
     faults: tuple[AnyFault, ...] = ()
     """Changes of the air at given instants; `fanet air` makes them by message."""
+    orders: tuple[PlannedOrder, ...] = ()
+    """Orders of the post on the ground; `fanet order` gives them while a swarm runs."""
     further_traffic: tuple[Traffic, ...] = ()
     """Further traffic classes: in a file, the second and all later `[[traffic]]`."""
 

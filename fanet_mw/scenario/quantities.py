@@ -31,6 +31,7 @@ _SUFFIXES: Final[Mapping[str, tuple[str, Mapping[str, str]]]] = {
     "_mbps": ("Mb/s", _BIT_RATE),
     "_bytes": ("bytes", {"bytes": "1", "B": "1", "kB": "1e3", "KiB": "1024"}),
     "_dbm": ("dBm", {"dBm": "1"}),
+    "_dbi": ("dBi", {"dBi": "1"}),
     "_db": ("dB", {"dB": "1"}),
     "_ppm": ("ppm", {"ppm": "1"}),
     "_deg": ("°", {"deg": "1", "°": "1"}),

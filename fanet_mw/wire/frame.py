@@ -366,10 +366,11 @@ BIDS: Final = Spec(53022, 212, struct.Struct("<12H12H12H12HH12BBB"))
 FOUND: Final = Spec(53023, 195, struct.Struct("<QIfffffHBB"))
 COVERED: Final = Spec(53024, 57, struct.Struct("<128BB"))
 ROLL: Final = Spec(53025, 30, struct.Struct("<IHH79BB"))
+ORDER: Final = Spec(53026, 213, struct.Struct("<QfffHHHBB"))
 SPECS: Final = (
     ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES, CLAIMS, ROUTING, LINKS,
     MESSAGE, RECEIPT, TARGETS, LOADS, HEARD, HELD, SEARCH, STATUS, BIDS, FOUND,
-    COVERED, ROLL,
+    COVERED, ROLL, ORDER,
 )  # fmt: skip
 _OURS: Final = {spec.msgid: spec for spec in SPECS}
 

@@ -19,6 +19,7 @@ from sim.cli.air import app as air_app
 from sim.cli.command_groups import OPTIONS
 from sim.cli.console import Console, discard_output, nobody_reads, open_closed_streams
 from sim.cli.memory import require_for
+from sim.cli.order import app as order_app
 
 app = App(
     name="fanet",
@@ -29,6 +30,7 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 app.command(air_app)
+app.command(order_app)
 for commands in (scenario_files, sweep, figures, runs, replay, single_services, swarms, tool_files):
     commands.add_to(app)
 app.register_install_completion_command()

@@ -54,7 +54,7 @@ from sim.world.environment.survivors import place
 from sim.world.mobility.layout import positions
 from sim.world.sensors.phone import REFERENCE_LOSS_DB
 
-_HOMEWARD: Final = frozenset({"return", "done", "land"})
+_HOMEWARD: Final = frozenset({"return", "done", "recall", "land"})
 """The mission modes of a UAV that has left the search."""
 _OFF_AIR: Final = frozenset({"cut", "mute", "deaf", "stop", "crash"})
 """The faults that take a UAV out of the network."""

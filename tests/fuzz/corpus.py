@@ -39,6 +39,7 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.mavlink import Encoder
+from fanet_mw.orders import Order, OrderKind
 from fanet_mw.radios.datagram import Datagram, DatagramKind
 from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.trace import Record
@@ -49,6 +50,7 @@ from fanet_mw.wire.roll import Roll
 from fanet_mw.wire.search_plan import Search, SearchStatus
 from fanet_mw.wire.searched_cells import Covered
 from fanet_mw.wire.survivors import Found, Standing
+from fanet_mw.wire.told_order import ToldOrder
 from sim.run.virtual import actors_of
 from sim.scenarios import catalog
 
@@ -173,6 +175,7 @@ def _not_recorded() -> list[bytes]:
         Found(7, 3, 10.0, 20.0, node=4, standing=Standing.ESTIMATED, **covariance).encode_frame(4),
         Covered(0x8001 << 1000 | 5).encode_frame(4),
         Roll(77, 3, 2, (0, 5, 127, 60), frozenset((1, 2))).encode_frame(4),
+        ToldOrder(7, 9, 1, Order(OrderKind.SEARCH, 3, 10.0, 20.0, 50.0)).encode_frame(9),
         encode_piece(head, bytes(range(200)), node=3),
         encode_piece(head._replace(piece=1), bytes(100), node=3, targets=range(1, 40)),
         encode_piece(head._replace(size=len(text), port=0, pieces=1, stride=1000), text, node=3, targets=(4,)),

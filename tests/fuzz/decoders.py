@@ -49,6 +49,7 @@ from fanet_mw.wire.search_plan import Search, SearchStatus
 from fanet_mw.wire.searched_cells import Covered
 from fanet_mw.wire.survivors import Found as FoundMessage
 from fanet_mw.wire.survivors import Survivor
+from fanet_mw.wire.told_order import ToldOrder
 from sim.run.collecting.bus_checks import BusChecks
 
 SLOW_S: Final = 0.5
@@ -114,6 +115,7 @@ def _of_the_air(found: Corpus) -> Iterator[Decoder]:
         (FoundMessage, wire.FOUND),
         (Covered, wire.COVERED),
         (Roll, wire.ROLL),
+        (ToldOrder, wire.ORDER),
     ):
         yield Decoder(kind.__name__, _there_and_back(kind.decode_frame, _encode_frame), of(spec.msgid))
     yield Decoder(

@@ -39,6 +39,7 @@ from fanet_mw.bus.messages import (
 )
 from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
 from fanet_mw.errors import MalformedFrameError
+from fanet_mw.orders import Order, OrderKind
 from fanet_mw.trace import Delivered, Detected, Generated
 from fanet_mw.units import Enu, NodeId
 
@@ -111,6 +112,7 @@ messages: st.SearchStrategy[Message] = st.one_of(
     st.builds(Jam, words, vectors, doubles, doubles, instants),
     st.builds(Cut, words, nodes, instants),
     st.builds(Restore, words),
+    st.builds(Order, st.sampled_from(OrderKind), nodes, finite, finite, finite),
     st.integers(0, 4).flatmap(
         lambda n: st.builds(
             LinkStats,

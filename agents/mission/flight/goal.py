@@ -1,8 +1,11 @@
-"""The goal of a searching UAV: a survivor, within the limits that its place in the formation sets, or its lane."""
+"""The goal of a searching UAV: where an order sends it; a survivor, within the limits of its place in the formation; or
+its lane.
+"""
 
 from typing import Final
 
 from agents.mission.finding.known_survivors import KnownSurvivors
+from agents.mission.flight.errand import Errand
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.search_formation.formation_place import FormationPlace, along
 from agents.mission.search_formation.missed_cells import MissedCells
@@ -26,16 +29,22 @@ class Goal:
         approach: Approach,
         missed_cells: MissedCells | None,
         listening: VoiceDescent | None,
+        errand: Errand | None = None,
     ) -> None:
         """`missed_cells`: the cells that the formation has left unsearched; None if UAVs do not share what
         they have searched. `listening`: takes a UAV with microphones down; None for a UAV without.
+        `errand`: what the post on the ground orders.
         """
+        self._errand = errand
         self._survivors, self._own_motion = survivors, own_motion
         self._formation, self._approach = formation, approach
         self._missed_cells, self._listening = missed_cells, listening
 
     def at(self, task: int | None, now_ns: int) -> tuple[Enu, Enu]:
         """The place to fly to, and how it moves; `task` is the survivor that this UAV has won, if any."""
+        ordered = None if self._errand is None else self._errand.goal(now_ns)
+        if ordered is not None:
+            return ordered, STILL
         formation = self._formation
         lane, moves = formation.lane(now_ns)  # before the sweep, on the way to it
         survivor = task

@@ -29,6 +29,8 @@ class ReturnReason(StrEnum):
     """It has received nothing from anybody for too long."""
     DONE = "done"
     """The search is over."""
+    RECALLED = "recall"
+    """The post on the ground has ordered it."""
 
 
 class ReturnHome:
@@ -83,9 +85,16 @@ class ReturnHome:
         self.reason = ReturnReason.LOST_LINK
         return True
 
-    def end(self) -> None:
-        """The search is over: the UAV leaves now."""
-        self.reason = self.reason or ReturnReason.DONE
+    def end(self, reason: ReturnReason = ReturnReason.DONE) -> None:
+        """The search is over, or the UAV is recalled: it leaves now."""
+        self.reason = self.reason or reason
+
+    def release(self) -> bool:
+        """End a recall; returns True if the UAV therefore takes part in the mission again."""
+        if self.reason is not ReturnReason.RECALLED or self.lands:
+            return False
+        self.reason = None
+        return True
 
     @property
     def leaves(self) -> bool:

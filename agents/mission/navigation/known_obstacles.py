@@ -130,6 +130,11 @@ class KnownObstacles:
                 if math.hypot(i, j) * CELL_M <= _MARGIN_M:
                     _put(self._taken, (column + i, row + j), fresh, now_ns)
 
+    def close(self, east_m: float, north_m: float, radius_m: float) -> None:
+        """One more no-fly area, from now on."""
+        self._no_fly = (*self._no_fly, (east_m, north_m, radius_m))
+        self._any = True
+
     # --- queries --------------------------------------------------------------------------------------------------
 
     def ground_m(self, place: Enu) -> float:

@@ -7,9 +7,9 @@ that it was refused (the emulator's report counts why), or that no emulator serv
 import json
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import TraceBatch
@@ -53,8 +53,12 @@ def change(endpoint: str, swarm: str | None, control: Control, *, zenoh_config: 
     """
     with Bus.join(endpoint, config_of(zenoh_config, OPERATOR)) as bus:
         names = Topics(swarm or find_swarm(bus))
-        count = _count(bus, names)
-        unknown = [] if count is None or isinstance(control, Restore) else [n for n in nodes_of(control) if n > count]
+        count = scenario_of_swarm(bus, names).get("nodes", {}).get("count")
+        unknown = (
+            []
+            if not isinstance(count, int) or isinstance(control, Restore)
+            else [n for n in nodes_of(control) if n > count]
+        )
         if unknown:
             raise FanetError(f"node {unknown[0]}: the nodes of swarm {names.swarm} are 1 to {count}")
         done: list[RadioFault] = []
@@ -69,8 +73,8 @@ def change(endpoint: str, swarm: str | None, control: Control, *, zenoh_config: 
         return list(done)
 
 
-def _count(bus: Bus, names: Topics) -> int | None:
-    """The number of nodes of a swarm, by the keeper of its clock; None if nobody says it at once."""
+def scenario_of_swarm(bus: Bus, names: Topics) -> Mapping[str, Any]:
+    """The scenario of a swarm as tables, by the keeper of its clock; empty if nobody says it at once."""
     answers: list[bytes] = []
     came = threading.Event()
 
@@ -81,10 +85,11 @@ def _count(bus: Bus, names: Topics) -> int | None:
     bus.ask(names.scenario, on_answer)
     came.wait(_DISCOVER_S)
     try:
-        count = json.loads(answers[0])["nodes"]["count"] if answers else None
-    except (ValueError, KeyError, TypeError, RecursionError):
-        return None
-    return count if isinstance(count, int) else None
+        tree = json.loads(answers[0]) if answers else {}
+    except (ValueError, RecursionError):
+        return {}
+    tables = tree.items() if isinstance(tree, dict) else ()
+    return {name: table for name, table in tables if isinstance(table, dict)}
 
 
 def _watch(control: Control, done: list[RadioFault], confirmed: threading.Event) -> Callable[[str, bytes], None]:

@@ -1,9 +1,10 @@
 """The rights of each participant of a swarm, as an access list of Zenoh's router: what is not allowed is denied.
 
-    agent-N    puts its requests, setpoint, telemetry, trace and report; subscribes to its receptions and sensors
+    agent-N    puts its requests, setpoint, telemetry, trace and report; subscribes to its receptions and sensors, and
+               the post on the ground to orders
     emulator   puts receptions, links, trace and report; subscribes to requests, poses, obstructions, changes of the air
     world      puts poses, obstructions, sensors, radios of crashed UAVs, trace, report; subscribes to setpoints
-    operator   puts changes of the air; subscribes to links, traces, reports and telemetry
+    operator   puts changes of the air and orders; subscribes to links, traces, reports and telemetry
 
 All but the operator subscribe to the clock, query it, and declare that they are alive. The launcher is the router
 itself: its own puts (the clock) pass no access list. Participants are identified by the common names of their
@@ -47,7 +48,7 @@ def rights(scenario: Scenario, names: Topics) -> dict[str, Rights]:
         return actor(
             f"agent-{node}",
             (names.radio_tx(node), names.setpoint(node), names.mavlink(node)),
-            (names.radio_rx(node), names.sensors(node)),
+            (names.radio_rx(node), names.sensors(node), *((names.orders,) if node == scenario.post else ())),
         )
 
     return {
@@ -63,7 +64,7 @@ def rights(scenario: Scenario, names: Topics) -> dict[str, Rights]:
         ),
         **{f"agent-{node}": agent(node) for node in scenario.node_ids},
         OPERATOR: Rights(
-            puts=(names.radio_control,),
+            puts=(names.radio_control, names.orders),
             subscribes=(names.radio_links, names.all_traces, names.all_reports, names.mavlink("*")),
             watches=(f"{ROOT}/*/alive/**",),
         ),

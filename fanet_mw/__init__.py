@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from fanet_mw.units import BROADCAST, Enu, NodeId
     from sim.run.api import Launched, launch, simulate
     from sim.run.result import Result
+    from sim.run.stored_result import load_result
     from sim.run.virtual_swarm import VirtualSwarm
     from sim.scenarios.catalog import find as load_scenario
 
@@ -63,6 +64,7 @@ _HOMES: Final = {
     "fanet_mw.units": ("BROADCAST", "Enu", "NodeId"),
     "sim.run.api": ("Launched", "launch", "simulate"),
     "sim.run.result": ("Result",),
+    "sim.run.stored_result": ("load_result",),
     "sim.run.virtual_swarm": ("VirtualSwarm",),
 }  # fmt: skip
 """The module of each public name. The packages above this one are named here and imported by nothing else in it."""
@@ -73,7 +75,7 @@ __all__ = [
     "ConfigError", "Course", "Data", "DropReason", "Emulated", "Enu", "FanetError", "Fate", "Gps", "HOME", "Inertial",
     "Launched", "LocalProtocolError", "MalformedFrameError", "Message", "Node", "NodeClosedError", "NodeId", "OnAir",
     "Radar", "Received", "Result", "Scenario", "SensorReading", "Sent", "Status", "VirtualSwarm", "Voice", "WifiScan",
-    "__version__", "join", "launch", "load_scenario", "simulate",
+    "__version__", "join", "launch", "load_result", "load_scenario", "simulate",
 ]  # fmt: skip
 
 

@@ -20,6 +20,11 @@ _EXTRAS: Final = {
     "distributed": "dask",
     "matplotlib": "figures",
     "rasterio": "maps",
+    "mcap": "record",
+    "mcap_protobuf": "record",
+    "foxglove_schemas_protobuf": "record",
+    "google": "record",
+    "viser": "view",
 }
 """The extra with which each module is installed."""
 _REMEDY: Final = (

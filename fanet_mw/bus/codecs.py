@@ -14,11 +14,13 @@ from fanet_mw import trace
 from fanet_mw.bus import sensor_codecs
 from fanet_mw.bus.link_stats import COUNTS, LinkStats
 from fanet_mw.bus.messages import (
+    PACE_BOUNDS,
     Altimeter,
     Battery,
     Camera,
     CameraImage,
     ClockEpoch,
+    ClockRequest,
     ClockState,
     Gps,
     Inertial,
@@ -52,6 +54,7 @@ _SETPOINT = struct.Struct("<q4dB3d")
 _POSES = struct.Struct("<qI")
 _OBSTRUCTIONS = struct.Struct("<qI")
 _CLOCK = struct.Struct("<qdBqQIq")
+_PACE = struct.Struct("<d")
 _INSTANT = struct.Struct("<q")
 _DEGRADE = struct.Struct("<HHBddq")
 _JAM = struct.Struct("<5dq")
@@ -151,6 +154,17 @@ def _decode_clock(body: bytes) -> ClockEpoch:
     if not 0 < time_scale <= 100:
         raise ValueError("time_scale")
     return ClockEpoch(epoch_unix_ns, time_scale, ClockState(state), epoch_mono_ns, machine, number, ends_ns)
+
+
+def _encode_request(m: ClockRequest) -> bytes:
+    return _PACE.pack(m.time_scale)
+
+
+def _decode_request(body: bytes) -> ClockRequest:
+    (time_scale,) = _PACE.unpack(body)
+    if not PACE_BOUNDS[0] <= time_scale <= PACE_BOUNDS[1]:  # also true for NaN
+        raise ValueError("pace")
+    return ClockRequest(time_scale)
 
 
 def _encode_report(m: Report) -> bytes:
@@ -277,10 +291,12 @@ _CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[byte
     25: (Partition, _encode_partition, _decode_partition),
     26: (Mishap, _encode_mishap, _decode_mishap),
     27: (Order, _encode_order, _decode_order),
+    28: (ClockRequest, _encode_request, _decode_request),
 }
 HEADS: Final[dict[type[Any], tuple[struct.Struct, ...]]] = {
     TxRequest: (_TX,), Reception: (_RX,), TxStatus: (_STATUS,), Poses: (_POSES,), Setpoint: (_SETPOINT,),
-    MavlinkTap: (_INSTANT,), TraceBatch: (), ClockEpoch: (_CLOCK,), Report: (_INSTANT,), Degrade: (_DEGRADE,),
+    MavlinkTap: (_INSTANT,), TraceBatch: (), ClockEpoch: (_CLOCK,), ClockRequest: (_PACE,),
+    Report: (_INSTANT,), Degrade: (_DEGRADE,),
     Jam: (_JAM,), Cut: (_CUT,), Partition: (_PARTITION,),
     Mishap: (_MISHAP,), Order: (_ORDER,), Restore: (), LinkStats: (_LINKS,), Obstructions: (_OBSTRUCTIONS,),
     **sensor_codecs.HEADS,

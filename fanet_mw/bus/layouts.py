@@ -57,6 +57,7 @@ NAMED: Final[dict[type[Any], Names]] = {
     m.MavlinkTap: Names("mavlink/<id>", "t_ns", "MAVLink frames to the end"),
     m.TraceBatch: Names("trace/<name>", "", "records, UTF-8: one JSON array per line"),
     m.ClockEpoch: Names("clock", "epoch_unix_ns time_scale state epoch_mono_ns machine number ends_ns"),
+    m.ClockRequest: Names("clock/control", "time_scale"),
     m.Report: Names("report/<name>", "t_ns", "UTF-8: the name, a line feed, a JSON object"),
     Degrade: Names("radio/control", "src dst both loss_db loss_share for_ns", "the label, UTF-8"),
     Jam: Names("radio/control", f"{_VECTOR} radius_m noise_dbm for_ns", "the label, UTF-8"),

@@ -283,6 +283,17 @@ class ClockEpoch(NamedTuple):
     """The swarm instant at which all leave before the scenario is over; 0: nobody leaves early."""
 
 
+class ClockRequest(NamedTuple):
+    """An operator -> the keeper of the swarm clock: let the swarm's time pass at another pace."""
+
+    time_scale: float
+    """Swarm seconds per second of real time, in [0.001, 100]; at 0.001 the swarm as good as stands still."""
+
+
+PACE_BOUNDS: Final = (1e-3, 100.0)
+"""The bounds of the pace that an operator may ask for."""
+
+
 @dataclass(frozen=True, slots=True)
 class Report:
     """Any actor -> the launcher: its cumulative counters as JSON text."""
@@ -307,6 +318,7 @@ Message = (
     | MavlinkTap
     | TraceBatch
     | ClockEpoch
+    | ClockRequest
     | Report
     | Degrade
     | Jam

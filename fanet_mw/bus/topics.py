@@ -15,6 +15,7 @@ fanet/<swarm>/ground/order           Order                  anyone -> the post o
 fanet/<swarm>/trace/<id>             TraceBatch             <id> is the actor's name
 fanet/<swarm>/report/<id>            Report                 <id> is the actor's name
 fanet/<swarm>/clock                  Clock
+fanet/<swarm>/clock/control          ClockRequest           an operator -> the keeper of the clock
 """
 
 import re
@@ -39,6 +40,7 @@ class Topics:
         self.pose = f"{self._base}/world/pose"
         self.obstruction = f"{self._base}/world/obstruction"
         self.clock = f"{self._base}/clock"
+        self.clock_control = f"{self._base}/clock/control"
         self.all_tx = self.radio_tx("*")
         self.radio_control = f"{self._base}/radio/control"
         self.orders = f"{self._base}/ground/order"
@@ -88,3 +90,9 @@ def node_of(topic: str) -> int:
     parts = topic.split("/")
     text = parts[3] if len(parts) > 3 else ""
     return int(text) if len(text) <= 5 and text.isascii() and text.isdigit() else 0  # an id has at most five digits
+
+
+def node_of_tap(topic: str) -> int:
+    """The node id in a `mavlink/<id>` topic; 0 when there is none."""
+    text = topic.rpartition("/")[2]
+    return int(text) if len(text) <= 5 and text.isascii() and text.isdigit() else 0

@@ -4,6 +4,7 @@ The names of the fields are the flags and their docstrings the help text; the co
 `--set KEY=VALUE` changes a file's values is in `fanet_mw/scenario/config.py`.
 """
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -99,6 +100,8 @@ class OutputFlags:
     pcap_receptions: Annotated[bool, Parameter(negative="")] = False
     """Write every reception too, with its RSSI."""
 
+    record: Path | None = None
+    """A file, FILE.mcap, to record the swarm in, for Foxglove and PlotJuggler."""
     report: Annotated[bool, Parameter(negative="")] = False
     """Write a page of the run with pictures into that folder, report.html and report.md."""
 
@@ -110,10 +113,25 @@ class OutputFlags:
             import sim.report.page  # noqa: F401  what is missing is said before the run, not after it
         if self.out is None and (self.pcap or self.pcap_receptions):
             raise ConfigError("--pcap: needs --out DIR, the folder that air.pcap goes to")
+        if self.record is not None:
+            self._prepare_recording(self.record)
         if self.out is not None:
             from sim.cli.out_folder import prepare
 
             prepare(self.out, force=self.force)
+
+    def _prepare_recording(self, path: Path) -> None:
+        import sim.recording.mcap_recording  # noqa: F401  what is missing is said before the run, not after it
+
+        if path.suffix != ".mcap":
+            raise ConfigError(f"--record {path}: must be a file whose name ends in .mcap")
+        if os.path.lexists(path) and not self.force:
+            raise ConfigError(f"--record {path}: exists; choose another file, or replace it with --force")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.open("wb").close()
+        except OSError as error:
+            raise ConfigError(f"--record {path}: cannot be written: {error.strerror}") from error
 
     def capture_path(self) -> Path | None:
         """The path of the capture, if one is wanted."""

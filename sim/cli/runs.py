@@ -15,6 +15,7 @@ from cyclopts import Parameter
 from cyclopts.validators import Number
 
 from sim.cli.command_groups import RUN
+from sim.cli.companions import Companions, record_command, view_command
 from sim.cli.completion import ScenarioName
 from sim.cli.console import Console
 from sim.cli.memory import COMPILING_MB, require
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from cyclopts import App
 
     from fanet_mw.scenario import Scenario
+    from sim.observation.observer import Observer
     from sim.run.launcher.progress import Progress
     from sim.run.outcome import Outcome
 
@@ -70,6 +72,7 @@ def simulate(
         begun(output.out),
         _progress(chosen, quiet=output.json) as tell,
         capture as file,
+        _recording(chosen, output.record, epoch_unix_ns=EPOCH_UNIX_NS) as observer,
         interrupts.handed_to(signals.append),
     ):
         if file is not None:
@@ -80,6 +83,7 @@ def simulate(
             capture=file.pcap if file else None,
             signals=signals,
             spool_folder=output.out,
+            observer=observer,
         )
     return _finish(outcome, output)
 
@@ -92,6 +96,8 @@ def launch(
     respawn: Annotated[bool, Parameter(negative="")] = False,
     slow_down_to: Annotated[float | None, Parameter(validator=Number(gte=1e-3, lte=100))] = None,
     no_world: Annotated[bool, Parameter(negative="")] = False,
+    view: Annotated[bool, Parameter(negative="")] = False,
+    view_port: int | None = None,
     listen: str | None = None,
     connect: str | None = None,
     swarm: str | None = None,
@@ -110,6 +116,10 @@ def launch(
         and speed up again afterwards; by default it does not, and the run says that it is not valid.
     no_world
         Start no world: another program says where all UAVs are (see docs/reference/bus.md).
+    view
+        Show the swarm in a browser: `fanet view` beside it, until it ends.
+    view_port
+        The port of that page; by default 8080, or the next one that is free.
     listen
         Zenoh endpoint to serve on, for example tcp/127.0.0.1:7447; by default a free port of the loopback interface.
     connect
@@ -132,7 +142,12 @@ def launch(
     print_notes(chosen)
     warn_of(listen, listens=True)
     warn_of(connect, listens=False)
-    with begun(output.out), _watched(chosen, quiet=output.json) as tell:
+    beside = [record_command(output.record)] if output.record is not None else []
+    if view or view_port is not None:
+        import viser  # noqa: F401  what is missing is said before the run
+
+        beside.append(view_command(view_port))
+    with begun(output.out), Companions(beside) as companions, _watched(chosen, quiet=output.json) as tell:
         outcome = asyncio.run(
             run(
                 chosen,
@@ -148,6 +163,7 @@ def launch(
                 on_progress=tell,
                 on_event=_say,
                 leads=leads,
+                on_started=lambda run: companions.start(run.address),
             )
         )
     return _finish(outcome, output)
@@ -180,6 +196,18 @@ def plan(
     from sim.cli.plan import show
 
     return show(choice.scenario(scenario), deadline=deadline, search=search, as_json=json)
+
+
+@contextmanager
+def _recording(scenario: "Scenario", path: Path | None, *, epoch_unix_ns: int) -> "Iterator[Observer | None]":
+    """A recording in a file, if one is wanted."""
+    if path is None:
+        yield None
+        return
+    from sim.recording.mcap_recording import McapRecording
+
+    with McapRecording(path, scenario, epoch_unix_ns=epoch_unix_ns) as recording:
+        yield recording
 
 
 @contextmanager

@@ -34,6 +34,7 @@ from fanet_mw.trace import (
 from fanet_mw.units import NodeId, S
 from fanet_mw.whole_file import replace_file
 from sim.figures import colors
+from sim.observation.event_text import event_text
 from sim.results.replay import Replay
 from sim.world.environment.obstacles import Box, obstacles
 from sim.world.mobility.layout import positions
@@ -145,32 +146,6 @@ def _outline(box: Box) -> list[list[int]]:
 def _events(records: Sequence[Record]) -> Iterator[list[Any]]:
     """What a person wants to know of, as text, with its instant and UAV."""
     for record in records:
-        text = _said(record)
+        text = event_text(record)
         if text:
             yield [round(record.t_ns / S, 2), record.node, text]
-
-
-def _said(record: Record) -> str:
-    match record:
-        case Detected():
-            return f"hears the phone of survivor {record.survivor}"
-        case Approaching():
-            return f"turns towards survivor {record.survivor}"
-        case Arrived():
-            return f"arrives at survivor {record.survivor}"
-        case Confirmed():
-            return f"confirms survivor {record.survivor}"
-        case Refuted():
-            return f"takes back the confirmation of survivor {record.survivor}"
-        case Collided():
-            return f"collides with {f'UAV {record.other}' if record.other else 'the ground or something solid'}"
-        case FlightModeChanged() if record.mode in ("fallen", "failsafe"):
-            return f"has flight mode {record.mode}"
-        case MissionModeChanged() if record.mode in ("return", "done", "lost_link", "land"):
-            return f"has mission mode {record.mode}"
-        case ProcessEnded():
-            return f"process {record.name} ended"
-        case RadioFault():
-            return f"radio fault {record.kind} {record.label} {'begins' if record.active else 'ends'}"
-        case _:
-            return ""

@@ -7,7 +7,7 @@ rounds           place in the round, a line for each node; turns are those of th
 
 from bisect import bisect_right
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 from matplotlib.axes import Axes
@@ -19,6 +19,7 @@ from fanet_mw.trace import LetOut
 from fanet_mw.units import MS, S
 from sim.figures.colors import BLUE, DARK, GRAY, GREEN, ORANGE, PINK, RED, SHADE
 from sim.figures.style import canvas, legend_above
+from sim.observation.turns import Span, spans_of
 from sim.report.run_pictures import RunPicture
 from sim.report.run_records import RunRecords
 
@@ -29,14 +30,6 @@ _MOST_NAMED: Final = 12
 _WINDOW_COLOR: Final = "#eeeeee"
 
 
-class _Own(NamedTuple):
-    """A span of the superframe that belongs to one node."""
-
-    node: int
-    start_ns: int
-    length_ns: int
-
-
 class _Frame(NamedTuple):
     """A superframe, or a round."""
 
@@ -44,7 +37,7 @@ class _Frame(NamedTuple):
     period_ns: int
     window: tuple[int, int]
     """Where nodes contend: start and length [ns]."""
-    own: Sequence[_Own]
+    own: Sequence[Span]
 
     def place_ns(self, one: LetOut) -> int:
         """The place of an instant in the superframe."""
@@ -121,7 +114,7 @@ def _in_turns(
     run: RunRecords, turns: Mapping[int, Mapping[str, Any]], reports: Mapping[int, Mapping[str, Any]]
 ) -> RunPicture:
     newest = max(turns.values(), key=lambda frame: float(frame["start_ms"]))
-    own = sorted((one for node, frame in turns.items() for one in _turns_of(node, frame)), key=lambda one: one.start_ns)
+    own = sorted((one for node, frame in turns.items() for one in spans_of(node, frame)), key=lambda one: one.start_ns)
     frame = _Frame(_ns(newest["start_ms"]), _ns(newest["period_ms"]), (0, _ns(newest.get("contention_ms", 0.0))), own)
     shown = [one for one in run.let_out if one.t_ns >= frame.start_ns]
     picture = _by_node(run, frame, shown, "superframe", ("nodes with turns", "other nodes"), "contention window")
@@ -141,7 +134,7 @@ def _in_turns(
 
 def _in_rounds(run: RunRecords) -> RunPicture:
     timing = RoundTiming.of(run.scenario)
-    own = [_Own(node, (node - 1) * timing.turn_ns, timing.turn_ns) for node in run.scenario.node_ids]
+    own = [Span(node, (node - 1) * timing.turn_ns, timing.turn_ns) for node in run.scenario.node_ids]
     frame = _Frame(0, timing.period_ns, (timing.nodes * timing.turn_ns, timing.window_ns), own)
     kept = sum(map(frame.in_own, run.let_out))
     bulk = sum(frame.place_ns(one) >= frame.window[0] for one in run.let_out)
@@ -190,12 +183,6 @@ def _scatter(
 def _frame_axes(axes: Axes, period_ns: int, called: str) -> None:
     axes.set_xlabel(f"place in the {called} of {period_ns / MS:.6g} ms [ms]")
     axes.set_xlim(0, period_ns / MS)
-
-
-def _turns_of(node: int, frame: Mapping[str, Any]) -> Iterator[_Own]:
-    for offset in frame["own"]:
-        turn_ns = _ns(frame["turn_ms"])
-        yield _Own(node, (_ns(frame["contention_ms"]) + offset * turn_ns) % _ns(frame["period_ms"]), turn_ns)
 
 
 def _ns(value_ms: float) -> int:

@@ -1,7 +1,7 @@
 """The traffic of each link over a whole run: sums of the medium's reports, as rows of `links.json`."""
 
 from collections.abc import Iterable
-from typing import Any, Final
+from typing import Any, Final, Self
 
 import numpy as np
 
@@ -19,6 +19,15 @@ class LinkTotals:
         self._pending: list[LinkStats] = []
         self._links = np.zeros((0, 2), np.uint16)
         self._sums = np.zeros((0, 1 + COUNTS), np.int64)
+
+    @classmethod
+    def of(cls, rows: Iterable[LinkRow]) -> Self:
+        """The sums that these rows state, one for each link."""
+        found, totals = list(rows), cls()
+        totals._links = np.array([[row.src, row.dst] for row in found], np.uint16).reshape(-1, 2)
+        sums = [[row.rssi_sum_mdbm, row.received, *row.lost] for row in found]
+        totals._sums = np.array(sums, np.int64).reshape(-1, 1 + COUNTS)
+        return totals
 
     def add(self, stats: LinkStats) -> None:
         """Add a report."""

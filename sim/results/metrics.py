@@ -55,6 +55,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "pauses": dict(outcome.pauses),
         "leads": dict(outcome.leads),
         "wall_s": round(outcome.wall_s, 3),
+        "epoch_unix_ns": outcome.epoch_unix_ns,
         **packets[classes[0]],
         "classes": {name: packets[name] for name in classes} if len(classes) > 1 else {},
         "reports": packets["report"],

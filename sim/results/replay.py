@@ -14,33 +14,25 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Final, NamedTuple, Self, TypeVar
+from typing import Any, NamedTuple, Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import (
-    Approaching,
-    Arrived,
-    Confirmed,
-    Detected,
     FlightModeChanged,
     MissionModeChanged,
     Planned,
     Posed,
     Record,
-    Refuted,
     RoleChanged,
 )
 from fanet_mw.units import Enu, NodeId, S
-from sim.results.mission import Confirmations, OverflownCells, mission
+from sim.results.mission import OverflownCells, mission
 from sim.results.run_folder import RunFolder
+from sim.results.survivor_states import SurvivorState, SurvivorStates
 from sim.world.environment.survivors import place
-
-UNHEARD: Final = "not heard"
-_STAGES: Final[Mapping[type[Any], str]] = {Detected: "detected", Approaching: "approached", Arrived: "reached"}
-_ORDER: Final = (UNHEARD, *_STAGES.values())
 
 R = TypeVar("R", FlightModeChanged, MissionModeChanged, Planned, RoleChanged)
 
@@ -61,17 +53,6 @@ class UavState(NamedTuple):
     """Its role in its cluster; empty if it had none yet."""
     head: int
     """The head of its cluster; 0 if it had none."""
-
-
-class SurvivorState(NamedTuple):
-    """The state of one survivor from an instant on."""
-
-    t_ns: int
-    status: str
-    """`not heard`, `detected`, `approached`, `reached`, `confirmed`, `mistaken` (confirmed far from the true place), or
-    `reopened` (the confirmation was taken back)."""
-    node: int
-    """The UAV that brought this about; 0 if there was none."""
 
 
 class Replay:
@@ -130,15 +111,12 @@ class Replay:
     @cached_property
     def finds(self) -> Mapping[int, Sequence[SurvivorState]]:
         """All states of each survivor, in the order of time; the first one is `not heard`, from the start."""
-        held = Confirmations(self.survivors)
-        states = {survivor: [SurvivorState(0, UNHEARD, 0)] for survivor in range(1, len(self.survivors) + 1)}
+        found = SurvivorStates(self.survivors)
+        states = {survivor: [state] for survivor, state in found.now.items()}
         for record in self.records:
-            if isinstance(record, Detected | Approaching | Arrived | Confirmed | Refuted) and record.survivor in states:
-                held.add(record)
-                so_far = states[record.survivor]
-                status = _status(record, so_far[-1].status, held)
-                if status != so_far[-1].status:
-                    so_far.append(SurvivorState(record.t_ns, status, record.node))
+            change = found.take(record)
+            if change is not None:
+                states[change[0]].append(change[1])
         return states
 
     def found(self, t_s: float) -> Mapping[int, SurvivorState]:
@@ -175,18 +153,6 @@ class Replay:
         records: Sequence[R] = self._changes.get((kind, node), ())
         index = bisect_right(records, t_ns, key=lambda record: record.t_ns)
         return records[index - 1] if index else None
-
-
-def _status(record: Record, before: str, held: Confirmations) -> str:
-    """The status of the survivor of a record that was taken in; one who is confirmed does not go back to `detected`."""
-    if isinstance(record, Confirmed | Refuted):
-        if record.survivor in {one.survivor for one in held.right()}:
-            return "confirmed"
-        if record.survivor in {one.survivor for one in held.mistaken()}:
-            return "mistaken"
-        return "reopened" if before in ("confirmed", "mistaken") else before
-    stage = _STAGES[type(record)]
-    return stage if before in _ORDER and _ORDER.index(stage) > _ORDER.index(before) else before
 
 
 def _between(posed: Sequence[Posed], t_ns: int) -> Enu:

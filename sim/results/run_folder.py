@@ -150,6 +150,8 @@ class _ShownReport(_ShownShape):
 
 
 _LINKS: Final = TypeAdapter(list[_ShownLink], config=ConfigDict(strict=True))
+_REPORTS: Final = TypeAdapter(dict[str, dict[str, Any]], config=ConfigDict(strict=True))
+SHOWN_REPORT: Final = TypeAdapter(_ShownReport)
 _AGENTS: Final = TypeAdapter(dict[str, _ShownReport], config=ConfigDict(strict=True))
 
 
@@ -202,6 +204,11 @@ class RunFolder:
         found: Mapping[str, Mapping[str, Any]] = self._json(REPORTS_FILE, _AGENTS, missing={})
         names = {f"agent-{node}": node for node in self.scenario.node_ids}
         return {names[name]: report for name, report in found.items() if name in names}
+
+    def reports(self) -> Mapping[str, Mapping[str, Any]]:
+        """The last report of each actor, by its name."""
+        found: Mapping[str, Mapping[str, Any]] = self._json(REPORTS_FILE, _REPORTS, missing={})
+        return found
 
     def records(self, *kinds: type[R]) -> Iterator[R]:
         """The records of these kinds, or of all, in the order of the trace."""

@@ -12,14 +12,16 @@ from sim.run.outcome import Outcome
 class Result:
     """One finished run, as programs and notebooks read it."""
 
-    def __init__(self, outcome: Outcome) -> None:
+    def __init__(self, outcome: Outcome, *, summary: Mapping[str, Any] | None = None) -> None:
+        """`summary`: of a run whose files were read; otherwise it is made when it is asked for."""
         self.outcome = outcome
         """The run as the functions of `sim.results` read it; its shape is no part of the promise."""
+        self._summary = summary
 
     @cached_property
     def summary(self) -> Mapping[str, Any]:
         """The content of `summary.json`."""
-        return finish(self.outcome, out=None)
+        return finish(self.outcome, out=None) if self._summary is None else self._summary
 
     @cached_property
     def trace(self) -> Mapping[str, Mapping[str, Sequence[Any]]]:

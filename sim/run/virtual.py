@@ -13,12 +13,14 @@ from emulator.pcap import Capture
 from fanet_mw.actor import Actor
 from fanet_mw.application import Application
 from fanet_mw.bus.link_stats import LinkStats
-from fanet_mw.bus.messages import MavlinkTap, Message
-from fanet_mw.bus.topics import Topics
+from fanet_mw.bus.messages import MavlinkTap, Message, Poses
+from fanet_mw.bus.topics import Topics, node_of_tap
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.node.reader import Reader
 from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Record
 from fanet_mw.units import MS, NodeId, S
+from sim.observation.observer import Observer
 from sim.results.clocks import true_delays
 from sim.results.links import LinkTotals
 from sim.run.collecting.taps import TapLog
@@ -83,19 +85,22 @@ def simulate(
     signals: Sequence[int] = (),
     applications: Applications = no_applications,
     spool_folder: Path | None = None,
+    observer: Observer | None = None,
 ) -> Outcome:
     """Run a scenario to its end, or until `signals` holds the number of a signal; then the outcome is what there is so
     far.
 
     `applications` gives the user's applications for each node, in addition to those of the scenario. `on_progress` is
     told how many seconds have been simulated. A long run keeps what it collects in a nameless file in `spool_folder`,
-    by default in the folder for temporary files. Raises KeyboardInterrupt with the signal's number if it comes before
-    anything was simulated.
+    by default in the folder for temporary files. `observer` is told what happens. Raises
+    KeyboardInterrupt with the signal's number if it comes before anything was simulated.
     """
     with GARBAGE.not_collected():
-        observed = Observed(scenario, capture=capture, applications=applications, folder=spool_folder)
+        observed = Observed(
+            scenario, capture=capture, applications=applications, folder=spool_folder, observer=observer
+        )
         began = time.perf_counter()
-        _run(observed.host, scenario, on_progress, signals)
+        _run(observed, on_progress, signals)
     interrupted = f"interrupted by {Signals(signals[0]).name}" if signals else ""
     return observed.outcome(wall_s=time.perf_counter() - began, cut_short=interrupted)
 
@@ -114,6 +119,7 @@ class Observed:
         capture: Capture | None = None,
         applications: Applications = no_applications,
         folder: Path | None = None,
+        observer: Observer | None = None,
     ) -> None:
         """What is too long for memory is kept in a nameless file in `folder`, by default in the folder for temporary
         files.
@@ -123,21 +129,50 @@ class Observed:
         self.names = Topics(scenario.name)
         self._taps = taps = TapLog(folder)
         self._links = links = LinkTotals()
+        self._observer = observer
+        self._reported_s = -1
 
-        def tap(_: str, message: Message) -> None:
+        def tap(topic: str, message: Message) -> None:
             if isinstance(message, MavlinkTap):
                 taps.append((message.t_ns, message.data))
+                if observer is not None:
+                    observer.take_tap(node_of_tap(topic), message.t_ns, message.data)
 
         def add_links(_: str, message: Message) -> None:
             if isinstance(message, LinkStats):
                 links.add(message)
+                if observer is not None:
+                    observer.take_links(message)
+
+        def see(_: str, message: Message) -> None:
+            if isinstance(message, Poses) and observer is not None:
+                observer.take_poses(message)
+
+        records = self.records
+
+        def take(some: list[Record]) -> None:
+            records.extend(some)
+            if observer is not None:
+                observer.take_records(some)
 
         self.actors = actors_of(scenario, scenario.name, capture=capture, applications=applications)
         self.host = VirtualHost(
             self.actors,
-            on_records=self.records.extend,
-            listeners=[(self.names.mavlink("*"), tap), (self.names.radio_links, add_links)],
+            on_records=take,
+            listeners=[
+                (self.names.mavlink("*"), tap),
+                (self.names.radio_links, add_links),
+                *([] if observer is None else [(self.names.pose, see)]),
+            ],
         )
+
+    def tell_reports(self) -> None:
+        """Hand the counters of all actors to the observer, at most once a second of swarm time."""
+        now_ns = self.host.now_ns
+        if self._observer is not None and now_ns // S > self._reported_s:
+            self._reported_s = now_ns // S
+            for actor in self.actors:
+                self._observer.take_report(actor.name, actor.report(), t_ns=now_ns)
 
     def outcome(self, *, wall_s: float, cut_short: str) -> Outcome:
         """The outcome, once the host was stopped; `cut_short` says why if that was before the end of the scenario."""
@@ -156,13 +191,15 @@ class Observed:
         )
 
 
-def _run(host: VirtualHost, scenario: Scenario, on_progress: Callable[[float], None], signals: Sequence[int]) -> None:
+def _run(observed: Observed, on_progress: Callable[[float], None], signals: Sequence[int]) -> None:
+    host, scenario = observed.host, observed.scenario
     if signals:
         raise KeyboardInterrupt(signals[0])
     host.start()
     pages = HugePages()
     for until_ns in range(_STEP_NS, scenario.duration_ns + _STEP_NS, _STEP_NS):
         host.run(min(until_ns, scenario.duration_ns))
+        observed.tell_reports()
         pages.keep_up()
         on_progress(host.now_ns / S)
         if signals:

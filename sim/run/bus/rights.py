@@ -4,10 +4,11 @@
                the post on the ground to orders
     emulator   puts receptions, links, trace and report; subscribes to requests, poses, obstructions, changes of the air
     world      puts poses, obstructions, sensors, radios of crashed UAVs, trace, report; subscribes to setpoints
-    operator   puts changes of the air and orders; subscribes to links, traces, reports and telemetry
+    operator   puts changes of the air and of the clock's pace, and orders; subscribes to poses, links, traces, reports,
+               telemetry
 
-All but the operator subscribe to the clock, query it, and declare that they are alive. The launcher is the router
-itself: its own puts (the clock) pass no access list. Participants are identified by the common names of their
+All subscribe to the clock and query it, and all but the operator declare that they are alive. The launcher is the
+router itself: its own puts (the clock) pass no access list. Participants are identified by the common names of their
 certificates. A put that is denied disappears without a message to its sender.
 """
 
@@ -64,8 +65,16 @@ def rights(scenario: Scenario, names: Topics) -> dict[str, Rights]:
         ),
         **{f"agent-{node}": agent(node) for node in scenario.node_ids},
         OPERATOR: Rights(
-            puts=(names.radio_control, names.orders),
-            subscribes=(names.radio_links, names.all_traces, names.all_reports, names.mavlink("*")),
+            puts=(names.radio_control, names.clock_control, names.orders),
+            subscribes=(
+                names.pose,
+                names.radio_links,
+                names.all_traces,
+                names.all_reports,
+                names.mavlink("*"),
+                names.clock,
+            ),
+            queries=(names.clock, names.scenario),
             watches=(f"{ROOT}/*/alive/**",),
         ),
     }

@@ -117,6 +117,15 @@ class ClockGovernor:
         """The mean lateness in the second before, if that was an overload, and by how much it had grown."""
         self._return = _Return(time_scale, time_scale, time_scale)
 
+    def ask(self, scale: float, *, swarm_ns: int) -> None:
+        """Let an operator choose the pace, which is the full one from now on."""
+        self.scale = self._full = scale
+        self._least = min(self._least, scale)
+        self._moment_ns = moment_ns(scale)
+        self._lately.clear()
+        self._return = _Return(scale, scale, scale)
+        self.steps.append((swarm_ns, scale))
+
     def pace(self, reports: Mapping[str, Mapping[str, Any]], at: Instant) -> float | None:
         """The scale to run at from now on, by the last reports of all actors; None: the clock keeps its pace."""
         emulator = reports.get("emulator", {})

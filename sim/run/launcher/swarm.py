@@ -15,14 +15,17 @@ import os
 import signal
 import socket
 import time
+from collections import deque
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 from emulator.kernel.compile import COMPILING_NOTICE, must_compile
+from fanet_mw.bus import codecs
+from fanet_mw.bus.messages import ClockRequest
 from fanet_mw.bus.topics import Topics
-from fanet_mw.errors import BusError
+from fanet_mw.errors import BusError, MalformedFrameError
 from fanet_mw.hosts import interrupts
 from fanet_mw.hosts.bus import Bus, config_of, with_port
 from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
@@ -115,6 +118,9 @@ class SwarmRun:
         """When the programs of UAVs end and are started again, by the scenario's faults."""
         self._stopped: set[str] = set()
         """The processes that do not run now because of that."""
+        self._asked: deque[float] = deque(maxlen=16)
+        """The paces that operators have asked for, not yet heeded."""
+        bus.subscribe(names.clock_control, self._on_pace)
         self._clock: SwarmClock | None = None
         self._over = asyncio.Event()
         self._ending = False
@@ -218,6 +224,7 @@ class SwarmRun:
         assert self._clock is not None, "the clock was started"
         while self._clock.wait_s(self._services.scenario.duration_ns) > 0 and not self._over.is_set():
             reports = self._collector.reports()
+            self._heed_paces()
             self._govern(reports)
             on_progress(self._progress(reports))
             with contextlib.suppress(TimeoutError):
@@ -238,6 +245,21 @@ class SwarmRun:
                 self._tell(f"{name} is started again at {self._now_ns() / S:.1f} s, as planned")
                 self._stopped.discard(name)
                 self.processes.restart(name)
+
+    def _on_pace(self, _topic: str, payload: bytes) -> None:
+        """Called on a thread of the bus."""
+        with contextlib.suppress(MalformedFrameError):
+            asked = [one.time_scale for one in codecs.decode(payload) if isinstance(one, ClockRequest)]
+            self._asked.extend(asked)
+
+    def _heed_paces(self) -> None:
+        """Let the clock run as an operator wants it to."""
+        assert self._clock is not None, "the clock was started"
+        while self._asked:
+            scale = self._asked.popleft()
+            self._governor.ask(scale, swarm_ns=self._now_ns())
+            self._clock.follow(self._keeper.pace(scale))
+            self._tell(f"at {self._now_ns() / S:.1f} s an operator set the swarm's clock to {scale:.3g}")
 
     def _govern(self, reports: Mapping[str, Mapping[str, Any]]) -> None:
         """Fit the pace of the clock to what the reports say of the machine."""

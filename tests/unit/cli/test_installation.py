@@ -157,6 +157,9 @@ def test_every_dependency_is_imported_by_us_and_none_is_for_development() -> Non
     extras = [line for lines in PROJECT["optional-dependencies"].values() for line in lines]
     wanted = {re.split(r"[\[<>=; ]", line)[0] for line in (*PROJECT["dependencies"], *extras)} - {"fanet-mw"}
 
-    modules = {name: {"eclipse-zenoh": "zenoh"}.get(name, name.replace("-", "_")) for name in wanted}
+    modules = {
+        name: {"eclipse-zenoh": "zenoh", "mcap-protobuf-support": "mcap_protobuf"}.get(name, name.replace("-", "_"))
+        for name in wanted
+    }
     assert {name for name, module in modules.items() if module not in imported} == set()
     assert not wanted & DEVELOPMENT

@@ -203,3 +203,14 @@ def test_pauses_of_which_the_lead_covers_most_pass(pauses: list[tuple[float, flo
     machine = Machine(lambda t: 0.0 if any(at <= t < at + length for at, length in starts) else capacity, alone)
     machine.run(60 + (starts[-1][0] if starts else 0))
     assert machine.history == [(0.0, 1.0)]
+
+
+def test_an_operator_sets_the_pace_and_it_stays() -> None:
+    governor = ClockGovernor(1.0, least=1.0, late_limit=0.01, end_ns=100 * S, processors=2.0)
+    governor.ask(0.25, swarm_ns=7 * S)
+    assert (governor.scale, governor.steps) == (0.25, [(7 * S, 0.25)])
+    for second in range(1, 60):
+        calm = {"emulator": {"late": {"frames": 100 * second}}}
+        assert governor.pace(calm, Instant(7 * S + second * S // 4, second * S, 0.1 * second)) is None
+    governor.ask(1.0, swarm_ns=30 * S)
+    assert governor.scale == 1.0

@@ -1,0 +1,75 @@
+"""Programs beside a swarm that is launched: `fanet record` and `fanet view`, each a process that only listens.
+
+They are processes of their own, so that the launcher, whose router all frames pass, has nothing to do with them.
+"""
+
+import contextlib
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Final, Self
+
+if TYPE_CHECKING:
+    from fanet_mw.hosts.realtime import SwarmAddress
+
+_NICENESS: Final = 5
+_CLOSING_S: Final = 20.0
+
+
+class Companions:
+    """A context manager that ends what was started in it."""
+
+    def __init__(self, commands: Sequence[Sequence[str]]) -> None:
+        """`commands`: words of a command of `fanet`, without those that say which swarm is meant."""
+        self._commands = commands
+        self._running: list[subprocess.Popen[bytes]] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.end()
+
+    def start(self, address: "SwarmAddress") -> None:
+        """Start all of them for a swarm that comes up."""
+        for words in self._commands:
+            where = ["--connect", address.endpoint, "--swarm", address.swarm]
+            if address.zenoh_config is not None:
+                where += ["--zenoh-config", str(address.zenoh_config)]
+            command = [sys.executable, "-m", "fanet_mw", *words, *where]
+            self._running.append(
+                subprocess.Popen(  # noqa: S603  (a command of ours)
+                    command, start_new_session=True, stdin=subprocess.DEVNULL, preexec_fn=_give_way
+                )
+            )
+
+    def end(self) -> None:
+        """End them; a recording closes its file first."""
+        for process in self._running:
+            with contextlib.suppress(ProcessLookupError):
+                process.terminate()
+        for process in self._running:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(_CLOSING_S)
+            process.kill()
+            process.wait()
+        self._running.clear()
+
+
+def _give_way() -> None:
+    os.nice(_NICENESS)
+
+
+def record_command(path: Path) -> list[str]:
+    """The words that record to a file."""
+    return ["record", str(path.absolute()), "--quiet"]
+
+
+def view_command(port: int | None) -> list[str]:
+    """The words that show a swarm."""
+    return ["view", *([] if port is None else ["--port", str(port)])]

@@ -1,0 +1,210 @@
+"""Hears a running swarm on its bus, as one more listener, and tells an observer what it hears.
+
+    bus threads   each put is kept, as bytes, in a bounded queue; a full one loses the oldest, which is counted
+    `pump`        decodes and checks what has come, on the caller's thread, and hands it to the observer
+
+It asks the keeper of the clock for the scenario and the clock, so it may come at any time, and sees a swarm from then
+on. What roles UAVs took before it came it learns from their reports.
+"""
+
+import json
+import threading
+import time
+from collections import deque
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final, NamedTuple, Self
+
+from fanet_mw.bus import codecs
+from fanet_mw.bus.link_stats import LinkStats
+from fanet_mw.bus.messages import ClockEpoch, ClockState, MavlinkTap, Message, Poses, Report, TraceBatch
+from fanet_mw.bus.topics import Topics, node_of_tap
+from fanet_mw.errors import ConfigError, FanetError, MalformedFrameError
+from fanet_mw.hosts.bus import Bus, config_of
+from fanet_mw.hosts.clock import SwarmClock
+from fanet_mw.scenario import Scenario, config
+from sim.observation.observer import Observer
+from sim.run.bus.air_control import OPERATOR, find_swarm
+from sim.run.collecting.bus_checks import BusChecks
+
+_MOST_PUTS: Final = 50_000
+_ANSWER_S: Final = 3.0
+_ASK_CLOCK_S: Final = 1.0
+
+
+class _Put(NamedTuple):
+    topic: str
+    payload: bytes
+
+
+class BusFeed:
+    """What is heard of one swarm; a context manager that ends its session."""
+
+    def __init__(self, endpoint: str, swarm: str | None, *, zenoh_config: Path | None = None) -> None:
+        """Raises BusError without a router, and FanetError without a swarm whose clock's keeper answers."""
+        self.bus = Bus.join(endpoint, config_of(zenoh_config, OPERATOR))
+        try:
+            self.names = Topics(swarm or find_swarm(self.bus))
+            self.scenario = self._ask_scenario()
+        except BaseException:
+            self.bus.close()
+            raise
+        self.clock: SwarmClock | None = None
+        """The clock of the swarm; None before it runs."""
+        self.time_scale = self.scenario.time_scale
+        self.over = False
+        """True once the swarm's time is over, or its clock was stopped."""
+        self.lost = self.refused = 0
+        """Puts that came faster than they were taken, and items that were refused."""
+        self._checks = BusChecks(self.scenario)
+        self._puts: deque[_Put] = deque(maxlen=_MOST_PUTS)
+        self._clocks: deque[bytes] = deque(maxlen=16)
+        self._asked_s = 0.0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.bus.close()
+
+    def listen(self) -> None:
+        """Begin to hear."""
+        for expression in (
+            self.names.pose, self.names.all_traces, self.names.all_reports, self.names.radio_links,
+            self.names.mavlink("*"),
+        ):  # fmt: skip
+            self.bus.subscribe(expression, self._keep)
+        self._ask_clock()
+
+    def pump(self, observer: Observer) -> int:
+        """Tell an observer what has come; returns the number of puts. Raises BusError when the router is gone."""
+        if not self.over:
+            self.bus.check()
+        self.look()
+        return self.drain(observer)
+
+    def look(self) -> None:
+        """Read the clock."""
+        if time.monotonic() >= self._asked_s + _ASK_CLOCK_S:
+            self._ask_clock()
+        while self._clocks:
+            self._follow(self._clocks.popleft())
+        if self.clock is not None and self.clock.wait_s(self.scenario.duration_ns) <= 0:
+            self.over = True
+
+    def drain(self, observer: Observer) -> int:
+        """Tell an observer what has come, whether the router is there or not; returns the number of puts."""
+        count = 0
+        while self._puts:
+            put = self._puts.popleft()
+            count += 1
+            try:
+                messages = codecs.decode(put.payload)
+            except MalformedFrameError:
+                self.refused += 1
+                continue
+            for message in messages:
+                self._take(put.topic, message, observer)
+        return count
+
+    def now_ns(self) -> int:
+        """The swarm instant; 0 before its clock runs."""
+        return min(max(0, self.clock.now_ns()), self.scenario.duration_ns) if self.clock else 0
+
+    # --- parts ----------------------------------------------------------------------------------------------------
+
+    def _keep(self, topic: str, payload: bytes) -> None:
+        """Called on the bus's threads."""
+        if len(self._puts) == _MOST_PUTS:
+            self.lost += 1
+        self._puts.append(_Put(topic, payload))
+
+    def _take(self, topic: str, message: Message, observer: Observer) -> None:
+        name = topic.rpartition("/")[2]
+        match message:
+            case Poses() if topic == self.names.pose and self._known(message):
+                observer.take_poses(message)
+            case TraceBatch() if name in self._checks.node_of:
+                good = [record for record in message.records if self._checks.record(name, record) is None]
+                self.refused += len(message.records) - len(good)
+                observer.take_records(good)
+            case Report() if name in self._checks.node_of and message.name == name:
+                content, why = self._checks.report(name, message.json)
+                if why is None and _has_turns_of_sense(content):
+                    observer.take_report(name, content, t_ns=message.t_ns)
+                else:
+                    self.refused += 1
+            case LinkStats() if self._checks.links(message) is None:
+                observer.take_links(message)
+            case MavlinkTap() if self._checks.tap(message) is None:
+                observer.take_tap(node_of_tap(topic), message.t_ns, message.data)
+            case _:
+                self.refused += 1
+
+    def _known(self, poses: Poses) -> bool:
+        return all(1 <= node <= self.scenario.nodes.count for node in poses.ids) and all(
+            abs(value) < 1e8 for value in poses.states
+        )
+
+    def _follow(self, payload: bytes) -> None:
+        try:
+            messages = codecs.decode(payload)
+        except MalformedFrameError:
+            return
+        for message in messages:
+            if isinstance(message, ClockEpoch):
+                self.time_scale = message.time_scale
+                self.over = self.over or message.state is ClockState.STOPPED
+                if self.clock is None:
+                    self.clock = SwarmClock(message)
+                else:
+                    self.clock.follow(message)
+
+    def _ask_clock(self) -> None:
+        self._asked_s = time.monotonic()
+        self.bus.ask(self.names.clock, lambda _, payload: self._clocks.append(payload))
+
+    def _ask_scenario(self) -> Scenario:
+        answers: list[bytes] = []
+        came = threading.Event()
+
+        def on_answer(_: str, payload: bytes) -> None:
+            answers.append(payload)
+            came.set()
+
+        self.bus.ask(self.names.scenario, on_answer)
+        if not came.wait(_ANSWER_S):
+            raise FanetError(f"swarm {self.names.swarm}: nobody says within {_ANSWER_S:g} s which scenario it runs")
+        try:
+            tree = json.loads(answers[0])
+            del tree["modules"]
+            return config.build(tree, source=f"swarm {self.names.swarm}", imports=False)
+        except (ValueError, TypeError, KeyError, RecursionError) as error:
+            if isinstance(error, ConfigError):
+                raise
+            raise FanetError(f"swarm {self.names.swarm}: its scenario cannot be read: {error}") from error
+
+
+def _has_turns_of_sense(content: Mapping[str, Any]) -> bool:
+    """False for a report whose slots or turns are of a shape that no node of this project states."""
+    from pydantic import ValidationError
+
+    from sim.results.run_folder import SHOWN_REPORT
+
+    try:
+        SHOWN_REPORT.validate_python(content)
+    except ValidationError:
+        return False
+    return True
+
+
+class Paced:
+    """Waits so that a loop runs at most so often a second of wall time."""
+
+    def __init__(self, rate_hz: float) -> None:
+        self._interval_s = 1 / rate_hz
+        self._next_s = time.monotonic()
+
+    def wait(self) -> None:
+        self._next_s = max(self._next_s + self._interval_s, time.monotonic())
+        time.sleep(max(0.0, self._next_s - time.monotonic()))

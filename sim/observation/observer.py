@@ -1,0 +1,22 @@
+"""What an observer of a swarm is told, by whoever runs or hears it."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Protocol
+
+from fanet_mw.bus.link_stats import LinkStats
+from fanet_mw.bus.messages import Poses
+from fanet_mw.trace import Record
+
+
+class Observer(Protocol):
+    """Someone who is told what can be seen and heard of a swarm, and changes nothing."""
+
+    def take_poses(self, poses: Poses) -> None: ...
+
+    def take_records(self, records: Iterable[Record]) -> None: ...
+
+    def take_links(self, stats: LinkStats) -> None: ...
+
+    def take_report(self, name: str, content: Mapping[str, Any], *, t_ns: int) -> None: ...
+
+    def take_tap(self, node: int, t_ns: int, data: bytes) -> None: ...

@@ -1,0 +1,418 @@
+"""The state of a swarm as an observer knows it: fed with what is heard on the bus, or with the records of a trace.
+
+    positions   `Poses` as they come; without them `posed`, once a second
+    packets     those of the last seconds: who had each when, against its bound
+    links       what each directed link carried in the last seconds (`LinkStats`)
+    reports     counters, roles and turns as each actor said last
+    survivors   how far the search for each has come, and where UAVs estimate it to be
+
+Shares of delivery are those of packets that had time to arrive: `SETTLES_NS` old and no older than `LATELY_NS`.
+"""
+
+import math
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from agents.applications.traffic import targets_of
+from fanet_mw.bus.link_stats import LinkRow, LinkStats
+from fanet_mw.bus.messages import Poses
+from fanet_mw.errors import ConfigError, MalformedFrameError
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import (
+    BoundStated,
+    Delivered,
+    Dropped,
+    FlightModeChanged,
+    Generated,
+    MissionModeChanged,
+    Posed,
+    RadioFault,
+    Record,
+    RoleChanged,
+)
+from fanet_mw.units import MS, STILL, Enu, S
+from fanet_mw.wire import FOUND, frames
+from fanet_mw.wire.frame import Content, message_id
+from fanet_mw.wire.survivors import Found, Standing
+from sim.observation.event_text import event_line
+from sim.observation.turns import Turns, turns
+from sim.results.mission import OverflownCells
+from sim.results.survivor_states import SurvivorStates
+from sim.world.environment.survivors import place
+
+LATELY_NS: Final = 12 * S
+SETTLES_NS: Final = 3 * S
+_REMEMBERED_NS: Final = 20 * S
+_LINKS_NS: Final = 4 * S
+_MOST_EVENTS: Final = 200
+_TRAIL: Final = 60
+"""The number of places of a trail, one a second."""
+_BATTERY_ID: Final = 1
+"""SYS_STATUS of MAVLink, whose byte 30 is the charge in percent, -1: unknown."""
+_BATTERY_AT: Final = 10 + 30
+Rows = npt.NDArray[np.float64]
+
+
+@dataclass(slots=True)
+class UavNow:
+    """One UAV."""
+
+    position: Enu
+    velocity: Enu = STILL
+    flight: str = ""
+    mission: str = ""
+    survivor: int = 0
+    """The survivor to whom it responds; 0 for none."""
+    role: str = ""
+    cluster: int = -1
+    head: int = 0
+    charge_percent: int | None = None
+    heard_ns: int = 0
+    """When its process was last heard of."""
+    delivered: int = 0
+    sent: int = 0
+    """Packets that its applications received and sent, since observation began."""
+    dropped: int = 0
+    trail: deque[Enu] = field(default_factory=lambda: deque(maxlen=_TRAIL))
+    yaw_rad: float = 0.0
+    """The direction of its flight, from north clockwise; kept while it hovers."""
+    acceleration: Enu = STILL
+
+
+class Copy(NamedTuple):
+    """A packet at one node."""
+
+    t_ns: int
+    delay_ns: int
+    hops: int
+
+
+@dataclass(slots=True)
+class PacketNow:
+    """A packet of the last seconds."""
+
+    born_ns: int
+    app: str = ""
+    targets: int = 0
+    bound_ns: int = 0
+    got: dict[int, Copy] = field(default_factory=dict)
+
+
+class Estimate(NamedTuple):
+    """Where a UAV says that a survivor is."""
+
+    t_ns: int
+    survivor: int
+    node: int
+    east_m: float
+    north_m: float
+    sigma_m: float
+    """The standard deviation in the worst direction."""
+    standing: str
+
+
+class Event(NamedTuple):
+    """What happened, for people."""
+
+    t_ns: int
+    node: int
+    text: str
+
+
+class SwarmState:
+    """What is known of one swarm at `t_ns`."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        self.t_ns = 0
+        self.uavs: dict[int, UavNow] = {}
+        self.reports: dict[int, Mapping[str, Any]] = {}
+        """The last report of each UAV."""
+        self.emulator: Mapping[str, Any] = {}
+        self.packets: dict[tuple[int, int], PacketNow] = {}
+        self.estimates: dict[int, Estimate] = {}
+        self.events: deque[Event] = deque(maxlen=_MOST_EVENTS)
+        self.told = 0
+        """The number of events so far."""
+        self.faults: dict[str, RadioFault] = {}
+        """The faults on the air that last, by label."""
+        self.turns: Turns | None = turns(scenario, {})
+        self.time_scale = 1.0
+        self.broken = 0
+        """Copies of packets that came later than the bound of their packet, or never."""
+        self._app = next(iter(scenario.traffic_classes))
+        self._targets: dict[tuple[str, int], int] = {}
+        self._links: deque[LinkStats] = deque()
+        self._cells = OverflownCells(scenario)
+        self._by_poses = False
+        self._pruned_ns = 0
+        self._trailed_ns = -S
+        try:
+            self.places: Sequence[Enu] = place(scenario)
+        except ConfigError:
+            self.places = ()  # its map is gone
+        self.survivors = SurvivorStates(self.places)
+
+    # --- what is heard --------------------------------------------------------------------------------------------
+
+    def take_poses(self, poses: Poses) -> None:
+        """The true positions of all bodies."""
+        self._by_poses = True
+        if poses.t_ns < self.t_ns - S:
+            return
+        for row, node in enumerate(poses.ids):
+            east, north, up, *velocity = poses.states[6 * row : 6 * row + 6]
+            self._moved(node, Enu(east, north, up), Enu(*velocity), poses.t_ns)
+        self._advance(poses.t_ns)
+
+    def take_records(self, records: Iterable[Record]) -> None:
+        """Records of the trace, of one actor in their order."""
+        for record in records:
+            match record:
+                case Delivered():
+                    self._delivered(record)
+                case Generated():
+                    self._generated(record)
+                case BoundStated():
+                    self._packet(record.node, record.seq, record.t_ns).bound_ns = record.bound_ns
+                case Posed():
+                    if not self._by_poses:
+                        self._posed(record)
+                case _:
+                    self._changed(record)
+            if record.t_ns > self.t_ns:
+                self._advance(record.t_ns)
+
+    def take_links(self, stats: LinkStats) -> None:
+        """What each link carried since the last report."""
+        self._links.append(stats)
+        while self._links[0].t_ns < stats.t_ns - _LINKS_NS:
+            self._links.popleft()
+
+    def take_report(self, name: str, content: Mapping[str, Any], *, t_ns: int) -> None:
+        """The counters that an actor has reported."""
+        if name == "emulator":
+            self.emulator = content
+        elif name.startswith("agent-"):
+            node = int(name.removeprefix("agent-"))
+            self.reports[node] = content
+            if node in self.uavs:
+                self.uavs[node].heard_ns = max(t_ns, self.uavs[node].heard_ns)
+            if content.get("slots") or content.get("turns"):
+                self.turns = turns(self.scenario, self.reports)
+
+    def take_tap(self, node: int, t_ns: int, data: bytes) -> None:
+        """MAVLink bytes of a UAV: its battery, and finds of survivors that it has sent or received."""
+        try:
+            for frame in frames(data):
+                kind = message_id(frame)
+                if kind == FOUND.msgid:
+                    self._found(Found.decode_frame(Content(((kind, frame),))), t_ns)
+                elif kind == _BATTERY_ID and len(frame) > _BATTERY_AT + 2 and node in self.uavs:
+                    percent = int.from_bytes(frame[_BATTERY_AT : _BATTERY_AT + 1], "little", signed=True)
+                    self.uavs[node].charge_percent = percent if percent >= 0 else None
+        except MalformedFrameError:
+            return  # telemetry of a foreign program; the collector of the run counts it
+
+    # --- what is known --------------------------------------------------------------------------------------------
+
+    def link_rows(self) -> Iterator[tuple[int, int, int, int]]:
+        """Each directed link with traffic in the last seconds: source, destination, copies, received."""
+        found: dict[tuple[int, int], list[int]] = {}
+        for stats in self._links:
+            for row in stats.rows():
+                self._add(found, row)
+        for (src, dst), (copies, received) in found.items():
+            yield src, dst, copies, received
+
+    def neighbors(self, node: int) -> list[int]:
+        """Those who received at least half of what this node sent lately, and it of what they sent."""
+        shares = {(src, dst): received / max(1, copies) for src, dst, copies, received in self.link_rows()}
+        return sorted(
+            dst for src, dst in shares if src == node and shares[src, dst] >= 0.5 and shares.get((dst, node), 0) >= 0.5
+        )
+
+    def lately(self) -> list[tuple[tuple[int, int], PacketNow]]:
+        """The packets of the traffic's first class that had time to arrive, and are not old."""
+        first_ns, last_ns = self.t_ns - LATELY_NS, self.t_ns - SETTLES_NS
+        return [
+            (name, one)
+            for name, one in self.packets.items()
+            if one.app == self._app and first_ns <= one.born_ns <= last_ns
+        ]
+
+    def newest(self, *, by_ns: int) -> tuple[tuple[int, int], PacketNow] | None:
+        """The latest packet that was sent by an instant, of those that anybody received."""
+        known = [(one.born_ns, name) for name, one in self.packets.items() if one.born_ns <= by_ns and one.got]
+        if not known:
+            return None
+        _, name = max(known)
+        return name, self.packets[name]
+
+    def latest_events(self, count: int) -> list[Event]:
+        """The latest events, the oldest of them first."""
+        return list(self.events)[-count:] if count > 0 else []
+
+    def heads(self) -> dict[int, list[int]]:
+        """The members of each cluster by its head."""
+        found: dict[int, list[int]] = {}
+        for node, uav in sorted(self.uavs.items()):
+            if uav.head:
+                found.setdefault(uav.head, []).append(node)
+        return found
+
+    def owners(self, t_ns: int) -> list[int]:
+        """The UAVs whose turn it is; a slot is the turn of the head of its cluster."""
+        if self.turns is None:
+            return []
+        owners = self.turns.owners(t_ns)
+        if self.turns.called == "turn":
+            return owners
+        return [node for node, uav in sorted(self.uavs.items()) if uav.role == "head" and uav.cluster in owners]
+
+    def covered(self) -> npt.NDArray[np.bool_]:
+        """The cells of the area that UAVs have flown over, rows from south to north."""
+        return self._cells.seen
+
+    def metrics(self) -> dict[str, float | None]:
+        """The figures of the swarm now; None for what is not known."""
+        packets = self.lately()
+        wanted = sum(one.targets for _, one in packets)
+        had = sum(min(one.targets, len(one.got)) for _, one in packets)
+        delays = sorted(copy.delay_ns for _, one in packets for copy in one.got.values())
+        bounds = [one.bound_ns for _, one in packets if one.bound_ns]
+        air, late = self.emulator.get("air", {}), self.emulator.get("late", {})
+        return {
+            "delivered_share": had / wanted if wanted else None,
+            "delay_p50_ms": delays[len(delays) // 2] / MS if delays else None,
+            "delay_p95_ms": delays[math.ceil(len(delays) * 0.95) - 1] / MS if delays else None,
+            "delay_max_ms": delays[-1] / MS if delays else None,
+            "bound_max_ms": max(bounds) / MS if bounds else None,
+            "bounds_broken": self.broken,
+            "airtime_share": air.get("busy"),
+            "late_share": late.get("late_frames", 0) / max(1, late.get("frames", 0)) if late else None,
+            "late_p99_ms": late.get("p99_ms"),
+            "time_scale": self.time_scale,
+            "confirmed": self.survivors.count("confirmed"),
+            "survivors": len(self.survivors.now),
+            "coverage_share": self._cells.share,
+            "waiting_packets": sum(report.get("waiting", 0) for report in self.reports.values()),
+        }
+
+    # --- parts ----------------------------------------------------------------------------------------------------
+
+    def _moved(self, node: int, position: Enu, velocity: Enu, t_ns: int) -> None:
+        uav = self.uavs.get(node)
+        if uav is None:
+            self.uavs[node] = uav = UavNow(position, velocity)
+        span_s = (t_ns - self.t_ns) / S
+        if 0 < span_s < 1:
+            change = velocity.minus(uav.velocity)
+            uav.acceleration = Enu(change.east / span_s, change.north / span_s, change.up / span_s)
+        uav.position, uav.velocity = position, velocity
+        if velocity.horizontal() >= 0.5:
+            uav.yaw_rad = math.atan2(velocity.east, velocity.north)
+
+    def _posed(self, record: Posed) -> None:
+        position = Enu(record.east_m, record.north_m, record.up_m)
+        uav = self.uavs.get(record.node)
+        velocity = position.minus(uav.position) if uav is not None else STILL  # they come once a second
+        self._moved(record.node, position, velocity, record.t_ns)
+
+    def _advance(self, t_ns: int) -> None:
+        self.t_ns = max(self.t_ns, t_ns)
+        if self.t_ns >= self._trailed_ns + S:
+            self._trailed_ns = self.t_ns
+            for uav in self.uavs.values():
+                uav.trail.append(uav.position)
+            self._cells.add([uav.position for uav in self.uavs.values()])
+        if self.t_ns >= self._pruned_ns + S:
+            self._pruned_ns = self.t_ns
+            self._forget()
+
+    def _forget(self) -> None:
+        for name, one in list(self.packets.items()):
+            if one.born_ns < self.t_ns - _REMEMBERED_NS:
+                del self.packets[name]
+                if one.bound_ns:
+                    in_time = sum(copy.delay_ns <= one.bound_ns for copy in one.got.values())
+                    self.broken += max(0, one.targets - in_time)
+
+    def _packet(self, origin: int, seq: int, born_ns: int) -> PacketNow:
+        found = self.packets.get((origin, seq))
+        if found is None:
+            self.packets[origin, seq] = found = PacketNow(born_ns)
+        return found
+
+    def _generated(self, record: Generated) -> None:
+        one = self._packet(record.node, record.seq, record.t_ns)
+        one.born_ns, one.app = record.t_ns, record.app
+        key = (record.app, record.node)
+        if key not in self._targets:
+            known = record.app in self.scenario.traffic_classes
+            count = len(targets_of(self.scenario, record.node, record.app)) if known else self.scenario.nodes.count - 1
+            self._targets[key] = count
+        one.targets = self._targets[key]
+        self._heard(record.node, record.t_ns)
+        if record.node in self.uavs:
+            self.uavs[record.node].sent += 1
+
+    def _delivered(self, record: Delivered) -> None:
+        one = self._packet(record.origin, record.seq, record.t_ns - record.delay_ns)
+        one.got.setdefault(record.node, Copy(record.t_ns, record.delay_ns, record.hops))
+        self._heard(record.node, record.t_ns)
+        if record.node in self.uavs:
+            self.uavs[record.node].delivered += 1
+
+    def _heard(self, node: int, t_ns: int) -> None:
+        uav = self.uavs.get(node)
+        if uav is not None and t_ns > uav.heard_ns:
+            uav.heard_ns = t_ns
+
+    def _changed(self, record: Record) -> None:
+        uav = self.uavs.setdefault(record.node, UavNow(STILL)) if record.node else None
+        match record:
+            case RoleChanged() if uav is not None:
+                uav.role, uav.cluster, uav.head = record.role, record.cluster, record.head
+            case FlightModeChanged() if uav is not None:
+                uav.flight = record.mode
+            case MissionModeChanged() if uav is not None:
+                uav.mission, uav.survivor = record.mode, record.survivor
+            case Dropped() if uav is not None:
+                uav.dropped += 1
+            case RadioFault():
+                if record.active:
+                    self.faults[record.label] = record
+                else:
+                    self.faults.pop(record.label, None)
+            case _:
+                self.survivors.take(record)
+        if text := event_line(record):
+            self.events.append(Event(record.t_ns, record.node, text))
+            self.told += 1
+
+    def _found(self, found: Found, t_ns: int) -> None:
+        known = self.estimates.get(found.survivor)
+        if known is not None and known.t_ns > found.t_us * 1000:
+            return
+        mean = (found.east_variance_m2 + found.north_variance_m2) / 2
+        spread = math.hypot((found.east_variance_m2 - found.north_variance_m2) / 2, found.covariance_m2)
+        sigma_m = math.sqrt(max(0.0, mean + spread))
+        if found.standing is Standing.REFUTED:
+            self.estimates.pop(found.survivor, None)
+            return
+        self.estimates[found.survivor] = Estimate(
+            min(found.t_us * 1000, t_ns), found.survivor, found.node, found.east_m, found.north_m, sigma_m,
+            found.standing.name.lower(),
+        )  # fmt: skip
+
+    @staticmethod
+    def _add(found: dict[tuple[int, int], list[int]], row: LinkRow) -> None:
+        sums = found.setdefault((row.src, row.dst), [0, 0])
+        sums[0] += row.copies
+        sums[1] += row.received

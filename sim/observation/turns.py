@@ -1,0 +1,63 @@
+"""Whose turn it is: the spans of the superframe or round that belong to nodes, from their reports."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from fanet_mw.routing.rounds.round_timing import RoundTiming
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import MS
+
+
+class Span(NamedTuple):
+    """A span of the superframe that belongs to one node."""
+
+    node: int
+    start_ns: int
+    length_ns: int
+
+
+class Turns(NamedTuple):
+    """Who may send when, repeated each period from an instant on."""
+
+    start_ns: int
+    period_ns: int
+    own: Sequence[Span]
+    """The spans of nodes; of slots, those of clusters by number, which their heads have."""
+    called: str
+    """What a span is called: `slot` or `turn`."""
+
+    def owners(self, t_ns: int) -> list[int]:
+        """The nodes, or the clusters, whose span it is; several where turns are used again far away."""
+        place_ns = (t_ns - self.start_ns) % self.period_ns
+        return [one.node for one in self.own if (place_ns - one.start_ns) % self.period_ns < one.length_ns]
+
+
+def turns(scenario: Scenario, reports: Mapping[int, Mapping[str, Any]]) -> Turns | None:
+    """The turns in force by the reports of nodes, or by the rule of rounds; None if nobody owns any."""
+    if scenario.routing.protocol == "rounds":
+        timing = RoundTiming.of(scenario)
+        own = [Span(node, (node - 1) * timing.turn_ns, timing.turn_ns) for node in scenario.node_ids]
+        return Turns(0, timing.period_ns, own, "turn")
+    turned = {node: report["turns"] for node, report in reports.items() if report.get("turns")}
+    if turned:
+        newest = max(turned.values(), key=lambda frame: float(frame["start_ms"]))
+        own = sorted((one for node, frame in turned.items() for one in spans_of(node, frame)), key=lambda one: one[1:])
+        return Turns(_ns(newest["start_ms"]), _ns(newest["period_ms"]), own, "turn")
+    slotted = [report["slots"] for report in reports.values() if report.get("slots")]
+    if not slotted:
+        return None
+    frame = max(slotted, key=lambda one: float(one["start_ms"]))
+    period_ns, slot_ns = _ns(frame["period_ms"]), _ns(frame["slot_ms"])
+    own = [Span(slot, slot * slot_ns, slot_ns - _ns(frame["guard_ms"])) for slot in range(period_ns // slot_ns)]
+    return Turns(_ns(frame["start_ms"]), period_ns, own, "slot")
+
+
+def spans_of(node: int, frame: Mapping[str, Any]) -> Iterator[Span]:
+    """The turns of a node, by its report of them."""
+    for offset in frame["own"]:
+        turn_ns = _ns(frame["turn_ms"])
+        yield Span(node, (_ns(frame.get("contention_ms", 0.0)) + offset * turn_ns) % _ns(frame["period_ms"]), turn_ns)
+
+
+def _ns(value_ms: float) -> int:
+    return round(value_ms * MS)

@@ -1,0 +1,363 @@
+"""Writes what is observed of a swarm as MCAP, in Foxglove's schemas, so that Foxglove and PlotJuggler draw it.
+
+    /tf             FrameTransforms, each UAV's frame in `map` (ENU, z up), as poses come
+    /poses          PosesInFrame, all UAVs by id
+    /uav/N/fix      LocationFix, true place on earth, once a second
+    /uav/N/state    fanet.UavState, once a second
+    /scene/world    SceneUpdate, once: ground, buildings, no-fly areas, true places of survivors
+    /scene/uavs     SceneUpdate, when a UAV appears or takes another role
+    /scene/links    SceneUpdate, once a second: links by what they delivered, and clusters
+    /scene/finds    SceneUpdate, once a second: survivors by state, estimates with their uncertainty
+    /links          fanet.Links, once a second, as the emulator counts them
+    /metrics        fanet.Metrics, once a second
+    /log            Log, events for people
+
+Instants are unix time: that of swarm instant 0 plus swarm time.
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO, Final, Self
+
+from foxglove_schemas_protobuf import (
+    CubePrimitive_pb2,
+    CylinderPrimitive_pb2,
+    FrameTransforms_pb2,
+    LinePrimitive_pb2,
+    LocationFix_pb2,
+    Log_pb2,
+    PosesInFrame_pb2,
+    SceneEntity_pb2,
+    SceneUpdate_pb2,
+    SpherePrimitive_pb2,
+    TextPrimitive_pb2,
+    TriangleListPrimitive_pb2,
+)
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+from google.protobuf.timestamp_pb2 import Timestamp
+from mcap_protobuf.writer import Writer
+
+from fanet_mw.bus.link_stats import LinkStats
+from fanet_mw.bus.messages import Poses
+from fanet_mw.errors import ConfigError
+from fanet_mw.mavlink import Geodetic, to_geodetic
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Record, RoleChanged
+from fanet_mw.units import Enu, S
+from sim.figures import colors
+from sim.observation.surroundings import Surroundings, surroundings
+from sim.observation.swarm_state import SwarmState, UavNow
+
+FRAME: Final = "map"
+_CHUNK_BYTES: Final = 1 << 20
+_METRICS: Final = (
+    "delivered_share", "delay_p50_ms", "delay_p95_ms", "delay_max_ms", "bound_max_ms", "bounds_broken",
+    "airtime_share", "late_share", "late_p99_ms", "time_scale", "confirmed", "survivors", "coverage_share",
+    "waiting_packets",
+)  # fmt: skip
+_STATE: Final = (
+    "east_m", "north_m", "up_m", "speed_m_s", "charge_percent", "cluster", "head", "waiting_packets", "delivered",
+    "sent", "dropped",
+)  # fmt: skip
+_STATE_TEXTS: Final = ("role", "flight_mode", "mission_mode")
+_LINK: Final = ("src", "dst", "copies", "received")
+
+
+def _messages() -> tuple[Any, Any, Any]:
+    """The classes of the messages of our own: flat numbers, which plot by themselves."""
+    kinds = descriptor_pb2.FieldDescriptorProto
+    file = descriptor_pb2.FileDescriptorProto(name="fanet.proto", package="fanet", syntax="proto3")
+
+    def add(name: str, fields: Iterable[tuple[str, int]]) -> Any:  # noqa: ANN401  (protobuf's types are made at run time)
+        message = file.message_type.add(name=name)
+        for number, (field, kind) in enumerate(fields, 1):
+            message.field.add(name=field, number=number, type=kind, label=kinds.LABEL_OPTIONAL)
+        return message
+
+    add("Metrics", ((name, kinds.TYPE_DOUBLE) for name in _METRICS))
+    state = [(name, kinds.TYPE_DOUBLE) for name in _STATE] + [(name, kinds.TYPE_STRING) for name in _STATE_TEXTS]
+    add("UavState", state)
+    add("Link", ((name, kinds.TYPE_UINT32) for name in _LINK))
+    links = add("Links", (("span_s", kinds.TYPE_DOUBLE),))
+    links.field.add(
+        name="links", number=2, type=kinds.TYPE_MESSAGE, label=kinds.LABEL_REPEATED, type_name=".fanet.Link"
+    )
+    pool = descriptor_pool.DescriptorPool()
+    pool.Add(file)
+    metrics, uav, several = (
+        message_factory.GetMessageClass(pool.FindMessageTypeByName(f"fanet.{name}"))
+        for name in ("Metrics", "UavState", "Links")
+    )
+    return metrics, uav, several
+
+
+_Metrics, _UavState, _Links = _messages()
+
+
+class McapRecording:
+    """A recording that is being written; a context manager, which closes the file."""
+
+    def __init__(self, path: Path, scenario: Scenario, *, epoch_unix_ns: int) -> None:
+        """Raises ConfigError when the file cannot be written."""
+        self.state = SwarmState(scenario)
+        self.path = path
+        self.epoch_unix_ns = epoch_unix_ns
+        self._around = surroundings(scenario)
+        self._origin = Geodetic(*scenario.world.origin_deg, 0.0)
+        self._roles: dict[int, tuple[str, int]] = {}
+        self._second = -1
+        self.count = 0
+        """Messages that were written."""
+        self._events = 0
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file: BinaryIO = path.open("wb")
+        except OSError as error:
+            raise ConfigError(f"--record {path}: cannot be written: {error.strerror}") from error
+        self._writer = Writer(self._file, chunk_size=_CHUNK_BYTES)
+        self._put("/scene/world", _world(scenario, self._around, self.state.places, self._stamp(0)), 0)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Write the index; without it readers must search the file."""
+        self._writer.finish()
+        self._file.close()
+
+    # --- what is observed -----------------------------------------------------------------------------------------
+
+    def take_poses(self, poses: Poses) -> None:
+        self.state.take_poses(poses)
+        transforms, together = FrameTransforms_pb2.FrameTransforms(), PosesInFrame_pb2.PosesInFrame(frame_id=FRAME)
+        stamp = self._stamp(poses.t_ns)
+        together.timestamp.CopyFrom(stamp)
+        for node in poses.ids:
+            uav = self.state.uavs[node]
+            one = transforms.transforms.add(parent_frame_id=FRAME, child_frame_id=f"uav-{node}")
+            one.timestamp.CopyFrom(stamp)
+            _place(one.translation, uav.position)
+            _turn(one.rotation, attitude(uav))
+            pose = together.poses.add()
+            _place(pose.position, uav.position)
+            _turn(pose.orientation, attitude(uav))
+        self._put("/tf", transforms, poses.t_ns)
+        self._put("/poses", together, poses.t_ns)
+        self._each_second(poses.t_ns)
+
+    def take_records(self, records: Iterable[Record]) -> None:
+        known = list(records)
+        self.state.take_records(known)
+        for record in known:
+            if type(record) is RoleChanged:
+                self._show_uav(record.node, record.t_ns)
+        for event in self.state.latest_events(self.state.told - self._events):
+            message = Log_pb2.Log(level=Log_pb2.Log.INFO, message=f"{event.t_ns / S:.1f} s: {event.text}")
+            message.name = f"uav-{event.node}" if event.node else "swarm"
+            message.timestamp.CopyFrom(self._stamp(event.t_ns))
+            self._put("/log", message, event.t_ns)
+        self._events = self.state.told
+
+    def take_links(self, stats: LinkStats) -> None:
+        self.state.take_links(stats)
+        message = _Links(span_s=stats.span_ns / S)
+        for row in stats.rows():
+            message.links.add(src=row.src, dst=row.dst, copies=row.copies, received=row.received)
+        self._put("/links", message, stats.t_ns)
+
+    def take_report(self, name: str, content: Mapping[str, Any], *, t_ns: int) -> None:
+        self.state.take_report(name, content, t_ns=t_ns)
+
+    def take_tap(self, node: int, t_ns: int, data: bytes) -> None:
+        self.state.take_tap(node, t_ns, data)
+
+    # --- parts ----------------------------------------------------------------------------------------------------
+
+    def _each_second(self, t_ns: int) -> None:
+        if t_ns // S <= self._second:
+            return
+        self._second = t_ns // S
+        metrics = _Metrics()
+        for name, value in self.state.metrics().items():
+            setattr(metrics, name, math.nan if value is None else value)
+        self._put("/metrics", metrics, t_ns)
+        for node, uav in sorted(self.state.uavs.items()):
+            if (uav.role, uav.head) != self._roles.get(node):
+                self._show_uav(node, t_ns)
+            self._put_uav(node, uav, t_ns)
+        self._put("/scene/links", self._links_scene(t_ns), t_ns)
+        self._put("/scene/finds", self._finds_scene(t_ns), t_ns)
+
+    def _put_uav(self, node: int, uav: UavNow, t_ns: int) -> None:
+        state = _UavState(
+            east_m=uav.position.east, north_m=uav.position.north, up_m=uav.position.up,
+            speed_m_s=math.hypot(*uav.velocity),
+            charge_percent=math.nan if uav.charge_percent is None else uav.charge_percent,
+            cluster=uav.cluster, head=uav.head, delivered=uav.delivered, sent=uav.sent, dropped=uav.dropped,
+            waiting_packets=self.state.reports.get(node, {}).get("waiting", 0),
+            role=uav.role, flight_mode=uav.flight, mission_mode=uav.mission,
+        )  # fmt: skip
+        self._put(f"/uav/{node}/state", state, t_ns)
+        at = to_geodetic(uav.position, self._origin)
+        fix = LocationFix_pb2.LocationFix(
+            frame_id=f"uav-{node}", latitude=at.lat_deg, longitude=at.lon_deg, altitude=at.alt_m
+        )
+        fix.timestamp.CopyFrom(self._stamp(t_ns))
+        self._put(f"/uav/{node}/fix", fix, t_ns)
+
+    def _show_uav(self, node: int, t_ns: int) -> None:
+        uav = self.state.uavs[node]
+        self._roles[node] = (uav.role, uav.head)
+        entity = self._entity(f"uav-{node}", t_ns, frame=f"uav-{node}")
+        entity.frame_locked = True
+        body = CubePrimitive_pb2.CubePrimitive()
+        _size(body.size, 8.0, 8.0, 2.5)
+        body.pose.orientation.w = 1.0
+        _paint(body.color, colors.ORANGE if uav.role == "head" else colors.BLUE)
+        entity.cubes.append(body)
+        text = TextPrimitive_pb2.TextPrimitive(text=str(node), font_size=12, scale_invariant=True, billboard=True)
+        text.pose.position.z = 8.0
+        text.pose.orientation.w = 1.0
+        _paint(text.color, colors.DARK)
+        entity.texts.append(text)
+        self._put("/scene/uavs", SceneUpdate_pb2.SceneUpdate(entities=[entity]), t_ns)
+
+    def _links_scene(self, t_ns: int) -> SceneUpdate_pb2.SceneUpdate:
+        entity = self._entity("links", t_ns)
+        lines = LinePrimitive_pb2.LinePrimitive(
+            type=LinePrimitive_pb2.LinePrimitive.LINE_LIST, thickness=1.5, scale_invariant=True
+        )
+        lines.pose.orientation.w = 1.0
+        for src, dst, copies, received in self.state.link_rows():
+            if src in self.state.uavs and dst in self.state.uavs and received:
+                for node in (src, dst):
+                    _place(lines.points.add(), self.state.uavs[node].position)
+                    _paint(lines.colors.add(), link_color(received / copies), alpha=0.6)
+        entity.lines.append(lines)
+        return SceneUpdate_pb2.SceneUpdate(entities=[entity])
+
+    def _finds_scene(self, t_ns: int) -> SceneUpdate_pb2.SceneUpdate:
+        entity = self._entity("finds", t_ns)
+        for survivor, state in self.state.survivors.now.items():
+            at = self.state.places[survivor - 1]
+            ball = SpherePrimitive_pb2.SpherePrimitive()
+            _place(ball.pose.position, self._around.on_ground(at))
+            ball.pose.orientation.w = 1.0
+            _size(ball.size, 10.0, 10.0, 10.0)
+            _paint(ball.color, STATUS_COLORS[state.status])
+            entity.spheres.append(ball)
+        for one in self.state.estimates.values():
+            disk = CylinderPrimitive_pb2.CylinderPrimitive(top_scale=1.0, bottom_scale=1.0)
+            at = self._around.on_ground(Enu(one.east_m, one.north_m, 0.0), above_m=0.5)
+            _place(disk.pose.position, at)
+            disk.pose.orientation.w = 1.0
+            width = 2 * max(1.0, one.sigma_m)
+            _size(disk.size, width, width, 1.0)
+            _paint(disk.color, colors.PINK, alpha=0.4)
+            entity.cylinders.append(disk)
+        return SceneUpdate_pb2.SceneUpdate(entities=[entity])
+
+    def _entity(self, name: str, t_ns: int, *, frame: str = FRAME) -> SceneEntity_pb2.SceneEntity:
+        entity = SceneEntity_pb2.SceneEntity(frame_id=frame, id=name)
+        entity.timestamp.CopyFrom(self._stamp(t_ns))
+        return entity
+
+    def _stamp(self, t_ns: int) -> Timestamp:
+        seconds, nanos = divmod(self.epoch_unix_ns + t_ns, S)
+        return Timestamp(seconds=seconds, nanos=nanos)
+
+    def _put(self, topic: str, message: Any, t_ns: int) -> None:  # noqa: ANN401  (protobuf's types are made at run time)
+        unix_ns = self.epoch_unix_ns + t_ns
+        self.count += 1
+        self._writer.write_message(topic, message, log_time=unix_ns, publish_time=unix_ns)
+
+
+STATUS_COLORS: Final = {
+    "not heard": colors.GRAY, "detected": colors.SHADE, "approached": colors.ORANGE, "reached": colors.ORANGE,
+    "confirmed": colors.GREEN, "mistaken": colors.RED, "reopened": colors.PINK,
+}  # fmt: skip
+"""The color of a survivor by the state of the search for him or her."""
+
+
+def link_color(share: float) -> str:
+    """The color of a link by the share of copies that arrived, as three classes that a gray print tells apart too."""
+    return colors.BLUE if share >= 0.9 else colors.ORANGE if share >= 0.5 else colors.RED
+
+
+def attitude(uav: UavNow) -> tuple[float, float, float, float]:
+    """The attitude of a multirotor that flies so, as a quaternion w, x, y, z in ENU: it tilts towards its acceleration
+    and faces its direction of flight.
+    """
+    yaw = math.pi / 2 - uav.yaw_rad  # from east towards north
+    east, north, _ = uav.acceleration
+    forward = max(-6.0, min(6.0, east * math.cos(yaw) + north * math.sin(yaw)))
+    left = max(-6.0, min(6.0, north * math.cos(yaw) - east * math.sin(yaw)))
+    pitch, roll = math.atan2(forward, 9.81), -math.atan2(left, 9.81)
+    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
+    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
+    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
+    return (
+        cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy,
+    )  # fmt: skip
+
+
+def _world(
+    scenario: Scenario, around: Surroundings, places: Sequence[Enu], stamp: Timestamp
+) -> SceneUpdate_pb2.SceneUpdate:
+    entity = SceneEntity_pb2.SceneEntity(frame_id=FRAME, id="world")
+    entity.timestamp.CopyFrom(stamp)
+    ground = TriangleListPrimitive_pb2.TriangleListPrimitive()
+    ground.pose.orientation.w = 1.0
+    _paint(ground.color, "#d9dccf")
+    for corner in around.corners:
+        _place(ground.points.add(), Enu(*corner.tolist()))
+    ground.indices.extend(around.triangles.ravel().tolist())
+    entity.triangles.append(ground)
+    for box in around.boxes:
+        cube = CubePrimitive_pb2.CubePrimitive()
+        _place(cube.pose.position, Enu(box.east, box.north, box.roof / 2))
+        cube.pose.orientation.z, cube.pose.orientation.w = math.sin(box.yaw / 2), math.cos(box.yaw / 2)
+        _size(cube.size, box.width, box.depth, box.roof)
+        _paint(cube.color, "#b0a99f")
+        entity.cubes.append(cube)
+    for outline in around.no_fly:
+        lines = LinePrimitive_pb2.LinePrimitive(
+            type=LinePrimitive_pb2.LinePrimitive.LINE_LOOP, thickness=2.0, scale_invariant=True
+        )
+        lines.pose.orientation.w = 1.0
+        _paint(lines.color, colors.RED)
+        for east, north in outline:
+            _place(lines.points.add(), Enu(east, north, 1.0))
+        entity.lines.append(lines)
+    for number, at in enumerate(places, 1):
+        text = TextPrimitive_pb2.TextPrimitive(text=f"S{number}", font_size=11, scale_invariant=True, billboard=True)
+        _place(text.pose.position, around.on_ground(at, above_m=10.0))
+        text.pose.orientation.w = 1.0
+        _paint(text.color, colors.DARK)
+        entity.texts.append(text)
+    return SceneUpdate_pb2.SceneUpdate(entities=[entity])
+
+
+def _place(vector: Any, at: Enu) -> None:  # noqa: ANN401  (protobuf's types are made at run time)
+    vector.x, vector.y, vector.z = at
+
+
+def _turn(quaternion: Any, wxyz: tuple[float, float, float, float]) -> None:  # noqa: ANN401
+    quaternion.w, quaternion.x, quaternion.y, quaternion.z = wxyz
+
+
+def _size(vector: Any, x: float, y: float, z: float) -> None:  # noqa: ANN401
+    vector.x, vector.y, vector.z = x, y, z
+
+
+def _paint(color: Any, web: str, *, alpha: float = 1.0) -> None:  # noqa: ANN401
+    color.r, color.g, color.b = (int(web[at : at + 2], 16) / 255 for at in (1, 3, 5))
+    color.a = alpha

@@ -1,0 +1,100 @@
+"""Reads the folder of a run as what `simulate` returned: its summary, trace, reports and links."""
+
+from collections.abc import Collection, Iterator, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from fanet_mw import tlog
+from fanet_mw.bus.link_stats import LOSSES, LinkRow
+from fanet_mw.errors import ConfigError, MalformedFrameError
+from fanet_mw.trace import Record
+from fanet_mw.units import US, NodeId, S
+from sim.results.file_names import TLOG_FILE
+from sim.results.links import LinkTotals
+from sim.results.run_folder import RunFolder
+from sim.run.outcome import Outcome
+from sim.run.result import Result
+
+
+class FolderRecords(Collection[Record]):
+    """The trace of a folder; each iteration reads the file again."""
+
+    def __init__(self, folder: RunFolder) -> None:
+        self._folder = folder
+
+    @cached_property
+    def _count(self) -> int:
+        return sum(1 for _ in self)
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __iter__(self) -> Iterator[Record]:
+        return self._folder.records()
+
+    def __contains__(self, value: object) -> bool:
+        return any(record == value for record in self)
+
+    def of_kinds(self, kinds: tuple[type[Record], ...]) -> Iterator[Record]:
+        return self._folder.records(*kinds)
+
+
+class _FolderTaps(Collection[tuple[int, bytes]]):
+    """The taps of a folder, frame by frame, at instants of whole microseconds."""
+
+    def __init__(self, path: Path, *, epoch_unix_ns: int) -> None:
+        self._path = path
+        self._epoch_ns = epoch_unix_ns
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def __iter__(self) -> Iterator[tuple[int, bytes]]:
+        try:
+            for t_us, frame in tlog.read(self._path):
+                yield t_us * US - self._epoch_ns, frame
+        except (OSError, MalformedFrameError) as error:
+            raise ConfigError(f"{self._path}: cannot be read: {error}") from error
+
+    def __contains__(self, value: object) -> bool:
+        return any(tap == value for tap in self)
+
+
+def load_result(folder: Path | str) -> Result:
+    """What `simulate` or `launch` returned for the run that this folder holds; raises ConfigError.
+
+    The trace is read when it is asked for, and checked against the digest that the summary names.
+    """
+    found = RunFolder(Path(folder))
+    return Result(_outcome(found), summary=found.summary)
+
+
+def _outcome(folder: RunFolder) -> Outcome:
+    summary = folder.summary
+    simulated_ns = round(summary["simulated_s"] * S)
+    epoch_ns = summary.get("epoch_unix_ns", 0)
+    return Outcome(
+        scenario=folder.scenario,
+        mode=summary["mode"],
+        wall_s=summary.get("wall_s", 0.0),
+        records=FolderRecords(folder),
+        reports=folder.reports(),
+        taps=_FolderTaps(folder.folder / TLOG_FILE, epoch_unix_ns=epoch_ns),
+        links=_totals(folder),
+        aborted=summary.get("aborted"),
+        ended_ns=None if summary.get("aborted") is None else simulated_ns,
+        epoch_unix_ns=epoch_ns,
+    )
+
+
+def _totals(folder: RunFolder) -> LinkTotals:
+    """The links of a run; their mean RSSI has the digits of the file."""
+    rows = []
+    for link in folder.links():
+        lost: Mapping[str, int] = link.get("lost", {})
+        rssi_dbm: Any = link.get("rssi_dbm")
+        total_mdbm = 0 if rssi_dbm is None else round(rssi_dbm * 1000 * link["received"])
+        counts = tuple(int(lost.get(reason.value, 0)) for reason in LOSSES)
+        rows.append(LinkRow(NodeId(link["src"]), NodeId(link["dst"]), link["received"], counts, total_mdbm))
+    return LinkTotals.of(rows)

@@ -1,0 +1,303 @@
+"""What other tools read of a run is what the run was: tables, recordings, and the result that is loaded again."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import duckdb
+import nbformat
+import pandas as pd
+import pytest
+from foxglove_schemas_protobuf import FrameTransforms_pb2, Log_pb2, PosesInFrame_pb2, SceneUpdate_pb2
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+
+import fanet_mw
+from fanet_mw.errors import ConfigError
+from fanet_mw.trace import Detected, Dropped, Posed, RoleChanged
+from fanet_mw.units import S
+from sim.cli.app import app
+from sim.recording import tables
+from sim.recording.mcap_recording import McapRecording
+from sim.results.run_folder import RunFolder
+from sim.run.virtual import EPOCH_UNIX_NS, simulate
+from sim.scenarios import catalog
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "how-to" / "recordings.md"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of nine UAVs that hears survivors, with a capture and a recording."""
+    out = tmp_path_factory.mktemp("runs") / "rescue"
+    words = ["simulate", "quick", "--out", str(out), "--pcap", "--pcap-receptions", "--record", str(out / "run.mcap")]
+    assert app([*words, "--json"], result_action="return_value") == 0
+    assert app(["log", "export", str(out), "--to", "parquet"], result_action="return_value") == 0
+    return out
+
+
+def rows(folder: Path, query: str) -> list[tuple[Any, ...]]:
+    return duckdb.sql(query.replace("@", f"{folder}/tables/")).fetchall()
+
+
+def test_a_loaded_result_is_what_simulate_returned(folder: Path) -> None:
+    loaded, run = fanet_mw.load_result(folder), fanet_mw.simulate("quick")
+    same = set(run.summary) - {"wall_s", "files"}
+    assert {key: loaded.summary[key] for key in same} == {key: run.summary[key] for key in same}
+    assert loaded.trace == run.trace
+    assert loaded.deliveries == run.deliveries
+    assert loaded.reports == json.loads(json.dumps(run.reports))
+    assert [row[:4] for row in loaded.outcome.links.rows()] == [row[:4] for row in run.outcome.links.rows()]
+    assert len(loaded.outcome.records) == len(run.outcome.records)
+    assert (loaded.outcome.simulated_ns, loaded.outcome.mode) == (run.outcome.simulated_ns, "virtual")
+    assert sum(len(frames) for _, frames in loaded.outcome.taps) == sum(len(frames) for _, frames in run.outcome.taps)
+    with pytest.raises(ConfigError, match=r"summary\.json"):
+        fanet_mw.load_result(folder / "tables")
+
+
+def test_tables_count_what_the_summary_counts(folder: Path) -> None:
+    summary = RunFolder(folder).summary
+    [(wanted,)] = rows(folder, "select sum(targets) from '@packets.parquet' where app = 'traffic'")
+    [(delivered, p50, longest)] = rows(
+        folder,
+        "select count(*), quantile_disc(delay_ms, 0.5), max(delay_ms) from '@deliveries.parquet' "
+        "where app = 'traffic' and counts",
+    )
+    assert (delivered, delivered / wanted) == (summary["delivered"], summary["pdr"])
+    assert longest == pytest.approx(summary["delay_ms"]["max"], abs=1e-3)
+    assert p50 == pytest.approx(summary["delay_ms"]["p50"], rel=0.02)
+    reports = rows(folder, "select count(*) from '@deliveries.parquet' where app = 'report' and counts")
+    assert reports == [(summary["reports"]["delivered"],)]
+    assert rows(folder, "select count(*) from '@deliveries.parquet' where node = origin and counts") == [(0,)]
+
+
+def test_tables_have_each_record_once(folder: Path) -> None:
+    records = list(RunFolder(folder).records())
+    posed = [(one.t_ns / S, *one[1:]) for one in records if isinstance(one, Posed)]
+    assert rows(folder, "select * from '@positions.parquet'") == posed
+    heard = [(one.t_ns / S, one.node, one.survivor, one.rssi_dbm) for one in records if isinstance(one, Detected)]
+    assert rows(folder, "select t_s, node, survivor, rssi_dbm from '@events.parquet' where kind = 'detected'") == heard
+    roles = [(one.node, one.role, one.cluster, one.head) for one in records if isinstance(one, RoleChanged)]
+    assert rows(folder, "select node, role, cluster, head from '@events.parquet' where kind = 'role_changed'") == roles
+    assert rows(folder, "select count(*) from '@drops.parquet'") == [(sum(isinstance(r, Dropped) for r in records),)]
+    counts = [rows(folder, f"select count(*) from '@{name}.parquet'")[0][0] for name in tables.TABLES]
+    stated = {"let_out", "bound_stated", "bound_excludes", "likely_stated"}  # columns of the packets
+    trace = (folder / "trace.jsonl").read_text().splitlines()
+    apart = sum(json.loads(line)[0] in stated for line in trace)
+    assert sum(counts[:5]) + apart == len(records)
+
+
+def test_duckdb_and_we_name_the_same_worst_link(folder: Path) -> None:
+    def key(link: Any) -> tuple[float, int, int]:
+        return link["received"] / link["copies"], link["src"], link["dst"]
+
+    ours = min((link for link in RunFolder(folder).links() if link["copies"] >= 20), key=key)
+    [(src, dst, share)] = rows(
+        folder,
+        "select src, dst, received_share from '@links.parquet' where copies >= 20 order by received_share, src, dst "
+        "limit 1",
+    )
+    assert (src, dst, share) == (ours["src"], ours["dst"], ours["received"] / ours["copies"])
+    assert share < 1
+    sums = rows(folder, "select sum(copies - received - lost_collision - lost_half_duplex) from '@links.parquet'")
+    assert sums == [(0,)]
+
+
+def test_frames_are_those_of_the_ledger_and_of_the_links(folder: Path) -> None:
+    frames = RunFolder(folder).summary["frames"]
+    [(sent,)] = rows(folder, "select count(*) from '@frames.parquet' where what = 'sent' and attempt = 1")
+    assert sent in (frames["sent"], frames["sent"] - 1)  # one may be in flight at the end
+    heard = rows(
+        folder, "select src, station, count(*) from '@frames.parquet' where what = 'received' group by all order by all"
+    )
+    links = RunFolder(folder).links()
+    assert heard == sorted((one["src"], one["dst"], one["received"]) for one in links)
+    assert rows(folder, "select min(t_s) >= 0, max(t_s) <= 20 from '@frames.parquet'") == [(True, True)]
+
+
+def test_csv_has_the_same_rows(folder: Path, tmp_path: Path) -> None:
+    assert app(["log", "export", str(folder), "--to", "csv", "--out", str(tmp_path)], result_action="return_value") == 0
+    for name in tables.TABLES:
+        packed = pd.read_parquet(folder / "tables" / f"{name}.parquet")
+        text = pd.read_csv(tmp_path / f"{name}.csv")
+        assert list(text.columns) == list(packed.columns)
+        assert len(text) == len(packed)
+    assert pd.read_csv(tmp_path / "positions.csv").east_m.sum() == pytest.approx(
+        pd.read_parquet(folder / "tables" / "positions.parquet").east_m.sum()
+    )
+
+
+def decoded(path: Path, *topics: str) -> list[tuple[str, int, Any]]:
+    with path.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        found = reader.iter_decoded_messages(topics=topics or None)
+        return [(channel.topic, message.log_time - EPOCH_UNIX_NS, content) for _, channel, message, content in found]
+
+
+def test_a_recording_is_read_back_by_mcap_with_foxgloves_schemas(folder: Path) -> None:
+    path = folder / "run.mcap"
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    schemas = {channel.topic: summary.schemas[channel.schema_id] for channel in summary.channels.values()}
+    for topic, kind in {
+        "/tf": FrameTransforms_pb2.FrameTransforms,
+        "/poses": PosesInFrame_pb2.PosesInFrame,
+        "/log": Log_pb2.Log,
+        **{f"/scene/{name}": SceneUpdate_pb2.SceneUpdate for name in ("world", "uavs", "links", "finds")},
+    }.items():
+        assert (schemas[topic].name, schemas[topic].encoding) == (kind.DESCRIPTOR.full_name, "protobuf")
+    assert {channel.message_encoding for channel in summary.channels.values()} == {"protobuf"}
+    places = {(t_ns, pose) for _, t_ns, message in decoded(path, "/poses") for pose in range(len(message.poses))}
+    assert len(places) == 201 * 9
+
+
+def test_a_recording_has_the_positions_links_and_events_of_the_run(folder: Path) -> None:
+    path, run = folder / "run.mcap", RunFolder(folder)
+    at = {(one.t_ns, one.node): one[2:] for one in run.records(Posed)}
+    seen = 0
+    for _, t_ns, message in decoded(path, "/tf"):
+        for one in message.transforms:
+            known = at.get((t_ns, int(one.child_frame_id.removeprefix("uav-"))))
+            if known is not None:
+                seen += 1
+                moved = (one.translation.x, one.translation.y, one.translation.z)
+                assert moved == pytest.approx(known, abs=0.006)  # the trace has centimetres
+    assert seen == len(at)
+    carried: dict[tuple[int, int], list[int]] = {}
+    for _, _, message in decoded(path, "/links"):
+        for link in message.links:
+            sums = carried.setdefault((link.src, link.dst), [0, 0])
+            sums[0] += link.copies
+            sums[1] += link.received
+    assert carried == {(one["src"], one["dst"]): [one["copies"], one["received"]] for one in run.links()}
+    said = [message.message for _, _, message in decoded(path, "/log")]
+    heard = list(run.records(Detected))
+    assert [text for text in said if "hears the phone" in text] == [
+        f"{one.t_ns / S:.1f} s: UAV {one.node} hears the phone of survivor {one.survivor}" for one in heard
+    ]
+    last = decoded(path, "/metrics")[-1][2]
+    assert last.coverage_share == pytest.approx(run.summary["mission"]["coverage"], abs=0.02)
+    assert last.airtime_share == run.summary["air"]["busy"]
+
+
+def test_an_observer_changes_nothing_and_sees_the_same_run_twice(tmp_path: Path) -> None:
+    scenario = catalog.find("quick", ["duration_s=9"])
+    plain = simulate(scenario)
+    for name in ("a", "b"):
+        with McapRecording(tmp_path / name, scenario, epoch_unix_ns=EPOCH_UNIX_NS) as recording:
+            assert list(simulate(scenario, observer=recording).records) == list(plain.records)
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+def test_a_finished_run_becomes_a_recording(folder: Path, tmp_path: Path) -> None:
+    path = tmp_path / "later.mcap"
+    assert app(["log", "export", str(folder), "--to", "mcap", "--out", str(path)], result_action="return_value") == 0
+    posed = {(one.t_ns, one.node): one[2:] for one in RunFolder(folder).records(Posed)}
+    found = {
+        (t_ns, int(one.child_frame_id.removeprefix("uav-"))): (one.translation.x, one.translation.y, one.translation.z)
+        for _, t_ns, message in decoded(path, "/tf")
+        for one in message.transforms
+    }
+    assert found == posed
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["export", "@", "--to", "xml"], "--to xml: must be one of parquet, csv, mcap"),
+        (["export", "@", "--to", "parquet"], "tables: exists"),
+        (["export", "/nowhere", "--to", "csv"], "summary.json"),
+        (["info", "@/trace.jsonl"], "summary.json"),
+        (["info", "@/broken.mcap"], "is no MCAP file"),
+    ],
+)
+def test_what_cannot_be_exported_is_said(folder: Path, words: list[str], message: str) -> None:
+    (folder / "broken.mcap").write_bytes(b"no recording" * 10)
+    with pytest.raises(ConfigError, match=re.escape(message)):
+        app(
+            ["log", *(word.replace("@", str(folder)) for word in words)],
+            result_action="return_value",
+            exit_on_error=False,
+        )
+
+
+@pytest.mark.parametrize(
+    ("path", "message"), [("run.txt", r"must be a file whose name ends in \.mcap"), ("is.mcap", "exists")]
+)
+def test_a_recording_that_cannot_be_written_is_said_before_the_run(tmp_path: Path, path: str, message: str) -> None:
+    (tmp_path / "is.mcap").write_bytes(b"x")
+    with pytest.raises(ConfigError, match=message):
+        app(["simulate", "quick", "--record", str(tmp_path / path)], result_action="return_value", exit_on_error=False)
+
+
+def test_info_names_kinds_and_topics(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for path, words in ((folder, ("delivered", "valid", "posed")), (folder / "run.mcap", ("/tf", "foxglove.Log"))):
+        assert app(["log", "info", str(path)], result_action="return_value") == 0
+        said = capsys.readouterr().out
+        assert all(word in said for word in words)
+
+
+def test_the_page_names_every_column_and_every_topic(folder: Path) -> None:
+    text = PAGE.read_text()
+    for name, table in tables.TABLES.items():
+        [row] = re.findall(rf"^\| `{name}` \| .* \| (.*) \|$", text, re.MULTILINE)
+        outside = re.sub(r"\([^()]*\)", "", row)
+        assert re.findall(r"`(\w+)`", outside) == table.schema.names
+    topics = {re.sub(r"/\d+/", "/N/", topic) for topic, _, _ in decoded(folder / "run.mcap")}
+    assert set(re.findall(r"^\| `(/\S+)` \|", text, re.MULTILINE)) == topics
+
+
+def test_the_programs_of_the_page_run(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(folder.parents[1])
+    if not Path("runs").exists():
+        Path("runs").symlink_to(folder.parent)
+    names: dict[str, object] = {}
+    programs = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    for program in programs:
+        exec(program, names)
+    said = capsys.readouterr().out
+    assert len(programs) == 4
+    assert "received_share" in said
+    assert "1.0 " in said
+
+
+def test_the_notebook_of_tables_runs() -> None:
+    notebook = nbformat.read(ROOT / "examples" / "run" / "tables.ipynb", as_version=4)
+    names: dict[str, Any] = {}
+    for cell in notebook.cells:
+        if cell.cell_type == "code":
+            assert not cell.outputs
+            exec(cell.source, names)
+    assert len(names["worst"]) == 5
+    assert (names["by_origin"].delivered > 0.9).all()
+    assert len(names["found"]) == 3
+
+
+@pytest.mark.realtime
+def test_a_swarm_of_processes_is_recorded_beside_it(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    words = ["launch", "quick", "--duration", "9", "--out", str(out), "--record", str(tmp_path / "run.mcap"), "--json"]
+    app(words, result_action="return_value")
+    run = RunFolder(out)
+    epoch_ns = run.summary["epoch_unix_ns"]
+    with (tmp_path / "run.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        found = [(c.topic, m.log_time - epoch_ns, d) for _, c, m, d in reader.iter_decoded_messages()]
+    posed = {(one.t_ns, one.node): one[2:] for one in run.records(Posed)}
+    seen = {
+        (t_ns, int(one.child_frame_id.removeprefix("uav-"))): (one.translation.x, one.translation.y, one.translation.z)
+        for topic, t_ns, message in found
+        if topic == "/tf"
+        for one in message.transforms
+    }
+    both = posed.keys() & seen.keys()
+    assert len(both) >= 0.5 * len(posed)  # a busy machine is late to listen
+    for key in both:
+        assert seen[key] == pytest.approx(posed[key], abs=0.006)
+    assert any("head of cluster" in message.message for topic, _, message in found if topic == "/log")
+    assert {"/metrics", "/links", "/uav/9/state"} <= {topic for topic, _, _ in found}

@@ -125,7 +125,7 @@ def _events(outcome: Outcome, _: Path | None) -> Iterator[Row]:
 
 
 def _links(outcome: Outcome, _: Path | None) -> Iterator[Row]:
-    for row in described(outcome.links.rows(), has_rssi=outcome.scenario.radio.channel != "range"):
+    for row in described(outcome.links.rows()):
         copies, received, lost = row["copies"], row["received"], row["lost"]
         share = received / copies if copies else None
         counts = (lost.get(reason.value, 0) for reason in LOSSES)

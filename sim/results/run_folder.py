@@ -138,7 +138,7 @@ class _ShownOwnTurns(_ShownTurns):
 
 
 class _ShownOwnSlots(_ShownTurns):
-    slot_ms: Number
+    slot_ms: Annotated[float, Field(gt=1e-3, le=1e9)]
     guard_ms: Number
 
 

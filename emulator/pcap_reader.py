@@ -11,7 +11,9 @@ from fanet_mw.units import S
 
 _FILE: Final = struct.Struct("<IHHiIII")
 _RECORD: Final = struct.Struct("<IIII")
-_TAP: Final = struct.Struct("<BBHIBBHHbB")
+_TAP: Final = struct.Struct("<BBHIBBHH")
+"""The radiotap fields of every record; then come those that its bits name, a byte each."""
+_HAS_SIGNAL: Final = 1 << 5
 _HAS_POWER: Final = 1 << 10
 _ACK_BITS: Final = 0xD4
 _FCS_BYTES: Final = 4
@@ -38,6 +40,7 @@ class AirFrame(NamedTuple):
     attempt: int | None
     """1: first transmission; None for receptions and ACKs."""
     rssi_dbm: int | None
+    """Of a reception, if the channel knows powers."""
 
 
 def frames_of(path: Path, *, epoch_unix_ns: int) -> Iterator[AirFrame]:
@@ -65,15 +68,18 @@ def _records(file: BinaryIO, path: Path, epoch_unix_ns: int) -> Iterator[AirFram
 
 
 def _frame(data: bytes, t_ns: int) -> AirFrame:
-    _, _, length, present, _, _, _, _, level_dbm, last = _TAP.unpack_from(data)
-    mac = data[length:]
+    _, _, length, present, *_ = _TAP.unpack_from(data)
+    mac, last = data[length:], data[length - 1]
     dst = _node(mac[4:10])
     if mac[0] == _ACK_BITS:
         return AirFrame(t_ns, "ack", None, dst, None, 0, None, None)
     size = len(mac) - _BEFORE_FRAME - _FCS_BYTES
     if present & _HAS_POWER:
         return AirFrame(t_ns, "sent", _node(mac[10:16]), dst, None, size, last + 1, None)
-    return AirFrame(t_ns, "received", _node(mac[10:16]), dst, last, size, None, level_dbm)
+    rssi_dbm = int.from_bytes(data[_TAP.size : _TAP.size + 1], "little", signed=True)
+    return AirFrame(
+        t_ns, "received", _node(mac[10:16]), dst, last, size, None, rssi_dbm if present & _HAS_SIGNAL else None
+    )
 
 
 def _node(address: bytes) -> int | None:

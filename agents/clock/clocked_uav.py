@@ -17,6 +17,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from agents.clock.local_clock import LocalClock
+from agents.clock.steady_clock import SteadyClock
 from agents.clock.swarm_time import SwarmTime, swarm_time
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.uav import NodeState, Uav
@@ -74,7 +75,8 @@ class ClockedUav(Actor):
         onboard_map: OnboardMap = NO_MAP,
         reader: Reader | None = None,
     ) -> None:
-        self._clock = LocalClock(scenario.clock, seed=scenario.seed, node=node)
+        clock = LocalClock(scenario.clock, seed=scenario.seed, node=node)
+        self._clock = SteadyClock(clock) if scenario.clock.counter else clock
         self._time = swarm_time(scenario, node)
         self._uav = Uav(
             scenario,
@@ -158,6 +160,7 @@ class ClockedUav(Actor):
             "bound_us": None if bound_ns is None else bound_ns / US,
             "worst_us": self._time.worst_ns(local_ns) / US,
             "withheld": self._withheld,
+            "jumps": self._clock.jumps if isinstance(self._clock, SteadyClock) else 0,
             **self._time.report(),
         }
         report = self._uav.report()

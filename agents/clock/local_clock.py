@@ -54,7 +54,7 @@ class LocalClock:
     def local_ns(self, true_ns: int) -> int:
         """The instant that the clock shows at a true instant."""
         by_ns = next(by for at, by in reversed(self._jumps) if at is None or at <= true_ns)
-        return self._smooth_ns(true_ns) + by_ns
+        return self.counter_ns(true_ns) + by_ns
 
     def true_ns(self, local_ns: int) -> int:
         """The true instant at which the clock shows `local_ns`. If it does so twice, that is the first one that is not
@@ -63,7 +63,7 @@ class LocalClock:
         shown = None
         for index, (at_ns, by_ns) in enumerate(self._jumps):
             until_ns = self._jumps[index + 1][0] if index + 1 < len(self._jumps) else None
-            found_ns = self._smooth_true_ns(local_ns - by_ns)
+            found_ns = self.counter_true_ns(local_ns - by_ns)
             if until_ns is not None and found_ns >= until_ns:
                 shown = until_ns if shown is None else shown  # unless a later part shows it
                 continue
@@ -74,12 +74,12 @@ class LocalClock:
         assert shown is not None, "the last part has no end, and the first one no beginning"
         return shown
 
-    def _smooth_ns(self, true_ns: int) -> int:
-        """The instant that the clock would show without jumps."""
+    def counter_ns(self, true_ns: int) -> int:
+        """The instant that the clock would show without jumps: what a counter shows that nobody sets."""
         index = max(0, min(len(self._walk) - 1, true_ns // S))
         return _shown(self._walk[index], true_ns)
 
-    def _smooth_true_ns(self, local_ns: int) -> int:
+    def counter_true_ns(self, local_ns: int) -> int:
         """The true instant at which the clock would show this without jumps."""
         index = max(0, min(len(self._walk) - 1, (local_ns - self._offset_ns) // S))
         while index and self._walk[index].local_ns > local_ns:

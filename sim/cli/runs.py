@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from fanet_mw.scenario import Scenario
     from sim.observation.observer import Observer
-    from sim.run.launcher.progress import Progress
+    from sim.run.collecting.running_tally import Progress
     from sim.run.outcome import Outcome
 
 _err = Console(stderr=True)

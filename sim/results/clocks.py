@@ -53,6 +53,7 @@ def clock_errors(outcome: Outcome) -> dict[str, Any]:
         "bound_us": round(max(bounds), 3) if bounds else None,
         "beyond_bound": sum(error > sample.bound_ns >= 0 for sample, error in measured),
         "samples": len(measured),
+        "jumps": sum(report.get("clock", {}).get("jumps", 0) for report in outcome.reports.values()),
         "lost": sum(report.get("clock", {}).get("lost", 0) for report in outcome.reports.values()),
         "without_time": _without_time(samples) if outcome.scenario.clock.sync != "none" else 0,
         "synced_after_s": _synced_after_s(samples, outcome.scenario.node_count),

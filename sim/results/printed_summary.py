@@ -128,6 +128,8 @@ def _clock_rows(clock: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     stated = ""
     if clock["bound_us"] is not None:
         stated = f", stated at most {clock['bound_us']:.1f} us, exceeded {clock['beyond_bound']} times"
+    if clock["jumps"]:
+        stated += f"; {clock['jumps']} jumps of clocks seen and taken out"
     if clock["without_time"]:
         stated += f"; {clock['without_time']} nodes have no swarm time at the end"
     yield "clocks", f"off by p50 {error['p50']:.1f} us, p99 {error['p99']:.1f} us, max {error['max']:.1f} us{stated}"

@@ -5,6 +5,7 @@ from collections import Counter, defaultdict
 import pytest
 
 from agents.clock.local_clock import LocalClock
+from agents.clock.steady_clock import SteadyClock
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Clock
 from fanet_mw.trace import ClockSampled, Delivered, Generated
@@ -33,16 +34,47 @@ def test_a_clock_that_jumps_shows_each_instant_back(by_ms: float) -> None:
         assert clock.true_ns(still.local_ns(40 * S) + round(by_ms * MS) // 2) == 40 * S, "a time that is left out"
 
 
+def test_stamps_from_before_a_jump_and_instants_after_it_are_right_and_a_rate_is_no_jump() -> None:
+    table = Clock(drift_ppm=20, wander_ppm=1, offset_ms=5, jumps=((3, 40.0, -300.0), (3, 41.0, 1.0)))
+    still = LocalClock(Clock(drift_ppm=20, wander_ppm=1, offset_ms=5), seed=1, node=NodeId(3))
+    clock = SteadyClock(LocalClock(table, seed=1, node=NodeId(3)))
+    for true_ns, before_ns in (
+        (39 * S, 38 * S),
+        (40 * S + MS, 40 * S - MS),
+        (40 * S + 5 * MS, 40 * S),
+        (50 * S, 50 * S),
+    ):
+        still.pass_time(true_ns, until_ns=100 * S)
+        clock.pass_time(true_ns, until_ns=100 * S)
+        for t_ns in (before_ns, true_ns):
+            assert clock.local_ns(t_ns) == still.local_ns(t_ns)
+        assert clock.true_ns(still.local_ns(true_ns + 2 * S)) == still.true_ns(still.local_ns(true_ns + 2 * S))
+    assert clock.jumps == 2
+
+
 def test_a_jump_of_a_node_that_is_not_there_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"clock\.jumps names node 16, which must be <= nodes\.count = 15"):
         catalog.find("clusters", [*KEYS, "clock.jumps=[[16, 1.0, 1.0]]"])
 
 
+@pytest.mark.parametrize(("node", "by_ms"), [(8, 300.0), (8, -2.0), (1, -10_000.0), (15, 10_000.0)])
+def test_a_node_whose_counter_shows_the_jump_loses_nothing(node: int, by_ms: float) -> None:
+    outcome = simulate(catalog.find("clusters", [*KEYS, f"clock.jumps=[[{node}, {AT_S}.3, {by_ms}]]"]))
+    summary = finish(outcome, out=None)
+    assert outcome.reports[f"agent-{node}"]["clock"]["jumps"] == 1
+    assert (summary["pdr"], summary["bound"]["violations"], summary["bound"]["never"]) == (1.0, 0, 0)
+    assert (summary["clock"]["lost"], summary["clock"]["beyond_bound"]) == (0, 0)
+
+
 @pytest.mark.parametrize(
     ("node", "by_ms"), [(8, 300.0), (8, -2_000.0), (8, 5.0), (1, 300.0), (1, -20.0), (15, 1_000.0), (8, 10_000.0)]
 )
-def test_nothing_comes_late_and_the_swarm_is_together_again_or_says_who_is_not(node: int, by_ms: float) -> None:
-    outcome = simulate(catalog.find("clusters", [*KEYS, f"clock.jumps=[[{node}, {AT_S}.0, {by_ms}]]"]))
+def test_without_a_counter_nothing_comes_late_and_the_swarm_is_together_again_or_says_who_is_not(
+    node: int, by_ms: float
+) -> None:
+    outcome = simulate(
+        catalog.find("clusters", [*KEYS, "clock.counter=false", f"clock.jumps=[[{node}, {AT_S}.0, {by_ms}]]"])
+    )
     summary = finish(outcome, out=None)
     assert summary["bound"]["violations"] == summary["bound"]["never"], "what a frozen node held back is lost, not late"
     left_out = by_ms > 5_000

@@ -40,6 +40,9 @@ class Clock(Section):
     jumps: tuple[tuple[Id, SomeTime, Annotated[float, Field(ge=-60_000, le=60_000)]], ...] = ()
     """Clocks that jump, as a step of NTP lets them: node, instant [s] and by how much [ms], for example
     `[[8, 50.0, 300.0]]`."""
+    counter: bool = True
+    """Each node's computer also has a counter that nobody sets, as CLOCK_MONOTONIC, by which it sees a jump of its own
+    clock and takes it out; `false`: only its neighbors can tell it."""
 
     @model_validator(mode="after")
     def _a_walk_has_bounds(self) -> Self:

@@ -150,6 +150,11 @@ class _WorldReport(_Checked):
     malformed: Count
 
 
+class _ClockReport(_Checked):
+    jumps: Count = 0
+    lost: Count = 0
+
+
 class _Agent(_Checked):
     kind: Literal["agent"]
     node: Count
@@ -161,6 +166,8 @@ class _Agent(_Checked):
     dropped: Reasons
     missed_turns: Count | None = None
     bound_ms: Number | None = None
+    clock: _ClockReport = _ClockReport()
+    messages: Reasons = {}
 
 
 _SHAPES: Final[dict[str, type[_Checked]]] = {"emulator": _Emulator, "world": _WorldReport}

@@ -36,13 +36,13 @@ from fanet_mw.units import MS, S
 from sim.run.bus.router import ROUTER, expected_names
 from sim.run.bus.running_swarms import registered
 from sim.run.collecting.collector import Collector
+from sim.run.collecting.running_tally import Progress
 from sim.run.launcher import limits
 from sim.run.launcher.child_processes import Processes, describe, end_if_imported_by_a_child
 from sim.run.launcher.clock_governor import ClockGovernor, Instant
 from sim.run.launcher.deaths import Deaths
 from sim.run.launcher.leads import Leads
 from sim.run.launcher.pauses import PauseWatch, processors
-from sim.run.launcher.progress import Progress
 from sim.run.launcher.services import Services
 from sim.run.outcome import Outcome
 from sim.run.stoppable_uav import planned_stops
@@ -284,6 +284,7 @@ class SwarmRun:
             delivered=tally.delivered_share(),
             late=late.get("late_frames", 0) / max(1, late.get("frames", 0)),
             confirmed=len(tally.confirmed),
+            without_phone=len(tally.without_phone),
             survivors=scenario.mission.survivors,
         )
 

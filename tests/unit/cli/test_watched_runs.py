@@ -4,11 +4,11 @@ import pytest
 from kit import MakeScenario
 
 from sim.cli import runs
-from sim.run.launcher.progress import Progress
+from sim.run.collecting.running_tally import Progress
 
 
 def state(swarm_s: float) -> Progress:
-    return Progress(swarm_s, 300.0, 0.75, 0.9876, 0.00456, 7, 16)
+    return Progress(swarm_s, 300.0, 0.75, 0.9876, 0.00456, 7, 0, 16)
 
 
 def test_a_line_every_ten_seconds_says_how_the_swarm_fares(
@@ -28,7 +28,7 @@ def test_a_line_every_ten_seconds_says_how_the_swarm_fares(
 
 
 def test_what_is_not_known_or_not_searched_for_is_not_said() -> None:
-    assert Progress(1.4, 60.0, 1.0, None, 0.0, 0, 0).sentence() == "1 of 60 s: clock 1, late 0.00%"
+    assert Progress(1.4, 60.0, 1.0, None, 0.0, 0, 0, 0).sentence() == "1 of 60 s: clock 1, late 0.00%"
 
 
 def test_nobody_who_listens_costs_no_run(monkeypatch: pytest.MonkeyPatch) -> None:

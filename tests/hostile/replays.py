@@ -1,0 +1,240 @@
+"""A foreign station repeats, byte for byte and later, what it heard: no clock follows it, and nearly all arrives.
+
+    python tests/hostile/replays.py [DRAWS [FIRST SEED [SCENARIO]]]     by default 40 of all combinations
+
+The station takes the place of a node. Each draw is a scenario with a seed, a place (corner or middle), a kind of frame,
+an address (the station's own, or that of whom it repeats) and a delay of 0.2 to 60 s. It is compared with the same run
+in which the station is silent, and with one in which it sends nonsense of the same lengths at the same instants:
+whoever sends takes airtime from others, and no check of a node can give it back.
+"""
+
+import contextlib
+import math
+import sys
+from collections import Counter, defaultdict
+from collections.abc import Mapping
+from functools import cache
+from random import Random
+from typing import Any, Final, NamedTuple
+
+from fanet_mw import wire
+from fanet_mw.actor import Actor
+from fanet_mw.bus.messages import Message, Reception, TxRequest
+from fanet_mw.bus.topics import Topics
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.hosts.virtual import VirtualHost
+from fanet_mw.node.reader import packet_of
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import ClockSampled
+from fanet_mw.units import BROADCAST, US, NodeId, S
+from fanet_mw.wire import Kind
+from sim.results.clocks import errors_ns, true_delays
+from sim.results.metrics import summarize
+from sim.run.collecting.record_kinds import records_of
+from sim.run.collecting.trace_log import TraceLog
+from sim.run.outcome import Outcome
+from sim.run.virtual import actors_of
+from sim.scenarios import catalog
+
+CLOCKS: Final = ("clock.sync=beacons", "clock.offset_ms=5", "clock.drift_ppm=20")
+SCENARIOS: Final[Mapping[str, tuple[str, ...]]] = {
+    "clusters": ("nodes.count=15", "clusters.count=14", "clusters.turn_slack_us=400", "warmup_s=26"),
+    "rescue": ("warmup_s=34",),
+}
+NODES: Final = {"clusters": 15, "rescue": 45}
+PLACES: Final = {"clusters": {"corner": 15, "middle": 8}, "rescue": {"corner": 45, "middle": 23}}
+DELAYS_S: Final = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0)
+OBSERVED_S: Final = {"clusters": 16, "rescue": 30}
+KINDS: Final = (Kind.HELLO, Kind.DATA, Kind.JOIN, Kind.SCHEDULE, Kind.LINKS)
+LEAST_SHARE: Final = 0.99
+"""Of what arrives without the station."""
+
+
+class Attack(NamedTuple):
+    """What the station does."""
+
+    scenario: str
+    seed: int
+    place: str
+    kind: Kind
+    spoofed: bool
+    delay_s: float
+
+    @property
+    def station(self) -> NodeId:
+        return NodeId(PLACES[self.scenario][self.place])
+
+    def __str__(self) -> str:
+        who = "under the address of whom it repeats" if self.spoofed else "under its own address"
+        return (
+            f"{self.scenario} seed {self.seed}, {self.place}: {self.kind.name.lower()} repeated {self.delay_s:g} s "
+            f"later {who}"
+        )
+
+
+class Repeater(Actor):
+    """Hears everything at the place of one node, and repeats each frame of some kinds later, or nonsense instead."""
+
+    def __init__(
+        self, node: NodeId, swarm: str, *, kinds: frozenset[Kind], delay_ns: int, nonsense: bool = False
+    ) -> None:
+        topics = Topics(swarm)
+        super().__init__(f"agent-{node}", (topics.radio_rx(node),))
+        self._node, self._topic = node, topics.radio_tx(node)
+        self._kinds, self._delay_ns, self._nonsense = kinds, delay_ns, nonsense
+        self.sent = self._heard = 0
+        self._waiting: list[tuple[int, bytes]] = []
+        self._random = Random("nonsense")
+
+    def start(self, now_ns: int) -> None:
+        """Nothing is prepared."""
+
+    def receive(self, topic: str, message: Message, now_ns: int) -> None:
+        if isinstance(message, Reception):
+            self._heard += 1
+            if wire.peek_kind(message.frame) in self._kinds:
+                self._waiting.append((message.end_ns + self._delay_ns, message.frame))
+
+    def next_wake_ns(self) -> int | None:
+        return self._waiting[0][0] if self._waiting else None
+
+    def wake(self, now_ns: int) -> None:
+        while self._waiting and self._waiting[0][0] <= now_ns:
+            frame = self._waiting.pop(0)[1]
+            if self._nonsense:
+                frame = self._random.randbytes(len(frame))
+            self.outbox.append((self._topic, TxRequest(self.sent, now_ns, frame, BROADCAST, wants_status=False)))
+            self.sent += 1
+
+    def report(self) -> Mapping[str, Any]:
+        own = {"kind": "agent", "node": self._node, "generated": 0, "bus_malformed": 0}
+        return {**own, "frames_sent": self.sent, "receptions": self._heard, "dropped": {}}
+
+
+class Seen(NamedTuple):
+    """What became of a run, as the other nodes saw it."""
+
+    summary: Mapping[str, Any]
+    reports: Mapping[str, Mapping[str, Any]]
+    sent: int
+    """The frames that the station has sent."""
+    apart_ns: int
+    """The greatest difference between two clocks after the warm-up."""
+    beyond: int
+    """The samples of clocks whose true error was beyond the stated one."""
+
+    def refused(self) -> Counter[str]:
+        found: Counter[str] = Counter()
+        for report in self.reports.values():
+            found.update({why: report.get("clock", {}).get(why, 0) for why in ("old", "relayed", "repeated")})
+            found.update(report.get("dropped", {}))
+            found["copies"] += report.get("duplicates", 0)
+        return +found
+
+
+def scenario_of(attack: Attack, *more: str) -> Scenario:
+    name = attack.scenario
+    fair = [node for node in range(1, NODES[name] + 1) if node != attack.station]
+    keys = SCENARIOS[name]
+    warmup_s = int(keys[-1].partition("=")[2])
+    seconds = warmup_s + max(OBSERVED_S[name], attack.delay_s / 2 if attack.delay_s > 20 else 0)
+    seconds = max(seconds, 12 + attack.delay_s) + (7 if name == "rescue" else 2)
+    return catalog.find(name, [
+        *CLOCKS, *keys, f"duration_s={seconds:g}", f"traffic.targets={fair}", f"traffic.sources={fair[1:]}",
+        *more, f"seed={attack.seed}",
+    ])  # fmt: skip
+
+
+def run(attack: Attack, *more: str, silent: bool = False, nonsense: bool = False) -> Seen:
+    """Fly once with the station in the place of its node."""
+    scenario = scenario_of(attack, *more)
+    kinds = frozenset(() if silent else (attack.kind,))
+    delay_ns = round(attack.delay_s * S)
+    repeater = Repeater(attack.station, scenario.name, kinds=kinds, delay_ns=delay_ns, nonsense=nonsense)
+    actors = [repeater if actor.name == repeater.name else actor for actor in actors_of(scenario, scenario.name)]
+    for actor in actors:
+        if attack.spoofed and actor.name.startswith("agent-") and actor is not repeater:
+            actor.receive = _heard_from_its_transmitter(actor, attack.station)  # type: ignore[method-assign]
+    records = TraceLog(None)
+    host = VirtualHost(actors, on_records=records.extend)
+    host.start()
+    for second in range(1, math.ceil(scenario.duration_s) + 1):
+        host.run(min(second * S, scenario.duration_ns))
+    host.stop()
+    reports = {actor.name: actor.report() for actor in actors}
+    outcome = Outcome(scenario=scenario, mode="virtual", wall_s=0.0, records=true_delays(records), reports=reports)
+    start_ns, _ = scenario.traffic_window_ns
+    samples = [one for one in records_of(outcome.records, ClockSampled) if one.t_ns >= start_ns]
+    ahead: dict[int, list[int]] = defaultdict(list)
+    for sample in samples:
+        ahead[sample.t_ns].append(sample.ahead_ns)
+    apart_ns = max((max(values) - min(values) for values in ahead.values()), default=0)
+    beyond = sum(abs(error_ns) > sample.bound_ns >= 0 for sample, error_ns in errors_ns(samples))
+    fair = {name: report for name, report in reports.items() if name.startswith("agent-") and name != repeater.name}
+    return Seen(summarize(outcome, trace_sha256=""), fair, repeater.sent, apart_ns, beyond)
+
+
+def _heard_from_its_transmitter(actor: Actor, station: NodeId) -> Any:
+    """The station also forges the address of its radio: it transmits under that of whom it repeats."""
+    receive = actor.receive
+
+    def received(topic: str, message: Message, now_ns: int) -> None:
+        if isinstance(message, Reception) and message.src == station:
+            with contextlib.suppress(MalformedFrameError):  # nonsense has no transmitter
+                message = message._replace(src=NodeId(packet_of(message.frame).header.prev_hop))
+        receive(topic, message, now_ns)
+
+    return received
+
+
+@cache
+def _silent(attack: Attack) -> Seen:
+    return run(attack, silent=True)
+
+
+def silent(attack: Attack) -> Seen:
+    """The same run with a station that only listens; computed once for all that differ in nothing else."""
+    return _silent(attack._replace(kind=Kind.HELLO, spoofed=False, delay_s=max(20.0, attack.delay_s)))
+
+
+def drawn(seed: int, scenario: str | None = None) -> Attack:
+    random = Random(f"replay/{seed}")
+    name = scenario or random.choice(sorted(SCENARIOS))
+    return Attack(
+        name, random.randint(1, 5), random.choice(["corner", "middle"]), random.choice(KINDS),
+        random.random() < 0.5, random.choice(DELAYS_S),
+    )  # fmt: skip
+
+
+def judged(attack: Attack, seen: Seen, without: Seen, noise: Seen | None) -> tuple[str, bool]:
+    """One line about a run, and whether it kept what is promised."""
+    share = seen.summary["pdr"] / without.summary["pdr"]
+    beside = "" if noise is None else f", nonsense instead {noise.summary['pdr'] / without.summary['pdr']:.4f}"
+    kept = seen.beyond <= without.beyond and seen.apart_ns < max(2 * without.apart_ns, 100 * US)
+    least = LEAST_SHARE if noise is None else min(LEAST_SHARE, 0.995 * noise.summary["pdr"] / without.summary["pdr"])
+    kept &= share >= least
+    refused = ", ".join(f"{count} {why}" for why, count in sorted(seen.refused().items()))
+    return (
+        f"{attack}: {seen.sent} sent, PDR {seen.summary['pdr']:.4f} of {without.summary['pdr']:.4f} = {share:.4f}"
+        f"{beside}, clocks apart {seen.apart_ns / US:.0f} us (without {without.apart_ns / US:.0f}), "
+        f"{seen.beyond} beyond their error; {refused}: {'kept' if kept else 'NOT KEPT'}"
+    ), kept
+
+
+def main() -> int:
+    count, first = (int(text) for text in (sys.argv[1:3] + ["40", "1"][len(sys.argv) - 1 :])[:2])
+    name = sys.argv[3] if len(sys.argv) > 3 else None
+    wrong = 0
+    for seed in range(first, first + count):
+        attack = drawn(seed, name)
+        seen, without = run(attack), silent(attack)
+        less = seen.summary["pdr"] < LEAST_SHARE * without.summary["pdr"]
+        line, kept = judged(attack, seen, without, run(attack, nonsense=True) if less else None)
+        wrong += not kept
+        print(line, flush=True)
+    print(f"{count} runs, {wrong} not kept")
+    return min(wrong, 1)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

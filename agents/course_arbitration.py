@@ -1,7 +1,7 @@
 """Chooses the course that a UAV flies among those that its applications command.
 
 The last command of each application counts. A course is flown if no other application objects; they are asked after all
-of them have received the same input.
+of them have received the same input. Nobody may object to a course that avoids a collision.
 """
 
 from collections.abc import Callable, Sequence
@@ -37,6 +37,7 @@ class CourseArbitration:
             course = commanded.get(application.name)
             if course is None:
                 continue
-            objections = [o for o in self._judges if o is not application and not o.permits(course, now_ns)]
+            judges = () if application.avoids else self._judges
+            objections = [o for o in judges if o is not application and not o.permits(course, now_ns)]
             if not objections:
                 self._fly(course, now_ns)

@@ -15,6 +15,7 @@ class Callbacks(NamedTuple):
     on_fix: tuple[Application, ...]
     on_sensor: tuple[Application, ...]
     on_hello: tuple[Application, ...]
+    on_operator: tuple[Application, ...]
     permits: tuple[Application, ...]
     hello_frames: tuple[Application, ...]
     next_wake_ns: tuple[Application, ...]

@@ -125,6 +125,12 @@ class Onboard:
         except MalformedFrameError:
             self.node.dropped[DropReason.MALFORMED] += 1
 
+    def operator(self, frames: bytes, now_ns: int) -> None:
+        """Pass on what a ground station says to this UAV."""
+        self._call(now_ns)
+        for application in self._callbacks.on_operator:
+            self._guard(application.on_operator, frames, now_ns)
+
     def fix(self, fix: Gps, now_ns: int) -> None:
         self._call(now_ns)
         for application in self._callbacks.on_fix:

@@ -12,6 +12,7 @@ from agents.applications.telemetry import Telemetry
 from agents.applications.telemetry_streams import TelemetryStreams
 from agents.applications.traffic import Load
 from agents.ground.post import Post
+from agents.ground_control.application import GroundControl
 from agents.hello_schedule import HelloSchedule, HelloTime
 from agents.mission.applications import PlannedSearch, Rescue
 from agents.mission.formation_flight.application import FormationFlight
@@ -84,7 +85,8 @@ class Uav(Actor):
         topics = Topics(swarm)
         self._post = Post(scenario) if node == scenario.post else None
         ordered = () if self._post is None else (topics.orders,)
-        super().__init__(f"agent-{node}", (topics.radio_rx(node), topics.sensors(node), *ordered))
+        heard = (topics.radio_rx(node), topics.sensors(node), topics.operator(node), *ordered)
+        super().__init__(f"agent-{node}", heard)
         self.slack_ns = min(scenario.radio.handover_ns, scenario.radio.lead_ns // 2)  # the rest is for the bus
         self._topics = _OutTopics(topics.radio_tx(node), topics.setpoint(node), topics.mavlink(node))
         self._prompt_ns = scenario.radio.handover_ns + scenario.radio.lead_ns
@@ -100,11 +102,13 @@ class Uav(Actor):
         self._reckoning = DeadReckoning()
         self._delay_ns = seconds_to_ns(scenario.sensors.gps_delay_s)
         self._fixes = SteadyFix(sigma_m=scenario.world.gps_sigma_m, range_m=scenario.radio.range_m)
-        asked_for = (
-            _asked_for(scenario, node, self._streams, position, onboard_map)
-            if self._post is None
-            else [*_loads(scenario, node), self._post]
-        )
+        self._ground_control: GroundControl | None = None
+        asked_for: Sequence[Application]
+        if self._post is None:
+            self._ground_control = GroundControl(scenario, node, self._streams, position=position)
+            asked_for = [*_asked_for(scenario, node, self._streams, position, onboard_map), self._ground_control]
+        else:
+            asked_for = [*_loads(scenario, node), self._post]
         self._built_in = tuple(application.name for application in asked_for)
         """The applications whose counters are among those of the UAV itself in its report."""
         carried = (*_foreign(scenario, node), *applications)
@@ -142,6 +146,8 @@ class Uav(Actor):
             if node.hear(message, now_ns):
                 return True  # a copy that changes nothing, as most receptions are
             if node.hellos:
+                if self._ground_control is not None:
+                    self._ground_control.on_link(message.rssi_dbm, node.dropped.total(), now_ns)
                 self._on_hellos(now_ns)
             return not self._settle(now_ns) and node.timeless
         if isinstance(message, TxStatus):
@@ -158,6 +164,8 @@ class Uav(Actor):
         elif isinstance(message, Order) and self._post is not None:
             self._post.asked.append(message)
             self._onboard.wake(now_ns)
+        elif isinstance(message, MavlinkTap):
+            self._onboard.operator(message.data, now_ns)
         else:
             self._malformed += 1
         self._settle(now_ns)

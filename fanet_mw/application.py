@@ -213,6 +213,8 @@ class Application:
     """The ids of the MAVLink messages that it receives; the first inner frame decides the id of a packet."""
     ports: Collection[int] = ()
     """The ports whose messages it receives."""
+    avoids: bool = False
+    """True: its courses avoid a collision, so that no other application may object to them."""
     follows: Collection[Fate] = ()
     """The fates of its messages that are reported to it."""
     port: AppPort
@@ -233,6 +235,9 @@ class Application:
 
     def on_sensor(self, reading: SensorReading, now_ns: int) -> None:
         """Any other sensor on board has given a reading."""
+
+    def on_operator(self, frames: bytes, now_ns: int) -> None:
+        """MAVLink frames of a ground station have come for this UAV, from its gateway."""
 
     def on_hello(self, frame: bytes, now_ns: int) -> None:
         """A neighbor's hello was received, routing header first; it states the neighbor's position and velocity."""

@@ -9,15 +9,18 @@ headings refer to north and east at the origin: 0.1 degrees off at 10 km).
 """
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from functools import cached_property, lru_cache, partial
+from importlib import metadata
 from types import ModuleType
 from typing import Any, Final, NamedTuple
 
-from pymavlink.dialects.v20 import common
+from pymavlink.dialects.v20 import common as common  # others take MAVLink's names and messages from here
 
 from fanet_mw.dialect import fanet
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
+from fanet_mw.flavors import Mode, number_of
 from fanet_mw.units import DEFAULT_ORIGIN_DEG, MAX_NODES, MS, US, Enu, NodeId
 from fanet_mw.wire import COMPONENT, Packed, frames, inner_frames, renumbered, system_id
 
@@ -36,6 +39,20 @@ _B: Final = _A * math.sqrt(1 - _E2)
 _EP2: Final = _E2 / (1 - _E2)
 """Second eccentricity squared."""
 
+LANDED_IN_AIR: Final = int(common.MAV_LANDED_STATE_IN_AIR)
+_HEALTHY: Final = int(
+    common.MAV_SYS_STATUS_SENSOR_3D_GYRO | common.MAV_SYS_STATUS_SENSOR_3D_ACCEL | common.MAV_SYS_STATUS_SENSOR_3D_MAG
+    | common.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE | common.MAV_SYS_STATUS_AHRS | common.MAV_SYS_STATUS_PREARM_CHECK
+)  # fmt: skip
+"""What a simulated flight controller is never without."""
+
+_CAPABILITIES: Final = int(
+    common.MAV_PROTOCOL_CAPABILITY_MISSION_INT | common.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+    | common.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT | common.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+    | common.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY | common.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+    | common.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+    | common.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+)  # fmt: skip
 _UNKNOWN_U16: Final = 0xFFFF
 _UNKNOWN_I16: Final = 0x7FFF
 _GPS_NO_FIX: Final = 1
@@ -202,14 +219,8 @@ class Encoder:
         )
         return bytes(heartbeat.pack(self._mav))
 
-    @cached_property
-    def _in_the_air(self) -> bytes:
-        in_the_air = common.MAVLink_extended_sys_state_message(
-            common.MAV_VTOL_STATE_UNDEFINED, common.MAV_LANDED_STATE_IN_AIR
-        )
-        return bytes(in_the_air.pack(self._mav))
-
-    def _pack(self, message: Any) -> bytes:  # noqa: ANN401  (pymavlink has no types)
+    def pack(self, message: Any) -> bytes:  # noqa: ANN401  (pymavlink has no types)
+        """Any message of `common`, numbered after the one before it."""
         data = bytes(message.pack(self._mav))
         self._count()
         return data
@@ -227,13 +238,73 @@ class Encoder:
         """HEARTBEAT: armed and autonomous. GENERIC, because INVALID would mean that there is no flight controller."""
         return self._renumber(self._heartbeat)
 
-    def global_position(self, position: Enu, velocity: Enu, *, yaw: float | None, now_ns: int) -> bytes:
-        """GLOBAL_POSITION_INT; the relative altitude is that over the origin."""
+    def vehicle_heartbeat(self, mode: Mode, *, armed: bool, critical: bool = False) -> bytes:
+        """HEARTBEAT of a flight controller with PX4's modes."""
+        base = common.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | common.MAV_MODE_FLAG_STABILIZE_ENABLED
+        base |= common.MAV_MODE_FLAG_GUIDED_ENABLED
+        base |= 0 if mode is Mode.GUIDED else common.MAV_MODE_FLAG_AUTO_ENABLED
+        base |= common.MAV_MODE_FLAG_SAFETY_ARMED if armed else 0
+        state = common.MAV_STATE_ACTIVE if armed else common.MAV_STATE_STANDBY
+        return self.pack(
+            common.MAVLink_heartbeat_message(
+                common.MAV_TYPE_QUADROTOR, common.MAV_AUTOPILOT_PX4, base, number_of(mode),
+                common.MAV_STATE_CRITICAL if critical else state, 3,
+            )
+        )  # fmt: skip
+
+    def local_position(self, position: Enu, velocity: Enu, *, now_ns: int) -> bytes:
+        """LOCAL_POSITION_NED: relative to the origin of the swarm."""
+        ned, moves = to_ned(position), to_ned(velocity)
+        return self.pack(common.MAVLink_local_position_ned_message(_boot_ms(now_ns), *ned, *moves))
+
+    def vfr_hud(self, position: Enu, velocity: Enu, *, yaw: float | None) -> bytes:
+        """VFR_HUD; the air speed is that over the ground, because nothing measures another."""
+        ground_m_s = velocity.horizontal()
+        heading = 0 if yaw is None else round(math.degrees(yaw)) % 360
+        alt_m = to_geodetic(position, self._origin).alt_m
+        return self.pack(common.MAVLink_vfr_hud_message(ground_m_s, ground_m_s, heading, 0, alt_m, velocity.up))
+
+    def mission_current(self, at: int, *, items: int, flies: bool) -> bytes:
+        """MISSION_CURRENT; without items the mission is the swarm's own task, of which MAVLink knows nothing."""
+        over = bool(items) and at >= items
+        state = (
+            common.MISSION_STATE_NO_MISSION if not items
+            else common.MISSION_STATE_COMPLETE if over
+            else common.MISSION_STATE_ACTIVE if flies
+            else common.MISSION_STATE_PAUSED if at
+            else common.MISSION_STATE_NOT_STARTED
+        )  # fmt: skip
+        shown = max(0, min(at, items - 1))
+        return self.pack(common.MAVLink_mission_current_message(shown, items or _UNKNOWN_U16, state, int(flies)))
+
+    def system_time(self, now_ns: int) -> bytes:
+        """SYSTEM_TIME: swarm time, counted from 1970 by a swarm that knows no other epoch."""
+        return self.pack(common.MAVLink_system_time_message(now_ns // US, _boot_ms(now_ns)))
+
+    def radio_status(self, rssi_dbm: float | None, lost: int) -> bytes:
+        """RADIO_STATUS as SiK radios give it: 1.9 x (dBm + 127); 0: nobody is heard."""
+        rssi = 0 if rssi_dbm is None else max(1, min(254, round(1.9 * (rssi_dbm + 127))))
+        return self.pack(common.MAVLink_radio_status_message(rssi, rssi, 100, 0, 0, lost & 0xFFFF, 0))
+
+    def autopilot_version(self, node: NodeId) -> bytes:
+        """AUTOPILOT_VERSION: what this vehicle can do; its identification is its node."""
+        version = tuple(int(part) for part in re.findall(r"\d+", metadata.version("fanet-mw"))[:3])
+        number = sum(part << shift for part, shift in zip(version, (24, 16, 8), strict=False))
+        return self.pack(
+            common.MAVLink_autopilot_version_message(
+                _CAPABILITIES, number, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, node
+            )
+        )
+
+    def global_position(
+        self, position: Enu, velocity: Enu, *, yaw: float | None, now_ns: int, home_m: float = 0.0
+    ) -> bytes:
+        """GLOBAL_POSITION_INT; the relative altitude is that over a place so high above the origin."""
         place = to_geodetic(position, self._origin)
         lat, lon, alt_mm = _place_ints(place)
-        relative_mm = _millimeters(place.alt_m - self._origin.alt_m)
+        relative_mm = _millimeters(place.alt_m - self._origin.alt_m - home_m)
         velocities = _velocity_ints(velocity)
-        return self._pack(
+        return self.pack(
             common.MAVLink_global_position_int_message(
                 _boot_ms(now_ns), lat, lon, alt_mm, relative_mm, *velocities, _centidegrees(yaw)
             )
@@ -243,7 +314,7 @@ class Encoder:
         """GPS_RAW_INT: the last reading of the receiver."""
         ground_m_s = velocity.horizontal()
         course = math.atan2(velocity.east, velocity.north) if ground_m_s else None
-        return self._pack(
+        return self.pack(
             common.MAVLink_gps_raw_int_message(
                 max(0, fix_ns // US),
                 _GPS_3D_FIX if has_fix else _GPS_NO_FIX,
@@ -258,23 +329,29 @@ class Encoder:
 
     def attitude(self, attitude: Attitude, *, now_ns: int) -> bytes:
         """ATTITUDE; the rates are zero, because they are not known here."""
-        return self._pack(common.MAVLink_attitude_message(_boot_ms(now_ns), *attitude, 0.0, 0.0, 0.0))
+        return self.pack(common.MAVLink_attitude_message(_boot_ms(now_ns), *attitude, 0.0, 0.0, 0.0))
 
-    def sys_status(self, battery: BatteryState | None) -> bytes:
-        """SYS_STATUS: the battery, and the sensors present, enabled and healthy, of which GPS is the only one.
+    def sys_status(
+        self, battery: BatteryState | None, *, has_fix: bool = True, fenced: bool = False, beyond: bool = False
+    ) -> bytes:
+        """SYS_STATUS: the battery, and the sensors present, enabled and healthy; of those GPS alone may not be healthy.
 
         None: nothing measures the battery.
         """
-        gps = common.MAV_SYS_STATUS_SENSOR_GPS
+        gps, fence = common.MAV_SYS_STATUS_SENSOR_GPS, common.MAV_SYS_STATUS_GEOFENCE
+        enabled = _HEALTHY | gps | (fence if fenced else 0)
+        healthy = _HEALTHY | (gps if has_fix else 0) | (0 if beyond else fence)
         millivolts, centiamperes, _, percent = _battery_fields(battery)
-        return self._pack(
-            common.MAVLink_sys_status_message(gps, gps, gps, 0, millivolts, centiamperes, percent, *(0,) * 6)
+        return self.pack(
+            common.MAVLink_sys_status_message(
+                _HEALTHY | gps | fence, enabled, healthy, 0, millivolts, centiamperes, percent, *(0,) * 6
+            )
         )
 
     def battery_status(self, battery: BatteryState | None) -> bytes:
         """BATTERY_STATUS of the one battery, with its voltage in place of that of its first cell."""
         millivolts, centiamperes, consumed_mah, percent = _battery_fields(battery)
-        return self._pack(
+        return self.pack(
             common.MAVLink_battery_status_message(
                 0,
                 common.MAV_BATTERY_FUNCTION_ALL,
@@ -293,11 +370,11 @@ class Encoder:
         ned = to_ned(position)
         level = (1.0, 0.0, 0.0, 0.0)
         lat, lon, alt_mm = _place_ints(to_geodetic(position, self._origin))
-        return self._pack(common.MAVLink_home_position_message(lat, lon, alt_mm, *ned, level, 0.0, 0.0, 0.0))
+        return self.pack(common.MAVLink_home_position_message(lat, lon, alt_mm, *ned, level, 0.0, 0.0, 0.0))
 
-    def extended_sys_state(self) -> bytes:
-        """EXTENDED_SYS_STATE: in the air, and not a VTOL."""
-        return self._renumber(self._in_the_air)
+    def extended_sys_state(self, landed: int = LANDED_IN_AIR) -> bytes:
+        """EXTENDED_SYS_STATE of what is not a VTOL; `landed` is a MAV_LANDED_STATE, by default in the air."""
+        return self.pack(common.MAVLink_extended_sys_state_message(common.MAV_VTOL_STATE_UNDEFINED, landed))
 
     def collision(self, other: NodeId, *, closest_s: float, altitude_m: float, horizontal_m: float) -> bytes:
         """COLLISION with another node: both know of it by positions over the air, and avoid it by height.
@@ -305,7 +382,7 @@ class Encoder:
         The distances are those at the closest point of approach, `closest_s` from now. `id` is the node, which equals
         its MAVLink system up to 250.
         """
-        return self._pack(
+        return self.pack(
             common.MAVLink_collision_message(
                 common.MAV_COLLISION_SRC_MAVLINK_GPS_GLOBAL_INT,
                 other,

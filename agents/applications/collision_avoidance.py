@@ -24,6 +24,7 @@ class CollisionAvoidance(Application):
 
     name: Final = "warning"
     listens = (mavlink.COLLISION_ID,)
+    avoids = True
 
     def __init__(self, scenario: Scenario, node: NodeId) -> None:
         self._monitor = ConflictMonitor(scenario, node)

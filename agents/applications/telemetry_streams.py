@@ -1,5 +1,8 @@
 """MAVLink telemetry of one UAV: the streams of messages that its flight controller would send, at their rates. Sans-IO.
 
+Without an operator the streams are those that a log needs. An operator who is heard gets all that a ground station
+draws, and changes the rate of each by message.
+
 Position and velocity are those of the receiver. The attitude is inferred: a multirotor tilts so that thrust and gravity
 add up to its acceleration, and it faces where it flies. The battery is as its sensor reads it; without a sensor nothing
 is known of it.
@@ -8,11 +11,12 @@ is known of it.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from fanet_mw.bus.messages import Battery, Gps
-from fanet_mw.mavlink import AUTOPILOT_COMPONENT, ORIGIN, Attitude, BatteryState, Encoder, Geodetic
-from fanet_mw.units import STILL, Enu, NodeId, S
+from fanet_mw.flavors import Mode
+from fanet_mw.mavlink import AUTOPILOT_COMPONENT, ORIGIN, Attitude, BatteryState, Encoder, Geodetic, common
+from fanet_mw.units import MS, STILL, Enu, NodeId, S
 
 GRAVITY_M_S2: Final = 9.80665
 MAX_TILT: Final = math.radians(35)
@@ -23,10 +27,58 @@ TURNING_M_S: Final = 0.5
 
 _HOUR_NS: Final = 3600 * S
 
-# No stream comes more often than this; `telemetry_hz` also bounds each stream, and sets the rate of the position.
+# `telemetry_hz` also bounds each stream, and sets the rate of the position.
 _EVERY_NS: Final = 1 * S
 _SELDOM_NS: Final = 5 * S
 _RARELY_NS: Final = 10 * S
+
+
+_FASTEST_NS: Final = 20 * MS
+"""No stream comes more often, whatever a ground station asks for."""
+_FIX_LASTS_NS: Final = 3 * S
+_OPERATORS: Final = {
+    common.MAVLINK_MSG_ID_HEARTBEAT: _EVERY_NS, common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: _EVERY_NS // 2,
+    common.MAVLINK_MSG_ID_ATTITUDE: _EVERY_NS, common.MAVLINK_MSG_ID_GPS_RAW_INT: _EVERY_NS,
+    common.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: _EVERY_NS, common.MAVLINK_MSG_ID_SYS_STATUS: _EVERY_NS,
+    common.MAVLINK_MSG_ID_BATTERY_STATUS: _SELDOM_NS, common.MAVLINK_MSG_ID_HOME_POSITION: _SELDOM_NS,
+    common.MAVLINK_MSG_ID_LOCAL_POSITION_NED: _EVERY_NS, common.MAVLINK_MSG_ID_VFR_HUD: _EVERY_NS,
+    common.MAVLINK_MSG_ID_MISSION_CURRENT: _EVERY_NS, common.MAVLINK_MSG_ID_SYSTEM_TIME: _SELDOM_NS,
+    common.MAVLINK_MSG_ID_RADIO_STATUS: _EVERY_NS,
+}  # fmt: skip
+"""The longest intervals while an operator is there."""
+
+_LOGGED: Final = {
+    common.MAVLINK_MSG_ID_HEARTBEAT: _EVERY_NS, common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 0,
+    common.MAVLINK_MSG_ID_ATTITUDE: _EVERY_NS, common.MAVLINK_MSG_ID_GPS_RAW_INT: _EVERY_NS,
+    common.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: _EVERY_NS, common.MAVLINK_MSG_ID_SYS_STATUS: _SELDOM_NS,
+    common.MAVLINK_MSG_ID_BATTERY_STATUS: _RARELY_NS, common.MAVLINK_MSG_ID_HOME_POSITION: _RARELY_NS,
+}  # fmt: skip
+"""The shortest intervals of what is sent without an operator, in the order of sending."""
+
+
+class Flown(NamedTuple):
+    """What the operator's side of the UAV knows of its flight, for telemetry."""
+
+    mode: Mode = Mode.MISSION
+    armed: bool = True
+    on_ground: bool = False
+    critical: bool = False
+    mission_at: int = 0
+    mission_items: int = 0
+    mission_flies: bool = False
+    home: Enu = STILL
+    fenced: bool = False
+    """An operator has uploaded a fence."""
+    beyond: bool = False
+    """The UAV is where the fence does not want it."""
+
+
+class Link(NamedTuple):
+    """The radio link of the UAV, as a modem would tell it."""
+
+    rssi_dbm: float | None = None
+    """The power of the strongest neighbor; None: nobody is heard."""
+    lost: int = 0
 
 
 @dataclass
@@ -36,6 +88,8 @@ class _Stream:
     encode: Callable[[int], bytes]
     interval_ns: int
     due_ns: int
+    usual_ns: int = 0
+    """The interval that is in force unless an operator asks for another."""
 
 
 class TelemetryStreams:
@@ -44,7 +98,10 @@ class TelemetryStreams:
     def __init__(self, node: NodeId, *, position: Enu, telemetry_hz: float, origin: Geodetic = ORIGIN) -> None:
         self.position = position
         self.velocity = STILL
-        self._home = position
+        self.flown = Flown(home=position)
+        self.link = Link()
+        self.height_off_m = 0.0
+        """By how much the receiver is wrong in height; the flight controller tells heights without it."""
         self._acceleration = STILL
         self._yaw: float | None = None
         """The heading; it is unknown until the UAV has flown. A heading of 0 would also shorten hellos, because MAVLink
@@ -57,33 +114,108 @@ class TelemetryStreams:
         self._beacons = Encoder(node, component=AUTOPILOT_COMPONENT, origin=origin)
         """The encoder of frames for the air. It counts them apart from telemetry, so that a gap in their numbers is a
         loss."""
-        self._streams = self._plan(node, telemetry_hz) if telemetry_hz else []
-        self._due_ns = min((stream.due_ns for stream in self._streams), default=None)
+        self.encoder = self._encoder
+        """The encoder of all that the flight controller says; answers to a ground station are numbered among
+        telemetry."""
+        self._node = node
+        self._base_ns = max(1, round(S / telemetry_hz)) if telemetry_hz else 0
+        self._messages = self._encoders()
+        self._streams: dict[int, _Stream] = {}
+        for message_id, least_ns in _LOGGED.items() if telemetry_hz else ():
+            self._begin(message_id, max(least_ns, self._base_ns), self._phase_ns)
+        self._due_ns = self._first_ns()
 
-    def _plan(self, node: NodeId, telemetry_hz: float) -> list[_Stream]:
-        """The streams in the order of sending. Their phases depend on the node's id, so that not all nodes send at
-        once.
-        """
+    def _encoders(self) -> dict[int, Callable[[int], bytes]]:
+        """What makes each message that the flight controller sends, by its id."""
         encoder = self._encoder
-        base_ns = max(1, round(S / telemetry_hz))
-        due_ns = node * 7_919_000 % base_ns
-        wanted: list[tuple[int, Callable[[int], bytes]]] = [
-            (_EVERY_NS, lambda _: encoder.heartbeat()),
-            (0, self._global_position),
-            (_EVERY_NS, lambda now_ns: encoder.attitude(self.attitude, now_ns=now_ns)),
-            (_EVERY_NS, self._gps_raw),
-            (_EVERY_NS, lambda _: encoder.extended_sys_state()),
-            (_SELDOM_NS, lambda _: encoder.sys_status(self._battery)),
-            (_RARELY_NS, lambda _: encoder.battery_status(self._battery)),
-            (_RARELY_NS, lambda _: encoder.home_position(self._home)),
-        ]
-        return [_Stream(encode, max(interval_ns, base_ns), due_ns) for interval_ns, encode in wanted]
+        return {
+            common.MAVLINK_MSG_ID_HEARTBEAT: lambda _: encoder.vehicle_heartbeat(
+                self.flown.mode, armed=self.flown.armed, critical=self.flown.critical
+            ),
+            common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._global_position,
+            common.MAVLINK_MSG_ID_ATTITUDE: lambda now_ns: encoder.attitude(self.attitude, now_ns=now_ns),
+            common.MAVLINK_MSG_ID_GPS_RAW_INT: self._gps_raw,
+            common.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: lambda _: encoder.extended_sys_state(self._landed()),
+            common.MAVLINK_MSG_ID_SYS_STATUS: lambda now_ns: encoder.sys_status(
+                self._battery,
+                has_fix=self._fix_ns is not None and now_ns - self._fix_ns < _FIX_LASTS_NS,
+                fenced=self.flown.fenced,
+                beyond=self.flown.beyond,
+            ),
+            common.MAVLINK_MSG_ID_BATTERY_STATUS: lambda _: encoder.battery_status(self._battery),
+            common.MAVLINK_MSG_ID_HOME_POSITION: lambda _: encoder.home_position(self.flown.home),
+            common.MAVLINK_MSG_ID_LOCAL_POSITION_NED: lambda now_ns: encoder.local_position(
+                self._estimate, self.velocity, now_ns=now_ns
+            ),
+            common.MAVLINK_MSG_ID_VFR_HUD: lambda _: encoder.vfr_hud(self._estimate, self.velocity, yaw=self._yaw),
+            common.MAVLINK_MSG_ID_MISSION_CURRENT: lambda _: encoder.mission_current(
+                self.flown.mission_at, items=self.flown.mission_items, flies=self.flown.mission_flies
+            ),
+            common.MAVLINK_MSG_ID_SYSTEM_TIME: lambda now_ns: encoder.system_time(now_ns),
+            common.MAVLINK_MSG_ID_RADIO_STATUS: lambda _: encoder.radio_status(self.link.rssi_dbm, self.link.lost),
+            common.MAVLINK_MSG_ID_AUTOPILOT_VERSION: lambda _: encoder.autopilot_version(self._node),
+        }
+
+    @property
+    def _phase_ns(self) -> int:
+        """The phase of the streams depends on the node's id, so that not all nodes send at once."""
+        return self._node * 7_919_000 % self._base_ns if self._base_ns else self._node * 7_919_000 % S
+
+    def _begin(self, message_id: int, interval_ns: int, due_ns: int) -> None:
+        self._streams[message_id] = _Stream(self._messages[message_id], interval_ns, due_ns, interval_ns)
+
+    def _first_ns(self) -> int | None:
+        return min((stream.due_ns for stream in self._streams.values()), default=None)
+
+    def operator(self, now_ns: int) -> None:
+        """An operator is there from now on."""
+        for message_id, interval_ns in _OPERATORS.items():
+            stream = self._streams.get(message_id)
+            if stream is None:
+                self._begin(message_id, interval_ns, now_ns + self._phase_ns % interval_ns)
+            elif stream.usual_ns > interval_ns:
+                stream.interval_ns = stream.usual_ns = interval_ns
+                stream.due_ns = min(stream.due_ns, now_ns + interval_ns)
+        self._due_ns = self._first_ns()
+
+    def set_interval(self, message_id: int, interval_ns: int | None, now_ns: int) -> bool:
+        """Change how often a message is sent; None: as usual, negative: never. False for one that is never sent."""
+        if message_id not in self._messages:
+            return False
+        stream = self._streams.get(message_id)
+        usual_ns = stream.usual_ns if stream else 0
+        wanted_ns = usual_ns or _OPERATORS.get(message_id, -1) if interval_ns is None else interval_ns
+        if wanted_ns < 0:
+            self._streams.pop(message_id, None)
+        else:
+            wanted_ns = max(_FASTEST_NS, wanted_ns)
+            self._begin(message_id, wanted_ns, now_ns + self._phase_ns % wanted_ns)
+            self._streams[message_id].usual_ns = usual_ns or wanted_ns
+        self._due_ns = self._first_ns()
+        return True
+
+    def interval_ns(self, message_id: int) -> int | None:
+        """How often a message is sent: 0 for one that is not, None for one that cannot be."""
+        stream = self._streams.get(message_id)
+        return stream.interval_ns if stream else 0 if message_id in self._messages else None
+
+    def one(self, message_id: int, now_ns: int) -> bytes | None:
+        """One message now; None for one that is never sent."""
+        encode = self._messages.get(message_id)
+        return None if encode is None else encode(now_ns)
+
+    def _landed(self) -> int:
+        flown = self.flown
+        if flown.on_ground:
+            return int(common.MAV_LANDED_STATE_ON_GROUND)
+        landed = {Mode.TAKEOFF: common.MAV_LANDED_STATE_TAKEOFF, Mode.LAND: common.MAV_LANDED_STATE_LANDING}
+        return int(landed.get(flown.mode, common.MAV_LANDED_STATE_IN_AIR))
 
     def start(self, now_ns: int) -> None:
         """Begin telemetry now, in this node's phase."""
-        for stream in self._streams:
+        for stream in self._streams.values():
             stream.due_ns += max(0, -((stream.due_ns - now_ns) // stream.interval_ns)) * stream.interval_ns
-        self._due_ns = min((stream.due_ns for stream in self._streams), default=None)
+        self._due_ns = self._first_ns()
 
     # --- in -------------------------------------------------------------------------------------------------------
 
@@ -100,6 +232,16 @@ class TelemetryStreams:
         self.position, self.velocity, self._fix_ns = gps.position, gps.velocity, gps.t_ns
         if gps.velocity.horizontal() >= TURNING_M_S:
             self._yaw = math.atan2(gps.velocity.east, gps.velocity.north)
+
+    @property
+    def yaw(self) -> float | None:
+        """The heading; None until the UAV has flown or was turned."""
+        return self._yaw
+
+    def face(self, yaw: float) -> None:
+        """Turn a UAV that hovers: the vehicles of the world have no heading of their own, so this is told alone."""
+        if self.velocity.horizontal() < TURNING_M_S:
+            self._yaw = math.remainder(yaw, math.tau)
 
     def on_battery(self, reading: Battery) -> None:
         """The sensor of the battery has given a reading; consumption counts from the first reading."""
@@ -134,10 +276,10 @@ class TelemetryStreams:
         """The frames that are due now: one of each stream, however late, because older telemetry is of no use."""
         if self._due_ns is None or now_ns < self._due_ns:
             return b""
-        due = [stream for stream in self._streams if stream.due_ns <= now_ns]
+        due = [stream for stream in self._streams.values() if stream.due_ns <= now_ns]
         for stream in due:
             stream.due_ns += ((now_ns - stream.due_ns) // stream.interval_ns + 1) * stream.interval_ns
-        self._due_ns = min(stream.due_ns for stream in self._streams)
+        self._due_ns = self._first_ns()
         return b"".join(stream.encode(now_ns) for stream in due)
 
     def beacon_frames(self, now_ns: int) -> bytes:
@@ -145,10 +287,17 @@ class TelemetryStreams:
         return self._beacons.heartbeat() + self._position(self._beacons, now_ns)
 
     def _global_position(self, now_ns: int) -> bytes:
-        return self._position(self._encoder, now_ns)
+        return self._encoder.global_position(
+            self._estimate, self.velocity, yaw=self._yaw, now_ns=now_ns, home_m=self.flown.home.up
+        )
 
     def _position(self, encoder: Encoder, now_ns: int) -> bytes:
         return encoder.global_position(self.position, self.velocity, yaw=self._yaw, now_ns=now_ns)
+
+    @property
+    def _estimate(self) -> Enu:
+        """Where the flight controller believes to be."""
+        return self.position._replace(up=self.position.up - self.height_off_m)
 
     def _gps_raw(self, now_ns: int) -> bytes:
         fix_ns = now_ns if self._fix_ns is None else self._fix_ns

@@ -10,7 +10,8 @@ fanet/<swarm>/world/<id>/setpoint    Setpoint               UAV -> world
 fanet/<swarm>/world/<id>/sensor/gps  Gps
 fanet/<swarm>/world/<id>/sensor/wifi WifiScan; camera: Camera, voice: Voice, radar: Radar, altimeter: Altimeter,
 inertial: Inertial, battery: Battery, image: CameraImage
-fanet/<swarm>/mavlink/<id>           MavlinkTap
+fanet/<swarm>/mavlink/<id>           MavlinkTap             UAV -> observers, gateways
+fanet/<swarm>/mavlink/<id>/in        MavlinkTap             gateway -> UAV
 fanet/<swarm>/ground/order           Order                  anyone -> the post on the ground
 fanet/<swarm>/trace/<id>             TraceBatch             <id> is the actor's name
 fanet/<swarm>/report/<id>            Report                 <id> is the actor's name
@@ -70,6 +71,10 @@ class Topics:
 
     def mavlink(self, node: int | str) -> str:
         return f"{self._base}/mavlink/{node}"
+
+    def operator(self, node: int | str) -> str:
+        """The topic on which a gateway hands a UAV what ground stations say to it."""
+        return f"{self.mavlink(node)}/in"
 
     def trace(self, name: str) -> str:
         return f"{self._base}/trace/{name}"

@@ -8,7 +8,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 from cyclopts import Parameter, Token
 
@@ -18,6 +18,7 @@ from sim.cli.console import Console
 from sim.run.bus.running_swarms import DEFAULT_ENDPOINT, locate
 
 if TYPE_CHECKING:
+    from fanet_mw.gateway.gateway import Doors
     from fanet_mw.hosts.realtime import SwarmAddress
     from fanet_mw.scenario import Scenario
 
@@ -177,6 +178,40 @@ class SwarmFlags:
         """The endpoint and, if it is known, the name of the swarm; warns if others can reach the endpoint."""
         warn_of(self.connect, listens=False)
         return locate(self.connect, self.swarm)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class DoorFlags:
+    """The connections to ground stations."""
+
+    mavlink: Annotated[tuple[str, ...], Parameter(negative="")] = ()
+    """A connection for ground stations, repeatable: udpout:127.0.0.1:14550, udpin:, tcpin:, tcpout: or
+    serial:DEVICE:BAUD."""
+    mavlink_per_uav: str | None = None
+    """A connection for each UAV, its ports counted up from UAV 1's: udpin:127.0.0.1:14540+."""
+    flavor: Literal["px4", "ardupilot"] = "px4"
+    """Whose flight modes ground stations see."""
+    mavlink_key: Path | None = None
+    """File of a key for MAVLink 2 signatures; what is not signed by it is refused."""
+
+    def doors(self, *, default: bool = False) -> "Doors":
+        """The connections, checked; by default the one where ground stations listen, if `default` is set."""
+        from fanet_mw.flavors import Flavor
+        from fanet_mw.gateway.connections import DEFAULT
+        from fanet_mw.gateway.gateway import Doors
+
+        given = self.mavlink or ((DEFAULT,) if default and self.mavlink_per_uav is None else ())
+        return Doors(given, self.mavlink_per_uav, Flavor(self.flavor), self.mavlink_key).checked()
+
+    def command(self) -> list[str] | None:
+        """The words of `fanet gateway` with these connections; None if there are none."""
+        if not self.mavlink and self.mavlink_per_uav is None:
+            return None
+        words = [word for text in self.mavlink for word in ("--mavlink", text)]
+        words += [] if self.mavlink_per_uav is None else ["--mavlink-per-uav", self.mavlink_per_uav]
+        words += [] if self.mavlink_key is None else ["--mavlink-key", str(self.mavlink_key.absolute())]
+        return ["gateway", *words, "--flavor", self.flavor]
 
 
 def print_notes(scenario: "Scenario") -> None:

@@ -19,7 +19,7 @@ from sim.cli.companions import Companions, record_command, view_command
 from sim.cli.completion import ScenarioName
 from sim.cli.console import Console
 from sim.cli.memory import COMPILING_MB, require
-from sim.cli.options import OutputFlags, ScenarioFlags, print_notes, warn_of
+from sim.cli.options import DoorFlags, OutputFlags, ScenarioFlags, print_notes, warn_of
 
 if TYPE_CHECKING:
     from cyclopts import App
@@ -102,6 +102,7 @@ def launch(
     connect: str | None = None,
     swarm: str | None = None,
     zenoh_config: Path | None = None,
+    doors: DoorFlags = DoorFlags(),
 ) -> int:
     """Run a scenario in real time: one process per UAV, the link emulator and the world, over Zenoh.
 
@@ -138,6 +139,7 @@ def launch(
 
     chosen = choice.realtime_scenario(scenario) if no_world else choice.scenario(scenario)
     output.prepare()
+    doors.doors()
     chosen, leads = (chosen, None) if no_world else fitted(chosen, _say)  # another's world has the scenario as it is
     print_notes(chosen)
     warn_of(listen, listens=True)
@@ -147,6 +149,8 @@ def launch(
         import viser  # noqa: F401  what is missing is said before the run
 
         beside.append(view_command(view_port))
+    if (words := doors.command()) is not None:
+        beside.append(words)
     with begun(output.out), Companions(beside) as companions, _watched(chosen, quiet=output.json) as tell:
         outcome = asyncio.run(
             run(

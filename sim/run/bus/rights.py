@@ -1,15 +1,16 @@
 """The rights of each participant of a swarm, as an access list of Zenoh's router: what is not allowed is denied.
 
-    agent-N    puts its requests, setpoint, telemetry, trace and report; subscribes to its receptions and sensors, and
-               the post on the ground to orders
+    agent-N    puts its requests, setpoint, telemetry, trace and report; subscribes to its receptions, its sensors and
+               what ground stations say to it, and the post on the ground to orders
     emulator   puts receptions, links, trace and report; subscribes to requests, poses, obstructions, changes of the air
     world      puts poses, obstructions, sensors, radios of crashed UAVs, trace, report; subscribes to setpoints
     operator   puts changes of the air and of the clock's pace, and orders; subscribes to poses, links, traces, reports,
                telemetry
+    gateway    puts what ground stations say to UAVs; subscribes to telemetry
 
-All subscribe to the clock and query it, and all but the operator declare that they are alive. The launcher is the
-router itself: its own puts (the clock) pass no access list. Participants are identified by the common names of their
-certificates. A put that is denied disappears without a message to its sender.
+All subscribe to the clock and query it, and all but the operator and the gateway declare that they are alive. The
+launcher is the router itself: its own puts (the clock) pass no access list. Participants are identified by the common
+names of their certificates. A put that is denied disappears without a message to its sender.
 """
 
 from typing import Any, Final, NamedTuple
@@ -17,6 +18,7 @@ from typing import Any, Final, NamedTuple
 from fanet_mw.bus.topics import ROOT, Topics
 from fanet_mw.scenario import Scenario
 from sim.run.bus.air_control import OPERATOR
+from sim.run.gateway import GATEWAY
 
 _INTO: Final = "ingress"
 _OUT_OF: Final = "egress"
@@ -49,7 +51,12 @@ def rights(scenario: Scenario, names: Topics) -> dict[str, Rights]:
         return actor(
             f"agent-{node}",
             (names.radio_tx(node), names.setpoint(node), names.mavlink(node)),
-            (names.radio_rx(node), names.sensors(node), *((names.orders,) if node == scenario.post else ())),
+            (
+                names.radio_rx(node),
+                names.sensors(node),
+                names.operator(node),
+                *((names.orders,) if node == scenario.post else ()),
+            ),
         )
 
     return {
@@ -74,6 +81,12 @@ def rights(scenario: Scenario, names: Topics) -> dict[str, Rights]:
                 names.mavlink("*"),
                 names.clock,
             ),
+            queries=(names.clock, names.scenario),
+            watches=(f"{ROOT}/*/alive/**",),
+        ),
+        GATEWAY: Rights(
+            puts=(names.operator("*"),),
+            subscribes=(names.mavlink("*"), names.clock),
             queries=(names.clock, names.scenario),
             watches=(f"{ROOT}/*/alive/**",),
         ),

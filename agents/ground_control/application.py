@@ -1,0 +1,387 @@
+"""The application by which a ground station sees and commands one UAV: it answers as a flight controller does.
+
+    MAVLink of a ground station -> commands, parameters, plans -> the pilot -> courses, by the arbitration on board
+    answers, telemetry, texts   -> the tap
+
+It does nothing until a ground station is heard. What it does not understand it counts; what it does not support it
+says.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any, Final
+
+from agents.applications.telemetry_streams import Flown, Link, TelemetryStreams
+from agents.ground_control import settings as names
+from agents.ground_control.commands import Commands
+from agents.ground_control.height_reference import HeightReference
+from agents.ground_control.pilot import Pilot
+from agents.ground_control.plan_transfer import Peer, PlanTransfer
+from agents.ground_control.plans import Ground, Item, Kind, RefusedError, fence_of, rally_of, step_of
+from agents.ground_control.settings import LONGEST_NAME, Settings, settings_of
+from fanet_mw.application import Application, Course
+from fanet_mw.bus.messages import Battery, Gps, SensorReading
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.mavlink import AUTOPILOT_COMPONENT, Geodetic, Ned, common, decode, from_ned
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import MS, Enu, NodeId, S, earliest, seconds_to_ns
+from fanet_mw.wire import frames, system_id
+
+_MOST_PER_S: Final = 200
+"""A UAV looks at no more messages of operators in a second; a ground station that floods must not take its time."""
+_LOOK_NS: Final = 500 * MS
+"""How often the silence of an operator is looked for."""
+_LOW: Final = 0.2
+"""Below this share of its charge a battery is low."""
+_LINK_LASTS_NS: Final = 4 * S
+_ALL_COMPONENTS: Final = 0
+_TEXT_BYTES: Final = 50
+_FTP_ACK, _FTP_NAK = 128, 129
+_FTP_SESSIONS: Final = (1, 2)
+"""TerminateSession and ResetSessions, which a vehicle without files carries out at once."""
+_FTP_NO_FILE, _FTP_UNKNOWN = 10, 7
+_FTP_OPENS: Final = (3, 4, 5, 14, 15)
+"""ListDirectory, the ways to open or read, and the checksum: of files, of which there are none."""
+_POSITION_IGNORED: Final = 0b111
+_VELOCITY_IGNORED: Final = 0b111000
+
+
+class GroundControl(Application):
+    """The side of one UAV that a ground station sees."""
+
+    name: Final = "operator"
+
+    def __init__(self, scenario: Scenario, node: NodeId, streams: TelemetryStreams, *, position: Enu) -> None:
+        self._node, self._streams = node, streams
+        origin = Geodetic(*scenario.world.origin_deg, 0.0)
+        on_ground = scenario.nodes.on_ground
+        home = position if on_ground else position._replace(up=0.0)
+        half_m = scenario.world.area_m / 2
+        self._settings = settings = Settings(settings_of(scenario, node))
+        mission, model = scenario.mission, scenario.mobility.model
+        self._pilot = pilot = Pilot(
+            home=home,
+            on_ground=on_ground,
+            has_task=mission.search != "none" or mission.formation != "none" or model not in ("static", "onboard"),
+            area_m=Enu(max(half_m, abs(position.east)), max(half_m, abs(position.north)), 0.0),
+            settings=settings,
+            say=self._say,
+        )
+        pilot.position = position
+        pilot.mission.on_reached = self._on_reached
+        self._ground = Ground(origin, home.up)
+        self._height = HeightReference(position.up)
+        self._transfer = PlanTransfer(self._reply, check=self._check, accept=self._accept)
+        self._commands = Commands(
+            pilot, streams, lambda: self._ground, reply=self._reply, send=self._send,
+        )  # fmt: skip
+        self._out: list[bytes] = []
+        self._heard_ns: int | None = None
+        """The instant at which an operator was heard last; None: never yet, or lost."""
+        self._look_ns: int | None = None
+        self._second, self._in_second = -1, 0
+        self._counts: Counter[str] = Counter()
+        self._low = False
+        self._link = Link()
+        self._link_ns = 0
+        streams.flown = self._flown()
+
+    # --- in -------------------------------------------------------------------------------------------------------
+
+    def on_operator(self, frames_: bytes, now_ns: int) -> None:
+        """MAVLink frames of a ground station."""
+        if now_ns // S != self._second:
+            self._second, self._in_second = now_ns // S, 0
+        for frame in frames(frames_):
+            self._in_second += 1
+            if self._in_second > _MOST_PER_S:
+                self._counts["flooded"] += 1
+                continue
+            try:
+                (message,) = decode(frame)
+            except MalformedFrameError:
+                self._counts["malformed"] += 1
+                continue
+            self._on_message(message, now_ns)
+        self._settle(now_ns)
+
+    def _on_message(self, message: Any, now_ns: int) -> None:  # noqa: ANN401  (pymavlink has no types)
+        peer = Peer(message.get_srcSystem(), message.get_srcComponent())
+        if getattr(message, "target_system", 0) not in (0, system_id(self._node)):
+            self._counts["not_for_this_node"] += 1
+            return
+        if self._heard_ns is None:
+            self._streams.operator(now_ns)
+        self._heard_ns = now_ns
+        if self._look_ns is None:
+            self._look_ns = now_ns + _LOOK_NS
+        if getattr(message, "target_component", _ALL_COMPONENTS) not in (_ALL_COMPONENTS, AUTOPILOT_COMPONENT):
+            self._counts["for_other_components"] += 1
+            return
+        if self._transfer.on_message(message, peer, now_ns):
+            self._counts["understood"] += 1
+            return
+        handle = self._HANDLERS.get(message.get_type())
+        self._counts["not_understood" if handle is None else "understood"] += 1
+        if handle is not None:
+            handle(self, message, peer, now_ns)
+
+    def on_fix(self, fix: Gps, now_ns: int) -> None:
+        off_m = self._height.off_m(fix, stands=self._pilot.on_ground)
+        self._streams.height_off_m = off_m
+        self._pilot.on_fix(fix.position._replace(up=fix.position.up - off_m), fix.velocity, now_ns)
+        self._settle(now_ns)
+
+    def on_sensor(self, reading: SensorReading, now_ns: int) -> None:
+        if isinstance(reading, Battery):
+            low = reading.charge < _LOW
+            if low and not self._low:
+                self._say(2, f"Low battery: {reading.charge:.0%}")
+            self._low = low
+            self._settle(now_ns)
+
+    def on_link(self, rssi_dbm: float, lost: int, now_ns: int) -> None:
+        """A neighbor was heard; the strongest of the last seconds is told."""
+        best = self._link.rssi_dbm
+        if best is None or rssi_dbm >= best or now_ns - self._link_ns > S:
+            self._link, self._link_ns = Link(rssi_dbm, lost), now_ns
+
+    def permits(self, course: Course, now_ns: int) -> bool:
+        return not (self._counts["commanded"] and self._pilot.commands)
+
+    def wake(self, now_ns: int) -> None:
+        if self._look_ns is not None and now_ns >= self._look_ns:
+            self._look_ns = now_ns + _LOOK_NS
+            self._look(now_ns)
+        self._transfer.wake(now_ns)
+        self._settle(now_ns)
+
+    def _look(self, now_ns: int) -> None:
+        """See whether the operator has fallen silent, and whether neighbors are still heard."""
+        if self._link.rssi_dbm is not None and now_ns - self._link_ns > _LINK_LASTS_NS:
+            self._link = Link(None, self._link.lost)
+            self._say(4, "Radio: no neighbor is heard")
+        if self._heard_ns is not None and now_ns - self._heard_ns > seconds_to_ns(self._settings[names.SILENCE]):
+            self._heard_ns = None
+            self._counts["silences"] += 1
+            self._pilot.silent()
+
+    def next_wake_ns(self) -> int | None:
+        return earliest(self._look_ns, self._transfer.next_due_ns())
+
+    def report(self) -> Mapping[str, Any]:
+        return {f"operator_{name}": count for name, count in sorted(self._counts.items())}
+
+    # --- what ground stations ask ---------------------------------------------------------------------------------
+
+    def _on_command(self, message: Any, peer: Peer, now_ns: int) -> None:  # noqa: ANN401
+        self._counts["commanded"] += 1
+        self._commands.on_command(message, peer, now_ns)
+
+    def _on_set_mode(self, message: Any, peer: Peer, now_ns: int) -> None:  # noqa: ANN401
+        self._counts["commanded"] += 1
+        result = self._commands.set_mode(message.custom_mode, now_ns)
+        self._reply(common.MAVLink_command_ack_message(common.MAVLINK_MSG_ID_SET_MODE, result, 0, 0, *peer))
+
+    def _on_set_current(self, message: Any, _peer: Peer, now_ns: int) -> None:  # noqa: ANN401
+        if 0 <= message.seq < len(self._pilot.mission.steps):
+            self._pilot.mission.go_to(message.seq)
+        self._refresh()
+        self._send(self._streams.one(common.MAVLINK_MSG_ID_MISSION_CURRENT, now_ns) or b"")
+
+    def _on_local_setpoint(self, message: Any, _peer: Peer, now_ns: int) -> None:  # noqa: ANN401
+        here = self._pilot.position
+        place: Enu | None = None
+        if message.coordinate_frame == common.MAV_FRAME_LOCAL_NED:
+            place = from_ned(Ned(message.x, message.y, message.z))
+        elif message.coordinate_frame == common.MAV_FRAME_LOCAL_OFFSET_NED:
+            offset = from_ned(Ned(message.x, message.y, message.z))
+            place = Enu(here.east + offset.east, here.north + offset.north, here.up + offset.up)
+        self._on_setpoint(message, place, now_ns)
+
+    def _on_global_setpoint(self, message: Any, _peer: Peer, now_ns: int) -> None:  # noqa: ANN401
+        place = self._ground.place(message.coordinate_frame, message.lat_int, message.lon_int, message.alt)
+        self._on_setpoint(message, place, now_ns)
+
+    def _on_setpoint(self, message: Any, place: Enu | None, now_ns: int) -> None:  # noqa: ANN401
+        self._counts["commanded"] += 1
+        mask = message.type_mask
+        velocity: Enu | None = None
+        if mask & _POSITION_IGNORED == _POSITION_IGNORED:
+            place = None
+            if mask & _VELOCITY_IGNORED != _VELOCITY_IGNORED:
+                velocity = from_ned(Ned(message.vx, message.vy, message.vz))
+        known = place if velocity is None else velocity
+        if known is None or not all(math.isfinite(part) for part in known):
+            self._counts["senseless_setpoints"] += 1
+        elif not self._pilot.setpoint(place, velocity, now_ns):
+            self._counts["refused_setpoints"] += 1
+
+    def _on_data_stream(self, message: Any, _peer: Peer, now_ns: int) -> None:  # noqa: ANN401
+        rate = message.req_message_rate
+        for message_id in _GROUPS.get(message.req_stream_id, ()):
+            if not message.start_stop or not rate:
+                self._streams.set_interval(message_id, -1, now_ns)
+            else:
+                self._streams.set_interval(message_id, S // max(1, min(50, rate)), now_ns)
+
+    def _on_param_list(self, _message: Any, _peer: Peer, _now_ns: int) -> None:  # noqa: ANN401
+        for at in range(len(self._settings.known)):
+            self._say_param(at)
+
+    def _on_param_read(self, message: Any, peer: Peer, _now_ns: int) -> None:  # noqa: ANN401
+        at: int | None = message.param_index
+        if message.param_index == -1:
+            at = self._settings.index(message.param_id)
+        if at is None or not 0 <= at < len(self._settings.known):
+            self._say_param_error(message, peer, message.param_index, common.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+        else:
+            self._say_param(at)
+
+    def _on_param_set(self, message: Any, peer: Peer, _now_ns: int) -> None:  # noqa: ANN401
+        at = self._settings.index(message.param_id)
+        if at is None:
+            self._say_param_error(message, peer, -1, common.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+            return
+        if message.param_type != common.MAV_PARAM_TYPE_REAL32:
+            self._say_param_error(message, peer, at, common.MAV_PARAM_ERROR_TYPE_MISMATCH)
+        elif not self._settings.change(message.param_id, message.param_value):
+            self._say_param_error(message, peer, at, common.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
+        self._say_param(at)
+
+    def _say_param(self, at: int) -> None:
+        known = self._settings.known
+        self._reply(
+            common.MAVLink_param_value_message(
+                known[at].name.encode(), self._settings[known[at].name], common.MAV_PARAM_TYPE_REAL32, len(known), at
+            )
+        )
+
+    def _say_param_error(self, message: Any, peer: Peer, at: int, error: int) -> None:  # noqa: ANN401
+        name = message.param_id.encode()[:LONGEST_NAME]
+        self._reply(common.MAVLink_param_error_message(*peer, name, at, error))
+
+    def _on_file(self, message: Any, peer: Peer, _now_ns: int) -> None:  # noqa: ANN401
+        """MAVLink FTP: there are no files, and each request is told so."""
+        asked = message.payload
+        seq, opcode = (asked[0] | asked[1] << 8) + 1 & 0xFFFF, asked[3]
+        answer = [0] * len(asked)
+        answer[0], answer[1], answer[2], answer[5] = seq & 0xFF, seq >> 8, asked[2], opcode
+        if opcode in _FTP_SESSIONS:
+            answer[3] = _FTP_ACK
+        else:
+            answer[3], answer[4] = _FTP_NAK, 1
+            answer[12] = _FTP_NO_FILE if opcode in _FTP_OPENS else _FTP_UNKNOWN
+        self._reply(common.MAVLink_file_transfer_protocol_message(0, *peer, answer))
+
+    def _on_ping(self, message: Any, peer: Peer, _now_ns: int) -> None:  # noqa: ANN401
+        if not message.target_system:
+            self._reply(common.MAVLink_ping_message(message.time_usec, message.seq, *peer))
+
+    def _on_timesync(self, message: Any, _peer: Peer, now_ns: int) -> None:  # noqa: ANN401
+        if not message.tc1:
+            self._reply(common.MAVLink_timesync_message(now_ns, message.ts1))
+
+    def _on_logs(self, _message: Any, _peer: Peer, _now_ns: int) -> None:  # noqa: ANN401
+        self._reply(common.MAVLink_log_entry_message(0, 0, 0, 0, 0))
+
+    def _ignore(self, _message: Any, _peer: Peer, _now_ns: int) -> None:  # noqa: ANN401
+        """A message that only says that an operator is there."""
+
+    _HANDLERS: Final = {
+        "HEARTBEAT": _ignore,
+        "SYSTEM_TIME": _ignore,
+        "COMMAND_LONG": _on_command,
+        "COMMAND_INT": _on_command,
+        "SET_MODE": _on_set_mode,
+        "MISSION_SET_CURRENT": _on_set_current,
+        "SET_POSITION_TARGET_LOCAL_NED": _on_local_setpoint,
+        "SET_POSITION_TARGET_GLOBAL_INT": _on_global_setpoint,
+        "REQUEST_DATA_STREAM": _on_data_stream,
+        "PARAM_REQUEST_LIST": _on_param_list,
+        "PARAM_REQUEST_READ": _on_param_read,
+        "PARAM_SET": _on_param_set,
+        "FILE_TRANSFER_PROTOCOL": _on_file,
+        "PING": _on_ping,
+        "TIMESYNC": _on_timesync,
+        "LOG_REQUEST_LIST": _on_logs,
+    }
+
+    # --- plans ----------------------------------------------------------------------------------------------------
+
+    def _check(self, kind: Kind, item: Item) -> None:
+        """Raise RefusedError for an item of a mission that cannot be flown."""
+        if kind is Kind.MISSION:
+            step_of(item, self._ground)
+
+    def _accept(self, kind: Kind, items: list[Item]) -> None:
+        """Take a whole plan into force; raises RefusedError."""
+        pilot = self._pilot
+        if kind is Kind.MISSION:
+            steps = [step_of(item, self._ground) for item in items]
+            if not all(pilot.may_fly(step) for step in steps):
+                raise RefusedError(common.MAV_MISSION_INVALID_PARAM7)
+            flies = pilot.commands and not pilot.mission.idle
+            pilot.mission.load(steps)
+            if flies:
+                pilot.hold()
+        elif kind is Kind.FENCE:
+            pilot.fence = fence_of(items, self._ground)
+        else:
+            pilot.rally = rally_of(items, self._ground)
+
+    def _on_reached(self, at: int) -> None:
+        self._reply(common.MAVLink_mission_item_reached_message(at))
+
+    # --- out ------------------------------------------------------------------------------------------------------
+
+    def _say(self, severity: int, text: str) -> None:
+        """Tell operators something, once anybody listens."""
+        if self._heard_ns is not None or self._counts["commanded"]:
+            self._reply(common.MAVLink_statustext_message(severity, text.encode()[:_TEXT_BYTES]))
+
+    def _reply(self, message: Any) -> None:  # noqa: ANN401  (pymavlink has no types)
+        self._out.append(self._streams.encoder.pack(message))
+
+    def _send(self, frame: bytes) -> None:
+        self._out.append(frame)
+
+    def _settle(self, now_ns: int) -> None:
+        """Command the course of the pilot, and hand answers over."""
+        course = self._pilot.take_course()
+        if course is not None:
+            self.port.fly(course)
+        self._refresh()
+        if self._out:
+            out, self._out = self._out, []
+            self.port.tap(b"".join(out))
+
+    def _refresh(self) -> None:
+        self._streams.flown = self._flown()
+        self._streams.link = self._link
+
+    def _flown(self) -> Flown:
+        pilot = self._pilot
+        mission = pilot.mission
+        return Flown(
+            pilot.mode, pilot.armed, pilot.on_ground, critical=self._low, mission_at=mission.at,
+            mission_items=len(mission.steps), mission_flies=not mission.idle, home=pilot.home,
+            fenced=bool(pilot.fence), beyond=pilot.beyond,
+        )  # fmt: skip
+
+
+_POSITIONS: Final = (common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, common.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
+_ATTITUDES: Final = (common.MAVLINK_MSG_ID_ATTITUDE,)
+_STATES: Final = (
+    common.MAVLINK_MSG_ID_SYS_STATUS, common.MAVLINK_MSG_ID_GPS_RAW_INT, common.MAVLINK_MSG_ID_MISSION_CURRENT,
+)  # fmt: skip
+_HUDS: Final = (common.MAVLINK_MSG_ID_VFR_HUD,)
+_GROUPS: Final = {
+    common.MAV_DATA_STREAM_ALL: (*_POSITIONS, *_ATTITUDES, *_STATES, *_HUDS),
+    common.MAV_DATA_STREAM_EXTENDED_STATUS: _STATES,
+    common.MAV_DATA_STREAM_POSITION: _POSITIONS,
+    common.MAV_DATA_STREAM_EXTRA1: _ATTITUDES,
+    common.MAV_DATA_STREAM_EXTRA2: _HUDS,
+}
+"""The messages of the groups of REQUEST_DATA_STREAM."""

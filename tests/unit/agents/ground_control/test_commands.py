@@ -1,0 +1,462 @@
+"""What a UAV answers to the commands of a ground station, and what it then flies."""
+
+import math
+from itertools import pairwise
+
+import pytest
+from operator_bench import GCS, LAT, LON, Bench, degrees, scenario
+
+from fanet_mw import mavlink
+from fanet_mw.application import Course
+from fanet_mw.flavors import Mode, number_of
+from fanet_mw.mavlink import Geodetic, common
+from fanet_mw.units import Enu, S
+
+ACCEPTED, LATER, DENIED, UNSUPPORTED = 0, 1, 2, 3
+ARM, TAKEOFF, LAND, HOME = 400, 22, 21, 20
+REPOSITION, SPEED, MODE, START, PAUSE = 192, 178, 176, 300, 193
+
+
+def test_every_command_is_acknowledged_and_an_unknown_one_is_unsupported() -> None:
+    bench = Bench()
+    for number in (*range(1, 600), 31000, 65535):
+        assert bench.command(number) in range(7)
+        bench.now_ns += 10_000_000  # as many as a UAV looks at in a second
+    assert bench.command(31000) == UNSUPPORTED
+    assert bench.command(common.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1) == UNSUPPORTED
+
+
+def test_who_is_not_armed_does_not_take_off_and_who_flies_is_not_disarmed() -> None:
+    bench = Bench()
+    assert bench.command(TAKEOFF, 0, 0, 0, math.nan, math.nan, math.nan, 20) == LATER
+    bench.airborne()
+    assert bench.command(ARM, 0) == LATER
+    assert bench.flown.armed
+
+
+def test_take_off_climbs_straight_up_to_its_height_and_holds() -> None:
+    bench = Bench(at=Enu(100.0, 50.0, 0.0))
+    bench.airborne(15.0)
+    assert bench.position == pytest.approx((100.0, 50.0, 15.0), abs=0.1)
+    assert bench.flown.mode is Mode.HOLD
+
+
+def test_a_take_off_without_a_height_climbs_to_the_parameters() -> None:
+    bench = Bench()
+    bench.say(common.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", 12.5, 9))
+    bench.command(ARM, 1)
+    assert bench.command(TAKEOFF, 0, 0, 0, math.nan, math.nan, math.nan, math.nan) == ACCEPTED
+    assert bench.courses[-1].position.up == 12.5
+
+
+def test_a_landing_ends_on_the_ground_disarmed() -> None:
+    bench = Bench().airborne()
+    assert bench.command(LAND) == ACCEPTED
+    assert bench.flown.mode is Mode.LAND
+    bench.run(20 / 1.5 + 4)
+    assert bench.position.up == 0.0
+    assert bench.flown.on_ground
+    assert not bench.flown.armed
+    assert "Landed and disarmed" in [text.text for text in bench.told("STATUSTEXT")]
+
+
+def test_a_return_climbs_first_then_crosses_then_lands_at_home() -> None:
+    bench = Bench()
+    bench.say(common.MAVLink_param_set_message(1, 1, b"RTL_RETURN_ALT", 40.0, 9))
+    bench.airborne()
+    go_to(bench, 200, 0, 20)
+    bench.run(25)
+    assert bench.command(HOME) == ACCEPTED
+    ways = len(bench.courses)
+    bench.run(90)
+    up, over, down = bench.courses[ways - 1 :]
+    assert up.position == pytest.approx((200, 0, 40), abs=3)
+    assert over.position == pytest.approx((0, 0, 40), abs=3)
+    assert down.land
+    assert bench.position == pytest.approx((0, 0, 0), abs=3)
+    assert bench.flown.on_ground
+
+
+def test_with_rally_points_a_return_ends_at_the_nearest() -> None:
+    bench = Bench()
+    x, y = degrees(150, 0)
+    upload(bench, [(3, common.MAV_CMD_NAV_RALLY_POINT, x, y, 20.0, (0, 0, 0, 0))], kind=2)
+    bench.airborne()
+    go_to(bench, 200, 0, 20)
+    bench.run(25)
+    bench.command(HOME)
+    bench.run(120)
+    assert bench.position == pytest.approx((150, 0, 0), abs=3.5)
+    assert bench.flown.on_ground
+
+
+def go_to(bench: Bench, east: float, north: float, up: float, *, flags: float = 1) -> int:
+    place = mavlink.to_geodetic(Enu(east, north, 0.0), Geodetic(LAT, LON, 0.0))
+    x, y = round(place.lat_deg * 1e7), round(place.lon_deg * 1e7)
+    message = common.MAVLink_command_int_message(1, 1, 6, REPOSITION, 0, 0, -1, flags, 0, math.nan, x, y, up)
+    (ack,) = [answer for answer in bench.say(message) if answer.get_type() == "COMMAND_ACK"]
+    return int(ack.result)
+
+
+def test_a_reposition_flies_there_at_the_parameters_speed() -> None:
+    bench = Bench().airborne()
+    bench.say(common.MAVLink_param_set_message(1, 1, b"MPC_XY_CRUISE", 8.0, 9))
+    assert go_to(bench, 120, -40, 30) == ACCEPTED
+    course = bench.courses[-1]
+    assert course.position == pytest.approx((120, -40, 30), abs=0.05)
+    assert course.speed_m_s == 8.0
+    bench.run(20)
+    assert bench.position == pytest.approx((120, -40, 30), abs=0.1)
+
+
+@pytest.mark.parametrize("place", [(501, 0, 20), (0, -700, 20), (0, 0, 1001), (0, 0, 2)])
+def test_nobody_is_sent_out_of_the_area(place: tuple[float, float, float]) -> None:
+    bench = Bench().airborne()
+    flown = len(bench.courses)
+    assert go_to(bench, *place) == DENIED
+    assert len(bench.courses) == flown
+
+
+def test_who_stands_on_the_ground_is_not_sent_anywhere() -> None:
+    bench = Bench()
+    bench.command(ARM, 1)
+    assert go_to(bench, 10, 10, 20) == LATER
+
+
+def test_another_speed_counts_on_the_way_and_later_until_it_is_taken_back() -> None:
+    bench = Bench().airborne()
+    go_to(bench, 300, 0, 20)
+    assert bench.command(SPEED, 1, 4.0) == ACCEPTED
+    assert bench.courses[-1] == Course(bench.courses[-2].position, 4.0)
+    assert bench.command(SPEED, 1, 90.0) == DENIED
+    assert bench.command(SPEED, 1, -2) == ACCEPTED
+    assert bench.courses[-1].speed_m_s == 10.0
+
+
+def test_modes_are_set_by_both_messages() -> None:
+    bench = Bench().airborne()
+    number = number_of(Mode.GUIDED)
+    assert bench.command(MODE, 1, number >> 16 & 0xFF, number >> 24) == ACCEPTED
+    assert bench.flown.mode is Mode.GUIDED
+    (ack,) = bench.say(common.MAVLink_set_mode_message(1, 1, number_of(Mode.LAND)))
+    assert (ack.command, ack.result) == (11, ACCEPTED)
+    assert bench.flown.mode is Mode.LAND
+    assert bench.command(MODE, 1, 7, 0) == UNSUPPORTED  # stabilized: nobody holds a stick
+    assert bench.flown.mode is Mode.LAND
+
+
+def velocity(bench: Bench, north: float, east: float) -> None:
+    bench.say(
+        common.MAVLink_set_position_target_local_ned_message(
+            0, 1, 1, common.MAV_FRAME_LOCAL_NED, 0b110111000111, 0, 0, 0, north, east, 0, 0, 0, 0, 0, 0
+        )
+    )
+
+
+def test_setpoints_fly_in_the_guided_mode_alone() -> None:
+    bench = Bench().airborne()
+    velocity(bench, 3, 4)
+    assert bench.courses[-1].velocity is None
+    bench.say(common.MAVLink_set_mode_message(1, 1, number_of(Mode.GUIDED)))
+    velocity(bench, 3, 4)
+    assert bench.courses[-1].velocity == Enu(4.0, 3.0, 0.0)
+    assert bench.courses[-1].speed_m_s == 5.0
+    assert bench.control.report()["operator_refused_setpoints"] == 1
+
+
+def test_who_gets_no_more_setpoints_holds() -> None:
+    bench = Bench().airborne()
+    bench.say(common.MAVLink_set_mode_message(1, 1, number_of(Mode.GUIDED)))
+    for _ in range(5):
+        velocity(bench, 5, 0)
+        bench.run(0.4)
+    assert bench.position.north == pytest.approx(10, abs=0.1)
+    bench.run(3)
+    assert bench.flown.mode is Mode.HOLD
+    assert bench.position.north == pytest.approx(15, abs=2.5)
+
+
+def test_setpoints_that_make_no_sense_are_counted() -> None:
+    bench = Bench().airborne()
+    bench.say(common.MAVLink_set_mode_message(1, 1, number_of(Mode.GUIDED)))
+    flown = len(bench.courses)
+    velocity(bench, math.nan, 0)
+    velocity(bench, math.inf, 0)
+    assert len(bench.courses) == flown
+    assert bench.control.report()["operator_senseless_setpoints"] == 2
+
+
+@pytest.mark.parametrize(("action", "mode"), [(0, Mode.HOLD), (1, Mode.HOLD), (2, Mode.RETURN), (3, Mode.LAND)])
+def test_what_happens_when_the_operator_falls_silent(action: int, mode: Mode) -> None:
+    bench = Bench().airborne()
+    bench.say(common.MAVLink_param_set_message(1, 1, b"NAV_DLL_ACT", action, 9))
+    bench.say(common.MAVLink_param_set_message(1, 1, b"COM_DL_LOSS_T", 5.0, 9))
+    go_to(bench, 400, 0, 20)
+    bench.run(4.4, heartbeats=False)
+    before = len(bench.courses)
+    assert bench.control.report().get("operator_silences") is None
+    bench.run(2, heartbeats=False)
+    assert bench.control.report()["operator_silences"] == 1
+    assert bench.flown.mode is mode
+    assert (len(bench.courses) == before) == (action == 0)
+
+
+def test_beyond_an_uploaded_fence_the_uav_holds_and_says_so() -> None:
+    bench = Bench().airborne()
+    go_to(bench, 300, 0, 20)
+    corners = [degrees(east, north) for east, north in ((-50, -50), (50, -50), (50, 50), (-50, 50))]
+    upload(bench, [(0, 5001, x, y, 0.0, (4, 0, 0, 0)) for x, y in corners], kind=1)
+    bench.run(20)
+    assert bench.flown.mode is Mode.HOLD
+    assert bench.position.east == pytest.approx(50, abs=5)
+    assert "Beyond the geofence: holding" in [text.text for text in bench.told("STATUSTEXT")]
+    assert go_to(bench, 60, 0, 20) == DENIED
+    assert go_to(bench, 40, 0, 20) == ACCEPTED
+
+
+def upload(
+    bench: Bench, items: list[tuple[int, int, int, int, float, tuple[float, ...]]], *, kind: int = 0, lose: int = -1
+) -> int:
+    """Upload as a ground station does; `lose`: the first transmission of that item is lost."""
+    answers = bench.say(common.MAVLink_mission_count_message(1, 1, len(items), kind))
+    for _ in range(4 * len(items) + 4):
+        wanted = [answer for answer in answers if answer.get_type() == "MISSION_REQUEST_INT"]
+        acks = [answer for answer in answers if answer.get_type() == "MISSION_ACK"]
+        if acks:
+            return int(acks[-1].type)
+        if not wanted:
+            before = len(bench.heard)
+            bench.run(2)
+            answers = bench.heard[before:]
+            continue
+        seq = wanted[-1].seq
+        if seq == lose:
+            lose, answers = -1, []
+            continue
+        frame, command, x, y, z, params = items[seq]
+        answers = bench.say(
+            common.MAVLink_mission_item_int_message(1, 1, seq, frame, command, 0, 1, *params, x, y, z, kind)
+        )
+    raise AssertionError("the upload did not end")
+
+
+NONE = (0.0, 0.0, 0.0, math.nan)
+
+
+def square() -> list[tuple[int, int, int, int, float, tuple[float, ...]]]:
+    corners = [(6, 16, *degrees(east, north), 25.0, NONE) for east, north in ((80, 0), (80, 60), (0, 60))]
+    return [(6, TAKEOFF, 0, 0, 20.0, NONE), *corners, (2, HOME, 0, 0, 0.0, NONE)]
+
+
+def test_an_uploaded_mission_is_downloaded_as_it_was() -> None:
+    bench = Bench()
+    items = square()
+    assert upload(bench, items) == 0
+    (count,) = bench.say(common.MAVLink_mission_request_list_message(1, 1))
+    assert count.count == len(items)
+    for seq, item in enumerate(items):
+        (answer,) = bench.say(common.MAVLink_mission_request_int_message(1, 1, seq))
+        assert (answer.frame, answer.command, answer.x, answer.y, answer.z) == item[:5]
+        assert answer.seq == seq
+    (answer,) = bench.say(common.MAVLink_mission_request_int_message(1, 1, len(items)))
+    assert (answer.get_type(), answer.type) == ("MISSION_ACK", common.MAV_MISSION_INVALID_SEQUENCE)
+    (old,) = bench.say(common.MAVLink_mission_request_message(1, 1, 1))
+    assert old.get_type() == "MISSION_ITEM"
+    assert old.x == pytest.approx(items[1][2] / 1e7, abs=1e-5)
+
+
+def test_an_uploaded_mission_is_flown_item_by_item_and_reported() -> None:
+    bench = Bench()
+    upload(bench, square())
+    bench.command(ARM, 1)
+    assert bench.command(START) == ACCEPTED
+    assert bench.flown.mode is Mode.MISSION
+    corners = {}
+    for _ in range(600):
+        bench.run(0.2)
+        for reached in bench.told("MISSION_ITEM_REACHED"):
+            corners.setdefault(reached.seq, bench.position)
+        if bench.flown.on_ground and len(corners) > 1:
+            break
+    assert [*corners] == [0, 1, 2, 3, 4]
+    assert corners[1] == pytest.approx((80, 0, 25), abs=3.5)
+    assert corners[2] == pytest.approx((80, 60, 25), abs=3.5)
+    assert corners[3] == pytest.approx((0, 60, 25), abs=3.5)
+    assert bench.position == pytest.approx((0, 0, 0), abs=3.5)
+
+
+def test_a_lost_item_is_asked_for_again() -> None:
+    bench = Bench()
+    assert upload(bench, square(), lose=2) == 0
+
+
+def test_an_upload_that_breaks_off_leaves_the_old_mission() -> None:
+    bench = Bench()
+    upload(bench, square())
+    bench.say(common.MAVLink_mission_count_message(1, 1, 2, 0))
+    bench.run(12)
+    assert [ack.type for ack in bench.told("MISSION_ACK")][-1] == common.MAV_MISSION_OPERATION_CANCELLED
+    (count,) = bench.say(common.MAVLink_mission_request_list_message(1, 1))
+    assert count.count == 5
+
+
+@pytest.mark.parametrize(
+    ("item", "result"),
+    [
+        ((6, 4000, 0, 0, 0.0, NONE), common.MAV_MISSION_UNSUPPORTED),
+        ((10, 16, *degrees(0, 0), 20.0, NONE), common.MAV_MISSION_UNSUPPORTED_FRAME),
+        ((6, 16, 2_000_000_000, 0, 20.0, NONE), common.MAV_MISSION_INVALID_PARAM5_X),
+        ((6, 16, *degrees(900, 0), 20.0, NONE), common.MAV_MISSION_INVALID_PARAM7),
+        ((6, 16, *degrees(0, 0), math.nan, NONE), common.MAV_MISSION_UNSUPPORTED_FRAME),
+    ],
+)
+def test_a_mission_that_cannot_be_flown_is_refused_with_its_reason(item: object, result: int) -> None:
+    bench = Bench()
+    upload(bench, square())
+    assert upload(bench, [item]) in (result, common.MAV_MISSION_INVALID_PARAM5_X)  # type: ignore[list-item]
+    (count,) = bench.say(common.MAVLink_mission_request_list_message(1, 1))
+    assert count.count == 5
+
+
+def test_a_second_ground_station_waits_for_the_first_ones_upload() -> None:
+    bench = Bench()
+    bench.say(common.MAVLink_mission_count_message(1, 1, 2, 0))
+    (answer,) = bench.say(common.MAVLink_mission_count_message(1, 1, 2, 0), sender=(254, 190))
+    assert (answer.type, answer.target_system) == (common.MAV_MISSION_DENIED, 254)
+
+
+def test_a_jump_is_made_as_often_as_it_says() -> None:
+    bench = Bench()
+    a, b = degrees(20, 0), degrees(0, 20)
+    items = [
+        (6, TAKEOFF, 0, 0, 10.0, NONE), (6, 16, *a, 10.0, NONE), (6, 16, *b, 10.0, NONE),
+        (2, 177, 0, 0, 0.0, (1, 2, 0, 0)),
+    ]  # fmt: skip
+    assert upload(bench, items) == 0
+    bench.command(ARM, 1)
+    bench.command(START)
+    bench.run(60)
+    assert [reached.seq for reached in bench.told("MISSION_ITEM_REACHED")] == [0, 1, 2, 3, 1, 2, 3, 1, 2, 3]
+    assert bench.flown.mode is Mode.HOLD
+
+
+def test_a_pause_holds_and_a_continuation_goes_on_from_there() -> None:
+    bench = Bench()
+    upload(bench, square())
+    bench.command(ARM, 1)
+    bench.command(START)
+    bench.run(15)
+    at = bench.flown.mission_at
+    assert bench.command(PAUSE, 0) == ACCEPTED
+    here = bench.position
+    bench.run(5)
+    assert bench.position == pytest.approx(here, abs=2.5)
+    assert bench.command(PAUSE, 1) == ACCEPTED
+    assert bench.flown.mission_at == at
+    bench.run(40)
+    assert bench.flown.mission_at > at
+
+
+def test_who_has_a_task_of_the_swarm_goes_on_with_it_when_its_mission_starts() -> None:
+    bench = Bench(scenario(mobility={"model": "random_waypoint", "speed_m_s": 5}, nodes={"count": 2}), at=Enu(0, 0, 50))
+    bench.run(3)
+    assert bench.flown.mode is Mode.MISSION
+    assert bench.control.permits(Course(Enu(0, 0, 0), 1.0), bench.now_ns)
+    assert bench.command(PAUSE, 0) == ACCEPTED
+    assert not bench.control.permits(Course(Enu(0, 0, 0), 1.0), bench.now_ns)
+    assert bench.command(START) == ACCEPTED
+    assert bench.control.permits(Course(Enu(0, 0, 0), 1.0), bench.now_ns)
+    assert bench.courses[-1].speed_m_s == 0  # back to where the formation wants it
+
+
+def test_without_a_ground_station_nothing_is_flown_and_nothing_said() -> None:
+    bench = Bench()
+    bench.run(20, heartbeats=False)
+    assert not bench.courses
+    assert not bench.heard
+    assert bench.control.next_wake_ns() is None
+
+
+# --- parameters, files, and what else is asked --------------------------------------------------------------------
+
+
+def test_parameters_are_listed_read_written_and_bounded() -> None:
+    bench = Bench()
+    listed = bench.say(common.MAVLink_param_request_list_message(1, 1))
+    assert [value.param_index for value in listed] == [*range(len(listed))]
+    assert {value.param_count for value in listed} == {len(listed)}
+    assert [value.param_id for value in listed] == sorted(value.param_id for value in listed)
+    (value,) = bench.say(common.MAVLink_param_request_read_message(1, 1, b"NAV_ACC_RAD", -1))
+    assert value.param_value == 3.0
+    (value,) = bench.say(common.MAVLink_param_set_message(1, 1, b"NAV_ACC_RAD", 7.0, 9))
+    assert value.param_value == 7.0
+    for wrong in (-1.0, math.nan, math.inf, 1e9):
+        error, value = bench.say(common.MAVLink_param_set_message(1, 1, b"NAV_ACC_RAD", wrong, 9))
+        assert error.error == common.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
+        assert value.param_value == 7.0
+    (error,) = bench.say(common.MAVLink_param_request_read_message(1, 1, b"SYS_AUTOSTART", -1))
+    assert error.get_type() == "PARAM_ERROR"
+    (error,) = bench.say(common.MAVLink_param_request_read_message(1, 1, b"", 99))
+    assert error.get_type() == "PARAM_ERROR"
+
+
+@pytest.mark.parametrize(
+    ("opcode", "answer", "why"), [(4, 129, 10), (3, 129, 10), (7, 129, 7), (2, 128, 0), (1, 128, 0)]
+)
+def test_files_are_refused_and_never_met_with_silence(opcode: int, answer: int, why: int) -> None:
+    bench = Bench()
+    payload = [5, 0, 9, opcode, *[0] * 247]
+    (said,) = bench.say(common.MAVLink_file_transfer_protocol_message(0, 1, 1, payload))
+    assert (said.target_system, said.target_component) == GCS
+    assert (said.payload[0], said.payload[2], said.payload[3], said.payload[5]) == (6, 9, answer, opcode)
+    assert said.payload[12] == why
+
+
+def test_a_ping_and_a_question_for_the_time_are_answered() -> None:
+    bench = Bench()
+    bench.run(3)
+    (pong,) = bench.say(common.MAVLink_ping_message(7, 8, 0, 0))
+    assert (pong.time_usec, pong.seq, pong.target_system) == (7, 8, 255)
+    (time,) = bench.say(common.MAVLink_timesync_message(0, 4711))
+    assert (time.tc1, time.ts1) == (bench.now_ns, 4711)
+    assert bench.now_ns == 3 * S
+
+
+def test_messages_are_sent_when_asked_for_and_as_often_as_asked() -> None:
+    bench = Bench()
+    answers = bench.say(common.MAVLink_command_long_message(1, 1, 512, 0, 148, 0, 0, 0, 0, 0, 0))
+    assert [answer.get_type() for answer in answers] == ["AUTOPILOT_VERSION", "COMMAND_ACK"]
+    assert bench.command(512, 259) == DENIED  # CAMERA_INFORMATION
+    assert bench.command(511, 30, 100_000) == ACCEPTED
+    answers = bench.say(common.MAVLink_command_long_message(1, 1, 510, 0, 30, 0, 0, 0, 0, 0, 0))
+    assert answers[0].interval_us == 100_000
+    count = 0
+    for step in range(200):
+        told = mavlink.decode(bench.streams.telemetry(bench.now_ns + step * 10_000_000))
+        count += sum(message.get_type() == "ATTITUDE" for message in told)
+    assert count == pytest.approx(20, abs=1)
+    assert bench.command(511, 30, -1) == ACCEPTED
+    assert bench.streams.interval_ns(30) == 0
+
+
+def test_answers_and_telemetry_are_numbered_without_a_gap() -> None:
+    bench = Bench()
+    bench.airborne()
+    upload(bench, square())
+    assert {(later - number) % 256 for number, later in pairwise(bench.numbers)} == {1}
+
+
+def test_a_ground_station_that_floods_takes_no_more_than_its_share() -> None:
+    bench = Bench()
+    bench.say(*[common.MAVLink_ping_message(0, seq, 0, 0) for seq in range(1000)])
+    assert len(bench.told("PING")) == 200
+    assert bench.control.report()["operator_flooded"] == 800
+    bench.run(1)
+    assert bench.say(common.MAVLink_ping_message(0, 1, 0, 0))
+
+
+def test_what_is_for_another_system_or_component_is_not_answered() -> None:
+    bench = Bench()
+    assert not bench.say(common.MAVLink_command_long_message(2, 1, ARM, 0, 1, 0, 0, 0, 0, 0, 0))
+    assert not bench.say(common.MAVLink_command_long_message(1, 100, ARM, 0, 1, 0, 0, 0, 0, 0, 0))
+    assert not bench.flown.armed

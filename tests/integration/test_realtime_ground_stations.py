@@ -1,0 +1,229 @@
+"""Ground stations of others fly a swarm: MAVSDK, MAVProxy, and pymavlink's tools on what they have recorded.
+
+With FANET_TRANSCRIPTS=1 what they say is written to docs/how-to/transcripts/.
+"""
+
+import importlib.util
+import os
+import pty
+import re
+import select
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).resolve().parent
+TRANSCRIPTS = HERE.parent.parent / "docs" / "how-to" / "transcripts"
+MAVPROXY = shutil.which("mavproxy.py", path=str(Path(sys.executable).parent))
+PATIENCE_S = 90
+FIELD = """
+duration_s = 900
+time_scale = 4.0
+[nodes]
+count = 3
+layout = "line"
+spacing_m = 60
+on_ground = true
+altitude_m = 20
+[traffic]
+arrivals = "none"
+[routing]
+protocol = "direct"
+[radio]
+lead_ms = 500
+[mobility]
+model = "onboard"
+speed_m_s = 12
+[world]
+area_m = 1000
+engine = "kinematic"
+"""
+pytestmark = pytest.mark.timeout(280)
+
+
+def keep(name: str, said: str) -> None:
+    """Write a transcript, if they are wanted."""
+    if os.environ.get("FANET_TRANSCRIPTS"):
+        TRANSCRIPTS.mkdir(exist_ok=True)
+        (TRANSCRIPTS / f"{name}.txt").write_text(said, encoding="utf-8")
+
+
+def free_port(kind: int = socket.SOCK_STREAM) -> int:
+    with socket.socket(type=kind) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Field:
+    """A swarm that stands on the ground, with its doors."""
+
+    def __init__(self, folder: Path) -> None:
+        self.udp, self.tcp = free_port(socket.SOCK_DGRAM), free_port()
+        self.name = f"field-{os.getpid()}"
+        scenario = folder / "field.toml"
+        scenario.write_text(FIELD, encoding="utf-8")
+        self.log = folder / "launch.log"
+        self._processes: list[subprocess.Popen[bytes]] = []
+        self._start("launch", str(scenario), "--swarm", self.name, "--mavlink", f"udpout:127.0.0.1:{self.udp}")
+        self.await_("processes up")
+        self._start("gateway", self.name, "--mavlink", f"tcpin:127.0.0.1:{self.tcp}", "--flavor", "ardupilot")
+        self.await_(f"MAVLink on tcpin:127.0.0.1:{self.tcp}")
+
+    def _start(self, *words: str) -> None:
+        with self.log.open("ab") as file:
+            command = [sys.executable, "-m", "fanet_mw", *words]
+            self._processes.append(subprocess.Popen(command, stdout=file, stderr=file))
+
+    def await_(self, text: str) -> None:
+        end_s = time.monotonic() + PATIENCE_S
+        while text not in self.log.read_text():
+            assert time.monotonic() < end_s, f"{text!r} is not in {self.log.read_text()}"
+            time.sleep(0.1)
+
+    def end(self) -> None:
+        for process in reversed(self._processes):
+            process.send_signal(signal.SIGINT)
+            process.wait(30)
+
+
+@pytest.fixture(scope="module")
+def field(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Field]:
+    swarm = Field(tmp_path_factory.mktemp("field"))
+    yield swarm
+    swarm.end()
+
+
+@pytest.mark.skipif(importlib.util.find_spec("mavsdk") is None, reason="MAVSDK is not installed")
+def test_mavsdk_flies_a_uav_from_parameters_to_the_landing(field: Field) -> None:
+    command = [sys.executable, str(HERE / "mavsdk_pilot.py"), f"udpin://127.0.0.1:{field.udp}", "3"]
+    flown = subprocess.run(command, capture_output=True, text=True, check=False, timeout=250)
+    said = "".join(line for line in flown.stdout.splitlines(keepends=True) if "[0m" not in line)
+    assert flown.returncode == 0, said + flown.stderr + field.log.read_text()
+    keep("mavsdk", said)
+    assert "uploaded 3 items, downloaded 3" in said
+    assert said.rstrip().endswith("disarmed")
+
+
+PLAN = """QGC WPL 110
+0\t1\t0\t16\t0\t0\t0\t0\t37.5665\t126.978\t0\t1
+1\t0\t3\t16\t0\t0\t0\t0\t37.5668\t126.978\t20\t1
+2\t0\t3\t16\t0\t0\t0\t0\t37.5668\t126.9784\t22\t1
+3\t0\t3\t21\t0\t0\t0\t0\t37.5665\t126.9784\t0\t1
+"""
+
+
+class Terminal:
+    """A program on a pseudo-terminal, to which a person types."""
+
+    def __init__(self, command: list[str], folder: Path) -> None:
+        self.said = ""
+        self.pid, self._end = pty.fork()
+        if self.pid == 0:
+            os.chdir(folder)
+            os.execve(
+                command[0], command, {**os.environ, "TERM": "dumb", "PYTHONWARNINGS": "ignore", "HOME": str(folder)}
+            )
+
+    def type(self, words: str, wait_for: str, *, seconds: float = PATIENCE_S) -> str:
+        """Type something; returns what is said until a text comes."""
+        before = len(self.said)
+        if words:
+            os.write(self._end, f"{words}\n".encode())
+        end_s = time.monotonic() + seconds
+        while not re.search(
+            wait_for, self.said[before:].replace(f"{words}\r\n", "", 1) if words else self.said[before:]
+        ):
+            assert time.monotonic() < end_s, f"{wait_for!r} after {words!r} is not in {self.said}"
+            ready, _, _ = select.select([self._end], [], [], 0.2)
+            if ready:
+                self.said += os.read(self._end, 65536).decode(errors="replace")
+        return self.said[before:]
+
+    def close(self) -> None:
+        os.kill(self.pid, signal.SIGKILL)
+        os.waitpid(self.pid, 0)
+        os.close(self._end)
+
+
+@pytest.mark.skipif(MAVPROXY is None, reason="MAVProxy is not installed (pip install --no-deps MAVProxy)")
+def test_mavproxy_links_arms_loads_waypoints_and_flies_them(field: Field, tmp_path: Path) -> None:
+    assert MAVPROXY is not None
+    (tmp_path / "plan.txt").write_text(PLAN, encoding="utf-8")
+    terminal = Terminal([sys.executable, MAVPROXY, f"--master=tcp:127.0.0.1:{field.tcp}"], tmp_path)
+    try:
+        terminal.type("", "online system")
+        terminal.type("", "Received 7 parameters")
+        terminal.type("vehicle 2", "Saved 7 parameters to mav_2_1.parm")
+        terminal.type("link", "0 lost")
+        terminal.type("param show MPC*", r"MPC_XY_CRUISE +12\.0")
+        terminal.type("param set MPC_XY_CRUISE 9", "> ")
+        for _ in range(PATIENCE_S):  # it is set when the UAV has said so
+            if "9.0" in terminal.type("param show MPC*", r"MPC_XY_CRUISE +\d"):
+                break
+            time.sleep(0.2)
+        assert "9.0" in terminal.said
+        terminal.type("mode GUIDED", "Mode GUIDED")
+        terminal.type("arm throttle", "ARMED")
+        terminal.type("takeoff 12", "Mode LOITER")
+        terminal.type("watch MISSION_ITEM_REACHED", "Watching")
+        terminal.type("wp load plan.txt", "MISSION_ACK: TYPE_MISSION: ACCEPTED")
+        terminal.type("wp list", "Saved 4 waypoints")
+        assert re.search(r"21 3 37\.5665\d* 126\.9784\d* 0\.0", terminal.said)
+        terminal.type("mode AUTO", "Mode AUTO")
+        terminal.type("", r"seq : 2")
+        terminal.type("", "DISARMED")
+        link = terminal.type("link", r"\d lost, .*loss")
+        assert " 0 lost" in link
+    finally:
+        terminal.close()
+    keep(
+        "mavproxy",
+        "".join(line for line in terminal.said.replace("\r", "").splitlines(keepends=True) if "module" not in line),
+    )
+    check_tools(tmp_path / "mav.tlog")
+
+
+def check_tools(log: Path) -> None:
+    """What MAVProxy has recorded, read by pymavlink's tools."""
+    tools = Path(sys.executable).parent
+    lost = subprocess.run(
+        [sys.executable, tools / "mavloss.py", log], capture_output=True, text=True, check=True
+    ).stdout
+    dump = subprocess.run(
+        [sys.executable, tools / "mavlogdump.py", "--types", "COMMAND_ACK,MISSION_ITEM_REACHED", log],
+        capture_output=True, text=True, check=True,
+    ).stdout  # fmt: skip
+    subprocess.run([sys.executable, tools / "mavtogpx.py", "--nofixcheck", log], capture_output=True, check=True)
+    gpx = log.with_name(f"{log.name}.gpx").read_text()
+    assert re.search(r"(\d+) packets, 0 lost 0\.0%", lost), lost
+    assert not re.search(r" [1-9]\d* lost", lost), lost
+    assert "MISSION_ITEM_REACHED {seq : 3}" in dump
+    assert gpx.count("<trkpt") > 20
+    told = [
+        "$ mavloss.py mav.tlog", lost, "$ mavlogdump.py --types COMMAND_ACK,MISSION_ITEM_REACHED mav.tlog", dump,
+        f"$ mavtogpx.py mav.tlog    # {gpx.count('<trkpt')} points",
+    ]  # fmt: skip
+    keep("tools", "\n".join(told) + "\n")
+
+
+def test_a_connection_that_cannot_be_is_one_message(capsys: pytest.CaptureFixture[str]) -> None:
+    for words, why in (
+        (["--mavlink", "udp"], "must be udpout:HOST:PORT"),
+        (["--mavlink", "tcpin:0.0.0.0:99999"], "port 99999 must be in"),
+        (["--mavlink", "serial:/dev/ttyS0:1234"], "1234 is no baud rate"),
+        (["--mavlink-per-uav", "udpin:127.0.0.1:14540"], "must end with +"),
+        (["--mavlink-key", "/nowhere"], "No such file"),
+    ):
+        ended = subprocess.run(
+            [sys.executable, "-m", "fanet_mw", "gateway", "nobody", *words], capture_output=True, text=True, check=False
+        )
+        assert ended.returncode == 2
+        assert why in ended.stderr.replace("\n", " ")
+        assert "Traceback" not in ended.stderr

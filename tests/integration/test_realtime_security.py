@@ -53,7 +53,7 @@ pytestmark = pytest.mark.skipif(shutil.which("openssl") is None, reason="needs o
 @pytest.fixture(scope="module")
 def keys(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("keys")
-    assert make(catalog.find("quick", SMALL), folder, swarm="test") == 4 + 4
+    assert make(catalog.find("quick", SMALL), folder, swarm="test") == 4 + 5
     return folder
 
 
@@ -100,6 +100,8 @@ NOT_OURS: dict[str, Message] = {
     NAMES.sensor(2, "gps"): Gps(S, Enu(1, 2, 3), Enu(0, 0, 0)),
     NAMES.setpoint(2): Setpoint(S, Enu(1, 2, 3), 5.0),
     NAMES.mavlink(2): MavlinkTap(S, b""),
+    NAMES.operator(2): MavlinkTap(S, b""),
+    NAMES.operator(1): MavlinkTap(S, b""),
     NAMES.trace("agent-2"): TraceBatch(()),
     NAMES.trace("emulator"): TraceBatch(()),
     NAMES.report("agent-2"): Report("agent-2", S, "{}"),
@@ -133,7 +135,7 @@ def test_an_agent_is_heard_on_its_own_topics_and_on_no_other(keys: Path) -> None
 
 def test_an_agent_hears_what_is_for_it_and_nothing_of_the_others(keys: Path) -> None:
     heard: list[tuple[str, str]] = []
-    with sessions(keys, "agent-1", "emulator", "world", "operator") as bus:
+    with sessions(keys, "agent-1", "emulator", "world", "operator", "gateway") as bus:
         for topic in (*OURS, *NOT_OURS):
             bus["agent-1"].subscribe(topic, lambda topic, _: heard.append(("", topic)))
         bus["agent-1"].subscribe("fanet/test/**", lambda topic, _: heard.append(("", topic)))
@@ -143,7 +145,8 @@ def test_an_agent_hears_what_is_for_it_and_nothing_of_the_others(keys: Path) -> 
         says = {
             "emulator": (NAMES.radio_rx(1), NAMES.radio_rx(2), NAMES.trace("emulator"), NAMES.report("emulator")),
             "world": (NAMES.pose, NAMES.sensor(1, "gps"), NAMES.sensor(2, "gps"), NAMES.report("world")),
-            "operator": (NAMES.radio_control,),
+            "operator": (NAMES.radio_control, NAMES.operator(1)),
+            "gateway": (NAMES.operator(1), NAMES.operator(2), NAMES.setpoint(1)),
             "router": (NAMES.clock,),
         }
 
@@ -152,7 +155,9 @@ def test_an_agent_hears_what_is_for_it_and_nothing_of_the_others(keys: Path) -> 
                 for topic in said:
                     bus[name].put(topic, payload, reliable=True)
 
-        expected = {("", topic) for topic in (NAMES.radio_rx(1), NAMES.sensor(1, "gps"), NAMES.clock)}
+        expected = {
+            ("", topic) for topic in (NAMES.radio_rx(1), NAMES.sensor(1, "gps"), NAMES.operator(1), NAMES.clock)
+        }
         put_until(say, heard, expected)
     assert set(heard) == expected
 

@@ -8,10 +8,12 @@ on it.
 import os
 import signal
 import sys
+from contextlib import suppress
 from importlib import import_module
 from types import FrameType
 from typing import NoReturn
 
+from fanet_mw.hosts.interrupts import ENDED_BY
 from fanet_mw.installation import damage
 
 
@@ -27,6 +29,9 @@ def main() -> None:
 
 
 def _leave(number: int, _frame: FrameType | None) -> NoReturn:
+    if number != signal.SIGINT:
+        with suppress(OSError):  # nobody may be listening any more
+            os.write(2, f"fanet: {ENDED_BY.format(signal.Signals(number).name)}\n".encode())
     os._exit(128 + number)  # nothing has been started yet, so nothing must be cleaned up
 
 

@@ -34,7 +34,7 @@ BACK_S = 30.0
 """The clock is back at full pace so much real time after the disturbance."""
 TERM_AFTER_S = (0.1, 0.5, 1.0, 3.0, 10.0, 100.0)
 MOST_LINES = 3
-"""Of a run that was ended before it had a result."""
+"""What a run may say that was ended before it had a result: where it runs, its lead, and why it ended."""
 _WRITES = """
 import os, sys
 block = os.urandom(1 << 22)
@@ -211,7 +211,8 @@ def terminated(after_s: float, options: argparse.Namespace) -> bool:
         wrong += [] if summary["frames"]["closes"] else ["the ledger does not close"]
     else:
         flown = f"no result: {demo.last_word()}"
-        wrong += [] if demo.process.returncode and len(demo.said) <= MOST_LINES else ["it does not say why"]
+        told = "SIGTERM" in demo.last_word() or demo.process.returncode == -signal.SIGTERM  # before it runs a line
+        wrong += [] if told and len(demo.said) <= MOST_LINES else ["it does not say why"]
     print(
         f"SIGTERM after {after_s:g} s to {len(processes)} processes: exit status {demo.process.returncode}, {flown}: "
         f"{'kept' if not wrong else 'NOT KEPT: ' + ', '.join(wrong)}",

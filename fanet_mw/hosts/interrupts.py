@@ -18,6 +18,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Final, NoReturn
 
+ENDED_BY: Final = "ended by {} before there was a result"
 SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _raised: Final[list[int]] = []
 
@@ -86,6 +87,19 @@ def exit_code(interrupt: KeyboardInterrupt) -> int:
     """The exit code that a shell shows for a process that was ended by this signal."""
     number: int = interrupt.args[0] if interrupt.args else signal.SIGINT
     return 128 + number
+
+
+def sentence(interrupt: KeyboardInterrupt) -> str | None:
+    """What a command says that another program has ended; None if a user has, or if it has been said (`said`)."""
+    number, *said = interrupt.args or (signal.SIGINT,)
+    if said or number == signal.SIGINT:
+        return None
+    return ENDED_BY.format(signal.Signals(number).name)
+
+
+def said(number: int) -> KeyboardInterrupt:
+    """An interrupt of which the user has been told."""
+    return KeyboardInterrupt(number, "said")
 
 
 def leave(code: int) -> NoReturn:

@@ -112,6 +112,8 @@ def main() -> None:
         code = refused(why)
     except KeyboardInterrupt as interrupt:
         code = interrupts.exit_code(interrupt)
+        if (why := interrupts.sentence(interrupt)) is not None:
+            sys.stderr.write(f"fanet: {why}\n")
     interrupts.leave(code if isinstance(code, int) else 0)
 
 

@@ -45,7 +45,7 @@ NODES: Final = {"clusters": 15, "rescue": 45}
 PLACES: Final = {"clusters": {"corner": 15, "middle": 8}, "rescue": {"corner": 45, "middle": 23}}
 DELAYS_S: Final = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0)
 OBSERVED_S: Final = {"clusters": 16, "rescue": 30}
-KINDS: Final = (Kind.HELLO, Kind.DATA, Kind.JOIN, Kind.SCHEDULE, Kind.LINKS)
+KINDS: Final = (Kind.HELLO, Kind.DATA, Kind.JOIN, Kind.SCHEDULE)
 LEAST_SHARE: Final = 0.99
 """Of what arrives without the station."""
 

@@ -262,10 +262,12 @@ def test_ctrl_c_while_a_swarm_starts_ends_it_without_a_traceback() -> None:
         assert len(said.splitlines()) <= 3, (at, said)
 
 
-def test_a_launcher_that_is_terminated_while_it_starts_says_so_in_its_exit_code() -> None:
-    code, said = at_start(signal.SIGTERM, services=True)
+@pytest.mark.parametrize("services", [False, True])
+def test_a_launcher_that_is_terminated_while_it_starts_says_so_once_and_in_its_exit_code(services: bool) -> None:
+    code, said = at_start(signal.SIGTERM, services=services)
     assert code == 143, said
     assert "Traceback" not in said
+    assert said.count("SIGTERM") == 1, said
 
 
 def late_agent(*, node: int, **arguments: Any) -> int:

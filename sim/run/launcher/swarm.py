@@ -198,7 +198,7 @@ class SwarmRun:
     def _check_not_over(self) -> None:
         """Raise if the swarm was told to end before its time began, because then there is nothing to report."""
         if self._signal is not None:
-            raise KeyboardInterrupt(self._signal)
+            raise interrupts.said(self._signal)
         if self._over.is_set():
             raise BusError(self._aborted or "ended before the swarm was up")
 

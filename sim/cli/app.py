@@ -14,7 +14,19 @@ from cyclopts import App, CycloptsError
 from fanet_mw import __version__
 from fanet_mw.errors import FanetError
 from fanet_mw.hosts import interrupts
-from sim.cli import figures, gateway, log, replay, runs, scenario_files, single_services, swarms, sweep, tool_files
+from sim.cli import (
+    figures,
+    gateway,
+    log,
+    replay,
+    runs,
+    scenario_files,
+    single_services,
+    swarms,
+    sweep,
+    tool_files,
+    view,
+)
 from sim.cli.air import app as air_app
 from sim.cli.command_groups import OPTIONS
 from sim.cli.console import Console, discard_output, nobody_reads, open_closed_streams
@@ -31,7 +43,7 @@ app = App(
 )
 app.command(air_app)
 app.command(order_app)
-for commands in (scenario_files, sweep, figures, runs, replay, log, single_services, swarms, gateway, tool_files):
+for commands in (scenario_files, sweep, figures, runs, replay, log, single_services, swarms, gateway, view, tool_files):
     commands.add_to(app)
 app.register_install_completion_command()
 _NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)

@@ -1,5 +1,6 @@
 """`fanet replay`: a finished run again, as a page that plays in a browser, or as text for one instant."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,20 +19,37 @@ def add_to(app: App) -> None:
     app.command(replay, group=RUN)
 
 
-def replay(folder: Path, *, out: Path | None = None, at: Annotated[float | None, Parameter(name="--at")] = None) -> int:
-    """Play a finished run again: writes replay.html, a map for the browser that needs no network.
+def replay(
+    folder: Path,
+    *,
+    html: Path | None = None,
+    map_: Annotated[Path | None, Parameter(name="--map")] = None,
+    at: Annotated[float | None, Parameter(name="--at")] = None,
+    start: float = 0.0,
+    port: int | None = None,
+) -> int:
+    """Play a finished run again in a browser, in 3-D, with time to go through; or write it as one file.
 
     Parameters
     ----------
     folder
         What `fanet simulate --out` or `fanet launch --out` has written.
-    out
-        The page; by default FOLDER/replay.html.
+    html
+        Write the scene to this file instead, which plays without a network; it needs WebGL.
+    map_
+        Write a map that plays to this file instead, with modes and events; it needs no WebGL, and is a tenth the size.
     at
         Print the state at this instant [s] as text instead, and write nothing.
+    start
+        Begin at this instant [s].
+    port
+        Port of the page on this machine; by default 8080, or the next one that is free.
 
     """
-    from sim.report.names import REPLAY
+    if not 0 <= start < math.inf:
+        raise ConfigError(f"--start {start:g}: must be 0 or more")
+    if at is None and map_ is None:
+        return _in_3d(folder, html=html, start_s=start, port=port)
     from sim.report.replay_page import REPLAYED, write
     from sim.results.replay import Replay
 
@@ -41,9 +59,23 @@ def replay(folder: Path, *, out: Path | None = None, at: Annotated[float | None,
             raise ConfigError(f"--at {at:g}: must be within 0 and duration_s = {found.scenario.duration_s:g}")
         _show(found, at)
         return 0
-    path = out or folder / REPLAY
-    write(found, path)
-    Console().print(f"written: {path}; open it in a browser", highlight=False, soft_wrap=True)
+    assert map_ is not None, "that is what is left"
+    write(found, map_)
+    Console().print(f"written to {map_}", highlight=False, soft_wrap=True)
+    return 0
+
+
+def _in_3d(folder: Path, *, html: Path | None, start_s: float, port: int | None) -> int:
+    from fanet_mw.hosts import interrupts
+    from sim.view.replayed import serve, write_html
+
+    console = Console(stderr=html is None, highlight=False, soft_wrap=True)
+    if html is not None:
+        write_html(folder, html, tell=console.print)
+        return 0
+    signals: list[int] = []
+    with interrupts.handed_to(signals.append):
+        serve(folder, port=port, start_s=start_s, ended=signals, tell=console.print)
     return 0
 
 

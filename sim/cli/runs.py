@@ -70,9 +70,9 @@ def simulate(
     capture = PcapFile(path, chosen.radio, receptions=output.pcap_receptions) if path else nullcontext()
     with (
         begun(output.out),
-        _progress(chosen, quiet=output.json) as tell,
+        _simulated(chosen, quiet=output.json) as (tell, watcher),
         capture as file,
-        _recording(chosen, output.record, epoch_unix_ns=EPOCH_UNIX_NS) as observer,
+        _recording(chosen, output.record, epoch_unix_ns=EPOCH_UNIX_NS) as recording,
         interrupts.handed_to(signals.append),
     ):
         if file is not None:
@@ -83,7 +83,7 @@ def simulate(
             capture=file.pcap if file else None,
             signals=signals,
             spool_folder=output.out,
-            observer=observer,
+            observer=_together(watcher, recording),
         )
     return _finish(outcome, output)
 
@@ -212,6 +212,43 @@ def _recording(scenario: "Scenario", path: Path | None, *, epoch_unix_ns: int) -
 
     with McapRecording(path, scenario, epoch_unix_ns=epoch_unix_ns) as recording:
         yield recording
+
+
+def _together(*observers: "Observer | None") -> "Observer | None":
+    from sim.observation.observer import Several
+
+    found = [one for one in observers if one is not None]
+    return Several(found) if found else None
+
+
+@contextmanager
+def _simulated(scenario: "Scenario", *, quiet: bool) -> "Iterator[tuple[Callable[[float], None], Observer | None]]":
+    """A progress bar that says how the swarm fares, for a person who is watching; else a line every ten seconds."""
+    from sim.run.collecting.running_tally import Progress, RunningTally, TallyObserver
+
+    began_s = said_s = monotonic()
+
+    def figures(seconds: float, tally: RunningTally | None) -> Progress:
+        pace = seconds / max(1e-3, monotonic() - began_s)
+        survivors = scenario.mission.survivors
+        if tally is None:
+            return Progress(seconds, scenario.duration_s, pace, None, None, None, 0, survivors)
+        found = len(tally.confirmed), len(tally.without_phone)
+        return Progress(seconds, scenario.duration_s, pace, tally.delivered_share(), None, *found, survivors)
+
+    if _err.is_terminal and not quiet:
+        tally = RunningTally(scenario)
+        with _progress(scenario, quiet=quiet) as tell:
+            yield lambda s: tell(s, f"{scenario.name}: {figures(s, tally).figures()}"), TallyObserver(tally)
+        return
+
+    def say(seconds: float) -> None:
+        nonlocal said_s
+        if not quiet and monotonic() >= said_s + _WORD_EVERY_S:
+            said_s += _WORD_EVERY_S
+            _say(figures(seconds, None).sentence())
+
+    yield say, None
 
 
 @contextmanager

@@ -10,7 +10,7 @@ Shares of delivery are those of packets that had time to arrive: `SETTLES_NS` ol
 """
 
 import math
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
@@ -77,7 +77,8 @@ class UavNow:
     delivered: int = 0
     sent: int = 0
     """Packets that its applications received and sent, since observation began."""
-    dropped: int = 0
+    drops: Counter[str] = field(default_factory=Counter)
+    """Packets that ended inside it, by reason, duplicates aside."""
     trail: deque[Enu] = field(default_factory=lambda: deque(maxlen=_TRAIL))
     yaw_rad: float = 0.0
     """The direction of its flight, from north clockwise; kept while it hovers."""
@@ -191,7 +192,7 @@ class SwarmState:
     def take_links(self, stats: LinkStats) -> None:
         """What each link carried since the last report."""
         self._links.append(stats)
-        while self._links[0].t_ns < stats.t_ns - _LINKS_NS:
+        while self._links[0].t_ns <= stats.t_ns - _LINKS_NS:
             self._links.popleft()
 
     def take_report(self, name: str, content: Mapping[str, Any], *, t_ns: int) -> None:
@@ -201,8 +202,12 @@ class SwarmState:
         elif name.startswith("agent-"):
             node = int(name.removeprefix("agent-"))
             self.reports[node] = content
-            if node in self.uavs:
-                self.uavs[node].heard_ns = max(t_ns, self.uavs[node].heard_ns)
+            uav = self.uavs.get(node)
+            if uav is not None:
+                uav.heard_ns = max(t_ns, uav.heard_ns)
+                if not uav.role and content.get("role"):  # taken before observation began
+                    uav.role, uav.cluster = content["role"], content.get("cluster") or 0
+                    uav.head = content.get("head") or 0
             if content.get("slots") or content.get("turns"):
                 self.turns = turns(self.scenario, self.reports)
 
@@ -384,7 +389,7 @@ class SwarmState:
             case MissionModeChanged() if uav is not None:
                 uav.mission, uav.survivor = record.mode, record.survivor
             case Dropped() if uav is not None:
-                uav.dropped += 1
+                uav.drops[record.reason] += 1
             case RadioFault():
                 if record.active:
                     self.faults[record.label] = record

@@ -49,6 +49,7 @@ from fanet_mw.units import Enu, S
 from sim.figures import colors
 from sim.observation.surroundings import Surroundings, surroundings
 from sim.observation.swarm_state import SwarmState, UavNow
+from sim.recording.drawing import STATUS_COLORS, attitude, link_color
 
 FRAME: Final = "map"
 _CHUNK_BYTES: Final = 1 << 20
@@ -200,7 +201,7 @@ class McapRecording:
             east_m=uav.position.east, north_m=uav.position.north, up_m=uav.position.up,
             speed_m_s=math.hypot(*uav.velocity),
             charge_percent=math.nan if uav.charge_percent is None else uav.charge_percent,
-            cluster=uav.cluster, head=uav.head, delivered=uav.delivered, sent=uav.sent, dropped=uav.dropped,
+            cluster=uav.cluster, head=uav.head, delivered=uav.delivered, sent=uav.sent, dropped=uav.drops.total(),
             waiting_packets=self.state.reports.get(node, {}).get("waiting", 0),
             role=uav.role, flight_mode=uav.flight, mission_mode=uav.mission,
         )  # fmt: skip
@@ -277,36 +278,6 @@ class McapRecording:
         unix_ns = self.epoch_unix_ns + t_ns
         self.count += 1
         self._writer.write_message(topic, message, log_time=unix_ns, publish_time=unix_ns)
-
-
-STATUS_COLORS: Final = {
-    "not heard": colors.GRAY, "detected": colors.SHADE, "approached": colors.ORANGE, "reached": colors.ORANGE,
-    "confirmed": colors.GREEN, "mistaken": colors.RED, "reopened": colors.PINK,
-}  # fmt: skip
-"""The color of a survivor by the state of the search for him or her."""
-
-
-def link_color(share: float) -> str:
-    """The color of a link by the share of copies that arrived, as three classes that a gray print tells apart too."""
-    return colors.BLUE if share >= 0.9 else colors.ORANGE if share >= 0.5 else colors.RED
-
-
-def attitude(uav: UavNow) -> tuple[float, float, float, float]:
-    """The attitude of a multirotor that flies so, as a quaternion w, x, y, z in ENU: it tilts towards its acceleration
-    and faces its direction of flight.
-    """
-    yaw = math.pi / 2 - uav.yaw_rad  # from east towards north
-    east, north, _ = uav.acceleration
-    forward = max(-6.0, min(6.0, east * math.cos(yaw) + north * math.sin(yaw)))
-    left = max(-6.0, min(6.0, north * math.cos(yaw) - east * math.sin(yaw)))
-    pitch, roll = math.atan2(forward, 9.81), -math.atan2(left, 9.81)
-    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
-    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
-    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
-    return (
-        cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy,
-    )  # fmt: skip
 
 
 def _world(

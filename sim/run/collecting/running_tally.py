@@ -5,10 +5,12 @@ it is forgotten, so memory does not grow with the run. The figures of the result
 """
 
 from collections import Counter, deque
-from collections.abc import Iterable
-from typing import Final, NamedTuple
+from collections.abc import Iterable, Mapping
+from typing import Any, Final, NamedTuple
 
 from agents.applications.traffic import targets_of
+from fanet_mw.bus.link_stats import LinkStats
+from fanet_mw.bus.messages import Poses
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Confirmed, Delivered, Generated, Record, Refuted
 from fanet_mw.wire import PRIORITY_BULK
@@ -27,12 +29,13 @@ class Progress(NamedTuple):
     swarm_s: float
     duration_s: float
     time_scale: float
-    """The pace of the swarm's clock: 1 is real time."""
+    """The pace of the swarm's time: 1 is real time."""
     delivered: float | None
     """The share of the traffic's copies that arrived, of packets that are ripe; None: there are none yet."""
-    late: float
-    """The share of frames that were announced too late."""
-    confirmed: int
+    late: float | None
+    """The share of frames that were announced too late; None in virtual time, where none is."""
+    confirmed: int | None
+    """None: not counted."""
     without_phone: int
     """The persons who were found otherwise than by a phone."""
     survivors: int
@@ -40,11 +43,12 @@ class Progress(NamedTuple):
 
     def figures(self) -> str:
         """All but the time, in words."""
-        parts = [f"clock {self.time_scale:.3g}"]
+        parts = [f"clock {self.time_scale:.3g}" if self.late is not None else f"{self.time_scale:.3g} x real time"]
         if self.delivered is not None:
             parts.append(f"delivered {self.delivered:.1%}")
-        parts.append(f"late {self.late:.2%}")
-        if self.survivors:
+        if self.late is not None:
+            parts.append(f"late {self.late:.2%}")
+        if self.survivors and self.confirmed is not None:
             parts.append(f"confirmed {self.confirmed} of {self.survivors}")
         if self.without_phone:
             parts.append(f"{self.without_phone} more without a phone")
@@ -108,3 +112,21 @@ class RunningTally:
     def delivered_share(self) -> float | None:
         """The share of the copies of ripe packets that arrived; None while there are none."""
         return self._delivered / self._wanted if self._wanted else None
+
+
+class TallyObserver:
+    """A tally as an observer of a run in virtual time."""
+
+    def __init__(self, tally: RunningTally) -> None:
+        self._tally = tally
+
+    def take_records(self, records: Iterable[Record]) -> None:
+        self._tally.take(records)
+
+    def take_poses(self, poses: Poses) -> None: ...
+
+    def take_links(self, stats: LinkStats) -> None: ...
+
+    def take_report(self, name: str, content: Mapping[str, Any], *, t_ns: int) -> None: ...
+
+    def take_tap(self, node: int, t_ns: int, data: bytes) -> None: ...

@@ -1,0 +1,355 @@
+"""The panel beside the scene: figures of the swarm, one UAV, what to draw, events, and things to do.
+
+Callbacks of the browser come on other threads: each only puts a function in a queue, and the loop that draws calls it.
+"""
+
+import html
+import math
+import queue
+from collections.abc import Callable, Sequence
+from typing import Any, Final
+
+import numpy as np
+import viser
+from viser import uplot
+
+from fanet_mw.units import MS, S
+from sim.view.actions import PAUSED, Actions
+from sim.view.scene import HOP_COLORS, Scene
+
+_MOST_POINTS: Final = 300
+"""Of the charts, one a second."""
+_EVENTS: Final = 14
+_STYLE: Final = "font-size:13px;line-height:1.45;padding:2px 10px;font-variant-numeric:tabular-nums"
+Job = Callable[[], None]
+
+
+class Panels:
+    """The panel of one server."""
+
+    def __init__(self, server: viser.ViserServer, scene: Scene, *, actions: Actions | None) -> None:
+        """Without `actions` there is nothing to do, because the swarm flew some time ago."""
+        self.jobs: queue.SimpleQueue[Job] = queue.SimpleQueue()
+        self._server, self._scene, self.state = server, scene, scene.state
+        self._actions = actions
+        self._second = -1
+        self._history: dict[str, list[tuple[float, float]]] = {}
+        self._follows = False
+        self._said = ""
+        self.texts: dict[str, str] = {}
+        """What each part of the panel says, as HTML."""
+        gui = server.gui
+        gui.set_panel_label(f"{scene.state.scenario.name}")
+        self._clock = gui.add_html("")
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Swarm"):
+            self._figures = gui.add_html("")
+            self._delivered = self._chart("delivered, last 12 s [%]", top=105.0)
+            self._delays = self._chart("delay of 95 of 100 packets [ms]")
+            self._bounds = self._chart("longest bound stated [ms]", visible=False)
+            self._spread = gui.add_html("")
+        with tabs.add_tab("UAV"):
+            nodes = [str(node) for node in scene.state.scenario.node_ids]
+            self._choice = gui.add_dropdown("UAV", ["none", *nodes], initial_value="none")
+            follow = gui.add_checkbox("follow it", initial_value=False)
+            self._uav = gui.add_html(_box("Click a UAV."))
+            if actions is not None:
+                self._add_uav_actions(nodes, actions)
+        if actions is not None:
+            with tabs.add_tab("Act"):
+                self._add_actions(actions)
+        with tabs.add_tab("Events"):
+            self._events = gui.add_html("")
+        with tabs.add_tab("Show"):
+            self._add_switches()
+        self._choice.on_update(self.later(lambda: self.select(_number(self._choice.value), from_list=True)))
+        follow.on_update(self.later(lambda: self._follow(follow.value)))
+
+    # --- for the loop that draws ----------------------------------------------------------------------------------
+
+    def run_jobs(self) -> None:
+        """Do what was asked for since the last frame."""
+        while True:
+            try:
+                job = self.jobs.get_nowait()
+            except queue.Empty:
+                return
+            job()
+
+    def refresh(self, t_ns: int, *, note: str = "", all_of_it: bool = False) -> None:
+        """Write the figures of an instant; those that need no hurry once a second."""
+        self._write_clock(t_ns, note)
+        if self._follows and self._scene.selected in self.state.uavs:
+            self._look_at_selected()
+        if not all_of_it and t_ns // S == self._second:
+            return
+        self._second = t_ns // S
+        metrics = self.state.metrics()
+        self._write("_figures", _figures(metrics, len(self.state.uavs), len(self.state.heads())))
+        self._write("_events", self._event_list())
+        self._write("_spread", self._spread_text(t_ns))
+        self._write("_uav", self._uav_text())
+        self._plot(t_ns, metrics)
+
+    def select(self, node: int, *, from_list: bool = False) -> None:
+        """Select a UAV; 0: none."""
+        self._scene.selected = node
+        if not from_list:
+            self._choice.value = str(node) if node else "none"
+        self._write("_uav", self._uav_text())
+
+    def clear_charts(self) -> None:
+        """Forget the past, because time has jumped."""
+        self._history.clear()
+
+    def say(self, text: str) -> None:
+        """Say what an action has done, below the clock."""
+        self._said = text
+
+    # --- parts ----------------------------------------------------------------------------------------------------
+
+    def later(self, job: Job) -> Callable[[Any], None]:
+        """A callback of the browser that lets the loop do this."""
+
+        def on_event(event: Any) -> None:  # noqa: ANN401  (viser's events)
+            if getattr(event, "client", None) is not None:  # not a change that we made
+                self.jobs.put(job)
+
+        return on_event
+
+    def _button(self, label: str, job: Callable[[], str], *, color: str | None = None) -> None:
+        def act() -> None:
+            self.say(job())
+
+        self._server.gui.add_button(label, color=color).on_click(self.later(act))
+
+    def _add_uav_actions(self, nodes: Sequence[str], actions: Actions) -> None:
+        gui, scene = self._server.gui, self._scene
+
+        def chosen(act: Callable[[int], str]) -> Callable[[], str]:
+            return lambda: act(scene.selected) if scene.selected else "choose a UAV first"
+
+        self._button("cut its radio", chosen(actions.cut), color="orange")
+        self._button("let it crash", chosen(actions.crash), color="red")
+        with gui.add_folder("its link to another", expand_by_default=False):
+            other = gui.add_dropdown("other", nodes)
+            loss = gui.add_slider("frames lost [%]", min=0, max=100, step=5, initial_value=100)
+            self._button(
+                "degrade the link",
+                chosen(lambda node: actions.degrade(node, int(other.value), loss_share=loss.value / 100)),
+            )
+        with gui.add_folder("send it", expand_by_default=False):
+            if actions.has_post:
+                gui.add_html(_box("Click the map, then send."))
+                self._button("send it to the mark", chosen(lambda node: self._sent(actions, node)))
+                self._button("call it home", chosen(actions.recall))
+                self._button("release it", chosen(actions.release))
+            else:
+                gui.add_html(_box("This swarm has no post on the ground (<code>ground.at_m</code>) to order UAVs."))
+
+    def _sent(self, actions: Actions, node: int) -> str:
+        target = self._scene.target
+        return "click the map first" if target is None else actions.send(node, *target)
+
+    def _add_actions(self, actions: Actions) -> None:
+        gui, state = self._server.gui, self.state
+        pace = gui.add_slider("clock: swarm s per s", min=0.05, max=2.0, step=0.05, initial_value=1.0)
+        pace.on_update(self.later(lambda: self.say(actions.pace(pace.value))))
+        group = gui.add_button_group("clock", ("pause", "slow", "run"))
+
+        def turn() -> None:
+            scale = {"pause": PAUSED, "slow": 0.1}.get(group.value, state.scenario.time_scale)
+            self.say(actions.pace(scale))
+
+        group.on_click(self.later(turn))
+        self._button("cut a head's radio", lambda: self._on_a_head(actions.cut), color="orange")
+        self._button("let a head crash", lambda: self._on_a_head(actions.crash), color="red")
+        radius = gui.add_slider("jam: radius [m]", min=20, max=500, step=10, initial_value=150)
+        self._button("jam at the mark, or about the UAV", lambda: self._jam(actions, radius.value), color="red")
+        self._button("end all faults", actions.restore, color="green")
+        gui.add_html(_box("Click the map to set the mark."))
+
+    def _on_a_head(self, act: Callable[[int], str]) -> str:
+        heads = self.state.heads()
+        selected = self.state.uavs.get(self._scene.selected)
+        if selected is not None and selected.head:
+            return act(selected.head)
+        return act(max(heads, key=lambda head: len(heads[head]))) if heads else "there is no head now"
+
+    def _jam(self, actions: Actions, radius: float) -> str:
+        uav = self.state.uavs.get(self._scene.selected)
+        place = self._scene.target
+        if place is None and uav is not None:
+            place = (uav.position.east, uav.position.north)
+        if place is None:
+            return "click the map or a UAV first"
+        label = f"jam-{len(self._scene.jams) + 1}"
+        self._scene.jams[label] = (*place, radius)
+        return actions.jam(label, *place, radius)
+
+    def _add_switches(self) -> None:
+        gui, scene = self._server.gui, self._scene
+        texts = {
+            "links": "links, by what they delivered", "clusters": "clusters: member to head", "trails": "trails",
+            "coverage": "area covered", "names": "names", "turns": "whose turn it is",
+            "spreading": "a packet that spreads", "survivors": "survivors, estimates",
+        }  # fmt: skip
+        for name, text in texts.items():
+            box = gui.add_checkbox(text, initial_value=getattr(scene.shown, name))
+
+            def switch(name: str = name, box: Any = box) -> None:  # noqa: ANN401  (viser's handles)
+                scene.shown = scene.shown._replace(**{name: box.value})
+
+            box.on_update(self.later(switch))
+        size = gui.add_slider("size of UAVs [m]", min=1, max=60, step=1, initial_value=round(scene.size_m))
+
+        def resize() -> None:
+            scene.size_m = float(size.value)
+
+        size.on_update(self.later(resize))
+        gui.add_html(_box(_LEGEND))
+
+    def _follow(self, wanted: bool) -> None:
+        self._follows = wanted
+
+    def _look_at_selected(self) -> None:
+        at = np.array(self.state.uavs[self._scene.selected].position)
+        for client in self._server.get_clients().values():
+            moved = at - client.camera.look_at
+            if float(np.abs(moved).max()) > 0.1:
+                client.camera.position = client.camera.position + moved
+                client.camera.look_at = at
+
+    def _write(self, name: str, text: str) -> None:
+        """Write text into a part of the panel, if it has changed."""
+        if self.texts.get(name) != text:
+            self.texts[name] = text
+            getattr(self, name).content = text
+
+    def _write_clock(self, t_ns: int, note: str) -> None:
+        state = self.state
+        pace = "" if math.isclose(state.time_scale, 1.0) else f" at {state.time_scale:.3g} of real time"
+        if state.time_scale <= PAUSED:
+            pace = ", paused"
+        now = f"<b style='font-size:17px'>{t_ns // (100 * MS) / 10:.1f} s</b>"
+        lines = [f"{now} of {state.scenario.duration_s:g} s{pace}"]
+        lines += [f"<span style='color:#b04a00'>{html.escape(text)}</span>" for text in (note, self._said) if text]
+        self._write("_clock", _box("<br>".join(lines)))
+
+    def _event_list(self) -> str:
+        events = self.state.latest_events(_EVENTS)
+        rows = "".join(f"<tr><td>{e.t_ns / S:.1f} s</td><td>{html.escape(e.text)}</td></tr>" for e in reversed(events))
+        return _box(f"<table>{rows}</table>" if rows else "Nothing yet.")
+
+    def _spread_text(self, t_ns: int) -> str:
+        found = self._scene.spreading()
+        turn = self.state.turns
+        lines = []
+        if turn is not None:
+            owners = self.state.owners(t_ns)
+            who = ", ".join(map(str, owners)) if owners else "nobody"
+            lines.append(f"<b>{turn.called}</b> of <span style='color:#009E73'>&#9679;</span> {who}, one of "
+                         f"{len(turn.own)} in {turn.period_ns / MS:.0f} ms")  # fmt: skip
+        if found is not None:
+            (origin, seq), packet = found
+            have, own_ns = self._scene.shown_spread(t_ns)
+            dots = "".join(f"<span style='color:{color}'>&#9679;</span>" for color in HOP_COLORS[:4])
+            lines.append(f"<b>packet {seq} of UAV {origin}</b> {dots}: {have} of {packet.targets} have it "
+                         f"{own_ns / MS:.0f} ms after it was handed over (slowed down)")  # fmt: skip
+        return _box("<br>".join(lines)) if lines else ""
+
+    def _uav_text(self) -> str:
+        node, state = self._scene.selected, self.state
+        uav = state.uavs.get(node)
+        if uav is None:
+            return _box("Click a UAV, or choose one.")
+        report = state.reports.get(node, {})
+        at, flies = uav.position, math.hypot(*uav.velocity)
+        since_s = (state.t_ns - uav.heard_ns) / S
+        rows = [
+            ("role", f"{uav.role or 'none yet'}{f', cluster {uav.cluster}, head {uav.head}' if uav.head else ''}"),
+            ("mode", f"{uav.flight or '-'}; mission {uav.mission or '-'}"
+                     f"{f', survivor {uav.survivor}' if uav.survivor else ''}"),
+            ("place", f"{at.east:.0f} m E, {at.north:.0f} m N, {at.up:.0f} m up; {flies:.1f} m/s"),
+            ("battery", "not told" if uav.charge_percent is None else f"{uav.charge_percent} %"),
+            ("neighbors", ", ".join(map(str, state.neighbors(node))) or "none"),
+            ("queue", "not in a trace" if report.get("at_end") else f"{report.get('waiting', 0)} packets wait"),
+            ("packets", f"{uav.sent} sent, {uav.delivered} received"),
+            ("dropped", ", ".join(f"{html.escape(str(k))} {v}" for k, v in sorted(uav.drops.items())) or "none"),
+            ("last heard", f"{max(0.0, since_s):.1f} s ago"),
+        ]  # fmt: skip
+        return _box(f"<b>UAV {node}</b>{_table(rows)}")
+
+    def _chart(self, title: str, *, top: float | None = None, visible: bool = True) -> Any:  # noqa: ANN401
+        scales = {"x": uplot.Scale(time=False)}
+        if top is not None:
+            scales["y"] = uplot.Scale(range=(0.0, top))
+        series = (uplot.Series(label="swarm s"), uplot.Series(label=title, stroke="#0072B2", width=2))
+        return self._server.gui.add_uplot(
+            (np.zeros(1), np.zeros(1)), series, title=title, scales=scales, aspect=2.6, visible=visible,
+            legend=uplot.Legend(show=False), padding=(14, 8, 0, 0),
+        )  # fmt: skip
+
+    def _plot(self, t_ns: int, metrics: dict[str, float | None]) -> None:
+        """Add a point to each chart whose figure is known; a chart without any figure is not shown."""
+        for chart, name, scale in (
+            (self._delivered, "delivered_share", 100.0),
+            (self._delays, "delay_p95_ms", 1.0),
+            (self._bounds, "bound_max_ms", 1.0),
+        ):
+            value, points = metrics[name], self._history.setdefault(name, [])
+            if value is not None:
+                points.append((t_ns / S, value * scale))
+                del points[:-_MOST_POINTS]
+                times, values = np.array(points).T
+                chart.data = (times, values)
+                if not chart.visible:
+                    chart.visible = True
+
+
+def _figures(metrics: dict[str, float | None], uavs: int, clusters: int) -> str:
+    def percent(name: str, digits: int = 1) -> str:
+        value = metrics[name]
+        return "-" if value is None else f"{100 * value:.{digits}f} %"
+
+    def ms(name: str) -> str:
+        value = metrics[name]
+        return "-" if value is None else f"{value:,.0f} ms"
+
+    bound = "no bound stated" if metrics["bound_max_ms"] is None else f"bound {ms('bound_max_ms')}"
+    rows = [
+        ("delivered, last 12 s", f"<b>{percent('delivered_share')}</b>"),
+        ("delay median, longest", f"{ms('delay_p50_ms')}, {ms('delay_max_ms')}; {bound}"),
+        ("bounds broken", f"{metrics['bounds_broken']:.0f}"),
+        *([("air busy", percent("airtime_share"))] if metrics["airtime_share"] is not None else []),
+        *(
+            [("frames late", f"{percent('late_share', 2)}, 99 of 100 below {ms('late_p99_ms')}")]
+            if metrics["late_share"] is not None
+            else []
+        ),
+        ("confirmed", f"<b>{metrics['confirmed']:.0f} of {metrics['survivors']:.0f}</b>"),
+        ("area covered", percent("coverage_share")),
+        ("UAVs, clusters", f"{uavs}, {clusters}"),
+    ]
+    return _box(_table(rows))
+
+
+def _table(rows: Sequence[tuple[str, str]]) -> str:
+    cells = "".join(f"<tr><td style='color:#666;padding-right:10px'>{k}</td><td>{v}</td></tr>" for k, v in rows)
+    return f"<table>{cells}</table>"
+
+
+def _box(content: str) -> str:
+    return f"<div style='{_STYLE}'>{content}</div>"
+
+
+def _number(text: str) -> int:
+    return int(text) if text.isdigit() else 0
+
+
+_LEGEND: Final = (
+    "<b>Links</b> in the last 4 s: <span style='color:#0072B2'>&#9644;</span> 90 % received, "
+    "<span style='color:#E69F00'>&#9644;</span> half, <span style='color:#D55E00'>&#9644;</span> less. "
+    "<b>UAVs</b> by cluster, heads larger. <b>Survivors</b>: gray not heard, yellow heard, orange approached, green "
+    "confirmed, red mistaken; circles are estimates, two standard deviations wide."
+)

@@ -1,0 +1,76 @@
+"""The server of a view: on the loopback interface only, with nothing that asks anybody else for anything."""
+
+import contextlib
+import io
+import math
+import socket
+from typing import Final
+
+import numpy as np
+import viser
+
+from fanet_mw.errors import ConfigError
+from sim.view.scene import Scene
+
+HOST: Final = "127.0.0.1"
+DEFAULT_PORT: Final = 8080
+_TRIED_PORTS: Final = 20
+_SKY: Final = np.full((2, 2, 3), (236, 240, 245), np.uint8)
+
+
+def open_server(port: int | None) -> viser.ViserServer:
+    """A server on this port, or on the first free one from the default on; raises ConfigError when it is taken."""
+    chosen = _free_port() if port is None else port
+    if not 1 <= chosen <= 65_535:
+        raise ConfigError(f"--port {chosen}: must be in [1, 65535]")
+    if not _is_free(chosen):
+        raise ConfigError(f"--port {chosen}: is in use")
+    with contextlib.redirect_stdout(io.StringIO()):  # it prints a box of its own
+        server = viser.ViserServer(host=HOST, port=chosen, verbose=False)
+    server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(0, 114, 178))
+    server.gui.main_panel.dock_right()
+    server.scene.set_up_direction("+z")
+    server.scene.world_axes.visible = False
+    server.scene.configure_environment_map(None)
+    server.scene.add_light_ambient("/light/ambient", intensity=0.9)
+    server.scene.add_light_directional("/light/sun", intensity=1.3, position=(0.5, -0.8, 1.0), cast_shadow=False)
+    server.scene.configure_default_lights(enabled=False)
+    server.scene.set_background_image(_SKY)
+    return server
+
+
+def close_server(server: viser.ViserServer) -> None:
+    """Stop a server without a word."""
+    with contextlib.suppress(RuntimeError), contextlib.redirect_stdout(io.StringIO()):
+        server.stop()
+
+
+def look_over(server: viser.ViserServer, scene: Scene) -> None:
+    """Let the camera see the whole area, from the south, far enough for kilometres."""
+    half = scene.around.half_m
+    uavs = [uav.position for uav in scene.state.uavs.values()]
+    reach = max([half, *(abs(value) for at in uavs for value in at[:2])])
+    camera = server.initial_camera
+    camera.position = (-0.3 * reach, -1.75 * reach, 1.35 * reach)
+    camera.look_at = (0.05 * reach, -0.12 * reach, 0.0)
+    camera.up = (0.0, 0.0, 1.0)
+    camera.far = 30.0 * reach
+    camera.near = reach / 1000
+    camera.fov = math.radians(45)
+
+
+def _free_port() -> int:
+    for port in range(DEFAULT_PORT, DEFAULT_PORT + _TRIED_PORTS):
+        if _is_free(port):
+            return port
+    raise ConfigError(f"--port: none of {DEFAULT_PORT} to {DEFAULT_PORT + _TRIED_PORTS - 1} is free")
+
+
+def _is_free(port: int) -> bool:
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((HOST, port))
+        except OSError:
+            return False
+    return True

@@ -1,0 +1,332 @@
+"""The view shows the swarm as its trace tells it, again and live, and what is pressed in it happens."""
+
+import asyncio
+import json
+import random
+import re
+import threading
+import time
+from bisect import bisect_right
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import viser
+
+from fanet_mw.errors import ConfigError
+from fanet_mw.units import S
+from sim.cli.app import app
+from sim.observation.bus_feed import BusFeed
+from sim.observation.swarm_state import SwarmState
+from sim.observation.timeline import Timeline
+from sim.run.api import launch
+from sim.view.actions import Actions
+from sim.view.panels import Panels
+from sim.view.replayed import write_html
+from sim.view.scene import CLUSTER_COLORS, Scene
+from sim.view.server import open_server
+from sim.view.shapes import rgb
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Nine UAVs of which one is silent for five seconds, with a recording."""
+    out = tmp_path_factory.mktemp("views") / "run"
+    scenario = out.parent / "cut.toml"
+    from sim.scenarios.catalog import text_of
+
+    text = text_of("quick")
+    scenario.write_text(f'{text}\n[[faults]]\nkind = "cut"\nnode = 4\nat_s = 12\nfor_s = 5\nlabel = "quiet"\n')
+    words = ["simulate", str(scenario), "--out", str(out), "--record", str(out / "run.mcap"), "--json"]
+    assert app(words, result_action="return_value") == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def timeline(folder: Path) -> Timeline:
+    return Timeline(folder)
+
+
+def lines(folder: Path, kind: str) -> list[list[Any]]:
+    found = (json.loads(line) for line in (folder / "trace.jsonl").read_text().splitlines())
+    return [record[1:] for record in found if record[0] == kind]
+
+
+def instants(seed: int) -> list[int]:
+    """Whole seconds and instants between them, forwards and back."""
+    draw = random.Random(seed)
+    return [draw.randrange(1, 20) * S if draw.random() < 0.5 else draw.randrange(1, 20 * S) for _ in range(14)]
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_replayed_positions_are_those_of_the_trace(folder: Path, timeline: Timeline, seed: int) -> None:
+    tracks: dict[int, list[tuple[int, tuple[float, ...]]]] = defaultdict(list)
+    for t_ns, node, *at in lines(folder, "posed"):
+        tracks[node].append((t_ns, tuple(at)))
+    for t_ns in instants(seed):
+        state = timeline.at(t_ns)
+        assert sorted(state.uavs) == sorted(tracks)
+        for node, track in tracks.items():
+            index = bisect_right([one[0] for one in track], t_ns)
+            (t0, a), (t1, b) = track[index - 1], track[min(index, len(track) - 1)]
+            share = (t_ns - t0) / (t1 - t0) if t1 > t0 else 0.0
+            flown = [x + share * (y - x) for x, y in zip(a, b, strict=True)]
+            assert tuple(state.uavs[node].position) == pytest.approx(flown, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_replayed_roles_drops_faults_and_packets_are_those_of_the_trace(
+    folder: Path, timeline: Timeline, seed: int
+) -> None:
+    roles, drops = lines(folder, "role_changed"), lines(folder, "dropped")
+    delivered, generated = lines(folder, "delivered"), lines(folder, "generated")
+    for t_ns in instants(seed):
+        state = timeline.at(t_ns)
+        for node, uav in state.uavs.items():
+            taken = [tuple(rest) for t, n, *rest in roles if n == node and t <= t_ns]
+            assert (uav.role, uav.cluster, uav.head) == (taken[-1] if taken else ("", -1, 0))
+            assert uav.drops == Counter(reason for t, n, reason, *_ in drops if n == node and t <= t_ns)
+            assert uav.delivered == sum(n == node and t <= t_ns for t, n, *_ in delivered)
+        assert set(state.faults) == ({"quiet"} if 12 * S <= t_ns < 17 * S else set())
+        for _, origin, seq, *_ in (one for one in generated if t_ns - 15 * S <= one[0] <= t_ns):
+            having = {n for t, n, o, s, *_ in delivered if (o, s) == (origin, seq) and t <= t_ns}
+            assert set(state.packets[origin, seq].got) == having
+
+
+def test_replayed_turns_are_those_in_which_heads_let_packets_out(folder: Path, timeline: Timeline) -> None:
+    roles = lines(folder, "role_changed")
+    inside = outside = packets = 0
+    for t_ns, node, _ in lines(folder, "let_out"):
+        taken = [role for t, n, role, *_ in roles if n == node and t <= t_ns]
+        if taken[-1:] == ["head"] and t_ns > 7 * S:
+            inside += node in timeline.at(t_ns).owners(t_ns)
+            outside += node in timeline.at(t_ns).owners(t_ns + S // 2)
+            packets += 1
+    assert packets >= 20
+    assert inside >= 0.95 * packets
+    assert outside == 0
+
+
+def test_a_jump_back_shows_what_was_shown_before(folder: Path) -> None:
+    again = Timeline(folder)
+    for t_s in (19, 5, 16, 2, 13):
+        forward = Timeline(folder).at(t_s * S)
+        back = again.at(t_s * S)
+        for name in ("uavs", "packets", "estimates", "faults", "told", "broken"):
+            assert getattr(back, name) == getattr(forward, name), name
+        assert back.metrics() == forward.metrics()
+        assert (back.covered() == forward.covered()).all()
+        assert list(back.link_rows()) == list(forward.link_rows())
+
+
+def test_links_of_a_replay_are_those_of_its_recording(folder: Path, timeline: Timeline) -> None:
+    assert timeline.has_links
+    rows = {(src, dst): (copies, received) for src, dst, copies, received in timeline.at(16 * S).link_rows()}
+    assert len(rows) >= 40
+    assert not any(received for (src, dst), (_, received) in rows.items() if 4 in (src, dst))
+    assert any(received for (src, dst), (_, received) in rows.items() if {src, dst} == {1, 2})
+
+
+def test_events_can_be_jumped_to_in_order(timeline: Timeline) -> None:
+    texts = [event.text for event in timeline.events]
+    assert any("radio fault cut quiet begins" in text for text in texts)
+    assert any("becomes head" in text for text in texts)
+    assert all(a.t_ns <= b.t_ns for a, b in pairwise(timeline.events))
+
+
+def test_a_folder_without_a_run_cannot_be_replayed(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"summary\.json"):
+        Timeline(tmp_path)
+    with pytest.raises(ConfigError, match="--start -1"):
+        app(["replay", str(tmp_path), "--start", "-1"], result_action="return_value", exit_on_error=False)
+
+
+# --- the scene ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def server() -> Iterator[viser.ViserServer]:
+    opened = open_server(None)
+    yield opened
+    opened.stop()
+
+
+def test_the_server_is_on_the_loopback_interface_alone(server: viser.ViserServer) -> None:
+    assert server.get_host() == "127.0.0.1"
+    with pytest.raises(ConfigError, match=f"--port {server.get_port()}: is in use"):
+        open_server(server.get_port())
+    with pytest.raises(ConfigError, match="--port 70000: must be in"):
+        open_server(70_000)
+
+
+def test_the_scene_shows_places_clusters_turns_links_and_survivors(
+    server: viser.ViserServer, timeline: Timeline
+) -> None:
+    state = timeline.at(15 * S)
+    scene = Scene(server, state, on_select=lambda _: None)
+    t_ns = next(t for t in range(15 * S, 16 * S, S // 100) if state.owners(t))
+    scene.draw(t_ns, all_of_it=True)
+
+    def handle(name: str) -> Any:
+        found = server.scene.get_handle_by_name(name)
+        assert found is not None
+        return found
+
+    nodes = sorted(state.uavs)
+    places = np.array([state.uavs[node].position for node in nodes])
+    assert np.allclose(handle("/uavs").batched_positions, places, atol=1e-3)
+    tints = [tuple(tint) for tint in handle("/uavs").batched_colors.tolist()]
+    gray = (136, 136, 136)
+    flown = [uav for _, uav in sorted(state.uavs.items())]
+    assert tints == [rgb(CLUSTER_COLORS[uav.cluster]) if uav.cluster >= 0 else gray for uav in flown]
+    owners = [state.uavs[node].position for node in state.owners(t_ns)]
+    assert np.allclose(handle("/turn").batched_positions, owners, atol=1e-3)
+    assert np.allclose(handle("/faulty").batched_positions, [state.uavs[4].position], atol=1e-3)
+    members = sum(1 for uav in state.uavs.values() if uav.role == "member")
+    assert handle("/clusters").points.shape == (members, 2, 3)
+    pairs = {(min(a, b), max(a, b)) for a, b, _, received in state.link_rows() if received}
+    assert len(handle("/links").points) == len(pairs)
+    assert len(handle("/survivors").batched_positions) == 4
+    east, north, *_ = handle("/world/covered").image.shape
+    assert (east, north) == state.covered().shape
+    north_row = handle("/world/covered").image[0, :, 0] == 164
+    assert (north_row == state.covered()[-1]).all(), "the first row of the image is the northernmost"
+
+
+def test_a_packets_spreading_ends_with_all_who_have_it(server: viser.ViserServer, timeline: Timeline) -> None:
+    state = timeline.at(15 * S)
+    scene = Scene(server, state, on_select=lambda _: None)
+    scene.draw(15 * S)
+    found = scene.spreading()
+    assert found is not None
+    (origin, _), packet = found
+    counts = []
+    for t_ns in range(15 * S, 15 * S + 5 * S // 2, S // 10):
+        scene.draw(t_ns)
+        counts.append(scene.shown_spread(t_ns)[0])
+    assert counts[0] == 0
+    assert counts[-1] == len(packet.got)
+    assert counts == sorted(counts)
+    rings = server.scene.get_handle_by_name("/spread")
+    assert rings is not None
+    assert len(rings.batched_positions) == len({*packet.got, origin})
+
+
+def test_what_is_switched_off_is_not_drawn(server: viser.ViserServer, timeline: Timeline) -> None:
+    scene = Scene(server, timeline.at(15 * S), on_select=lambda _: None)
+    scene.draw(15 * S, all_of_it=True)
+    scene.shown = scene.shown._replace(links=False, clusters=False, trails=False, names=False, survivors=False)
+    scene.draw(15 * S, all_of_it=True)
+    for name in ("links", "clusters", "trails", "survivors", "names/uav-3", "names/survivor-1"):
+        found = server.scene.get_handle_by_name(f"/{name}")
+        assert found is not None
+        assert not found.visible, name
+
+
+def test_the_panel_says_what_the_state_knows(server: viser.ViserServer, timeline: Timeline) -> None:
+    state = timeline.at(19 * S)
+    scene = Scene(server, state, on_select=lambda _: None)
+    panels = Panels(server, scene, actions=None)
+    panels.select(4)
+    scene.draw(19 * S)
+    panels.refresh(19 * S)
+    texts = {name: re.sub(r"<[^>]+>", " ", text) for name, text in panels.texts.items()}
+    share = state.metrics()["delivered_share"]
+    assert share is not None
+    assert f"{100 * share:.1f} %" in texts["_figures"]
+    assert 0.7 < share < 0.99, "one of nine is silent"
+    assert "19.0 s" in texts["_clock"]
+    assert "UAV 4" in texts["_uav"]
+    assert f"cluster {state.uavs[4].cluster}" in texts["_uav"]
+    assert "radio fault cut quiet begins" in texts["_events"]
+    assert "slot" in texts["_spread"]
+
+
+def test_one_file_holds_the_scene_and_asks_for_nothing(folder: Path, tmp_path: Path) -> None:
+    path = tmp_path / "run.html"
+    write_html(folder, path, tell=lambda _: None)
+    page = path.read_text()
+    assert len(page) > 500_000
+    assert not re.search(r"<(script|link|img)[^>]+(src|href)=[\"']?https?:", page)
+    with pytest.raises(ConfigError, match="cannot be written"):
+        write_html(folder, tmp_path / "no" / "such.html", tell=lambda _: None)
+
+
+# --- live ---------------------------------------------------------------------------------------------------------
+
+
+class Watcher:
+    """What `fanet view` does, without a browser: a feed, a state, and actions."""
+
+    def __init__(self, endpoint: str, swarm: str) -> None:
+        self.ends = False
+        self.shares: list[tuple[float, float]] = []
+        self.paces: list[float] = []
+        self.events: list[str] = []
+        self.failure: BaseException | None = None
+        self._where = endpoint, swarm
+        self.thread = threading.Thread(target=self._run)
+
+    def _run(self) -> None:
+        try:
+            with BusFeed(*self._where) as feed:
+                self._watch(feed)
+        except BaseException as error:  # noqa: BLE001  (it is reported by the test)
+            self.failure = error
+
+    def _watch(self, feed: BusFeed) -> None:
+        state, actions = SwarmState(feed.scenario), Actions(feed)
+        feed.listen()
+        done: set[str] = set()
+
+        def once(name: str, due_s: float) -> bool:
+            if name in done or feed.now_ns() < due_s * S:
+                return False
+            done.add(name)
+            return True
+
+        while not self.ends and not feed.over:
+            feed.pump(state)
+            share = state.metrics()["delivered_share"]
+            if share is not None:
+                self.shares.append((feed.now_ns() / S, share))
+            self.paces.append(feed.time_scale)
+            if once("cut", 14):
+                actions.cut(next(iter(state.heads())))
+            if once("slow", 16):
+                actions.pace(0.5)
+            if once("run", 18):
+                actions.pace(1.0)
+            if once("restore", 30):
+                actions.restore()
+            time.sleep(0.1)
+        self.events = [event.text for event in state.latest_events(200)]
+
+
+@pytest.mark.realtime
+def test_a_head_that_is_cut_in_a_view_costs_deliveries_and_the_clock_obeys() -> None:
+    async def run() -> Watcher:
+        async with launch("quick", overrides=["duration_s=34"]) as launched:
+            await asyncio.sleep(1)
+            watcher = Watcher(launched.radio.endpoint, launched.radio.swarm)
+            watcher.thread.start()
+            while watcher.thread.is_alive():  # noqa: ASYNC110
+                await asyncio.sleep(0.2)
+        assert launched.result is not None
+        slowed = launched.result.summary["slowed"]
+        assert [step["time_scale"] for step in slowed] == [0.5, 1.0]
+        return watcher
+
+    watcher = asyncio.run(run())
+    assert watcher.failure is None
+    assert 0.5 in watcher.paces
+    before = [share for t_s, share in watcher.shares if t_s < 14]
+    after = [share for t_s, share in watcher.shares if 27 < t_s < 30]
+    assert before[-1] > 0.9
+    assert after[-1] < 0.85, "56 of 72 copies are left when one of nine is silent"
+    assert any("radio fault cut" in text and "begins" in text for text in watcher.events)
+    assert any("radio fault cut" in text and "ends" in text for text in watcher.events)

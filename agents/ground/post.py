@@ -106,6 +106,8 @@ class Post(Application):
         self._tell(now_ns)
 
     def next_wake_ns(self) -> int | None:
+        if self.asked:
+            return 0  # at once
         planned = [self._planned[0][0]] if self._planned else []
         return min([*planned, *(due_ns for due_ns, _, _ in self._tellings)], default=None)
 

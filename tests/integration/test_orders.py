@@ -5,10 +5,11 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
+from fanet_mw.orders import Order, OrderKind
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Collided, FlightModeChanged, MissionModeChanged, Ordered, Posed, Record
 from fanet_mw.units import S
-from sim.run.virtual import simulate
+from sim.run.virtual import Observed, simulate
 
 KEYS = {
     "nodes.count": 7, "nodes.spacing_m": 40, "nodes.altitude_m": 40, "duration_s": 100, "warmup_s": 1, "drain_s": 1,
@@ -89,3 +90,20 @@ def test_all_keep_out_of_an_area_that_is_closed_while_they_fly(make_scenario: Ca
     assert inside(flown(make_scenario)), "they fly there otherwise"
     order = {"at_s": 25, "order": "no_fly", "place_m": (0.0, 0.0), "radius_m": 30.0}
     assert not inside(flown(make_scenario, order))
+
+
+def test_an_operator_orders_while_the_swarm_flies_and_what_is_impossible_is_refused_and_counted(
+    make_scenario: Callable[..., Scenario],
+) -> None:
+    observed = Observed(make_scenario(**{**KEYS, "duration_s": 25}))
+    observed.host.start()
+    for at_s, order in ((15, Order(OrderKind.RECALL, 4)), (16, Order(OrderKind.RECALL, 9))):
+        observed.host.run(at_s * S)
+        observed.host.put(observed.names.orders, order)
+    observed.host.run(25 * S)
+    observed.host.stop()
+    given = [r for r in observed.records if isinstance(r, Ordered) and r.node == POST]
+    assert [(r.t_ns // S, r.order, r.other) for r in given] == [(15, "recall", 4)]
+    assert dict(modes([*observed.records], 4))["recall"] == pytest.approx(15, abs=2)
+    post = next(actor.report() for actor in observed.actors if actor.name == f"agent-{POST}")
+    assert (post["orders_given"], post["orders_refused"]) == (1, 1)

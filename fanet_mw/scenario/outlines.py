@@ -107,22 +107,31 @@ def _polygons(tree: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any],
         is_feature = feature.get("type") == "Feature"
         tags = _tags(feature.get("properties")) if is_feature else {}
         name = str(tags.get("@id") or feature.get("id") or tags.get("osm_id") or tags.get("id") or f"feature {number}")
-        for ring in _rings(feature.get("geometry") if is_feature else feature):
+        geometry = feature.get("geometry") if is_feature else feature
+        for ring in _rings(geometry, lines=any(key in tags for key in _BUILDING)):
             yield name, tags, ring
 
 
-def _rings(geometry: object) -> Iterator[Any]:
-    """The outer rings of a geometry; what has no area has none."""
+def _rings(geometry: object, *, lines: bool) -> Iterator[Any]:
+    """The outer rings of a geometry; what has no area has none. `lines`: closed lines are outlines, too."""
     if not isinstance(geometry, dict):
         return
     inner = geometry.get("geometries" if geometry.get("type") == "GeometryCollection" else "coordinates")
     polygons = [inner] if geometry.get("type") == "Polygon" else inner
     if geometry.get("type") == "GeometryCollection":
         for each in inner or ():
-            yield from _rings(each)
+            yield from _rings(each, lines=lines)
     elif geometry.get("type") in {"Polygon", "MultiPolygon"}:
         for polygon in polygons if isinstance(polygons, list) else [None]:
             yield polygon[0] if isinstance(polygon, list) and polygon else polygon
+    elif (
+        lines
+        and geometry.get("type") == "LineString"
+        and isinstance(inner, list)
+        and inner[3:]
+        and inner[0] == inner[-1]
+    ):
+        yield inner
 
 
 def _tags(properties: object) -> Mapping[str, Any]:

@@ -84,6 +84,8 @@ HEIGHTS: tuple[tuple[dict[str, object], float], ...] = (
     ({"building:levels": "3"}, 9.0), ({"building:levels": "2;3"}, 9.0), ({"building:levels": "3-4"}, 12.0),
     ({"building:levels": "2.5"}, 7.5), ({"building:levels": "0", "roof:levels": "1"}, 19.0), ({"levels": 4}, 12.0),
     ({"building:levels": "ground floor"}, 19.0), ({"height": ["12"]}, 19.0), ({"height": {"value": 3}}, 19.0),
+    ({"building:levels": "4F"}, 12.0), ({"building:levels": "3 storeys"}, 9.0), ({"height": "12."}, 12.0),
+    ({"height": "12 mt"}, 12.0), ({"height": "9 m (est.)"}, 9.0), ({"height": "1,200"}, 19.0),
     ({"height": True}, 19.0), ({"height": "NaN"}, 19.0), ({"height": "12 стор."}, 19.0), ({"height": "١٢"}, 12.0),
 )  # fmt: skip
 """Tags of a building, and its height; 19 m is the default."""

@@ -37,12 +37,17 @@ _MOST_CUTS: Final = 24
 _KEYS: Final = (
     ("height", 1.0), ("building:height", 1.0), ("est_height", 1.0), ("building:levels", LEVEL_M), ("levels", LEVEL_M)
 )  # fmt: skip
-_NUMBER: Final = r"\d+(?:[.,]\d+)?|[.,]\d+"
+_NUMBER: Final = r"\+?(?:\d+(?:\.\d*|,(?!\d{3}(?!\d))\d*)?|[.,]\d+)"
+"""A comma before three digits may be one of thousands, so that number is not read."""
 _FEET: Final = re.compile(
     rf"({_NUMBER})\s*(?:'|ft\.?|feet|foot|\u2032)\s*(?:({_NUMBER})\s*(?:\"|in\.?|inch(?:es)?|\u2033|'')?)?"
 )
-_METRES: Final = re.compile(rf"({_NUMBER})\s*(?:m|m\.|metres?|meters?|mètres?)?")
-_ABOUT: Final = re.compile(r"^(?:~|≈|<|>|<=|>=|ca\.?|c\.|approx\.?|approximately|about|around)\s*")
+_METRES: Final = re.compile(
+    rf"({_NUMBER})\s*(?:m\.?|mt|mts|mtrs?|metres?|meters?|mètres?|\u043c\.?|\u043c\u0435\u0442\u0440\w*)?"
+)
+_LEVELS: Final = re.compile(rf"({_NUMBER})\s*(?:levels?|lvls?|floors?|fl|f|stor(?:e?ys?|ies))?")
+_ABOUT: Final = re.compile(r"^(?:~|≈|<|>|<=|>=|ca\.?|c\.|approx\.?|approximately|about|around|est\.?)\s*")
+_SUPPOSED: Final = re.compile(r"\s*(?:\(.*\)|\?|approx\.?|approximately|ca\.?|est\.?|estimated)$")
 _SEVERAL: Final = re.compile(r"\s*(?:;|\||/|\u2013|\u2014|-|\bto\b|\bor\b)\s*")
 
 
@@ -106,8 +111,8 @@ def height_of(tags: Mapping[str, Any], default_m: float) -> tuple[float, str]:
     for key, unit_m in _KEYS:
         if (said := tags.get(key)) is None or not str(said).strip():
             continue
-        values = _values(str(said), feet_allowed=unit_m == 1.0)
-        height = max(values, default=0.0) * unit_m
+        values = _values(str(said), in_levels=unit_m != 1.0)
+        height = max((value for value in values if value is not None), default=0.0) * unit_m
         if 0 < height <= _HIGHEST_M:
             passed += [f"{key} = {said}"] if len(values) > 1 else []
             return height, f"{', '.join(passed)}: taken as {height:g} m" if passed else ""
@@ -115,17 +120,20 @@ def height_of(tags: Mapping[str, Any], default_m: float) -> tuple[float, str]:
     return default_m, f"{', '.join(passed)}: taken as {default_m:g} m" if passed else ""
 
 
-def _values(text: str, *, feet_allowed: bool) -> list[float]:
-    """The numbers that a tag states, in metres or levels; none if it states anything else."""
-    found = []
-    for part in _SEVERAL.split(_ABOUT.sub("", text.strip().lower())):
-        word = part.strip()
-        if match := _METRES.fullmatch(word):
+def _values(text: str, *, in_levels: bool) -> list[float | None]:
+    """The numbers that a tag states, in metres or levels; None for a part of it that states anything else."""
+    found: list[float | None] = []
+    parts = _SEVERAL.split(_ABOUT.sub("", text.strip().lower()))
+    if not parts[0]:  # a minus, and no range
+        return [None]
+    for part in parts:
+        word = _SUPPOSED.sub("", part.strip())
+        if match := (_LEVELS if in_levels else _METRES).fullmatch(word):
             found.append(_float(match[1]))
-        elif feet_allowed and (match := _FEET.fullmatch(word)):
+        elif not in_levels and (match := _FEET.fullmatch(word)):
             found.append(_float(match[1]) * _FOOT_M + _float(match[2] or "0") * _INCH_M)
         else:
-            return []
+            found.append(None)
     return found
 
 

@@ -273,6 +273,14 @@ def town(path: Path, origin: Geodetic = PARIS) -> footprints.Town:
         ({"building:levels": "0", "roof:levels": "1"}, 19.0, True),
         ({"building:levels": "0", "levels": "2"}, 6.0, True),
         ({"building:levels": "2,5"}, 7.5, False),
+        ({"building:levels": "4 floors"}, 12.0, False),
+        ({"building:levels": "5."}, 15.0, False),
+        ({"height": "+12."}, 12.0, False),
+        ({"height": "12 (estimated)"}, 12.0, False),
+        ({"height": "3 mtr approx."}, 3.0, False),
+        ({"height": "12 \u043c\u0435\u0442\u0440\u043e\u0432"}, 12.0, False),
+        ({"height": "12 m; yes"}, 12.0, True),
+        ({"height": "1,200"}, 19.0, True),
         ({"levels": "many"}, 19.0, True),
         ({"building": "yes"}, 19.0, False),
         ({"tags": {"height": "30"}}, 30.0, False),
@@ -312,6 +320,18 @@ def test_one_feature_a_line_is_read_as_a_collection(tmp_path: Path) -> None:
     path = tmp_path / "lines.geojson"
     path.write_text("\ufeff" + "\n".join("\x1e" + json.dumps(feature) for feature in whole["features"]) + "\n")
     assert town(path).buildings == 3
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-32"])
+def test_a_closed_line_of_a_building_is_its_outline_in_any_unicode(tmp_path: Path, encoding: str) -> None:
+    line = [[0.0, 0.0], [0.0001, 0.0], [0.0001, 0.0001], [0.0, 0.0001], [0.0, 0.0]]
+    features = [
+        {"type": "Feature", "properties": tags, "geometry": {"type": "LineString", "coordinates": points}}
+        for tags, points in (({"building": "yes", "height": 8}, line), ({"building": "yes"}, line[:-1]), ({}, line))
+    ]
+    path = tmp_path / "a.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": features}), encoding=encoding)
+    assert [box.height for box in town(path, Geodetic(0.0, 0.0, 0.0)).boxes] == [8.0]
 
 
 def test_a_town_across_180_degrees_is_one_town(tmp_path: Path) -> None:
@@ -393,6 +413,9 @@ def test_the_smallest_rectangle_may_lie_along_a_side_of_the_hull_alone(tmp_path:
         ('{"elements": []}', "JSON of Overpass; export it as GeoJSON"),
         ('{"type": "Polygon", "coordinates": [[[448000, 5411000], [448010, 5411000], [448010, 5411010]]]}', "ogr2ogr"),
         ('{"type": "FeatureCollection"}', "features are no list"),
+        ('\ufeff<?xml version="1.0"?><osm/>', "it is XML or HTML: export it"),
+        ("PK\x03\x04", "it is a ZIP archive: unpack it"),
+        ("SQLite format 3\0", "a GeoPackage or another SQLite database"),
     ],
 )
 def test_a_file_of_another_kind_is_refused_with_the_way_to_convert_it(tmp_path: Path, text: str, why: str) -> None:

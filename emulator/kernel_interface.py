@@ -48,9 +48,12 @@ class KernelInterface:
         """A lower bound of the next instant at which `advance` returns rows; NEVER when nothing is planned."""
         self._entry = self.arrays.entry()
 
-    def obstruct(self, pairs: npt.NDArray[np.int64]) -> None:
-        """Set the pairs of stations [n, 2] with something solid between them; it takes effect at the next `place`."""
-        self._placement.obstruct(pairs)
+    def obstruct(self, pairs: npt.NDArray[np.int64], losses_db: npt.NDArray[np.float64]) -> None:
+        """Set the pairs of stations [n, 2] with something solid between them, and the loss of each, if that is known.
+
+        It takes effect at the next `place`.
+        """
+        self._placement.obstruct(pairs, losses_db)
 
     def place(self, at: npt.NDArray[np.float64], velocity: npt.NDArray[np.float64], t_ns: int) -> None:
         """Take over positions [m] and velocities [m/s] of an instant, one row per station; frames in flight are carried

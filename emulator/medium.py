@@ -295,7 +295,11 @@ class Medium(Actor):
         if len(pairs) % 2 or (len(pairs) and not 1 <= pairs.min() <= pairs.max() <= self._count):
             self._counters.refused["obstructions"] += 1
             return
-        self._kernel.obstruct(pairs.reshape(-1, 2) - 1)
+        losses_db = np.frombuffer(obstructions.losses_ddb, np.uint16) / 10
+        if len(losses_db) not in (0, len(pairs) // 2):
+            self._counters.refused["obstructions"] += 1
+            return
+        self._kernel.obstruct(pairs.reshape(-1, 2) - 1, losses_db)
 
     def _place(self, poses: Poses) -> None:
         ids = np.frombuffer(poses.ids, np.uint16).astype(np.int64)

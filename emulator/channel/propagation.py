@@ -12,7 +12,7 @@ or more (`longest_delay_ns`).
 
 import math
 from collections.abc import Mapping
-from typing import Final, Protocol
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
@@ -50,6 +50,8 @@ from fanet_mw.scenario.tables.radio import CHANNELS, UMA_ANTENNA_M, Radio, defau
 
 _ROUNDING_DB: Final = 1e-9
 """A tolerance, so that rounding does not remove a link exactly as long as the reach."""
+_UNKNOWN_EDGE_DB: Final = 20.0
+"""The loss of an obstruction of which a foreign world does not say how much it costs."""
 
 
 def milliwatt(dbm: float) -> float:
@@ -216,6 +218,26 @@ def longest_delay_ns(radio: Radio) -> int:
     return Timing.of(radio).difs_ns - 1
 
 
+class Blocked(NamedTuple):
+    """The obstructed pairs."""
+
+    codes: Ints
+    """Their `pair_codes`, ascending."""
+    each_db: Reals
+    """The loss of each; empty: that of the scenario."""
+
+    def losses_db(self, codes: Ints, radio: Radio) -> Reals:
+        """The losses of links by their codes; infinite for obstructed ones of the channel `range`."""
+        place = np.minimum(np.searchsorted(self.codes, codes), len(self.codes) - 1)
+        lost = self.codes[place] == codes
+        if radio.channel == "range":
+            return np.where(lost, np.inf, 0.0)
+        if len(self.each_db):
+            return np.where(lost, self.each_db[place], 0.0)
+        known = _UNKNOWN_EDGE_DB if radio.obstruction_loss_db == "knife_edge" else radio.obstruction_loss_db
+        return np.where(lost, known, 0.0)
+
+
 class LinkTable:
     """All links of one set of positions, as the kernel's arrays, with room for `spare` more."""
 
@@ -226,25 +248,23 @@ class LinkTable:
         *,
         spare: int,
         shadowing: Shadowing | None = None,
-        blocked: Ints | None = None,
+        blocked: Blocked | None = None,
         gains: Mapping[int, float] = {},
     ) -> None:
-        """`blocked`: the codes of the obstructed pairs (`pair_codes`), ascending. `gains`: the gains in dBi of antennas
-        that are not isotropic, by station.
-        """
+        """`gains`: the gains in dBi of antennas that are not isotropic, by station."""
         found, distance = pairs_in_reach(at, radio, gains)
         power_dbm = received_dbm(distance, at[found[:, 0]], at[found[:, 1]], radio)
         for station, gain_dbi in gains.items() if radio.channel != "range" else ():
             power_dbm = power_dbm + gain_dbi * (found == station).any(axis=1)
         if shadowing is not None:
             power_dbm = power_dbm - shadowing.loss_db(at, found, distance)
-        obstructed = np.zeros(len(found), bool)
-        if blocked is not None and len(blocked):
-            obstructed = np.isin(pair_codes(found, len(at)), blocked)
+        lost_db = np.zeros(len(found))
+        if blocked is not None and len(blocked.codes):
+            lost_db = blocked.losses_db(pair_codes(found, len(at)), radio)
         if radio.channel == "range":
-            kept = ~obstructed
+            kept = lost_db == 0
         else:
-            power_dbm = power_dbm - radio.obstruction_loss_db * obstructed
+            power_dbm = power_dbm - lost_db
             kept = power_dbm >= radio.interference_floor_dbm - _ROUNDING_DB
         if not kept.all():
             found, distance, power_dbm = found[kept], distance[kept], power_dbm[kept]

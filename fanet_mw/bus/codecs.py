@@ -108,16 +108,18 @@ def _decode_poses(body: bytes) -> Poses:
 
 
 def _encode_obstructions(m: Obstructions) -> bytes:
-    return _OBSTRUCTIONS.pack(m.t_ns, len(m.pairs)) + m.pairs.tobytes()
+    return _OBSTRUCTIONS.pack(m.t_ns, len(m.pairs)) + m.pairs.tobytes() + m.losses_ddb.tobytes()
 
 
 def _decode_obstructions(body: bytes) -> Obstructions:
     t_ns, count = _OBSTRUCTIONS.unpack_from(body)
-    pairs = array("H")
-    if len(body) != _OBSTRUCTIONS.size + 2 * count or count % 2:
+    pairs, losses = array("H"), array("H")
+    split = _OBSTRUCTIONS.size + 2 * count
+    if len(body) not in (split, split + count) or count % 2:
         raise ValueError("length")
-    pairs.frombytes(body[_OBSTRUCTIONS.size :])
-    return Obstructions(t_ns, pairs)
+    pairs.frombytes(body[_OBSTRUCTIONS.size : split])
+    losses.frombytes(body[split:])
+    return Obstructions(t_ns, pairs, losses)
 
 
 def _encode_setpoint(m: Setpoint) -> bytes:

@@ -79,11 +79,13 @@ class Poses(NamedTuple):
 
 
 class Obstructions(NamedTuple):
-    """World -> medium: all pairs of nodes between which something solid stands at one instant."""
+    """World -> medium: all pairs of nodes whose link something solid weakens at one instant."""
 
     t_ns: int
     pairs: array[int]
     """`array('H')`, two node ids per pair, the smaller first, ascending."""
+    losses_ddb: array[int] = array("H")
+    """`array('H')`, the loss of each pair [1/10 dB]; empty: that of the scenario (`radio.obstruction_loss_db`)."""
 
 
 class SetpointKind(IntEnum):

@@ -124,8 +124,9 @@ class Radio(Section):
     scatterer_speed_m_s: Annotated[float, Field(ge=0, le=1000)] = 0.0
     """`fading`: speed of what scatters the waves around the nodes, such as leaves and cars. It makes links fade whose
     nodes are at rest; 0: these keep their gain."""
-    obstruction_loss_db: Decibels = 20.0
-    """Loss of a link that the world reports as obstructed; with `range` such a link is cut."""
+    obstruction_loss_db: Decibels | Literal["knife_edge"] = "knife_edge"
+    """Loss of a link with a hill or a building in its way: that over or around the edge (ITU-R P.526), or as many dB
+    wherever something solid is between; with `range` such a link is cut."""
     sensitivity_dbm: Level = -82.0
     """All channels but `range`: the weakest frame that is received; weaker frames only interfere. By default that of
     which one in a hundred with 128 bytes arrives, by the error rates of data and of acknowledgments; -82 with

@@ -9,11 +9,12 @@ import math
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from sim.world.engines.contract import Flags, Rows, Values
 from sim.world.environment.obstacles import Obstacles
 
-_RAYS: Final = 1000
+RAYS: Final = 1000
 """Rays that are cast over hills at once; more would take much memory."""
 _SHORT_M: Final = 0.01
 """A body stops this far before a wall or the ground."""
@@ -34,6 +35,11 @@ class Solids:
         self._hills = obstacles.hills if obstacles else None
         self._steepest = self._hills.steepest if self._hills else 0.0
         self.top_m = obstacles.top_m if obstacles else 0.0
+
+    @property
+    def hilly(self) -> bool:
+        """True if the ground is not flat."""
+        return self._hills is not None
 
     @property
     def any(self) -> bool:
@@ -77,7 +83,7 @@ class Solids:
         start, way = before[near], path[near]
         least = np.minimum(gap[near], self.gap_m(start))
         if self._hills is not None:
-            _, above = self._above_hills(start, way, np.ones(len(near)))
+            _, above = self.above_hills(start, way, np.ones(len(near)))
             least = np.minimum(least, above.min(axis=1))
         if len(self._middle):
             least = np.minimum(least, self._boxes_least_m(start, way, within_m=within_m))
@@ -115,6 +121,23 @@ class Solids:
         east = self._cos * local[:, 0] - self._sin * local[:, 1]
         north = self._sin * local[:, 0] + self._cos * local[:, 1]
         return np.stack([east, north, local[:, 2]], axis=1) + self._middle
+
+    def corners_near(self, start: Rows, way: Rows, *, margin_m: float) -> tuple[npt.NDArray[np.int64], Values, Values]:
+        """The buildings near straight paths, seen from above: each by the row of the path, its corners [4, 2], and its
+        roof.
+        """
+        middle, span = start[:, :2] + way[:, :2] / 2, np.linalg.norm(way[:, :2], axis=1) / 2
+        apart = np.linalg.norm(middle[:, None] - self._middle[None, :, :2], axis=2)
+        ray, box = np.nonzero(apart <= span[:, None] + self._radius[None] + margin_m)
+        along, across = self._middle[box, :2] - start[ray, :2], way[ray, :2] / np.maximum(2 * span[ray], 1e-9)[:, None]
+        beside = np.abs(along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]) <= self._radius[box] + margin_m
+        ray, box = ray[beside], box[beside]
+        signs = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
+        local = self._half[box, None, :2] * signs
+        cos, sin = self._cos[box, None], self._sin[box, None]
+        east = cos * local[..., 0] - sin * local[..., 1]
+        north = sin * local[..., 0] + cos * local[..., 1]
+        return ray, np.stack([east, north], axis=2) + self._middle[box, None, :2], 2 * self._half[box, 2]
 
     def blocked(self, first: Rows, second: Rows) -> Flags:
         """True where something stands between `first` and `second` [n, 3]."""
@@ -211,9 +234,9 @@ class Solids:
         hit = np.full(len(origin), math.inf)
         lowest = np.minimum(origin[:, 2], origin[:, 2] + direction[:, 2] * reach)
         every = np.flatnonzero(lowest <= float(self._hills.heights.max()))
-        for begin in range(0, len(every), _RAYS):
-            rows = every[begin : begin + _RAYS]
-            along, above = self._above_hills(origin[rows], direction[rows], reach[rows])
+        for begin in range(0, len(every), RAYS):
+            rows = every[begin : begin + RAYS]
+            along, above = self.above_hills(origin[rows], direction[rows], reach[rows])
             below = above <= 0
             first = below.argmax(axis=1)
             each = np.arange(len(rows))
@@ -224,7 +247,7 @@ class Solids:
             hit[rows] = np.where(below[each, first], distance, math.inf)
         return hit
 
-    def _above_hills(self, origin: Rows, direction: Rows, reach: Values) -> tuple[Values, Values]:
+    def above_hills(self, origin: Rows, direction: Rows, reach: Values) -> tuple[Values, Values]:
         """Where each ray begins, crosses the edges of triangles, and ends, in order; and its height above them there.
 
         The edges lie where east, north, or their difference is a whole number of cells.

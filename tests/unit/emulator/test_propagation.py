@@ -21,7 +21,16 @@ from emulator.channel.path_loss import (
     uma_av_db,
     uma_av_sight_probability,
 )
-from emulator.channel.propagation import LinkTable, heard_m, milliwatt, noise_mw, pair_codes, reach_m, received_dbm
+from emulator.channel.propagation import (
+    Blocked,
+    LinkTable,
+    heard_m,
+    milliwatt,
+    noise_mw,
+    pair_codes,
+    reach_m,
+    received_dbm,
+)
 from emulator.channel.shadowing import Shadowing
 from emulator.kernel.state import AUDIBLE, LINK_DST, LINK_POWER, LINK_SRC
 from fanet_mw.errors import ConfigError
@@ -217,7 +226,7 @@ def test_shadowing_follows_the_places_and_nothing_else(make_scenario: MakeScenar
 
 def test_an_obstruction_costs_its_loss_and_cuts_a_link_of_the_range_channel() -> None:
     at = [[0, 0, 50], [100, 0, 50], [0, 100, 50]]
-    blocked = pair_codes(np.array([[1, 0]]), 3)
+    blocked = Blocked(pair_codes(np.array([[1, 0]]), 3), np.zeros(0))
     keys = radio(channel="friis", obstruction_loss_db=25)
     clear, behind = links_of(at, keys), links_of(at, keys, blocked=blocked)
     assert {pair: clear[pair] - behind[pair] for pair in clear} == pytest.approx(

@@ -99,7 +99,8 @@ def test_the_loss_does_not_jump_as_a_node_moves(north: float, up: float) -> None
 
 def test_the_world_tells_the_loss_and_the_medium_takes_it_off(make_scenario: Any) -> None:
     scenario = make_scenario(**{
-        "nodes.count": 3, "nodes.layout": "explicit", "nodes.positions_m": ((-300, 0, 20), (300, 0, 20), (0, 0, 80)), "radio.channel": "friis",
+        "nodes.count": 3, "nodes.layout": "explicit",
+        "nodes.positions_m": ((-300, 0, 20), (300, 0, 20), (0, 0, 80)), "radio.channel": "friis",
         "world.area_m": 1000, "world.buildings": ((0, 0, 0.2, 1000, 30),),
     })  # fmt: skip
     world = WorldActor(scenario, "test")

@@ -11,6 +11,7 @@ from agents.applications.collision_avoidance import CollisionAvoidance
 from agents.applications.telemetry import Telemetry
 from agents.applications.telemetry_streams import TelemetryStreams
 from agents.applications.traffic import Load
+from agents.ground.operator_relay import OperatorRelay
 from agents.ground.post import Post
 from agents.ground_control.application import GroundControl
 from agents.hello_schedule import HelloSchedule, HelloTime
@@ -108,7 +109,7 @@ class Uav(Actor):
             self._ground_control = GroundControl(scenario, node, self._streams, position=position)
             asked_for = [*_asked_for(scenario, node, self._streams, position, onboard_map), self._ground_control]
         else:
-            asked_for = [*_loads(scenario, node), self._post]
+            asked_for = [*_loads(scenario, node), self._post, OperatorRelay(scenario)]
         self._built_in = tuple(application.name for application in asked_for)
         """The applications whose counters are among those of the UAV itself in its report."""
         carried = (*_foreign(scenario, node), *applications)

@@ -30,6 +30,8 @@ COLLISION_ID: Final = int(common.MAVLINK_MSG_ID_COLLISION)
 GLOBAL_POSITION_ID: Final = int(common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT)
 AUTOPILOT_COMPONENT: Final = 1
 """MAV_COMP_ID_AUTOPILOT1, the sender of telemetry: ground stations take no other component for a vehicle."""
+GATEWAY_COMPONENT: Final = 240
+"""MAV_COMP_ID_UDP_BRIDGE, by which a gateway tells UAVs that ground stations may be there."""
 
 _A: Final = 6_378_137.0
 """WGS84 semi-major axis [m]."""

@@ -119,22 +119,24 @@ class TelemetryStreams:
         telemetry."""
         self._node = node
         self._base_ns = max(1, round(S / telemetry_hz)) if telemetry_hz else 0
-        self._messages = self._encoders()
+        self._messages = self._encoders(self._encoder)
+        self.air_encoder = Encoder(node, component=AUTOPILOT_COMPONENT, origin=origin)
+        """The encoder of what crosses the air to the post: a stream of its own, with its own numbers."""
+        self._over_air = self._encoders(self.air_encoder)
         self._streams: dict[int, _Stream] = {}
         for message_id, least_ns in _LOGGED.items() if telemetry_hz else ():
             self._begin(message_id, max(least_ns, self._base_ns), self._phase_ns)
         self._due_ns = self._first_ns()
 
-    def _encoders(self) -> dict[int, Callable[[int], bytes]]:
+    def _encoders(self, encoder: Encoder) -> dict[int, Callable[[int], bytes]]:
         """What makes each message that the flight controller sends, by its id."""
-        encoder = self._encoder
         return {
             common.MAVLINK_MSG_ID_HEARTBEAT: lambda _: encoder.vehicle_heartbeat(
                 self.flown.mode, armed=self.flown.armed, critical=self.flown.critical
             ),
-            common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._global_position,
+            common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: lambda now_ns: self._global_position(encoder, now_ns),
             common.MAVLINK_MSG_ID_ATTITUDE: lambda now_ns: encoder.attitude(self.attitude, now_ns=now_ns),
-            common.MAVLINK_MSG_ID_GPS_RAW_INT: self._gps_raw,
+            common.MAVLINK_MSG_ID_GPS_RAW_INT: lambda now_ns: self._gps_raw(encoder, now_ns),
             common.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: lambda _: encoder.extended_sys_state(self._landed()),
             common.MAVLINK_MSG_ID_SYS_STATUS: lambda now_ns: encoder.sys_status(
                 self._battery,
@@ -199,9 +201,9 @@ class TelemetryStreams:
         stream = self._streams.get(message_id)
         return stream.interval_ns if stream else 0 if message_id in self._messages else None
 
-    def one(self, message_id: int, now_ns: int) -> bytes | None:
+    def one(self, message_id: int, now_ns: int, *, over_air: bool = False) -> bytes | None:
         """One message now; None for one that is never sent."""
-        encode = self._messages.get(message_id)
+        encode = (self._over_air if over_air else self._messages).get(message_id)
         return None if encode is None else encode(now_ns)
 
     def _landed(self) -> int:
@@ -286,8 +288,8 @@ class TelemetryStreams:
         """The inner frames of a position beacon."""
         return self._beacons.heartbeat() + self._position(self._beacons, now_ns)
 
-    def _global_position(self, now_ns: int) -> bytes:
-        return self._encoder.global_position(
+    def _global_position(self, encoder: Encoder, now_ns: int) -> bytes:
+        return encoder.global_position(
             self._estimate, self.velocity, yaw=self._yaw, now_ns=now_ns, home_m=self.flown.home.up
         )
 
@@ -299,6 +301,6 @@ class TelemetryStreams:
         """Where the flight controller believes to be."""
         return self.position._replace(up=self.position.up - self.height_off_m)
 
-    def _gps_raw(self, now_ns: int) -> bytes:
+    def _gps_raw(self, encoder: Encoder, now_ns: int) -> bytes:
         fix_ns = now_ns if self._fix_ns is None else self._fix_ns
-        return self._encoder.gps_raw(self.position, self.velocity, has_fix=self._fix_ns is not None, fix_ns=fix_ns)
+        return encoder.gps_raw(self.position, self.velocity, has_fix=self._fix_ns is not None, fix_ns=fix_ns)

@@ -1,7 +1,7 @@
 """The application by which a ground station sees and commands one UAV: it answers as a flight controller does.
 
     MAVLink of a ground station -> commands, parameters, plans -> the pilot -> courses, by the arbitration on board
-    answers, telemetry, texts   -> the tap
+    answers, texts, telemetry   -> the tap, or over the air to the post on the ground: where the question came from
 
 It does nothing until a ground station is heard. What it does not understand it counts; what it does not support it
 says.
@@ -20,13 +20,14 @@ from agents.ground_control.pilot import Pilot
 from agents.ground_control.plan_transfer import Peer, PlanTransfer
 from agents.ground_control.plans import Ground, Item, Kind, RefusedError, fence_of, rally_of, step_of
 from agents.ground_control.settings import LONGEST_NAME, Settings, settings_of
-from fanet_mw.application import Application, Course
+from agents.ground_control.telemetry_pace import pace_of
+from fanet_mw.application import Application, Course, Fate, Received, Status
 from fanet_mw.bus.messages import Battery, Gps, SensorReading
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.mavlink import AUTOPILOT_COMPONENT, Geodetic, Ned, common, decode, from_ned
+from fanet_mw.mavlink import AUTOPILOT_COMPONENT, GATEWAY_COMPONENT, Geodetic, Ned, common, decode, from_ned
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S, earliest, seconds_to_ns
-from fanet_mw.wire import frames, system_id
+from fanet_mw.wire import PRIORITY_BULK, PRIORITY_REPORT, frames, system_id
 
 _MOST_PER_S: Final = 200
 """A UAV looks at no more messages of operators in a second; a ground station that floods must not take its time."""
@@ -37,6 +38,27 @@ _LOW: Final = 0.2
 _LINK_LASTS_NS: Final = 4 * S
 _ALL_COMPONENTS: Final = 0
 _TEXT_BYTES: Final = 50
+_LONGEST: Final = 900
+"""Inner bytes of a packet over the air."""
+_SLOWEST_NS: Final = 60 * S
+_WATCHED_NS: Final = 10 * S
+"""Telemetry over the air ends when the gateway has not been heard for so long."""
+_AGAIN_NS: Final = 3 * S
+"""A command that comes again within this time, in the same words of the same operator, is not carried out again."""
+_OVER_AIR: Final = frozenset({
+    common.MAVLINK_MSG_ID_HEARTBEAT, common.MAVLINK_MSG_ID_SYSTEM_TIME, common.MAVLINK_MSG_ID_COMMAND_LONG,
+    common.MAVLINK_MSG_ID_COMMAND_INT, common.MAVLINK_MSG_ID_SET_MODE, common.MAVLINK_MSG_ID_MISSION_SET_CURRENT,
+    common.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED, common.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT,
+    common.MAVLINK_MSG_ID_REQUEST_DATA_STREAM, common.MAVLINK_MSG_ID_PARAM_REQUEST_LIST,
+    common.MAVLINK_MSG_ID_PARAM_REQUEST_READ, common.MAVLINK_MSG_ID_PARAM_SET,
+    common.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL, common.MAVLINK_MSG_ID_PING, common.MAVLINK_MSG_ID_TIMESYNC,
+    common.MAVLINK_MSG_ID_LOG_REQUEST_LIST, common.MAVLINK_MSG_ID_MISSION_COUNT,
+    common.MAVLINK_MSG_ID_MISSION_ITEM_INT, common.MAVLINK_MSG_ID_MISSION_ITEM,
+    common.MAVLINK_MSG_ID_MISSION_REQUEST_LIST, common.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
+    common.MAVLINK_MSG_ID_MISSION_REQUEST, common.MAVLINK_MSG_ID_MISSION_CLEAR_ALL,
+    common.MAVLINK_MSG_ID_MISSION_ACK,
+})  # fmt: skip
+"""The messages with which a packet of the post for a UAV may begin."""
 _FTP_ACK, _FTP_NAK = 128, 129
 _FTP_SESSIONS: Final = (1, 2)
 """TerminateSession and ResetSessions, which a vehicle without files carries out at once."""
@@ -51,9 +73,23 @@ class GroundControl(Application):
     """The side of one UAV that a ground station sees."""
 
     name: Final = "operator"
+    follows = (Fate.REFUSED,)
 
     def __init__(self, scenario: Scenario, node: NodeId, streams: TelemetryStreams, *, position: Enu) -> None:
         self._node, self._streams = node, streams
+        self._post = scenario.post
+        self.listens = _OVER_AIR if scenario.post is not None else ()
+        self._pace_ns = pace_of(scenario).interval_ns
+        self._deadline_ns = scenario.routing.lifetime_ns(PRIORITY_BULK)
+        self._over_air = False
+        """True if the last question of an operator came over the air."""
+        self._report_ns: int | None = None
+        """When telemetry goes over the air next."""
+        self._turn = 0
+        self._last_command: tuple[Any, ...] = ()
+        self._last_command_ns = 0
+        self._last_ack: Any = None
+        self._count = scenario.nodes.count
         origin = Geodetic(*scenario.world.origin_deg, 0.0)
         on_ground = scenario.nodes.on_ground
         home = position if on_ground else position._replace(up=0.0)
@@ -74,11 +110,13 @@ class GroundControl(Application):
         self._height = HeightReference(position.up)
         self._transfer = PlanTransfer(self._reply, check=self._check, accept=self._accept)
         self._commands = Commands(
-            pilot, streams, lambda: self._ground, reply=self._reply, send=self._send,
+            pilot, streams, lambda: self._ground, reply=self._reply, send=self._send, one=self._one,
         )  # fmt: skip
         self._out: list[bytes] = []
         self._heard_ns: int | None = None
         """The instant at which an operator was heard last; None: never yet, or lost."""
+        self._watched_ns: int | None = None
+        """The same for a gateway, which says that somebody may look and not that anybody commands; None: never."""
         self._look_ns: int | None = None
         self._second, self._in_second = -1, 0
         self._counts: Counter[str] = Counter()
@@ -90,7 +128,28 @@ class GroundControl(Application):
     # --- in -------------------------------------------------------------------------------------------------------
 
     def on_operator(self, frames_: bytes, now_ns: int) -> None:
-        """MAVLink frames of a ground station."""
+        """MAVLink frames of a ground station, from a gateway on the bus."""
+        self._over_air = self._commands.paced = False
+        self._take(frames_, now_ns)
+
+    def on_message(self, message: Received, now_ns: int) -> None:
+        """MAVLink frames of a ground station, over the air from the post."""
+        if message.origin != self._post:
+            self._counts["not_from_the_post"] += 1
+            return
+        self._over_air = self._commands.paced = True
+        if self._report_ns is None:
+            self._report_ns = now_ns + self._node * self._pace_ns // max(1, self._count)
+        self._take(message.data, now_ns)
+
+    def on_status(self, status: Status, now_ns: int) -> None:
+        """The network cannot deliver telemetry so often."""
+        if status.interval_ns is not None:
+            self._pace_ns = max(self._pace_ns, status.interval_ns)
+        else:
+            self._pace_ns = min(_SLOWEST_NS, 2 * self._pace_ns)
+
+    def _take(self, frames_: bytes, now_ns: int) -> None:
         if now_ns // S != self._second:
             self._second, self._in_second = now_ns // S, 0
         for frame in frames(frames_):
@@ -111,9 +170,11 @@ class GroundControl(Application):
         if getattr(message, "target_system", 0) not in (0, system_id(self._node)):
             self._counts["not_for_this_node"] += 1
             return
-        if self._heard_ns is None:
+        if self._watched_ns is None:
             self._streams.operator(now_ns)
-        self._heard_ns = now_ns
+        self._watched_ns = now_ns
+        if peer.component != GATEWAY_COMPONENT:
+            self._heard_ns = now_ns
         if self._look_ns is None:
             self._look_ns = now_ns + _LOOK_NS
         if getattr(message, "target_component", _ALL_COMPONENTS) not in (_ALL_COMPONENTS, AUTOPILOT_COMPONENT):
@@ -155,7 +216,23 @@ class GroundControl(Application):
             self._look_ns = now_ns + _LOOK_NS
             self._look(now_ns)
         self._transfer.wake(now_ns)
+        if self._report_ns is not None and now_ns >= self._report_ns:
+            self._report(now_ns)
         self._settle(now_ns)
+
+    def _report(self, now_ns: int) -> None:
+        """Send telemetry over the air: heartbeat and position always, and the other streams in turn."""
+        watched = self._watched_ns is not None and now_ns - self._watched_ns < _WATCHED_NS
+        self._report_ns = now_ns + self._pace_ns if watched else None
+        post = self._post
+        if post is None or self._report_ns is None:
+            return
+        self._refresh()
+        rest = _IN_TURN[self._turn % len(_IN_TURN)]
+        self._turn += 1
+        told = [self._streams.one(message_id, now_ns, over_air=True) or b"" for message_id in (*_ALWAYS, *rest)]
+        self._counts["reports"] += 1
+        self.port.send(b"".join(told), destination=post, priority=PRIORITY_BULK, deadline_ns=self._deadline_ns)
 
     def _look(self, now_ns: int) -> None:
         """See whether the operator has fallen silent, and whether neighbors are still heard."""
@@ -168,7 +245,7 @@ class GroundControl(Application):
             self._pilot.silent()
 
     def next_wake_ns(self) -> int | None:
-        return earliest(self._look_ns, self._transfer.next_due_ns())
+        return earliest(self._look_ns, self._transfer.next_due_ns(), self._report_ns)
 
     def report(self) -> Mapping[str, Any]:
         return {f"operator_{name}": count for name, count in sorted(self._counts.items())}
@@ -177,7 +254,18 @@ class GroundControl(Application):
 
     def _on_command(self, message: Any, peer: Peer, now_ns: int) -> None:  # noqa: ANN401
         self._counts["commanded"] += 1
+        said = (
+            peer,
+            message.get_type(),
+            message.command,
+            *(repr(getattr(message, name)) for name in _PARAMS[message.get_type()]),
+        )
+        if said == self._last_command and now_ns - self._last_command_ns < _AGAIN_NS and self._last_ack is not None:
+            self._counts["repeated"] += 1  # its acknowledgment was lost, or is on its way
+            self._reply(self._last_ack)
+            return
         self._commands.on_command(message, peer, now_ns)
+        self._last_command, self._last_command_ns = said, now_ns
 
     def _on_set_mode(self, message: Any, peer: Peer, now_ns: int) -> None:  # noqa: ANN401
         self._counts["commanded"] += 1
@@ -188,7 +276,7 @@ class GroundControl(Application):
         if 0 <= message.seq < len(self._pilot.mission.steps):
             self._pilot.mission.go_to(message.seq)
         self._refresh()
-        self._send(self._streams.one(common.MAVLINK_MSG_ID_MISSION_CURRENT, now_ns) or b"")
+        self._send(self._one(common.MAVLINK_MSG_ID_MISSION_CURRENT, now_ns) or b"")
 
     def _on_local_setpoint(self, message: Any, _peer: Peer, now_ns: int) -> None:  # noqa: ANN401
         here = self._pilot.position
@@ -342,10 +430,17 @@ class GroundControl(Application):
             self._reply(common.MAVLink_statustext_message(severity, text.encode()[:_TEXT_BYTES]))
 
     def _reply(self, message: Any) -> None:  # noqa: ANN401  (pymavlink has no types)
-        self._out.append(self._streams.encoder.pack(message))
+        if message.get_type() == "COMMAND_ACK":
+            self._last_ack = message
+        encoder = self._streams.air_encoder if self._over_air else self._streams.encoder
+        self._out.append(encoder.pack(message))
 
     def _send(self, frame: bytes) -> None:
         self._out.append(frame)
+
+    def _one(self, message_id: int, now_ns: int) -> bytes | None:
+        self._refresh()
+        return self._streams.one(message_id, now_ns, over_air=self._over_air)
 
     def _settle(self, now_ns: int) -> None:
         """Command the course of the pilot, and hand answers over."""
@@ -353,9 +448,18 @@ class GroundControl(Application):
         if course is not None:
             self.port.fly(course)
         self._refresh()
-        if self._out:
-            out, self._out = self._out, []
+        if not self._out:
+            return
+        out, self._out = self._out, []
+        if not self._over_air or self._post is None:
             self.port.tap(b"".join(out))
+            return
+        packet = b""
+        for frame in [*out, b""]:
+            if packet and (not frame or len(packet) + len(frame) > _LONGEST):
+                self.port.send(packet, destination=self._post, priority=PRIORITY_REPORT)
+                packet = b""
+            packet += frame
 
     def _refresh(self) -> None:
         self._streams.flown = self._flown()
@@ -371,6 +475,19 @@ class GroundControl(Application):
         )  # fmt: skip
 
 
+_PARAMS: Final = {
+    "COMMAND_LONG": tuple(f"param{number}" for number in range(1, 8)),
+    "COMMAND_INT": ("frame", "param1", "param2", "param3", "param4", "x", "y", "z"),
+}
+_ALWAYS: Final = (common.MAVLINK_MSG_ID_HEARTBEAT, common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT)
+_IN_TURN: Final = (
+    (common.MAVLINK_MSG_ID_SYS_STATUS, common.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, common.MAVLINK_MSG_ID_GPS_RAW_INT,
+     common.MAVLINK_MSG_ID_HOME_POSITION, common.MAVLINK_MSG_ID_MISSION_CURRENT),
+    (common.MAVLINK_MSG_ID_ATTITUDE, common.MAVLINK_MSG_ID_LOCAL_POSITION_NED, common.MAVLINK_MSG_ID_VFR_HUD,
+     common.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, common.MAVLINK_MSG_ID_BATTERY_STATUS,
+     common.MAVLINK_MSG_ID_RADIO_STATUS),
+)  # fmt: skip
+"""The messages of telemetry over the air: those of every packet, and those of every other."""
 _POSITIONS: Final = (common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, common.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
 _ATTITUDES: Final = (common.MAVLINK_MSG_ID_ATTITUDE,)
 _STATES: Final = (

@@ -60,10 +60,13 @@ class Commands:
         *,
         reply: Callable[[Any], None],
         send: Callable[[bytes], None],
+        one: Callable[[int, int], bytes | None],
     ) -> None:
-        """`reply` takes a message to be sent, `send` one that is packed already."""
+        """`reply` takes a message to be sent, `send` one that is packed already; `one` packs a stream's message now."""
         self._pilot, self._streams, self._ground = pilot, streams, ground
-        self._reply, self._send = reply, send
+        self._reply, self._send, self._one = reply, send, one
+        self.paced = False
+        """True while telemetry crosses the air, at a pace of its own that no ground station changes."""
 
     def on_command(self, message: Any, peer: Peer, now_ns: int) -> None:  # noqa: ANN401
         """Carry a command out, and answer it."""
@@ -171,6 +174,8 @@ class Commands:
         message_id, interval_us = command.params[:2]
         if not (0 <= message_id < 2**24 and -1 <= interval_us <= _MOST_US):
             return int(_DENIED)
+        if self.paced:
+            return int(_DENIED)
         interval_ns = None if interval_us == 0 else round(interval_us) * US
         return int(_ACCEPTED if self._streams.set_interval(int(message_id), interval_ns, now_ns) else _DENIED)
 
@@ -185,7 +190,7 @@ class Commands:
 
     def _request(self, command: Command, now_ns: int) -> int:
         message_id = command.params[0]
-        frame = self._streams.one(int(message_id), now_ns) if 0 <= message_id < 2**24 else None
+        frame = self._one(int(message_id), now_ns) if 0 <= message_id < 2**24 else None
         if frame is None:
             return int(_DENIED)
         self._send(frame)

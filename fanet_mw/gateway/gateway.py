@@ -4,7 +4,7 @@ import asyncio
 import json
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -19,7 +19,9 @@ from fanet_mw.gateway.signing import Signing, read_key
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import START_PATIENCE_S, ClockListener, SwarmClock
 from fanet_mw.hosts.timebase import THIS_MACHINE
+from fanet_mw.mavlink import GATEWAY_COMPONENT, common
 from fanet_mw.units import NodeId, seconds_to_ns
+from fanet_mw.wire import frames, system_id
 
 MOST_VEHICLES: Final = 250
 """System ids of vehicles; 251 to 255 are ground stations'."""
@@ -27,6 +29,11 @@ _ANSWER_S: Final = 3.0
 _LOOK_S: Final = 0.5
 _WORD_EVERY: Final = 20
 """Looks between two words about what did not pass."""
+_PRESENT_EVERY: Final = 4
+"""Looks between two heartbeats of the gateway."""
+_SYSTEM: Final = 251
+_NO_AUTOPILOT: Final = common.MAV_AUTOPILOT_INVALID
+_ACTIVE: Final = common.MAV_STATE_ACTIVE
 _MOST_WAITING: Final = 20_000
 Tell = Callable[[str], None]
 
@@ -39,6 +46,9 @@ class Doors(NamedTuple):
     """A connection for each UAV, its port ending in `+`: UAV 1 has that port, UAV 2 the next."""
     flavor: Flavor = Flavor.PX4
     key: Path | None = None
+    in_band: bool | None = None
+    """True: over the air, by the post on the ground; False: from the taps of all UAVs; None: over the air if there is a
+    post."""
 
     def checked(self) -> "Doors":
         """Raises ConfigError for a connection that cannot be."""
@@ -71,6 +81,8 @@ class SwarmFacts(NamedTuple):
     nodes: list[NodeId]
     until_ns: int
     """The end of the swarm's time."""
+    post: NodeId | None
+    """The post on the ground, if there is one."""
 
 
 def facts_of(bus: Bus, names: Topics) -> SwarmFacts:
@@ -89,11 +101,12 @@ def facts_of(bus: Bus, names: Topics) -> SwarmFacts:
     try:
         scenario = json.loads(answers[0])
         count, until_ns = int(scenario["nodes"]["count"]), seconds_to_ns(float(scenario["duration_s"]))
+        post = NodeId(count + 1) if scenario["ground"]["at_m"] else None
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise BusError(f"swarm {names.swarm} says what no swarm says: {error}") from error
     if count > MOST_VEHICLES:
         raise ConfigError(f"nodes.count = {count}: MAVLink has system ids for {MOST_VEHICLES} vehicles at most")
-    return SwarmFacts([NodeId(node) for node in range(1, count + 1)], until_ns)
+    return SwarmFacts([NodeId(node) for node in range(1, count + 1)], until_ns, post)
 
 
 class Gateway:
@@ -102,6 +115,11 @@ class Gateway:
     def __init__(self, bus: Bus, names: Topics, facts: SwarmFacts, doors: Doors, *, tell: Tell) -> None:
         self._bus, self._names, self._tell = bus, names, tell
         self._until_ns, nodes = facts.until_ns, facts.nodes
+        in_band = facts.post is not None if doors.in_band is None else doors.in_band
+        if in_band and facts.post is None:
+            raise ConfigError("--in-band: the scenario has no post on the ground (ground.at_m)")
+        self._post = facts.post if in_band else None
+        self._node_of = {system_id(node): node for node in nodes}
         unix_ns = THIS_MACHINE.unix_ns()
         key = None if doors.key is None else read_key(doors.key)
 
@@ -113,6 +131,7 @@ class Gateway:
             whole = address.kind.startswith("udp")
             return link, Connection(address, lambda peer, data: self._from_ground(link, peer, data, whole=whole))
 
+        self._presence: Any = common.MAVLink(None, srcSystem=_SYSTEM, srcComponent=GATEWAY_COMPONENT)
         self._signings: list[Signing] = []
         self._doors = [opened(address_of(text), nodes) for text in doors.mavlink]
         if doors.per_uav is not None:
@@ -130,8 +149,9 @@ class Gateway:
         try:
             for _, connection in self._doors:
                 await connection.open()
-            self._bus.subscribe(self._names.mavlink("*"), self._from_thread)
-            self._tell("MAVLink on " + ", ".join(str(connection.address) for _, connection in self._doors[:8])
+            self._bus.subscribe(self._names.mavlink(self._post or "*"), self._from_thread)
+            way = "from the taps" if self._post is None else f"over the air by node {self._post}"
+            self._tell(f"MAVLink {way} on " + ", ".join(str(connection.address) for _, connection in self._doors[:8])
                        + (f" and {len(self._doors) - 8} more" if len(self._doors) > 8 else ""))  # fmt: skip
             await self._watch(over, listener, clock)
         finally:
@@ -150,12 +170,24 @@ class Gateway:
                 await asyncio.wait_for(over.wait(), _LOOK_S)
             except TimeoutError:
                 self._bus.check()
+            if looks % _PRESENT_EVERY == 0:
+                self._tell_presence()
             unix_ns = THIS_MACHINE.unix_ns()
             for signing in self._signings:
                 signing.follow(unix_ns)
             looks += 1
             if looks % _WORD_EVERY == 0:
                 self._say_counts()
+
+    def _tell_presence(self) -> None:
+        """Let UAVs know that somebody may look at them: many ground stations say nothing before they have heard one."""
+        heartbeat = common.MAVLink_heartbeat_message(
+            common.MAV_TYPE_ONBOARD_CONTROLLER, _NO_AUTOPILOT, 0, 0, _ACTIVE, 3
+        )
+        frame = bytes(heartbeat.pack(self._presence))
+        self._presence.seq = (self._presence.seq + 1) % 256
+        for node in self._node_of.values() if self._post is None else (self._post,):
+            self._bus.put(self._names.operator(node), codecs.encode([MavlinkTap(0, frame)]))
 
     def counts(self) -> dict[str, dict[str, int]]:
         """What has passed and what has not, for each link."""
@@ -194,22 +226,36 @@ class Gateway:
         while self._heard:
             topic, payload = self._heard.popleft()
             try:
-                node = NodeId(int(topic.rpartition("/")[2]))
                 taps = [message for message in codecs.decode(payload) if isinstance(message, MavlinkTap)]
-                data = b"".join(tap.data for tap in taps)
-                for link, connection in self._doors:
-                    shown = link.out(node, data)
-                    if shown:
-                        connection.send(shown)
+                for node, data in self._by_node(int(topic.rpartition("/")[2]), b"".join(tap.data for tap in taps)):
+                    for link, connection in self._doors:
+                        shown = link.out(node, data)
+                        if shown:
+                            connection.send(shown)
             except (MalformedFrameError, ValueError):
                 self._counts["malformed_taps"] += 1
+
+    def _by_node(self, node: int, data: bytes) -> Iterable[tuple[NodeId, bytes]]:
+        """What each UAV has said, in what was tapped at a node: at the post, what it has heard from all."""
+        if self._post is None:
+            return ((NodeId(node), data),)
+        said: dict[NodeId, bytes] = {}
+        for frame in frames(data):
+            of = self._node_of.get(frame[5])
+            if of is not None:
+                said[of] = said.get(of, b"") + frame
+        return said.items()
 
     # --- from ground stations -------------------------------------------------------------------------------------
 
     def _from_ground(self, link: Link, peer: object, data: bytes, *, whole: bool) -> bytes:
         said, answer = link.into(peer, data, time.monotonic(), whole=whole)
-        for node, frames in said:
-            self._bus.put(self._names.operator(node), codecs.encode([MavlinkTap(0, frames)]))
+        if self._post is None:
+            for node, frames_ in said:
+                self._bus.put(self._names.operator(node), codecs.encode([MavlinkTap(0, frames_)]))
+        elif said:  # the post sees itself for whom a frame is
+            together = b"".join(dict.fromkeys(frame for _, frames_ in said for frame in frames(frames_)))
+            self._bus.put(self._names.operator(self._post), codecs.encode([MavlinkTap(0, together)]))
         return answer
 
 

@@ -194,6 +194,8 @@ class DoorFlags:
     """Whose flight modes ground stations see."""
     mavlink_key: Path | None = None
     """File of a key for MAVLink 2 signatures; what is not signed by it is refused."""
+    in_band: Annotated[bool | None, Parameter(negative="--tap")] = None
+    """Over the air by the post on the ground, as is the default if there is one; --tap: from the bus, past the air."""
 
     def doors(self, *, default: bool = False) -> "Doors":
         """The connections, checked; by default the one where ground stations listen, if `default` is set."""
@@ -202,7 +204,7 @@ class DoorFlags:
         from fanet_mw.gateway.gateway import Doors
 
         given = self.mavlink or ((DEFAULT,) if default and self.mavlink_per_uav is None else ())
-        return Doors(given, self.mavlink_per_uav, Flavor(self.flavor), self.mavlink_key).checked()
+        return Doors(given, self.mavlink_per_uav, Flavor(self.flavor), self.mavlink_key, self.in_band).checked()
 
     def command(self) -> list[str] | None:
         """The words of `fanet gateway` with these connections; None if there are none."""
@@ -211,6 +213,7 @@ class DoorFlags:
         words = [word for text in self.mavlink for word in ("--mavlink", text)]
         words += [] if self.mavlink_per_uav is None else ["--mavlink-per-uav", self.mavlink_per_uav]
         words += [] if self.mavlink_key is None else ["--mavlink-key", str(self.mavlink_key.absolute())]
+        words += [] if self.in_band is None else ["--in-band" if self.in_band else "--tap"]
         return ["gateway", *words, "--flavor", self.flavor]
 
 

@@ -12,6 +12,7 @@ from random import Random
 from typing import Any, Final
 
 from agents.applications.traffic import sources_of
+from agents.ground_control.telemetry_pace import pace_of
 from agents.positioning.steady_fix import error_m
 from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.errors import ConfigError
@@ -40,6 +41,7 @@ from fanet_mw.planner import (
     with_capacity,
 )
 from fanet_mw.planner.claimed_turns import ClaimedPlan
+from fanet_mw.planner.plan_text import item
 from fanet_mw.rng import stream
 from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE
 from fanet_mw.routing.clustered.timetable.turn_size import links
@@ -81,7 +83,11 @@ def judge(
         return describe(found), {"feasible": False, "problems": [found.reason]}, False
     found, missed = _with_loss(with_capacity(found, at), at)
     left = tuple(not_counted(scenario))
+    operator = _operator(found)
     text, content = [describe(found)], {**_json(found), "not_counted": list(left)}
+    if operator is not None:
+        text.append(item("operator", operator))
+        content["operator"] = operator
     if left:
         text.append(describe_not_counted(left))
     if _has_floods(found, at):
@@ -112,6 +118,23 @@ def judge(
         text.append(describe_optimum(best, deadline_ns=deadline_ns))
         content["search"] = None if best is None else _optimum_json(best)
     return "\n".join(text), content, found.feasible
+
+
+def _operator(found: ScenarioPlan) -> str | None:
+    """What a ground station in band may count on; None without a post on the ground."""
+    if found.scenario.post is None:
+        return None
+    pace = pace_of(found.scenario)
+    bounds = [c.bound.delay_ns for c in found.classes if isinstance(c.bound, Bounded)]
+    delay = (
+        f"a command, and its acknowledgment, each within {max(bounds) / MS:.0f} ms, "
+        "when the post sends as often as a source"
+        if bounds
+        else "no bound for a command"
+    )
+    return (
+        f"telemetry of each UAV every {pace.interval_ns / S:.1f} s or less often ({pace.share:.0%} of the air); {delay}"
+    )
 
 
 def _judge_lossy(

@@ -1,6 +1,6 @@
 """Flies one UAV of a swarm with MAVSDK, as its user would, and says what came of each step; a process of its own.
 
-python mavsdk_pilot.py URL SYSTEMS [--light]
+python mavsdk_pilot.py URL SYSTEMS [--light | SYSTEM]
 """
 
 import math
@@ -11,14 +11,11 @@ from typing import Any
 
 from mavsdk import ComponentType, Configuration, Mavsdk
 from mavsdk.plugins.action.action import Action
-from mavsdk.plugins.geofence.geofence import Geofence
 from mavsdk.plugins.info.info import Info
 from mavsdk.plugins.mission.mission import Mission, MissionItem, MissionPlan
 from mavsdk.plugins.offboard.offboard import Offboard, VelocityNedYaw
 from mavsdk.plugins.param.param import Param
 from mavsdk.plugins.telemetry.telemetry import Telemetry
-
-_ = Geofence
 
 
 def say(text: str) -> None:
@@ -97,7 +94,7 @@ def fly(system: Any) -> None:
     until("disarmed", lambda: not telemetry.armed())
 
 
-def main(url: str, count: int, light: bool) -> None:
+def main(url: str, count: int, light: bool, chosen: int = 1) -> None:
     began_s = time.monotonic()
     mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
     say(f">>> mavsdk.add_any_connection({url!r})")
@@ -105,7 +102,7 @@ def main(url: str, count: int, light: bool) -> None:
     until(f"{count} systems", lambda: mavsdk.system_count() >= count, 90)
     systems = sorted(mavsdk.get_systems(), key=lambda system: system.get_system_id())
     if not light:
-        fly(systems[0])
+        fly(systems[chosen - 1])
     else:
         for system in systems:
             assert system.has_autopilot()
@@ -116,4 +113,5 @@ def main(url: str, count: int, light: bool) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]), "--light" in sys.argv)
+    light = "--light" in sys.argv
+    main(sys.argv[1], int(sys.argv[2]), light, int(sys.argv[3]) if len(sys.argv) > 3 and not light else 1)

@@ -64,17 +64,17 @@ def free_port(kind: int = socket.SOCK_STREAM) -> int:
 class Field:
     """A swarm that stands on the ground, with its doors."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, text: str = FIELD) -> None:
         self.udp, self.tcp = free_port(socket.SOCK_DGRAM), free_port()
         self.name = f"field-{os.getpid()}"
         scenario = folder / "field.toml"
-        scenario.write_text(FIELD, encoding="utf-8")
+        scenario.write_text(text, encoding="utf-8")
         self.log = folder / "launch.log"
         self._processes: list[subprocess.Popen[bytes]] = []
         self._start("launch", str(scenario), "--swarm", self.name, "--mavlink", f"udpout:127.0.0.1:{self.udp}")
         self.await_("processes up")
         self._start("gateway", self.name, "--mavlink", f"tcpin:127.0.0.1:{self.tcp}", "--flavor", "ardupilot")
-        self.await_(f"MAVLink on tcpin:127.0.0.1:{self.tcp}")
+        self.await_(f" on tcpin:127.0.0.1:{self.tcp}")
 
     def _start(self, *words: str) -> None:
         with self.log.open("ab") as file:
@@ -109,6 +109,63 @@ def test_mavsdk_flies_a_uav_from_parameters_to_the_landing(field: Field) -> None
     keep("mavsdk", said)
     assert "uploaded 3 items, downloaded 3" in said
     assert said.rstrip().endswith("disarmed")
+
+
+LINE = """
+duration_s = 900
+time_scale = 2.0
+[nodes]
+count = 3
+layout = "explicit"
+positions_m = [[150.0, 0.0, 0.0], [300.0, 0.0, 0.0], [300.0, 120.0, 0.0]]
+on_ground = true
+altitude_m = 20
+[ground]
+at_m = [0.0, 0.0]
+[traffic]
+arrivals = "none"
+[routing]
+protocol = "flooding"
+[radio]
+channel = "range"
+range_m = 220
+lead_ms = 120
+[mobility]
+model = "onboard"
+speed_m_s = 12
+[world]
+area_m = 2000
+engine = "kinematic"
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(importlib.util.find_spec("mavsdk") is None, reason="MAVSDK is not installed")
+def test_mavsdk_flies_a_uav_two_hops_away_over_the_air(tmp_path: Path) -> None:
+    swarm = Field(tmp_path, LINE)
+    try:
+        assert "MAVLink over the air by node 4" in swarm.log.read_text()
+        command = [sys.executable, str(HERE / "mavsdk_pilot.py"), f"udpin://127.0.0.1:{swarm.udp}", "3", "2"]
+        flown = subprocess.run(command, capture_output=True, text=True, check=False, timeout=200)
+    finally:
+        swarm.end()
+    said = "".join(line for line in flown.stdout.splitlines(keepends=True) if "[0m" not in line)
+    assert flown.returncode == 0, said + flown.stderr + swarm.log.read_text()
+    keep("mavsdk-in-band", said)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(importlib.util.find_spec("mavsdk") is None, reason="MAVSDK is not installed")
+def test_mavsdk_sees_45_uavs_on_one_port(tmp_path: Path) -> None:
+    swarm = Field(tmp_path, FIELD.replace("count = 3", "count = 45").replace("time_scale = 4.0", "time_scale = 0.5"))
+    try:
+        command = [sys.executable, str(HERE / "mavsdk_pilot.py"), f"udpin://127.0.0.1:{swarm.udp}", "45", "--light"]
+        seen = subprocess.run(command, capture_output=True, text=True, check=False, timeout=200)
+    finally:
+        swarm.end()
+    assert seen.returncode == 0, seen.stdout + seen.stderr + swarm.log.read_text()
+    assert "system 45: a position" in seen.stdout
+    keep("mavsdk-45", "".join(line for line in seen.stdout.splitlines(keepends=True) if "[0m" not in line))
 
 
 PLAN = """QGC WPL 110

@@ -1,0 +1,118 @@
+"""The gateway's way over the air: what ground stations say goes from the post to UAVs, and their answers come back.
+
+    ground station -> gateway -> the post (this application) -> the air -> a UAV's `GroundControl`
+    its answers and telemetry -> the air -> the post -> its tap -> gateway -> ground stations
+
+Commands have the priority of safety, plans and parameters that of reports, and telemetry that of bulk. Heartbeats of
+ground stations are told to all, and no more often than UAVs need them.
+"""
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any, Final
+
+from fanet_mw.application import Application, Received
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.gateway.framing import frame_of, layout
+from fanet_mw.mavlink import AUTOPILOT_COMPONENT, common
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import BROADCAST, NodeId, S
+from fanet_mw.wire import PRIORITY_REPORT, PRIORITY_SAFETY, frames, system_id
+
+PRESENCE_NS: Final = 2 * S
+"""How often UAVs are told that an operator is there."""
+MOST_PER_S: Final = 40
+"""Packets that operators may put on the air in a second; what is more must be said again."""
+_LONGEST: Final = 900
+"""Inner bytes of a packet; more frames for one UAV go in another."""
+URGENT: Final = frozenset({
+    common.MAVLINK_MSG_ID_COMMAND_LONG, common.MAVLINK_MSG_ID_COMMAND_INT, common.MAVLINK_MSG_ID_SET_MODE,
+    common.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED, common.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT,
+})  # fmt: skip
+ANSWERS: Final = frozenset({
+    common.MAVLINK_MSG_ID_COMMAND_ACK, common.MAVLINK_MSG_ID_HEARTBEAT, common.MAVLINK_MSG_ID_STATUSTEXT,
+    common.MAVLINK_MSG_ID_PARAM_VALUE, common.MAVLINK_MSG_ID_PARAM_ERROR, common.MAVLINK_MSG_ID_MISSION_ACK,
+    common.MAVLINK_MSG_ID_MISSION_COUNT, common.MAVLINK_MSG_ID_MISSION_ITEM_INT, common.MAVLINK_MSG_ID_MISSION_ITEM,
+    common.MAVLINK_MSG_ID_MISSION_REQUEST_INT, common.MAVLINK_MSG_ID_MISSION_CURRENT,
+    common.MAVLINK_MSG_ID_MISSION_ITEM_REACHED, common.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL,
+    common.MAVLINK_MSG_ID_PING, common.MAVLINK_MSG_ID_TIMESYNC, common.MAVLINK_MSG_ID_LOG_ENTRY,
+    common.MAVLINK_MSG_ID_MESSAGE_INTERVAL, common.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+    common.MAVLINK_MSG_ID_HOME_POSITION, common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+    common.MAVLINK_MSG_ID_SYS_STATUS, common.MAVLINK_MSG_ID_GPS_RAW_INT, common.MAVLINK_MSG_ID_ATTITUDE,
+    common.MAVLINK_MSG_ID_LOCAL_POSITION_NED, common.MAVLINK_MSG_ID_VFR_HUD, common.MAVLINK_MSG_ID_RADIO_STATUS,
+    common.MAVLINK_MSG_ID_BATTERY_STATUS, common.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+    common.MAVLINK_MSG_ID_SYSTEM_TIME,
+})  # fmt: skip
+"""The messages with which a packet of a UAV to the post may begin."""
+
+
+class OperatorRelay(Application):
+    """What passes between ground stations and the air at the post."""
+
+    name: Final = "operator"
+    listens = ANSWERS
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._nodes = {system_id(node): NodeId(node) for node in scenario.uav_ids}
+        self._told_ns: dict[int, int] = {}
+        """When the heartbeat of each ground station was told last, by its system."""
+        self._second, self._in_second = -1, 0
+        self._counts: Counter[str] = Counter()
+
+    def on_operator(self, frames_: bytes, now_ns: int) -> None:
+        """What ground stations say, from the gateway: once for each UAV that it is for."""
+        said: dict[tuple[int, int], bytes] = {}
+        for data in frames(frames_):
+            shape = layout(int.from_bytes(data[7:10], "little"))
+            if shape is None:
+                self._counts["not_understood"] += 1
+                continue
+            frame = frame_of(data, shape)
+            if frame.message_id == common.MAVLINK_MSG_ID_HEARTBEAT:
+                self._presence(data, frame.system, now_ns)
+                continue
+            to = self._nodes.get(frame.target) if frame.target else BROADCAST
+            if to is None:
+                self._counts["for_nobody_here"] += 1
+                continue
+            priority = PRIORITY_SAFETY if frame.message_id in URGENT else PRIORITY_REPORT
+            waiting = said.get((to, priority), b"")
+            if waiting and len(waiting) + len(data) > _LONGEST:
+                self._send(waiting, to, priority, now_ns)
+                waiting = b""
+            said[to, priority] = waiting + data
+        for (target, priority), together in said.items():
+            self._send(together, target, priority, now_ns)
+
+    def _presence(self, data: bytes, system: int, now_ns: int) -> None:
+        if len(self._told_ns) < 8 or system in self._told_ns:
+            last_ns = self._told_ns.get(system)
+            if last_ns is None or now_ns - last_ns >= PRESENCE_NS:
+                self._told_ns[system] = now_ns
+                self._send(data, BROADCAST, PRIORITY_REPORT, now_ns)
+
+    def _send(self, together: bytes, to: int, priority: int, now_ns: int) -> None:
+        if now_ns // S != self._second:
+            self._second, self._in_second = now_ns // S, 0
+        self._in_second += 1
+        if self._in_second > MOST_PER_S:
+            self._counts["too_many"] += 1
+            return
+        self._counts["sent"] += 1
+        self.port.send(together, destination=to, priority=priority)
+
+    def on_message(self, message: Received, now_ns: int) -> None:
+        """What a UAV answers."""
+        node = self._nodes.get(system_id(message.origin))
+        passed = []
+        for frame in frames(message.data):
+            if frame[5] != system_id(message.origin):
+                raise MalformedFrameError(f"frame of system {frame[5]} by node {message.origin}")
+            if frame[6] == AUTOPILOT_COMPONENT:  # companions tell each other positions in the same messages
+                passed.append(frame)
+        if node is not None and passed:
+            self._counts["heard"] += len(passed)
+            self.port.tap(b"".join(passed))
+
+    def report(self) -> Mapping[str, Any]:
+        return {f"operator_{name}": count for name, count in sorted(self._counts.items())}

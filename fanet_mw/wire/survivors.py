@@ -84,6 +84,13 @@ class Found(NamedTuple):
     node: int
     standing: Standing
 
+    @property
+    def sigma_m(self) -> float:
+        """The standard deviation of the place in its worst direction."""
+        mean = (self.east_variance_m2 + self.north_variance_m2) / 2
+        spread = math.hypot((self.east_variance_m2 - self.north_variance_m2) / 2, self.covariance_m2)
+        return math.sqrt(max(0.0, mean + spread))
+
     def encode_frame(self, node: int) -> bytes:
         return encode_inner(FOUND, FOUND.layout.pack(*self, VERSION), node=node)
 

@@ -6,7 +6,8 @@
     reports     counters, roles and turns as each actor said last
     survivors   how far the search for each has come, and where UAVs estimate it to be
 
-Shares of delivery are those of packets that had time to arrive: `SETTLES_NS` old and no older than `LATELY_NS`.
+Shares of delivery are those of packets that had time to arrive: older than the longest delay seen lately, and sent
+within `LATELY_NS` before that.
 """
 
 import math
@@ -45,9 +46,12 @@ from sim.results.mission import OverflownCells
 from sim.results.survivor_states import SurvivorStates
 from sim.world.environment.survivors import place
 
-LATELY_NS: Final = 12 * S
-SETTLES_NS: Final = 3 * S
-_REMEMBERED_NS: Final = 20 * S
+LATELY_NS: Final = 10 * S
+_LEAST_SETTLING_NS: Final = 2 * S
+_MOST_SETTLING_NS: Final = 20 * S
+_MARGIN: Final = 1.2
+"""A packet counts when it is so many times as old as the longest delay lately."""
+_REMEMBERED_NS: Final = _MOST_SETTLING_NS + LATELY_NS + 2 * S
 _LINKS_NS: Final = 4 * S
 _MOST_EVENTS: Final = 200
 _TRAIL: Final = 60
@@ -144,6 +148,8 @@ class SwarmState:
         """The faults on the air that last, by label."""
         self.turns: Turns | None = turns(scenario, {})
         self.time_scale = 1.0
+        self.settling_ns = _LEAST_SETTLING_NS
+        """A packet counts as sent when it is this old; whoever has not got it by then has lost it."""
         self.broken = 0
         """Copies of packets that came later than the bound of their packet, or never."""
         self._app = next(iter(scenario.traffic_classes))
@@ -243,8 +249,9 @@ class SwarmState:
         )
 
     def lately(self) -> list[tuple[tuple[int, int], PacketNow]]:
-        """The packets of the traffic's first class that had time to arrive, and are not old."""
-        first_ns, last_ns = self.t_ns - LATELY_NS, self.t_ns - SETTLES_NS
+        """The packets of the traffic's first class that had time to arrive, of the ten seconds before."""
+        last_ns = self.t_ns - self.settling_ns
+        first_ns = last_ns - LATELY_NS
         return [
             (name, one)
             for name, one in self.packets.items()
@@ -341,6 +348,11 @@ class SwarmState:
             self._forget()
 
     def _forget(self) -> None:
+        longest_ns = max(
+            (copy.delay_ns for one in self.packets.values() if one.app == self._app for copy in one.got.values()),
+            default=0,
+        )
+        self.settling_ns = min(_MOST_SETTLING_NS, max(_LEAST_SETTLING_NS, round(_MARGIN * longest_ns)))
         for name, one in list(self.packets.items()):
             if one.born_ns < self.t_ns - _REMEMBERED_NS:
                 del self.packets[name]
@@ -405,14 +417,11 @@ class SwarmState:
         known = self.estimates.get(found.survivor)
         if known is not None and known.t_ns > found.t_us * 1000:
             return
-        mean = (found.east_variance_m2 + found.north_variance_m2) / 2
-        spread = math.hypot((found.east_variance_m2 - found.north_variance_m2) / 2, found.covariance_m2)
-        sigma_m = math.sqrt(max(0.0, mean + spread))
         if found.standing is Standing.REFUTED:
             self.estimates.pop(found.survivor, None)
             return
         self.estimates[found.survivor] = Estimate(
-            min(found.t_us * 1000, t_ns), found.survivor, found.node, found.east_m, found.north_m, sigma_m,
+            min(found.t_us * 1000, t_ns), found.survivor, found.node, found.east_m, found.north_m, found.sigma_m,
             found.standing.name.lower(),
         )  # fmt: skip
 

@@ -6,6 +6,7 @@ from typing import Final
 
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.colors import ListedColormap
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
@@ -20,6 +21,8 @@ from sim.results.mission import Confirmations, OverflownCells
 _STEPS: Final = ((Detected, "detected", ORANGE, "o", "-"), (Approaching, "approached", BLUE, "s", "--"),
                  (Arrived, "reached", PINK, "^", "-."))  # fmt: skip
 
+_UNSEARCHED_COLOR: Final = "#e3dccb"
+_UNSEARCHED: Final = ListedColormap(["none", _UNSEARCHED_COLOR])
 Step = tuple[float, float]
 """An instant [s], and the value from then on."""
 
@@ -109,6 +112,12 @@ def tracks(run: RunRecords) -> RunPicture | None:
     figure, axes = map_canvas([(-half, -half), (half, half), *(at for track in flown for at in track)])
     axes.add_patch(Rectangle((-half, -half), 2 * half, 2 * half, fill=False, edgecolor=DARK, linestyle="--",
                              linewidth=0.9, label="area to be searched"))  # fmt: skip
+    cells = OverflownCells(run.scenario)
+    cells.add((one.east_m, one.north_m, one.up_m) for track in run.tracks.values() for one in track)
+    if not cells.seen.all():
+        axes.imshow(~cells.seen, extent=(-half, half, -half, half), origin="lower", cmap=_UNSEARCHED, vmin=0, vmax=1,
+                    zorder=0, interpolation="nearest")  # fmt: skip
+        axes.add_patch(Rectangle((0, 0), 0, 0, facecolor=_UNSEARCHED_COLOR, label="not searched"))
     axes.add_collection(LineCollection(flown, colors=BLUE, linewidths=0.8, alpha=0.6, label="tracks"))
     ends = [track[-1] for track in flown]
     axes.scatter([at[0] for at in ends], [at[1] for at in ends], s=14, color=BLUE, zorder=3, label="UAVs at the end")
@@ -129,6 +138,8 @@ def tracks(run: RunRecords) -> RunPicture | None:
         if places:
             axes.scatter([at[0] for at in places], [at[1] for at in places], s=55, marker=marker, linewidths=1.5,
                          zorder=4, label=label, color=color, facecolors="none" if marker == "o" else color)  # fmt: skip
+    for survivor, at in enumerate(run.survivors, 1):
+        axes.annotate(str(survivor), (at.east, at.north), textcoords="offset points", xytext=(6, 5), fontsize=8)
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=3)
     end = f"The true positions of all {len(flown)} UAVs from 0 to {run.end_s:g} s, once a second."

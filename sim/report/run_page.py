@@ -9,7 +9,7 @@ from typing import Any
 
 from fanet_mw.whole_file import require_folder
 from sim.figures.style import applied, save
-from sim.report import mission_pictures, run_pictures, run_rows, slot_pictures
+from sim.report import finds, mission_pictures, run_pictures, run_rows, slot_pictures
 from sim.report.html import Block, Commands, Heading, Picture, Quoted, Text
 from sim.report.names import KINDS, PICTURES
 from sim.report.run_records import SHOWN, RunRecords
@@ -31,6 +31,7 @@ def blocks_of_run(folder: Path, out: Path) -> list[Block]:
         Quoted(run.scenario.description),
         *_verdict(summary),
         *_slowed(summary),
+        *(_finds(run, folder) if run.searches else ()),
         Heading("Network", 3),
         run_rows.network(summary),
     ]
@@ -79,6 +80,26 @@ def _verdict(summary: Mapping[str, Any]) -> list[Block]:
     if summary["valid"]:
         return [Text("The result may be used.")]
     return [Quoted(f"NOT VALID: {'; '.join(summary['invalid_because'])}.")]
+
+
+def _finds(run: RunRecords, folder: Path) -> list[Block]:
+    """Who was found, where, how sure and when, and what is not searched yet."""
+    blocks: list[Block] = []
+    known, doubles = finds.without_doubles(finds.with_estimates(finds.finds(run), finds.told(folder)))
+    if run.scenario.mission.survivors:
+        blocks.append(Heading("Who was found", 3))
+        if known:
+            blocks.append(finds.found_rows(run, known))
+        if run.survivors:
+            blocks.append(Text(finds.missed_sentence(run, known, doubles)))
+    if run.tracks:
+        share, pieces = finds.unsearched(run)
+        blocks.append(Heading("What is not searched", 3))
+        if pieces:
+            blocks.append(finds.unsearched_rows(share, pieces))
+        else:
+            blocks.append(Text("Nothing: the whole area came within the nominal range of a UAV's phone receiver."))
+    return blocks
 
 
 def _nothing() -> None:

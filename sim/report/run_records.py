@@ -17,6 +17,7 @@ from fanet_mw.trace import (
     Detected,
     Generated,
     LetOut,
+    PlacedInside,
     Posed,
     Record,
     Refuted,
@@ -27,7 +28,8 @@ from sim.world.environment.survivors import place
 from sim.world.mobility.layout import positions
 
 SHOWN: Final = (
-    Generated, Delivered, BoundStated, LetOut, RoleChanged, Detected, Approaching, Arrived, Confirmed, Refuted, Posed,
+    Generated, Delivered, BoundStated, LetOut, RoleChanged, Detected, Approaching, Arrived, Confirmed, PlacedInside,
+    Refuted, Posed,
 )  # fmt: skip
 """The kinds of records that the pictures are drawn from."""
 _WINDOW_NS: Final = 10 * S
@@ -58,7 +60,7 @@ class RunRecords:
     """The last head of each node."""
     roles: dict[int, list[RoleChanged]] = field(default_factory=lambda: defaultdict(list))
     """The roles of each node, in the order of time."""
-    mission: list[Detected | Approaching | Arrived | Confirmed | Refuted] = field(default_factory=list)
+    mission: list[Detected | Approaching | Arrived | Confirmed | PlacedInside | Refuted] = field(default_factory=list)
     tracks: dict[int, list[Posed]] = field(default_factory=lambda: defaultdict(list))
     """The positions of each UAV, once a second."""
     survivors: Sequence[Enu] = ()
@@ -85,7 +87,7 @@ class RunRecords:
                 case RoleChanged():
                     self.heads[record.node] = record.head
                     self.roles[record.node].append(record)
-                case Detected() | Approaching() | Arrived() | Confirmed() | Refuted():
+                case Detected() | Approaching() | Arrived() | Confirmed() | PlacedInside() | Refuted():
                     self.mission.append(record)
         targets = {node: set(self.targets(node)) for node in self.scenario.node_ids}
         self.delivered = [

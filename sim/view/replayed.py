@@ -32,7 +32,7 @@ class _Player:
         self.t_ns, self.speed, self.plays = start_ns, 1.0, True
         self._shown_ns = start_ns
         gui = server.gui
-        end_s = timeline.end_ns / S
+        end_s = round(timeline.end_ns / S, 1)
         with gui.add_folder("Time", order=-1.0):
             self._slider = gui.add_slider(
                 "swarm time [s]", min=0.0, max=end_s, step=0.1, initial_value=round(start_ns / S, 1)

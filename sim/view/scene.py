@@ -265,7 +265,7 @@ class Scene:
 
     def write_time(self, t_ns: int) -> None:
         """Write the swarm's time into the scene, where there is no panel."""
-        north = self.around.on_ground(Enu(-self.around.half_m, self.around.half_m * 1.05, 0.0))
+        north = self.around.on_ground(Enu(0.0, self.around.half_m * 1.2, 0.0))
         found = self.state.survivors.count("confirmed")
         people = f", confirmed {found} of {len(self.state.survivors.now)}" if self.state.survivors.now else ""
         self._name("time", f"{t_ns / S:.0f} s{people}", north, shown=True, above_m=0.0)

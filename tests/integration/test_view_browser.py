@@ -1,0 +1,151 @@
+"""The pages in a browser, where there is a headless Chromium: what is clicked is selected, moved and cut."""
+
+import json
+import math
+import re
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sim.cli.app import app
+
+CHROMIUM = shutil.which("chromium-headless-shell") or shutil.which("chromium") or shutil.which("google-chrome")
+pytestmark = [
+    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt install chromium-headless-shell"),
+    pytest.mark.realtime,
+    pytest.mark.filterwarnings("ignore"),  # of playwright's event loop
+]
+SOFTWARE = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
+PATIENCE_MS = 60_000
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    sync_api = pytest.importorskip("playwright.sync_api")
+    with sync_api.sync_playwright() as started:
+        opened = started.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE)
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def page(browser: Any) -> Iterator[Any]:
+    """A page that fails the test if it asks anybody but this machine."""
+    opened = browser.new_page(viewport={"width": 1200, "height": 760})
+    outside: list[str] = []
+    local = ("http://127.0.0.1", "ws://127.0.0.1", "blob:", "data:", "file:")
+    opened.on("request", lambda asked: None if asked.url.startswith(local) else outside.append(asked.url))
+    yield opened
+    opened.close()
+    assert outside == []
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("browsed") / "run"
+    assert app(["simulate", "quick", "--out", str(out), "--json"], result_action="return_value") == 0
+    return out
+
+
+@pytest.fixture
+def start() -> Iterator[Callable[..., str]]:
+    """Starts `fanet ...` and returns the address of its page."""
+    running: list[subprocess.Popen[str]] = []
+
+    def begin(*words: str) -> str:
+        process = subprocess.Popen([sys.executable, "-m", "fanet_mw", *words], stderr=subprocess.PIPE, text=True)
+        running.append(process)
+        assert process.stderr is not None
+        for line in process.stderr:
+            if found := re.search(r"http://127\.0\.0\.1:\d+", line):
+                return found.group()
+        raise AssertionError("no page was served")
+
+    yield begin
+    for process in running:
+        process.terminate()
+        process.wait(30)
+
+
+def wait_for(what: Callable[[], bool], *, seconds: float = 60.0) -> None:
+    end_s = time.monotonic() + seconds
+    while not what():
+        assert time.monotonic() < end_s, "it did not come"
+        time.sleep(0.3)
+
+
+def share(page: Any) -> float | None:
+    found = re.search(r"delivered lately\s*([\d.]+) % of packets", page.inner_text("body"))
+    return float(found.group(1)) if found else None
+
+
+def on_screen(page: Any, at: np.ndarray, half_m: float) -> tuple[float, float]:
+    """Where a place is drawn, by the first camera of the view (`look_over`)."""
+    eye = np.array([-0.3, -1.75, 1.35]) * half_m
+    ahead = np.array([0.05, -0.12, 0.0]) * half_m - eye
+    ahead /= np.linalg.norm(ahead)
+    right = np.cross(ahead, [0, 0, 1])
+    right /= np.linalg.norm(right)
+    up = np.cross(right, ahead)
+    seen = at - eye
+    box = page.locator("canvas").first.bounding_box()
+    scale = box["height"] / 2 / math.tan(math.radians(45) / 2) / (seen @ ahead)
+    return (
+        box["x"] + box["width"] / 2 + scale * (seen @ right),
+        box["y"] + box["height"] / 2 - scale * (seen @ up),
+    )
+
+
+def test_a_uav_that_is_clicked_is_shown_and_the_slider_moves_time(
+    page: Any, start: Callable[..., str], folder: Path
+) -> None:
+    page.goto(start("replay", str(folder), "--start", "1"))
+    page.get_by_text("delivered lately").first.wait_for(timeout=PATIENCE_MS)
+    page.get_by_role("button", name="play").click()  # pause
+    time.sleep(1.5)
+    now_s = float(re.search(r"([\d.]+) s of 20 s", page.inner_text("body")).group(1))  # type: ignore[union-attr]
+    posed = [json.loads(line)[1:] for line in (folder / "trace.jsonl").open() if line.startswith('["posed"')]
+    track = {t_ns / 1e9: np.array(at) for t_ns, node, *at in posed if node == 9}
+    before, after = track[float(int(now_s))], track[float(int(now_s) + 1)]
+    at = before + (now_s - int(now_s)) * (after - before)
+    page.mouse.click(*on_screen(page, at, half_m=400.0))
+    page.get_by_role("tab", name="UAV").click()
+    wait_for(lambda: re.search(r"UAV 9\s", page.inner_text("body")) is not None)
+    assert "neighbors" in page.inner_text("body")
+    time_box = page.get_by_role("textbox").first
+    time_box.fill("15")
+    time_box.press("Enter")
+    wait_for(lambda: "15.0 s of 20 s" in page.inner_text("body"))
+
+
+def test_cut_in_the_page_lets_deliveries_fall_in_the_panel(page: Any, start: Callable[..., str]) -> None:
+    page.goto(start("launch", "quick", "--duration", "80", "--view"))
+    page.get_by_text("delivered lately").first.wait_for(timeout=PATIENCE_MS)
+    wait_for(lambda: (share(page) or 0) > 90)
+    page.get_by_role("tab", name="Act").click()
+    page.get_by_role("button", name="cut a head's radio").click()
+    page.get_by_role("tab", name="Swarm").click()
+    wait_for(lambda: (share(page) or 100) < 85)
+    page.get_by_role("tab", name="Events").click()
+    wait_for(lambda: "radio fault cut" in page.inner_text("body"))
+
+
+def test_one_file_plays_without_a_network(page: Any, folder: Path, tmp_path: Path) -> None:
+    path = tmp_path / "run.html"
+    assert app(["replay", str(folder), "--html", str(path)], result_action="return_value") == 0
+    page.goto(path.as_uri())
+    page.locator("canvas").first.wait_for(timeout=PATIENCE_MS)
+    pictures: set[bytes] = set()
+
+    def plays() -> bool:
+        pictures.add(page.locator("canvas").first.screenshot(timeout=PATIENCE_MS))
+        return len(pictures) >= 3
+
+    wait_for(plays)

@@ -11,7 +11,8 @@ from agents.clock.local_clock import LocalClock
 from fanet_mw.units import US
 
 _NOTICED_NS: Final = 50 * US
-"""A change of less than this between two inputs is not taken for a jump."""
+_SLEWED: Final = 500e-6
+"""A smaller change between two inputs is not taken for a jump: adjtime(3) slews a clock by 500 ppm."""
 
 
 class SteadyClock:
@@ -23,6 +24,7 @@ class SteadyClock:
         """How far the clock was ahead of the counter: at the last input, and at the last one before the last jump."""
         self._taken_out_ns = [0, 0]
         """The sum of all jumps, and that sum without the last one."""
+        self._input_ns = 0
         self.jumps = 0
 
     def pass_time(self, true_ns: int, *, until_ns: int) -> None:
@@ -32,11 +34,11 @@ class SteadyClock:
         if not self._ahead_ns:
             self._ahead_ns = [ahead_ns, ahead_ns]
         by_ns = ahead_ns - self._ahead_ns[0]
-        if abs(by_ns) > _NOTICED_NS:
+        if abs(by_ns) > _NOTICED_NS + _SLEWED * (true_ns - self._input_ns):
             self.jumps += 1
             self._taken_out_ns = [self._taken_out_ns[0] + by_ns, self._taken_out_ns[0]]
             self._ahead_ns[1] = self._ahead_ns[0]
-        self._ahead_ns[0] = ahead_ns
+        self._ahead_ns[0], self._input_ns = ahead_ns, true_ns
 
     def local_ns(self, true_ns: int) -> int:
         """The instant that the clock shows at a true instant, without jumps."""

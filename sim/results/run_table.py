@@ -56,13 +56,14 @@ def read_parquet(path: Path, *, follow: bool = False) -> "Table":
         try:
             found = pq.ParquetFile(file)
             size = sum(found.metadata.row_group(i).total_byte_size for i in range(found.metadata.num_row_groups))
-            if not 0 <= size <= _MOST_BYTES:
-                raise ConfigError(f"{path}: cannot be read: {size} bytes when unpacked, at most {_MOST_BYTES}")
-            table = found.read()
-            table.validate(full=True)  # for example that text is UTF-8
-            return table
-        except (OSError, pa.ArrowException) as error:
+            table = found.read() if 0 <= size <= _MOST_BYTES else None
+            if table is not None:
+                table.validate(full=True)  # for example that text is UTF-8
+        except (OSError, ValueError, pa.ArrowException) as error:  # also names of columns that are no UTF-8
             raise ConfigError(f"{path}: cannot be read: {str(error)[:200]}") from error
+    if table is None:
+        raise ConfigError(f"{path}: cannot be read: {size} bytes when unpacked, at most {_MOST_BYTES}")
+    return table
 
 
 def _row(folder: Path) -> dict[str, Any]:

@@ -42,6 +42,8 @@ def test_stamps_from_before_a_jump_and_instants_after_it_are_right_and_a_rate_is
         (39 * S, 38 * S),
         (40 * S + MS, 40 * S - MS),
         (40 * S + 5 * MS, 40 * S),
+        (41 * S - MS, 41 * S - MS),
+        (41 * S + MS, 41 * S - 1),
         (50 * S, 50 * S),
     ):
         still.pass_time(true_ns, until_ns=100 * S)
@@ -50,6 +52,20 @@ def test_stamps_from_before_a_jump_and_instants_after_it_are_right_and_a_rate_is
             assert clock.local_ns(t_ns) == still.local_ns(t_ns)
         assert clock.true_ns(still.local_ns(true_ns + 2 * S)) == still.true_ns(still.local_ns(true_ns + 2 * S))
     assert clock.jumps == 2
+
+
+class Slewed(LocalClock):
+    """A clock that is made to run faster, and not set."""
+
+    def local_ns(self, true_ns: int) -> int:
+        return super().local_ns(true_ns) + true_ns // 2_500
+
+
+def test_a_clock_that_is_slewed_has_not_jumped() -> None:
+    clock = SteadyClock(Slewed(Clock(drift_ppm=20), seed=1, node=NodeId(3)))
+    for second in range(9):
+        clock.pass_time(second * S, until_ns=9 * S)
+    assert clock.jumps == 0
 
 
 def test_a_jump_of_a_node_that_is_not_there_is_refused() -> None:

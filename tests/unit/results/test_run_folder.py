@@ -10,6 +10,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from fanet_mw.errors import ConfigError
@@ -79,6 +81,14 @@ def refused(folder: Path, *, by: Callable[[Path], Any]) -> str:
 
 def report(folder: Path) -> None:
     page.write([folder], folder)
+
+
+def test_a_table_whose_columns_have_no_names_is_refused(tmp_path: Path) -> None:
+    pq.write_table(pa.table({"abcdefgh": [1]}), tmp_path / "runs.parquet")
+    whole = (tmp_path / "runs.parquet").read_bytes()
+    (tmp_path / "runs.parquet").write_bytes(whole.replace(b"abcdefgh", b"abc\x8befgh"))
+    with pytest.raises(ConfigError, match="can't decode byte 0x8b"):
+        read(tmp_path)
 
 
 def test_a_folder_of_ones_own_makes_a_page_a_replay_and_a_row(folder: Path) -> None:

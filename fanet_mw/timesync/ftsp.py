@@ -349,7 +349,7 @@ class TimeSync:
         if src in self._agreed:
             self._contradicting.add(src)
         if self._is_contradicted(local_ns, hellos=_QUESTION_HELLOS):
-            self._learn_worst(MOST_STATED_NS, stated_at_ns=local_ns)
+            self._worst = (MOST_STATED_NS, local_ns)
         if self.reference is not None and self._is_contradicted(local_ns, hellos=_LOST_HELLOS):
             self._lose(local_ns)
 
@@ -373,7 +373,6 @@ class TimeSync:
         self._agreed.clear()
         self._contradicting.clear()
         self._agreed_ns = local_ns
-        self._worst = (MOST_STATED_NS, local_ns)
         self._wait(local_ns)
 
     def _follow(self, neighbor: _LastBeacon, pair: Pair, local_ns: int) -> None:

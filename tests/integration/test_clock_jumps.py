@@ -8,7 +8,7 @@ from agents.clock.local_clock import LocalClock
 from agents.clock.steady_clock import SteadyClock
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Clock
-from fanet_mw.trace import ClockSampled, Delivered, Generated
+from fanet_mw.trace import BoundStated, ClockSampled, Delivered, Generated
 from fanet_mw.units import MS, US, NodeId, S
 from sim.results.files import finish
 from sim.run.virtual import simulate
@@ -93,6 +93,8 @@ def test_without_a_counter_nothing_comes_late_and_the_swarm_is_together_again_or
     )
     summary = finish(outcome, out=None)
     assert summary["bound"]["violations"] == summary["bound"]["never"], "what a frozen node held back is lost, not late"
+    stated_s = [record.t_ns / S - AT_S for record in outcome.records if isinstance(record, BoundStated)]
+    assert not [at_s for at_s in stated_s if 11 < at_s < 15], "all have heard that some clock is in doubt"
     left_out = by_ms > 5_000
     assert (summary["clock"]["lost"], summary["clock"]["without_time"]) == (1, int(left_out))
     ahead: dict[int, list[int]] = defaultdict(list)

@@ -25,6 +25,7 @@ _EXTRAS: Final = {
     "foxglove_schemas_protobuf": "record",
     "google": "record",
     "viser": "view",
+    "textual": "inspect",
 }
 """The extra with which each module is installed."""
 _REMEDY: Final = (

@@ -17,6 +17,7 @@ from fanet_mw.hosts import interrupts
 from sim.cli import (
     figures,
     gateway,
+    inspect,
     log,
     replay,
     runs,
@@ -43,7 +44,20 @@ app = App(
 )
 app.command(air_app)
 app.command(order_app)
-for commands in (scenario_files, sweep, figures, runs, replay, log, single_services, swarms, gateway, view, tool_files):
+for commands in (
+    scenario_files,
+    sweep,
+    figures,
+    runs,
+    replay,
+    log,
+    single_services,
+    swarms,
+    gateway,
+    view,
+    inspect,
+    tool_files,
+):
     commands.add_to(app)
 app.register_install_completion_command()
 _NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)

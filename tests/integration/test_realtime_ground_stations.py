@@ -270,6 +270,20 @@ def check_tools(log: Path) -> None:
     keep("tools", "\n".join(told) + "\n")
 
 
+def test_topics_of_a_running_swarm_are_listed_and_measured(field: Field) -> None:
+    def topic(*words: str) -> str:
+        command = [sys.executable, "-m", "fanet_mw", "topic", *words, "--swarm", field.name]
+        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=60).stdout
+
+    listed = topic("list", "--seconds", "1.5")
+    assert re.search(r"^mavlink/3 +MavlinkTap +\d", listed, re.MULTILINE)
+    assert re.search(r"^world/pose +Poses +[234]\d\.", listed, re.MULTILINE)  # 10 Hz, four times as fast
+    assert '"message": "HEARTBEAT"' in topic("echo", "mavlink/2", "--count", "3")
+    rate = re.search(r"average rate: (\d+\.\d+)", topic("hz", "world/pose", "--count", "2").splitlines()[-1])
+    assert rate is not None
+    assert 25 < float(rate[1]) < 45
+
+
 def test_a_connection_that_cannot_be_is_one_message(capsys: pytest.CaptureFixture[str]) -> None:
     for words, why in (
         (["--mavlink", "udp"], "must be udpout:HOST:PORT"),

@@ -1,0 +1,1 @@
+"""What a swarm says, message by message: counted, decoded, and followed from node to node."""

@@ -1,0 +1,93 @@
+"""Everything that an inspector shows of a swarm: an observer that keeps what it is told, bounded."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from fanet_mw import tlog
+from fanet_mw.bus.link_stats import LOSSES, LinkStats
+from fanet_mw.bus.messages import Poses
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Record
+from fanet_mw.units import US
+from sim.inspection.messages import Messages
+from sim.inspection.packets import Packets
+from sim.observation.turns import Turns, turns
+from sim.results.file_names import TLOG_FILE
+from sim.results.run_folder import RunFolder
+
+
+class LinkLine(NamedTuple):
+    """What one link carried."""
+
+    src: int
+    dst: int
+    copies: int
+    received: int
+    rssi_dbm: float | None
+    lost: Mapping[str, int]
+
+    def order(self) -> tuple[int, int, int]:
+        return -self.copies, self.src, self.dst
+
+
+class Inspection:
+    """What was told of one swarm until now."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        self.messages = Messages()
+        self.packets = Packets()
+        self.links: Sequence[LinkLine] = ()
+        """What links carried lately, or in the whole run of a recording, the busiest first."""
+        self.now_ns = 0
+        self._reports: dict[int, Mapping[str, Any]] = {}
+
+    def take_poses(self, poses: Poses) -> None:
+        self.now_ns = max(self.now_ns, poses.t_ns)
+
+    def take_records(self, some: Iterable[Record]) -> None:
+        self.packets.take(some)
+
+    def take_links(self, stats: LinkStats) -> None:
+        lines = [
+            LinkLine(row.src, row.dst, row.copies, row.received, row.rssi_dbm, dict(zip(LOSSES, row.lost, strict=True)))
+            for row in stats.rows()
+        ]
+        self.links = sorted(lines, key=LinkLine.order)
+
+    def take_report(self, name: str, content: Mapping[str, Any], *, t_ns: int) -> None:
+        if name.startswith("agent-"):
+            self._reports[int(name.removeprefix("agent-"))] = content
+
+    def take_tap(self, node: int, t_ns: int, data: bytes) -> None:
+        self.now_ns = max(self.now_ns, t_ns)
+        self.messages.take(node, "tap", t_ns, data)
+
+    def take_frame(self, node: int, t_ns: int, frame: bytes) -> None:
+        """A frame that a node sends."""
+        self.messages.take(node, "air", t_ns, frame)
+
+    def turns(self) -> Turns | None:
+        """Who may send when, now."""
+        return turns(self.scenario, self._reports)
+
+
+def of_folder(folder: RunFolder) -> Inspection:
+    """What the folder of a run holds; a log of MAVLink that is cut off there is counted as malformed."""
+    found = Inspection(folder.scenario)
+    epoch_us: int | None = None
+    try:
+        for t_us, frame in tlog.read(folder.folder / TLOG_FILE):
+            epoch_us = t_us if epoch_us is None else epoch_us
+            found.take_tap(frame[5], (t_us - epoch_us) * US, frame)
+    except MalformedFrameError:
+        found.messages.malformed += 1
+    except OSError:
+        pass  # a run without telemetry has no such file
+    found.take_records(folder.records())
+    for node, report in folder.agents().items():
+        found.take_report(f"agent-{node}", report, t_ns=0)
+    lines = [LinkLine(**{name: row[name] for name in LinkLine._fields}) for row in folder.links()]
+    found.links = sorted(lines, key=LinkLine.order)
+    return found

@@ -19,6 +19,7 @@ from tests.tables import (
     paper_rescue,
     plans,
     protocol,
+    sensors,
     small_rescues,
 )
 from tests.tables.markdown import Rows, Tolerance
@@ -101,6 +102,8 @@ TABLES: Final[Mapping[str, Table]] = {
     "installations": Table(
         "results/installations.md", installations.installations, Tolerance(relative=0.1), installations.MACHINE
     ),
+    "sensor-errors": Table("reference/sensors.md", sensors.errors, Tolerance(absolute=0.1, relative=0.05)),
+    "sensor-heights": Table("reference/sensors.md", sensors.heights, Tolerance(absolute=0.1)),
     "attacks": Table(
         "results/attacks.md", attacks.over_the_air, Tolerance(absolute=0.02, relative=0.2), attacks.MACHINE
     ),

@@ -1,0 +1,295 @@
+#!/usr/bin/env python
+"""Draws models beside the truth, into the documents that explain them (needs matplotlib):
+
+docs/reference/sensors.png                         truth and measurement of each sensor
+docs/explanation/channel-distance.png, -height     the loss of each channel over distance and height
+docs/explanation/channel-edge.png                  the loss over an edge
+docs/explanation/channel-fading.png                fading over time
+"""
+
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT))
+
+from emulator.channel import fading  # noqa: E402  (the tree's root is on the path now)
+from emulator.channel.path_loss import SPEED_OF_LIGHT_M_S  # noqa: E402
+from emulator.channel.propagation import received_dbm  # noqa: E402
+from emulator.kernel import state  # noqa: E402
+from emulator.kernel.state import Reals  # noqa: E402
+from fanet_mw.bus.messages import Altimeter, Camera, Inertial, Radar  # noqa: E402
+from fanet_mw.scenario import Radio, Scenario, config  # noqa: E402
+from fanet_mw.units import S  # noqa: E402
+from sim.figures.colors import BLUE, GRAY, GREEN, RED  # noqa: E402
+from sim.figures.style import applied, canvas  # noqa: E402
+from sim.scenarios import catalog  # noqa: E402
+from sim.world.environment.diffraction import loss_db as edge_loss_db  # noqa: E402
+from sim.world.environment.obstacles import obstacles  # noqa: E402
+from sim.world.environment.solids import Solids  # noqa: E402
+from sim.world.environment.survivors import Survivors  # noqa: E402
+from sim.world.mobility.position_estimate import PositionEstimate  # noqa: E402
+from sim.world.sensors.altimeter import AltimeterSensor  # noqa: E402
+from sim.world.sensors.camera import CameraSensor  # noqa: E402
+from sim.world.sensors.contract import Truth  # noqa: E402
+from sim.world.sensors.gps import GpsReceiver  # noqa: E402
+from sim.world.sensors.inertial import InertialSensor  # noqa: E402
+from sim.world.sensors.phone import REFERENCE_LOSS_DB, PhoneSensor  # noqa: E402
+from sim.world.sensors.radar import RadarSensor  # noqa: E402
+from sim.world.sensors.voice import VoiceSensor, level_db  # noqa: E402
+
+REFERENCE, EXPLANATION = ROOT / "docs" / "reference", ROOT / "docs" / "explanation"
+PLAIN = Solids(None)
+CHANNELS: Final = ("log_distance", "friis", "two_ray", "air_to_air", "air_to_ground", "uma_av")
+ANTENNA_M: Final = {"uma_av": 25.0}
+"""The height of the other node; 2 m in the other channels."""
+
+
+def _scenario(*keys: str) -> Scenario:
+    """Three UAVs and one survivor at the origin."""
+    given = ["nodes.count=3", "clusters.count=1", "mission.survivors=1", "mission.survivor_positions_m=[[0,0]]"]
+    return catalog.find("quick", [*given, *keys])
+
+
+def _gps(axes: Axes) -> None:
+    scenario = _scenario()
+    receiver, at = GpsReceiver(scenario), np.zeros((3, 3))
+    fixes = np.array([receiver.fixes(Truth(second * S, at, at))[0] for second in range(0, 1800, 2)])
+    for row, color in enumerate((BLUE, RED, GREEN)):
+        axes.plot(fixes[:, row, 0], fixes[:, row, 1], color=color, linewidth=0.6, label=f"UAV {row + 1}")
+    turn = np.linspace(0, 2 * math.pi, 100)
+    axes.plot(2.5 * np.cos(turn), 2.5 * np.sin(turn), color=GRAY, linestyle=":", label="2.5 m (CEP)")
+    axes.set(title="GPS at rest, 30 min", xlabel="east, off [m]", ylabel="north, off [m]", aspect="equal")
+    axes.legend(loc="best", fontsize="small")
+
+
+def _height(axes: Axes) -> None:
+    scenario = _scenario("sensors.altimeter_hz=1")
+    sensor, receiver = AltimeterSensor(scenario, PLAIN), GpsReceiver(scenario)
+    at, still = np.tile([0.0, 0, 50], (3, 1)), np.zeros((3, 3))
+    barometer, gps = [], []
+    for second in range(1800):
+        (_, told), *_ = sensor.read(Truth(second * S, at, still), [0])
+        assert isinstance(told, Altimeter)
+        barometer.append(told.up_m)
+        gps.append(receiver.fixes(Truth(second * S, at, still))[0][0, 2])
+    axes.plot(gps, color=RED, linewidth=0.6, label="GPS")
+    axes.plot(barometer, color=BLUE, linewidth=0.6, label="barometer")
+    axes.axhline(50, color=GRAY, linestyle=":", label="truth")
+    axes.set(title="Height of a UAV that hovers", xlabel="time [s]", ylabel="height [m]")
+    axes.legend(loc="best", fontsize="small")
+
+
+def _phone(axes: Axes) -> None:
+    sensor = PhoneSensor(_scenario("mission.detection_dbm=-200"))
+    east = np.arange(-300.0, 301.0, 4.0)
+    told = [dict(sensor.scan(np.array([x, 30.0, 50.0])))[1] for x in east]
+    distance = np.sqrt(east**2 + 30**2 + 50**2)
+    axes.plot(east, told, color=BLUE, linewidth=0.8, label="measured")
+    axes.plot(east, 15 - REFERENCE_LOSS_DB - 30 * np.log10(distance), color=GRAY, linestyle=":", label="path loss")
+    axes.set(title="Phone, on a straight way past it", xlabel="east [m]", ylabel="power [dBm]")
+    axes.legend(loc="best", fontsize="small")
+
+
+def _voice(axes: Axes) -> None:
+    keys = ("sensors.voice_hz=1", "sensors.voice_share=1", "sensors.voice_rotor_db=0")
+    distances = np.linspace(2.0, 14.0, 120)
+    for seed, color in ((1, BLUE), (2, RED), (3, GREEN)):
+        scenario = _scenario(*keys, f"seed={seed}")
+        sensor = VoiceSensor(scenario, Survivors(scenario), PLAIN)
+        levels = []
+        for distance in distances:
+            at = np.tile([0.0, 0, distance], (3, 1))
+            ((_, told),) = sensor.read(Truth(0, at, np.zeros((3, 3))), [0])
+            levels.append(told.calls[0].level_db)  # type: ignore[union-attr]
+        axes.plot(distances, levels, color=color, linewidth=0.6, label=f"survivor {seed}")
+    axes.plot(distances, level_db(distances, at_1_m_db=88.0), color=GRAY, linestyle=":", label="88 dB at 1 m")
+    axes.set(title="Level of calls", xlabel="distance [m]", ylabel="level [dB]")
+    axes.legend(loc="best", fontsize="small")
+
+
+def _radar(axes: Axes) -> None:
+    sensor = RadarSensor(_scenario("sensors.radar_hz=5"), PLAIN)
+    velocity = np.array([[0.0, 0, 0], [-8.0, 0, 0], [0, 0, 0]])
+    true, off = [], []
+    for step in range(600):
+        at = np.array([[0.0, 0, 50], [110 - 0.16 * step, 0, 50], [0, 900, 50]])
+        for _, told in sensor.read(Truth(step * S // 5, at, velocity), [0]):
+            assert isinstance(told, Radar)
+            for echo in told.echoes:
+                if abs(echo.range_m - at[1, 0]) < 5:
+                    true.append(at[1, 0])
+                    off.append(echo.closing_m_s - 8.0)
+    axes.plot(true, off, ".", color=BLUE, markersize=2)
+    axes.axhline(0, color=GRAY, linestyle=":")
+    axes.set(title="Radar: closing speed of a UAV at 8 m/s", xlabel="distance [m]", ylabel="off [m/s]")
+
+
+def _outage(axes: Axes) -> None:
+    for keys, color, name in (((), BLUE, "inertial"), (("sensors.inertial_hz=5",), RED, "with optical flow")):
+        scenario = _scenario("nodes.count=200", "sensors.gps_outages=[[0,0,9000,30,9000]]", *keys)
+        estimate, at = PositionEstimate(scenario, GpsReceiver(scenario)), np.zeros((200, 3))
+        spread = []
+        for tick in range(600):
+            estimate.advance(Truth(tick * S // 10, at, at))
+            spread.append(math.sqrt((estimate.off_m[:, :2] ** 2).sum(axis=1).mean()))
+        axes.plot(np.arange(600) / 10, spread, color=color, label=name)
+    axes.axvline(30, color=GRAY, linestyle=":", label="GPS is lost")
+    axes.axvline(35, color=GRAY, linestyle="--", label="landing, without flow")
+    axes.set(title="Estimate of the flight control", xlabel="time [s]", ylabel="off, RMS [m]", ylim=(0, 40))
+    axes.legend(loc="upper left", fontsize="small")
+
+
+def _camera(axes: Axes) -> None:
+    scenario = _scenario("sensors.camera_hz=1")
+    sensor = CameraSensor(scenario, Survivors(scenario), PLAIN)
+    heights = np.arange(10.0, 121.0, 1.0)
+    seen: list[tuple[float, float]] = []
+    for second, up in enumerate(heights):
+        truth = Truth(second * S, np.array([[0.0, 0, up], [500, 500, 50], [500, 500, 50]]), np.zeros((3, 3)))
+        for _, told in sensor.read(truth, [0]):
+            assert isinstance(told, Camera)
+            seen += [(up, person.pixels) for person in told.people]
+    axes.plot(*np.array(seen).T, ".", color=BLUE, markersize=3, label="measured")
+    axes.plot(heights, sensor.pixels(heights), color=GRAY, linestyle=":", label="truth")
+    axes.set(title="Camera: a person straight below", xlabel="height [m]", ylabel="pixels across", yscale="log")
+    axes.legend(loc="best", fontsize="small")
+
+
+def _inertial(axes: Axes) -> None:
+    sensor, told, true = InertialSensor(_scenario("sensors.inertial_hz=5")), [], []
+    times = np.arange(0, 120, 0.2)
+    for t in times:
+        velocity = np.zeros((3, 3))
+        velocity[0, 0] = true_m_s = 0.5 * math.sin(t / 10)
+        for _, reading in sensor.read(Truth(round(t * S), np.zeros((3, 3)), velocity), [0]):
+            assert isinstance(reading, Inertial)
+            told.append(reading.velocity.east)
+            true.append(true_m_s)
+    axes.plot(times, told, color=BLUE, linewidth=0.6, label="measured")
+    axes.plot(times, true, color=GRAY, linestyle=":", label="truth")
+    axes.set(title="Inertial: velocity to the east", xlabel="time [s]", ylabel="velocity [m/s]")
+    axes.legend(loc="best", fontsize="small")
+
+
+def radio(**keys: object) -> Radio:
+    return config.build({"clusters": {"count": 1}, "radio": keys}).radio
+
+
+def loss_db(channel: str, distance_m: Reals | float, height_m: Reals | float) -> Reals:
+    """The loss between a node at `height_m` and one near the ground, `distance_m` apart along the ground."""
+    keys = radio(channel=channel, environment="urban")
+    along, up = np.broadcast_arrays(np.asarray(distance_m, float), np.asarray(height_m, float))
+    here = np.column_stack([along, np.zeros_like(along), up])
+    there = np.tile([0.0, 0.0, ANTENNA_M.get(channel, 2.0)], (len(along), 1))
+    return keys.tx_power_dbm - received_dbm(np.linalg.norm(here - there, axis=1), here, there, keys)
+
+
+def panels(title: str, draw: Callable[[Axes, str], None]) -> Figure:
+    figure = Figure(figsize=(11, 6.4), layout="constrained")
+    for axes, channel in zip(figure.subplots(2, 3, sharey=True).flat, CHANNELS, strict=True):
+        draw(axes, channel)
+        axes.set_title(f"{channel}, other node at {ANTENNA_M.get(channel, 2.0):g} m", fontsize=9)
+        axes.grid(alpha=0.3)
+        axes.set_ylabel("loss [dB]")
+    figure.suptitle(title, fontsize=10)
+    return figure
+
+
+def over_distance(axes: Axes, channel: str) -> None:
+    along = np.geomspace(10, 10_000, 300)
+    for height_m in (2.0, 10.0, 30.0, 100.0):
+        axes.semilogx(along, loss_db(channel, along, height_m), label=f"{height_m:g} m up")
+    axes.legend(fontsize=7)
+    axes.set_xlabel("distance along the ground [m]")
+
+
+def over_height(axes: Axes, channel: str) -> None:
+    up = np.linspace(1, 150, 600)
+    for along_m in (50.0, 200.0, 1000.0):
+        axes.plot(up, loss_db(channel, along_m, up), label=f"{along_m:g} m away")
+    axes.legend(fontsize=7)
+    axes.set_xlabel("height [m]")
+
+
+def correlation() -> Figure:
+    """The correlation of Rayleigh-faded power while one node moves, or both, beside J0^2 and J0^4."""
+    keys = radio(channel="friis", fading="nakagami", nakagami_m=1)
+    p, pf, g = np.zeros(state.PARAMETERS, np.int64), np.zeros(state.REALS), np.zeros(state.GLOBALS, np.int64)
+    p[state.FADING], pf[state.FADING_SHAPE] = fading.law_of(keys)
+    wavelength_m, table = SPEED_OF_LIGHT_M_S / (keys.frequency_mhz * 1e6), fading.tables(keys)
+    way = np.linspace(0, 2, 81)  # wavelengths, at 1 m/s
+    instants = np.rint(way * wavelength_m * 1e9).astype(int).tolist()
+    angle = 2 * np.pi * (np.arange(400) + 0.5) / 400
+    j0 = np.cos(np.multiply.outer(2 * np.pi * way, np.cos(angle))).mean(axis=1)
+    figure = Figure(figsize=(7, 3.6), layout="constrained")
+    axes = figure.subplots()
+    random = np.random.Generator(np.random.PCG64(1))
+    for both, color in ((False, "tab:blue"), (True, "tab:orange")):
+        drawn = []
+        for seed in range(40):
+            at, velocity = random.uniform(0, 5000, (60, 3)), np.zeros((60, 3))
+            velocity[::2, 0], velocity[1::2, 1] = 1.0, float(both)
+            waves = fading.Waves(keys, seed=seed).of(at, velocity, 0)
+            drawn += [[fading.gain(g, p, pf, waves, table, i, i + 1, t) - 1 for t in instants] for i in range(0, 60, 2)]
+        gains = np.array(drawn)
+        who = "both nodes move" if both else "one node moves"
+        axes.plot(way, (gains * gains[:, :1]).mean(axis=0) / (gains[:, 0] ** 2).mean(), ".", color=color, label=who)
+        axes.plot(way, j0 ** (4 if both else 2), color=color, lw=1, label="J0^4" if both else "J0^2 (Clarke, Jakes)")
+    axes.set(xlabel="way of a node [wavelengths]", ylabel="correlation of the power")
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8)
+    return figure
+
+
+def edge() -> Figure:
+    """The loss behind a wall and past a tower, as one node rises or moves aside."""
+    figure = Figure(figsize=(8, 3.4), layout="constrained")
+    wavelength_m = SPEED_OF_LIGHT_M_S / 2.412e9
+    other = np.array([[250.0, 0.0, 20.0]])
+    above, beside = figure.subplots(1, 2, sharey=True)
+    for axes, building, moves, name in (
+        (above, (0, 0, 1, 600, 40), 2, "height of the node [m]"), (beside, (0, 0, 20, 20, 60), 1, "way aside [m]"),
+    ):  # fmt: skip
+        scenario = _scenario("world.area_m=1000", f"world.buildings=[{list(building)}]", "nodes.spacing_m=400")
+        solids = Solids(obstacles(scenario, np.array([[400.0, 400.0, 100.0]])))
+        places = np.linspace(1, 100, 400) if moves == 2 else np.linspace(-60, 60, 400)
+        at = np.tile([-50.0, 0.0, 20.0], (len(places), 1))
+        at[:, moves] = places
+        axes.plot(
+            places, edge_loss_db(solids, at, np.repeat(other, len(at), axis=0), wavelength_m=wavelength_m), color=BLUE
+        )
+        axes.set(xlabel=name, ylabel="loss by the edge [dB]")
+        axes.grid(alpha=0.3)
+    above.set_title("behind a wall of 40 m, 50 and 250 m away", fontsize=9)
+    beside.set_title("behind a tower 20 m wide", fontsize=9)
+    return figure
+
+
+def main() -> None:
+    """All pictures."""
+    with applied():
+        figure, grid = canvas(2, 4, width=4.0, height=3.4)
+        drawn = (_gps, _height, _phone, _voice, _camera, _radar, _inertial, _outage)
+        for draw, axes in zip(drawn, grid, strict=True):
+            draw(axes)
+        figure.savefig(REFERENCE / "sensors.png", dpi=90, metadata={"Software": None})
+    pictures = {
+        "distance": panels("Loss over distance, by the height of one node; 2412 MHz, urban", over_distance),
+        "height": panels("Loss over the height of one node; 2412 MHz, urban", over_height),
+        "edge": edge(),
+        "fading": correlation(),
+    }
+    for name, picture in pictures.items():
+        picture.savefig(EXPLANATION / f"channel-{name}.png", dpi=90, metadata={"Software": None})
+
+
+if __name__ == "__main__":
+    main()

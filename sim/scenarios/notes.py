@@ -25,7 +25,7 @@ _CLUSTERED: Final = frozenset({"clustered"})
 
 def notes(scenario: Scenario) -> list[str]:
     """One sentence for each."""
-    return [*_after_the_end(scenario), *_without_effect(scenario), *_guessed(scenario)]
+    return [*_after_the_end(scenario), *_without_effect(scenario), *_still_waves(scenario), *_guessed(scenario)]
 
 
 def _after_the_end(scenario: Scenario) -> Iterator[str]:
@@ -51,6 +51,8 @@ def _without_effect(scenario: Scenario) -> Iterator[str]:
         unused = [key for key, _ in _changed(scenario.clusters)]
         if unused:
             yield f"clusters.{', clusters.'.join(unused)}: no effect with routing.protocol = {protocol!r}"
+    if protocol in PROTOCOLS and protocol != "rounds" and (unused := [key for key, _ in _changed(scenario.rounds)]):
+        yield f"rounds.{', rounds.'.join(unused)}: no effect with routing.protocol = {protocol!r}"
     for table in ("nodes", "routing", "radio", "mobility", "clock", "world", "traffic"):
         section = getattr(scenario, table)
         for key, field in _changed(section):
@@ -61,6 +63,15 @@ def _without_effect(scenario: Scenario) -> Iterator[str]:
                 value = getattr(section, other)
                 if other != key and wanted and wanted <= known and value in known and value not in wanted:
                     yield f"{table}.{key}: no effect with {table}.{other} = {value!r}"
+
+
+def _still_waves(scenario: Scenario) -> Iterator[str]:
+    radio = scenario.radio
+    if radio.fading != "none" and not radio.scatterer_speed_m_s and scenario.mobility.model == "static":
+        yield (
+            f"radio.fading = {radio.fading!r}: nothing moves, so each link keeps one gain for the whole run; "
+            "radio.scatterer_speed_m_s lets them change"
+        )
 
 
 def _changed(section: Section) -> Iterator[tuple[str, FieldInfo]]:

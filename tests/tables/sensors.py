@@ -41,7 +41,7 @@ def errors() -> Rows:
         for sensors, more in (("white noise, flown on the truth", _PLAIN), ("default", ())):
             runs = [summarized("rescue", *keys, *_QUIET, *more, f"seed={seed}") for seed in seeds]
             missions = [run["mission"] for run in runs]
-            off_m = [m["confirmed_error_m"]["median"] for m in missions if m["confirmed_error_m"]["median"] is not None]
+            off_m = [m["confirmed_error_m"] for m in missions if m["confirmed_error_m"] is not None]
             rows.append([
                 name, sensors, str(len(runs)),
                 f"{sum(m['confirmed'] for m in missions)} of {sum(m['survivors'] for m in missions)}",

@@ -60,6 +60,7 @@ def test_what_comes_after_the_end_is_noted(changes: dict[str, object], said: lis
             ["routing.protocol=aodv", "clusters.relay=scheduled"],
             "clusters.relay: no effect with routing.protocol = 'aodv'",
         ),
+        (["rounds.bulk_share=0.4"], "rounds.bulk_share: no effect with routing.protocol = 'flooding'"),
         (["nodes.layout=line", "nodes.radius_m=5"], "nodes.radius_m: no effect with nodes.layout = 'line'"),
         (["routing.gossip_p=0.3"], "routing.gossip_p: no effect with routing.protocol = 'flooding'"),
         (["radio.exponent=4"], "radio.exponent: no effect with radio.channel = 'range'"),
@@ -90,3 +91,13 @@ def test_a_guessed_height_is_noted_before_the_run_and_in_its_summary(
     assert said in capsys.readouterr().err
     summary = finish(simulate(config.load(tmp_path / "s.toml")), out=None)
     assert summary["notes"] == [f"world.buildings_geojson: {said}"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [((), True), (("radio.scatterer_speed_m_s=1",), False), (("mobility.model=random_waypoint",), False)],
+)
+def test_links_that_keep_one_gain_are_told(changes: tuple[str, ...], *, told: bool) -> None:
+    fading = ("radio.channel=friis", "radio.fading=rician")
+    found = [note for note in notes(catalog.find("flooding", [*fading, *changes])) if note.startswith("radio.fading")]
+    assert len(found) == told

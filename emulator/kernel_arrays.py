@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from emulator.channel.error_rate import SHORT_BYTES, header_rates, log_success_per_bit
-from emulator.channel.fading import WAVE_COLUMNS, law_of, tables
+from emulator.channel.fading import law_of, tables
 from emulator.channel.propagation import (
     LinkTable,
     carrier_sense_mw,
@@ -20,6 +20,7 @@ from emulator.channel.propagation import (
 )
 from emulator.kernel import state as s
 from emulator.kernel.entry import KernelEntry
+from emulator.kernel.fading_gain import WAVE_COLUMNS
 from emulator.kernel.random_numbers import MODULUS
 from fanet_mw.airtime import DETECT_NS, Timing, airtime_ns
 from fanet_mw.rng import stream_seed

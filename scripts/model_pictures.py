@@ -24,6 +24,7 @@ from emulator.channel import fading  # noqa: E402  (the tree's root is on the pa
 from emulator.channel.path_loss import SPEED_OF_LIGHT_M_S  # noqa: E402
 from emulator.channel.propagation import received_dbm  # noqa: E402
 from emulator.kernel import state  # noqa: E402
+from emulator.kernel.fading_gain import gain  # noqa: E402
 from emulator.kernel.state import Reals  # noqa: E402
 from fanet_mw.bus.messages import Altimeter, Camera, Inertial, Radar  # noqa: E402
 from fanet_mw.scenario import Radio, Scenario, config  # noqa: E402
@@ -238,7 +239,7 @@ def correlation() -> Figure:
             at, velocity = random.uniform(0, 5000, (60, 3)), np.zeros((60, 3))
             velocity[::2, 0], velocity[1::2, 1] = 1.0, float(both)
             waves = fading.Waves(keys, seed=seed).of(at, velocity, 0)
-            drawn += [[fading.gain(g, p, pf, waves, table, i, i + 1, t) - 1 for t in instants] for i in range(0, 60, 2)]
+            drawn += [[gain(g, p, pf, waves, table, i, i + 1, t) - 1 for t in instants] for i in range(0, 60, 2)]
         gains = np.array(drawn)
         who = "both nodes move" if both else "one node moves"
         axes.plot(way, (gains * gains[:, :1]).mean(axis=0) / (gains[:, 0] ** 2).mean(), ".", color=color, label=who)

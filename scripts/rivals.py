@@ -20,7 +20,7 @@ from fanet_mw.units import S
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
-from sim.world.engines.contract import Rows
+from sim.world.arrays import Rows
 from sim.world.mobility.guidance import Guidance
 from sim.world.mobility.layout import positions
 

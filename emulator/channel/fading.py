@@ -23,27 +23,12 @@ from typing import Final
 import numpy as np
 
 from emulator.channel.path_loss import SPEED_OF_LIGHT_M_S
-from emulator.kernel.jit import jit
-from emulator.kernel.state import FADING, FADING_SHAPE, WAVES_FROM_NS, Ints, Reals
+from emulator.kernel.fading_gain import NAKAGAMI, NONE, RICIAN, ROOT, TABLE, WAVES
+from emulator.kernel.state import Reals
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario.tables.radio import Radio
 from fanet_mw.units import S
 
-NONE: Final = 0
-NAKAGAMI: Final = 1
-RICIAN: Final = 2
-WAVES: Final = 32
-TABLE: Final = 4096  # a power of two: see `gain`
-COSINE, SHAPED = 0, 1
-"""The rows of the table: cos(2 pi i / TABLE), and by |h| the gain (Rician: what scales h to be normal)."""
-_MASK = TABLE - 1
-_QUARTER = TABLE // 4
-_ROOT = math.sqrt(WAVES)
-_PER_AMPLITUDE = (TABLE - 1) / _ROOT
-_K, _K_RATE, _L, _L_RATE, _AT = 0, WAVES, 2 * WAVES, 3 * WAVES, 4 * WAVES
-WAVE_COLUMNS: Final = 4 * WAVES + 6
-"""Of a station: phases as the lower end and their change per ns [turns], the same as the higher end, position and
-velocity per ns [wavelengths]."""
 _TWO_PI: Final = 2.0 * math.pi
 RARE: Final = 0.001
 """The share of frames on a link of which fading may lift none, for the link to carry no copies."""
@@ -97,7 +82,7 @@ def random_walk_exponent(amplitude: Reals) -> Reals:
     t, weight = 2.25 * (t + 1), 2.25 * weight  # beyond 4.5 less than 1e-12 is left of J0^32
     sine = np.sin(_TWO_PI / 4 * (np.arange(96) + 0.5) / 96)  # Bessel's integrals over a quarter turn
     spectrum = weight * np.cos(np.outer(t, sine)).mean(axis=1) ** WAVES
-    length = _ROOT * amplitude
+    length = ROOT * amplitude
     j1 = [(np.sin(r * np.outer(t, sine)) * sine).mean(axis=1) for r in length]
     return np.asarray(-np.log1p(-np.clip(length * (np.array(j1) @ spectrum), 0.0, 1 - 1e-12)), dtype=np.float64)
 
@@ -111,8 +96,8 @@ def tables(radio: Radio) -> Reals:
 def _tables(law: int, shape: float) -> Reals:
     if law == NONE:
         return np.zeros((2, 1))
-    coarse = np.linspace(0.02, _ROOT, 400)
-    amplitude = np.linspace(0.0, _ROOT, TABLE)
+    coarse = np.linspace(0.02, ROOT, 400)
+    amplitude = np.linspace(0.0, ROOT, TABLE)
     ratio = np.interp(amplitude, coarse, random_walk_exponent(coarse) / coarse**2)
     exponent = amplitude**2 * ratio
     shaped = np.sqrt(ratio) if law == RICIAN else gamma_quantile(exponent, shape)
@@ -152,32 +137,3 @@ class Waves:
             ],
             axis=1,
         )
-
-
-@jit
-def gain(g: Ints, p: Ints, pf: Reals, wv: Reals, tb: Reals, a: int, b: int, t: int) -> float:
-    """The power gain between two stations at an instant."""
-    lo, hi = min(a, b), max(a, b)
-    since = float(t - g[WAVES_FROM_NS])
-    x = 0.0
-    y = 0.0
-    for n in range(WAVES):
-        turns = wv[lo, _K + n] + wv[hi, _L + n] + (wv[lo, _K_RATE + n] + wv[hi, _L_RATE + n]) * since
-        at = int(turns * TABLE)
-        x += tb[COSINE, at & _MASK]
-        y += tb[COSINE, (at - _QUARTER) & _MASK]
-    place = math.sqrt(x * x + y * y) / _ROOT * _PER_AMPLITUDE
-    i = min(int(place), TABLE - 2)
-    shaped = tb[SHAPED, i] + (place - i) * (tb[SHAPED, i + 1] - tb[SHAPED, i])
-    if p[FADING] == NAKAGAMI:
-        return float(shaped)
-    square = 0.0
-    for axis in range(3):
-        apart = wv[lo, _AT + axis] - wv[hi, _AT + axis] + (wv[lo, _AT + 3 + axis] - wv[hi, _AT + 3 + axis]) * since
-        square += apart * apart
-    at = int(math.sqrt(square) * TABLE)
-    k = pf[FADING_SHAPE]
-    direct, scattered = math.sqrt(k / (k + 1.0)), shaped / _ROOT / math.sqrt(k + 1.0)
-    x = direct * tb[COSINE, at & _MASK] + scattered * x
-    y = direct * tb[COSINE, (at - _QUARTER) & _MASK] + scattered * y
-    return float(x * x + y * y)

@@ -6,7 +6,6 @@ When a station may transmit (DIFS or EIFS, contention window, backoff) is in `ch
 counted in `frame_ends.py`.
 """
 
-from emulator.channel.fading import gain
 from emulator.kernel.channel_access import (
     access_from,
     arm,
@@ -17,6 +16,7 @@ from emulator.kernel.channel_access import (
     slots_left,
     widen_window,
 )
+from emulator.kernel.fading_gain import gain
 from emulator.kernel.frame_ends import done, lost, put, release
 from emulator.kernel.heap import push
 from emulator.kernel.jit import jit

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from agents.applications.traffic import sources_of, targets_of
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import S
-from sim.world.engines.contract import Rows
+from sim.world.arrays import Rows
 from sim.world.mobility.guidance import Guidance
 from sim.world.mobility.layout import positions
 

@@ -16,7 +16,7 @@ from fanet_mw.bus.topics import Topics, node_of
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.hosts.bus import OnSample
 from fanet_mw.scenario import Scenario
-from sim.world.engines.contract import Rows
+from sim.world.arrays import Rows
 from sim.world.mobility.guidance import makes_sense
 
 _FARTHEST: Final = 1e6

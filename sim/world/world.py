@@ -18,8 +18,9 @@ from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Collided, FlightModeChanged, Posed
 from fanet_mw.units import NodeId, S
+from sim.world.arrays import Rows
 from sim.world.engines.battery_drain import BatteryDrain
-from sim.world.engines.contract import Engine, Rows
+from sim.world.engines.contract import Engine
 from sim.world.engines.kinematic import Kinematic
 from sim.world.engines.rotors.rigid_body import Rotors
 from sim.world.engines.rotors.vehicle_types import VEHICLES

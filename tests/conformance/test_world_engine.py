@@ -7,7 +7,8 @@ import pytest
 
 from fanet_mw.units import Enu
 from sim.scenarios import catalog
-from sim.world.engines.contract import Engine, Rows
+from sim.world.arrays import Rows
+from sim.world.engines.contract import Engine
 from sim.world.engines.kinematic import Kinematic
 from sim.world.engines.pybullet import Physics
 from sim.world.engines.rotors.rigid_body import Rotors

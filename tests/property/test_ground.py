@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from agents.mission.navigation.onboard_map import OnboardMap
 from fanet_mw.scenario import Scenario
 from sim.scenarios import catalog
-from sim.world.engines.contract import Engine, Rows
+from sim.world.arrays import Rows
+from sim.world.engines.contract import Engine
 from sim.world.engines.kinematic import Kinematic
 from sim.world.engines.pybullet import Physics
 from sim.world.engines.rotors.rigid_body import Rotors

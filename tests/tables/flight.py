@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.world.engines.contract import Engine, Rows, Values
+from sim.world.arrays import Rows, Values
+from sim.world.engines.contract import Engine
 from sim.world.engines.kinematic import Kinematic
 from sim.world.engines.rotors.battery import Batteries
 from sim.world.engines.rotors.power import trimmed_w

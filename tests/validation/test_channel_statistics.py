@@ -10,6 +10,7 @@ import pytest
 from emulator.channel import fading
 from emulator.channel.shadowing import Shadowing
 from emulator.kernel import state
+from emulator.kernel.fading_gain import gain
 from fanet_mw.scenario import Radio, config
 
 FAR_M = 5000.0
@@ -89,7 +90,7 @@ def gains_at(at: Any, velocity: Any, instants_ns: Any, pairs: Any, *, seed: int 
     g = np.zeros(state.GLOBALS, np.int64)
     waves = fading.Waves(radio_keys, seed=seed).of(np.asarray(at, float), np.asarray(velocity, float), 0)
     table = fading.tables(radio_keys)
-    return np.array([[fading.gain(g, p, pf, waves, table, a, b, t) for a, b in pairs] for t in instants_ns])
+    return np.array([[gain(g, p, pf, waves, table, a, b, t) for a, b in pairs] for t in instants_ns])
 
 
 def gains(**keys: Any) -> Any:
@@ -157,9 +158,9 @@ def test_a_pose_that_continues_the_last_one_continues_the_fading() -> None:
     p, pf, g = np.zeros(state.PARAMETERS, np.int64), np.zeros(state.REALS), np.zeros(state.GLOBALS, np.int64)
     p[state.FADING], pf[state.FADING_SHAPE] = fading.law_of(keys)
     waves, table, t_ns = fading.Waves(keys, seed=1), fading.tables(keys), 3_000_000
-    before = fading.gain(g, p, pf, waves.of(at, velocity, 0), table, 0, 1, t_ns)
+    before = gain(g, p, pf, waves.of(at, velocity, 0), table, 0, 1, t_ns)
     g[state.WAVES_FROM_NS] = t_ns
-    after = fading.gain(g, p, pf, waves.of(at + velocity * t_ns / 1e9, velocity, t_ns), table, 0, 1, t_ns)
+    after = gain(g, p, pf, waves.of(at + velocity * t_ns / 1e9, velocity, t_ns), table, 0, 1, t_ns)
     assert after == pytest.approx(before, rel=0.02)
 
 

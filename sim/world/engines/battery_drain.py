@@ -11,7 +11,8 @@ import numpy as np
 
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
-from sim.world.engines.contract import Engine, Flags, Values
+from sim.world.arrays import Flags, Values
+from sim.world.engines.contract import Engine
 from sim.world.engines.rotors.battery import Batteries
 from sim.world.engines.rotors.power import trimmed_w
 from sim.world.engines.rotors.vehicle_types import VEHICLES, Vehicle

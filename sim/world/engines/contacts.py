@@ -7,7 +7,7 @@ pass each other between two instants have touched, too.
 import numpy as np
 import numpy.typing as npt
 
-from sim.world.engines.contract import Rows, Values
+from sim.world.arrays import Rows, Values
 from sim.world.environment.solids import Solids
 
 Indices = npt.NDArray[np.int64]

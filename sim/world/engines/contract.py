@@ -7,15 +7,7 @@ Row i is node i + 1. The same calls give the same results. Engines know nothing 
 from abc import ABC, abstractmethod
 from typing import Final
 
-import numpy as np
-import numpy.typing as npt
-
-Rows = npt.NDArray[np.float64]
-"""One row for each node, with east, north and up: float64 [nodes, 3]."""
-Values = npt.NDArray[np.float64]
-"""float64 of any shape."""
-Flags = npt.NDArray[np.bool_]
-
+from sim.world.arrays import Flags, Rows, Values
 
 GRAVITY_M_S2: Final = 9.81
 

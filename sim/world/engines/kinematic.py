@@ -8,8 +8,9 @@ from typing import Final
 
 import numpy as np
 
+from sim.world.arrays import Rows
 from sim.world.engines.contacts import Contacts
-from sim.world.engines.contract import GRAVITY_M_S2, Engine, Rows
+from sim.world.engines.contract import GRAVITY_M_S2, Engine
 from sim.world.engines.rotors.vehicle_types import IRIS
 from sim.world.environment.solids import Solids
 

@@ -14,8 +14,9 @@ from typing import Final
 
 import numpy as np
 
+from sim.world.arrays import Rows, Values
 from sim.world.engines.contacts import Contacts
-from sim.world.engines.contract import Engine, Rows, Values
+from sim.world.engines.contract import Engine
 from sim.world.engines.quiet_pybullet import pybullet
 from sim.world.engines.rotors.vehicle_types import IRIS
 from sim.world.environment.obstacles import Hills, Obstacles

@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from sim.world.engines.contract import Rows, Values
+from sim.world.arrays import Rows, Values
 from sim.world.environment.solids import RAYS, Solids
 
 _LEAST_NU: Final = -0.78

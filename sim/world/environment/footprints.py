@@ -20,7 +20,7 @@ import numpy as np
 from fanet_mw.errors import ConfigError
 from fanet_mw.mavlink import Geodetic, to_enu
 from fanet_mw.scenario import outlines
-from sim.world.engines.contract import Rows
+from sim.world.arrays import Rows
 from sim.world.environment.given_file import content
 
 LEVEL_M: Final = 3.0

@@ -23,7 +23,7 @@ from fanet_mw.mavlink import Geodetic, to_geodetic
 from fanet_mw.scenario import ascii_grid
 from fanet_mw.scenario.outlines import half_turn
 from fanet_mw.units import Enu
-from sim.world.engines.contract import Flags, Rows, Values
+from sim.world.arrays import Flags, Rows, Values
 from sim.world.environment.given_file import content
 from sim.world.environment.grayscale_png import SIGNATURE, brightness
 

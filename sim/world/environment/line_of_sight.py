@@ -13,7 +13,7 @@ from emulator.channel.propagation import gains_dbi, pairs_in_reach
 from fanet_mw.bus.messages import Obstructions
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import LIGHT_M_PER_S
-from sim.world.engines.contract import Rows
+from sim.world.arrays import Rows
 from sim.world.environment.diffraction import FRESNEL_M, loss_db
 from sim.world.environment.solids import Solids
 

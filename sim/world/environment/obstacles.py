@@ -18,7 +18,7 @@ import numpy.typing as npt
 from fanet_mw.errors import ConfigError
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario, World
-from sim.world.engines.contract import Rows, Values
+from sim.world.arrays import Rows, Values
 from sim.world.environment import footprints, heightmap
 
 _CLEAR_M: Final = 5.0

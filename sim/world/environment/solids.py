@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from sim.world.engines.contract import Flags, Rows, Values
+from sim.world.arrays import Flags, Rows, Values
 from sim.world.environment.obstacles import Obstacles
 
 RAYS: Final = 1000

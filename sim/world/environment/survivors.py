@@ -10,7 +10,7 @@ import numpy as np
 from fanet_mw.rng import stream
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import Enu
-from sim.world.engines.contract import Flags, Rows, Values
+from sim.world.arrays import Flags, Rows, Values
 from sim.world.environment.obstacles import Box, obstacles
 from sim.world.mobility.layout import positions
 

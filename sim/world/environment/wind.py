@@ -18,7 +18,7 @@ from typing import Final
 
 import numpy as np
 
-from sim.world.engines.contract import Rows, Values
+from sim.world.arrays import Rows, Values
 
 _FOOT_M: Final = 0.3048
 _LOWEST_FT: Final = 10.0

@@ -1,7 +1,7 @@
 """Counts the incidents of a run: contacts, losses of separation, and entries into no-fly areas."""
 
 from fanet_mw.scenario import Scenario
-from sim.world.engines.contract import Rows
+from sim.world.arrays import Rows
 from sim.world.incidents.no_fly_entries import NoFlyEntries
 from sim.world.incidents.separation import Separation
 

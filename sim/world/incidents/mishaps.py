@@ -9,7 +9,7 @@ import numpy as np
 
 from fanet_mw.bus.radio_control import Control, Mishap, MishapKind, Restore, wrong
 from fanet_mw.scenario import Scenario
-from sim.world.engines.contract import Flags, Rows
+from sim.world.arrays import Flags, Rows
 
 
 class Mishaps:

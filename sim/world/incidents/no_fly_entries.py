@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fanet_mw.errors import ConfigError
-from sim.world.engines.contract import Flags, Rows
+from sim.world.arrays import Flags, Rows
 
 
 class NoFlyEntries:

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from sim.world.arrays import Rows
 from sim.world.engines.contacts import approaches
-from sim.world.engines.contract import Rows
 
 
 class Separation:

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple, Protocol
 
-from sim.world.engines.contract import Rows
+from sim.world.arrays import Rows
 
 
 class Track(NamedTuple):

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fanet_mw.scenario import Scenario
-from sim.world.engines.contract import Rows
+from sim.world.arrays import Rows
 from sim.world.mobility.contract import Track
 
 

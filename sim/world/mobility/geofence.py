@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from fanet_mw.units import Enu
-from sim.world.engines.contract import Flags, Rows
+from sim.world.arrays import Flags, Rows
 
 FENCE_M: Final = 50.0
 """The distance of the geofence from the area; a UAV with a velocity setpoint brakes before it reaches the geofence."""

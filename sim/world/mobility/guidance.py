@@ -19,7 +19,7 @@ from fanet_mw.extensions import load
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.mobility import MOBILITY_MODELS
 from fanet_mw.units import FARTHEST_M, FASTEST_M_S, Enu, S
-from sim.world.engines.contract import Flags, Rows, Values
+from sim.world.arrays import Flags, Rows, Values
 from sim.world.mobility.contract import MobilityModel, Track
 from sim.world.mobility.crossing import Crossing
 from sim.world.mobility.formation import Formation

@@ -19,7 +19,7 @@ import numpy as np
 
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import S
-from sim.world.engines.contract import Flags, Rows
+from sim.world.arrays import Flags, Rows
 from sim.world.sensors.altimeter import DRIFT_S as BAROMETER_S
 from sim.world.sensors.contract import Drift, Truth, generator
 from sim.world.sensors.gps import GpsReceiver

@@ -4,7 +4,7 @@ import numpy as np
 
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
-from sim.world.engines.contract import Rows
+from sim.world.arrays import Rows
 from sim.world.mobility.contract import Track
 
 

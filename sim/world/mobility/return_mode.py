@@ -18,7 +18,7 @@ from typing import Final, NamedTuple
 
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu
-from sim.world.engines.contract import Flags, Rows, Values
+from sim.world.arrays import Flags, Rows, Values
 from sim.world.mobility.geofence import CEILING_M
 
 _HOME_M: Final = 2.0

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from sim.world.engines.contract import Rows
+from sim.world.arrays import Rows
 from sim.world.mobility.geofence import BRAKE_M_S2
 
 CLEAR_M: Final = 4.0

@@ -23,7 +23,7 @@ import numpy.typing as npt
 from fanet_mw.bus.messages import Camera, Message, Person
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import S
-from sim.world.engines.contract import Rows, Values
+from sim.world.arrays import Rows, Values
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors
 from sim.world.sensors.contract import Sensor, Truth, angles, generator, shaken

@@ -14,7 +14,7 @@ import numpy as np
 from fanet_mw.bus.messages import Message
 from fanet_mw.rng import stream_seed
 from fanet_mw.units import S
-from sim.world.engines.contract import Rows, Values
+from sim.world.arrays import Rows, Values
 
 
 class Truth(NamedTuple):

@@ -23,7 +23,7 @@ import numpy.typing as npt
 from fanet_mw.bus.messages import Message, WifiScan
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import seconds_to_ns
-from sim.world.engines.contract import Values
+from sim.world.arrays import Values
 from sim.world.environment.survivors import Survivors
 from sim.world.sensors.contract import Sensor, Truth, generator
 

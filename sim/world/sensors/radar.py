@@ -24,7 +24,7 @@ import numpy as np
 from fanet_mw.bus.messages import Echo, Message, Radar
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import S
-from sim.world.engines.contract import Rows, Values
+from sim.world.arrays import Rows, Values
 from sim.world.environment.solids import Solids
 from sim.world.sensors.contract import Sensor, Truth, angles, generator
 

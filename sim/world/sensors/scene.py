@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from sim.world.engines.contract import Rows, Values
+from sim.world.arrays import Rows, Values
 from sim.world.engines.quiet_pybullet import pybullet
 from sim.world.environment.obstacles import Box, Hills, Obstacles
 

@@ -7,8 +7,8 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.routing import PROTOCOLS
 from fanet_mw.units import S
+from sim.world.arrays import Flags
 from sim.world.engines.battery_drain import BatteryDrain
-from sim.world.engines.contract import Flags
 from sim.world.environment.obstacles import Obstacles
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors

@@ -25,7 +25,7 @@ import numpy as np
 from fanet_mw.bus.messages import Call, Message, Voice
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import S
-from sim.world.engines.contract import Values
+from sim.world.arrays import Values
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors
 from sim.world.sensors.contract import Sensor, Truth, angles, generator, shaken

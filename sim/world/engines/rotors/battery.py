@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from sim.world.engines.contract import Flags, Values
+from sim.world.arrays import Flags, Values
 from sim.world.engines.rotors.vehicle_types import Cell
 
 _CHARGE: Final = np.array([0.0, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0])

@@ -15,7 +15,8 @@ from typing import Final
 
 import numpy as np
 
-from sim.world.engines.contract import GRAVITY_M_S2, Flags, Values
+from sim.world.arrays import Flags, Values
+from sim.world.engines.contract import GRAVITY_M_S2
 from sim.world.engines.rotors.vehicle_types import Vehicle, hover_rad_s
 
 _RATIO: Final = 3.0

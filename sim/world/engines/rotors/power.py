@@ -16,7 +16,8 @@ from typing import Final
 
 import numpy as np
 
-from sim.world.engines.contract import GRAVITY_M_S2, Values
+from sim.world.arrays import Values
+from sim.world.engines.contract import GRAVITY_M_S2
 from sim.world.engines.rotors.vehicle_types import AIR_KG_M3, Vehicle
 
 INDUCED_LOSS: Final = 1.15

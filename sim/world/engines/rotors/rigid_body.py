@@ -13,8 +13,9 @@ from typing import Final
 
 import numpy as np
 
+from sim.world.arrays import Flags, Rows, Values
 from sim.world.engines.contacts import Contacts
-from sim.world.engines.contract import GRAVITY_M_S2, Engine, Flags, Rows, Values
+from sim.world.engines.contract import GRAVITY_M_S2, Engine
 from sim.world.engines.rotors.flight_control import FlightControl, allocation, body_up, cross, level_attitude, times
 from sim.world.engines.rotors.power import electrical_w, rotor_power_w
 from sim.world.engines.rotors.vehicle_types import Vehicle, hover_rad_s

@@ -48,6 +48,7 @@ class Topics:
         self.radio_links = f"{self._base}/radio/links"
         self.all_setpoints = f"{self._base}/world/*/setpoint"
         self.all_sensors = f"{self._base}/world/*/sensor/*"
+        self.images = self.sensor("*", "image")
         self.all_traces = f"{self._base}/trace/*"
         self.all_reports = f"{self._base}/report/*"
         self.all_alive = f"{self._base}/alive/**"
@@ -63,7 +64,7 @@ class Topics:
     def setpoint(self, node: int) -> str:
         return f"{self._base}/world/{node}/setpoint"
 
-    def sensor(self, node: int, kind: str) -> str:
+    def sensor(self, node: int | str, kind: str) -> str:
         return f"{self._base}/world/{node}/sensor/{kind}"
 
     def sensors(self, node: int) -> str:

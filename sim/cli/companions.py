@@ -7,6 +7,7 @@ import contextlib
 import os
 import subprocess
 import sys
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Final, Self
 
 if TYPE_CHECKING:
     from fanet_mw.hosts.realtime import SwarmAddress
+    from fanet_mw.scenario import Scenario
 
 _NICENESS: Final = 5
 _CLOSING_S: Final = 20.0
@@ -25,6 +27,7 @@ class Companions:
     def __init__(self, commands: Sequence[Sequence[str]]) -> None:
         """`commands`: words of a command of `fanet`, without those that say which swarm is meant."""
         self._commands = commands
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._running: list[subprocess.Popen[bytes]] = []
 
     def __enter__(self) -> Self:
@@ -35,12 +38,14 @@ class Companions:
     ) -> None:
         self.end()
 
-    def start(self, address: "SwarmAddress") -> None:
-        """Start all of them for a swarm that comes up."""
+    def start(self, address: "SwarmAddress", scenario: "Scenario") -> None:
+        """Start all of them for a swarm that comes up. A scenario that names files is handed over as a file."""
         for words in self._commands:
             where = ["--connect", address.endpoint, "--swarm", address.swarm]
             if address.zenoh_config is not None:
                 where += ["--zenoh-config", str(address.zenoh_config)]
+            if scenario.world.heightmap or scenario.world.buildings_geojson:
+                where += ["--scenario", str(self._written(scenario))]
             command = [sys.executable, "-m", "fanet_mw", *words, *where]
             self._running.append(
                 subprocess.Popen(  # noqa: S603  (a command of ours)
@@ -59,6 +64,17 @@ class Companions:
             process.kill()
             process.wait()
         self._running.clear()
+        if self._folder is not None:
+            self._folder.cleanup()
+
+    def _written(self, scenario: "Scenario") -> Path:
+        """A file with the scenario."""
+        import tomli_w
+
+        self._folder = self._folder or tempfile.TemporaryDirectory(prefix="fanet-")
+        path = Path(self._folder.name) / "scenario.toml"
+        path.write_text(tomli_w.dumps(scenario.model_dump(mode="json", exclude_none=True)), encoding="utf-8")
+        return path
 
 
 def _give_way() -> None:

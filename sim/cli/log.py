@@ -12,7 +12,7 @@ from rich.table import Table
 from fanet_mw.errors import ConfigError
 from sim.cli.command_groups import RUNNING, TOOLS
 from sim.cli.console import Console
-from sim.cli.options import SwarmFlags
+from sim.cli.options import SwarmFlags, given
 
 if TYPE_CHECKING:
     from sim.run.result import Result
@@ -31,6 +31,7 @@ def record(
     *,
     force: Annotated[bool, Parameter(negative="")] = False,
     quiet: Annotated[bool, Parameter(negative="")] = False,
+    scenario: Path | None = None,
     where: SwarmFlags = SwarmFlags(),
 ) -> int:
     """Record a swarm that runs, from now until it ends, as MCAP for Foxglove and PlotJuggler.
@@ -43,6 +44,8 @@ def record(
         Replace a file that exists.
     quiet
         Say nothing; a file that exists and is empty is filled.
+    scenario
+        The scenario of the swarm, needed only if it names files (maps), which the bus does not carry.
 
     """
     from fanet_mw.hosts import interrupts
@@ -55,7 +58,10 @@ def record(
         raise ConfigError(f"{file}: exists; choose another file, or replace it with --force")
     signals: list[int] = []
     endpoint, swarm = where.located()
-    with BusFeed(endpoint, swarm, zenoh_config=where.zenoh_config) as feed, interrupts.handed_to(signals.append):
+    with (
+        BusFeed(endpoint, swarm, zenoh_config=where.zenoh_config, scenario=given(scenario)) as feed,
+        interrupts.handed_to(signals.append),
+    ):
         carry_out(feed, file, ended=signals)
         if not quiet:
             lost = f"; {feed.lost} puts were lost" if feed.lost else ""

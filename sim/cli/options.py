@@ -233,3 +233,12 @@ def warn_of(endpoint: str | None, *, listens: bool) -> None:
 
     if (warning := exposure(endpoint, listens=listens)) is not None:
         _err.print(warning, highlight=False, soft_wrap=True, markup=False)
+
+
+def given(scenario: Path | None) -> "Scenario | None":
+    """The scenario of a file, if one is given."""
+    if scenario is None:
+        return None
+    from sim.scenarios import catalog
+
+    return catalog.find(scenario)

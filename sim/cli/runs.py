@@ -167,7 +167,7 @@ def launch(
                 on_progress=tell,
                 on_event=_say,
                 leads=leads,
-                on_started=lambda run: companions.start(run.address),
+                on_started=lambda run: companions.start(run.address, chosen),
             )
         )
     return _finish(outcome, output)

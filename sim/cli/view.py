@@ -1,5 +1,6 @@
 """`fanet view` and `fanet top`: a running swarm in a browser, or on the terminal."""
 
+from pathlib import Path
 from typing import Annotated
 
 from cyclopts import App, Parameter
@@ -7,7 +8,7 @@ from cyclopts.validators import Number
 
 from sim.cli.command_groups import RUNNING
 from sim.cli.console import Console
-from sim.cli.options import SwarmFlags
+from sim.cli.options import SwarmFlags, given
 
 
 def add_to(app: App) -> None:
@@ -16,7 +17,13 @@ def add_to(app: App) -> None:
         app.command(command, group=RUNNING)
 
 
-def view(swarm_name: str | None = None, *, port: int | None = None, where: SwarmFlags = SwarmFlags()) -> int:
+def view(
+    swarm_name: str | None = None,
+    *,
+    port: int | None = None,
+    scenario: Path | None = None,
+    where: SwarmFlags = SwarmFlags(),
+) -> int:
     """Show a swarm that runs in a browser, in 3-D, with things to do: cut, degrade, jam, crash, pause, send.
 
     Parameters
@@ -25,6 +32,8 @@ def view(swarm_name: str | None = None, *, port: int | None = None, where: Swarm
         Name of the swarm; by default the only one running on this machine.
     port
         Port of the page on this machine; by default 8080, or the next one that is free.
+    scenario
+        The scenario of the swarm, needed only if it names files (maps), which the bus does not carry.
 
     """
     from dataclasses import replace
@@ -37,7 +46,10 @@ def view(swarm_name: str | None = None, *, port: int | None = None, where: Swarm
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     signals: list[int] = []
     endpoint, swarm = chosen.located()
-    with BusFeed(endpoint, swarm, zenoh_config=where.zenoh_config) as feed, interrupts.handed_to(signals.append):
+    with (
+        BusFeed(endpoint, swarm, zenoh_config=where.zenoh_config, scenario=given(scenario)) as feed,
+        interrupts.handed_to(signals.append),
+    ):
         show(feed, port=port, ended=signals, tell=console.print)
     return 0
 
@@ -46,6 +58,7 @@ def top(
     swarm_name: str | None = None,
     *,
     screens: Annotated[int | None, Parameter(validator=Number(gte=1))] = None,
+    scenario: Path | None = None,
     where: SwarmFlags = SwarmFlags(),
 ) -> int:
     """Show a swarm that runs on the terminal: a line per UAV with mode, battery, head, neighbors and queue.
@@ -56,6 +69,8 @@ def top(
         Name of the swarm; by default the only one running on this machine.
     screens
         End after this many seconds of the swarm; by default when interrupted.
+    scenario
+        The scenario of the swarm, needed only if it names files (maps), which the bus does not carry.
 
     """
     from dataclasses import replace
@@ -67,6 +82,9 @@ def top(
     chosen = replace(where, swarm=swarm_name) if swarm_name is not None else where
     signals: list[int] = []
     endpoint, swarm = chosen.located()
-    with BusFeed(endpoint, swarm, zenoh_config=where.zenoh_config) as feed, interrupts.handed_to(signals.append):
+    with (
+        BusFeed(endpoint, swarm, zenoh_config=where.zenoh_config, scenario=given(scenario)) as feed,
+        interrupts.handed_to(signals.append),
+    ):
         watch(feed, ended=signals, screens=screens, console=Console())
     return 0

@@ -17,8 +17,8 @@ from typing import Any, Final, NamedTuple, Self
 
 from fanet_mw.bus import codecs
 from fanet_mw.bus.link_stats import LinkStats
-from fanet_mw.bus.messages import ClockEpoch, ClockState, MavlinkTap, Message, Poses, Report, TraceBatch
-from fanet_mw.bus.topics import Topics, node_of_tap
+from fanet_mw.bus.messages import CameraImage, ClockEpoch, ClockState, MavlinkTap, Message, Poses, Report, TraceBatch
+from fanet_mw.bus.topics import Topics, node_of, node_of_tap
 from fanet_mw.errors import ConfigError, FanetError, MalformedFrameError
 from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.hosts.clock import SwarmClock
@@ -40,12 +40,22 @@ class _Put(NamedTuple):
 class BusFeed:
     """What is heard of one swarm; a context manager that ends its session."""
 
-    def __init__(self, endpoint: str, swarm: str | None, *, zenoh_config: Path | None = None) -> None:
-        """Raises BusError without a router, and FanetError without a swarm whose clock's keeper answers."""
+    def __init__(
+        self,
+        endpoint: str,
+        swarm: str | None,
+        *,
+        zenoh_config: Path | None = None,
+        scenario: Scenario | None = None,
+    ) -> None:
+        """`scenario`: that of the swarm, if it names files, which the bus does not carry; otherwise it is asked for.
+
+        Raises BusError without a router, and FanetError without a swarm whose clock's keeper answers.
+        """
         self.bus = Bus.join(endpoint, config_of(zenoh_config, OPERATOR))
         try:
             self.names = Topics(swarm or find_swarm(self.bus))
-            self.scenario = self._ask_scenario()
+            self.scenario = scenario or self._ask_scenario()
         except BaseException:
             self.bus.close()
             raise
@@ -56,6 +66,8 @@ class BusFeed:
         """True once the swarm's time is over, or its clock was stopped."""
         self.lost = self.refused = 0
         """Puts that came faster than they were taken, and items that were refused."""
+        self.images: dict[int, CameraImage] = {}
+        """The last image of each UAV's camera, where the scenario has images rendered."""
         self._checks = BusChecks(self.scenario)
         self._puts: deque[_Put] = deque(maxlen=_MOST_PUTS)
         self._clocks: deque[bytes] = deque(maxlen=16)
@@ -74,6 +86,8 @@ class BusFeed:
             self.names.mavlink("*"),
         ):  # fmt: skip
             self.bus.subscribe(expression, self._keep)
+        if self.scenario.sensors.image_hz:
+            self.bus.subscribe(self.names.images, self._keep)
         self._ask_clock()
 
     def pump(self, observer: Observer) -> int:
@@ -136,6 +150,8 @@ class BusFeed:
                     self.refused += 1
             case LinkStats() if self._checks.links(message) is None:
                 observer.take_links(message)
+            case CameraImage() if len(message.rgb) == 3 * message.width * message.height:
+                self.images[node_of(topic)] = message
             case MavlinkTap() if self._checks.tap(message) is None:
                 observer.take_tap(node_of_tap(topic), message.t_ns, message.data)
             case _:
@@ -181,7 +197,8 @@ class BusFeed:
             return config.build(tree, source=f"swarm {self.names.swarm}", imports=False)
         except (ValueError, TypeError, KeyError, RecursionError) as error:
             if isinstance(error, ConfigError):
-                raise
+                where = "; its files are not on the bus: say --scenario FILE" if "file" in str(error) else ""
+                raise FanetError(f"{error}{where}") from error
             raise FanetError(f"swarm {self.names.swarm}: its scenario cannot be read: {error}") from error
 
 

@@ -137,6 +137,7 @@ def _finds(path: Path, epoch_ns: int) -> list[tuple[int, int, bytes]]:
 def _links(folder: Path, epoch_ns: int) -> list[LinkStats]:
     """What links carried each second, from a recording in the folder; none without one, or without MCAP installed."""
     try:
+        from google.protobuf.message import DecodeError
         from mcap.exceptions import McapError
         from mcap.reader import make_reader
         from mcap_protobuf.decoder import DecoderFactory
@@ -150,7 +151,7 @@ def _links(folder: Path, epoch_ns: int) -> list[LinkStats]:
                 for _, _, message, links in reader.iter_decoded_messages(topics=["/links"]):
                     rows = [(link.src, link.dst, link.copies, link.received) for link in links.links]
                     found.append(_stats(message.log_time - epoch_ns, round(links.span_s * S), rows))
-        except (McapError, OSError, ValueError) as error:
+        except (McapError, DecodeError, OSError, ValueError, OverflowError) as error:
             raise ConfigError(f"{path}: cannot be read: {str(error)[:200]}") from error
     return found
 

@@ -44,6 +44,7 @@ def view(feed: BusFeed, *, port: int | None, ended: Sequence[int], tell: Callabl
             now_ns = feed.now_ns()
             scene.draw(now_ns)
             panels.refresh(now_ns, note=note)
+            panels.show_image(feed.images.get(scene.selected))
             paced.wait()
     finally:
         close_server(server)

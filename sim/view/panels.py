@@ -13,6 +13,7 @@ import numpy as np
 import viser
 from viser import uplot
 
+from fanet_mw.bus.messages import CameraImage
 from fanet_mw.units import MS, S
 from sim.observation.swarm_state import LATELY_NS, SwarmState
 from sim.view.actions import PAUSED, Actions
@@ -33,7 +34,7 @@ class Panels:
         self.jobs: queue.SimpleQueue[Job] = queue.SimpleQueue()
         self._server, self._scene, self.state = server, scene, scene.state
         self._actions = actions
-        self._second = -1
+        self._second = self._image_ns = -1
         self._history: dict[str, list[tuple[float, float]]] = {}
         self._follows = False
         self._said = ""
@@ -54,6 +55,7 @@ class Panels:
             self._choice = gui.add_dropdown("UAV", ["none", *nodes], initial_value="none")
             follow = gui.add_checkbox("follow it", initial_value=False)
             self._uav = gui.add_html(_box("Click a UAV."))
+            self._image = gui.add_image(np.zeros((1, 1, 3), np.uint8), label="its camera", visible=False)
             if actions is not None:
                 self._add_uav_actions(nodes, actions)
         if actions is not None:
@@ -91,6 +93,17 @@ class Panels:
         self._write("_spread", self._spread_text(t_ns))
         self._write("_uav", self._uav_text())
         self._plot(t_ns, metrics)
+
+    def show_image(self, image: CameraImage | None) -> None:
+        """Show what the camera of the selected UAV sees; None: it has none."""
+        if image is None:
+            if self._image.visible:
+                self._image.visible = False
+            return
+        if image.t_ns != self._image_ns:
+            self._image_ns = image.t_ns
+            self._image.image = np.frombuffer(image.rgb, np.uint8).reshape(image.height, image.width, 3)
+            self._image.visible = True
 
     def select(self, node: int, *, from_list: bool = False) -> None:
         """Select a UAV; 0: none."""

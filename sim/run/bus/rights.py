@@ -80,6 +80,7 @@ def rights(scenario: Scenario, names: Topics) -> dict[str, Rights]:
                 names.all_reports,
                 names.mavlink("*"),
                 names.clock,
+                names.images,
             ),
             queries=(names.clock, names.scenario),
             watches=(f"{ROOT}/*/alive/**",),

@@ -3,12 +3,12 @@
 from array import array
 
 from kit import MakeScenario
+from rich.console import Console
 
 from fanet_mw.bus.link_stats import COUNTS, LinkStats
 from fanet_mw.bus.messages import Poses
 from fanet_mw.trace import Delivered, Dropped, FlightModeChanged, MissionModeChanged, RoleChanged
 from fanet_mw.units import MS, S
-from sim.cli.console import Console
 from sim.cli.top import screen
 from sim.observation.swarm_state import SwarmState
 
@@ -20,7 +20,7 @@ def links(rows: list[tuple[int, int, int, int]], t_ns: int) -> LinkStats:
 
 
 def shown(state: SwarmState, now_ns: int, *, most: int = 20) -> list[str]:
-    console = Console(width=150, force_terminal=False, no_color=True)
+    console = Console(width=150, force_terminal=False, no_color=True, markup=False)
     with console.capture() as capture:
         console.print(screen("swarm", state, now_ns, most=most))
     return capture.get().splitlines()

@@ -103,9 +103,10 @@ def export(
     folder
         What `fanet simulate --out` or `fanet launch --out` has written.
     to
-        The format: parquet or csv (one file per table), mcap (Foxglove, PlotJuggler).
+        The format: parquet or csv (one file per table), mcap (Foxglove, PlotJuggler), gpx (a track per UAV) or kml.
     out
-        The folder, or the file of a format of one file; by default FOLDER/tables, FOLDER/recording.mcap.
+        The folder, or the file of a format of one file; by default FOLDER/tables, FOLDER/tracks, FOLDER/recording.mcap,
+        FOLDER/tracks.kml.
     force
         Replace what is there.
 
@@ -149,9 +150,23 @@ def _mcap(run: "Result", _: Path, out: Path) -> Mapping[Path, str]:
     return {out: f"{write_mcap(run.outcome, out):,} messages"}
 
 
+def _gpx(run: "Result", _: Path, out: Path) -> Mapping[Path, str]:
+    from sim.recording.tracks import write_gpx
+
+    return {path: f"{count:,} points" for path, count in write_gpx(run.outcome, out).items()}
+
+
+def _kml(run: "Result", _: Path, out: Path) -> Mapping[Path, str]:
+    from sim.recording.tracks import write_kml
+
+    return {out: f"{write_kml(run.outcome, out):,} points"}
+
+
 FORMATS: Final[dict[str, tuple[str, Callable[["Result", Path, Path], Mapping[Path, Any]]]]] = {
     "parquet": ("tables", _parquet),
     "csv": ("tables", _csv),
     "mcap": ("recording.mcap", _mcap),
+    "gpx": ("tracks", _gpx),
+    "kml": ("tracks.kml", _kml),
 }
 """The formats of `fanet log export`: where each is written in the folder of the run, and by what."""

@@ -4,6 +4,7 @@ import json
 import re
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import duckdb
 import nbformat
@@ -15,6 +16,7 @@ from mcap_protobuf.decoder import DecoderFactory
 
 import fanet_mw
 from fanet_mw.errors import ConfigError
+from fanet_mw.mavlink import Geodetic, to_enu
 from fanet_mw.trace import Detected, Dropped, Posed, RoleChanged
 from fanet_mw.units import S
 from sim.cli.app import app
@@ -204,10 +206,36 @@ def test_a_finished_run_becomes_a_recording(folder: Path, tmp_path: Path) -> Non
     assert found == posed
 
 
+def test_a_gpx_per_uav_and_a_kml_have_the_tracks_on_earth(folder: Path, tmp_path: Path) -> None:
+    run = RunFolder(folder)
+    origin = Geodetic(*run.scenario.world.origin_deg, 0.0)
+    posed = [one for one in run.records(Posed) if one.node == 3]
+    for to, out in (("gpx", tmp_path / "tracks"), ("kml", tmp_path / "all.kml")):
+        words = ["log", "export", str(folder), "--to", to, "--out", str(out)]
+        assert app(words, result_action="return_value") == 0
+    assert sorted(path.name for path in (tmp_path / "tracks").iterdir()) == [f"uav-{node}.gpx" for node in range(1, 10)]
+    gpx = "{http://www.topografix.com/GPX/1/1}"
+    points = ElementTree.parse(tmp_path / "tracks" / "uav-3.gpx").getroot().findall(f"{gpx}trk/{gpx}trkseg/{gpx}trkpt")
+    assert len(points) == len(posed)
+    for point, one in zip(points, posed, strict=True):
+        place = Geodetic(float(point.attrib["lat"]), float(point.attrib["lon"]), 0.0)
+        assert to_enu(place, origin)[:2] == pytest.approx((one.east_m, one.north_m), abs=0.02)
+        assert float(point.findtext(f"{gpx}ele", "nan")) == one.up_m
+    assert points[5].findtext(f"{gpx}time") == "2025-01-01T00:00:05.000Z"
+    kml = "{http://www.opengis.net/kml/2.2}"
+    tracks = list(ElementTree.parse(tmp_path / "all.kml").getroot().iter("{http://www.google.com/kml/ext/2.2}Track"))
+    assert len(tracks) == 9
+    coords = [one.text for one in tracks[2].findall("{http://www.google.com/kml/ext/2.2}coord")]
+    assert len(coords) == len(tracks[2].findall(f"{kml}when")) == len(posed)
+    lon, lat, up = map(float, str(coords[7]).split())
+    assert (lat, lon) == (float(points[7].attrib["lat"]), float(points[7].attrib["lon"]))
+    assert up == posed[7].up_m
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["export", "@", "--to", "xml"], "--to xml: must be one of parquet, csv, mcap"),
+        (["export", "@", "--to", "xml"], "--to xml: must be one of parquet, csv, mcap, gpx, kml"),
         (["export", "@", "--to", "parquet"], "tables: exists"),
         (["export", "/nowhere", "--to", "csv"], "summary.json"),
         (["info", "@/trace.jsonl"], "summary.json"),

@@ -306,7 +306,7 @@ def _world(
         lines.pose.orientation.w = 1.0
         _paint(lines.color, colors.RED)
         for east, north in outline:
-            _place(lines.points.add(), Enu(east, north, 1.0))
+            _place(lines.points.add(), around.on_ground(Enu(east, north, 0.0), above_m=2.0))
         entity.lines.append(lines)
     for number, at in enumerate(places, 1):
         text = TextPrimitive_pb2.TextPrimitive(text=f"S{number}", font_size=11, scale_invariant=True, billboard=True)

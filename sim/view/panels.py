@@ -22,6 +22,7 @@ from sim.view.scene import HOP_COLORS, Scene
 _MOST_POINTS: Final = 300
 """Of the charts, one a second."""
 _EVENTS: Final = 14
+_OWN_EVENTS: Final = 5
 _STYLE: Final = "font-size:13px;line-height:1.45;padding:2px 10px;font-variant-numeric:tabular-nums"
 Job = Callable[[], None]
 
@@ -292,7 +293,9 @@ class Panels:
             ("dropped", ", ".join(f"{html.escape(str(k))} {v}" for k, v in sorted(uav.drops.items())) or "none"),
             ("last heard", f"{max(0.0, since_s):.1f} s ago"),
         ]  # fmt: skip
-        return _box(f"<b>UAV {node}</b>{_table(rows)}")
+        said = [one for one in state.events if one.node == node][-_OWN_EVENTS:]
+        lately = "<br>".join(f"{one.t_ns / S:.1f} s {html.escape(one.text)}" for one in reversed(said))
+        return _box(f"<b>UAV {node}</b>{_table(rows)}{lately}")
 
     def _chart(self, title: str, *, top: float | None = None, visible: bool = True) -> Any:  # noqa: ANN401
         scales = {"x": uplot.Scale(time=False)}

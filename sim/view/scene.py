@@ -30,9 +30,12 @@ _WRECK: Final = "#222222"
 _GROUND: Final = (214, 218, 205)
 _COVERED: Final = (164, 196, 158)
 _BUILDING: Final = (176, 169, 159)
+_FENCE_M: Final = 80.0
 _SLOWED: Final = 2 * S
 """A packet's spreading is stretched to this much swarm time, because it takes a fraction of a second."""
 _HOLDS_NS: Final = S
+_HILLS_EVERY_S: Final = 5
+"""The area covered of hills is a mesh of a quarter of a megabyte, and so is drawn more rarely."""
 HOP_COLORS: Final = ("#222222", "#D55E00", "#E69F00", "#F0E442", "#CC79A7", "#ffffff")
 """The origin of a packet, then its receivers by hops."""
 
@@ -144,10 +147,12 @@ class Scene:
                 batched_colors=_BUILDING, flat_shading=True,
             )  # fmt: skip
         for number, outline in enumerate(around.no_fly):
-            corners = np.array([(*corner, 1.0) for corner in outline], np.float32)
-            segments = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+            low = np.array([around.on_ground(Enu(*corner, 0.0), above_m=2.0) for corner in outline], np.float32)
+            high = low + np.array([0, 0, _FENCE_M], np.float32)
+            around_it = [np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in (low, high)]
+            segments = np.concatenate([*around_it, np.stack([low, high], axis=1)])
             self._api.add_line_segments(
-                f"/world/no-fly-{number}", segments, rgb(colors.RED), thickness=3.0, thickness_units="screen"
+                f"/world/no-fly-{number}", segments, rgb(colors.RED), thickness=2.0, thickness_units="screen"
             )
 
     # --- every frame ----------------------------------------------------------------------------------------------
@@ -317,7 +322,7 @@ class Scene:
     def _draw_coverage(self) -> None:
         cells = self.state.covered()
         count = int(cells.sum()) if self.shown.coverage else 0
-        if count == self._covered:
+        if count == self._covered or (self.around.hills is not None and self._second % _HILLS_EVERY_S and count):
             return
         self._covered = count
         half = self.around.half_m
@@ -331,14 +336,19 @@ class Scene:
                 wxyz=(0.0, 1.0, 0.0, 0.0), cast_shadow=False, receive_shadow=False,
             )  # fmt: skip
             return
-        axis = (np.arange(cells.shape[0]) + 0.5) * 2 * half / cells.shape[0] - half
-        north, east = np.nonzero(cells)
-        flat = np.stack([axis[east], axis[north]], axis=1)
-        up = self.around.hills.at(flat) + 2.0
-        points = np.column_stack([flat, up]).astype(np.float32) if self.shown.coverage else np.zeros((0, 3), np.float32)
-        self._api.add_point_cloud(
-            "/world/covered", points, (60, 140, 70), point_size=5.0, point_shape="circle", precision="float32"
-        )
+        count = cells.shape[0]
+        axis = np.linspace(-half, half, count + 1)
+        east, north = np.meshgrid(axis, axis)
+        flat = np.stack([east.ravel(), north.ravel()], axis=1)
+        corners = np.column_stack([flat, self.around.hills.at(flat) + 2.0]).astype(np.float32)
+        row, column = np.nonzero(cells)
+        first = row * (count + 1) + column
+        quads = np.stack([first, first + 1, first + count + 2, first, first + count + 2, first + count + 1], axis=1)
+        faces = quads.reshape(-1, 3) if self.shown.coverage and len(first) else np.zeros((1, 3), np.int64)
+        self._api.add_mesh_simple(
+            "/world/covered", corners, faces.astype(np.int32), color=_COVERED, opacity=0.55, side="double",
+            cast_shadow=False,
+        )  # fmt: skip
 
     def _draw_survivors(self) -> None:
         state = self.state

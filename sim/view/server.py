@@ -32,8 +32,8 @@ def open_server(port: int | None) -> viser.ViserServer:
     server.scene.set_up_direction("+z")
     server.scene.world_axes.visible = False
     server.scene.configure_environment_map(None)
-    server.scene.add_light_ambient("/light/ambient", intensity=0.9)
-    server.scene.add_light_directional("/light/sun", intensity=1.3, position=(0.5, -0.8, 1.0), cast_shadow=False)
+    server.scene.add_light_ambient("/light/ambient", intensity=0.6)
+    server.scene.add_light_directional("/light/sun", intensity=1.9, position=(0.5, -0.8, 1.0), cast_shadow=False)
     server.scene.configure_default_lights(enabled=False)
     server.scene.set_background_image(_SKY)
     return server

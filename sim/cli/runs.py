@@ -116,7 +116,7 @@ def launch(
         Let the swarm's clock slow down while this machine cannot keep up with it, at most to this share of real time,
         and speed up again afterwards; by default it does not, and the run says that it is not valid.
     no_world
-        Start no world: another program says where all UAVs are (see docs/reference/bus.md).
+        Start no world: another program says where all UAVs are (how is in the documentation, reference/bus).
     view
         Show the swarm in a browser: `fanet view` beside it, until it ends.
     view_port

@@ -9,7 +9,7 @@ from fanet_mw.scenario.tables.sections import Id, Section
 
 
 class ForeignApplication(Section):
-    """An application of another package (`docs/how-to/extend.md`), on board some or all UAVs."""
+    """An application of another package (documentation, how-to/extend), on board some or all UAVs."""
 
     use: Annotated[str, PartName("applications.use", ())]
     """The application: an entry point, or module and class."""

@@ -78,7 +78,7 @@ class Radio(Section):
     """The radio, its MAC and the channel. Defaults are the reference set-up: 802.11b, DSSS 11 Mb/s, long preamble."""
 
     channel: Annotated[str, PartName("radio.channel", CHANNELS)] = "range"
-    """The path loss model; docs/explanation/channel.md has the equations, sources and ranges of validity."""
+    """The path loss model; the documentation (explanation/channel) has equations, sources and ranges of validity."""
     options: Annotated[dict[str, Any], OptionsOf("radio.channel", CHANNELS)] = Field(default_factory=Options)
     """The options of a channel from another package, as that package documents them."""
     range_m: SomeLength = 250.0
@@ -158,7 +158,7 @@ class Radio(Section):
     """`capture`: how much stronger the later frame must be."""
     access: Literal["standard", "ns3"] | tuple[Ns3Point, ...] = "standard"
     """`standard`: as in IEEE 802.11; `ns3`: as in ns-3.44 in all points in which it differs; or a list of those points
-    in which it is as in ns-3: `difs`, `eifs`, `sums`, `onset`, `window` (docs/explanation/emulator.md)."""
+    in which it is as in ns-3: `difs`, `eifs`, `sums`, `onset`, `window` (documentation, explanation/emulator)."""
     cw_min: Annotated[int, Field(ge=1, le=1023)] = 31
     """The first contention window, in slots. By default 31, and 15 with OFDM rates."""
     cw_max: Annotated[int, Field(ge=1, le=32767)] = 1023

@@ -45,8 +45,8 @@ def errors() -> Rows:
             rows.append([
                 name, sensors, str(len(runs)),
                 f"{sum(m['confirmed'] for m in missions)} of {sum(m['survivors'] for m in missions)}",
-                f"{statistics.median(off_m):.1f}", str(sum(run["separation"]["contacts"] for run in runs)),
-                f"{min(run['separation']['least_m'] for run in runs):.1f}",
+                f"{statistics.median(off_m):.1f}", str(sum(m["collisions"] for m in missions)),
+                f"{min(m['nearest_m']['least'] for m in missions):.1f}",
             ])  # fmt: skip
     return rows
 

@@ -7,6 +7,7 @@ from typing import BinaryIO, Final, NamedTuple
 
 from emulator.pcap import LINK_TYPE, MAGIC
 from fanet_mw.errors import ConfigError
+from fanet_mw.foreign_file import open_regular
 from fanet_mw.units import S
 
 _FILE: Final = struct.Struct("<IHHiIII")
@@ -46,7 +47,7 @@ class AirFrame(NamedTuple):
 def frames_of(path: Path, *, epoch_unix_ns: int) -> Iterator[AirFrame]:
     """The records of a capture; raises ConfigError for what is none, and where it is cut off."""
     try:
-        with path.open("rb") as file:
+        with open_regular(path, follow=False) as file:
             head = file.read(_FILE.size)
             if len(head) < _FILE.size or (found := _FILE.unpack(head))[0] != MAGIC or found[-1] != LINK_TYPE:
                 raise ConfigError(f"{path}: is no capture of radiotap frames with nanoseconds")

@@ -50,16 +50,21 @@ def _stamped(taps: Iterable[tuple[int, bytes]], epoch_us: int) -> Iterator[bytes
 def read(path: Path) -> Iterator[tuple[int, bytes]]:
     """(microseconds, frame) pairs, one at a time; raises MalformedFrameError where the file is cut off or broken."""
     with path.open("rb") as file:
-        at = 0
-        rest = b""
-        while rest := rest + file.read(_LONGEST - len(rest)):
-            if len(rest) <= _STAMP.size:
-                raise MalformedFrameError(f"{path}: cut off at byte {at}")
-            (t_us,) = _STAMP.unpack_from(rest)
-            try:
-                frame = next(frames(rest, start=_STAMP.size))
-            except MalformedFrameError as error:
-                raise MalformedFrameError(f"{path}: record at byte {at}: {error}") from error
-            yield t_us, frame
-            at += _STAMP.size + len(frame)
-            rest = rest[_STAMP.size + len(frame) :]
+        yield from read_from(file, source=str(path))
+
+
+def read_from(file: BinaryIO, *, source: str) -> Iterator[tuple[int, bytes]]:
+    """The same of an open file, which messages call `source`."""
+    at = 0
+    rest = b""
+    while rest := rest + file.read(_LONGEST - len(rest)):
+        if len(rest) <= _STAMP.size:
+            raise MalformedFrameError(f"{source}: cut off at byte {at}")
+        (t_us,) = _STAMP.unpack_from(rest)
+        try:
+            frame = next(frames(rest, start=_STAMP.size))
+        except MalformedFrameError as error:
+            raise MalformedFrameError(f"{source}: record at byte {at}: {error}") from error
+        yield t_us, frame
+        at += _STAMP.size + len(frame)
+        rest = rest[_STAMP.size + len(frame) :]

@@ -10,10 +10,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
-from fanet_mw import tlog
 from fanet_mw.bus.link_stats import COUNTS, LinkStats
 from fanet_mw.bus.messages import Poses
-from fanet_mw.errors import ConfigError, MalformedFrameError
+from fanet_mw.errors import ConfigError
+from fanet_mw.foreign_file import open_regular
 from fanet_mw.trace import (
     BoundStated,
     Collided,
@@ -32,7 +32,6 @@ from fanet_mw.wire import FOUND
 from fanet_mw.wire.frame import message_id
 from sim.observation.event_text import event_line
 from sim.observation.swarm_state import Event, SwarmState
-from sim.results.file_names import TLOG_FILE
 from sim.results.replay import Replay
 from sim.results.run_folder import RunFolder
 
@@ -55,7 +54,7 @@ class Timeline:
         if not self._posed:
             raise ConfigError("the trace has no positions of UAVs (`posed`), so there is nothing to replay")
         self._records = [one for one in records if not isinstance(one, Posed)]
-        self._finds = _finds(folder / TLOG_FILE, found.summary.get("epoch_unix_ns", 0))
+        self._finds = _finds(found, found.summary.get("epoch_unix_ns", 0))
         self._links = _links(folder, found.summary.get("epoch_unix_ns", 0))
         self.has_links = bool(self._links)
         """True if the folder has a recording, which tells what links carried each second."""
@@ -122,16 +121,13 @@ class Timeline:
         self.state.take_poses(Poses(t_ns, array("H", now), array("d", states)))
 
 
-def _finds(path: Path, epoch_ns: int) -> list[tuple[int, int, bytes]]:
-    """The finds of survivors in a telemetry log: instant, UAV, frame; none if there is no such log."""
-    found = []
-    try:
-        for t_us, frame in tlog.read(path):
-            if message_id(frame) == FOUND.msgid:
-                found.append((t_us * US - epoch_ns, frame[5], frame))
-    except (OSError, MalformedFrameError):
-        return found
-    return found
+def _finds(folder: RunFolder, epoch_ns: int) -> list[tuple[int, int, bytes]]:
+    """The finds of survivors in the telemetry: instant, UAV, frame."""
+    return [
+        (t_us * US - epoch_ns, frame[5], frame)
+        for t_us, frame in folder.telemetry()
+        if message_id(frame) == FOUND.msgid
+    ]
 
 
 def _links(folder: Path, epoch_ns: int) -> list[LinkStats]:
@@ -146,7 +142,7 @@ def _links(folder: Path, epoch_ns: int) -> list[LinkStats]:
     found: list[LinkStats] = []
     for path in sorted(folder.glob("*.mcap")):
         try:
-            with path.open("rb") as file:
+            with open_regular(path, follow=False) as file:
                 reader = make_reader(file, decoder_factories=[DecoderFactory()])
                 for _, _, message, links in reader.iter_decoded_messages(topics=["/links"]):
                     rows = [(link.src, link.dst, link.copies, link.received) for link in links.links]

@@ -6,11 +6,9 @@ nobody has found need the truth, which a simulation knows.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Final, NamedTuple
 
 from agents.mission.finding.known_survivors import SAME_PLACE_M
-from fanet_mw import tlog
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.mavlink import Geodetic, to_geodetic
 from fanet_mw.trace import Approaching, Confirmed, Detected, PlacedInside, Posed, Refuted
@@ -21,8 +19,8 @@ from fanet_mw.wire.survivors import Found, Standing, is_person
 from sim.report.html import Rows
 from sim.report.run_records import RunRecords
 from sim.report.run_rows import number, percent
-from sim.results.file_names import TLOG_FILE
 from sim.results.mission import OverflownCells
+from sim.results.run_folder import RunFolder
 
 _MOST_PIECES: Final = 5
 _M2_PER_HA: Final = 10_000.0
@@ -92,20 +90,20 @@ def _seen(record: Confirmed) -> Find:
     return Find(record.survivor, "confirmed", at, None, record.t_ns, record.node)
 
 
-def told(folder: Path) -> Mapping[tuple[int, Standing], Found]:
+def told(folder: RunFolder) -> Mapping[tuple[int, Standing], Found]:
     """The last estimate and the last confirmation of each survivor that UAVs told each other, from the telemetry log;
     none without such a log.
     """
     latest: dict[tuple[int, Standing], Found] = {}
-    try:
-        for _, frame in tlog.read(folder / TLOG_FILE):
-            if message_id(frame) == FOUND.msgid:
+    for _, frame in folder.telemetry():
+        if message_id(frame) == FOUND.msgid:
+            try:
                 found = Found.decode_frame(Content(((FOUND.msgid, frame),)))
-                key = (found.survivor, found.standing)
-                if key not in latest or found.t_us >= latest[key].t_us:
-                    latest[key] = found
-    except (OSError, MalformedFrameError):
-        return latest
+            except MalformedFrameError:
+                continue  # of a foreign program
+            key = (found.survivor, found.standing)
+            if key not in latest or found.t_us >= latest[key].t_us:
+                latest[key] = found
     return latest
 
 

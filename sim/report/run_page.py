@@ -31,7 +31,7 @@ def blocks_of_run(folder: Path, out: Path) -> list[Block]:
         Quoted(run.scenario.description),
         *_verdict(summary),
         *_slowed(summary),
-        *(_finds(run, folder) if run.searches else ()),
+        *(_finds(run, found) if run.searches else ()),
         Heading("Network", 3),
         run_rows.network(summary),
     ]
@@ -82,7 +82,7 @@ def _verdict(summary: Mapping[str, Any]) -> list[Block]:
     return [Quoted(f"NOT VALID: {'; '.join(summary['invalid_because'])}.")]
 
 
-def _finds(run: RunRecords, folder: Path) -> list[Block]:
+def _finds(run: RunRecords, folder: RunFolder) -> list[Block]:
     """Who was found, where, how sure and when, and what is not searched yet."""
     blocks: list[Block] = []
     known, doubles = finds.without_doubles(finds.with_estimates(finds.finds(run), finds.told(folder)))

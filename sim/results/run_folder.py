@@ -17,12 +17,13 @@ from typing import Annotated, Any, Final, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
+from fanet_mw import tlog
 from fanet_mw.errors import ConfigError, MalformedFrameError
 from fanet_mw.foreign_file import json_of, open_regular, read_regular, toml_of
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.scenario.tables.world import FILE_KEYS
 from fanet_mw.trace import Record, name_of, parse
-from sim.results.file_names import LINKS_FILE, REPORTS_FILE, SCENARIO_FILE, SUMMARY_FILE, TRACE_FILE
+from sim.results.file_names import LINKS_FILE, REPORTS_FILE, SCENARIO_FILE, SUMMARY_FILE, TLOG_FILE, TRACE_FILE
 from sim.run.collecting.bus_checks import BusChecks, Count, Number, Share
 
 _MOST_BYTES: Final = 1 << 28
@@ -222,6 +223,22 @@ class RunFolder:
                     raise ConfigError(f"{path}, line {number}: a record with a wrong {wrong}")
                 yield record  # type: ignore[misc]  # the kinds are those that were asked for
         self._compare(TRACE_FILE, size, digest.hexdigest())
+
+    def telemetry(self) -> Iterator[tuple[int, bytes]]:
+        """The frames of `mavlink.tlog`, each with its instant in microseconds of unix time; none if it is not whole."""
+        if TLOG_FILE not in self._files or TLOG_FILE in self.summary["unwritten"]:
+            return
+        path = self.folder / TLOG_FILE
+        with open_regular(path, follow=False) as file:
+            digest = hashlib.sha256()
+            while part := file.read(1 << 20):
+                digest.update(part)
+            self._compare(TLOG_FILE, file.tell(), digest.hexdigest())
+            file.seek(0)
+            try:
+                yield from tlog.read_from(file, source=str(path))
+            except MalformedFrameError as error:
+                raise ConfigError(str(error)) from error
 
     def _json(self, name: str, shape: TypeAdapter[Any], *, missing: Any) -> Any:  # noqa: ANN401  (JSON of a run)
         if name not in self._files or name in self.summary["unwritten"]:

@@ -5,12 +5,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from fanet_mw import tlog
 from fanet_mw.bus.link_stats import LOSSES, LinkRow
-from fanet_mw.errors import ConfigError, MalformedFrameError
 from fanet_mw.trace import Record
 from fanet_mw.units import US, NodeId, S
-from sim.results.file_names import TLOG_FILE
 from sim.results.links import LinkTotals
 from sim.results.run_folder import RunFolder
 from sim.run.outcome import Outcome
@@ -43,19 +40,15 @@ class FolderRecords(Collection[Record]):
 class _FolderTaps(Collection[tuple[int, bytes]]):
     """The taps of a folder, frame by frame, at instants of whole microseconds."""
 
-    def __init__(self, path: Path, *, epoch_unix_ns: int) -> None:
-        self._path = path
+    def __init__(self, folder: RunFolder, *, epoch_unix_ns: int) -> None:
+        self._folder = folder
         self._epoch_ns = epoch_unix_ns
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
 
     def __iter__(self) -> Iterator[tuple[int, bytes]]:
-        try:
-            for t_us, frame in tlog.read(self._path):
-                yield t_us * US - self._epoch_ns, frame
-        except (OSError, MalformedFrameError) as error:
-            raise ConfigError(f"{self._path}: cannot be read: {error}") from error
+        return ((t_us * US - self._epoch_ns, frame) for t_us, frame in self._folder.telemetry())
 
     def __contains__(self, value: object) -> bool:
         return any(tap == value for tap in self)
@@ -80,7 +73,7 @@ def _outcome(folder: RunFolder) -> Outcome:
         wall_s=summary.get("wall_s", 0.0),
         records=FolderRecords(folder),
         reports=folder.reports(),
-        taps=_FolderTaps(folder.folder / TLOG_FILE, epoch_unix_ns=epoch_ns),
+        taps=_FolderTaps(folder, epoch_unix_ns=epoch_ns),
         links=_totals(folder),
         aborted=summary.get("aborted"),
         ended_ns=None if summary.get("aborted") is None else simulated_ns,

@@ -295,13 +295,13 @@ class Watcher:
             if share is not None:
                 self.shares.append((feed.now_ns() / S, share))
             self.paces.append(feed.time_scale)
-            if once("cut", 14):
+            if once("cut", 11):
                 actions.cut(next(iter(state.heads())))
-            if once("slow", 16):
+            if once("slow", 12):
                 actions.pace(0.5)
-            if once("run", 18):
+            if once("run", 13):
                 actions.pace(1.0)
-            if once("restore", 30):
+            if once("restore", 24):
                 actions.restore()
             time.sleep(0.1)
         self.events = [event.text for event in state.latest_events(200)]
@@ -310,7 +310,7 @@ class Watcher:
 @pytest.mark.realtime
 def test_a_head_that_is_cut_in_a_view_costs_deliveries_and_the_clock_obeys() -> None:
     async def run() -> Watcher:
-        async with launch("quick", overrides=["duration_s=34"]) as launched:
+        async with launch("quick", overrides=["duration_s=28"]) as launched:
             await asyncio.sleep(1)
             watcher = Watcher(launched.radio.endpoint, launched.radio.swarm)
             watcher.thread.start()
@@ -324,8 +324,8 @@ def test_a_head_that_is_cut_in_a_view_costs_deliveries_and_the_clock_obeys() -> 
     watcher = asyncio.run(run())
     assert watcher.failure is None
     assert 0.5 in watcher.paces
-    before = [share for t_s, share in watcher.shares if t_s < 14]
-    after = [share for t_s, share in watcher.shares if 27 < t_s < 30]
+    before = [share for t_s, share in watcher.shares if t_s < 11]
+    after = [share for t_s, share in watcher.shares if 22 < t_s < 24]
     assert before[-1] > 0.9
     assert after[-1] < 0.85, "56 of 72 copies are left when one of nine is silent"
     assert any("radio fault cut" in text and "begins" in text for text in watcher.events)

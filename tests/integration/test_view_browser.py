@@ -20,6 +20,7 @@ CHROMIUM = shutil.which("chromium-headless-shell") or shutil.which("chromium") o
 pytestmark = [
     pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt install chromium-headless-shell"),
     pytest.mark.realtime,
+    pytest.mark.slow,
     pytest.mark.filterwarnings("ignore"),  # of playwright's event loop
 ]
 SOFTWARE = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]

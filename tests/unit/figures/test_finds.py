@@ -5,13 +5,16 @@ from pathlib import Path
 import pytest
 from kit import MakeScenario
 
-from fanet_mw import tlog
+from fanet_mw.errors import ConfigError
 from fanet_mw.trace import Approaching, Confirmed, Detected, PlacedInside, Posed, Record, Refuted
 from fanet_mw.units import S
 from fanet_mw.wire.survivors import Found, Standing, person_id
 from sim.report import finds
 from sim.report.run_records import RunRecords
+from sim.results.files import finish
 from sim.results.mission import OverflownCells
+from sim.results.run_folder import RunFolder
+from sim.run.outcome import Outcome
 
 KEYS = {
     "nodes.count": 2, "nodes.altitude_m": 60, "world.area_m": 1000, "duration_s": 60, "mission.survivors": 6,
@@ -32,6 +35,12 @@ def run_of(make_scenario: MakeScenario, *more: Record) -> RunRecords:
     run = RunRecords(make_scenario(**KEYS))
     run.read([*RECORDS, *more])
     return run
+
+
+def folder_of(run: RunRecords, taps: list[tuple[int, bytes]], path: Path) -> RunFolder:
+    """The folder of a run with this telemetry."""
+    finish(Outcome(run.scenario, "virtual", 1.0, RECORDS, {}, taps), out=path)
+    return RunFolder(path)
 
 
 def test_the_last_word_about_each_survivor_with_place_time_and_uav(make_scenario: MakeScenario) -> None:
@@ -62,9 +71,8 @@ def test_how_sure_is_what_uavs_told_each_other(make_scenario: MakeScenario, tmp_
         Found(9_000_000, 1, 3.0, 4.0, 4.0, 0.0, 4.0, 2, Standing.CONFIRMED),
     ]
     taps = [(one.t_us * 1000, one.encode_frame(one.node)) for one in told]
-    tlog.write(tmp_path / "mavlink.tlog", taps)
     run = run_of(make_scenario)
-    known = finds.with_estimates(finds.finds(run), finds.told(tmp_path))
+    known = finds.with_estimates(finds.finds(run), finds.told(folder_of(run, taps, tmp_path)))
     rows = {row[0]: row for row in finds.found_rows(run, known).rows}
     assert rows["survivor 3"][1] == "-95 E, 5 N"
     assert rows["survivor 3"][3] == "by phone alone, within 20 m (95 %)"
@@ -79,9 +87,22 @@ def test_how_sure_is_what_uavs_told_each_other(make_scenario: MakeScenario, tmp_
 
 def test_without_telemetry_an_estimate_is_rough(make_scenario: MakeScenario, tmp_path: Path) -> None:
     run = run_of(make_scenario)
-    known = finds.with_estimates(finds.finds(run), finds.told(tmp_path))
+    known = finds.with_estimates(finds.finds(run), finds.told(folder_of(run, [], tmp_path)))
     rows = {row[0]: row for row in finds.found_rows(run, known).rows}
     assert rows["survivor 3"][3] == "by phone alone, roughly"
+
+
+def test_telemetry_that_is_not_the_runs_is_refused(make_scenario: MakeScenario, tmp_path: Path) -> None:
+    folder = folder_of(run_of(make_scenario), [(1000, b"")], tmp_path)
+    path = tmp_path / "mavlink.tlog"
+    path.unlink()
+    path.symlink_to("/dev/zero")
+    with pytest.raises(ConfigError, match=r"mavlink\.tlog: cannot be read"):
+        finds.told(folder)
+    path.unlink()
+    path.write_bytes(b"else")
+    with pytest.raises(ConfigError, match="is not the file that was written"):
+        finds.told(folder)
 
 
 def test_who_was_missed_is_named(make_scenario: MakeScenario) -> None:

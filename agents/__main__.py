@@ -1,39 +1,175 @@
 """One UAV as a process: `python -m agents SCENARIO.toml --id N`, or `fanet agent`. Needs neither numpy nor physics."""
 
+import asyncio
+import contextlib
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
+from typing import Final, NamedTuple
 
-from agents.clock.clocked_uav import make_uav
+from agents.clock.clocked_uav import ClockedUav, make_uav
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.program.attached import OnAir
+from agents.uav import Uav
+from fanet_mw.autopilot.link import AutopilotLink
+from fanet_mw.autopilot.serving import Autopilot, AutopilotBus
+from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
+from fanet_mw.flavors import Flavor
+from fanet_mw.gateway.connections import Address, address_of
 from fanet_mw.hosts import interrupts, loop, service
+from fanet_mw.hosts.bus import Bus, HostBus, config_of
 from fanet_mw.hosts.clock import START_PATIENCE_S
-from fanet_mw.hosts.realtime import SwarmAddress
+from fanet_mw.hosts.realtime import RealtimeHost, SwarmAddress
+from fanet_mw.mavlink import Geodetic
 from fanet_mw.radios.udp import PORT
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId
 
 
+class FlightController(NamedTuple):
+    """The flight controller at the end of a MAVLink connection."""
+
+    address: Address
+    flavor: Flavor
+
+    def beside(self, host: Callable[[], RealtimeHost], scenario: Scenario, node: NodeId) -> Autopilot:
+        """Its link, in the time of a host."""
+        link = AutopilotLink(flavor=self.flavor, origin=Geodetic(*scenario.world.origin_deg, 0.0))
+
+        def now_ns() -> int:
+            return host().now_ns() if host().running else 0
+
+        return Autopilot(f"UAV {node}", link, self.address, now_ns=now_ns, tell=_tell)
+
+
+def _tell(text: str) -> None:
+    sys.stderr.write(f"{text}\n")
+
+
 def run(
-    scenario: Scenario, address: SwarmAddress, *, node: NodeId, position: Enu, onboard_map: OnboardMap = NO_MAP
-) -> int:
-    """Run one UAV, with a map on board, against a router until the scenario is over; raises BusError."""
-    service.live(make_uav(scenario, node, address.swarm, position=position, onboard_map=onboard_map), scenario, address)
+    scenario: Scenario, address: SwarmAddress, *, node: NodeId, position: Enu, onboard_map: OnboardMap = NO_MAP,
+    controller: FlightController | None = None,
+) -> int:  # fmt: skip
+    """Run one UAV, with a map on board, against a router until the scenario is over; raises BusError.
+
+    `controller`: what flies it and says where it is; None: the world of the swarm.
+    """
+    uav = make_uav(scenario, node, address.swarm, position=position, onboard_map=onboard_map)
+    if controller is None:
+        service.live(uav, scenario, address)
+    else:
+        loop.run(_run(uav, scenario, address, node, controller))
     return 0
 
 
-def fly(scenario: Scenario, on_air: OnAir, *, node: NodeId) -> Mapping[str, object]:
+async def _run(
+    uav: Uav | ClockedUav, scenario: Scenario, address: SwarmAddress, node: NodeId, controller: FlightController
+) -> None:
+    names = Topics(address.swarm)
+    config = config_of(address.zenoh_config, uav.name)
+    with Bus.join(address.endpoint, config, patience_s=address.patience_s) as inner:
+        bus = AutopilotBus(inner, names, node)
+        host = RealtimeHost(uav, bus, names)
+        async with _beside(bus, controller, host, scenario, node):
+            await host.run(until_ns=scenario.duration_ns, clock_timeout_s=START_PATIENCE_S, scenario=scenario)
+
+
+@contextlib.asynccontextmanager
+async def _beside(
+    bus: AutopilotBus | None, controller: FlightController | None, host: RealtimeHost, scenario: Scenario, node: NodeId
+) -> AsyncIterator[Mapping[str, int]]:
+    """Serve the flight controller while the host runs; yields its counters."""
+    if bus is None or controller is None:
+        yield {}
+        return
+    autopilot = controller.beside(lambda: host, scenario, node)
+    task = asyncio.ensure_future(bus.serve(autopilot, lambda: host.running))
+    try:
+        await asyncio.sleep(0)
+        yield autopilot.link.counts
+        if task.done():
+            task.result()
+    finally:
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+
+
+def fly(
+    scenario: Scenario, on_air: OnAir, *, node: NodeId, controller: FlightController | None = None
+) -> Mapping[str, object]:
     """Run one UAV on a real radio until the scenario is over; returns its report. Raises BusError."""
-    return loop.run(_fly(scenario, on_air, node))
+    return loop.run(_fly(scenario, on_air, node, controller))
 
 
-async def _fly(scenario: Scenario, on_air: OnAir, node: NodeId) -> Mapping[str, object]:
+async def _fly(
+    scenario: Scenario, on_air: OnAir, node: NodeId, controller: FlightController | None
+) -> Mapping[str, object]:
     uav = make_uav(scenario, node, on_air.swarm or scenario.name, position=on_air.position)
-    async with on_air.opened(uav, scenario, node) as (host, radio):
-        await host.run(until_ns=scenario.duration_ns, clock_timeout_s=START_PATIENCE_S)
-    return {**uav.report(), "radio": dict(sorted(radio.counts.items()))}
+    names = Topics(on_air.swarm or scenario.name)
+    between: list[AutopilotBus] = []
+
+    def through(bus: HostBus) -> HostBus:
+        if controller is None:
+            return bus
+        between.append(AutopilotBus(bus, names, node))
+        return between[0]
+
+    async with on_air.opened(uav, scenario, node, through=through) as (host, radio):
+        bus = between[0] if between else None
+        async with _beside(bus, controller, host, scenario, node) as counts:
+            await host.run(until_ns=scenario.duration_ns, clock_timeout_s=START_PATIENCE_S)
+    heard = {"autopilot": dict(sorted(counts.items()))} if controller is not None else {}
+    return {**uav.report(), "radio": dict(sorted(radio.counts.items())), **heard}
+
+
+class Radio(NamedTuple):
+    """A real radio, as the command line names it; without an address the radio is emulated."""
+
+    address: str | None = None
+    broadcast: str | None = None
+    port: int = PORT
+    epoch_unix_s: float | None = None
+
+
+EMULATED: Final = Radio()
+
+
+def start(
+    scenario: Scenario,
+    address: SwarmAddress,
+    *,
+    node: NodeId,
+    position: Enu,
+    onboard_map: OnboardMap = NO_MAP,
+    radio: Radio = EMULATED,
+    autopilot: str | None = None,
+    flavor: str = "px4",
+) -> int:
+    """Run one UAV as a command line asks for it; raises ConfigError and BusError."""
+    if node not in scenario.node_ids:
+        raise ConfigError(f"--id {node}: must be in [1, {scenario.last_id}]")
+    if (radio.address is None) != (radio.broadcast is None):
+        raise ConfigError("--radio-address and --radio-broadcast: both or none")
+    if flavor not in tuple(Flavor):
+        raise ConfigError(f"--flavor {flavor}: must be {' or '.join(Flavor)}")
+    controller = None
+    if autopilot is not None:
+        controller = FlightController(address_of(autopilot, flag="--autopilot"), Flavor(flavor))
+    if radio.address is None or radio.broadcast is None:
+        if radio.epoch_unix_s is not None:
+            raise ConfigError(
+                f"--epoch {radio.epoch_unix_s:g}: needs --radio-address; the emulated radio is on the router"
+            )
+        return run(scenario, address, node=node, position=position, onboard_map=onboard_map, controller=controller)
+    on_air = OnAir(
+        radio.address, radio.broadcast, radio.port, epoch_unix_s=radio.epoch_unix_s,
+        endpoint=None if radio.epoch_unix_s is not None else address.endpoint, swarm=address.swarm,
+        zenoh_config=address.zenoh_config, position=position,
+    )  # fmt: skip
+    sys.stdout.write(json.dumps(fly(scenario, on_air, node=node, controller=controller)) + "\n")
+    return 0
 
 
 def main() -> int:
@@ -48,29 +184,18 @@ def main() -> int:
     flags.add_argument("--radio-broadcast", help="the broadcast address of that interface's network")
     flags.add_argument("--radio-port", type=int, default=PORT, help="UDP port of the swarm (%(default)s)")
     flags.add_argument("--epoch", type=float, help="unix time of swarm instant 0 [s]: no router, clocks by GPS or NTP")
+    flags.add_argument("--autopilot", help="its flight controller: udpin:HOST:PORT, tcpout:, serial:DEVICE:BAUD ...")
+    flags.add_argument("--flavor", choices=[*Flavor], default="px4", help="of the flight controller (%(default)s)")
     given = flags.parse_args()
 
-    def start(scenario: Scenario, address: SwarmAddress) -> int:
-        node, at = NodeId(given.id), Enu(*given.at)
-        if node not in scenario.node_ids:
-            raise ConfigError(f"--id {node}: must be in [1, {scenario.last_id}]")
-        if (given.radio_address is None) != (given.radio_broadcast is None):
-            raise ConfigError("--radio-address and --radio-broadcast: both or none")
-        if given.radio_address is None:
-            if given.epoch is not None:
-                raise ConfigError(
-                    f"--epoch {given.epoch:g}: needs --radio-address; the emulated radio is on the router"
-                )
-            return run(scenario, address, node=node, position=at)
-        on_air = OnAir(
-            given.radio_address, given.radio_broadcast, given.radio_port, epoch_unix_s=given.epoch,
-            endpoint=None if given.epoch is not None else address.endpoint, swarm=address.swarm,
-            zenoh_config=address.zenoh_config, position=at,
+    def begin(scenario: Scenario, address: SwarmAddress) -> int:
+        radio = Radio(given.radio_address, given.radio_broadcast, given.radio_port, given.epoch)
+        return start(
+            scenario, address, node=NodeId(given.id), position=Enu(*given.at), radio=radio,
+            autopilot=given.autopilot, flavor=given.flavor,
         )  # fmt: skip
-        sys.stdout.write(json.dumps(fly(scenario, on_air, node=node)) + "\n")
-        return 0
 
-    return service.serve(given, start)
+    return service.serve(given, begin)
 
 
 if __name__ == "__main__":

@@ -13,16 +13,18 @@ from typing import Any, Final
 
 from fanet_mw.application import Application, Received
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.gateway.framing import frame_of, layout
+from fanet_mw.gateway.framing import Frame, frame_of, layout
 from fanet_mw.mavlink import AUTOPILOT_COMPONENT, common
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import BROADCAST, NodeId, S
+from fanet_mw.units import BROADCAST, MS, NodeId, S
 from fanet_mw.wire import PRIORITY_REPORT, PRIORITY_SAFETY, frames, system_id
 
 PRESENCE_NS: Final = 2 * S
 """How often UAVs are told that an operator is there."""
 MOST_PER_S: Final = 40
 """Packets that operators may put on the air in a second; what is more must be said again."""
+_UNDER_WAY_NS: Final = 1_200 * MS
+_MOST_ASKED: Final = 500
 _LONGEST: Final = 900
 """Inner bytes of a packet; more frames for one UAV go in another."""
 URGENT: Final = frozenset({
@@ -56,6 +58,8 @@ class OperatorRelay(Application):
         self._nodes = {system_id(node): NodeId(node) for node in scenario.uav_ids}
         self._told_ns: dict[int, int] = {}
         """When the heartbeat of each ground station was told last, by its system."""
+        self._asked: dict[tuple[int, int, int, bytes], int] = {}
+        """When each question was put on the air last, the newest at the end."""
         self._second, self._in_second = -1, 0
         self._counts: Counter[str] = Counter()
 
@@ -75,6 +79,9 @@ class OperatorRelay(Application):
             if to is None:
                 self._counts["for_nobody_here"] += 1
                 continue
+            if frame.message_id not in URGENT and self._is_under_way(frame, now_ns):
+                self._counts["under_way"] += 1
+                continue
             priority = PRIORITY_SAFETY if frame.message_id in URGENT else PRIORITY_REPORT
             waiting = said.get((to, priority), b"")
             if waiting and len(waiting) + len(data) > _LONGEST:
@@ -83,6 +90,20 @@ class OperatorRelay(Application):
             said[to, priority] = waiting + data
         for (target, priority), together in said.items():
             self._send(together, target, priority, now_ns)
+
+    def _is_under_way(self, frame: Frame, now_ns: int) -> bool:
+        """True if the same was asked lately: ground stations ask again before an answer over several hops can be there,
+        and some take the second answer for that to their next question.
+        """
+        asked = frame.system, frame.component, frame.message_id, frame.data[10:-2]
+        last_ns = self._asked.get(asked)
+        if last_ns is not None and now_ns - last_ns < _UNDER_WAY_NS:
+            return True
+        self._asked.pop(asked, None)
+        self._asked[asked] = now_ns
+        if len(self._asked) > _MOST_ASKED:
+            self._asked.pop(next(iter(self._asked)))
+        return False
 
     def _presence(self, data: bytes, system: int, now_ns: int) -> None:
         if len(self._told_ns) < 8 or system in self._told_ns:

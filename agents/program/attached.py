@@ -9,7 +9,7 @@ router is gone or the UAV has raised, every task that waits for the node is told
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Protocol, TypeVar
@@ -19,7 +19,7 @@ from agents.uav import NodeState, Uav
 from fanet_mw.application import Application
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError, ConfigError
-from fanet_mw.hosts.bus import Bus, config_of
+from fanet_mw.hosts.bus import Bus, HostBus, config_of
 from fanet_mw.hosts.clock import START_PATIENCE_S
 from fanet_mw.hosts.realtime import RealtimeHost
 from fanet_mw.radios.field_bus import FieldBus, joined
@@ -193,16 +193,23 @@ class OnAir:
 
     @contextlib.asynccontextmanager
     async def opened(
-        self, uav: Uav | ClockedUav, scenario: Scenario, node: NodeId
+        self,
+        uav: Uav | ClockedUav,
+        scenario: Scenario,
+        node: NodeId,
+        *,
+        through: Callable[[HostBus], HostBus] = lambda bus: bus,
     ) -> AsyncIterator[tuple[RealtimeHost, UdpRadio]]:
-        """The host of a UAV and its radio, which is open within the block; the caller runs the host."""
+        """The host of a UAV and its radio, which is open within the block; the caller runs the host. `through`: puts
+        something between the host and its bus.
+        """
         if (self.epoch_unix_s is None) == (self.endpoint is None):
             raise ConfigError("a real radio needs epoch_unix_s or endpoint, and not both: one of them keeps the clock")
         names = Topics(self.swarm or scenario.name)
         epoch_unix_ns = None if self.epoch_unix_s is None else round(self.epoch_unix_s * S)
         with joined(self.endpoint, config_of(self.zenoh_config, uav.name)) as inner:
             bus = FieldBus(names, node, inner=inner, epoch_unix_ns=epoch_unix_ns)
-            host = RealtimeHost(uav, bus, names)
+            host = RealtimeHost(uav, through(bus), names)
             radio = UdpRadio(
                 node, address=self.address, broadcast=self.broadcast, port=self.port,
                 max_frame_bytes=scenario.radio.max_frame_bytes, now_ns=host.now_ns, on_message=bus.on_radio,

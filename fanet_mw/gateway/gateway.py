@@ -55,15 +55,14 @@ class Doors(NamedTuple):
         for text in self.mavlink:
             address_of(text)
         if self.per_uav is not None:
-            _per_uav(self.per_uav, 1)
+            per_uav(self.per_uav, 1)
         if self.key is not None:
             read_key(self.key)
         return self
 
 
-def _per_uav(text: str, node: int) -> Address:
-    """The connection of one UAV."""
-    flag = "--mavlink-per-uav"
+def per_uav(text: str, node: int, *, flag: str = "--mavlink-per-uav") -> Address:
+    """The connection of one UAV, whose port is counted up from that of UAV 1."""
     if not text.endswith("+"):
         raise ConfigError(f"{flag} {text}: must end with +, for example udpin:127.0.0.1:14540+")
     address = address_of(text[:-1], flag=flag)
@@ -135,7 +134,7 @@ class Gateway:
         self._signings: list[Signing] = []
         self._doors = [opened(address_of(text), nodes) for text in doors.mavlink]
         if doors.per_uav is not None:
-            self._doors += [opened(_per_uav(doors.per_uav, node), (node,)) for node in nodes]
+            self._doors += [opened(per_uav(doors.per_uav, node), (node,)) for node in nodes]
         self._heard: deque[tuple[str, bytes]] = deque()
         self._drain_asked = False
         self._counts: Counter[str] = Counter()

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 from cyclopts.validators import Number
 
+from fanet_mw.errors import ConfigError
 from sim.cli.command_groups import RUN
 from sim.cli.companions import Companions, record_command, view_command
 from sim.cli.completion import ScenarioName
@@ -96,6 +97,7 @@ def launch(
     respawn: Annotated[bool, Parameter(negative="")] = False,
     slow_down_to: Annotated[float | None, Parameter(validator=Number(gte=1e-3, lte=100))] = None,
     no_world: Annotated[bool, Parameter(negative="")] = False,
+    autopilots: str | None = None,
     view: Annotated[bool, Parameter(negative="")] = False,
     view_port: int | None = None,
     listen: str | None = None,
@@ -117,6 +119,9 @@ def launch(
         and speed up again afterwards; by default it does not, and the run says that it is not valid.
     no_world
         Start no world: another program says where all UAVs are (how is in the documentation, reference/bus).
+    autopilots
+        With --no-world: flight controllers (PX4's or ArduPilot's, by --flavor) fly the UAVs and say where they are; the
+        connection of UAV 1, whose port is counted up for the others: udpin:127.0.0.1:14540+.
     view
         Show the swarm in a browser: `fanet view` beside it, until it ends.
     view_port
@@ -151,6 +156,10 @@ def launch(
         beside.append(view_command(view_port))
     if (words := doors.command()) is not None:
         beside.append(words)
+    if autopilots is not None:
+        if not no_world:
+            raise ConfigError("--autopilots: needs --no-world, because flight controllers are the world then")
+        beside.append(["autopilots", autopilots, "--flavor", doors.flavor])
     with begun(output.out), Companions(beside) as companions, _watched(chosen, quiet=output.json) as tell:
         outcome = asyncio.run(
             run(

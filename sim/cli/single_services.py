@@ -1,7 +1,7 @@
 """`fanet router`, `emulator`, `world` and `agent`: the services of a swarm, each started on its own."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import App, Parameter
 
@@ -9,7 +9,7 @@ from fanet_mw.errors import FanetError
 from sim.cli.command_groups import SERVICE
 from sim.cli.completion import ScenarioName
 from sim.cli.console import Console
-from sim.cli.options import OutputFlags, ScenarioFlags, ServiceFlags, warn_of
+from sim.cli.options import OutputFlags, ScenarioFlags, ServiceFlags, SwarmFlags, warn_of
 from sim.run.bus.running_swarms import DEFAULT_ENDPOINT
 
 _err = Console(stderr=True)
@@ -17,7 +17,7 @@ _err = Console(stderr=True)
 
 def add_to(app: App) -> None:
     """Register the commands."""
-    for command in (router, emulator, world, agent):
+    for command in (router, emulator, world, agent, autopilots):
         app.command(command, group=SERVICE)
 
 
@@ -129,8 +129,14 @@ def agent(
     id: int,  # noqa: A002
     choice: ScenarioFlags = ScenarioFlags(),
     join: ServiceFlags = ServiceFlags(),
+    radio_address: str | None = None,
+    radio_broadcast: str | None = None,
+    radio_port: int | None = None,
+    epoch: float | None = None,
+    autopilot: str | None = None,
+    flavor: Literal["px4", "ardupilot"] = "px4",
 ) -> int:
-    """Run one UAV alone; it joins a swarm that fanet router serves.
+    """Run one UAV alone; it joins a swarm that fanet router serves, or speaks over a real radio.
 
     Parameters
     ----------
@@ -138,9 +144,22 @@ def agent(
         The scenario of the swarm.
     id
         Node id, from 1 to the number of nodes.
+    radio_address
+        Send and hear frames on the interface with this address, not emulated.
+    radio_broadcast
+        The broadcast address of that interface's network.
+    radio_port
+        UDP port of the swarm; by default 14560.
+    epoch
+        Unix time of swarm instant 0 [s]: no router, clocks by GPS or NTP.
+    autopilot
+        Its flight controller, which flies it and says where it is: udpin:127.0.0.1:14540, tcpout:, serial:DEVICE:BAUD.
+    flavor
+        Of the flight controller.
 
     """
-    from agents.__main__ import run
+    from agents.__main__ import Radio
+    from agents.__main__ import start as begin
     from fanet_mw.units import NodeId
     from sim.world.environment.map_on_board import map_on_board
     from sim.world.mobility.layout import positions
@@ -148,5 +167,44 @@ def agent(
     chosen = choice.realtime_scenario(scenario)
     if id not in chosen.node_ids:
         raise FanetError(f"--id {id}: must be in [1, {chosen.last_id}]")
-    start = positions(chosen)[id - 1]
-    return run(chosen, join.address(chosen), node=NodeId(id), position=start, onboard_map=map_on_board(chosen))
+    where = positions(chosen)[id - 1]
+    return begin(
+        chosen,
+        join.address(chosen),
+        node=NodeId(id),
+        position=where,
+        onboard_map=map_on_board(chosen),
+        radio=Radio(radio_address, radio_broadcast, radio_port or Radio().port, epoch),
+        autopilot=autopilot,
+        flavor=flavor,
+    )
+
+
+def autopilots(
+    connection: str,
+    *,
+    flavor: Literal["px4", "ardupilot"] = "px4",
+    where: SwarmFlags = SwarmFlags(),
+) -> int:
+    """Play the world of a swarm by flight controllers, each at the end of a MAVLink connection; for launch --no-world.
+
+    Parameters
+    ----------
+    connection
+        The connection of UAV 1, whose port is counted up for the others: udpin:127.0.0.1:14540+.
+    flavor
+        Of the flight controllers.
+
+    """
+    import asyncio
+
+    from fanet_mw.flavors import Flavor
+    from sim.run.autopilots import run
+
+    def tell(text: str) -> None:
+        _err.print(text, highlight=False, soft_wrap=True, markup=False)
+
+    endpoint, swarm = where.located()
+    return asyncio.run(
+        run(endpoint, swarm, connection, flavor=Flavor(flavor), zenoh_config=where.zenoh_config, tell=tell)
+    )

@@ -83,8 +83,8 @@ def fly(system: Any) -> None:
     there = mission.download_mission().mission_items
     say(f"  uploaded {len(plan.mission_items)} items, downloaded {len(there)}")
     for sent, read in zip(plan.mission_items, there, strict=True):
-        assert abs(sent.latitude_deg - read.latitude_deg) < 1e-6
-        assert abs(sent.relative_altitude_m - read.relative_altitude_m) < 0.01
+        assert abs(sent.latitude_deg - read.latitude_deg) < 1e-6, (plan.mission_items, there)
+        assert abs(sent.relative_altitude_m - read.relative_altitude_m) < 0.01, (plan.mission_items, there)
     mission.start_mission()
     until("item 2 of 3", lambda: mission.mission_progress().current >= 1)
     until("finished", mission.is_mission_finished)

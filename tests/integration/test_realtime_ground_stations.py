@@ -64,14 +64,14 @@ def free_port(kind: int = socket.SOCK_STREAM) -> int:
 class Field:
     """A swarm that stands on the ground, with its doors."""
 
-    def __init__(self, folder: Path, text: str = FIELD) -> None:
+    def __init__(self, folder: Path, text: str = FIELD, *more: str) -> None:
         self.udp, self.tcp = free_port(socket.SOCK_DGRAM), free_port()
         self.name = f"field-{os.getpid()}"
         scenario = folder / "field.toml"
         scenario.write_text(text, encoding="utf-8")
         self.log = folder / "launch.log"
         self._processes: list[subprocess.Popen[bytes]] = []
-        self._start("launch", str(scenario), "--swarm", self.name, "--mavlink", f"udpout:127.0.0.1:{self.udp}")
+        self._start("launch", str(scenario), "--swarm", self.name, "--mavlink", f"udpout:127.0.0.1:{self.udp}", *more)
         self.await_("processes up")
         self._start("gateway", self.name, "--mavlink", f"tcpin:127.0.0.1:{self.tcp}", "--flavor", "ardupilot")
         self.await_(f" on tcpin:127.0.0.1:{self.tcp}")
@@ -152,6 +152,38 @@ def test_mavsdk_flies_a_uav_two_hops_away_over_the_air(tmp_path: Path) -> None:
     said = "".join(line for line in flown.stdout.splitlines(keepends=True) if "[0m" not in line)
     assert flown.returncode == 0, said + flown.stderr + swarm.log.read_text()
     keep("mavsdk-in-band", said)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(importlib.util.find_spec("mavsdk") is None, reason="MAVSDK is not installed")
+def test_mavsdk_on_both_sides_and_the_swarm_in_band_between_them(tmp_path: Path) -> None:
+    """Flight controllers of MAVSDK are the world; a ground station of MAVSDK flies the one that is two hops away."""
+    first = free_port(socket.SOCK_DGRAM)
+    logs = [tmp_path / f"autopilot-{number}.log" for number in (1, 2, 3)]
+    flying = []
+    for number, (log, east_m) in enumerate(zip(logs, (150, 300, 300), strict=True)):
+        command = [sys.executable, str(HERE / "mavsdk_autopilot.py"), f"udpout://127.0.0.1:{first + number}"]
+        with log.open("wb") as file:
+            flying.append(subprocess.Popen([*command, str(number + 1), str(east_m)], stdout=file, stderr=file))
+    text = LINE.replace('engine = "kinematic"\n', "").replace("time_scale = 2.0", "time_scale = 1.0")
+    try:
+        swarm = Field(tmp_path, text, "--no-world", "--autopilots", f"udpin:127.0.0.1:{first}+")
+        try:
+            command = [sys.executable, str(HERE / "mavsdk_pilot.py"), f"udpin://127.0.0.1:{swarm.udp}", "3", "2"]
+            flown = subprocess.run(command, capture_output=True, text=True, check=False, timeout=200)
+        finally:
+            swarm.end()
+    finally:
+        for process in flying:
+            process.kill()
+            process.wait()
+    said = "".join(line for line in flown.stdout.splitlines(keepends=True) if "[0m" not in line)
+    autopilot = "".join(line for line in logs[1].read_text().splitlines(keepends=True) if "[0m" not in line)
+    assert flown.returncode == 0, said + flown.stderr + swarm.log.read_text() + autopilot
+    assert "armed True" in autopilot
+    assert "mode OFFBOARD" in autopilot
+    assert autopilot.rstrip().endswith("landed")
+    keep("closed-loop", f"The ground station:\n\n{said}\nThe flight controller, two hops away:\n\n{autopilot}")
 
 
 @pytest.mark.slow

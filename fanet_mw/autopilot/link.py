@@ -1,0 +1,330 @@
+"""The link of a companion computer to one flight controller, PX4 or ArduPilot. Sans-IO.
+
+    in     its MAVLink (`on_bytes`), the setpoints of the computer (`command`), time (`wake`)
+    out    MAVLink for it (`out`), position and battery for the computer (`readings`), what happened (`events`)
+
+    POSITION, VELOCITY, HOLD   setpoints, four a second, and the guided mode (OFFBOARD, GUIDED) once they flow
+    TAKEOFF                    arm, then NAV_TAKEOFF
+    LAND, RETURN               the modes of these names
+
+Commands go out one at a time, each again until it is acknowledged. A flight controller that leaves the mode in which it
+was put, because its failsafe or a pilot took over, is left alone until it is back there. Heights are over home.
+"""
+
+import math
+from collections import Counter, deque
+from typing import Any, Final, NamedTuple
+
+from fanet_mw.bus.messages import VELOCITY_LASTS_NS, Battery, Gps, Setpoint, SetpointKind
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.flavors import Flavor, Mode, mode_of, number_of
+from fanet_mw.gateway.framing import Framing
+from fanet_mw.mavlink import AUTOPILOT_COMPONENT, Geodetic, Ned, common, decode, from_ned, to_enu, to_geodetic, to_ned
+from fanet_mw.units import MS, STILL, Enu, S
+from fanet_mw.wire import COMPONENT
+
+SETPOINT_NS: Final = 250 * MS
+"""The interval of setpoints: PX4 leaves OFFBOARD without one for 0.5 s, ArduPilot GUIDED's velocities last for 3 s."""
+LOST_NS: Final = 3 * S
+"""A flight controller that is not heard for so long is lost."""
+_HEARTBEAT_NS: Final = S
+_AGAIN_NS: Final = S
+_MOST_TIMES: Final = 3
+_LEAD_SETPOINTS: Final = 3
+"""Setpoints that flow before the guided mode is asked for; PX4 refuses it without."""
+_STREAMS: Final = {
+    common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 200 * MS, common.MAVLINK_MSG_ID_GPS_RAW_INT: S,
+    common.MAVLINK_MSG_ID_SYS_STATUS: S, common.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: S,
+}  # fmt: skip
+"""What is asked for, and how often."""
+_3D_FIX: Final = 3
+_POSITION_MASK: Final = 0b110111111000
+_VELOCITY_MASK: Final = 0b110111000111
+_HOLD_M_S: Final = 5.0
+_MISSING: Final = (65_535, -1)
+
+
+class _Waiting(NamedTuple):
+    """A command that is not acknowledged yet."""
+
+    command: int
+    params: tuple[float, ...]
+    what: str
+
+
+class AutopilotLink:
+    """One flight controller."""
+
+    def __init__(self, *, flavor: Flavor, origin: Geodetic) -> None:
+        self._flavor, self._origin = flavor, origin
+        self.counts: Counter[str] = Counter()
+        self.out = b""
+        self.readings: list[Gps | Battery] = []
+        self.events: list[str] = []
+        self.system: int | None = None
+        """Its MAVLink system; None before it was heard."""
+        self.mode: Mode | None = None
+        """Its mode, if it is one that is known here."""
+        self.armed = False
+        self.on_ground: bool | None = None
+        self.lost = False
+        self.position: Enu | None = None
+        """Its position by its own estimate, in the swarm's frame, up from home."""
+        self.velocity = STILL
+        self.yielded = False
+        """True while it flies by itself or by a pilot, and is not commanded."""
+        self._guided = False
+        """True once it was in the guided mode because it was asked to be."""
+        self._framing = Framing(self.counts)
+        self._mav: Any = None
+        self._heard_ns = 0
+        self._beat_ns: int | None = None
+        self._home_amsl_m = 0.0
+        self._fix_type = _3D_FIX
+        self._waiting: deque[_Waiting] = deque()
+        self._sent_ns, self._times = 0, 0
+        self._wanted: Setpoint | None = None
+        self._hold: Enu | None = None
+        self._setpoint_ns = 0
+        self._streamed = 0
+        self._speed_m_s: float | None = None
+
+    # --- in -------------------------------------------------------------------------------------------------------
+
+    def on_bytes(self, data: bytes, now_ns: int, *, whole: bool = True) -> None:
+        """Some bytes of its connection; `whole`: they are a datagram."""
+        for frame in self._framing.datagram(data) if whole else self._framing.frames(data):
+            if frame.component != AUTOPILOT_COMPONENT or self.system not in (None, frame.system):
+                self.counts["of_others"] += 1
+                continue
+            try:
+                (message,) = decode(frame.data)
+            except MalformedFrameError:
+                self.counts["malformed"] += 1
+                continue
+            handle = self._HANDLERS.get(message.get_type())
+            if handle is not None and (self.system is not None or message.get_type() == "HEARTBEAT"):
+                handle(self, message, now_ns)
+
+    def _on_heartbeat(self, message: Any, now_ns: int) -> None:  # noqa: ANN401  (pymavlink has no types)
+        if message.autopilot == common.MAV_AUTOPILOT_INVALID:
+            return
+        if self.system is None:
+            self.system = message.get_srcSystem()
+            self._mav = common.MAVLink(None, srcSystem=self.system, srcComponent=COMPONENT)
+            self.events.append(f"flight controller {self.system} heard")
+            for message_id, interval_ns in _STREAMS.items():
+                self._ask(511, (message_id, interval_ns / 1000), f"message {message_id} every {interval_ns / MS:g} ms")
+        if self.lost:
+            self.lost = False
+            self.events.append("flight controller heard again")
+        self._heard_ns = now_ns
+        self.armed = bool(message.base_mode & common.MAV_MODE_FLAG_SAFETY_ARMED)
+        before, self.mode = self.mode, mode_of(message.custom_mode, self._flavor)
+        if self.mode is Mode.GUIDED:
+            if self.yielded:
+                self.events.append("back in the guided mode: commanding again")
+            self._guided, self.yielded = True, False
+        elif self._guided and before is Mode.GUIDED and not self._asked_to_leave:
+            self.yielded, self._guided = True, False
+            self._waiting.clear()
+            self._times = 0
+            self.events.append(f"left the guided mode for {self.mode or message.custom_mode}: left alone")
+
+    @property
+    def _asked_to_leave(self) -> bool:
+        """True if the setpoint in force asks for another mode than the guided one."""
+        wanted = self._wanted
+        return wanted is not None and wanted.kind in (SetpointKind.LAND, SetpointKind.RETURN, SetpointKind.TAKEOFF)
+
+    def _on_position(self, message: Any, now_ns: int) -> None:  # noqa: ANN401
+        if abs(message.lat) > 900_000_000 or abs(message.lon) > 1_800_000_000 or (not message.lat and not message.lon):
+            self.counts["no_position"] += 1
+            return
+        place = to_enu(Geodetic(message.lat / 1e7, message.lon / 1e7, self._origin.alt_m), self._origin)
+        self._home_amsl_m = (message.alt - message.relative_alt) / 1000
+        self.position = Enu(place.east, place.north, message.relative_alt / 1000)
+        self.velocity = from_ned(Ned(message.vx / 100, message.vy / 100, message.vz / 100))
+        if self._fix_type >= _3D_FIX:
+            self.readings.append(Gps(now_ns, self.position, self.velocity))
+        else:
+            self.counts["no_fix"] += 1
+
+    def _on_gps(self, message: Any, _now_ns: int) -> None:  # noqa: ANN401
+        self._fix_type = message.fix_type
+
+    def _on_status(self, message: Any, now_ns: int) -> None:  # noqa: ANN401
+        if message.voltage_battery not in _MISSING and message.battery_remaining >= 0:
+            current_a = max(0.0, message.current_battery / 100)
+            charge = min(1.0, message.battery_remaining / 100)
+            self.readings.append(Battery(now_ns, message.voltage_battery / 1000, current_a, charge))
+
+    def _on_landed(self, message: Any, _now_ns: int) -> None:  # noqa: ANN401
+        self.on_ground = message.landed_state == common.MAV_LANDED_STATE_ON_GROUND
+
+    def _on_ack(self, message: Any, now_ns: int) -> None:  # noqa: ANN401
+        if not self._waiting or message.command != self._waiting[0].command:
+            return
+        if message.result == common.MAV_RESULT_IN_PROGRESS:
+            self._sent_ns = now_ns
+            return
+        done = self._waiting.popleft()
+        self._times = 0
+        if message.result == common.MAV_RESULT_ACCEPTED:
+            self.counts["accepted"] += 1
+        else:
+            self.counts["refused"] += 1
+            self.events.append(f"refused ({message.result}): {done.what}")
+
+    def _on_text(self, message: Any, _now_ns: int) -> None:  # noqa: ANN401
+        text = "".join(letter for letter in str(message.text) if letter.isprintable())
+        self.events.append(f"says: {text}")
+
+    def _on_timesync(self, message: Any, now_ns: int) -> None:  # noqa: ANN401
+        if not message.tc1:
+            self._say(common.MAVLink_timesync_message(now_ns, message.ts1))
+
+    _HANDLERS: Final = {
+        "HEARTBEAT": _on_heartbeat,
+        "GLOBAL_POSITION_INT": _on_position,
+        "GPS_RAW_INT": _on_gps,
+        "SYS_STATUS": _on_status,
+        "EXTENDED_SYS_STATE": _on_landed,
+        "COMMAND_ACK": _on_ack,
+        "STATUSTEXT": _on_text,
+        "TIMESYNC": _on_timesync,
+    }
+
+    def command(self, setpoint: Setpoint, now_ns: int) -> None:
+        """What the UAV's computer wants to be flown from now on."""
+        before, self._wanted = self._wanted, setpoint
+        again = before is not None and before.kind is setpoint.kind and before.position == setpoint.position
+        kind = setpoint.kind
+        if kind is SetpointKind.HOLD or (kind is SetpointKind.POSITION and setpoint.speed_m_s <= 0):
+            self._hold = self.position if self._hold is None else self._hold
+        else:
+            self._hold = None
+        if self.yielded or self.lost or again:
+            return
+        if kind is SetpointKind.TAKEOFF:
+            self._take_off(setpoint.position.up)
+        elif kind is SetpointKind.LAND:
+            self._ask_mode(Mode.LAND)
+        elif kind is SetpointKind.RETURN:
+            self._ask_mode(Mode.RETURN)
+        elif kind is SetpointKind.POSITION and setpoint.speed_m_s > 0 and setpoint.speed_m_s != self._speed_m_s:
+            self._speed_m_s = setpoint.speed_m_s
+            self._ask(common.MAV_CMD_DO_CHANGE_SPEED, (1, setpoint.speed_m_s, -1), f"speed {setpoint.speed_m_s:g} m/s")
+        self._setpoint_ns = min(self._setpoint_ns, now_ns)
+
+    def _take_off(self, up_m: float) -> None:
+        self._waiting.clear()
+        self._times = 0
+        if self._flavor is Flavor.ARDUPILOT:
+            self._ask_mode(Mode.GUIDED)
+        self._ask(common.MAV_CMD_COMPONENT_ARM_DISARM, (1,), "arm")
+        height_m = up_m + (self._home_amsl_m if self._flavor is Flavor.PX4 else 0.0)
+        self._ask(
+            common.MAV_CMD_NAV_TAKEOFF, (0, 0, 0, math.nan, math.nan, math.nan, height_m), f"take-off to {up_m:g} m"
+        )
+
+    # --- time -----------------------------------------------------------------------------------------------------
+
+    def wake(self, now_ns: int) -> None:
+        """To be called at least as often as setpoints go out."""
+        if self.system is None:
+            return
+        if not self.lost and now_ns - self._heard_ns > LOST_NS:
+            self.lost = True
+            self.counts["lost"] += 1
+            self.events.append(f"flight controller not heard for {LOST_NS // S} s")
+        if self._beat_ns is None or now_ns >= self._beat_ns:
+            self._beat_ns = now_ns + _HEARTBEAT_NS
+            kind, none, active = (
+                common.MAV_TYPE_ONBOARD_CONTROLLER,
+                common.MAV_AUTOPILOT_INVALID,
+                common.MAV_STATE_ACTIVE,
+            )
+            self._say(common.MAVLink_heartbeat_message(kind, none, 0, 0, active, 3))
+        if self.lost:
+            return
+        self._repeat(now_ns)
+        if now_ns >= self._setpoint_ns:
+            self._setpoint_ns = now_ns + SETPOINT_NS
+            self._stream(now_ns)
+
+    def _repeat(self, now_ns: int) -> None:
+        """Send the command that waits, again if it was not acknowledged."""
+        if not self._waiting or (self._times and now_ns - self._sent_ns < _AGAIN_NS):
+            return
+        if self._times >= _MOST_TIMES:
+            self.counts["unanswered"] += 1
+            self.events.append(f"no answer: {self._waiting.popleft().what}")
+            self._times = 0
+            return
+        waiting = self._waiting[0]
+        seven = [*waiting.params, *[0.0] * (7 - len(waiting.params))]
+        message = common.MAVLink_command_long_message(
+            self.system, AUTOPILOT_COMPONENT, waiting.command, self._times, *seven
+        )
+        self._say(message)
+        self._sent_ns = now_ns
+        self._times += 1
+
+    def _stream(self, now_ns: int) -> None:
+        """The setpoint that is in force."""
+        wanted = self._wanted
+        if wanted is None or self.yielded or self._asked_to_leave or self.position is None:
+            self._streamed = 0
+            return
+        if wanted.kind is SetpointKind.VELOCITY and now_ns - wanted.t_ns <= VELOCITY_LASTS_NS:
+            self._say_velocity(wanted.velocity, now_ns)
+        else:
+            if wanted.kind is SetpointKind.VELOCITY and self._hold is None:
+                self._hold = self.position
+                self.events.append("no more velocities: holding")
+            self._say_position(self._hold or wanted.position, now_ns)
+        self._streamed += 1
+        if self._streamed == _LEAD_SETPOINTS and self.mode is not Mode.GUIDED:
+            self._ask_mode(Mode.GUIDED)
+
+    def _say_position(self, place: Enu, now_ns: int) -> None:
+        at = to_geodetic(Enu(place.east, place.north, 0.0), self._origin)
+        self._say(
+            common.MAVLink_set_position_target_global_int_message(
+                now_ns // MS & 0xFFFF_FFFF, self.system, AUTOPILOT_COMPONENT,
+                common.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, _POSITION_MASK, round(at.lat_deg * 1e7),
+                round(at.lon_deg * 1e7), place.up, 0, 0, 0, 0, 0, 0, 0, 0,
+            )
+        )  # fmt: skip
+
+    def _say_velocity(self, velocity: Enu, now_ns: int) -> None:
+        ned = to_ned(velocity)
+        self._say(
+            common.MAVLink_set_position_target_local_ned_message(
+                now_ns // MS & 0xFFFF_FFFF, self.system, AUTOPILOT_COMPONENT, common.MAV_FRAME_LOCAL_NED,
+                _VELOCITY_MASK, 0, 0, 0, *ned, 0, 0, 0, 0, 0,
+            )
+        )  # fmt: skip
+
+    def _ask_mode(self, mode: Mode) -> None:
+        number = number_of(mode, self._flavor)
+        if self._flavor is Flavor.PX4:
+            params: tuple[float, ...] = (1, number >> 16 & 0xFF, number >> 24)
+        else:
+            params = (1, number)
+        self._ask(common.MAV_CMD_DO_SET_MODE, params, f"mode {mode}", first=True)
+
+    def _ask(self, command: int, params: tuple[float, ...], what: str, *, first: bool = False) -> None:
+        """Put a command into the line, unless it waits there already; `first`: before those that were not sent yet."""
+        waiting = _Waiting(command, params, what)
+        if any(other.what == what for other in self._waiting):
+            return
+        if first:
+            self._waiting.insert(1 if self._times else 0, waiting)
+        else:
+            self._waiting.append(waiting)
+
+    def _say(self, message: Any) -> None:  # noqa: ANN401
+        self.out += bytes(message.pack(self._mav))
+        self._mav.seq = (self._mav.seq + 1) % 256

@@ -1,0 +1,145 @@
+"""Runs the links to flight controllers on asyncio: a UAV's computer beside one, or a world that consists of many."""
+
+import asyncio
+import contextlib
+from array import array
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from fanet_mw.autopilot.link import AutopilotLink
+from fanet_mw.bus import codecs
+from fanet_mw.bus.messages import Battery, Gps, Poses, Setpoint
+from fanet_mw.bus.topics import Topics, node_of
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.gateway.connections import Address, Connection
+from fanet_mw.hosts.bus import HostBus, OnSample
+from fanet_mw.units import STILL, Enu, NodeId
+
+_TICK_S: Final = 0.05
+_POSE_EVERY: Final = 2
+"""Ticks between two reports of all positions."""
+Tell = Callable[[str], None]
+
+
+class Autopilot:
+    """One flight controller with its connection."""
+
+    def __init__(
+        self, name: str, link: AutopilotLink, address: Address, *, now_ns: Callable[[], int], tell: Tell
+    ) -> None:
+        self.link = link
+        self._name, self._now_ns, self._tell = name, now_ns, tell
+        whole = address.kind.startswith("udp")
+        self.connection = Connection(address, lambda _, data: self._hear(data, whole=whole))
+
+    def _hear(self, data: bytes, *, whole: bool) -> bytes:
+        self.link.on_bytes(data, self._now_ns(), whole=whole)
+        return b""
+
+    def tick(self) -> list[Gps | Battery]:
+        """Send what is due; returns what has been read since the last tick."""
+        link = self.link
+        link.wake(self._now_ns())
+        if link.out:
+            out, link.out = link.out, b""
+            self.connection.send(out)
+        events, link.events = link.events, []
+        for event in events:
+            self._tell(f"{self._name}: {event}")
+        readings, link.readings = link.readings, []
+        return readings
+
+
+class AutopilotBus:
+    """A bus for the host of one UAV, whose sensors and flight controller are at the end of a MAVLink connection.
+
+    Everything else goes to the bus below.
+    """
+
+    def __init__(self, inner: HostBus, names: Topics, node: NodeId) -> None:
+        self._inner = inner
+        self._sensors = names.sensors(node)
+        self._setpoint = names.setpoint(node)
+        self._gps, self._battery = names.sensor(node, "gps"), names.sensor(node, "battery")
+        self._on_sensor: OnSample | None = None
+        self.autopilot: Autopilot | None = None
+
+    def subscribe(self, expression: str, on_sample: OnSample) -> None:
+        if expression == self._sensors:
+            self._on_sensor = on_sample
+        else:
+            self._inner.subscribe(expression, on_sample)
+
+    def put(self, topic: str, payload: bytes, *, reliable: bool = False) -> None:
+        if topic != self._setpoint or self.autopilot is None:
+            self._inner.put(topic, payload, reliable=reliable)
+            return
+        for message in codecs.decode(payload):
+            if isinstance(message, Setpoint):
+                self.autopilot.link.command(message, message.t_ns)
+
+    def announce(self, topic: str) -> None:
+        self._inner.announce(topic)
+
+    def ask(self, topic: str, on_sample: OnSample) -> None:
+        self._inner.ask(topic, on_sample)
+
+    def check(self) -> None:
+        self._inner.check()
+
+    async def serve(self, autopilot: Autopilot, running: Callable[[], bool]) -> None:
+        """Pass on what the flight controller says, as readings of sensors; `running`: the clock of the swarm runs."""
+        self.autopilot = autopilot
+        await autopilot.connection.open()
+        try:
+            while True:
+                if running():
+                    for reading in autopilot.tick():
+                        topic = self._gps if isinstance(reading, Gps) else self._battery
+                        if self._on_sensor is not None:
+                            self._on_sensor(topic, codecs.encode([reading]))
+                await asyncio.sleep(_TICK_S)
+        finally:
+            autopilot.connection.close()
+
+
+async def serve_world(
+    bus: HostBus,
+    names: Topics,
+    autopilots: Mapping[NodeId, Autopilot],
+    standing: Mapping[NodeId, Enu],
+    *,
+    now_ns: Callable[[], int],
+) -> None:
+    """Play the world of a swarm whose UAVs are flown by flight controllers: their positions are those of the swarm.
+
+    `standing`: the nodes that are no UAVs, and where they stand.
+    """
+
+    def on_setpoint(topic: str, payload: bytes) -> None:
+        autopilot = autopilots.get(NodeId(node_of(topic)))
+        if autopilot is None:
+            return
+        with contextlib.suppress(MalformedFrameError):
+            for message in codecs.decode(payload):
+                if isinstance(message, Setpoint):
+                    loop.call_soon_threadsafe(autopilot.link.command, message, now_ns())
+
+    loop = asyncio.get_running_loop()
+    bus.subscribe(names.all_setpoints, on_setpoint)
+    ticks = 0
+    while True:
+        for node, autopilot in autopilots.items():
+            for reading in autopilot.tick():
+                kind = "gps" if isinstance(reading, Gps) else "battery"
+                bus.put(names.sensor(node, kind), codecs.encode([reading]))
+        if ticks % _POSE_EVERY == 0:
+            known = {node: (a.link.position, a.link.velocity) for node, a in autopilots.items() if a.link.position}
+            known |= {node: (place, STILL) for node, place in standing.items()}
+            states = array("d", [part for _, (at, moves) in sorted(known.items()) for part in (*at, *moves)])
+            bus.put(names.pose, codecs.encode([Poses(now_ns(), array("H", sorted(known)), states)]))
+            for node, place in standing.items():
+                bus.put(names.sensor(node, "gps"), codecs.encode([Gps(now_ns(), place, STILL)]))
+        ticks += 1
+        bus.check()
+        await asyncio.sleep(_TICK_S)

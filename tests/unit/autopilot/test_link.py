@@ -1,0 +1,311 @@
+"""A UAV's computer beside a flight controller of PX4 or ArduPilot, as timelines by hand."""
+
+import asyncio
+import math
+import os
+import pty
+import random
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega
+
+from fanet_mw.autopilot.link import AutopilotLink
+from fanet_mw.autopilot.serving import Autopilot
+from fanet_mw.bus.messages import Battery, Gps, Setpoint, SetpointKind
+from fanet_mw.flavors import Flavor, Mode, number_of
+from fanet_mw.gateway.connections import Address
+from fanet_mw.mavlink import Geodetic, common, decode, to_geodetic
+from fanet_mw.rng import stream
+from fanet_mw.units import MS, STILL, Enu, S
+
+ORIGIN = Geodetic(37.5665, 126.978, 0.0)
+AMSL_M = 40.0
+
+
+class Controller:
+    """A flight controller that answers, and the link to it."""
+
+    def __init__(self, flavor: Flavor = Flavor.PX4) -> None:
+        self.link = AutopilotLink(flavor=flavor, origin=ORIGIN)
+        self.mav = common.MAVLink(None, srcSystem=7, srcComponent=1)
+        self.flavor = flavor
+        self.mode, self.armed, self.at = Mode.HOLD, False, Enu(10.0, 20.0, 0.0)
+        self.now_ns = 0
+        self.said: list[Any] = []
+        self.answers = True
+        self.silent = False
+        self.result = 0
+
+    def tell(self, message: Any) -> None:
+        self.link.on_bytes(bytes(message.pack(self.mav)), self.now_ns)
+
+    def run(self, seconds: float) -> list[Any]:
+        """Let time pass; returns what the computer has said meanwhile."""
+        before, until_ns = len(self.said), self.now_ns + round(seconds * S)
+        while self.now_ns < until_ns:
+            self.now_ns += 50 * MS
+            if not self.silent and self.now_ns % S == 0:
+                self.beat()
+            if not self.silent and self.now_ns % (200 * MS) == 0:
+                self.position()
+            self.link.wake(self.now_ns)
+            out, self.link.out = self.link.out, b""
+            for message in decode(out):
+                self.said.append(message)
+                if message.get_type() == "COMMAND_LONG" and self.answers:
+                    self.obey(message)
+        return self.said[before:]
+
+    def beat(self) -> None:
+        kind = common.MAV_AUTOPILOT_PX4 if self.flavor is Flavor.PX4 else common.MAV_AUTOPILOT_ARDUPILOTMEGA
+        self.tell(
+            common.MAVLink_heartbeat_message(2, kind, 1 | 128 * self.armed, number_of(self.mode, self.flavor), 4, 3)
+        )
+
+    def position(self) -> None:
+        place = to_geodetic(self.at._replace(up=0.0), ORIGIN)
+        lat, lon = round(place.lat_deg * 1e7), round(place.lon_deg * 1e7)
+        alt_mm, up_mm = round(1000 * (AMSL_M + self.at.up)), round(1000 * self.at.up)
+        self.tell(common.MAVLink_global_position_int_message(0, lat, lon, alt_mm, up_mm, 100, 200, -300, 0))
+
+    def obey(self, message: Any) -> None:
+        if message.command == 400 and self.result == 0:
+            self.armed = bool(message.param1)
+        if message.command == 176 and self.result == 0:
+            number = int(message.param2) << 16 | int(message.param3) << 24
+            number = number if self.flavor is Flavor.PX4 else int(message.param2)
+            self.mode = next(m for m in (Mode.GUIDED, *Mode) if number_of(m, self.flavor) == number)
+        self.tell(common.MAVLink_command_ack_message(message.command, self.result))
+
+    def want(self, kind: SetpointKind, place: Enu = STILL, speed: float = 6.0, velocity: Enu = STILL) -> None:
+        self.link.command(Setpoint(self.now_ns, place, speed, kind, velocity), self.now_ns)
+
+
+def commands(said: list[Any]) -> list[int]:
+    return [message.command for message in said if message.get_type() == "COMMAND_LONG"]
+
+
+def places(said: list[Any]) -> list[Any]:
+    return [message for message in said if message.get_type() == "SET_POSITION_TARGET_GLOBAL_INT"]
+
+
+def test_streams_are_asked_for_one_by_one_and_each_answer_is_checked() -> None:
+    controller = Controller()
+    controller.result = 3
+    said = controller.run(6)
+    asked = [(message.param1, message.param2) for message in said if message.get_type() == "COMMAND_LONG"]
+    assert asked == [(33, 200_000), (24, 1_000_000), (1, 1_000_000), (245, 1_000_000)]
+    assert controller.link.counts["refused"] == 4
+    assert any("refused (3): message 33" in event for event in controller.link.events)
+
+
+def test_what_is_not_answered_is_said_again_and_given_up() -> None:
+    controller = Controller()
+    controller.answers = False
+    said = controller.run(14)
+    assert commands(said) == [511] * 12
+    assert [message.confirmation for message in said if message.get_type() == "COMMAND_LONG"] == [0, 1, 2] * 4
+    assert controller.link.counts["unanswered"] == 4
+
+
+def test_position_velocity_and_battery_come_in_the_swarms_frame() -> None:
+    controller = Controller()
+    controller.at = Enu(120.0, -40.0, 25.0)
+    controller.run(3)
+    fix = [reading for reading in controller.link.readings if isinstance(reading, Gps)][-1]
+    assert fix.position == pytest.approx((120, -40, 25), abs=0.02)
+    assert fix.velocity == pytest.approx((2, 1, 3))
+    controller.tell(common.MAVLink_sys_status_message(0, 0, 0, 0, 15_200, 820, 63, 0, 0, 0, 0, 0, 0))
+    assert controller.link.readings[-1] == Battery(controller.now_ns, 15.2, 8.2, 0.63)
+
+
+def test_without_a_fix_there_is_no_position() -> None:
+    controller = Controller()
+    controller.run(2)
+    controller.tell(common.MAVLink_gps_raw_int_message(0, 1, 0, 0, 0, 0, 0, 0, 0, 0))
+    controller.link.readings.clear()
+    controller.run(2)
+    assert not controller.link.readings
+    assert controller.link.counts["no_fix"] == 10
+
+
+@pytest.mark.parametrize(("flavor", "height_m"), [(Flavor.PX4, AMSL_M + 20.0), (Flavor.ARDUPILOT, 20.0)])
+def test_a_take_off_arms_first_and_counts_its_height_as_the_flavor_does(flavor: Flavor, height_m: float) -> None:
+    controller = Controller(flavor)
+    controller.run(6)
+    controller.want(SetpointKind.TAKEOFF, Enu(10.0, 20.0, 20.0))
+    said = controller.run(3)
+    wanted = [176, 400, 22] if flavor is Flavor.ARDUPILOT else [400, 22]
+    assert commands(said) == wanted
+    take_off = [message for message in said if message.get_type() == "COMMAND_LONG"][-1]
+    assert take_off.param7 == height_m
+    assert math.isnan(take_off.param5)
+    assert controller.armed
+
+
+@pytest.mark.parametrize("flavor", [*Flavor])
+def test_a_place_is_streamed_before_the_guided_mode_is_asked_for(flavor: Flavor) -> None:
+    controller = Controller(flavor)
+    controller.run(6)
+    controller.want(SetpointKind.POSITION, Enu(100.0, 50.0, 30.0))
+    said = controller.run(3)
+    kinds = [m.command if m.get_type() == "COMMAND_LONG" else m.get_type()[:12] for m in said]
+    assert kinds.index(176) > kinds.index("SET_POSITION") + 1
+    assert controller.mode is Mode.GUIDED
+    assert commands(said).count(178) == 1
+    place = to_geodetic(Enu(100.0, 50.0, 0.0), ORIGIN)
+    last = places(said)[-1]
+    assert (last.lat_int / 1e7, last.lon_int / 1e7, last.alt) == pytest.approx(
+        (place.lat_deg, place.lon_deg, 30.0), abs=1e-6
+    )
+    assert last.coordinate_frame == common.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+    assert len(places(controller.run(2))) == 8
+
+
+def test_a_velocity_that_is_not_renewed_becomes_a_hold() -> None:
+    controller = Controller()
+    controller.run(6)
+    controller.want(SetpointKind.VELOCITY, velocity=Enu(3.0, 4.0, 1.0))
+    said = controller.run(0.9)
+    flown = [message for message in said if message.get_type() == "SET_POSITION_TARGET_LOCAL_NED"]
+    assert [(m.vx, m.vy, m.vz) for m in flown] == [(4.0, 3.0, -1.0)] * len(flown)
+    assert len(flown) >= 3
+    held = places(controller.run(2))
+    assert len(held) >= 4
+    assert held[-1].alt == pytest.approx(controller.at.up)
+    assert "no more velocities: holding" in controller.link.events
+
+
+@pytest.mark.parametrize(("kind", "mode"), [(SetpointKind.LAND, Mode.LAND), (SetpointKind.RETURN, Mode.RETURN)])
+def test_landing_and_return_are_modes_and_no_setpoints_flow(kind: SetpointKind, mode: Mode) -> None:
+    controller = Controller()
+    controller.run(6)
+    controller.want(SetpointKind.POSITION, Enu(0.0, 0.0, 30.0))
+    controller.run(3)
+    controller.want(kind)
+    said = controller.run(4)
+    assert controller.mode is mode
+    assert not places(said)
+    assert not controller.link.yielded, "it was asked to leave the guided mode"
+
+
+def test_whoever_takes_over_is_left_alone_until_the_guided_mode_is_back() -> None:
+    controller = Controller()
+    controller.run(6)
+    controller.want(SetpointKind.POSITION, Enu(0.0, 0.0, 30.0))
+    controller.run(4)
+    controller.mode = Mode.RETURN  # its own failsafe
+    controller.run(1)
+    assert controller.link.yielded
+    controller.want(SetpointKind.POSITION, Enu(50.0, 0.0, 30.0))
+    controller.want(SetpointKind.TAKEOFF, Enu(50.0, 0.0, 30.0))
+    said = controller.run(5)
+    assert {message.get_type() for message in said} == {"HEARTBEAT"}
+    controller.want(SetpointKind.POSITION, Enu(50.0, 0.0, 30.0))
+    controller.mode = Mode.GUIDED
+    assert places(controller.run(3))
+    assert not controller.link.yielded
+
+
+def test_a_flight_controller_that_falls_silent_is_lost_and_found_again() -> None:
+    controller = Controller()
+    controller.run(6)
+    controller.want(SetpointKind.POSITION, Enu(0.0, 0.0, 30.0))
+    controller.run(2)
+    controller.silent = True
+    controller.run(4)
+    assert controller.link.lost
+    assert not places(controller.run(2))
+    controller.silent = False
+    controller.run(2)
+    assert not controller.link.lost
+    assert [event for event in controller.link.events if "heard" in event] == [
+        "flight controller 7 heard", "flight controller not heard for 3 s", "flight controller heard again",
+    ]  # fmt: skip
+
+
+def test_other_systems_on_the_line_are_not_taken_for_it() -> None:
+    controller = Controller()
+    controller.run(3)
+    for system, component in ((8, 1), (7, 100), (255, 190)):
+        other = common.MAVLink(None, srcSystem=system, srcComponent=component)
+        frame = bytes(common.MAVLink_heartbeat_message(2, 12, 0, number_of(Mode.LAND), 4, 3).pack(other))
+        controller.link.on_bytes(frame, controller.now_ns)
+    assert controller.link.mode is Mode.HOLD
+    assert controller.link.counts["of_others"] == 3
+
+
+@pytest.mark.parametrize("count", [20_000, pytest.param(1_000_000, marks=[pytest.mark.slow, pytest.mark.timeout(900)])])
+def test_hostile_frames_end_nothing_and_leave_positions_on_earth(count: int) -> None:
+    random_, controller = stream(1, "hostile"), Controller()
+    controller.run(2)
+    classes = [common.mavlink_map[number] for number in (0, 1, 24, 33, 77, 111, 245, 253)]
+    for _ in range(count):
+        controller.now_ns += MS
+        controller.link.on_bytes(mangled(random_, classes, controller.mav), controller.now_ns)
+        controller.link.wake(controller.now_ns)
+        decode(controller.link.out)
+        controller.link.out = b""
+        controller.link.events.clear()
+        for reading in controller.link.readings:
+            assert isinstance(reading, Battery) or all(math.isfinite(part) for part in reading.position)
+        controller.link.readings.clear()
+    assert controller.link.counts["bad_crc"] > count / 20
+
+
+def mangled(random_: random.Random, classes: list[Any], mav: Any) -> bytes:
+    known = random_.choice(classes)
+    payload = random_.randbytes(known.unpacker.size)
+    fields = known.unpacker.unpack(payload)
+    try:
+        ordered = [fields[known.orders[at]] for at in range(len(known.fieldnames))]
+        frame = bytes(known(*ordered).pack(mav))
+    except Exception:  # noqa: BLE001  (texts, arrays)
+        frame = bytes(common.MAVLink_statustext_message(1, payload[:50]).pack(mav))
+    if random_.random() < 0.3:
+        at = random_.randrange(len(frame))
+        frame = frame[:at] + bytes((random_.randrange(256),)) + frame[at + 1 :]
+    return frame
+
+
+async def test_pymavlink_is_met_over_a_serial_line() -> None:
+    ours, theirs = pty.openpty()
+    device = os.ttyname(theirs)
+    link = AutopilotLink(flavor=Flavor.ARDUPILOT, origin=ORIGIN)
+    now = asyncio.get_running_loop().time
+    began_s = now()
+    autopilot = Autopilot(
+        "UAV 1",
+        link,
+        Address("serial", device, 921_600),
+        now_ns=lambda: round((now() - began_s) * S),
+        tell=lambda _: None,
+    )
+    await autopilot.connection.open()
+    peer = ardupilotmega.MAVLink(None, srcSystem=3, srcComponent=1)
+    os.set_blocking(ours, False)
+    heard: list[str] = []
+    try:
+        for _ in range(60):
+            os.write(ours, peer_heartbeat(peer))
+            autopilot.tick()
+            await asyncio.sleep(0.02)
+            try:
+                data = os.read(ours, 4096)
+            except BlockingIOError:
+                continue
+            heard += [message.get_type() for message in peer.parse_buffer(data) or []]
+            if {"HEARTBEAT", "COMMAND_LONG"} <= {*heard}:
+                break
+    finally:
+        autopilot.connection.close()
+        os.close(ours)
+        os.close(theirs)
+    assert link.system == 3
+    assert {"HEARTBEAT", "COMMAND_LONG"} <= {*heard}
+
+
+def peer_heartbeat(peer: Any) -> bytes:
+    message = ardupilotmega.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3)
+    return bytes(message.pack(peer))

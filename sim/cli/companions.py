@@ -88,4 +88,4 @@ def record_command(path: Path) -> list[str]:
 
 def view_command(port: int | None) -> list[str]:
     """The words that show a swarm."""
-    return ["view", *([] if port is None else ["--port", str(port)])]
+    return ["view", "--until-gone", *([] if port is None else ["--port", str(port)])]

@@ -21,6 +21,7 @@ def view(
     swarm_name: str | None = None,
     *,
     port: int | None = None,
+    until_gone: Annotated[bool, Parameter(negative="")] = False,
     scenario: Path | None = None,
     where: SwarmFlags = SwarmFlags(),
 ) -> int:
@@ -32,6 +33,8 @@ def view(
         Name of the swarm; by default the only one running on this machine.
     port
         Port of the page on this machine; by default 8080, or the next one that is free.
+    until_gone
+        End when the swarm has gone; otherwise its last state stays.
     scenario
         The scenario of the swarm, needed only if it names files (maps), which the bus does not carry.
 
@@ -50,7 +53,7 @@ def view(
         BusFeed(endpoint, swarm, zenoh_config=where.zenoh_config, scenario=given(scenario)) as feed,
         interrupts.handed_to(signals.append),
     ):
-        show(feed, port=port, ended=signals, tell=console.print)
+        show(feed, port=port, until_gone=until_gone, ended=signals, tell=console.print)
     return 0
 
 

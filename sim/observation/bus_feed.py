@@ -92,8 +92,7 @@ class BusFeed:
 
     def pump(self, observer: Observer) -> int:
         """Tell an observer what has come; returns the number of puts. Raises BusError when the router is gone."""
-        if not self.over:
-            self.bus.check()
+        self.bus.check()
         self.look()
         return self.drain(observer)
 

@@ -14,8 +14,10 @@ from sim.view.server import HOST, close_server, look_over, open_server
 RATE_HZ: Final = 10.0
 
 
-def view(feed: BusFeed, *, port: int | None, ended: Sequence[int], tell: Callable[[str], None]) -> None:
-    """Serve the view; once the swarm is over its last state stays until `ended`, or until the router is gone."""
+def view(
+    feed: BusFeed, *, port: int | None, until_gone: bool, ended: Sequence[int], tell: Callable[[str], None]
+) -> None:
+    """Serve the view until `ended`; with `until_gone` also no longer than the swarm's router is there."""
     server = open_server(port)
     try:
         state = SwarmState(feed.scenario)
@@ -32,6 +34,8 @@ def view(feed: BusFeed, *, port: int | None, ended: Sequence[int], tell: Callabl
             try:
                 feed.pump(state)
             except BusError:
+                if until_gone:
+                    return
                 note = "the swarm has gone"
             if feed.over:
                 note = "the swarm's time is over"

@@ -1,7 +1,11 @@
 """What other tools read of a run is what the run was: tables, recordings, and the result that is loaded again."""
 
+import contextlib
 import json
 import re
+import subprocess
+import sys
+import time
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -304,6 +308,38 @@ def test_the_notebook_of_tables_runs() -> None:
     assert len(names["worst"]) == 5
     assert (names["by_origin"].delivered > 0.9).all()
     assert len(names["found"]) == 3
+
+
+@pytest.mark.realtime
+def test_a_launcher_that_is_killed_leaves_no_process_and_a_whole_recording(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    words = ["launch", "quick", "--duration", "60", "--record", str(path), "--view", "--swarm", tmp_path.name]
+    with subprocess.Popen(
+        [sys.executable, "-m", "fanet_mw", *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr is not None
+        while "processes up" not in (line := process.stderr.readline()):
+            assert line, "the swarm did not come up"
+        time.sleep(5)
+        assert len(beside(tmp_path.name)) == 2
+        process.kill()
+    end_s = time.monotonic() + 30
+    while beside(tmp_path.name):
+        assert time.monotonic() < end_s, "a view or a recording is left"
+        time.sleep(0.3)
+    with path.open("rb") as file:
+        reader = make_reader(file)
+        assert reader.get_summary() is not None, "the file has its index"
+        assert len(list(reader.iter_messages(topics=["/poses"]))) > 10
+
+
+def beside(swarm: str) -> list[str]:
+    """The processes that only look at a swarm."""
+    commands = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            commands.append((folder / "cmdline").read_bytes().decode(errors="replace").split("\0"))
+    return [" ".join(one) for one in commands if swarm in one and {"view", "record"} & set(one) and "launch" not in one]
 
 
 @pytest.mark.realtime

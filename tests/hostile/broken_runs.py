@@ -138,20 +138,24 @@ def disk(places: int, command: str) -> Iterator[tuple[str, list[str]]]:
 
 
 def kills(count: int, command: str) -> Iterator[tuple[str, list[str]]]:
-    """Half of the instants lie in the last fifth of a run, when its files are written; a run that was over by then does
-    not count, and tells how long runs take now.
+    """One in ten is killed before it has a folder; of the others, half in the last fifth, when files are written.
+
+    A run that was over by then does not count, and tells how long runs take now.
     """
     options = ["--json", "--pcap"]
     random = Random("kills")
     whole_s, done = 60.0, 0
     while done < count:
-        share = random.uniform(0.8, 1.0) if done % 2 else random.uniform(0.02, 0.8)
+        share = random.uniform(0.8, 1.0) if done % 2 else random.uniform(0.0, 0.8)
         with tempfile.TemporaryDirectory() as folder:
-            run, began = Path(folder) / "run", time.monotonic()
+            run = Path(folder) / "run"
             process = subprocess.Popen(
                 [FANET, *MISSION[command], "--out", str(run), *options], stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
             )  # fmt: skip
+            while done % 10 and not run.exists() and process.poll() is None:
+                time.sleep(0.005)
+            began = time.monotonic()
             try:
                 process.wait(share * whole_s)
             except subprocess.TimeoutExpired:

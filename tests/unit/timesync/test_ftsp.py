@@ -173,6 +173,14 @@ def test_a_time_farther_than_the_limit_is_counted_and_not_believed() -> None:
     assert not sync.synced
 
 
+def test_a_clock_that_can_never_agree_with_the_swarm_does_not_set_up_another_time() -> None:
+    sync = follower()
+    follow(sync, ahead_ns=6 * S, hellos=60)
+    sync.pass_time(60 * S)
+    assert not sync.synced
+    assert not sync.is_reference
+
+
 def test_one_liar_among_honest_neighbors_moves_nothing_whenever_it_begins() -> None:
     for first in (1, 12):
         sync = follower(5)

@@ -44,7 +44,8 @@ SCENARIOS: Final[Mapping[str, tuple[str, ...]]] = {
 NODES: Final = {"clusters": 15, "rescue": 45}
 PLACES: Final = {"clusters": {"corner": 15, "middle": 8}, "rescue": {"corner": 45, "middle": 23}}
 DELAYS_S: Final = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0)
-OBSERVED_S: Final = {"clusters": 16, "rescue": 30}
+REPEATING_S: Final = 12
+"""How long data of the longest delay are repeated: they begin after the warm-up."""
 KINDS: Final = (Kind.HELLO, Kind.DATA, Kind.JOIN, Kind.SCHEDULE)
 LEAST_SHARE: Final = 0.99
 """Of what arrives without the station."""
@@ -137,8 +138,8 @@ def scenario_of(attack: Attack, *more: str) -> Scenario:
     fair = [node for node in range(1, NODES[name] + 1) if node != attack.station]
     keys = SCENARIOS[name]
     warmup_s = int(keys[-1].partition("=")[2])
-    seconds = warmup_s + max(OBSERVED_S[name], attack.delay_s / 2 if attack.delay_s > 20 else 0)
-    seconds = max(seconds, 12 + attack.delay_s) + (7 if name == "rescue" else 2)
+    longest_s = max(DELAYS_S[-2:] if attack.delay_s > DELAYS_S[-2] else DELAYS_S[:-1])
+    seconds = warmup_s + longest_s + REPEATING_S + (7 if name == "rescue" else 2)
     return catalog.find(name, [
         *CLOCKS, *keys, f"duration_s={seconds:g}", f"traffic.targets={fair}", f"traffic.sources={fair[1:]}",
         *more, f"seed={attack.seed}",

@@ -38,7 +38,8 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
     frames, copies, lateness = ledger.frames(outcome), ledger.copies(outcome), _lateness(outcome, emulator)
     disturbance = validity.measures(outcome, frames=frames, late_share=lateness["share"])
     bound = against_bounds(sent, ended_ns=outcome.simulated_ns)
-    reasons = validity.reasons(outcome, frames=frames, copies=copies, bound=bound, disturbance=disturbance)
+    clock = clock_errors(outcome)
+    reasons = validity.reasons(outcome, frames=frames, copies=copies, bound=bound, clock=clock, disturbance=disturbance)
     return {
         "valid": not reasons,
         "invalid_because": reasons,
@@ -71,7 +72,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         },
         "bound": bound,
         "likely": likely(sent),
-        "clock": clock_errors(outcome),
+        "clock": clock,
         "admission": _admission(outcome),
         "mission": mission(outcome.scenario, outcome.records),
         "separation": separation(outcome),

@@ -5,7 +5,7 @@ A result is valid, and the exit code 0, when all of this holds:
     the run ended by itself, and no process died before its end
     every actor has sent its last report, and no record of the trace was refused
     every frame is accounted for
-    no delay bound that a node stated was broken
+    no bound that a node stated, of a delay or of its clock, was wrong
     in real time: each measure of how the machine disturbed the run is within its limit
 
 In virtual time the machine cannot disturb a run. The limits come from runs in virtual time that were disturbed on
@@ -98,6 +98,7 @@ def reasons(
     frames: Mapping[str, Any],
     copies: Mapping[str, Any],
     bound: Mapping[str, Any],
+    clock: Mapping[str, Any],
     disturbance: Mapping[str, Measure],
 ) -> list[str]:
     """The reasons why the result may not be used, gravest first, one sentence each; empty if it may be used."""
@@ -105,7 +106,7 @@ def reasons(
         *_broken(outcome),
         *_incomplete(outcome),
         *_unaccounted(frames, copies),
-        *_promised(bound),
+        *_promised(bound, clock),
         *_disturbed(disturbance),
     ]
 
@@ -142,10 +143,12 @@ def _unaccounted(frames: Mapping[str, Any], copies: Mapping[str, Any]) -> Iterat
         yield f"the ledger of {copies['on_air']} copies at receivers does not close"
 
 
-def _promised(bound: Mapping[str, Any]) -> Iterator[str]:
+def _promised(bound: Mapping[str, Any], clock: Mapping[str, Any]) -> Iterator[str]:
     if broken := bound.get("violations"):
         late, never = broken - bound["never"], bound["never"]
         yield f"delay bounds that did not hold: {broken} ({late} too late, {never} never there), limit 0"
+    if wrong := clock.get("beyond_bound"):
+        yield f"clocks that were off by more than their nodes stated: {wrong} of {clock['samples']} samples, limit 0"
 
 
 def _disturbed(disturbance: Mapping[str, Measure]) -> Iterator[str]:

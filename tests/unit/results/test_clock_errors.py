@@ -8,6 +8,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import ClockSampled, Delivered, Generated, Record
 from fanet_mw.units import MS, US, S
 from sim.results.clocks import clock_errors, true_delays
+from sim.results.metrics import summarize
 from sim.run.collecting.trace_log import TraceLog
 from sim.run.outcome import Outcome
 
@@ -36,6 +37,18 @@ def test_an_error_beyond_its_bound_is_counted_by_however_little(
 ) -> None:
     found = errors(make_scenario, sample(1, 0, bound_us=0), sample(2, error_us))
     assert found["beyond_bound"] == beyond
+
+
+@pytest.mark.parametrize(("error_us", "valid"), [(10, True), (10.001, False)])
+def test_a_run_in_which_a_clock_was_off_by_more_than_it_said_is_not_valid(
+    make_scenario: MakeScenario, error_us: float, *, valid: bool
+) -> None:
+    scenario = make_scenario(**{"nodes.count": 2, "clock.sync": "beacons", "clock.drift_ppm": 10})
+    outcome = Outcome(scenario, "virtual", 1.0, [sample(1, 0, bound_us=0), sample(2, error_us)], {})
+    reasons = summarize(outcome, trace_sha256="")["invalid_because"]
+    assert reasons == (
+        [] if valid else ["clocks that were off by more than their nodes stated: 1 of 2 samples, limit 0"]
+    )
 
 
 def test_delays_run_from_the_true_instant_of_generation() -> None:

@@ -7,6 +7,7 @@ rest is corrected by how much the finished ones took.
 
 import math
 import os
+import time
 from typing import Final
 
 from agents.applications.traffic import sources_of
@@ -34,6 +35,8 @@ _PER_TURN_S: Final = 85e-6
 """CPU seconds per packet and node with a timetable, whose turns, room and bounds are computed for each."""
 _WORKER_S: Final = 3.0
 """CPU seconds until a worker process of this machine begins its first run."""
+_SPIN_S: Final = 0.25
+"""The time for which it is tried how much of a core there is."""
 _TRUSTED_S: Final = 10.0
 """Finished runs count for the rest as much as the estimate once so many seconds of them were expected."""
 _MOST_FRAMES: Final = 80
@@ -76,9 +79,21 @@ def launch_s(scenario: Scenario) -> float:
 
 
 def pace_of_workers(workers: int) -> float:
-    """The share of a core that each of some new processes gets, beside those that were running in the last minute."""
-    cores, others = len(os.sched_getaffinity(0)), os.getloadavg()[0]
+    """The share of a core that each of some new processes gets, beside what else the machine does.
+
+    Others are those that ran in the last minute, but no more than the share that this process gets allows for.
+    """
+    cores = len(os.sched_getaffinity(0))
+    others = min(os.getloadavg()[0], cores / share_of_core() - 1)
     return min(1.0, cores / (workers + others))
+
+
+def share_of_core() -> float:
+    """The share of a core that this process gets now."""
+    began_s, cpu_s = time.perf_counter(), time.thread_time()
+    while (wall_s := time.perf_counter() - began_s) < _SPIN_S:
+        pass
+    return max(0.01, min(1.0, (time.thread_time() - cpu_s) / wall_s))
 
 
 class TimeLeft:

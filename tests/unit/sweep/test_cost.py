@@ -4,6 +4,7 @@ import os
 
 import pytest
 
+from sim.sweep import cost
 from sim.sweep.cost import TimeLeft, pace_of_workers
 
 
@@ -14,12 +15,18 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
 
 
 @pytest.mark.parametrize(
-    ("load", "workers", "pace"), [(0.0, 4, 1.0), (0.0, 2, 1.0), (0.0, 16, 0.25), (12.0, 4, 0.25), (24.0, 4, 1 / 7)]
-)
+    ("load", "share", "workers", "pace"),
+    [
+        (0.0, 1.0, 4, 1.0), (0.0, 1.0, 2, 1.0), (0.0, 1.0, 16, 0.25), (12.0, 0.3, 4, 0.25), (24.0, 0.15, 4, 1 / 7),
+        (24.0, 1.0, 4, 4 / 7), (2.0, 0.1, 4, 4 / 6),
+    ],
+)  # fmt: skip
 def test_workers_share_the_cores_with_what_else_runs(
-    machine: pytest.MonkeyPatch, load: float, workers: int, pace: float
+    machine: pytest.MonkeyPatch, load: float, share: float, workers: int, pace: float
 ) -> None:
+    """A load that is over, or only waits, leaves this process more of a core than the mean of a minute would."""
     machine.setattr(os, "getloadavg", lambda: (load, 0.0, 0.0))
+    machine.setattr(cost, "share_of_core", lambda: share)
     assert pace_of_workers(workers) == pytest.approx(pace)
 
 

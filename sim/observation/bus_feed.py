@@ -157,7 +157,7 @@ class BusFeed:
                 self.refused += 1
 
     def _known(self, poses: Poses) -> bool:
-        return all(1 <= node <= self.scenario.nodes.count for node in poses.ids) and all(
+        return all(1 <= node <= self.scenario.node_count for node in poses.ids) and all(
             abs(value) < 1e8 for value in poses.states
         )
 

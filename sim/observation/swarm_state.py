@@ -342,7 +342,7 @@ class SwarmState:
             self._trailed_ns = self.t_ns
             for uav in self.uavs.values():
                 uav.trail.append(uav.position)
-            self._cells.add([uav.position for uav in self.uavs.values()])
+            self._cells.add([uav.position for node, uav in self.uavs.items() if node != self.scenario.post])
         if self.t_ns >= self._pruned_ns + S:
             self._pruned_ns = self.t_ns
             self._forget()

@@ -350,7 +350,7 @@ def _figures(state: SwarmState, metrics: dict[str, float | None]) -> str:
         ),
         ("confirmed", f"<b>{metrics['confirmed']:.0f} of {metrics['survivors']:.0f}</b>"),
         ("area covered", percent("coverage_share")),
-        ("UAVs, clusters", f"{len(state.uavs)}, {len(state.heads())}"),
+        ("UAVs, clusters", f"{len(state.uavs) - (state.scenario.post in state.uavs)}, {len(state.heads())}"),
     ]
     return _box(_table(rows))
 

@@ -164,7 +164,8 @@ class Scene:
             return
         places = np.array([uavs[node].position for node in nodes], np.float32)
         turned = np.array([attitude(uavs[node]) for node in nodes], np.float32)
-        tints = np.array([self._tint(uavs[node]) for node in nodes], np.uint8)
+        post = self.state.scenario.post
+        tints = np.array([rgb(_WRECK) if node == post else self._tint(uavs[node]) for node in nodes], np.uint8)
         sizes = np.array([self.size_m * (1.7 if uavs[node].role == "head" else 1.0) for node in nodes], np.float32)
         handle = self._handles.get("uavs")
         if handle is None or nodes != self._nodes:
@@ -289,7 +290,8 @@ class Scene:
 
     def _draw_names(self) -> None:
         for node, uav in self.state.uavs.items():
-            self._name(f"uav-{node}", str(node), uav.position, shown=self.shown.names, above_m=self.size_m * 0.7)
+            name = "post" if node == self.state.scenario.post else str(node)
+            self._name(f"uav-{node}", name, uav.position, shown=self.shown.names, above_m=self.size_m * 0.7)
 
     def _name(self, key: str, text: str, at: Enu, *, shown: bool, above_m: float) -> None:
         handle = self._names.get(key)

@@ -24,6 +24,9 @@ from sim.observation.bus_feed import BusFeed
 from sim.observation.swarm_state import SwarmState
 from sim.observation.timeline import Timeline
 from sim.run.api import launch
+from sim.run.result import Result
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 from sim.view.actions import Actions
 from sim.view.panels import Panels
 from sim.view.replayed import write_html
@@ -195,6 +198,22 @@ def test_the_scene_shows_places_clusters_turns_links_and_survivors(
     assert (east, north) == state.covered().shape
     north_row = handle("/world/covered").image[0, :, 0] == 164
     assert (north_row == state.covered()[-1]).all(), "the first row of the image is the northernmost"
+
+
+def test_a_post_on_the_ground_is_no_uav_that_covers_anything(server: viser.ViserServer) -> None:
+    scenario = catalog.find("quick", ["duration_s=12", "ground.at_m=[300,300]"])
+    state = SwarmState(scenario)
+    result = Result(simulate(scenario, observer=state))
+    assert state.metrics()["coverage_share"] == pytest.approx(result.summary["mission"]["coverage"], abs=1e-6)
+    assert scenario.post in state.uavs
+    scene = Scene(server, state, on_select=lambda _: None)
+    panels = Panels(server, scene, actions=None)
+    scene.draw(state.t_ns, all_of_it=True)
+    panels.refresh(state.t_ns)
+    label = server.scene.get_handle_by_name(f"/names/uav-{scenario.post}")
+    assert label is not None
+    assert label.text == "post"
+    assert "9, 2" in panels.texts["_figures"]
 
 
 def test_a_packets_spreading_ends_with_all_who_have_it(server: viser.ViserServer, timeline: Timeline) -> None:

@@ -27,6 +27,8 @@ _CLUSTERS: Final = (BLUE, RED, GREEN, PINK, ORANGE)
 """The colors of clusters, in turn."""
 _MOST_NAMED: Final = 12
 """The greatest number of slots that are named above them."""
+_MOST_LINES: Final = 1000
+"""The greatest number of slots that are told apart; a folder of somebody else may state any."""
 _WINDOW_COLOR: Final = "#eeeeee"
 
 
@@ -43,12 +45,14 @@ class _Frame(NamedTuple):
         """The place of an instant in the superframe."""
         return (one.t_ns - self.start_ns) % self.period_ns
 
-    def in_own(self, one: LetOut) -> bool:
-        """True if a packet was let out in a span of its origin."""
-        return any(
-            (self.place_ns(one) - own.start_ns) % self.period_ns < own.length_ns
-            for own in self.own
-            if own.node == one.node
+    def kept(self, let_out: Sequence[LetOut]) -> int:
+        """The number of packets that were let out in a span of their origin."""
+        spans: dict[int, list[Own]] = defaultdict(list)
+        for own in self.own:
+            spans[own.node].append(own)
+        return sum(
+            any((self.place_ns(one) - own.start_ns) % self.period_ns < own.length_ns for own in spans[one.node])
+            for one in let_out
         )
 
 
@@ -85,7 +89,7 @@ def _in_slots(run: RunRecords, reports: Mapping[int, Mapping[str, Any]]) -> RunP
         _scatter(axes, places, _CLUSTERS[cluster % len(_CLUSTERS)], "|", label, 40)
         kept += sum((one.t_ns % period_ns - cluster * slot_ns) % period_ns < slot_ns - guard_ns for one in let_out)
     slots = period_ns // slot_ns if slot_ns else 0
-    for slot in range(slots):
+    for slot in range(min(slots, _MOST_LINES)):
         axes.axvline(slot * slot_ns / MS, color="#999999", linewidth=0.7, zorder=0)
         if slots <= _MOST_NAMED:
             axes.text((slot + 0.5) * slot_ns / MS, 1.0, f"slot {slot + 1}", transform=axes.get_xaxis_transform(),
@@ -120,7 +124,7 @@ def _in_turns(
     picture = _by_node(run, frame, shown, "superframe", ("nodes with turns", "other nodes"), "contention window")
     owners = {one.node for one in own}
     owned = [one for one in shown if one.node in owners]
-    kept = sum(map(frame.in_own, owned))
+    kept = frame.kept(owned)
     said = (
         f"When packets were let out first, under the last timetable, which began at {frame.start_ns / S:.3g} s "
         f"({len(shown):,} of {len(run.let_out):,} packets). Shaded: the turns in which a node transmits packets of its "
@@ -136,7 +140,7 @@ def _in_rounds(run: RunRecords) -> RunPicture:
     timing = RoundTiming.of(run.scenario)
     own = [Span(node, (node - 1) * timing.turn_ns, timing.turn_ns) for node in run.scenario.node_ids]
     frame = _Frame(0, timing.period_ns, (timing.nodes * timing.turn_ns, timing.window_ns), own)
-    kept = sum(map(frame.in_own, run.let_out))
+    kept = frame.kept(run.let_out)
     bulk = sum(frame.place_ns(one) >= frame.window[0] for one in run.let_out)
     window = (", and the window in which bulk is sent", f", {bulk:,} in the window") if timing.window_ns else ("", "")
     said = (

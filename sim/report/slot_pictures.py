@@ -47,7 +47,7 @@ class _Frame(NamedTuple):
 
     def kept(self, let_out: Sequence[LetOut]) -> int:
         """The number of packets that were let out in a span of their origin."""
-        spans: dict[int, list[Own]] = defaultdict(list)
+        spans: dict[int, list[Span]] = defaultdict(list)
         for own in self.own:
             spans[own.node].append(own)
         return sum(

@@ -9,17 +9,15 @@ import numpy.typing as npt
 from agents.applications.traffic import sources_of, targets_of
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import S
-from sim.world.arrays import Rows
 from sim.world.mobility.guidance import Guidance
 from sim.world.mobility.layout import positions
 
 
-def parts(places: Rows, range_m: float) -> npt.NDArray[np.int64]:
-    """The number of the connected component of each node, over links of up to `range_m`."""
-    linked = np.linalg.norm(places[:, None] - places[None], axis=2) <= range_m
-    part = np.arange(len(places))
+def parts(linked: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
+    """The number of the connected component of each node; `linked` holds for a node and itself, too."""
+    part = np.arange(len(linked))
     while True:
-        lower = np.where(linked, part[None], len(places)).min(axis=1)
+        lower = np.where(linked, part[None], len(linked)).min(axis=1)
         if (lower == part).all():
             return part
         part = lower
@@ -35,6 +33,7 @@ def connectivity(scenario: Scenario) -> float:
     sources, targets = np.array(pairs).T - 1
     shares = []
     for t_s in range(first_ns // S, max(end_ns // S, first_ns // S + 1)):
-        part = parts(guidance.track(float(t_s)).places, scenario.radio.range_m)
+        at = guidance.track(float(t_s)).places
+        part = parts(np.linalg.norm(at[:, None] - at[None], axis=2) <= scenario.radio.range_m)
         shares.append(float((part[sources] == part[targets]).mean()))
     return float(np.mean(shares))

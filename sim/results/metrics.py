@@ -20,8 +20,11 @@ from fanet_mw.units import S
 from sim.results import delays, ledger, validity
 from sim.results.bounds import against_bounds, likely
 from sim.results.clocks import clock_errors
+from sim.results.clusters import clusters
+from sim.results.links_over_time import LinksOverTime
 from sim.results.mission import mission
 from sim.results.packets import OTHER_APPS, AppPackets, packets_of, targets_by_source
+from sim.results.reachability import reachability
 from sim.results.separation import separation
 from sim.run.collecting.record_kinds import records_of
 from sim.run.outcome import Outcome
@@ -37,6 +40,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
     emulator = outcome.reports.get("emulator", {})
     frames, copies, lateness = ledger.frames(outcome), ledger.copies(outcome), _lateness(outcome, emulator)
     disturbance = validity.measures(outcome, frames=frames, late_share=lateness["share"])
+    links = LinksOverTime(outcome)
     bound = against_bounds(sent, ended_ns=outcome.simulated_ns)
     clock = clock_errors(outcome)
     reasons = validity.reasons(outcome, frames=frames, copies=copies, bound=bound, clock=clock, disturbance=disturbance)
@@ -72,6 +76,8 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         },
         "bound": bound,
         "likely": likely(sent),
+        "reachable": reachability(outcome, sent, links),
+        "clusters": clusters(outcome, links),
         "clock": clock,
         "admission": _admission(outcome),
         "mission": mission(outcome.scenario, outcome.records),

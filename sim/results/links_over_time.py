@@ -1,0 +1,88 @@
+"""Who was within reach of whom, second by second, by the true positions in the trace and the reach of the channel.
+
+    link in second k   both on the air, and within reach at its beginning or at its end
+
+Obstacles, fading and collisions are left out: this is what distance allows.
+"""
+
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from emulator.channel.propagation import heard_m
+from fanet_mw.trace import Posed, ProcessEnded, RadioFault
+from fanet_mw.units import S
+from sim.run.collecting.record_kinds import records_of
+from sim.run.outcome import Outcome
+from sim.world.mobility.layout import positions
+
+Flags = npt.NDArray[np.bool_]
+Rows = npt.NDArray[np.float64]
+
+OFF_AIR: Final = frozenset({"cut", "mute", "deaf", "stop", "crash"})
+"""The faults that take a UAV out of the network."""
+
+
+class LinksOverTime:
+    """The links of each second of a run; rows and columns are node ids less one."""
+
+    def __init__(self, outcome: Outcome) -> None:
+        self._reach_m = heard_m(outcome.scenario.radio)
+        self.seconds = max(1, -(-outcome.simulated_ns // S))
+        self._places = _places(outcome, self.seconds + 1)
+        self._near: dict[int, Flags] = {}
+        self._links: dict[int, Flags] = {}
+
+    def at(self, second: int) -> Flags:
+        """Whether each pair of nodes had a link in a second; each node has one with itself. The same array is returned
+        while nothing changes.
+        """
+        if second not in self._links:
+            links, before = self._near_at(second) | self._near_at(second + 1), self._links.get(second - 1)
+            self._links[second] = before if before is not None and np.array_equal(before, links) else links
+        return self._links[second]
+
+    def _near_at(self, instant: int) -> Flags:
+        at = self._places[instant]
+        if id(at) not in self._near:
+            self._near[id(at)] = within(at, self._reach_m)
+        return self._near[id(at)]
+
+
+def within(at: Rows, reach_m: float) -> Flags:
+    """Whether each pair of nodes is within reach; a node that is nowhere (NaN) is within that of itself only."""
+    near: Flags = np.linalg.norm(at[:, None] - at[None], axis=2) <= reach_m
+    near |= np.eye(len(at), dtype=bool)
+    return near
+
+
+def _places(outcome: Outcome, count: int) -> list[Rows]:
+    """The positions at the beginning of each second, NaN of nodes off the air; one array while nothing changes."""
+    at = np.array(positions(outcome.scenario), dtype=np.float64)
+    faults: dict[str, int] = {}
+    dead: set[int] = set()
+    found: list[Rows] = []
+    changed = True
+
+    def fill(until: int) -> None:
+        nonlocal changed
+        while len(found) < min(count, until):
+            if changed or not found:
+                now = at.copy()
+                now[[node - 1 for node in dead | set(faults.values()) if 1 <= node <= len(at)]] = np.nan
+            found.append(now if changed or not found else found[-1])
+            changed = False
+
+    for record in records_of(outcome.records, Posed, ProcessEnded, RadioFault):
+        fill(-(-record.t_ns // S))
+        if type(record) is Posed:
+            at[record.node - 1] = record.east_m, record.north_m, record.up_m
+        elif type(record) is ProcessEnded:
+            dead.add(record.node)
+        elif type(record) is RadioFault and record.kind in OFF_AIR:
+            faults.pop(record.label, None)
+            faults.update({record.label: record.node} if record.active else {})
+        changed = True
+    fill(count)
+    return found

@@ -89,6 +89,12 @@ def _network_rows(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
             f"{share} of packets x targets within it; at most {bound['worst_ms']:.0f} ms, stated for "
             f"{bound['stated_share']:.1%} of the packets; worst seen {bound['observed_max_ms']:.0f} ms, {broken}",
         )
+    missed = {name: part for name, part in summary["reachable"].items() if part["share"] is not None}
+    if any(part["share"] < 1 for part in missed.values()):
+        yield (
+            "reachable",
+            ", ".join(f"{part['pdr']:.2%} of {part['share']:.1%} in reach ({name})" for name, part in missed.items()),
+        )
     stated = summary["likely"]
     if stated:
         share = "-" if stated["within_share"] is None else f"{stated['within_share']:.2%}"

@@ -47,6 +47,11 @@ _DATA: Final = int(Kind.DATA)
 _STORE_PACKETS: Final = 4096
 """The most packets that a node keeps for repair."""
 _MOST_HELD: Final = 64
+_FIRST_WINDOWS: Final = 0.25
+"""A new bulk packet is sent at a random instant within so much of a window, which keeps apart those that heard it
+together."""
+_MOST_WINDOWS: Final = 8
+"""The most windows over which a repetition is spread."""
 _BEFORE_TURN_NS: Final = 1 * US
 """A hello is made just before the turn in which it goes is filled."""
 _PATIENT_TURNS: Final = 2
@@ -251,7 +256,7 @@ class RoundFlooding(RoutingProtocol):
 
     def _take_bulk(self, packet: Packet, *, src: int | None, from_ns: int, now_ns: int) -> None:
         """A bulk packet may be sent from an instant on."""
-        start_ns = self._pacing.start_ns(from_ns, windows=0.5)
+        start_ns = self._pacing.start_ns(from_ns, windows=_FIRST_WINDOWS)
         evicted = self._spreading.take(packet, src=src, now_ns=now_ns, bulk_from_ns=start_ns)
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
@@ -274,7 +279,8 @@ class RoundFlooding(RoutingProtocol):
             room -= size
             together.append(packet)
             times = self._spreading.sent(packet, start_ns=start_ns)
-            again_ns = self._pacing.start_ns(start_ns + 2 * self._law.hop_ns, windows=1 << times)
+            spread = min(_MOST_WINDOWS, 1 << times)
+            again_ns = self._pacing.start_ns(start_ns + 2 * self._law.hop_ns, windows=spread)
             self._spreading.look_again(packet, from_ns=again_ns)
         if together:
             self._port.transmit_together(together, flags=FLAG_FLOOD, at_ns=(start_ns,), wants_status=True)

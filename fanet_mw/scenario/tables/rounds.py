@@ -18,8 +18,9 @@ class Rounds(Section):
     """Share of a round that is left to bulk, which contends for it (0 to 0.95); 0: bulk goes in turns, too."""
     least_period_ms: Milliseconds = 0.0
     """The shortest round; 0: as short as the turns and `bulk_share` allow."""
-    repeats: Annotated[int, Field(ge=0, le=16)] = 3
-    """How often a node sends a packet again that a neighbor was not heard to pass on."""
+    repeats: Annotated[int, Field(ge=0, le=64)] = 16
+    """How often a node sends a packet again that a neighbor is not known to have, while it is not older than its
+    lifetime."""
     burst_bytes: Annotated[int, Field(ge=0, le=1_000_000)] = 4096
     """The bytes of urgent packets that may be under way at the same time under a stated bound; while a node hears of
     more it states none."""

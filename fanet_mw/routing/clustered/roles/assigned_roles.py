@@ -122,7 +122,7 @@ class AssignedRoles:
             raise MalformedFrameError(f"join of {join.node} instead of {join.instead_of} by {header.origin}")
         if self._leader is not None:
             told = decoded(packet.frame, Links.decode_frames) if parts.links is not None else None
-            self._leader.on_join(join, born_ns=born_ns, now_ns=now_ns)
+            self._leader.on_join(join, parts.joining.motion(now_ns), born_ns=born_ns, now_ns=now_ns)
             if told is not None:
                 self._leader.on_links(NodeId(join.node), told.links)
         if join.instead_of:

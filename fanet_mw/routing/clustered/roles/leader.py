@@ -7,7 +7,8 @@ An *epoch* is one assignment of nodes to clusters. The leader begins a new one w
     a node is new, or has gone                 at the next announcement; one that is reported silent may object first
     a schedule is forged in the leader's name  at the next announcement
     the links of most nodes are measured       at the next announcement, for the first time
-    the clusters or links have become too bad  `clusters.reassign_s` after the present epoch began; never if that is 0
+    the clusters or links have become too bad  `clusters.reassign_s` after the present epoch began, and once it is known
+                                               who has turned with the leader; never if `reassign_s` is 0
     the load of nodes has changed              likewise, with `clusters.load = "heard"`; after `_RELOAD_NS` if that is 0
 
 Joins come in bursts, so the leader waits until none has come for a moment, but not so long that its lease would end.
@@ -26,7 +27,7 @@ from fanet_mw.routing.clustered.clustering.division import Division, drift
 from fanet_mw.routing.clustered.roles.leader_election import Authority, silence_ns
 from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import EPOCH_BITS
-from fanet_mw.routing.clustered.roles.position_updates import lost_ns
+from fanet_mw.routing.clustered.roles.position_updates import lost_ns, settled_ns
 from fanet_mw.routing.clustered.roles.roster import Roster, sure_m
 from fanet_mw.routing.clustered.timetable.heard_load import HeardLoads
 from fanet_mw.routing.clustered.timetable.link_state import LinkState, adjacency, worth_a_change
@@ -119,6 +120,7 @@ class Leader:
             lost_ns=lost_ns(scenario),
             objection_ns=max(OBJECTION_NS, _OBJECTION_PERIODS * clusters.period_ns if needs_every_link else 0),
             sure_m=sure_m(self._range_m) if needs_every_link else None,
+            settled_ns=settled_ns(scenario),
         )
         self._division = Division(
             clusters.method, count=clusters.count, range_m=self._range_m, options=clusters.options
@@ -137,8 +139,11 @@ class Leader:
         self._not_before_ns = now_ns + ANSWER_NS if elected else now_ns
         """No assignment is made before this instant, at which all nodes have had time to answer the call."""
 
-    def on_join(self, join: Join, *, born_ns: int, now_ns: int) -> None:
-        """A node has joined, or stands in for a head. The leader itself is in no cluster (paper, 4.1)."""
+    def on_join(self, join: Join, here: Motion, *, born_ns: int, now_ns: int) -> None:
+        """A node has joined, or stands in for a head. The leader itself is in no cluster (paper, 4.1), and flies as
+        `here` states.
+        """
+        self._roster.own.add(here)
         node, silent = NodeId(join.node), NodeId(join.instead_of)
         if node == self._authority.leader:
             return
@@ -187,6 +192,7 @@ class Leader:
         """
         if now_ns < self._due_ns:
             return []
+        self._roster.own.add(here)
         self._roster.forget(now_ns)
         if self._roster.nodes and now_ns >= self._not_before_ns:
             self._renew(here, notice_ns, now_ns)
@@ -216,7 +222,7 @@ class Leader:
         notice_ns = max(HEARD_NS, notice_ns, measured_ns)
         decided_ns = max(now_ns, self._announced_ns + self._period_ns)  # nodes expect no new schedule within a period
         start_ns = (decided_ns + notice_ns) // self._period_ns * self._period_ns + self._period_ns
-        places = self._places(here, start_ns)
+        places = self._places(here, start_ns, now_ns)
         members = {node: place for node, place in places.items() if node != self._authority.leader}
         links = within_range(places, range_m=self._range_m) if not measured else adjacency(measured, places)
         near = within_range(members, range_m=self._range_m) if not measured else adjacency(measured, members)
@@ -227,7 +233,8 @@ class Leader:
             moved = worth_a_change(before.measured, measured)
         else:
             moved = self._by_links and drift(before.links, links) > _DRIFT
-        if not changed and same and not moved and not loaded:
+        worse = (moved or not same) and not (self._by_links and self._roster.is_turning(now_ns))
+        if not changed and not worse and not loaded:
             return
         self._roster.forget_reports()
         ordered = [Cluster(cluster.head, succession(cluster, swarm)) for cluster in clusters]
@@ -258,10 +265,10 @@ class Leader:
         known = self._assigned.measured or self._estimates.links.known(nodes) >= _MOST * len(nodes)
         return self._estimates.links.between(nodes) if known else ()
 
-    def _places(self, here: Motion, start_ns: int) -> dict[NodeId, Enu]:
+    def _places(self, here: Motion, start_ns: int, now_ns: int) -> dict[NodeId, Enu]:
         """The positions of all nodes in the middle of the time for which the assignment is made."""
         t_ns = start_ns + self._reassign_ns // 2
-        places = self._roster.places(t_ns) | {NodeId(self._authority.leader): here.position_at(t_ns)}
+        places = self._roster.places(t_ns, now_ns=now_ns) | {NodeId(self._authority.leader): here.position_at(t_ns)}
         return {node: places[node] for node in sorted(places)}
 
     def _parts(self, clusters: list[Cluster], start_ns: int) -> list[Schedule]:

@@ -38,6 +38,19 @@ def lost_ns(scenario: Scenario) -> int:
     return 2 * update_ns + _A_LITTLE_NS
 
 
+def settled_ns(scenario: Scenario) -> int:
+    """The time after which the leader has been told of a turn that all nodes made together.
+
+    Until then it believes that some have turned and others have not, and so that the swarm falls apart. Each notices
+    when it has strayed, and updates with the next hello in its share of the spread, at most once per `_LEAST_NS`.
+    """
+    routing, clusters = scenario.routing, scenario.clusters
+    speed_m_s = max(scenario.mobility.speed_m_s, 1.0)
+    straying_ns = round(STRAYED * (clusters.link_m or scenario.radio.range_m) / speed_m_s * S)
+    hello_ns = round(_HELLO_VARIES * seconds_to_ns(routing.hello_interval_s))
+    return straying_ns + _LEAST_NS + hello_ns + UPDATE_NS * (1 + scenario.nodes.count) + clusters.period_ns
+
+
 class PositionUpdates:
     """The leader's belief about the motion of one node, as that node knows it."""
 

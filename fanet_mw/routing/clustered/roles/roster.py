@@ -1,5 +1,10 @@
 """The nodes that the leader knows: their motions, from joins, and which of them are reported silent.
 
+    position of a node   where it was, flown on straight with the velocity that it stated
+    of a companion       the same, moved by as much as the leader has strayed from straight flight since: a node whose
+                         velocity was the leader's. So a formation that turns keeps its shape before its updates have
+                         come. One that has sent none although the leader has turned long ago has not turned along
+
     a node joins              -> it is known until it has given no sign of life for `lost_ns`, in which it should have
                                  sent two position updates
     it is reported silent     -> it may object for `objection_ns` -> it is forgotten unless it has objected
@@ -7,15 +12,20 @@
 Any packet that the node has generated after the report counts as its objection.
 """
 
+from collections import deque
 from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 from fanet_mw.motion import Motion
 from fanet_mw.routing.clustered.roles.liveness import Liveness
-from fanet_mw.units import Enu, NodeId, S
+from fanet_mw.units import MS, Enu, NodeId, S
 
 _MISSED_NS: Final = 4 * S
 """About the time for which a node has been silent when it is reported."""
+_ALONG_M_S: Final = 2.0
+"""The difference of velocities up to which a node flies with the leader."""
+_SAMPLE_NS: Final = 200 * MS
+_FLOWN_NS: Final = 60 * S
 _SURE: Final = 0.9
 """The share of the radio range within which two nodes certainly hear each other, given the accuracy of positions."""
 
@@ -32,15 +42,56 @@ class _SilentNode(NamedTuple):
     """The instant at which the report was made; if the node has generated a packet after it, it is alive."""
 
 
+def alike(one: Motion, other: Motion) -> bool:
+    """True if two velocities are those of one formation."""
+    return one.velocity.minus(other.velocity).norm() <= _ALONG_M_S
+
+
+class OwnFlight:
+    """Where the leader itself was in the last minute."""
+
+    def __init__(self) -> None:
+        self._flown: deque[Motion] = deque()
+
+    def add(self, here: Motion) -> None:
+        """The leader's motion now."""
+        if not self._flown or here.at_ns >= self._flown[-1].at_ns + _SAMPLE_NS:
+            self._flown.append(here)
+        while self._flown[0].at_ns < here.at_ns - _FLOWN_NS:
+            self._flown.popleft()
+
+    def at(self, t_ns: int) -> Motion | None:
+        """The motion at an instant of the last minute, or after it; None if it is not known."""
+        if not self._flown or t_ns < self._flown[0].at_ns - _SAMPLE_NS:
+            return None
+        nearest = min(self._flown, key=lambda motion: abs(motion.at_ns - t_ns))
+        return Motion(nearest.position_at(t_ns), nearest.velocity, t_ns)
+
+    def turned_ns(self, from_ns: int) -> int | None:
+        """When the leader's velocity was first another one than at an instant; None if it has flown straight."""
+        then = self.at(from_ns)
+        if then is None:
+            return None
+        for motion in self._flown:
+            if motion.at_ns > from_ns and not alike(motion, then):
+                return motion.at_ns
+        return None
+
+
 class Roster:
     """The nodes that one leader knows; the leader itself is not among them."""
 
-    def __init__(self, liveness: Liveness, *, lost_ns: int, objection_ns: int, sure_m: float | None) -> None:
+    def __init__(
+        self, liveness: Liveness, *, lost_ns: int, objection_ns: int, sure_m: float | None, settled_ns: int
+    ) -> None:  # fmt: skip
         """A node is forgotten `lost_ns` after its last sign of life, or `objection_ns` after it was reported silent.
 
         `sure_m`: a report counts only if the reported node was all the time within this distance of the reporting one,
         so that they should have heard each other; None means that every report counts.
+        `settled_ns`: the time after which all updates about one turn have come.
         """
+        self.own = OwnFlight()
+        self._settled_ns = settled_ns
         self._liveness = liveness
         self._lost_ns = lost_ns
         self._objection_ns = objection_ns
@@ -110,9 +161,30 @@ class Roster:
         """Forget reports about nodes that are no longer known, because an assignment without them has been made."""
         self._reports = {silent: report for silent, report in self._reports.items() if silent in self._motions}
 
-    def places(self, t_ns: int) -> dict[NodeId, Enu]:
-        """The positions of all nodes at an instant, if they fly on straight, by id."""
-        return {node: self._motions[node].position_at(t_ns) for node in sorted(self._motions)}
+    def places(self, t_ns: int, *, now_ns: int) -> dict[NodeId, Enu]:
+        """The positions of all nodes at an instant, if they fly on straight, or with the leader, by id."""
+        return {node: self._place(self._motions[node], t_ns, now_ns) for node in sorted(self._motions)}
+
+    def _place(self, motion: Motion, t_ns: int, now_ns: int) -> Enu:
+        straight = motion.position_at(t_ns)
+        beside, here = self.own.at(motion.at_ns), self.own.at(now_ns)
+        if beside is None or here is None or not alike(motion, beside):
+            return straight
+        if now_ns - motion.at_ns > self._settled_ns:
+            turned_ns = self.own.turned_ns(motion.at_ns)
+            if turned_ns is None or now_ns - turned_ns > self._settled_ns:
+                return straight
+        return straight.minus(beside.position_at(t_ns).minus(here.position_at(t_ns)))
+
+    def is_turning(self, now_ns: int) -> bool:
+        """True while it is not known which companions have turned with the leader."""
+        for motion in self._motions.values():
+            turned_ns = self.own.turned_ns(motion.at_ns)
+            if turned_ns is not None and now_ns - turned_ns <= self._settled_ns:
+                beside = self.own.at(motion.at_ns)
+                if beside is not None and alike(motion, beside):
+                    return True
+        return False
 
     def velocities(self) -> Mapping[NodeId, Enu]:
         """The velocities of the nodes [m/s], by id."""

@@ -33,7 +33,7 @@ class Desk:
     def join(self, node: int, east_m: float, *, born_ns: int, instead_of: int = 0) -> None:
         join = Join(node, Enu(east_m, 0.0, 50.0), STILL, instead_of)
         self.liveness.on_sign_of_life(node, born_ns=born_ns)
-        self.leader.on_join(join, born_ns=born_ns, now_ns=born_ns)
+        self.leader.on_join(join, HERE._replace(at_ns=born_ns), born_ns=born_ns, now_ns=born_ns)
 
     def announce(self) -> tuple[int, Sequence[Schedule]]:
         """The next announcement, and when."""

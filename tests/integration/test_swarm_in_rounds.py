@@ -79,3 +79,16 @@ def test_a_partition_that_ends_leaves_nobody_without_a_packet() -> None:
     cuts = [{"kind": "cut", "at_s": 6, "for_s": 3, "node": node} for node in (3, 8, 13)]
     summary = flown(faults=cuts, drain_s=6, duration_s=18)
     assert summary["pdr"] >= 0.999
+
+
+def test_receivers_tell_soon_enough_what_they_hold_where_many_hear_each_other() -> None:
+    """Who is not told in time sends again: 16 nodes in reach of each other, 400 packets of bulk a second."""
+    tree = {
+        **BASE, "nodes": {**BASE["nodes"], "count": 16, "columns": 4, "spacing_m": 40}, "duration_s": 7, "drain_s": 2,
+        "traffic": {**BASE["traffic"], "interval_s": 0.04, "priority": "bulk", "sources": 16},
+    }  # fmt: skip
+    outcome = simulate(config.build(tree))
+    summary = finish(outcome, out=None)
+    assert summary["pdr"] == 1.0
+    repeated = sum(report.get("repeated", 0) for report in outcome.reports.values())
+    assert repeated < 0.1 * summary["generated"]

@@ -8,9 +8,9 @@ the turn, and is handed over. `h` is the greatest distance that the node knows t
 that changes meanwhile. All urgent packets that are under way together, `B` bytes, delay each other once: every node
 serves them at the same rate, one frame of `room` bytes per round, so what waited for one node's turn does not wait
 again for the next one's (tandem of equal servers; Le Boudec and Thiran, Network Calculus, 1.4.3).
-Assumed: no frame is lost. No bound is stated while more than B bytes were heard in the time that they take, nor while a
-node has been out of reach for less than the silence by which it is known to be gone; nodes gone for longer are not
-among those to which a bound applies.
+Assumed: no frame is lost, so over any channel but `range` no bound is stated. None is stated either while more than B
+bytes were heard in the time that they take, or while a node has been out of reach for less than the silence by which it
+is known to be gone; nodes gone for longer are not among those to which a bound applies.
 """
 
 from collections import deque
@@ -33,6 +33,7 @@ class DelayLaw:
 
     def __init__(self, timing: RoundTiming, scenario: Scenario) -> None:
         self._timing = timing
+        self._loses_frames = scenario.radio.channel != "range" or scenario.radio.fading != "none"
         self._burst_bytes = scenario.rounds.burst_bytes
         self._burst_ns = -(-self._burst_bytes // timing.turn_bytes) * timing.period_ns
         self.hop_ns = timing.period_ns + timing.turn_ns + scenario.radio.lead_ns + scenario.radio.handover_ns
@@ -53,6 +54,8 @@ class DelayLaw:
 
     def bound_ns(self, topology: Topology, *, now_ns: int) -> int | None:
         """The bound for a packet that is handed over now; None if none can be stated."""
+        if self._loses_frames:
+            return None
         while self._recent and self._recent[0][0] < now_ns - self._burst_ns:
             self._recent_bytes -= self._recent.popleft()[1]
         if self._recent_bytes > self._burst_bytes or self.absent(topology, now_ns=now_ns) is None:

@@ -46,7 +46,8 @@ from fanet_mw.wire.rounds import (
 _DATA: Final = int(Kind.DATA)
 _STORE_PACKETS: Final = 4096
 """The most packets that a node keeps for repair."""
-_MOST_HELD: Final = 64
+_MOST_HELD: Final = 512
+_MOST_TOLD: Final = 4096
 _FIRST_WINDOWS: Final = 0.25
 """A new bulk packet is sent at a random instant within so much of a window, which keeps apart those that heard it
 together."""
@@ -93,6 +94,8 @@ class RoundFlooding(RoutingProtocol):
         """The requests of hellos of which the clock wants to know when they ended."""
         self._held: dict[HeldPacket, None] = {}
         """Packets of which a neighbor should be told that this node holds them."""
+        self._told_ns: dict[HeldPacket, int] = {}
+        """When neighbors were last told of each packet, the latest last."""
         self._hello: Packet | None = None
         self._hello_waits = 0
         """The number of turns in which the hello found no room."""
@@ -132,7 +135,7 @@ class RoundFlooding(RoutingProtocol):
         elif self._in_turns(packet):
             self._take(packet, src=src, now_ns=now_ns)
         else:
-            self._tell_held(packet.header.seq, packet.header.origin)
+            self._tell_held(packet.header.seq, packet.header.origin, now_ns)
             self._take_bulk(packet, src=src, from_ns=now_ns + self._lead_ns, now_ns=now_ns)
 
     def on_copy(self, key: int, src: NodeId, *, now_ns: int) -> None:
@@ -141,7 +144,7 @@ class RoundFlooding(RoutingProtocol):
             self._repair.on_copy(key, now_ns=now_ns)
         if self._spreading.on_copy(key, src, now_ns=now_ns):
             origin, seq = origin_and_seq(key)
-            self._tell_held(seq, origin)
+            self._tell_held(seq, origin, now_ns)
 
     def _state_bound(self, packet: Packet, now_ns: int) -> None:
         """State by when all nodes have an own packet, if that is known."""
@@ -162,10 +165,12 @@ class RoundFlooding(RoutingProtocol):
         if self._repair is not None and packet.header.destination == BROADCAST and self._in_turns(packet):
             self._repair.hold(packet, flooded=True, expect_ns=now_ns, now_ns=now_ns)
 
-    def _tell_held(self, seq: int, origin: int) -> None:
+    def _tell_held(self, seq: int, origin: int, now_ns: int) -> None:
         """Tell the neighbors in the next turns that this node has a packet."""
-        if len(self._held) < _MOST_HELD:
-            self._held[HeldPacket(seq, origin)] = None
+        held = HeldPacket(seq, origin)
+        if len(self._held) >= _MOST_HELD or now_ns - self._told_ns.get(held, -self._law.hop_ns) < self._law.hop_ns:
+            return  # who sent this copy could not know yet what was told lately
+        self._held[held] = None
 
     # --- turns ----------------------------------------------------------------------------------------------------
 
@@ -229,11 +234,15 @@ class RoundFlooding(RoutingProtocol):
         room -= HEADER_BYTES
         inner = b""
         if self._held and room >= HELD_BYTES:
-            told = list(self._held)[:CAPACITY]
+            told = list(self._held)[: room // HELD_BYTES * CAPACITY]
             for each in told:
                 del self._held[each]
+                self._told_ns.pop(each, None)
+                self._told_ns[each] = now_ns
+            while len(self._told_ns) > _MOST_TOLD:
+                del self._told_ns[next(iter(self._told_ns))]
             inner += encode_held(told, self._port.node)
-            room -= HELD_BYTES
+            room -= HELD_BYTES * -(-len(told) // CAPACITY)
         if self._topology.has_news and room >= HEARD_BYTES:
             count = self._port.scenario.node_count
             most = room // HEARD_BYTES * heard_capacity(count)
@@ -268,7 +277,10 @@ class RoundFlooding(RoutingProtocol):
         start_ns = self._bulk_ns
         assert start_ns is not None, "bulk is sent when it is due"
         room, together = self._timing.bulk_bytes, list[Packet]()
-        for packet, again in self._spreading.bulk_wanted(self._neighbors(now_ns), start_ns=start_ns):
+        wanted, later = self._spreading.bulk_wanted(self._neighbors(now_ns), start_ns=start_ns)
+        for packet, _, from_ns in later:
+            self._spreading.look_again(packet, from_ns=self._pacing.start_ns(from_ns, windows=_FIRST_WINDOWS))
+        for packet, again, _ in wanted:
             if self._expired(packet, start_ns):
                 continue
             size = len(packet.frame)

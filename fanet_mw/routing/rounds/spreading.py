@@ -12,7 +12,8 @@ round must have passed in which nobody else sent it, so that mostly one node rep
 """
 
 from collections.abc import Callable, Collection
-from typing import Final
+from heapq import heappop, heappush
+from typing import Final, NamedTuple
 
 from fanet_mw.node.duplicates import key_of
 from fanet_mw.node.packet import Packet
@@ -27,10 +28,18 @@ def _key(packet: Packet) -> int:
     return key_of(packet.header.origin, packet.header.seq)
 
 
+class Bulk(NamedTuple):
+    """A bulk packet, whether it was sent or left to others before, and the instant from which it may be sent."""
+
+    packet: Packet
+    again: bool
+    from_ns: int
+
+
 class _Spread:
     """A packet, and what is known of it."""
 
-    __slots__ = ("copy_ns", "from_ns", "having", "packet", "rank", "reached", "sent", "sent_ns")
+    __slots__ = ("copy_ns", "from_ns", "having", "left", "packet", "rank", "reached", "sent", "sent_ns")
 
     def __init__(self, packet: Packet, rank: tuple[int, int], src: int | None, from_ns: int) -> None:
         self.packet = packet
@@ -42,15 +51,17 @@ class _Spread:
         """The instant at which a copy was last heard."""
         self.having: set[int] = set() if src is None else {src}
         """The neighbors that are known to have it."""
-        self.reached: set[int] | None = set()
-        """Bulk: the nodes in reach of those that were heard to send it; None once that was looked at."""
+        self.reached: set[int] = set()
+        """Bulk: the nodes in reach of those that were heard to send it."""
+        self.left = False
+        """Bulk: true once it was left to others, because nobody lacked it."""
         self.from_ns = from_ns
         """Bulk: the instant before which it need not be looked at."""
 
     @property
     def again(self) -> bool:
         """Bulk: True if it was sent, or left to others, before."""
-        return self.reached is None or self.sent > 0
+        return self.left or self.sent > 0
 
 
 class Spreading:
@@ -71,6 +82,8 @@ class Spreading:
         self._waiting: set[int] = set()
         """The urgent ones that wait for a turn."""
         self._bulk: dict[int, _Spread] = {}
+        self._due: list[tuple[int, int]] = []
+        """A heap of the instants and keys at which bulk is looked at; outdated entries are skipped."""
         self._order = 0
         self.repeated = 0
 
@@ -103,6 +116,7 @@ class Spreading:
             self._waiting.add(key)
         else:
             self._bulk[key] = entry
+            heappush(self._due, (bulk_from_ns, key))
             self._reach(entry, src, now_ns)
         if len(self._entries) <= self._capacity:
             return None
@@ -129,7 +143,7 @@ class Spreading:
 
     def _reach(self, entry: _Spread, src: int | None, now_ns: int) -> None:
         """A neighbor was heard to send a bulk packet, which those that hear the neighbor have, too."""
-        if src is not None and entry.reached is not None:
+        if src is not None and not entry.again:
             entry.reached.add(src)
             entry.reached.update(self._neighbors_of(src, now_ns))
 
@@ -175,32 +189,49 @@ class Spreading:
         self._remove(key)
         return fresh
 
-    def bulk_wanted(self, neighbors: Collection[int], *, start_ns: int) -> list[tuple[Packet, bool]]:
-        """The bulk for a frame that starts at `start_ns`, what is new first, each with whether it is sent again.
+    def bulk_wanted(self, neighbors: Collection[int], *, start_ns: int) -> tuple[list[Bulk], list[Bulk]]:
+        """The bulk for a frame that starts at `start_ns`, what is new first, and what is to be looked at later.
 
         What nobody lacks is forgotten.
         """
-        done, chosen = [], []
-        for key, entry in self._bulk.items():
-            if entry.from_ns > start_ns:
+        chosen, later = list[_Spread](), list[Bulk]()
+        while self._due and self._due[0][0] <= start_ns:
+            from_ns, key = heappop(self._due)
+            entry = self._bulk.get(key)
+            if entry is None or entry.from_ns != from_ns:
                 continue
             if entry.sent > self._repeats or (entry.having and entry.having.issuperset(neighbors)):
-                done.append(key)
-            elif entry.reached and entry.reached.issuperset(neighbors):
-                entry.reached, entry.from_ns = None, start_ns + _WAY_ROUND * self._patience_ns
-            elif entry.again and entry.copy_ns > start_ns - self._patience_ns:
-                entry.from_ns = entry.copy_ns + self._patience_ns  # somebody else is at it
+                self._remove(key)
+                continue
+            next_ns = self._not_before_ns(entry, neighbors, start_ns)
+            if next_ns > start_ns:
+                later.append(Bulk(entry.packet, entry.again, next_ns))
             else:
                 chosen.append(entry)
-        for key in done:
-            self._remove(key)
         chosen.sort(key=lambda entry: (entry.again, entry.rank))
-        return [(entry.packet, entry.again) for entry in chosen]
+        return [Bulk(entry.packet, entry.again, start_ns) for entry in chosen], later
+
+    def _not_before_ns(self, entry: _Spread, neighbors: Collection[int], start_ns: int) -> int:
+        """The instant before which others may do what sending this packet would."""
+        if entry.again:
+            return entry.copy_ns + self._patience_ns  # somebody else is at it
+        if neighbors and entry.reached.issuperset(neighbors):
+            entry.left = True
+            return start_ns + _WAY_ROUND * self._patience_ns
+        return start_ns
 
     def look_again(self, packet: Packet, *, from_ns: int) -> None:
         """Look at a bulk packet again from an instant on: does a neighbor still lack it?"""
-        self._bulk[_key(packet)].from_ns = from_ns
+        key = _key(packet)
+        self._bulk[key].from_ns = from_ns
+        heappush(self._due, (from_ns, key))
 
     def bulk_due_ns(self) -> int | None:
         """The instant before which no bulk need be looked at; None if there is none."""
-        return min((entry.from_ns for entry in self._bulk.values()), default=None)
+        while self._due:
+            from_ns, key = self._due[0]
+            entry = self._bulk.get(key)
+            if entry is not None and entry.from_ns == from_ns:
+                return from_ns
+            heappop(self._due)
+        return None

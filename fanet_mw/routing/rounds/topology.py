@@ -5,7 +5,7 @@ and whenever a node was started. A node states at the beginning of an epoch whet
 per second in any case. A link counts if both its ends state it.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from fanet_mw.graph.topology import Adjacency
@@ -13,6 +13,14 @@ from fanet_mw.units import NodeId, S
 from fanet_mw.wire.rounds import HeardNodes
 
 _MODULUS: Final = 256
+
+
+def _nodes(heard: int) -> Iterator[NodeId]:
+    """The nodes of a set of bits, in order."""
+    while heard:
+        last = heard & -heard
+        yield NodeId(last.bit_length())
+        heard ^= last
 
 
 class _Stated(NamedTuple):
@@ -97,7 +105,7 @@ class Topology:
         self._arranged_for = epoch
         alive = {n: one.heard for n, one in sorted(self._stated.items()) if one.epoch >= epoch - self._lifetime}
         self._links = {
-            n: tuple(m for m in alive if heard >> (m - 1) & 1 and alive[m] >> (n - 1) & 1) for n, heard in alive.items()
+            n: tuple(m for m in _nodes(heard) if alive.get(m, 0) >> (n - 1) & 1) for n, heard in alive.items()
         }
         hops, ring = {self._node: 0}, [self._node]
         while ring:

@@ -84,11 +84,13 @@ def bulk(seq: int) -> Packet:
 
 
 def bulk_sent(made: Spreading, at_ns: int, *, neighbors: tuple[int, ...] = (2, 3)) -> list[int]:
-    chosen = made.bulk_wanted(neighbors, start_ns=at_ns)
-    for each, _ in chosen:
-        made.sent(each, start_ns=at_ns)
-        made.look_again(each, from_ns=at_ns + 2 * ROUND)
-    return [each.header.seq for each, _ in chosen]
+    chosen, later = made.bulk_wanted(neighbors, start_ns=at_ns)
+    for each in later:
+        made.look_again(each.packet, from_ns=each.from_ns)
+    for each in chosen:
+        made.sent(each.packet, start_ns=at_ns)
+        made.look_again(each.packet, from_ns=at_ns + 2 * ROUND)
+    return [each.packet.header.seq for each in chosen]
 
 
 def test_bulk_is_not_sent_where_those_who_sent_it_reach_every_neighbor() -> None:

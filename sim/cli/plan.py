@@ -14,9 +14,10 @@ from typing import Any, Final
 from agents.applications.traffic import sources_of
 from agents.ground_control.telemetry_pace import pace_of
 from agents.positioning.steady_fix import error_m
+from emulator.channel.propagation import heard_m
 from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.errors import ConfigError
-from fanet_mw.graph.topology import within_range
+from fanet_mw.graph.topology import levels, within_range
 from fanet_mw.planner import (
     ClassPlan,
     Loss,
@@ -45,8 +46,11 @@ from fanet_mw.planner.plan_text import item
 from fanet_mw.rng import stream
 from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE
 from fanet_mw.routing.clustered.timetable.turn_size import links
+from fanet_mw.routing.rounds.delay_law import DelayLaw
+from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
+from fanet_mw.wire import HEADER_BYTES
 from fanet_mw.wire.places import rounded
 from sim.expected_channel.expected_links import expected_links
 from sim.expected_channel.reception_probability import chance_of
@@ -66,13 +70,14 @@ def judge(
     `change`: search the cheapest change if it is not feasible. `search`: search the configuration with the least
     airtime.
     """
-    if scenario.routing.protocol != "clustered":
-        raise ConfigError(f'routing.protocol = {scenario.routing.protocol}: only "clustered" can be planned')
-    if deadline_s is not None and not (math.isfinite(deadline_s) and deadline_s > 0):
-        raise ConfigError(f"--deadline {deadline_s:g}: must be > 0 [s]")
+    if scenario.routing.protocol not in ("clustered", "rounds"):
+        raise ConfigError(
+            f'routing.protocol = {scenario.routing.protocol}: only "clustered" and "rounds" can be planned'
+        )
+    deadline_ns = _deadline_ns(scenario, deadline_s)
     at = dict(zip(map(NodeId, scenario.node_ids), positions(scenario), strict=True))
-    wanted_s = scenario.traffic.deadline_s if deadline_s is None else deadline_s
-    deadline_ns = None if wanted_s is None else seconds_to_ns(wanted_s)
+    if scenario.routing.protocol == "rounds":
+        return _judge_rounds(scenario, at, deadline_ns=deadline_ns)
     sources = [NodeId(node) for node in sources_of(scenario)]
     if scenario.measures_links:
         announced = {node: rounded(place) for node, place in at.items()}
@@ -83,7 +88,7 @@ def judge(
         return describe(found), {"feasible": False, "problems": [found.reason]}, False
     found, missed = _with_loss(with_capacity(found, at), at)
     left = tuple(not_counted(scenario))
-    operator = _operator(found)
+    operator = _operator(scenario, [c.bound.delay_ns for c in found.classes if isinstance(c.bound, Bounded)])
     text, content = [describe(found)], {**_json(found), "not_counted": list(left)}
     if operator is not None:
         text.append(item("operator", operator))
@@ -120,12 +125,72 @@ def judge(
     return "\n".join(text), content, found.feasible
 
 
-def _operator(found: ScenarioPlan) -> str | None:
+def _deadline_ns(scenario: Scenario, deadline_s: float | None) -> int | None:
+    if deadline_s is not None and not (math.isfinite(deadline_s) and deadline_s > 0):
+        raise ConfigError(f"--deadline {deadline_s:g}: must be > 0 [s]")
+    wanted_s = scenario.traffic.deadline_s if deadline_s is None else deadline_s
+    return None if wanted_s is None else seconds_to_ns(wanted_s)
+
+
+def _judge_rounds(
+    scenario: Scenario, at: Mapping[NodeId, Enu], *, deadline_ns: int | None
+) -> tuple[str, dict[str, Any], bool]:
+    """The verdict on rounds: the bound over the hops that the starting positions need, and the load of the turns."""
+    timing = RoundTiming.of(scenario)
+    law = DelayLaw(timing, scenario)
+    near = within_range(at, range_m=heard_m(scenario.radio))
+    hops = max(max(levels(near, node).values()) for node in at)
+    bound_ns = law.over_ns(hops)
+    urgent = {
+        name: each for name, each in scenario.traffic_classes.items() if each.priority != "bulk" or not timing.window_ns
+    }
+    offered = sum(
+        len(sources_of(scenario, name)) / each.interval_s * (each.longest_bytes + HEADER_BYTES)
+        for name, each in urgent.items()
+    )
+    carried = timing.turn_bytes / (timing.period_ns / S)
+    longest = max((each.longest_bytes + HEADER_BYTES for each in urgent.values()), default=0)
+    problems = list[str]()
+    if longest > timing.turn_bytes:
+        problems.append(f"urgent packets of {longest} B are longer than rounds.turn_bytes = {timing.turn_bytes}")
+    if any(len(levels(near, node)) < len(at) for node in at):
+        problems.append("the nodes are not all connected at their starting positions")
+    if offered > carried:
+        problems.append(f"urgent packets of {offered:.0f} B/s are more than the {carried:.0f} B/s that turns carry")
+    if deadline_ns is not None and (bound_ns is None or bound_ns > deadline_ns):
+        problems.append(f"the bound is not within the deadline of {deadline_ns / MS:.0f} ms")
+    feasible = not problems
+    bound = "none: the channel loses frames" if bound_ns is None else f"at most {bound_ns / MS:.0f} ms over {hops} hops"
+    text = [
+        f"{'FEASIBLE' if feasible else 'NOT FEASIBLE'}  {scenario.name}: {scenario.nodes.count} nodes, a round of "
+        f"{timing.period_ns / MS:.1f} ms: turns of {timing.turn_ns / MS:.2f}, {timing.window_ns / MS:.1f} for bulk",
+        *(item("problem", problem) for problem in problems),
+        item(
+            "urgent",
+            f"{bound} at the starting positions, {law.hop_ns / MS:.1f} ms for each further hop, while at most "
+            f"{scenario.rounds.burst_bytes} B are under way; from {law.silent_ns / S:.1f} s on, when links are known",
+        ),
+        item("turns", f"carry {carried / 1000:.1f} kB/s of urgent packets, the traffic has {offered / 1000:.1f} kB/s"),
+        item("bulk", "contends in the window, without a bound" if timing.window_ns else "goes in turns, too"),
+    ]
+    content: dict[str, Any] = {
+        "feasible": feasible, "problems": problems, "period_ms": timing.period_ns / MS, "turn_ms": timing.turn_ns / MS,
+        "window_ms": timing.window_ns / MS, "hop_ms": law.hop_ns / MS, "hops": hops,
+        "bound_ms": None if bound_ns is None else bound_ns / MS, "from_s": law.silent_ns / S,
+        "carried_bytes_per_s": carried, "offered_bytes_per_s": offered,
+    }  # fmt: skip
+    operator = _operator(scenario, [] if bound_ns is None else [bound_ns])
+    if operator is not None:
+        text.append(item("operator", operator))
+        content["operator"] = operator
+    return "\n".join(text), content, feasible
+
+
+def _operator(scenario: Scenario, bounds: list[int]) -> str | None:
     """What a ground station in band may count on; None without a post on the ground."""
-    if found.scenario.post is None:
+    if scenario.post is None:
         return None
-    pace = pace_of(found.scenario)
-    bounds = [c.bound.delay_ns for c in found.classes if isinstance(c.bound, Bounded)]
+    pace = pace_of(scenario)
     delay = (
         f"a command, and its acknowledgment, each within {max(bounds) / MS:.0f} ms, "
         "when the post sends as often as a source"

@@ -54,14 +54,16 @@ class DelayLaw:
 
     def bound_ns(self, topology: Topology, *, now_ns: int) -> int | None:
         """The bound for a packet that is handed over now; None if none can be stated."""
-        if self._loses_frames:
-            return None
         while self._recent and self._recent[0][0] < now_ns - self._burst_ns:
             self._recent_bytes -= self._recent.popleft()[1]
         if self._recent_bytes > self._burst_bytes or self.absent(topology, now_ns=now_ns) is None:
             return None
         hops = topology.hops(now_ns)
-        return (max(hops.values()) + MARGIN_HOPS) * self.hop_ns + self._burst_ns if len(hops) > 1 else None
+        return self.over_ns(max(hops.values())) if len(hops) > 1 else None
+
+    def over_ns(self, hops: int) -> int | None:
+        """The bound over so many hops; None if the channel loses frames."""
+        return None if self._loses_frames else (hops + MARGIN_HOPS) * self.hop_ns + self._burst_ns
 
     def absent(self, topology: Topology, *, now_ns: int) -> Sequence[NodeId] | None:
         """The nodes to which a bound does not apply, because they are gone; None while some may just have gone."""

@@ -49,8 +49,10 @@ _STORE_PACKETS: Final = 4096
 _MOST_HELD: Final = 512
 _MOST_TOLD: Final = 4096
 _FIRST_WINDOWS: Final = 0.25
-"""A new bulk packet is sent at a random instant within so much of a window, which keeps apart those that heard it
-together."""
+"""A new bulk packet is sent at a random instant within so much of a window, and twice the time for which nodes do not
+know of each other's decisions, which keeps apart those that heard it together."""
+_SPARE_HOPS: Final = 2
+"""The hops for which a node that is not in the dominating set waits for others to send a new bulk packet."""
 _MOST_WINDOWS: Final = 8
 """The most windows over which a repetition is spread."""
 _BEFORE_TURN_NS: Final = 1 * US
@@ -88,6 +90,9 @@ class RoundFlooding(RoutingProtocol):
                 random=port.stream("repair").random, flood_over_ns=max(4 * FLOOD_OVER_NS, 16 * self._law.hop_ns),
             )  # fmt: skip
         self._pacing = BulkPacing(timing, port.stream("rounds").random)
+        self._blind_ns = self._lead_ns + radio.handover_ns
+        """The time that passes from the decision to send until others know of it, airtime and waiting left out."""
+        self._first_windows = _FIRST_WINDOWS + 2 * self._blind_ns / max(1, timing.window_ns)
         self._bulk_ns: int | None = None
         """The next instant at which this node contends with bulk; None if it has none."""
         self._clock_hellos: set[int] = set()
@@ -265,7 +270,9 @@ class RoundFlooding(RoutingProtocol):
 
     def _take_bulk(self, packet: Packet, *, src: int | None, from_ns: int, now_ns: int) -> None:
         """A bulk packet may be sent from an instant on."""
-        start_ns = self._pacing.start_ns(from_ns, windows=_FIRST_WINDOWS)
+        if src is not None and not self._topology.dominates(now_ns):
+            from_ns += _SPARE_HOPS * self._law.hop_ns
+        start_ns = self._pacing.start_ns(from_ns, windows=self._first_windows)
         evicted = self._spreading.take(packet, src=src, now_ns=now_ns, bulk_from_ns=start_ns)
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
@@ -292,7 +299,7 @@ class RoundFlooding(RoutingProtocol):
             together.append(packet)
             times = self._spreading.sent(packet, start_ns=start_ns)
             spread = min(_MOST_WINDOWS, 1 << times)
-            again_ns = self._pacing.start_ns(start_ns + 2 * self._law.hop_ns, windows=spread)
+            again_ns = self._pacing.start_ns(start_ns + 2 * (self._law.hop_ns + self._blind_ns), windows=spread)
             self._spreading.look_again(packet, from_ns=again_ns)
         if together:
             self._port.transmit_together(together, flags=FLAG_FLOOD, at_ns=(start_ns,), wants_status=True)

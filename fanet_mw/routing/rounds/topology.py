@@ -8,6 +8,7 @@ per second in any case. A link counts if both its ends state it.
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
+from fanet_mw.graph.connected_dominating_set import dominates
 from fanet_mw.graph.topology import Adjacency
 from fanet_mw.units import NodeId, S
 from fanet_mw.wire.rounds import HeardNodes
@@ -44,6 +45,8 @@ class Topology:
         self._own_epoch = -1
         self._links: Adjacency = {}
         self._hops: Mapping[NodeId, int] = {node: 0}
+        self._dominates: bool | None = None
+        """Whether this node is in the dominating set; None if that must be computed anew."""
         self._unreached_ns: dict[NodeId, int] = {}
         """The instant since which each node without a way is known to have none."""
         self._arranged_for = -1
@@ -102,7 +105,7 @@ class Topology:
         epoch = now_ns // self._epoch_ns
         if self._arranged_for == epoch:
             return
-        self._arranged_for = epoch
+        self._arranged_for, self._dominates = epoch, None
         alive = {n: one.heard for n, one in sorted(self._stated.items()) if one.epoch >= epoch - self._lifetime}
         self._links = {
             n: tuple(m for m in _nodes(heard) if alive.get(m, 0) >> (n - 1) & 1) for n, heard in alive.items()
@@ -127,6 +130,13 @@ class Topology:
         """The nodes with which a node has links."""
         self._arrange(now_ns)
         return self._links.get(NodeId(node), ())
+
+    def dominates(self, now_ns: int) -> bool:
+        """True if this node is one of the connected dominating set whose transmissions reach all nodes."""
+        self._arrange(now_ns)
+        if self._dominates is None:
+            self._dominates = self._node not in self._links or dominates(self._node, self._links)
+        return self._dominates
 
     def absent(self, now_ns: int, *, doubt_ns: int) -> Sequence[NodeId] | None:
         """The nodes to which there has been no way for longer than `doubt_ns`; None while there is a node to which

@@ -4,7 +4,7 @@ import os
 import sys
 from typing import Any, Final, NoReturn
 
-import rich.console
+from rich.console import Console as RichConsole
 
 CLOSED: Final = 128 + 13
 """The exit code that a shell shows for a process that SIGPIPE ended."""
@@ -14,7 +14,7 @@ _UNWRAPPED: Final = 10_000
 """The width where no terminal limits it: nothing is this long."""
 
 
-class Console(rich.console.Console):
+class Console(RichConsole):
     """The console of rich, except that writing to a closed pipe raises an error, with which `main` ends the command,
     that brackets are brackets, because the names of files may contain some, and that lines which no terminal shows are
     neither wrapped nor padded.

@@ -1,4 +1,4 @@
-"""Native MAVLink messages, and the only module that knows NED and geodetic coordinates. The border to pymavlink.
+"""Native MAVLink messages, and the only module that knows NED. The border to pymavlink; places on earth: `geodesy.py`.
 
 Inside, positions are ENU metres in the plane that touches the WGS84 ellipsoid at an origin. Outside are degrees x 1e7,
 millimetres of height, and velocities north, east, down in cm/s. Conversions use the earth-centered frame and are exact;
@@ -21,7 +21,11 @@ from pymavlink.dialects.v20 import common as common  # others take MAVLink's nam
 from fanet_mw.dialect import fanet
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.flavors import Mode, number_of
-from fanet_mw.units import DEFAULT_ORIGIN_DEG, MAX_NODES, MS, US, Enu, NodeId
+from fanet_mw.geodesy import ORIGIN as ORIGIN
+from fanet_mw.geodesy import Geodetic as Geodetic
+from fanet_mw.geodesy import to_enu as to_enu
+from fanet_mw.geodesy import to_geodetic as to_geodetic
+from fanet_mw.units import MAX_NODES, MS, US, Enu, NodeId
 from fanet_mw.wire import COMPONENT, Packed, frames, inner_frames, renumbered, system_id
 
 common.mavlink_map.update(fanet.mavlink_map)  # one parser decodes both dialects
@@ -32,14 +36,6 @@ AUTOPILOT_COMPONENT: Final = 1
 """MAV_COMP_ID_AUTOPILOT1, the sender of telemetry: ground stations take no other component for a vehicle."""
 GATEWAY_COMPONENT: Final = 240
 """MAV_COMP_ID_UDP_BRIDGE, by which a gateway tells UAVs that ground stations may be there."""
-
-_A: Final = 6_378_137.0
-"""WGS84 semi-major axis [m]."""
-_E2: Final = 6.694_379_990_14e-3
-"""WGS84 first eccentricity squared."""
-_B: Final = _A * math.sqrt(1 - _E2)
-_EP2: Final = _E2 / (1 - _E2)
-"""Second eccentricity squared."""
 
 LANDED_IN_AIR: Final = int(common.MAV_LANDED_STATE_IN_AIR)
 _HEALTHY: Final = int(
@@ -61,77 +57,7 @@ _GPS_NO_FIX: Final = 1
 _GPS_3D_FIX: Final = 3
 
 
-class Geodetic(NamedTuple):
-    """WGS84 latitude and longitude [degrees], height over the ellipsoid [m]."""
-
-    lat_deg: float
-    lon_deg: float
-    alt_m: float
-
-
-ORIGIN: Final = Geodetic(*DEFAULT_ORIGIN_DEG, 0.0)
-"""The point at which the swarm's frame touches the earth unless the scenario or its map names another one
-(`world.origin_deg`)."""
-
-
 # --- coordinates --------------------------------------------------------------------------------------------------
-
-
-class _Plane(NamedTuple):
-    """An origin in the earth-centered frame, with the sines and cosines that turn vectors into
-    east, north, up there.
-    """
-
-    x: float
-    y: float
-    z: float
-    sin_lat: float
-    cos_lat: float
-    sin_lon: float
-    cos_lon: float
-
-
-def _earth_centered(place: Geodetic) -> _Plane:
-    lat, lon = math.radians(place.lat_deg), math.radians(place.lon_deg)
-    sin_lat, cos_lat, sin_lon, cos_lon = math.sin(lat), math.cos(lat), math.sin(lon), math.cos(lon)
-    normal = _A / math.sqrt(1 - _E2 * sin_lat * sin_lat)
-    across = (normal + place.alt_m) * cos_lat
-    z = (normal * (1 - _E2) + place.alt_m) * sin_lat
-    return _Plane(across * cos_lon, across * sin_lon, z, sin_lat, cos_lat, sin_lon, cos_lon)
-
-
-@lru_cache(maxsize=8)
-def _plane(origin: Geodetic) -> _Plane:
-    if not (abs(origin.lat_deg) <= 90 and abs(origin.lon_deg) <= 180 and math.isfinite(origin.alt_m)):
-        raise LocalProtocolError(f"origin = {origin} must be within 90 and 180 degrees, and its height finite")
-    return _earth_centered(origin)
-
-
-def to_geodetic(position: Enu, origin: Geodetic = ORIGIN) -> Geodetic:
-    """The place on earth of a point in the swarm's frame."""
-    o = _plane(origin)
-    outward = o.cos_lat * position.up - o.sin_lat * position.north
-    x = o.x + o.cos_lon * outward - o.sin_lon * position.east
-    y = o.y + o.sin_lon * outward + o.cos_lon * position.east
-    z = o.z + o.cos_lat * position.north + o.sin_lat * position.up
-    across = math.hypot(x, y)
-    theta = math.atan2(z * _A, across * _B)  # Bowring (1976): one step is exact to a micrometre near the ground
-    lat = math.atan2(z + _EP2 * _B * math.sin(theta) ** 3, across - _E2 * _A * math.cos(theta) ** 3)
-    sin_lat = math.sin(lat)
-    alt_m = across * math.cos(lat) + z * sin_lat - _A * math.sqrt(1 - _E2 * sin_lat * sin_lat)
-    return Geodetic(math.degrees(lat), math.degrees(math.atan2(y, x)), alt_m)
-
-
-def to_enu(place: Geodetic, origin: Geodetic = ORIGIN) -> Enu:
-    """The inverse of `to_geodetic`."""
-    o, p = _plane(origin), _earth_centered(place)
-    dx, dy, dz = p.x - o.x, p.y - o.y, p.z - o.z
-    outward = o.cos_lon * dx + o.sin_lon * dy
-    return Enu(
-        o.cos_lon * dy - o.sin_lon * dx,
-        o.cos_lat * dz - o.sin_lat * outward,
-        o.cos_lat * outward + o.sin_lat * dz,
-    )
 
 
 class Ned(NamedTuple):

@@ -16,7 +16,7 @@ from pydantic import ValidationError
 from fanet_mw.errors import ConfigError
 from fanet_mw.extensions import AS_TEXT
 from fanet_mw.foreign_file import require_plain, toml_of
-from fanet_mw.scenario import Scenario
+from fanet_mw.scenario import Scenario, map_files
 from fanet_mw.scenario.overrides import apply_override
 from fanet_mw.scenario.quantities import in_unit_of, unit_of
 from fanet_mw.scenario.tables.world import FILE_KEYS
@@ -106,6 +106,7 @@ def _from_folder(tree: dict[str, Any], folder: Path) -> None:
     for number, table in enumerate(traffic if isinstance(traffic, list) else [traffic]):
         if isinstance(table, dict) and isinstance(table.get("packets_csv"), str) and table["packets_csv"]:
             table["packets"] = _packets(folder / table.pop("packets_csv"), f"traffic.{number}.packets_csv")
+    map_files.take_in(tree, folder)
     world = tree.get("world")
     if not isinstance(world, dict):
         return

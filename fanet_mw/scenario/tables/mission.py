@@ -2,7 +2,7 @@
 
 from typing import Annotated, Final, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from fanet_mw.scenario.tables.sections import (
     Coordinate,
@@ -12,6 +12,7 @@ from fanet_mw.scenario.tables.sections import (
     Level,
     Section,
     SomeLength,
+    read_with_file,
 )
 
 LEAST_REPORT_BYTES: Final = 96
@@ -28,6 +29,13 @@ class Mission(Section):
     """Number of survivors, at random places drawn by the seed."""
     survivor_positions_m: tuple[tuple[Coordinate, Coordinate], ...] = ()
     """East and north of each survivor; empty: random places."""
+    survivors_at: Annotated[str, AfterValidator(read_with_file)] = ""
+    """A file with a point for each survivor (.kml, .kmz, .geojson, .plan, .waypoints), read with the scenario; its path
+    is relative to the scenario file's folder."""
+    area: Annotated[str, AfterValidator(read_with_file)] = ""
+    """A file with the area to search (.plan, .kml, .kmz, .geojson, .waypoints), read with the scenario:
+    `world.origin_deg` is the middle of its polygons and `world.area_m` the least square around them, unless those keys
+    are there."""
     survivors_in: Literal["area", "buildings"] = "area"
     """Where the random places are: anywhere in the open area, or inside buildings."""
     buried: Annotated[float, Field(ge=0, le=1)] = 0.0

@@ -70,3 +70,10 @@ def _types(annotation: object) -> set[object]:
         return {type(choice) for choice in get_args(annotation)}
     found: set[object] = {annotation} if isinstance(annotation, type) or annotation is Any else set()
     return found.union(*map(_types, get_args(annotation)))
+
+
+def read_with_file(path: str) -> str:
+    """Refuse a file that is read with the scenario and was not, because there is no scenario file that names it."""
+    if path:
+        raise ValueError(f"{path!r}: is read with a scenario file only")
+    return path

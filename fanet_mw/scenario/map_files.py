@@ -1,0 +1,260 @@
+"""Areas, no-fly areas and people from the files of ground stations and maps, as values of a scenario.
+
+    mission.area = "area.kml"           -> world.origin_deg and world.area_m: the least square around its polygons
+    world.no_fly = "fence.plan"         -> world.no_fly_m: a circle around each polygon, and each circle
+    mission.survivors_at = "people.kml" -> mission.survivor_positions_m, one for each point
+
+Read are GeoJSON (RFC 7946), KML and KMZ (OGC 12-007r2), plans of QGroundControl (.plan) and lists of waypoints
+(QGC WPL 110). In a plan the area is its surveys and the fences to stay inside, the no-fly areas are the fences to stay
+outside, and the points are its rally points, or its waypoints if there are none.
+"""
+
+import io
+import json
+import math
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+from xml.etree import ElementTree
+
+from fanet_mw.errors import ConfigError
+from fanet_mw.foreign_file import read_regular
+from fanet_mw.geodesy import Geodetic, to_enu
+
+_MOST_BYTES: Final = 16 << 20
+_MOST_SHAPES: Final = 10_000
+_Point = tuple[float, float]
+_WAYPOINT: Final = 16
+_KEYS: Final = (("mission", "area"), ("world", "no_fly"), ("mission", "survivors_at"))
+"""The keys that name such files."""
+
+
+class Shapes(NamedTuple):
+    """What a file holds, as latitudes and longitudes [degrees]."""
+
+    inside: list[list[_Point]]
+    """Polygons that are areas."""
+    outside: list[list[_Point]]
+    """Polygons to stay out of; in a file that knows no such thing, the same."""
+    circles: list[tuple[float, float, float]]
+    """Circles to stay out of: latitude, longitude, radius [m]."""
+    points: list[_Point]
+
+
+def take_in(tree: dict[str, Any], folder: Path) -> None:
+    """Replace the keys of a scenario that name such files by what the files say; raises ConfigError."""
+    found = {}
+    for table, key in _KEYS:
+        within = tree.get(table)
+        if isinstance(within, dict) and isinstance(within.get(key), str) and within[key]:
+            path = folder / within.pop(key)
+            found[key] = f"{table}.{key} = {path}", read(path, key=f"{table}.{key}")
+    if not found:
+        return
+    world, mission = tree.setdefault("world", {}), tree.setdefault("mission", {})
+    if "area" in found:
+        said, shapes = found["area"]
+        _take_area(world, said, shapes)
+    origin = world.get("origin_deg")
+    if not (isinstance(origin, list | tuple) and len(origin) == 2):
+        raise ConfigError(f"{next(iter(found.values()))[0]}: needs world.origin_deg, or mission.area, which says it")
+    if "no_fly" in found:
+        said, shapes = found["no_fly"]
+        circles = [
+            *(_around(ring, origin) for ring in shapes.outside),
+            *(_circle(one, origin) for one in shapes.circles),
+        ]
+        if not circles:
+            raise ConfigError(f"{said}: it holds no area to stay out of")
+        world["no_fly_m"] = [*world.get("no_fly_m", ()), *circles]
+    if "survivors_at" in found:
+        said, shapes = found["survivors_at"]
+        if not shapes.points:
+            raise ConfigError(f"{said}: it holds no points")
+        mission["survivor_positions_m"] = [[round(part, 2) for part in _flat(point, origin)] for point in shapes.points]
+        mission.setdefault("survivors", len(shapes.points))
+
+
+def _take_area(world: dict[str, Any], said: str, shapes: Shapes) -> None:
+    points = [point for ring in shapes.inside for point in ring]
+    if not points:
+        raise ConfigError(f"{said}: it holds no polygon")
+    lats, lons = [lat for lat, _ in points], [lon for _, lon in points]
+    if max(lons) - min(lons) > 180:
+        raise ConfigError(
+            f"{said}: it reaches across 180 degrees of longitude; shift it, or state world.origin_deg and area_m"
+        )
+    middle = (min(lats) + max(lats)) / 2, (min(lons) + max(lons)) / 2
+    world.setdefault("origin_deg", [round(part, 7) for part in middle])
+    reach_m = max(abs(part) for point in points for part in _flat(point, world["origin_deg"]))
+    world.setdefault("area_m", math.ceil(2 * reach_m))
+
+
+def _flat(point: _Point, origin: Any) -> tuple[float, float]:  # noqa: ANN401  (of TOML)
+    """East and north of a place [m]."""
+    at = to_enu(Geodetic(*point, 0.0), Geodetic(float(origin[0]), float(origin[1]), 0.0))
+    return at.east, at.north
+
+
+def _around(ring: list[_Point], origin: Any) -> list[float]:  # noqa: ANN401
+    """East, north and radius of a circle around a polygon: about the middle of its extent."""
+    corners = [_flat(point, origin) for point in ring]
+    east = (min(e for e, _ in corners) + max(e for e, _ in corners)) / 2
+    north = (min(n for _, n in corners) + max(n for _, n in corners)) / 2
+    radius_m = max(math.hypot(e - east, n - north) for e, n in corners)
+    return [round(east, 2), round(north, 2), math.ceil(100 * radius_m) / 100]
+
+
+def _circle(circle: tuple[float, float, float], origin: Any) -> list[float]:  # noqa: ANN401
+    east, north = _flat(circle[:2], origin)
+    return [round(east, 2), round(north, 2), circle[2]]
+
+
+# --- files --------------------------------------------------------------------------------------------------------
+
+
+def read(path: Path, *, key: str = "file") -> Shapes:
+    """What a file holds; raises ConfigError with what is wrong."""
+    readers = {
+        ".geojson": _geojson, ".json": _geojson, ".kml": _kml, ".kmz": _kmz, ".plan": _plan, ".waypoints": _waypoints,
+        ".txt": _waypoints,
+    }  # fmt: skip
+    reader = readers.get(path.suffix.lower())
+    if reader is None:
+        raise ConfigError(f"{key} = {path}: must be a .geojson, .kml, .kmz, .plan or .waypoints file")
+    data = read_regular(path, most_bytes=_MOST_BYTES)
+    try:
+        shapes = reader(data)
+    except (
+        ValueError,
+        TypeError,
+        KeyError,
+        IndexError,
+        AttributeError,
+        RecursionError,
+        ElementTree.ParseError,
+    ) as error:
+        raise ConfigError(f"{key} = {path}: cannot be read as {path.suffix}: {error}") from error
+    except (zipfile.BadZipFile, NotImplementedError, EOFError, OSError) as error:
+        raise ConfigError(f"{key} = {path}: is no KMZ: {error}") from error
+    return shapes
+
+
+def _shapes(polygons: list[list[_Point]], points: list[_Point]) -> Shapes:
+    if len(polygons) + len(points) > _MOST_SHAPES:
+        raise ValueError(f"{len(polygons) + len(points)} shapes, must be <= {_MOST_SHAPES}")
+    return Shapes(polygons, polygons, [], points)
+
+
+def _place(lat: Any, lon: Any) -> _Point:  # noqa: ANN401  (of a file)
+    """A latitude and longitude; raises ValueError for what is none."""
+    found = float(lat), float(lon)
+    if not (abs(found[0]) <= 90 and abs(found[1]) <= 180):
+        raise ValueError(f"latitude {lat!r:.20} and longitude {lon!r:.20} must be within 90 and 180 degrees")
+    return found
+
+
+def _ring(points: list[_Point]) -> list[_Point]:
+    if len(set(points)) < 3:
+        raise ValueError(f"a polygon has {len(set(points))} corners, must be >= 3")
+    return points
+
+
+def _geojson(data: bytes) -> Shapes:
+    polygons: list[list[_Point]] = []
+    points: list[_Point] = []
+
+    def look(node: Any) -> None:  # noqa: ANN401  (JSON)
+        kind = node["type"]
+        if kind == "FeatureCollection":
+            for feature in node["features"]:
+                look(feature)
+        elif kind == "Feature":
+            if node.get("geometry") is not None:
+                look(node["geometry"])
+        elif kind == "GeometryCollection":
+            for geometry in node["geometries"]:
+                look(geometry)
+        elif kind in ("Polygon", "MultiPolygon"):
+            several = [node["coordinates"]] if kind == "Polygon" else node["coordinates"]
+            polygons.extend(_ring([_place(lat, lon) for lon, lat, *_ in rings[0]]) for rings in several)
+        elif kind in ("Point", "MultiPoint"):
+            for lon, lat, *_ in [node["coordinates"]] if kind == "Point" else node["coordinates"]:
+                points.append(_place(lat, lon))
+
+    look(json.loads(data.decode("utf-8-sig")))
+    return _shapes(polygons, points)
+
+
+def _kml(data: bytes) -> Shapes:
+    if b"<!DOCTYPE" in data[:4096] or b"<!ENTITY" in data:
+        raise ValueError("it declares entities, which no KML needs")
+    polygons: list[list[_Point]] = []
+    points: list[_Point] = []
+    for element in ElementTree.fromstring(data).iter():  # noqa: S314  (entities are refused above)
+        kind = element.tag.rpartition("}")[2]
+        if kind == "Polygon":
+            outer = next((one for one in element.iter() if one.tag.endswith("outerBoundaryIs")), None)
+            polygons.append(_ring([*_coordinates(element if outer is None else outer)]))
+        elif kind == "Point":
+            points += _coordinates(element)
+    return _shapes(polygons, points)
+
+
+def _coordinates(element: ElementTree.Element) -> Iterator[_Point]:
+    for one in element.iter():
+        if one.tag.rpartition("}")[2] == "coordinates":
+            for triple in (one.text or "").split():
+                lon, lat, *_ = triple.split(",")
+                yield _place(lat, lon)
+
+
+def _kmz(data: bytes) -> Shapes:
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        names = [entry for entry in archive.infolist() if entry.filename.lower().endswith(".kml")]
+        if not names:
+            raise ValueError("it holds no .kml")
+        with archive.open(names[0]) as file:
+            content = file.read(_MOST_BYTES + 1)
+    if len(content) > _MOST_BYTES:
+        raise ValueError(f"{names[0].filename} is longer than {_MOST_BYTES} bytes")
+    return _kml(content)
+
+
+def _plan(data: bytes) -> Shapes:
+    tree = json.loads(data.decode("utf-8-sig"))
+    if tree.get("fileType") != "Plan":
+        raise ValueError('its fileType is not "Plan"')
+    fence = tree.get("geoFence", {})
+    inside, outside = list[list[_Point]](), list[list[_Point]]()
+    circles = []
+    for polygon in fence.get("polygons", ()):
+        ring = _ring([_place(lat, lon) for lat, lon, *_ in polygon["polygon"]])
+        (inside if polygon.get("inclusion", True) else outside).append(ring)
+    for entry in fence.get("circles", ()):
+        lat, lon = _place(*entry["circle"]["center"][:2])
+        radius_m = float(entry["circle"]["radius"])
+        if not 0 < radius_m < 1e6:
+            raise ValueError(f"a circle has a radius of {radius_m:g} m, must be in (0, 1e6)")
+        if not entry.get("inclusion", True):
+            circles.append((lat, lon, radius_m))
+    flown = []
+    for item in tree.get("mission", {}).get("items", ()):
+        if isinstance(item.get("polygon"), list):
+            inside.append(_ring([_place(lat, lon) for lat, lon, *_ in item["polygon"]]))
+        elif item.get("command") == _WAYPOINT:
+            flown.append(_place(*item["params"][4:6]))
+    rally = [_place(*point[:2]) for point in tree.get("rallyPoints", {}).get("points", ())]
+    if len(inside) + len(outside) + len(rally) + len(flown) > _MOST_SHAPES:
+        raise ValueError(f"more than {_MOST_SHAPES} shapes")
+    return Shapes(inside, outside, circles, rally or flown)
+
+
+def _waypoints(data: bytes) -> Shapes:
+    lines = data.decode("utf-8-sig").split("\n")
+    if not lines[0].startswith("QGC WPL"):
+        raise ValueError("its first line is not QGC WPL 110")
+    rows = [line.split("\t") if "\t" in line else line.split() for line in lines[1:] if line.strip()]
+    points = [_place(row[8], row[9]) for row in rows[1:] if int(row[3]) == _WAYPOINT]  # the first row is home
+    return _shapes([points] if len(set(points)) >= 3 else [], points)

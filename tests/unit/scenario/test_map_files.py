@@ -1,0 +1,185 @@
+"""Areas, no-fly areas and people from the files of ground stations and maps."""
+
+import json
+import zipfile
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from kit import examples
+
+from fanet_mw.errors import ConfigError
+from fanet_mw.mavlink import Geodetic, to_geodetic
+from fanet_mw.scenario import Scenario, config, map_files
+from fanet_mw.units import Enu
+
+ORIGIN = Geodetic(47.3, 8.5, 0.0)
+SQUARE = [(-300.0, -200.0), (300.0, -200.0), (300.0, 200.0), (-300.0, 200.0)]
+TOWER = [(90.0, 90.0), (110.0, 90.0), (110.0, 110.0), (90.0, 110.0)]
+PEOPLE = [(10.0, 20.0), (-100.0, 150.0)]
+
+
+def degrees(point: tuple[float, float]) -> tuple[float, float]:
+    place = to_geodetic(Enu(*point, 0.0), ORIGIN)
+    return place.lat_deg, place.lon_deg
+
+
+def lonlat(points: list[tuple[float, float]]) -> list[list[float]]:
+    return [[lon, lat] for lat, lon in map(degrees, points)]
+
+
+def kml(polygons: list[list[tuple[float, float]]], points: list[tuple[float, float]] = []) -> str:  # noqa: B006
+    rings = "".join(
+        "<Placemark><Polygon><outerBoundaryIs><LinearRing><coordinates>"
+        + " ".join(f"{lon},{lat},0" for lon, lat in lonlat([*ring, ring[0]]))
+        + "</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark>"
+        for ring in polygons
+    )
+    marks = "".join(
+        f"<Placemark><Point><coordinates>{lon},{lat}</coordinates></Point></Placemark>" for lon, lat in lonlat(points)
+    )
+    return f'<?xml version="1.0"?><kml xmlns="http://www.opengis.net/kml/2.2"><Document>{rings}{marks}</Document></kml>'
+
+
+def plan() -> str:
+    center = [*degrees((0.0, -100.0))]
+    return json.dumps({
+        "fileType": "Plan", "version": 1,
+        "geoFence": {
+            "polygons": [
+                {"inclusion": True, "polygon": [list(degrees(point)) for point in SQUARE], "version": 1},
+                {"inclusion": False, "polygon": [list(degrees(point)) for point in TOWER], "version": 1},
+            ],
+            "circles": [{"inclusion": False, "circle": {"center": center, "radius": 25.0}, "version": 1}],
+            "version": 2,
+        },
+        "mission": {"items": [{"command": 16, "params": [0, 0, 0, None, *degrees(SQUARE[0]), 50]}]},
+        "rallyPoints": {"points": [[*degrees(point), 30] for point in PEOPLE], "version": 2},
+    })  # fmt: skip
+
+
+def geojson() -> str:
+    features = [
+        {
+            "type": "Feature",
+            "properties": {},
+            "geometry": {"type": "Polygon", "coordinates": [lonlat([*SQUARE, SQUARE[0]])]},
+        },
+        {"type": "Feature", "properties": {}, "geometry": {"type": "MultiPoint", "coordinates": lonlat(PEOPLE)}},
+        {"type": "Feature", "properties": {}, "geometry": None},
+    ]
+    return json.dumps({"type": "FeatureCollection", "features": features})
+
+
+def waypoints() -> str:
+    home = degrees((0.0, 0.0))
+    rows = [(0, 16, *home), *((n + 1, 16, *degrees(point)) for n, point in enumerate(SQUARE)), (5, 20, 0.0, 0.0)]
+    return "QGC WPL 110\n" + "".join(f"{n}\t0\t3\t{c}\t0\t0\t0\t0\t{lat}\t{lon}\t50\t1\n" for n, c, lat, lon in rows)
+
+
+def scenario(folder: Path, text: str) -> Scenario:
+    path = folder / "search.toml"
+    path.write_text(f"[nodes]\ncount = 9\n{text}", encoding="utf-8")
+    return config.load(path)
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    (tmp_path / "area.kml").write_text(kml([SQUARE]), encoding="utf-8")
+    (tmp_path / "area.geojson").write_text(geojson(), encoding="utf-8")
+    (tmp_path / "area.plan").write_text(plan(), encoding="utf-8")
+    (tmp_path / "area.waypoints").write_text(waypoints(), encoding="utf-8")
+    (tmp_path / "towers.kml").write_text(kml([TOWER]), encoding="utf-8")
+    (tmp_path / "people.kml").write_text(kml([], PEOPLE), encoding="utf-8")
+    with zipfile.ZipFile(tmp_path / "area.kmz", "w") as archive:
+        archive.writestr("doc.kml", kml([SQUARE]))
+    return tmp_path
+
+
+@pytest.mark.parametrize("kind", ["kml", "kmz", "geojson", "plan", "waypoints"])
+def test_an_area_of_any_kind_of_file_is_the_square_around_it(files: Path, kind: str) -> None:
+    found = scenario(files, f'[mission]\narea = "area.{kind}"')
+    assert found.world.origin_deg == pytest.approx((ORIGIN.lat_deg, ORIGIN.lon_deg), abs=2e-6)
+    assert found.world.area_m == pytest.approx(600, abs=1.5)
+
+
+def test_an_area_changes_neither_origin_nor_size_that_are_there(files: Path) -> None:
+    found = scenario(files, '[mission]\narea = "area.kml"\n[world]\norigin_deg = [47.3, 8.501]\narea_m = 900')
+    assert found.world.origin_deg == (47.3, 8.501)
+    assert found.world.area_m == 900
+
+
+def test_fences_to_stay_outside_are_no_fly_areas(files: Path) -> None:
+    found = scenario(files, '[mission]\narea = "area.plan"\n[world]\nno_fly = "area.plan"\nno_fly_m = [[1, 2, 3]]')
+    first, tower, circle = found.world.no_fly_m
+    assert first == (1, 2, 3)
+    assert tower == pytest.approx((100, 100, 14.15), abs=0.1)
+    assert circle == pytest.approx((0, -100, 25), abs=0.1)
+    found = scenario(files, '[mission]\narea = "area.plan"\n[world]\nno_fly = "towers.kml"')
+    assert found.world.no_fly_m[0] == pytest.approx((100, 100, 14.15), abs=0.1)
+
+
+@pytest.mark.parametrize("name", ["people.kml", "area.plan", "area.geojson"])
+def test_points_are_people(files: Path, name: str) -> None:
+    found = scenario(files, f'[mission]\narea = "area.kml"\nsurvivors_at = "{name}"')
+    assert found.mission.survivors == 2
+    for at, wanted in zip(found.mission.survivor_positions_m, PEOPLE, strict=True):
+        assert at == pytest.approx(wanted, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "why"),
+    [
+        ("x.kml", "<kml", "cannot be read as .kml"),
+        ("x.kml", '<!DOCTYPE x [<!ENTITY a "b">]><kml/>', "entities"),
+        ("x.kml", kml([[(0, 0), (1, 1), (0, 0)]]), "has 2 corners, must be >= 3"),
+        ("x.kml", kml([], PEOPLE), "it holds no polygon"),
+        ("x.kml", "<kml><Polygon><coordinates>8.5,97 1,2 3,4</coordinates></Polygon></kml>", "within 90 and 180"),
+        ("x.geojson", '{"type": "Polygon", "coordinates": [[["a", 1], [2, 3], [4, 5]]]}', "cannot be read"),
+        ("x.geojson", "[" * 100_000, "cannot be read"),
+        ("x.plan", '{"fileType": "Mission"}', 'fileType is not "Plan"'),
+        ("x.plan", "[]", "cannot be read"),
+        ("x.waypoints", "hello", "first line is not QGC WPL"),
+        ("x.kmz", "no zip", "is no KMZ"),
+        ("x.shp", "", "must be a .geojson"),
+    ],
+)
+def test_what_cannot_be_used_is_one_line_with_the_file(tmp_path: Path, name: str, content: str, why: str) -> None:
+    (tmp_path / name).write_text(content, encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"mission\.area = ") as caught:
+        scenario(tmp_path, f'[mission]\narea = "{name}"')
+    assert why in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_what_needs_an_origin_says_so_and_what_is_not_there_is_named(files: Path) -> None:
+    with pytest.raises(ConfigError, match=r"needs world.origin_deg, or mission.area"):
+        scenario(files, '[mission]\nsurvivors_at = "people.kml"')
+    with pytest.raises(ConfigError, match=r"nowhere.kml"):
+        scenario(files, '[mission]\narea = "nowhere.kml"')
+    with pytest.raises(ConfigError, match="is read with a scenario file only"):
+        config.build({"mission": {"area": "area.kml"}})
+    with pytest.raises(ConfigError, match="no area to stay out of"):
+        scenario(files, '[mission]\narea = "area.kml"\n[world]\nno_fly = "people.kml"')
+
+
+@given(
+    st.binary(max_size=200), st.sampled_from([".kml", ".kmz", ".geojson", ".plan", ".waypoints"]), st.integers(0, 10**6)
+)
+@examples(200)
+def test_any_bytes_are_shapes_or_one_message(
+    tmp_path_factory: pytest.TempPathFactory, noise: bytes, kind: str, at: int
+) -> None:
+    whole = {".kml": kml([SQUARE], PEOPLE), ".geojson": geojson(), ".plan": plan(), ".waypoints": waypoints()}
+    text = whole.get(kind, "").encode()
+    data = text[: at % (len(text) + 1)] + noise + text[at % (len(text) + 1) + len(noise) :]
+    path = tmp_path_factory.getbasetemp() / f"fuzz{kind}"
+    path.write_bytes(data)
+    try:
+        shapes = map_files.read(path)
+    except ConfigError:
+        return
+    for lat, lon in [*shapes.points, *(point for ring in shapes.inside for point in ring)]:
+        assert abs(lat) <= 90
+        assert abs(lon) <= 180

@@ -27,7 +27,9 @@ public interface: [programs and runs](api.md)."""
 PAGES: Final = {
     "api.md": (PROGRAMS, {
         "A node in a program": ("join", "Node", "Message", "Sent", "Emulated", "OnAir"),
-        "Runs": ("simulate", "Result", "launch", "Launched", "VirtualSwarm", "load_scenario", "Scenario"),
+        "Runs": (
+            "simulate", "Result", "load_result", "launch", "Launched", "VirtualSwarm", "load_scenario", "Scenario",
+        ),
         "Fixtures for pytest": ("swarm", "real_swarm"),
         "Identities and errors": (
             "NodeId", "BROADCAST", "Enu", "FanetError", "ConfigError", "LocalProtocolError", "MalformedFrameError",

@@ -48,7 +48,7 @@ class Companions:
                 where += ["--scenario", str(self._written(scenario))]
             command = [sys.executable, "-m", "fanet_mw", *words, *where]
             self._running.append(
-                subprocess.Popen(  # noqa: S603  (a command of ours)
+                subprocess.Popen(  # noqa: S603  (a command of fanet-mw)
                     command, start_new_session=True, stdin=subprocess.DEVNULL, preexec_fn=_give_way
                 )
             )

@@ -67,7 +67,7 @@ _LINK: Final = ("src", "dst", "copies", "received")
 
 
 def _messages() -> tuple[Any, Any, Any]:
-    """The classes of the messages of our own: flat numbers, which plot by themselves."""
+    """The classes of the messages of this project: flat numbers, which plot by themselves."""
     kinds = descriptor_pb2.FieldDescriptorProto
     file = descriptor_pb2.FileDescriptorProto(name="fanet.proto", package="fanet", syntax="proto3")
 

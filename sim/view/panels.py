@@ -127,7 +127,7 @@ class Panels:
         """A callback of the browser that lets the loop do this."""
 
         def on_event(event: Any) -> None:  # noqa: ANN401  (viser's events)
-            if getattr(event, "client", None) is not None:  # not a change that we made
+            if getattr(event, "client", None) is not None:  # not a change that was made here
                 self.jobs.put(job)
 
         return on_event

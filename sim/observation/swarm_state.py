@@ -49,6 +49,8 @@ from sim.world.environment.survivors import place
 LATELY_NS: Final = 10 * S
 _LEAST_SETTLING_NS: Final = 2 * S
 _MOST_SETTLING_NS: Final = 20 * S
+_PERIODS: Final = 3
+"""A flood over clusters may take so many of their periods; while nothing has arrived yet, no delay says so."""
 _MARGIN: Final = 1.2
 """A packet counts when it is so many times as old as the longest delay lately."""
 _REMEMBERED_NS: Final = _MOST_SETTLING_NS + LATELY_NS + 2 * S
@@ -148,7 +150,9 @@ class SwarmState:
         """The faults on the air that last, by label."""
         self.turns: Turns | None = turns(scenario, {})
         self.time_scale = 1.0
-        self.settling_ns = _LEAST_SETTLING_NS
+        periods_ns = _PERIODS * scenario.clusters.period_ns if scenario.routing.protocol == "clustered" else 0
+        self._least_settling_ns = min(_MOST_SETTLING_NS, max(_LEAST_SETTLING_NS, periods_ns))
+        self.settling_ns = self._least_settling_ns
         """A packet counts as sent when it is this old; whoever has not got it by then has lost it."""
         self.broken = 0
         """Copies of packets that came later than the bound of their packet, or never."""
@@ -352,7 +356,7 @@ class SwarmState:
             (copy.delay_ns for one in self.packets.values() if one.app == self._app for copy in one.got.values()),
             default=0,
         )
-        self.settling_ns = min(_MOST_SETTLING_NS, max(_LEAST_SETTLING_NS, round(_MARGIN * longest_ns)))
+        self.settling_ns = min(_MOST_SETTLING_NS, max(self._least_settling_ns, round(_MARGIN * longest_ns)))
         for name, one in list(self.packets.items()):
             if one.born_ns < self.t_ns - _REMEMBERED_NS:
                 del self.packets[name]

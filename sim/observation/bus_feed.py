@@ -29,6 +29,8 @@ from sim.run.collecting.bus_checks import BusChecks
 
 _MOST_PUTS: Final = 50_000
 _ANSWER_S: Final = 3.0
+_MOST_SPANS: Final = 4096
+"""The greatest number of slots or turns of a report that is believed."""
 _ASK_CLOCK_S: Final = 1.0
 
 
@@ -143,7 +145,7 @@ class BusFeed:
                 observer.take_records(good)
             case Report() if name in self._checks.node_of and message.name == name:
                 content, why = self._checks.report(name, message.json)
-                if why is None and _has_turns_of_sense(content):
+                if why is None and makes_sense(content):
                     observer.take_report(name, content, t_ns=message.t_ns)
                 else:
                     self.refused += 1
@@ -201,17 +203,21 @@ class BusFeed:
             raise FanetError(f"swarm {self.names.swarm}: its scenario cannot be read: {error}") from error
 
 
-def _has_turns_of_sense(content: Mapping[str, Any]) -> bool:
-    """False for a report whose slots or turns are of a shape that no node of this project states."""
+def makes_sense(content: Mapping[str, Any]) -> bool:
+    """False for a report whose slots, turns, role or queue are of a shape that no node of this project states."""
     from pydantic import ValidationError
 
     from sim.results.run_folder import SHOWN_REPORT
 
+    if any(type(content.get(key) or 0) is not int for key in ("waiting", "head", "cluster")):
+        return False
     try:
         SHOWN_REPORT.validate_python(content)
     except ValidationError:
         return False
-    return True
+    slots, turns = content.get("slots") or {}, content.get("turns") or {}
+    few_slots = slots.get("period_ms", 0.0) <= _MOST_SPANS * slots.get("slot_ms", 1.0)
+    return few_slots and len(turns.get("own", ())) <= _MOST_SPANS
 
 
 class Paced:

@@ -16,6 +16,7 @@ class Callbacks(NamedTuple):
     on_sensor: tuple[Application, ...]
     on_hello: tuple[Application, ...]
     on_operator: tuple[Application, ...]
+    on_record: tuple[Application, ...]
     permits: tuple[Application, ...]
     hello_frames: tuple[Application, ...]
     next_wake_ns: tuple[Application, ...]

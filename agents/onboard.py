@@ -7,6 +7,7 @@ goes.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from random import Random
 from typing import Any, Final
 
@@ -131,6 +132,13 @@ class Onboard:
         for application in self._callbacks.on_operator:
             self._guard(application.on_operator, frames, now_ns)
 
+    def record(self, by: Application, record: Record) -> None:
+        """Write a record into the trace, and let the other applications know."""
+        self.node.records.append(record)
+        for application in self._callbacks.on_record:
+            if application is not by:
+                application.on_record(record, self.now_ns)
+
     def fix(self, fix: Gps, now_ns: int) -> None:
         self._call(now_ns)
         for application in self._callbacks.on_fix:
@@ -191,7 +199,7 @@ class _ApplicationPort:
         self._sending = Sending(onboard.node.node, onboard.node.scenario.node_count)
         self.node: NodeId = onboard.node.node
         self.scenario: Scenario = onboard.node.scenario
-        self.record: Callable[[Record], None] = onboard.node.records.append
+        self.record: Callable[[Record], None] = partial(onboard.record, application)
 
     @property
     def position(self) -> Enu:

@@ -246,6 +246,9 @@ class Application:
         """MAVLink frames to add to the hello that is sent now; a hello reaches neighbors sooner than a flood."""
         return b""
 
+    def on_record(self, record: Record, now_ns: int) -> None:
+        """Another application on board has written a record into the trace."""
+
     def permits(self, course: Course, now_ns: int) -> bool:
         """True if this application does not object to a course that another one has commanded.
 

@@ -26,6 +26,7 @@ from fanet_mw.bus.messages import Battery, Gps, SensorReading
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.mavlink import AUTOPILOT_COMPONENT, GATEWAY_COMPONENT, Geodetic, Ned, common, decode, from_ned
 from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Confirmed, PlacedInside, Record, Refuted, Warned
 from fanet_mw.units import MS, Enu, NodeId, S, earliest, seconds_to_ns
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_REPORT, frames, system_id
 
@@ -38,6 +39,7 @@ _LOW: Final = 0.2
 _LINK_LASTS_NS: Final = 4 * S
 _ALL_COMPONENTS: Final = 0
 _TEXT_BYTES: Final = 50
+_NOTICE: Final = common.MAV_SEVERITY_NOTICE
 _LONGEST: Final = 900
 """Inner bytes of a packet over the air."""
 _SLOWEST_NS: Final = 60 * S
@@ -201,6 +203,23 @@ class GroundControl(Application):
                 self._say(2, f"Low battery: {reading.charge:.0%}")
             self._low = low
             self._settle(now_ns)
+
+    def on_record(self, record: Record, now_ns: int) -> None:
+        """Something has happened on board that an operator must know."""
+        text = None
+        match record:
+            case Confirmed(survivor=survivor):
+                text = f"Survivor {survivor} confirmed"
+            case PlacedInside(survivor=survivor):
+                text = f"Survivor {survivor} is inside a building"
+            case Refuted(survivor=survivor):
+                text = f"Survivor {survivor} refuted"
+            case Warned(other=other):
+                text = f"Collision warning: UAV {other}"
+            case _:
+                return
+        self._say(_NOTICE, text)
+        self._settle(now_ns)
 
     def on_link(self, rssi_dbm: float, lost: int, now_ns: int) -> None:
         """A neighbor was heard; the strongest of the last seconds is told."""
@@ -426,7 +445,7 @@ class GroundControl(Application):
 
     def _say(self, severity: int, text: str) -> None:
         """Tell operators something, once anybody listens."""
-        if self._heard_ns is not None or self._counts["commanded"]:
+        if self._watched_ns is not None:
             self._reply(common.MAVLink_statustext_message(severity, text.encode()[:_TEXT_BYTES]))
 
     def _reply(self, message: Any) -> None:  # noqa: ANN401  (pymavlink has no types)

@@ -290,6 +290,22 @@ def test_a_lost_item_is_asked_for_again() -> None:
     assert upload(bench, square(), lose=2) == 0
 
 
+def test_an_item_that_comes_twice_is_taken_once() -> None:
+    bench = Bench()
+    items = square()
+    bench.say(common.MAVLink_mission_count_message(1, 1, len(items), 0))
+    for seq in (0, 1, 1, 0, 2, 3, 2, 4):
+        frame, command, x, y, z, params = items[seq]
+        answers = bench.say(
+            common.MAVLink_mission_item_int_message(1, 1, seq, frame, command, 0, 1, *params, x, y, z, 0)
+        )
+    assert [answer.type for answer in answers] == [0]
+    (count,) = bench.say(common.MAVLink_mission_request_list_message(1, 1))
+    assert count.count == len(items)
+    (third,) = bench.say(common.MAVLink_mission_request_int_message(1, 1, 2))
+    assert (third.x, third.y) == items[2][2:4]
+
+
 def test_an_upload_that_breaks_off_leaves_the_old_mission() -> None:
     bench = Bench()
     upload(bench, square())
@@ -375,6 +391,20 @@ def test_without_a_ground_station_nothing_is_flown_and_nothing_said() -> None:
     assert not bench.courses
     assert not bench.heard
     assert bench.control.next_wake_ns() is None
+
+
+def test_what_an_operator_must_know_is_said_once_somebody_listens() -> None:
+    from fanet_mw.trace import Confirmed, Posed, Warned
+
+    bench = Bench()
+    bench.control.on_record(Confirmed(0, 1, 9, 1.0, 2.0), 0)
+    assert not bench.heard
+    bench.run(2)
+    bench.control.on_record(Confirmed(0, 1, 9, 1.0, 2.0), bench.now_ns)
+    bench.control.on_record(Posed(0, 1, 1.0, 2.0, 3.0), bench.now_ns)
+    bench.control.on_record(Warned(0, 1, 2, 5), bench.now_ns)
+    said = [(text.severity, text.text) for text in bench.told("STATUSTEXT")]
+    assert said == [(5, "Survivor 9 confirmed"), (5, "Collision warning: UAV 2")]
 
 
 # --- parameters, files, and what else is asked --------------------------------------------------------------------

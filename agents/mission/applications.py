@@ -107,7 +107,7 @@ class PlannedSearch(Application):
         self._searcher.hello(origin, motion, now_ns=now_ns)
         for told in messages:
             if self._plausibility.holds(told, now_ns=now_ns):  # else the sender passes on what another one has made up
-                self._searcher.on_message(told, now_ns=now_ns)
+                self._searcher.on_message(told, flooded=False, now_ns=now_ns)
         self._settle()
 
     def hello_frames(self, now_ns: int) -> bytes:

@@ -281,7 +281,8 @@ class Searcher:
             self._announcing.on_post(now_ns)
             return
         self._neighbors.on_hello(origin, motion)
-        self._plans.on_hello(origin, motion.position, now_ns=now_ns)
+        if self._plans.on_hello(origin, motion.position, now_ns=now_ns):
+            self._announcing.on_returned(now_ns)
 
     def _on_heard(self, now_ns: int) -> None:
         """Another UAV was heard; a UAV that flew home because it heard nobody takes part again."""
@@ -289,8 +290,8 @@ class Searcher:
             self._plans.come_back(self._percent, now_ns)
             self._mode.review(self._bidding.survivor, now_ns)
 
-    def on_message(self, message: Told, *, now_ns: int) -> None:
-        """A message of another node was received, sent to its neighbors or to all nodes."""
+    def on_message(self, message: Told, *, flooded: bool = True, now_ns: int) -> None:
+        """A message of another node was received, `flooded` to all nodes or sent to its neighbors."""
         self._on_heard(now_ns)
         match message:
             case Survivor():
@@ -305,7 +306,7 @@ class Searcher:
             case Bids():
                 self._bidding.merge(message.bids, now_ns=now_ns)
             case Found():
-                self._on_found(message, now_ns)
+                self._on_found(message, now_ns, flooded=flooded)
             case Covered():
                 self._reception.on_covered(message)
             case Roll():
@@ -344,7 +345,7 @@ class Searcher:
         """The percentage of its battery that this UAV may spend for the search; 0 if it has no part in it any more."""
         return 0 if self._orders.errand is not None else self._return_home.percent
 
-    def _on_found(self, found: Found, now_ns: int) -> None:
+    def _on_found(self, found: Found, now_ns: int, *, flooded: bool) -> None:
         """Another node states the place of a survivor: an estimate, a confirmation, or a refutation."""
         if self._survivors.on_found(found, now_ns=now_ns):
             self._announcing.decided(found.survivor, now_ns)
@@ -356,6 +357,8 @@ class Searcher:
                 self._bidding.reopen(found.survivor)
         elif self._survivors.is_outdated(found):
             self._announcing.outdated(found, now_ns)
+        elif flooded and found.standing is not Standing.ESTIMATED:
+            self._announcing.repeated(found, now_ns)
 
     # --- sent messages --------------------------------------------------------------------------------------------
 

@@ -25,8 +25,12 @@ def symmetric(heard: Mapping[NodeId, Collection[NodeId]]) -> dict[NodeId, tuple[
     }
 
 
-def within_range(positions: Mapping[NodeId, Enu], *, range_m: float) -> dict[NodeId, tuple[NodeId, ...]]:
-    """The neighbors in a disk model: all nodes within `range_m` in three dimensions."""
+def within_range(
+    positions: Mapping[NodeId, Enu], *, range_m: float, reaches: Mapping[NodeId, float] = {}
+) -> dict[NodeId, tuple[NodeId, ...]]:
+    """The neighbors in a disk model: all nodes within `range_m` in three dimensions. `reaches`: of nodes with an
+    antenna of their own, how many times as long their links are.
+    """
     cell_m = max(range_m, _MIN_CELL_M)
     cells: dict[tuple[int, int], list[NodeId]] = {}
     place = {node: (int(at.east // cell_m), int(at.north // cell_m)) for node, at in positions.items()}
@@ -39,12 +43,17 @@ def within_range(positions: Mapping[NodeId, Enu], *, range_m: float) -> dict[Nod
             for y in (north - 1, north, north + 1):
                 yield from cells.get((x, y), ())
 
-    return {
-        node: tuple(
-            sorted(n for n in near(node) if n != node and positions[n].minus(positions[node]).norm() <= range_m)
-        )
+    found = {
+        node: {n for n in near(node) if n != node and positions[n].minus(positions[node]).norm() <= range_m}
         for node in sorted(positions)
     }
+    for node, times in sorted(reaches.items()):
+        if node in positions:
+            far = [n for n in positions if n != node and positions[n].minus(positions[node]).norm() <= times * range_m]
+            found[node].update(far)
+            for other in far:
+                found[other].add(node)
+    return {node: tuple(sorted(others)) for node, others in found.items()}
 
 
 def two_hop(adjacency: Adjacency) -> dict[NodeId, tuple[NodeId, ...]]:

@@ -32,7 +32,11 @@ class Site:
         self._standing = standing or self.positions
         self.reported = reported
         self._exact = positions
-        self.adjacency = within_range(positions, range_m=scenario.radio.range_m) if adjacency is None else adjacency
+        self.adjacency = (
+            within_range(positions, range_m=scenario.radio.range_m, reaches=scenario.reaches)
+            if adjacency is None
+            else adjacency
+        )
         self._floods: dict[tuple[NodeId, int], FloodCost] = {}
         self._claimants: dict[object, Claimants] = {}
 
@@ -52,13 +56,18 @@ class Site:
 
     def within(self, distance_m: float) -> Adjacency:
         """The pairs of nodes that stand within this distance of each other, whatever positions they report."""
-        return within_range(self._standing, range_m=distance_m)
+        return within_range(self._standing, range_m=distance_m, reaches=self.scenario.reaches)
 
     def varying_links(self) -> int:
         """The number of pairs of nodes that are near enough for a link of the timetable in some draws only."""
         link_m = self.scenario.clusters.link_m or self.scenario.radio.range_m
         found = [
-            {(a, b) for a, near in within_range(positions, range_m=link_m).items() for b in near if a < b}
+            {
+                (a, b)
+                for a, near in within_range(positions, range_m=link_m, reaches=self.scenario.reaches).items()
+                for b in near
+                if a < b
+            }
             for positions in self.reported
         ]
         return len(set().union(*found)) - len(found[0].intersection(*found)) if found else 0

@@ -5,6 +5,7 @@ integer nanoseconds. Each table has a file of its name in `tables/` and checks i
 spans several tables.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Self
 
@@ -172,6 +173,11 @@ class Scenario(Section):
     def post(self) -> NodeId | None:
         """The node of the post on the ground (`ground.at_m`); None if there is none."""
         return NodeId(self.nodes.count + 1) if self.ground.at_m else None
+
+    @property
+    def reaches(self) -> Mapping[NodeId, float]:
+        """How many times as far as UAVs nodes reach that have an antenna of their own, as in free space."""
+        return {} if self.post is None else {self.post: math.pow(10.0, self.ground.gain_dbi / 20)}
 
     @property
     def node_count(self) -> int:

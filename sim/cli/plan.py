@@ -273,7 +273,9 @@ def _with_loss(found: ScenarioPlan, at: Mapping[NodeId, Enu]) -> tuple[ScenarioP
         return found, None
     turns = superframe.turns
     geometry = links(scenario, turns)
-    adjacency = within_range({node: rounded(place) for node, place in at.items()}, range_m=geometry.link_m)
+    adjacency = within_range(
+        {node: rounded(place) for node, place in at.items()}, range_m=geometry.link_m, reaches=scenario.reaches
+    )
     missed = loss(
         superframe.table, adjacency, per_superframe=turns.per_superframe, hop_turns=geometry.hop_turns, chance=chance
     )

@@ -161,7 +161,8 @@ def schema(file: Path | None = None) -> int:
 def _sentence(scenario: "Scenario") -> str:
     protocol = scenario.routing.protocol
     return (
-        f"scenario {scenario.name} is right: {scenario.nodes.count} nodes, {scenario.duration_s:g} s, "
+        f"scenario {scenario.name} is right: {scenario.nodes.count} nodes"
+        f"{', a post on the ground' if scenario.post else ''}, {scenario.duration_s:g} s, "
         f"{protocol}, seed {scenario.seed}"
     )
 

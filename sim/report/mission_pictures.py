@@ -4,13 +4,15 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import Final
 
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import ListedColormap
-from matplotlib.patches import Rectangle
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
-from fanet_mw.trace import Approaching, Arrived, Detected
+from fanet_mw.trace import Approaching, Arrived, Detected, KnownOnGround
 from fanet_mw.units import S
 from sim.figures.colors import BLUE, DARK, GREEN, ORANGE, PINK, RED
 from sim.figures.style import canvas, legend_above
@@ -103,6 +105,49 @@ def _coverage(run: RunRecords) -> Iterator[Step]:
         yield t_ns / S, cells.share
 
 
+def waits(run: RunRecords) -> RunPicture | None:
+    """How long each survivor waited: from heard to confirmed, and until the post on the ground knew."""
+    heard: dict[int, int] = {}
+    known: dict[int, list[int]] = {}
+    held = Confirmations(run.survivors)
+    for record in run.mission:
+        held.add(record)
+        if isinstance(record, Detected):
+            heard.setdefault(record.survivor, record.t_ns)
+        elif isinstance(record, KnownOnGround):
+            known.setdefault(record.survivor, []).append(record.t_ns)
+    if not heard or run.scenario.mission.search == "none":
+        return None
+    confirmed = {one.survivor: one.t_ns for one in held.right()}
+    rows = sorted(heard, key=lambda one: (heard[one], one))
+    figure, (axes,) = canvas(1, width=6.5, height=1.0 + 0.17 * len(rows))
+    for row, survivor in enumerate(rows):
+        since_s, until_s = heard[survivor] / S, confirmed.get(survivor, round(run.end_s * S)) / S
+        found = survivor in confirmed
+        axes.barh(row, until_s - since_s, left=since_s, height=0.62, color=ORANGE if found else "none",
+                  edgecolor=ORANGE if found else RED, linestyle="-" if found else "--")  # fmt: skip
+        told = [t_ns / S for t_ns in known.get(survivor, ()) if found and t_ns >= confirmed[survivor]]
+        if told:
+            axes.barh(row, told[0] - until_s, left=until_s, height=0.3, color=BLUE)
+            axes.plot(told[0], row, marker="D", markersize=4, color=BLUE)
+    handles: list[Artist] = [Patch(color=ORANGE, label="heard, until confirmed")]
+    if len(confirmed) < len(rows):
+        handles.append(Patch(edgecolor=RED, facecolor="none", linestyle="--", label="not confirmed"))
+    if run.scenario.post is not None:
+        handles.append(Line2D([], [], color=BLUE, marker="D", label="known at the post"))
+    figure.legend(handles=handles, loc="outside upper center", ncols=3)
+    axes.set_yticks(range(len(rows)), [str(survivor) for survivor in rows])
+    axes.invert_yaxis()
+    axes.set_ylabel("survivor")
+    axes.set_xlabel("time [s]")
+    axes.set_xlim(0, run.end_s)
+    waited = sorted(confirmed[one] - heard[one] for one in confirmed if one in heard)
+    longest = f", at most {waited[-1] / S:.0f} s" if waited else ""
+    return RunPicture(
+        figure, f"Each survivor from the first reception of the phone to the right confirmation{longest}."
+    )
+
+
 def tracks(run: RunRecords) -> RunPicture | None:
     """The tracks of all UAVs over the area, with survivors and the places at which they were confirmed."""
     if not run.tracks:
@@ -121,6 +166,10 @@ def tracks(run: RunRecords) -> RunPicture | None:
     axes.add_collection(LineCollection(flown, colors=BLUE, linewidths=0.8, alpha=0.6, label="tracks"))
     ends = [track[-1] for track in flown]
     axes.scatter([at[0] for at in ends], [at[1] for at in ends], s=14, color=BLUE, zorder=3, label="UAVs at the end")
+    if run.scenario.ground.at_m:
+        east_m, north_m = run.scenario.ground.at_m
+        axes.scatter([east_m], [north_m], s=70, marker="s", color=ORANGE, edgecolors=DARK, zorder=4,
+                     label="post on the ground")  # fmt: skip
     confirms = run.scenario.mission.search != "none"
     held = Confirmations(run.survivors)
     for record in run.mission:

@@ -55,6 +55,7 @@ _TITLES = {
     "links": "Links",
     "slots": "Slots and turns",
     "mission": "Mission over time",
+    "waits": "From heard to confirmed",
     "tracks": "Tracks",
 }
 
@@ -70,7 +71,7 @@ def _drawings(
         partial(slot_pictures.slots, run, reports),
         *(
             partial(draw, run) if run.searches else _nothing
-            for draw in (mission_pictures.progress, mission_pictures.tracks)
+            for draw in (mission_pictures.progress, mission_pictures.waits, mission_pictures.tracks)
         ),
     )
 

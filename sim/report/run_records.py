@@ -16,6 +16,7 @@ from fanet_mw.trace import (
     Delivered,
     Detected,
     Generated,
+    KnownOnGround,
     LetOut,
     PlacedInside,
     Posed,
@@ -29,7 +30,7 @@ from sim.world.mobility.layout import positions
 
 SHOWN: Final = (
     Generated, Delivered, BoundStated, LetOut, RoleChanged, Detected, Approaching, Arrived, Confirmed, PlacedInside,
-    Refuted, Posed,
+    Refuted, KnownOnGround, Posed,
 )  # fmt: skip
 """The kinds of records that the pictures are drawn from."""
 _WINDOW_NS: Final = 10 * S
@@ -60,7 +61,9 @@ class RunRecords:
     """The last head of each node."""
     roles: dict[int, list[RoleChanged]] = field(default_factory=lambda: defaultdict(list))
     """The roles of each node, in the order of time."""
-    mission: list[Detected | Approaching | Arrived | Confirmed | PlacedInside | Refuted] = field(default_factory=list)
+    mission: list[Detected | Approaching | Arrived | Confirmed | PlacedInside | Refuted | KnownOnGround] = field(
+        default_factory=list
+    )
     tracks: dict[int, list[Posed]] = field(default_factory=lambda: defaultdict(list))
     """The positions of each UAV, once a second."""
     survivors: Sequence[Enu] = ()
@@ -87,7 +90,9 @@ class RunRecords:
                 case RoleChanged():
                     self.heads[record.node] = record.head
                     self.roles[record.node].append(record)
-                case Detected() | Approaching() | Arrived() | Confirmed() | PlacedInside() | Refuted():
+                case (
+                    Detected() | Approaching() | Arrived() | Confirmed() | PlacedInside() | Refuted() | KnownOnGround()
+                ):
                     self.mission.append(record)
         targets = {node: set(self.targets(node)) for node in self.scenario.node_ids}
         self.delivered = [

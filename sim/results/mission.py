@@ -215,7 +215,7 @@ def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
     covered = OverflownCells(scenario)
     graphs: list[Coherence] = []
     with_post: list[bool] = []
-    ground, range_m = scenario.ground, scenario.radio.range_m
+    range_m, reaches = scenario.radio.range_m, max(scenario.reaches.values(), default=1.0)
     post = np.array(positions(scenario)[-1]) if scenario.post is not None else None
     nearly_all_ns: int | None = None
     nearest: list[Values] = []
@@ -224,7 +224,7 @@ def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
         linked = apart[np.ix_(searching, searching)] <= range_m
         graphs.append(coherence(linked))
         if post is not None:
-            heard = np.linalg.norm(at[searching] - post, axis=1) <= range_m * 10 ** (ground.gain_dbi / 20)
+            heard = np.linalg.norm(at[searching] - post, axis=1) <= range_m * reaches
             with_post.append(_all_reached(linked, heard))
         if len(at) > 1:
             np.fill_diagonal(apart, math.inf)

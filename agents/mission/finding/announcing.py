@@ -4,6 +4,7 @@ seen often enough at close range, place certain  -> confirmed: flooded three tim
 later receptions make that place impossible      -> refuted: flooded likewise, and the survivor is searched again
 somebody seen, without a phone that fits         -> a person: flooded likewise
 another UAV does not seem to know of a verdict   -> some of those that know it flood it again
+a UAV that was lost is heard again               -> whoever hears it floods all verdicts that were not flooded lately
 """
 
 import math
@@ -14,7 +15,7 @@ from agents.mission.finding.known_survivors import KnownSurvivors, estimate_of
 from agents.mission.finding.phone_localization import Estimate
 from agents.mission.outbox import Outbox, OutgoingPacket
 from fanet_mw.trace import Confirmed, PlacedInside, Refuted
-from fanet_mw.units import US, NodeId, S
+from fanet_mw.units import MS, US, NodeId, S
 from fanet_mw.wire.survivors import Found, Standing, Survivor, person_id
 
 _TELLINGS: Final = 3
@@ -31,6 +32,11 @@ _POST_NS: Final = 5 * S
 """How long the post on the ground is taken to be in reach after a hello of its."""
 _PASSED_ON: Final = 3
 """The greatest number of verdicts in one hello."""
+_LATELY_NS: Final = 4 * S
+"""Parts of a swarm that meet tell each other no verdict that was flooded within this time."""
+_TURN_NS: Final = 250 * MS
+_TURNS: Final = 6
+"""Who hears a lost UAV again waits for its turn, one of so many of this length by its id, so that not all speak."""
 _TELLERS: Final = 4
 """If a UAV does not seem to know of a verdict, one in this number of the UAVs that know it floods it again."""
 
@@ -56,6 +62,19 @@ class Announcing:
         self._post_ns: int | None = None
         """The instant at which the post on the ground was last heard."""
         self._told_post = 0
+        self._flooded_ns: dict[int, int] = {}
+        """The instant at which somebody last flooded each verdict that this UAV knew already."""
+        self._meets_ns: int | None = None
+        """The instant from which this UAV floods all verdicts, because it has met somebody who was lost."""
+
+    def on_returned(self, now_ns: int) -> None:
+        """A UAV that was lost is heard again: it, and others with it, may not know what was found in the meantime."""
+        if self._meets_ns is None:
+            self._meets_ns = now_ns + self._node % _TURNS * _TURN_NS
+
+    def repeated(self, found: Found, now_ns: int) -> None:
+        """Somebody has flooded a verdict that this UAV knows."""
+        self._flooded_ns[found.survivor] = now_ns
 
     def on_post(self, now_ns: int) -> None:
         """The post on the ground is in reach, and may not know yet what was found while it was not."""
@@ -128,6 +147,9 @@ class Announcing:
 
     def tell(self, task: int | None, now_ns: int) -> None:
         """Flood the verdicts that are due, and the estimate of the survivor to whom this UAV flies."""
+        if self._meets_ns is not None and now_ns >= self._meets_ns:
+            self._meets_ns = None
+            self._tell_all(now_ns)
         for survivor, (left, next_ns) in sorted(self._tellings.items()):
             if now_ns < next_ns:
                 continue
@@ -173,6 +195,14 @@ class Announcing:
             self._told_post += 1
         told = [self._survivors.verdict(survivor) for survivor in chosen]
         return b"".join(found.encode_frame(self._node) for found in told if found is not None)
+
+    def _tell_all(self, now_ns: int) -> None:
+        """Flood all verdicts but those that were flooded lately, the newest ones first."""
+        for survivor in sorted(self._heard_ns, key=lambda one: (-self._heard_ns[one], one)):
+            verdict = self._survivors.verdict(survivor)
+            if verdict is not None and now_ns - self._flooded_ns.get(survivor, now_ns - S - _LATELY_NS) > _LATELY_NS:
+                self._flooded_ns[survivor] = now_ns
+                self._flood(verdict)
 
     def _tell_estimate(self, survivor: int, now_ns: int) -> None:
         """Flood the estimate of a responder if it has become clearly better."""

@@ -87,10 +87,12 @@ class PlanExchange:
 
     # --- received messages ----------------------------------------------------------------------------------------
 
-    def on_hello(self, node: int, position: Enu, *, now_ns: int) -> None:
-        """A neighbor's hello states its position."""
+    def on_hello(self, node: int, position: Enu, *, now_ns: int) -> bool:
+        """A neighbor's hello states its position; returns True if it was lost."""
         self._planner.on_neighbor(node, position, now_ns=now_ns)
+        returned = node in self._roll_call.lost
         self._roll_call.on_hello(node, now_ns=now_ns)
+        return returned
 
     def on_roll(self, roll: Roll, *, now_ns: int) -> None:
         """A neighbor tells who was heard when."""

@@ -10,7 +10,7 @@ from kit import MakeScenario
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from fanet_mw.trace import Confirmed, Detected, Generated, LetOut, Posed, Record, Refuted, RoleChanged
+from fanet_mw.trace import Confirmed, Detected, Generated, KnownOnGround, LetOut, Posed, Record, Refuted, RoleChanged
 from fanet_mw.units import MS, S
 from sim.report import mission_pictures, run_pictures, run_rows, slot_pictures
 from sim.report.run_records import RunRecords
@@ -74,6 +74,18 @@ def test_coverage_over_time_ends_at_that_of_the_summary(make_scenario: MakeScena
     assert times == list(range(11))
     assert shares[-1] == pytest.approx(mission(scenario, in_order(FOUND))["coverage"], abs=1e-6)
     assert shares[0] < shares[-1], "the UAVs fly on"
+
+
+def test_the_wait_of_each_survivor_is_drawn_until_the_post_knows(make_scenario: MakeScenario) -> None:
+    told = KnownOnGround(6 * S, 3, 1, 0.0, 98.0)
+    drawing = mission_pictures.waits(run_of(make_scenario(**SEARCH, **{"ground.at_m": (0.0, -150.0)}), *FOUND, told))
+    assert drawing is not None
+    axes = drawing.figure.axes[0]
+    bars = [bar.get_window_extent().transformed(axes.transData.inverted()) for bar in axes.patches]
+    assert [(round(bar.x0, 3), round(bar.x1, 3)) for bar in bars] == [(2, 4), (4, 6), (3, 7)]
+    assert legend(drawing.figure) == ["heard, until confirmed", "known at the post"]
+    assert drawing.caption.endswith("at most 4 s.")
+    assert mission_pictures.waits(run_of(make_scenario(**SEARCH), *FOUND[:20])) is None, "nobody was heard"
 
 
 def test_the_map_shows_tracks_and_where_each_survivor_was_confirmed(make_scenario: MakeScenario) -> None:

@@ -114,6 +114,7 @@ class Leader:
         self._period_ns = clusters.period_ns
         self._reassign_ns = seconds_to_ns(clusters.reassign_s)
         self._range_m = clusters.link_m or scenario.radio.range_m
+        self._reaches = scenario.reaches
         self._by_links = needs_every_link
         self._roster = Roster(
             liveness,
@@ -224,8 +225,16 @@ class Leader:
         start_ns = (decided_ns + notice_ns) // self._period_ns * self._period_ns + self._period_ns
         places = self._places(here, start_ns, now_ns)
         members = {node: place for node, place in places.items() if node != self._authority.leader}
-        links = within_range(places, range_m=self._range_m) if not measured else adjacency(measured, places)
-        near = within_range(members, range_m=self._range_m) if not measured else adjacency(measured, members)
+        links = (
+            within_range(places, range_m=self._range_m, reaches=self._reaches)
+            if not measured
+            else adjacency(measured, places)
+        )
+        near = (
+            within_range(members, range_m=self._range_m, reaches=self._reaches)
+            if not measured
+            else adjacency(measured, members)
+        )
         swarm = Swarm(members, near, velocities=self._roster.velocities())
         clusters = self._division.renew(before.clusters, swarm, self._roster.stand_ins, now_ns=now_ns)
         same = [(c.head, sorted(c.members)) for c in clusters] == [(c.head, sorted(c.members)) for c in before.clusters]

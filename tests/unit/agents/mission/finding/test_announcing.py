@@ -6,7 +6,7 @@ from search_board import FOLLOWER, MODEL, UP_M, Board
 
 from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, Estimate
 from fanet_mw.trace import Confirmed, Refuted
-from fanet_mw.units import Enu, S
+from fanet_mw.units import Enu, NodeId, S
 from fanet_mw.wire.search_messages import told_in
 from fanet_mw.wire.survivors import Found, Standing, Survivor
 
@@ -65,3 +65,36 @@ def test_a_refutation_is_told_as_a_confirmation_is_and_answers_who_tells_the_con
     for node in range(10, 14):
         board.announcing.outdated(mistaken._replace(node=node), node * 8 * S)
     assert len(board.out.packets) == 1
+
+
+def test_who_hears_a_lost_one_again_floods_all_verdicts_once_but_those_that_were_flooded_just_now() -> None:
+    board = seen()
+    others = {survivor: Found(1, survivor, 10.0, 20.0, 4, 0, 4, 7, Standing.CONFIRMED) for survivor in (2, 3)}
+    board.announcing.confirm(1, 0)
+    for found in others.values():
+        board.survivors.on_found(found, now_ns=0)
+        board.announcing.decided(found.survivor, 0)
+    for second in range(30):
+        board.announcing.tell(None, second * S)
+    board.out.packets.clear()
+    board.announcing.on_returned(40 * S)
+    board.announcing.repeated(others[3], 40 * S)
+    for second in range(40, 50):
+        board.announcing.tell(None, second * S)
+    assert sorted(found.survivor for found in confirmed(board)) == [1, 2]
+
+
+def test_those_who_hear_it_take_turns() -> None:
+    began = set()
+    for node in range(1, 7):
+        board = Board(NodeId(node), Enu(0, 0, UP_M))
+        board.survivors.on_found(Found(1, 2, 10.0, 20.0, 4, 0, 4, 7, Standing.CONFIRMED), now_ns=0)
+        board.announcing.decided(2, 0)
+        board.announcing.on_returned(20 * S)
+        steps = [20 * S + step * S // 20 for step in range(60)]
+        for now_ns in steps:
+            board.announcing.tell(None, now_ns)
+            if confirmed(board):
+                began.add(now_ns)
+                break
+    assert len(began) == 6

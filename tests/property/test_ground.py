@@ -124,7 +124,9 @@ def test_pads_and_roofs_stand_on_the_ground(terrain_m: float) -> None:
     starts = np.array(positions(scenario))
     solid = obstacles(scenario, starts)
     solids = Solids(solid)
-    assert starts[:, 2] - solids.ground_m(starts) == pytest.approx(ON_GROUND_M)
+    *pads, post = (starts[:, 2] - solids.ground_m(starts)).tolist()
+    assert pads == pytest.approx([ON_GROUND_M] * 45)
+    assert post == pytest.approx(scenario.ground.antenna_m)
     middles = np.array([[box.east, box.north, 0] for box in solid.boxes])
     heights = np.array([box.roof for box in solid.boxes]) - solids.ground_m(middles)
     least, greatest = scenario.world.building_height_m

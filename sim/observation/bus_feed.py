@@ -24,13 +24,12 @@ from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.hosts.clock import SwarmClock
 from fanet_mw.scenario import Scenario, config
 from sim.observation.observer import Observer
+from sim.observation.turns import MOST_SPANS
 from sim.run.bus.air_control import OPERATOR, find_swarm
 from sim.run.collecting.bus_checks import BusChecks
 
 _MOST_PUTS: Final = 50_000
 _ANSWER_S: Final = 3.0
-_MOST_SPANS: Final = 4096
-"""The greatest number of slots or turns of a report that is believed."""
 _ASK_CLOCK_S: Final = 1.0
 
 
@@ -216,8 +215,8 @@ def makes_sense(content: Mapping[str, Any]) -> bool:
     except ValidationError:
         return False
     slots, turns = content.get("slots") or {}, content.get("turns") or {}
-    few_slots = slots.get("period_ms", 0.0) <= _MOST_SPANS * slots.get("slot_ms", 1.0)
-    return few_slots and len(turns.get("own", ())) <= _MOST_SPANS
+    few_slots = slots.get("period_ms", 0.0) <= MOST_SPANS * slots.get("slot_ms", 1.0)
+    return few_slots and len(turns.get("own", ())) <= MOST_SPANS
 
 
 class Paced:

@@ -1,11 +1,14 @@
 """Whose turn it is: the spans of the superframe or round that belong to nodes, from their reports."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS
+
+MOST_SPANS: Final = 4096
+"""The greatest number of slots or turns of a report that is believed."""
 
 
 class Span(NamedTuple):
@@ -48,6 +51,8 @@ def turns(scenario: Scenario, reports: Mapping[int, Mapping[str, Any]]) -> Turns
         return None
     frame = max(slotted, key=lambda one: float(one["start_ms"]))
     period_ns, slot_ns = _ns(frame["period_ms"]), _ns(frame["slot_ms"])
+    if period_ns // slot_ns > MOST_SPANS:
+        return None
     own = [Span(slot, slot * slot_ns, slot_ns - _ns(frame["guard_ms"])) for slot in range(period_ns // slot_ns)]
     return Turns(_ns(frame["start_ms"]), period_ns, own, "slot")
 

@@ -194,7 +194,8 @@ class GroundControl(Application):
         off_m = self._height.off_m(fix, stands=self._pilot.on_ground)
         self._streams.height_off_m = off_m
         self._pilot.on_fix(fix.position._replace(up=fix.position.up - off_m), fix.velocity, now_ns)
-        self._settle(now_ns)
+        if self._watched_ns is not None or self._pilot.on_ground is not self._streams.flown.on_ground:
+            self._settle(now_ns)  # as long as nobody looks, there is nothing to hand over
 
     def on_sensor(self, reading: SensorReading, now_ns: int) -> None:
         if isinstance(reading, Battery):

@@ -78,7 +78,7 @@ def _ratio(part: int, whole: int) -> float | None:
 
 def _meant(outcome: Outcome, name: str, packets: list[Any]) -> Flags:
     """For each packet, the nodes for which it is meant, by node id."""
-    count = outcome.scenario.nodes.count
+    count = outcome.scenario.node_count
     targets = targets_by_source(outcome, name) if name in outcome.scenario.traffic_classes else {}
     rows: dict[int, Flags] = {}
     for node in outcome.scenario.node_ids:

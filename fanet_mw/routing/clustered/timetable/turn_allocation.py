@@ -14,7 +14,7 @@ timetable from the same schedule and positions. Which turn of the superframe eac
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from typing import Final, NamedTuple, TypeVar
 
@@ -95,16 +95,43 @@ def fit(
     heads = tuple((node, head) for node, head in sorted(head_of.items()) if node != head)
     whole_ns = scenario.clusters.period_ns if period_ns is None else period_ns
     wishes = _wishes_by_load(scenario, head_of, leads, whole_ns, loads) if loads else None
-    for wish in islice(wishes or _wishes(scenario, head_of, leads, whole_ns), int(quick), None):
-        if quick and not wish.enough:
-            return None
+    ordered = wishes or _wishes(scenario, head_of, leads, whole_ns)
+
+    def made(wish: _Wish) -> FittedTimetable | None:
         turns = superframe(scenario, origin_ns=origin_ns, period_ns=whole_ns, together=wish.together)
         geometry, ways = links(scenario, turns), heads if wish.whole else ()
         table = _table(places, wish.roots, geometry, ways, blocks=wish.blocks, hard=wish.hard and not quick)
-        if table is not None:
-            frame_bytes = largest_frame(scenario, together=wish.together)
-            return FittedTimetable(turns, table, wish.together, frame_bytes, wish.whole, wish.enough, loads=loads)
-    return None
+        if table is None:
+            return None
+        frame_bytes = largest_frame(scenario, together=wish.together)
+        return FittedTimetable(turns, table, wish.together, frame_bytes, wish.whole, wish.enough, loads=loads)
+
+    scarce = list[_Wish]()
+    for wish in islice(ordered, int(quick), None):
+        if wish.enough:
+            found = made(wish)
+            if found is not None:
+                return found
+        elif quick:
+            return None
+        else:
+            scarce.append(wish)
+    return _first_made(scarce, made)
+
+
+def _first_made(wishes: Sequence[_Wish], made: Callable[[_Wish], FittedTimetable | None]) -> FittedTimetable | None:
+    """The timetable of the first wish that fits, of wishes for fewer and fewer turns, by bisection: far too much load
+    would take dozens of tries.
+    """
+    best, low, high = None, 0, len(wishes)
+    while low < high:
+        middle = (low + high) // 2
+        found = made(wishes[middle])
+        if found is None:
+            low = middle + 1
+        else:
+            best, high = found, middle
+    return best
 
 
 def fit_measured(

@@ -47,13 +47,15 @@ class BusFeed:
         swarm: str | None,
         *,
         zenoh_config: Path | None = None,
+        name: str = OPERATOR,
         scenario: Scenario | None = None,
     ) -> None:
         """`scenario`: that of the swarm, if it names files, which the bus does not carry; otherwise it is asked for.
+        `name`: whose certificate the session has.
 
         Raises BusError without a router, and FanetError without a swarm whose clock's keeper answers.
         """
-        self.bus = Bus.join(endpoint, config_of(zenoh_config, OPERATOR))
+        self.bus = Bus.join(endpoint, config_of(zenoh_config, name))
         try:
             self.names = Topics(swarm or find_swarm(self.bus))
             self.scenario = scenario or self._ask_scenario()

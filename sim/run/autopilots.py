@@ -36,7 +36,7 @@ async def run(
     for number in interrupts.heeded():
         loop.add_signal_handler(number, over.set)
     per_uav(connection, 1, flag="--autopilots")
-    with BusFeed(endpoint, swarm, zenoh_config=zenoh_config) as feed:
+    with BusFeed(endpoint, swarm, zenoh_config=zenoh_config, name=WORLD) as feed:
         bus, names, scenario = feed.bus, feed.names, feed.scenario
         listener = ClockListener(bus, names)
         origin = Geodetic(*scenario.world.origin_deg, 0.0)

@@ -14,7 +14,6 @@ from typing import Any, Final
 from agents.applications.traffic import sources_of
 from agents.ground_control.telemetry_pace import pace_of
 from agents.positioning.steady_fix import error_m
-from emulator.channel.propagation import heard_m
 from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.errors import ConfigError
 from fanet_mw.graph.topology import levels, within_range
@@ -138,6 +137,8 @@ def _judge_rounds(
     """The verdict on rounds: the bound over the hops that the starting positions need, and the load of the turns."""
     timing = RoundTiming.of(scenario)
     law = DelayLaw(timing, scenario)
+    from emulator.channel.propagation import heard_m  # numpy, which a plan of clusters does not need
+
     near = within_range(at, range_m=heard_m(scenario.radio))
     hops = max(max(levels(near, node).values()) for node in at)
     bound_ns = law.over_ns(hops)

@@ -137,9 +137,7 @@ def _judge_rounds(
     """The verdict on rounds: the bound over the hops that the starting positions need, and the load of the turns."""
     timing = RoundTiming.of(scenario)
     law = DelayLaw(timing, scenario)
-    from emulator.channel.propagation import heard_m  # numpy, which a plan of clusters does not need
-
-    near = within_range(at, range_m=heard_m(scenario.radio))
+    near = within_range(at, range_m=scenario.radio.range_m, reaches=scenario.reaches)
     hops = max(max(levels(near, node).values()) for node in at)
     bound_ns = law.over_ns(hops)
     urgent = {

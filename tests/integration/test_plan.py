@@ -222,7 +222,7 @@ def test_the_search_meets_its_deadline_and_every_delivery_of_the_swarm_does() ->
         (("convoy",), 0, "FEASIBLE  convoy"),
         (("rescue",), 0, "a round of"),
         (("rescue", "--deadline", "0.5"), 1, "not within the deadline of 500 ms"),
-        (("flooding",), 2, 'only "clustered" can be planned'),
+        (("flooding",), 2, 'only "clustered" and "rounds" can be planned'),
         (("clusters", "--deadline", "-1"), 2, "must be > 0"),
     ],
 )

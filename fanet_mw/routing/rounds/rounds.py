@@ -291,7 +291,7 @@ class RoundFlooding(RoutingProtocol):
             if self._expired(packet, start_ns):
                 continue
             size = len(packet.frame)
-            if size > room or (not together and not self._pacing.take(start_ns)):
+            if size > room or (not together and not self._pacing.take(start_ns, again=again)):
                 next_ns = start_ns + self._timing.period_ns - self._timing.in_window_ns(start_ns)
                 self._spreading.look_again(packet, from_ns=self._pacing.start_ns(next_ns, windows=1 + again))
                 continue

@@ -13,7 +13,7 @@ WINDOW = 10 * MS
 
 def frames_allowed(pacing: BulkPacing, number: int) -> int:
     at_ns = WINDOW + number * TIMING.period_ns
-    return sum(pacing.take(at_ns + i) for i in range(300))
+    return sum(pacing.take(at_ns + i, again=False) for i in range(300))
 
 
 def test_a_node_may_send_so_many_frames_per_window_and_again_in_the_next() -> None:
@@ -47,3 +47,13 @@ def test_one_frame_per_window_is_always_allowed() -> None:
 def test_a_wait_is_a_part_of_the_windows() -> None:
     pacing = BulkPacing(TIMING, lambda: 0.5)
     assert pacing.start_ns(WINDOW, windows=0.5) == WINDOW + TIMING.window_ns // 4
+
+
+def test_repetitions_are_in_proportion_to_what_is_new_so_that_an_overload_ends() -> None:
+    pacing = BulkPacing(TIMING, lambda: 0.5)
+    for _ in range(2000):
+        pacing.ended(WINDOW + 50 * MS)
+    assert sum(pacing.take(WINDOW + i, again=True) for i in range(60)) == 16, "what it has saved"
+    for i in range(20):
+        assert pacing.take(WINDOW + 100 + i, again=False)
+    assert sum(pacing.take(WINDOW + 200 + i, again=True) for i in range(60)) == 15, "three for four new ones"

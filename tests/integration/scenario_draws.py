@@ -128,6 +128,8 @@ def _value(key: Key, pick: random.Random) -> Any:
         return pick.randint(*_SMALL[key.name])
     if key.name == "nodes.positions_m":
         return []
+    if key.annotation is str or "PlannedOrder" in str(key.annotation):
+        return key.default  # the name of a file, or what an operator wants
     if key.name == "radio.rate_mbps" or key.name == "radio.ack_rate_mbps":
         return pick.choice([1.0, 2.0, 5.5, 11.0, 6.0, 24.0, 54.0])
     for item in key.metadata:
@@ -148,7 +150,7 @@ def _of(annotation: Any, metadata: tuple[Any, ...], pick: random.Random) -> Any:
     if origin is Literal:
         return pick.choice(get_args(annotation))
     if origin in (Union, UnionType):
-        branch = pick.choice([arm for arm in get_args(annotation) if arm is not NoneType])
+        branch = pick.choice([arm for arm in get_args(annotation) if arm not in (NoneType, str)])
         return _of(branch, metadata, pick)
     if origin is tuple:
         arms = get_args(annotation)

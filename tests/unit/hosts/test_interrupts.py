@@ -55,6 +55,7 @@ async def nothing() -> None:
 def test_an_interrupt_that_an_import_took_for_its_failure_ends_what_starts_next(number: signal.Signals) -> None:
     before = [signal.getsignal(one) for one in interrupts.SIGNALS]
     try:
+        signal.signal(number, signal.SIG_DFL)  # under nohup it would stay ignored
         interrupts.install()
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(number)

@@ -268,6 +268,11 @@ def test_mavproxy_links_arms_loads_waypoints_and_flies_them(field: Field, tmp_pa
         terminal.type("mode AUTO", "Mode AUTO")
         terminal.type("", r"seq : 2")
         terminal.type("", "DISARMED")
+        for _ in range(PATIENCE_S):  # that the last item is reached may be told after that
+            if "seq : 3" in terminal.said:
+                break
+            terminal.type("link", "lost")
+            time.sleep(0.5)
         link = terminal.type("link", r"\d lost, .*loss")
         assert " 0 lost" in link
     finally:

@@ -23,6 +23,8 @@ from sim.run.launcher.swarm import free_endpoint
 MARK = "FANET_TEST_MARK"
 SMALL = "nodes = {count = 2}\nclusters = {count = 1}\nduration_s = %s\nwarmup_s = 0\ndrain_s = 0\n"
 
+TERMINATED = "fanet: ended by SIGTERM before there was a result\n"
+
 
 def marked(mark: str) -> list[int]:
     """Live processes that were started with this mark in their environment, by whomever."""
@@ -280,7 +282,7 @@ def test_a_router_that_is_interrupted_stops_the_services_it_kept_time_for(
     for service in services:
         assert ended(service) == (0, "")
     assert router.stderr is not None
-    assert last_words(router.stderr.read()) == ""
+    assert last_words(router.stderr.read()) == ("" if number == signal.SIGINT else TERMINATED)
     _, status, usage = os.wait4(router.pid, 0)
     router.returncode = os.waitstatus_to_exitcode(status)
     router.stderr.close()
@@ -312,7 +314,7 @@ def test_a_router_or_service_that_still_waits_for_the_others_ends_when_interrupt
     said(router, "serving")
     agent = start(mark, "sim.cli.app", "agent", str(path), "--connect", endpoint, "--id", "1", deaf=True)
     wait_for("agent-1", endpoint=endpoint)
-    line = "" if number == signal.SIGINT else "fanet: ended by SIGTERM before there was a result\n"
+    line = "" if number == signal.SIGINT else TERMINATED
     agent.send_signal(number)
     assert ended(agent) == (128 + number, line)
     router.send_signal(number)

@@ -269,7 +269,7 @@ def test_mavproxy_links_arms_loads_waypoints_and_flies_them(field: Field, tmp_pa
         terminal.type("", r"seq : 2")
         terminal.type("", "DISARMED")
         for _ in range(PATIENCE_S):  # that the last item is reached may be told after that
-            if "seq : 3" in terminal.said:
+            if "MISSION_ITEM_REACHED {seq : 3}" in terminal.said:
                 break
             terminal.type("link", "lost")
             time.sleep(0.5)

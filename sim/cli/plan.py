@@ -138,7 +138,8 @@ def _judge_rounds(
     timing = RoundTiming.of(scenario)
     law = DelayLaw(timing, scenario)
     near = within_range(at, range_m=scenario.radio.range_m, reaches=scenario.reaches)
-    hops = max(max(levels(near, node).values()) for node in at)
+    ways = [levels(near, node) for node in at]
+    hops = max(max(hops_to.values()) for hops_to in ways)
     bound_ns = law.over_ns(hops)
     urgent = {
         name: each for name, each in scenario.traffic_classes.items() if each.priority != "bulk" or not timing.window_ns
@@ -152,7 +153,7 @@ def _judge_rounds(
     problems = list[str]()
     if longest > timing.turn_bytes:
         problems.append(f"urgent packets of {longest} B are longer than rounds.turn_bytes = {timing.turn_bytes}")
-    if any(len(levels(near, node)) < len(at) for node in at):
+    if any(len(hops_to) < len(at) for hops_to in ways):
         problems.append("the nodes are not all connected at their starting positions")
     if offered > carried:
         problems.append(f"urgent packets of {offered:.0f} B/s are more than the {carried:.0f} B/s that turns carry")

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from agents.applications.traffic import sources_of, targets_of
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import S
+from sim.results.links_over_time import within
 from sim.world.mobility.guidance import Guidance
 from sim.world.mobility.layout import positions
 
@@ -34,6 +35,6 @@ def connectivity(scenario: Scenario) -> float:
     shares = []
     for t_s in range(first_ns // S, max(end_ns // S, first_ns // S + 1)):
         at = guidance.track(float(t_s)).places
-        part = parts(np.linalg.norm(at[:, None] - at[None], axis=2) <= scenario.radio.range_m)
+        part = parts(within(at, scenario.radio.range_m))
         shares.append(float((part[sources] == part[targets]).mean()))
     return float(np.mean(shares))

@@ -57,9 +57,8 @@ def _differences(outcome: Outcome, requests: Mapping[str, Mapping[str, int]]) ->
         had = counts.get("all", 0)
         made = outcome.reports.get(name, {}).get("frames_sent", 0)
         restarted = outcome.mode == "realtime" and bool(planned_stops(outcome.scenario, node))
-        if restarted or _cut_short(
-            outcome, name
-        ):  # the node's count ends before the node did, so the medium's count is used
+        if restarted or _cut_short(outcome, name):
+            # the node's count ends before the node did, so the medium's count is used
             made = max(had, counts.get("before_restart", 0) + made)
         missing += max(0, made - had)
         unasked += max(0, had - made)

@@ -49,6 +49,7 @@ from fanet_mw.trace import (
 from fanet_mw.units import Enu, S
 from fanet_mw.wire.survivors import is_person
 from sim.results.coherence import Coherence, coherence
+from sim.results.links_over_time import OFF_AIR
 from sim.run.collecting.record_kinds import records_of
 from sim.world.environment.survivors import place
 from sim.world.mobility.layout import positions
@@ -56,8 +57,6 @@ from sim.world.sensors.phone import REFERENCE_LOSS_DB
 
 _HOMEWARD: Final = frozenset({"return", "done", "recall", "land"})
 """The mission modes of a UAV that has left the search."""
-_OFF_AIR: Final = frozenset({"cut", "mute", "deaf", "stop", "crash"})
-"""The faults that take a UAV out of the network."""
 _WRECKED: Final = "fallen"
 _RETURNING: Final = "return"
 """The flight mode of a UAV that its flight controller brings home."""
@@ -280,7 +279,7 @@ def _instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows, Flags]]:
     for record in records_of(records, ProcessEnded, RadioFault, MissionModeChanged, FlightModeChanged, Posed):
         if type(record) is ProcessEnded:
             dead.add(record.node)
-        elif type(record) is RadioFault and record.kind in _OFF_AIR:
+        elif type(record) is RadioFault and record.kind in OFF_AIR:
             off_air.pop(record.label, None)
             off_air.update({record.label: record.node} if record.active else {})
         elif type(record) is FlightModeChanged:

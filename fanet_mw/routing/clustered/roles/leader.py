@@ -225,16 +225,7 @@ class Leader:
         start_ns = (decided_ns + notice_ns) // self._period_ns * self._period_ns + self._period_ns
         places = self._places(here, start_ns, now_ns)
         members = {node: place for node, place in places.items() if node != self._authority.leader}
-        links = (
-            within_range(places, range_m=self._range_m, reaches=self._reaches)
-            if not measured
-            else adjacency(measured, places)
-        )
-        near = (
-            within_range(members, range_m=self._range_m, reaches=self._reaches)
-            if not measured
-            else adjacency(measured, members)
-        )
+        links, near = self._near(places, measured), self._near(members, measured)
         swarm = Swarm(members, near, velocities=self._roster.velocities())
         clusters = self._division.renew(before.clusters, swarm, self._roster.stand_ins, now_ns=now_ns)
         same = [(c.head, sorted(c.members)) for c in clusters] == [(c.head, sorted(c.members)) for c in before.clusters]
@@ -273,6 +264,12 @@ class Leader:
         nodes = [*self._roster.nodes, NodeId(self._authority.leader)]
         known = self._assigned.measured or self._estimates.links.known(nodes) >= _MOST * len(nodes)
         return self._estimates.links.between(nodes) if known else ()
+
+    def _near(self, places: Mapping[NodeId, Enu], measured: tuple[Link, ...]) -> Adjacency:
+        """The links between nodes at these places: the measured ones, if there are any."""
+        if measured:
+            return adjacency(measured, places)
+        return within_range(places, range_m=self._range_m, reaches=self._reaches)
 
     def _places(self, here: Motion, start_ns: int, now_ns: int) -> dict[NodeId, Enu]:
         """The positions of all nodes in the middle of the time for which the assignment is made."""

@@ -28,27 +28,27 @@ _A_LITTLE_NS: Final = 2 * S
 
 
 def lost_ns(scenario: Scenario) -> int:
-    """The time without a sign of life after which the leader forgets a node: two updates and a margin.
-
-    An update is due after 20 s without a flood; then it waits for the next hello, its share of the spread, and a turn.
+    """The time without a sign of life after which the leader forgets a node: two updates, each due after 20 s without a
+    flood, and a margin.
     """
-    routing, clusters = scenario.routing, scenario.clusters
-    hello_ns = round(_HELLO_VARIES * seconds_to_ns(routing.hello_interval_s))
-    update_ns = _QUIET_NS + hello_ns + UPDATE_NS * (1 + scenario.node_count) + clusters.period_ns
-    return 2 * update_ns + _A_LITTLE_NS
+    return 2 * (_QUIET_NS + _update_ns(scenario)) + _A_LITTLE_NS
 
 
 def settled_ns(scenario: Scenario) -> int:
     """The time after which the leader has been told of a turn that all nodes made together.
 
     Until then it believes that some have turned and others have not, and so that the swarm falls apart. Each notices
-    when it has strayed, and updates with the next hello in its share of the spread, at most once per `_LEAST_NS`.
+    when it has strayed, and updates at most once per `_LEAST_NS`.
     """
-    routing, clusters = scenario.routing, scenario.clusters
     speed_m_s = max(scenario.mobility.speed_m_s, 1.0)
-    straying_ns = round(STRAYED * (clusters.link_m or scenario.radio.range_m) / speed_m_s * S)
-    hello_ns = round(_HELLO_VARIES * seconds_to_ns(routing.hello_interval_s))
-    return straying_ns + _LEAST_NS + hello_ns + UPDATE_NS * (1 + scenario.nodes.count) + clusters.period_ns
+    straying_ns = round(STRAYED * (scenario.clusters.link_m or scenario.radio.range_m) / speed_m_s * S)
+    return straying_ns + _LEAST_NS + _update_ns(scenario)
+
+
+def _update_ns(scenario: Scenario) -> int:
+    """The time that an update which is due waits for the next hello, its share of the spread, and a turn."""
+    hello_ns = round(_HELLO_VARIES * seconds_to_ns(scenario.routing.hello_interval_s))
+    return hello_ns + UPDATE_NS * (1 + scenario.node_count) + scenario.clusters.period_ns
 
 
 class PositionUpdates:

@@ -83,7 +83,7 @@ class Roster:
 
     def __init__(
         self, liveness: Liveness, *, lost_ns: int, objection_ns: int, sure_m: float | None, settled_ns: int
-    ) -> None:  # fmt: skip
+    ) -> None:
         """A node is forgotten `lost_ns` after its last sign of life, or `objection_ns` after it was reported silent.
 
         `sure_m`: a report counts only if the reported node was all the time within this distance of the reporting one,

@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from emulator.kernel.compile import COMPILING_NOTICE, must_compile, warm_up
+from emulator.compile_kernel import COMPILING_NOTICE, must_compile, warm_up
 from emulator.medium import Medium
 from emulator.pcap_file import PcapFile, unused
 from fanet_mw.hosts import interrupts, service

@@ -19,8 +19,8 @@ from collections.abc import Callable
 from typing import Final, Protocol
 from zlib import crc32
 
-from fanet_mw.airtime import Timing
-from fanet_mw.scenario.tables.radio import Radio, is_ofdm
+from fanet_mw.airtime import Timing, is_ofdm
+from fanet_mw.scenario.tables.radio import Radio
 from fanet_mw.units import BROADCAST, US, S
 
 PORT: Final = 14550

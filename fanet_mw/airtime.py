@@ -8,15 +8,15 @@ stations that know only DSSS, 5 and 10 MHz channels, QoS access categories.
 """
 
 import math
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Protocol
 
-from fanet_mw.scenario.tables.radio import Radio, is_ofdm
 from fanet_mw.units import US
 
 OVERHEAD_BYTES: Final = 8 + 20 + 8 + 24 + 4
 """The bytes that are sent around each frame of this project, which is the UDP payload: UDP, IPv4, LLC/SNAP, MAC header,
 FCS."""
 ACK_BYTES: Final = 14
+OFDM_RATES_MBPS: Final = (6.0, 9.0, 12.0, 18.0, 24.0, 36.0, 48.0, 54.0)
 DETECT_NS: Final = 4 * US
 """The time from the first bit of a frame at a station until the station detects it and senses the medium busy (as in
 ns-3)."""
@@ -24,6 +24,11 @@ OFDM_HEADER_NS: Final = 20 * US  # 17.3.2.4 and table 17-5: two training fields 
 SYMBOL_NS: Final = 4 * US  # table 17-5 (T_SYM)
 SIGNAL_EXTENSION_NS: Final = 6 * US  # table 18-5 (aSignalExtension), ERP-OFDM only
 _SERVICE_AND_TAIL_BITS: Final = 16 + 6  # 17.3.5.2, 17.3.5.3
+
+
+def is_ofdm(rate_mbps: float) -> bool:
+    """True if a rate is sent by OFDM (clauses 17 and 18 of IEEE 802.11-2020) and not by DSSS."""
+    return rate_mbps in OFDM_RATES_MBPS
 
 
 def plcp_ns(*, short: bool) -> int:
@@ -45,6 +50,25 @@ def ofdm_frame_ns(size: int, *, rate_mbps: float, extension_ns: int = 0) -> int:
     return OFDM_HEADER_NS + -(-(_SERVICE_AND_TAIL_BITS + 8 * size) // bits_per_symbol) * SYMBOL_NS + extension_ns
 
 
+class RadioTiming(Protocol):
+    """What airtimes depend on: the table `[radio]` of a scenario."""
+
+    @property
+    def standard(self) -> str: ...
+    @property
+    def rate_mbps(self) -> float: ...
+    @property
+    def ack_rate_mbps(self) -> float: ...
+    @property
+    def preamble(self) -> str: ...
+    @property
+    def slot(self) -> str: ...
+    @property
+    def coverage_class(self) -> int: ...
+    @property
+    def cw_min(self) -> int: ...
+
+
 class Timing(NamedTuple):
     """The durations that the DCF needs, in ns."""
 
@@ -59,7 +83,7 @@ class Timing(NamedTuple):
     """The last part of a frame, in which nothing is transmitted but the medium counts as busy."""
 
     @classmethod
-    def of(cls, radio: Radio) -> "Timing":
+    def of(cls, radio: RadioTiming) -> "Timing":
         """The values that follow from the scenario's standard, rates and preamble."""
         short = radio.preamble == "short"
         ofdm = is_ofdm(radio.rate_mbps)
@@ -84,7 +108,7 @@ class Timing(NamedTuple):
         )
 
 
-def airtime_ns(size: int, radio: Radio, *, rate_mbps: float) -> int:
+def airtime_ns(size: int, radio: RadioTiming, *, rate_mbps: float) -> int:
     """Airtime of a MAC frame of `size` bytes, FCS included, at one of the rates of the scenario's standard."""
     if is_ofdm(rate_mbps):
         extension_ns = SIGNAL_EXTENSION_NS if radio.standard == "g" else 0
@@ -92,7 +116,7 @@ def airtime_ns(size: int, radio: Radio, *, rate_mbps: float) -> int:
     return frame_ns(size, rate_mbps=rate_mbps, short=radio.preamble == "short")
 
 
-def longest_access_ns(size: int, radio: Radio) -> int:
+def longest_access_ns(size: int, radio: RadioTiming) -> int:
     """The longest time that a frame of this project, of `size` bytes, takes at an idle medium: DIFS, the longest
     backoff that an earlier frame may have left behind, and its airtime.
     """

@@ -36,13 +36,13 @@ from sim.world.environment.diffraction import loss_db as edge_loss_db  # noqa: E
 from sim.world.environment.obstacles import obstacles  # noqa: E402
 from sim.world.environment.solids import Solids  # noqa: E402
 from sim.world.environment.survivors import Survivors  # noqa: E402
-from sim.world.mobility.position_estimate import PositionEstimate  # noqa: E402
 from sim.world.sensors.altimeter import AltimeterSensor  # noqa: E402
 from sim.world.sensors.camera import CameraSensor  # noqa: E402
 from sim.world.sensors.contract import Truth  # noqa: E402
 from sim.world.sensors.gps import GpsReceiver  # noqa: E402
 from sim.world.sensors.inertial import InertialSensor  # noqa: E402
 from sim.world.sensors.phone import REFERENCE_LOSS_DB, PhoneSensor  # noqa: E402
+from sim.world.sensors.position_estimate import PositionEstimate  # noqa: E402
 from sim.world.sensors.radar import RadarSensor  # noqa: E402
 from sim.world.sensors.voice import VoiceSensor, level_db  # noqa: E402
 

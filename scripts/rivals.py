@@ -21,8 +21,8 @@ from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 from sim.world.arrays import Rows
+from sim.world.environment.layout import positions
 from sim.world.mobility.guidance import Guidance
-from sim.world.mobility.layout import positions
 
 
 def reached(at: Rows, range_m: float) -> int:

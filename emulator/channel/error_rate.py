@@ -18,7 +18,8 @@ import numpy.typing as npt
 from emulator.channel.ofdm_error_rate import bit_error
 from emulator.channel.ofdm_error_tables import SHORT_BYTES, TABLED_MBPS, log_success
 from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
-from fanet_mw.scenario.tables.radio import DSSS_BANDWIDTH_HZ, is_ofdm
+from fanet_mw.airtime import is_ofdm
+from fanet_mw.scenario.tables.radio import DSSS_BANDWIDTH_HZ
 
 _TOP_DB: Final = 35.0
 _SYMBOLS_PER_S: Final = 1.375e6

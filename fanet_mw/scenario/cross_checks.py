@@ -9,7 +9,7 @@ from __future__ import annotations  # `Scenario` imports this module: to it, the
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
-from fanet_mw import airtime  # whole: it imports this package, and may be the first to be imported
+from fanet_mw.airtime import longest_access_ns
 from fanet_mw.bus.radio_control import EVERY, Degrade, Mishap, MishapKind, Partition, Restore, nodes_of
 from fanet_mw.orders import wrong
 from fanet_mw.units import MAX_NODES, MS, US
@@ -130,7 +130,7 @@ def _no_claimed_turns(scenario: Scenario) -> Iterator[str]:
     clusters, radio, hello_s = scenario.clusters, scenario.radio, scenario.routing.hello_interval_s
     if clusters.relay != "claimed" or not hello_s:
         return
-    turn_ns = airtime.longest_access_ns(scenario.claimed_turn_bytes, radio) + round(clusters.turn_slack_us * US)
+    turn_ns = longest_access_ns(scenario.claimed_turn_bytes, radio) + round(clusters.turn_slack_us * US)
     most_ms = (scenario.claimed_period_ns - turn_ns) // US * US / MS
     if clusters.contention_ms > most_ms:
         yield (

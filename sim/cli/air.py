@@ -1,4 +1,4 @@
-"""The `fanet air` commands: parsing and printing; what they do is in `sim.run.bus.air_control`."""
+"""The `fanet air` commands: parsing and printing; what they do is in `sim.bus.air_control`."""
 
 import math
 from dataclasses import dataclass
@@ -25,8 +25,8 @@ from fanet_mw.bus.radio_control import (
 from fanet_mw.errors import ConfigError
 from fanet_mw.units import MAX_NODES, STILL, Enu, NodeId, S, seconds_to_ns
 from sim.cli.command_groups import RUNNING
-from sim.cli.console import Console
 from sim.cli.options import SwarmFlags
+from sim.console import Console
 
 app = App(
     name="air",
@@ -244,7 +244,7 @@ def restore(label: str = "", *, where: SwarmFlags = SwarmFlags()) -> int:
 
 
 def _do(control: Control, where: SwarmFlags) -> int:
-    from sim.run.bus.air_control import change
+    from sim.bus.air_control import change
 
     if not isinstance(control, Restore) and (why := wrong(control, count=MAX_NODES)):
         kind, what = type(control).__name__.lower(), why.removeprefix("fault_").replace("_", " ")

@@ -30,9 +30,9 @@ from sim.cli import (
 )
 from sim.cli.air import app as air_app
 from sim.cli.command_groups import OPTIONS
-from sim.cli.console import Console, discard_output, nobody_reads, open_closed_streams
 from sim.cli.memory import require_for
 from sim.cli.order import app as order_app
+from sim.console import Console, discard_output, nobody_reads, open_closed_streams
 
 app = App(
     name="fanet",

@@ -13,8 +13,8 @@ from rich.text import Text
 
 from fanet_mw.errors import ConfigError
 from sim.cli.command_groups import STUDY
-from sim.cli.console import Console
 from sim.cli.sweep import carry_out, runs_of_other_code
+from sim.console import Console
 
 
 def add_to(app: App) -> None:

@@ -3,8 +3,8 @@
 from typing import TYPE_CHECKING
 
 from sim.cli.command_groups import RUNNING
-from sim.cli.console import Console
 from sim.cli.options import DoorFlags, SwarmFlags
+from sim.console import Console
 
 if TYPE_CHECKING:
     from cyclopts import App

@@ -11,11 +11,11 @@ from rich.table import Table
 
 from fanet_mw.errors import ConfigError
 from sim.cli.command_groups import RUNNING, TOOLS
-from sim.cli.console import Console
 from sim.cli.options import SwarmFlags, given
+from sim.console import Console
 
 if TYPE_CHECKING:
-    from sim.run.result import Result
+    from sim.results.result import Result
 
 app = App(name="log", group=TOOLS, help="What the folder or the recording of a run holds, and its export.")
 
@@ -111,7 +111,7 @@ def export(
         Replace what is there.
 
     """
-    from sim.run.stored_result import load_result
+    from sim.results.stored_result import load_result
 
     if to not in FORMATS:
         raise ConfigError(f"--to {to}: must be one of {', '.join(FORMATS)}")

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 from cyclopts import Parameter, Token
 
 from fanet_mw.errors import ConfigError
+from sim.bus.running_swarms import DEFAULT_ENDPOINT, locate
 from sim.cli.completion import keys
-from sim.cli.console import Console
-from sim.run.bus.running_swarms import DEFAULT_ENDPOINT, locate
+from sim.console import Console
 
 if TYPE_CHECKING:
     from fanet_mw.gateway.gateway import Doors

@@ -1,4 +1,4 @@
-"""The `fanet order` commands: parsing and printing; what they do is in `sim.run.bus.operator_orders`."""
+"""The `fanet order` commands: parsing and printing; what they do is in `sim.bus.operator_orders`."""
 
 from cyclopts import App
 
@@ -6,8 +6,8 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.orders import Order, OrderKind, wrong
 from fanet_mw.units import MAX_NODES, S
 from sim.cli.command_groups import RUNNING
-from sim.cli.console import Console
 from sim.cli.options import SwarmFlags
+from sim.console import Console
 
 app = App(
     name="order",
@@ -103,7 +103,7 @@ def no_fly(east_m: float, north_m: float, radius_m: float, *, where: SwarmFlags 
 
 
 def _give(order: Order, where: SwarmFlags) -> int:
-    from sim.run.bus.operator_orders import give
+    from sim.bus.operator_orders import give
 
     name = order.kind.name.lower().replace("_", "-")
     if (why := wrong(order, uavs=MAX_NODES)) is not None:

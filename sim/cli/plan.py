@@ -53,7 +53,7 @@ from fanet_mw.wire import HEADER_BYTES
 from fanet_mw.wire.places import rounded
 from sim.expected_channel.expected_links import expected_links
 from sim.expected_channel.reception_probability import chance_of
-from sim.world.mobility.layout import positions
+from sim.world.environment.layout import positions
 
 _DRAWS: Final = 3
 """The number of draws of shadowing for which a plan is made; each takes up to some seconds."""

@@ -8,7 +8,7 @@ from cyclopts import App, Parameter
 
 from fanet_mw.errors import ConfigError
 from sim.cli.command_groups import RUN
-from sim.cli.console import Console
+from sim.console import Console
 
 if TYPE_CHECKING:
     from sim.results.replay import Replay

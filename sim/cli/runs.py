@@ -18,17 +18,17 @@ from fanet_mw.errors import ConfigError
 from sim.cli.command_groups import RUN
 from sim.cli.companions import Companions, record_command, view_command
 from sim.cli.completion import ScenarioName
-from sim.cli.console import Console
 from sim.cli.memory import COMPILING_MB, require
 from sim.cli.options import DoorFlags, OutputFlags, ScenarioFlags, print_notes, warn_of
+from sim.console import Console
 
 if TYPE_CHECKING:
     from cyclopts import App
 
     from fanet_mw.scenario import Scenario
     from sim.observation.observer import Observer
+    from sim.results.outcome import Outcome
     from sim.run.collecting.running_tally import Progress
-    from sim.run.outcome import Outcome
 
 _err = Console(stderr=True)
 _WORD_EVERY_S = 10.0
@@ -52,7 +52,7 @@ def simulate(
         A shipped scenario's name (see `fanet scenarios`) or a .toml file.
 
     """
-    from emulator.kernel.compile import COMPILING_NOTICE, must_compile, warm_up
+    from emulator.compile_kernel import COMPILING_NOTICE, must_compile, warm_up
     from emulator.pcap_file import PcapFile
     from fanet_mw.hosts import interrupts
     from sim.results.files import begun

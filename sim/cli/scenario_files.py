@@ -11,8 +11,8 @@ from rich.table import Table
 from fanet_mw.errors import ConfigError
 from sim.cli.command_groups import SCENARIO
 from sim.cli.completion import ScenarioName
-from sim.cli.console import Console
 from sim.cli.options import ScenarioFlags, print_notes
+from sim.console import Console
 from sim.scenarios.shipped import shipped
 
 if TYPE_CHECKING:

@@ -6,11 +6,11 @@ from typing import Annotated, Literal
 from cyclopts import App, Parameter
 
 from fanet_mw.errors import FanetError
+from sim.bus.running_swarms import DEFAULT_ENDPOINT
 from sim.cli.command_groups import SERVICE
 from sim.cli.completion import ScenarioName
-from sim.cli.console import Console
 from sim.cli.options import OutputFlags, ScenarioFlags, ServiceFlags, SwarmFlags, warn_of
-from sim.run.bus.running_swarms import DEFAULT_ENDPOINT
+from sim.console import Console
 
 _err = Console(stderr=True)
 
@@ -52,7 +52,7 @@ def router(
 
     """
     from fanet_mw.hosts import loop
-    from sim.run.bus.router import serve
+    from sim.run.router import serve
 
     chosen = choice.realtime_scenario(scenario)
     OutputFlags(out=out, force=force).prepare()
@@ -98,7 +98,7 @@ def emulator(
 
     """
     from emulator.__main__ import run
-    from emulator.kernel.compile import COMPILING_NOTICE, must_compile
+    from emulator.compile_kernel import COMPILING_NOTICE, must_compile
 
     chosen = choice.realtime_scenario(scenario)
     if must_compile():
@@ -161,8 +161,8 @@ def agent(
     from agents.__main__ import Radio
     from agents.__main__ import start as begin
     from fanet_mw.units import NodeId
+    from sim.world.environment.layout import positions
     from sim.world.environment.map_on_board import map_on_board
-    from sim.world.mobility.layout import positions
 
     chosen = choice.realtime_scenario(scenario)
     if id not in chosen.node_ids:

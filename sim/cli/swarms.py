@@ -8,10 +8,10 @@ from cyclopts import App, Parameter
 from cyclopts.validators import Number
 from rich.table import Table
 
+from sim.bus.running_swarms import running
 from sim.cli.command_groups import RUNNING
-from sim.cli.console import Console
 from sim.cli.options import SwarmFlags
-from sim.run.bus.running_swarms import running
+from sim.console import Console
 
 
 def add_to(app: App) -> None:

@@ -15,8 +15,8 @@ from cyclopts.validators import Number
 
 from fanet_mw.errors import ConfigError
 from sim.cli.command_groups import STUDY
-from sim.cli.console import Console
 from sim.cli.memory import COMPILING_MB, require
+from sim.console import Console
 
 if TYPE_CHECKING:
     from pyarrow import Table
@@ -207,7 +207,7 @@ def runs_of_other_code(codes: Mapping[str, int]) -> str:
 
 def _compile() -> None:
     """Compile the kernel once, so that not every worker does so for itself."""
-    from emulator.kernel.compile import COMPILING_NOTICE, must_compile, warm_up
+    from emulator.compile_kernel import COMPILING_NOTICE, must_compile, warm_up
 
     if must_compile():
         require(COMPILING_MB, what="compiling the kernel")

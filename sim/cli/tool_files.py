@@ -10,8 +10,8 @@ from cyclopts import App, Parameter
 from fanet_mw.errors import ConfigError
 from sim.cli.command_groups import TOOLS
 from sim.cli.completion import ScenarioName
-from sim.cli.console import Console
 from sim.cli.options import ScenarioFlags
+from sim.console import Console
 
 
 def add_to(app: App) -> None:
@@ -46,7 +46,7 @@ def keys(
         How long the certificates are valid [days].
 
     """
-    from sim.run.bus.certificates import make
+    from sim.bus.certificates import make
 
     chosen = choice.scenario(scenario)
     made = make(chosen, out, swarm=swarm or chosen.name, hosts=host, days=days)

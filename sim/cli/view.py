@@ -7,8 +7,8 @@ from cyclopts import App, Parameter
 from cyclopts.validators import Number
 
 from sim.cli.command_groups import RUNNING
-from sim.cli.console import Console
 from sim.cli.options import SwarmFlags, given
+from sim.console import Console
 
 
 def add_to(app: App) -> None:

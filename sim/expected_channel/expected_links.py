@@ -12,7 +12,7 @@ from typing import Final
 
 from fanet_mw.airtime import OVERHEAD_BYTES, Timing
 from fanet_mw.rng import stream, stream_seed
-from fanet_mw.routing.clustered.timetable.link_quality import STEADY
+from fanet_mw.routing.clustered.links.link_quality import STEADY
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.radio import Radio
 from fanet_mw.units import Enu, NodeId

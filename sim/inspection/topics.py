@@ -21,8 +21,8 @@ from fanet_mw.bus.topics import ROOT, Topics
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.mavlink import decode
-from sim.cli.console import Console
-from sim.run.bus.air_control import OPERATOR, find_swarm
+from sim.bus.air_control import OPERATOR, find_swarm
+from sim.console import Console
 
 _LOOK_S: Final = 0.5
 _MOST_WAITING: Final = 50_000

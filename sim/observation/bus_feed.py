@@ -23,10 +23,10 @@ from fanet_mw.errors import ConfigError, FanetError, MalformedFrameError
 from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.hosts.clock import SwarmClock
 from fanet_mw.scenario import Scenario, config
+from sim.bus.air_control import OPERATOR, find_swarm
 from sim.observation.observer import Observer
 from sim.observation.turns import MOST_SPANS
-from sim.run.bus.air_control import OPERATOR, find_swarm
-from sim.run.collecting.bus_checks import BusChecks
+from sim.records.bus_checks import BusChecks
 
 _MOST_PUTS: Final = 50_000
 _ANSWER_S: Final = 3.0

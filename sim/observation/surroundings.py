@@ -9,8 +9,8 @@ import numpy as np
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu
+from sim.world.environment.layout import positions
 from sim.world.environment.obstacles import Box, Hills, Indices, Obstacles, obstacles
-from sim.world.mobility.layout import positions
 
 _CORNERS: Final = 32
 """The number of corners of the outline of a circle."""

@@ -11,7 +11,7 @@ from fanet_mw.bus.messages import Poses
 from fanet_mw.trace import Posed, Record
 from fanet_mw.units import S
 from sim.recording.mcap_recording import McapRecording
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 
 
 def write_mcap(outcome: Outcome, path: Path) -> int:

@@ -27,10 +27,10 @@ from fanet_mw.trace import (
     kind_of,
 )
 from fanet_mw.units import MS, S
+from sim.records.record_kinds import KINDS, records_of
 from sim.results.links import described
+from sim.results.outcome import Outcome
 from sim.results.packets import OTHER_APPS, SentPacket, packets_of
-from sim.run.collecting.record_kinds import KINDS, records_of
-from sim.run.outcome import Outcome
 
 Row = tuple[Any, ...]
 _APART: Final = frozenset({Generated, LetOut, BoundStated, BoundExcludes, LikelyStated, Delivered, Dropped, Posed})

@@ -14,8 +14,8 @@ from fanet_mw.mavlink import Geodetic, to_geodetic
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Confirmed, PlacedInside, Posed
 from fanet_mw.units import Enu, S
-from sim.run.collecting.record_kinds import records_of
-from sim.run.outcome import Outcome
+from sim.records.record_kinds import records_of
+from sim.results.outcome import Outcome
 
 _GPX: Final = "http://www.topografix.com/GPX/1/1"
 _KML: Final = "http://www.opengis.net/kml/2.2"

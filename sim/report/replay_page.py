@@ -36,8 +36,8 @@ from fanet_mw.whole_file import replace_file
 from sim.figures import colors
 from sim.observation.event_text import event_text
 from sim.results.replay import Replay
+from sim.world.environment.layout import positions
 from sim.world.environment.obstacles import Box, obstacles
-from sim.world.mobility.layout import positions
 
 REPLAYED: Final = (
     Posed, RoleChanged, FlightModeChanged, MissionModeChanged, Detected, Approaching, Arrived, Confirmed, Refuted,

@@ -25,8 +25,8 @@ from fanet_mw.trace import (
     RoleChanged,
 )
 from fanet_mw.units import Enu, S
+from sim.world.environment.layout import positions
 from sim.world.environment.survivors import place
-from sim.world.mobility.layout import positions
 
 SHOWN: Final = (
     Generated, Delivered, BoundStated, LetOut, RoleChanged, Detected, Approaching, Arrived, Confirmed, PlacedInside,

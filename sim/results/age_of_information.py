@@ -5,8 +5,8 @@ from collections.abc import Iterable
 
 from agents.applications.traffic import sources_of, targets_of
 from fanet_mw.units import S
+from sim.results.outcome import Outcome
 from sim.results.packets import AppPackets, first_class_of, packets_of
-from sim.run.outcome import Outcome
 
 
 def age_s(outcome: Outcome) -> float:

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from fanet_mw.units import MS
+from sim.records.delivery_columns import Column
 from sim.results.packets import AppPackets
-from sim.run.collecting.delivery_columns import Column
 
 
 def against_bounds(applications: Mapping[str, AppPackets], *, ended_ns: int) -> dict[str, Any]:

@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 from fanet_mw.trace import ClockSampled, Delivered, Generated, Record
 from fanet_mw.units import US, S
-from sim.run.collecting.record_kinds import records_of
-from sim.run.collecting.trace_log import TraceLog
-from sim.run.outcome import Outcome
+from sim.records.record_kinds import records_of
+from sim.records.trace_log import TraceLog
+from sim.results.outcome import Outcome
 
 
 def true_delays(records: TraceLog) -> Collection[Record]:

@@ -18,10 +18,10 @@ import numpy.typing as npt
 
 from fanet_mw.trace import RoleChanged
 from fanet_mw.units import S
+from sim.records.record_kinds import records_of
 from sim.results.connectivity import parts
 from sim.results.links_over_time import Flags, LinksOverTime
-from sim.run.collecting.record_kinds import records_of
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 
 _FAR: Final = 4
 

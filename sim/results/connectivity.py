@@ -10,8 +10,8 @@ from agents.applications.traffic import sources_of, targets_of
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import S
 from sim.results.links_over_time import within
+from sim.world.environment.layout import positions
 from sim.world.mobility.guidance import Guidance
-from sim.world.mobility.layout import positions
 
 
 def parts(linked: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:

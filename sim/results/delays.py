@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 
 from fanet_mw.units import MS
+from sim.records.delivery_columns import Column
 from sim.results.packets import AppPackets, SentPacket
-from sim.run.collecting.delivery_columns import Column
 
 PARTS: Final = ("lead", "queue", "air", "handover")
 

@@ -25,6 +25,7 @@ from fanet_mw.foreign_file import read_regular
 from fanet_mw.scenario.named_files import MOST_BYTES, digest_of_bytes
 from fanet_mw.scenario.tables.world import FILE_KEYS
 from fanet_mw.whole_file import Written, batches, replace_file, write_items
+from sim.records.record_kinds import lines
 from sim.results.file_names import (
     LINKS_FILE,
     REPORTS_FILE,
@@ -37,8 +38,7 @@ from sim.results.file_names import (
 )
 from sim.results.links import described
 from sim.results.metrics import summarize
-from sim.run.collecting.record_kinds import lines
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 
 _HASHED_BYTES: Final = 1 << 16
 _NOT_ENDED: Final = {

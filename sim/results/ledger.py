@@ -14,8 +14,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from fanet_mw.errors import DropReason
-from sim.run.outcome import Outcome
-from sim.run.stoppable_uav import planned_stops
+from sim.results.outcome import Outcome
 
 _NO_FRAMES: Mapping[str, Any] = {"sent": 0, "delivered": 0, "in_flight": 0, "dropped": {}}
 
@@ -56,7 +55,7 @@ def _differences(outcome: Outcome, requests: Mapping[str, Mapping[str, int]]) ->
         counts = requests.get(str(node), {})
         had = counts.get("all", 0)
         made = outcome.reports.get(name, {}).get("frames_sent", 0)
-        restarted = outcome.mode == "realtime" and bool(planned_stops(outcome.scenario, node))
+        restarted = outcome.mode == "realtime" and bool(outcome.scenario.planned_stops(node))
         if restarted or _cut_short(outcome, name):
             # the node's count ends before the node did, so the medium's count is used
             made = max(had, counts.get("before_restart", 0) + made)

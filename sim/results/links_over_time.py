@@ -13,9 +13,9 @@ import numpy.typing as npt
 from emulator.channel.propagation import heard_m
 from fanet_mw.trace import Posed, ProcessEnded, RadioFault
 from fanet_mw.units import S
-from sim.run.collecting.record_kinds import records_of
-from sim.run.outcome import Outcome
-from sim.world.mobility.layout import positions
+from sim.records.record_kinds import records_of
+from sim.results.outcome import Outcome
+from sim.world.environment.layout import positions
 
 Flags = npt.NDArray[np.bool_]
 Rows = npt.NDArray[np.float64]

@@ -17,17 +17,17 @@ from fanet_mw.trace import (
     Dropped,
 )
 from fanet_mw.units import S
+from sim.records.record_kinds import records_of
 from sim.results import delays, ledger, validity
 from sim.results.bounds import against_bounds, likely
 from sim.results.clocks import clock_errors
 from sim.results.clusters import clusters
 from sim.results.links_over_time import LinksOverTime
 from sim.results.mission import mission
+from sim.results.outcome import Outcome
 from sim.results.packets import OTHER_APPS, AppPackets, packets_of, targets_by_source
 from sim.results.reachability import reachability
 from sim.results.separation import separation
-from sim.run.collecting.record_kinds import records_of
-from sim.run.outcome import Outcome
 from sim.scenarios.notes import notes
 
 

@@ -48,11 +48,11 @@ from fanet_mw.trace import (
 )
 from fanet_mw.units import Enu, S
 from fanet_mw.wire.survivors import is_person
+from sim.records.record_kinds import records_of
 from sim.results.coherence import Coherence, coherence
 from sim.results.links_over_time import OFF_AIR
-from sim.run.collecting.record_kinds import records_of
+from sim.world.environment.layout import positions
 from sim.world.environment.survivors import place
-from sim.world.mobility.layout import positions
 from sim.world.sensors.phone import REFERENCE_LOSS_DB
 
 _HOMEWARD: Final = frozenset({"return", "done", "recall", "land"})

@@ -14,9 +14,9 @@ import numpy.typing as npt
 
 from agents.applications.traffic import targets_of
 from fanet_mw.trace import BoundExcludes, BoundStated, Generated, LetOut, LikelyStated
-from sim.run.collecting.delivery_columns import Column, DeliveryColumns, delivery_columns
-from sim.run.collecting.record_kinds import records_of
-from sim.run.outcome import Outcome
+from sim.records.delivery_columns import Column, DeliveryColumns, delivery_columns
+from sim.records.record_kinds import records_of
+from sim.results.outcome import Outcome
 
 OTHER_APPS: Final = ("report", "warning")
 """The built-in applications that send packets, in addition to the traffic classes."""

@@ -21,8 +21,8 @@ from fanet_mw.units import S
 from fanet_mw.wire import PRIORITIES, PRIORITY_SAFETY
 from sim.results.connectivity import parts
 from sim.results.links_over_time import LinksOverTime
+from sim.results.outcome import Outcome
 from sim.results.packets import OTHER_APPS, AppPackets, targets_by_source
-from sim.run.outcome import Outcome
 
 Flags = npt.NDArray[np.bool_]
 

@@ -23,8 +23,8 @@ from fanet_mw.foreign_file import json_of, open_regular, read_regular, toml_of
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.scenario.tables.world import FILE_KEYS
 from fanet_mw.trace import Record, name_of, parse
+from sim.records.bus_checks import BusChecks, Count, Number, Share
 from sim.results.file_names import LINKS_FILE, REPORTS_FILE, SCENARIO_FILE, SUMMARY_FILE, TLOG_FILE, TRACE_FILE
-from sim.run.collecting.bus_checks import BusChecks, Count, Number, Share
 
 _MOST_BYTES: Final = 1 << 28
 """The greatest size of a file that is read at once; the links of a thousand UAVs take half as much."""

@@ -6,8 +6,8 @@ import numpy as np
 
 from fanet_mw.trace import ConflictForeseen, Delivered, Warned
 from fanet_mw.units import MS
-from sim.run.collecting.record_kinds import records_of
-from sim.run.outcome import Outcome
+from sim.records.record_kinds import records_of
+from sim.results.outcome import Outcome
 
 
 def separation(outcome: Outcome) -> dict[str, Any]:

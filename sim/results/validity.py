@@ -16,8 +16,7 @@ purpose: within the limits, their delivery ratio is within 0.015 of that of the 
 from collections.abc import Iterator, Mapping
 from typing import Any, Final, NamedTuple
 
-from sim.run.launcher.child_processes import describe
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome, described
 
 LOST_LIMIT: Final = 0.0025
 """The greatest sum of four shares that a slow machine loses: of all transmit requests, those lost on the bus, those
@@ -116,7 +115,7 @@ def _broken(outcome: Outcome) -> Iterator[str]:
         yield f"partial result: {outcome.aborted}"
     for code in dict.fromkeys(code for _, code in outcome.ended):
         dead = [name for name, ended in outcome.ended if ended == code]
-        yield f"{_named(dead)} ended before the end, with {describe(code)}: {len(dead)}, limit 0"
+        yield f"{_named(dead)} ended before the end, with {described(code)}: {len(dead)}, limit 0"
     for name, why in outcome.absent.items():
         yield f"no report of {name} ({why}); all must report"
     unfinished = [name for name, report in outcome.reports.items() if not report.get("final")]

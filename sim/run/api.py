@@ -7,11 +7,11 @@ from pathlib import Path
 
 from agents.program.attached import Emulated
 from fanet_mw.scenario import Scenario
+from sim.results.result import Result
 from sim.run.arguments import OfUser, by_node, known_nodes, scenario_of
 from sim.run.launcher.leads import fitted
 from sim.run.launcher.swarm import READY_TIMEOUT_S, SwarmRun
 from sim.run.launcher.swarm import launch as launch_processes
-from sim.run.result import Result
 from sim.run.virtual import simulate as run_virtual
 
 

@@ -15,7 +15,7 @@ from fanet_mw.mavlink import Geodetic
 from fanet_mw.scenario.fingerprint import fingerprint
 from fanet_mw.units import NodeId
 from sim.observation.bus_feed import BusFeed
-from sim.world.mobility.layout import positions
+from sim.world.environment.layout import positions
 
 WORLD: Final = "world"
 _LOOK_S: Final = 0.2

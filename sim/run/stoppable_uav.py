@@ -9,26 +9,13 @@ from typing import Any
 
 from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import Message, Reception
-from fanet_mw.bus.radio_control import Mishap, MishapKind
-from fanet_mw.scenario import Scenario
-
-Stop = tuple[int, int | None]
-"""When a program ends, and when it is started again; None if it is not."""
-
-
-def planned_stops(scenario: Scenario, node: int) -> list[Stop]:
-    """When the program of a node ends, by the scenario's faults."""
-    return sorted(
-        (at_ns, at_ns + control.for_ns if control.for_ns else None)
-        for at_ns, control in scenario.planned_faults
-        if isinstance(control, Mishap) and control.what is MishapKind.STOP and control.node == node
-    )
 
 
 class StoppableUav(Actor):
     """The lives of one UAV's program, one after the other."""
 
-    def __init__(self, make: Callable[[], Actor], stops: Sequence[Stop]) -> None:
+    def __init__(self, make: Callable[[], Actor], stops: Sequence[tuple[int, int | None]]) -> None:
+        """`stops`: when the program ends, and when it is started again; None if it is not."""
         self._make = make
         self._uav: Actor | None = make()
         super().__init__(self._uav.name, self._uav.subscriptions)

@@ -21,16 +21,16 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record
 from fanet_mw.units import MS, NodeId, S
 from sim.observation.observer import Observer
+from sim.records.trace_log import TraceLog
 from sim.results.clocks import true_delays
 from sim.results.links import LinkTotals
+from sim.results.outcome import Outcome
 from sim.run.collecting.taps import TapLog
-from sim.run.collecting.trace_log import TraceLog
 from sim.run.garbage import GARBAGE
 from sim.run.huge_pages import HugePages
-from sim.run.outcome import Outcome
-from sim.run.stoppable_uav import StoppableUav, planned_stops
+from sim.run.stoppable_uav import StoppableUav
+from sim.world.environment.layout import positions
 from sim.world.environment.map_on_board import map_on_board
-from sim.world.mobility.layout import positions
 from sim.world.world import WorldActor
 
 EPOCH_UNIX_NS: Final = 1_735_689_600 * S
@@ -72,7 +72,7 @@ def actors_of(
 
     uavs = []
     for n in scenario.node_ids:
-        stops = planned_stops(scenario, n)
+        stops = scenario.planned_stops(n)
         uavs.append(StoppableUav(partial(uav, n), stops) if stops else uav(n))
     return [WorldActor(scenario, swarm), Medium(scenario, swarm, capture=capture), *uavs]
 

@@ -18,8 +18,8 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Delivered
 from fanet_mw.units import MS, NodeId, S, seconds_to_ns
+from sim.results.result import Result
 from sim.run.arguments import OfUser, by_node, scenario_of
-from sim.run.result import Result
 from sim.run.virtual import Observed
 
 T = TypeVar("T")

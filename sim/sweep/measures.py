@@ -11,11 +11,11 @@ import numpy as np
 from fanet_mw.errors import ConfigError
 from fanet_mw.trace import Approaching, Detected
 from fanet_mw.units import S
+from sim.records.record_kinds import records_of
 from sim.results.age_of_information import age_s, report_age_s
 from sim.results.connectivity import connectivity
+from sim.results.outcome import Outcome
 from sim.results.packets import first_class_of
-from sim.run.collecting.record_kinds import records_of
-from sim.run.outcome import Outcome
 
 Value = float | list[float] | None
 _LEAST_S: Final = 1e-3

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from fanet_mw.errors import FanetError, HostError
 from fanet_mw.scenario import Scenario, config
 from sim.results.files import finish
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 from sim.run.virtual import simulate
 from sim.sweep.measures import MEASURES, Value
 from sim.sweep.provenance import code

@@ -14,7 +14,6 @@ from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import Message, Poses, Setpoint
 from fanet_mw.bus.topics import Topics, node_of
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.hosts.bus import OnSample
 from fanet_mw.scenario import Scenario
 from sim.world.arrays import Rows
 from sim.world.mobility.guidance import makes_sense
@@ -35,7 +34,9 @@ class SwarmFlight(NamedTuple):
 class FlightRecorder:
     """Receives the poses and setpoints of a swarm, and keeps the newest."""
 
-    def __init__(self, scenario: Scenario, subscribe: Callable[[str, OnSample], None], names: Topics) -> None:
+    def __init__(
+        self, scenario: Scenario, subscribe: Callable[[str, Callable[[str, bytes], None]], None], names: Topics
+    ) -> None:
         self._ids = list(scenario.uav_ids)
         self._all_ids = list(scenario.node_ids)
         self._lock = threading.Lock()  # the bus calls on threads of its own

@@ -15,9 +15,9 @@ def require_possible(scenario: Scenario) -> None:
     # imported here, because they bring numpy, which scenarios without any of this do not need
     import numpy as np
 
+    from sim.world.environment.layout import positions
     from sim.world.environment.obstacles import obstacles
     from sim.world.incidents.no_fly_entries import NoFlyEntries
-    from sim.world.mobility.layout import positions
 
     starts = np.array(positions(scenario), dtype=np.float64)
     if world.has_obstacles:

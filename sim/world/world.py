@@ -24,6 +24,7 @@ from sim.world.engines.contract import Engine
 from sim.world.engines.kinematic import Kinematic
 from sim.world.engines.rotors.rigid_body import Rotors
 from sim.world.engines.rotors.vehicle_types import VEHICLES
+from sim.world.environment.layout import positions
 from sim.world.environment.obstacles import Obstacles, obstacles
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors
@@ -32,10 +33,9 @@ from sim.world.flight_recorder import SwarmFlight
 from sim.world.incidents.incidents import Incidents
 from sim.world.incidents.mishaps import Mishaps
 from sim.world.mobility.guidance import Guidance, makes_sense
-from sim.world.mobility.layout import positions
-from sim.world.mobility.position_estimate import PositionEstimate
 from sim.world.sensors.contract import Truth
 from sim.world.sensors.gps import GpsReceiver
+from sim.world.sensors.position_estimate import PositionEstimate
 from sim.world.sensors.suite import Suite, sensors_of
 from sim.world.ticks import Ticks
 

@@ -35,12 +35,12 @@ from fanet_mw.planner import ScenarioPlan, plan
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.trace import Dropped
 from fanet_mw.units import Enu, NodeId, S
+from sim.records.record_kinds import records_of
 from sim.results.bounds import Column, delays_under_bound, likely
+from sim.results.outcome import Outcome
 from sim.results.packets import packets_of
-from sim.run.collecting.record_kinds import records_of
-from sim.run.outcome import Outcome
 from sim.run.virtual import actors_of
-from sim.world.mobility.layout import positions
+from sim.world.environment.layout import positions
 from tests.benchmarks.told_swarm import run_of, run_with
 
 _INTERVALS_S: Final = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0)

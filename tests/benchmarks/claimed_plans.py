@@ -14,7 +14,7 @@ from fanet_mw.units import NodeId
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
-from sim.world.mobility.layout import positions
+from sim.world.environment.layout import positions
 
 DISC = ("nodes.layout=disc", "nodes.radius_m=250")
 CASES: tuple[tuple[str, tuple[str, ...], tuple[float, ...]], ...] = (

@@ -15,7 +15,7 @@ from fanet_mw.trace import ClockSampled
 from fanet_mw.units import US, S
 from sim.results.clocks import errors_ns
 from sim.results.files import finish
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 

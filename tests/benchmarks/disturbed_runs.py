@@ -26,8 +26,8 @@ from fanet_mw.trace import Record
 from fanet_mw.units import MS, S
 from sim.results.files import finish
 from sim.results.metrics import summarize
+from sim.results.outcome import Outcome
 from sim.run.launcher import swarm
-from sim.run.outcome import Outcome
 from sim.run.virtual import actors_of, simulate
 from sim.scenarios import catalog
 

@@ -20,12 +20,12 @@ from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, Estimat
 from fanet_mw.scenario import Traffic
 from fanet_mw.trace import BoundStated
 from fanet_mw.units import MS, Enu, NodeId
+from sim.records.record_kinds import records_of
 from sim.results.bounds import against_bounds
+from sim.results.outcome import Outcome
 from sim.results.packets import packets_of
-from sim.run.collecting.record_kinds import records_of
-from sim.run.outcome import Outcome
 from sim.scenarios import catalog
-from sim.world.mobility.layout import positions
+from sim.world.environment.layout import positions
 from tests.benchmarks.told_swarm import run_with
 
 _SEEDS: Final = (1,)

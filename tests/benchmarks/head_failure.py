@@ -22,7 +22,7 @@ from collections import Counter
 from fanet_mw.scenario import config
 from fanet_mw.trace import Delivered, Generated, RoleChanged
 from fanet_mw.units import S
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 from sim.run.virtual import simulate
 
 KILLED_S = 15

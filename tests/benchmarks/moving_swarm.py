@@ -20,7 +20,7 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.scenario import config
 from sim.results.files import finish
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 from sim.run.virtual import actors_of
 
 COUNT, DURATION_S = 25, 90

@@ -14,7 +14,7 @@ from fanet_mw.trace import Delivered
 from fanet_mw.units import NodeId, S
 from sim.results.files import finish
 from sim.run.virtual import simulate
-from sim.world.mobility.layout import positions
+from sim.world.environment.layout import positions
 
 CASES = ((2.0, 4, 5.0), (1.0, 4, 5.0), (1.0, 8, 2.0), (1.0, 22, 1.0), (0.5, 4, 5.0))
 """Interval [s], clusters, flooding period [s]."""

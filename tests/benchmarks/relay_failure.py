@@ -21,7 +21,7 @@ from fanet_mw.trace import Delivered, Generated
 from fanet_mw.units import NodeId, S
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
-from sim.world.mobility.layout import positions
+from sim.world.environment.layout import positions
 
 KILLED_S = 20
 _SOON_S: Final = 10

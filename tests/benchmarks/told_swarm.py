@@ -7,7 +7,7 @@ from fanet_mw.actor import Actor
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 from sim.world.world import WorldActor
 
 

@@ -18,8 +18,8 @@ from typing import Final, NamedTuple
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
+from sim.records.record_kinds import lines
 from sim.results.links import described
-from sim.run.collecting.record_kinds import lines
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 

@@ -22,7 +22,7 @@ from fanet_mw.testing.routing_contract import RoutingContract
 from fanet_mw.trace import Delivered, Dropped, Generated, Record
 from fanet_mw.units import MS, US
 from sim.results.files import finish
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 from sim.run.virtual import actors_of, simulate
 
 MULTIHOP = sorted(set(PROTOCOLS) - {"direct"})

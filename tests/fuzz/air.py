@@ -20,7 +20,7 @@ from typing import Any, Final, NamedTuple
 import corpus
 import mutations
 
-from emulator.kernel.compile import warm_up
+from emulator.compile_kernel import warm_up
 from fanet_mw import wire
 from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import Message, Reception, TxRequest

@@ -50,7 +50,7 @@ from fanet_mw.wire.searched_cells import Covered
 from fanet_mw.wire.survivors import Found as FoundMessage
 from fanet_mw.wire.survivors import Survivor
 from fanet_mw.wire.told_order import ToldOrder
-from sim.run.collecting.bus_checks import BusChecks
+from sim.records.bus_checks import BusChecks
 
 SLOW_S: Final = 0.5
 """Of processor time, the most that one input may cost; usual are microseconds."""

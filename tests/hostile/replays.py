@@ -28,11 +28,11 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import ClockSampled
 from fanet_mw.units import BROADCAST, US, NodeId, S
 from fanet_mw.wire import Kind
+from sim.records.record_kinds import records_of
+from sim.records.trace_log import TraceLog
 from sim.results.clocks import errors_ns, true_delays
 from sim.results.metrics import summarize
-from sim.run.collecting.record_kinds import records_of
-from sim.run.collecting.trace_log import TraceLog
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 from sim.run.virtual import actors_of
 from sim.scenarios import catalog
 

@@ -14,8 +14,8 @@ from fanet_mw.hosts import service
 from fanet_mw.hosts.realtime import SwarmAddress
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS
+from sim.results.outcome import Outcome
 from sim.run.launcher import services, swarm
-from sim.run.outcome import Outcome
 
 AHEAD_NS = 100 * MS
 

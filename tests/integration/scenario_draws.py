@@ -32,7 +32,7 @@ from fanet_mw.scenario.tables.sections import Section
 from fanet_mw.trace import Record
 from fanet_mw.units import S
 from sim.results.metrics import summarize
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 from sim.run.virtual import actors_of
 
 LEAST_WAKES: Final = 20_000

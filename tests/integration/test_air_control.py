@@ -10,7 +10,7 @@ from collections.abc import AsyncIterator
 
 import pytest
 
-from emulator.kernel.compile import warm_up
+from emulator.compile_kernel import warm_up
 from emulator.medium import Medium
 from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import Poses, Report, TxRequest
@@ -21,9 +21,9 @@ from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
 from fanet_mw.hosts.realtime import SwarmAddress, run_actor
 from fanet_mw.units import BROADCAST, MS, NodeId, S
+from sim.bus import air_control
 from sim.cli.app import app
 from sim.results.files import finish
-from sim.run.bus import air_control
 from sim.run.launcher.swarm import free_endpoint
 from sim.run.virtual import simulate
 from sim.scenarios import catalog

@@ -18,12 +18,12 @@ from fanet_mw.routing.clustered.tdma.turn_timing import clocks_fit
 from fanet_mw.trace import Delivered, Generated
 from fanet_mw.units import MS, US, Enu, NodeId
 from sim.cli.plan import judge
+from sim.records.record_kinds import lines
 from sim.results.files import finish
-from sim.run.collecting.record_kinds import lines
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
-from sim.world.mobility.layout import positions
+from sim.world.environment.layout import positions
 
 GRID = [
     "nodes.count=15", "traffic.sources=14", "clusters.count=14", "clusters.turn_slack_us=400", "duration_s=44",

@@ -7,7 +7,7 @@ from fanet_mw.scenario import Scenario, config
 from fanet_mw.units import NodeId
 from sim.results.files import finish
 from sim.run.virtual import simulate
-from sim.world.mobility.layout import positions
+from sim.world.environment.layout import positions
 
 TREE = {
     "duration_s": 70, "warmup_s": 40, "drain_s": 5, "nodes": {"count": 6, "layout": "line", "spacing_m": 200},

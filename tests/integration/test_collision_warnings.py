@@ -8,9 +8,9 @@ from fanet_mw import mavlink
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario.config import build
 from fanet_mw.trace import ConflictForeseen, ConflictOver, Warned
+from sim.records.record_kinds import lines
 from sim.results.files import finish
-from sim.run.collecting.record_kinds import lines
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 

@@ -8,7 +8,7 @@ from fanet_mw.scenario import config
 from fanet_mw.trace import Collided, Delivered, RadioFault, RoleChanged
 from fanet_mw.units import S
 from sim.results.files import finish
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 from sim.run.virtual import simulate
 
 

@@ -9,7 +9,7 @@ from fanet_mw.scenario.config import build
 from fanet_mw.trace import DeadlineLost, DeadlineMet, Dropped
 from sim.cli.plan import judge
 from sim.results.files import finish
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 

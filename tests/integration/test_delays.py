@@ -9,7 +9,7 @@ from fanet_mw.trace import Delivered, Generated
 from fanet_mw.units import MS
 from sim.results.delays import PARTS
 from sim.results.files import finish
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 from sim.run.virtual import simulate
 
 LEAD_MS, HANDOVER_MS = 40, 20

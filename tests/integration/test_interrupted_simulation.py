@@ -13,9 +13,9 @@ import pytest
 from rich.console import Console
 
 from fanet_mw.units import MS, S
+from sim.records.record_kinds import lines
 from sim.results import printed_summary
 from sim.results.files import finish
-from sim.run.collecting.record_kinds import lines
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 

@@ -14,7 +14,7 @@ from fanet_mw.delivery import receiver, sender
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, NodeId, S
-from sim.world.mobility.layout import positions
+from sim.world.environment.layout import positions
 from sim.world.world import WorldActor
 
 MakeScenario = Callable[..., Scenario]

@@ -9,7 +9,7 @@ from fanet_mw.scenario import config
 from fanet_mw.trace import Delivered, FlightModeChanged, Generated, MissionModeChanged, Posed, RadioFault
 from fanet_mw.units import S
 from sim.results.files import finish
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 

@@ -17,7 +17,7 @@ from sim.cli.plan import judge
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
-from sim.world.mobility.layout import positions
+from sim.world.environment.layout import positions
 
 TWENTY = ("nodes.count=20", "clusters.count=19", "traffic.sources=19")
 

@@ -18,8 +18,8 @@ from fanet_mw.hosts.bus import MAX_PUT_BYTES, Bus
 from fanet_mw.trace import Approaching, Delivered, Generated
 from fanet_mw.units import S
 from sim.results.files import finish
+from sim.results.outcome import Outcome
 from sim.run.launcher.swarm import SwarmRun, free_endpoint, launch
-from sim.run.outcome import Outcome
 from sim.scenarios import catalog
 
 NAMES = Topics("test")

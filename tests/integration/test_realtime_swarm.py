@@ -19,15 +19,15 @@ import pytest
 from undisturbed import LIMIT_S, undisturbed, with_time_enough
 
 from agents.__main__ import run as run_agent
-from emulator.kernel.compile import must_compile, warm_up
+from emulator.compile_kernel import must_compile, warm_up
 from fanet_mw import tlog
 from fanet_mw.errors import BusError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import ProcessEnded
 from fanet_mw.units import NodeId, S
 from sim.results.files import finish
+from sim.results.outcome import Outcome
 from sim.run.launcher.swarm import SwarmRun, launch
-from sim.run.outcome import Outcome
 from sim.scenarios import catalog
 
 FAST = ["duration_s=5", "warmup_s=2", "drain_s=1", "clusters.flooding_period_s=0.5", "radio.lead_ms=150"]

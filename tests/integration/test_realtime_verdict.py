@@ -23,8 +23,8 @@ from fanet_mw.hosts.bus import Bus
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import S
 from sim.results.files import finish
+from sim.results.outcome import Outcome
 from sim.run.launcher.swarm import SwarmRun, launch
-from sim.run.outcome import Outcome
 from sim.scenarios import catalog
 
 SHORT = ["duration_s=4", "warmup_s=1", "drain_s=0.5", "clusters.flooding_period_s=0.5", "world.engine=kinematic",

@@ -14,8 +14,8 @@ from fanet_mw.trace import Detected, Record, Sighted
 from fanet_mw.units import S
 from sim.results.files import finish
 from sim.results.links import LinkTotals
+from sim.results.outcome import Outcome
 from sim.results.replay import Replay
-from sim.run.outcome import Outcome
 from sim.run.virtual import actors_of
 
 KEYS = {

@@ -15,7 +15,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Confirmed, Planned, Posed, Record, Sighted
 from fanet_mw.units import S
 from sim.results.mission import mission
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 from sim.run.virtual import actors_of, simulate
 from sim.scenarios.catalog import find
 

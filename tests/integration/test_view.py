@@ -23,8 +23,8 @@ from sim.cli.app import app
 from sim.observation.bus_feed import BusFeed
 from sim.observation.swarm_state import SwarmState
 from sim.observation.timeline import Timeline
+from sim.results.result import Result
 from sim.run.api import launch
-from sim.run.result import Result
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 from sim.view.actions import Actions

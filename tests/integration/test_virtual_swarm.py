@@ -14,7 +14,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Approaching, Delivered, Generated, RoleChanged
 from fanet_mw.units import MS, S
 from sim.results.files import finish
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 

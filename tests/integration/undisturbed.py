@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any, Final, TypeVar
 
 from sim.results.files import finish
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 
 SPEEDS: Final = (1.0, 0.5, 0.25)
 LIMIT_S: Final = 300

@@ -18,10 +18,10 @@ from sim.world.engines.kinematic import Kinematic
 from sim.world.engines.pybullet import Physics
 from sim.world.engines.rotors.rigid_body import Rotors
 from sim.world.engines.rotors.vehicle_types import IRIS
+from sim.world.environment.layout import ON_GROUND_M, positions
 from sim.world.environment.obstacles import Box, Hills, Obstacles, obstacles
 from sim.world.environment.solids import Solids
 from sim.world.mobility.guidance import Guidance
-from sim.world.mobility.layout import ON_GROUND_M, positions
 
 terrains = st.builds(
     lambda seed, side, cell_m, most: Hills(np.random.default_rng(seed).uniform(0, most, (side, side)), cell_m),

@@ -23,7 +23,7 @@ from fanet_mw.trace import Delivered
 from fanet_mw.units import Enu, NodeId, S
 from sim.run.virtual import simulate as simulate_swarm
 from sim.scenarios import catalog
-from sim.world.mobility.layout import positions
+from sim.world.environment.layout import positions
 
 # --- one head against exact simulation ---
 

@@ -14,7 +14,7 @@ from fanet_mw.planner.claimed_turns import converged_slots
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.scenario import config
 from fanet_mw.units import Enu, NodeId, S
-from sim.world.mobility.layout import positions
+from sim.world.environment.layout import positions
 
 
 def placed(scenario) -> dict[NodeId, Enu]:

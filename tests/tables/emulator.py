@@ -7,7 +7,8 @@ from typing import Final
 
 from emulator.channel.error_rate import log_success_per_bit
 from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
-from fanet_mw.scenario.tables.radio import DSSS_RATES_MBPS, OFDM_RATES_MBPS
+from fanet_mw.airtime import OFDM_RATES_MBPS
+from fanet_mw.scenario.tables.radio import DSSS_RATES_MBPS
 from fanet_mw.units import NodeId
 from tests.tables.markdown import Rows
 from tests.validation.medium_driver import contention, disc

@@ -6,8 +6,9 @@ hands them what happens at a node:
     roles         who leads the swarm and who heads a cluster; failures of both
     clustering    the methods that divide nodes into clusters
     forwarding    a packet's way to the head, its flood, and the repair of lost packets
-    relaying      who passes a flood on
-    tdma          slots and turns, and the queues that are emptied in them
+    relaying      who passes a flood on in contention
+    links         what a node knows of links and loads
+    tdma, slots   turns, slots of heads, and the queues that are emptied in them
     timetable     `clusters.relay = "scheduled"`: floods that never collide, with delay bounds
     claimed       `clusters.relay = "claimed"`: slots without a leader
 """

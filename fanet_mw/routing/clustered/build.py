@@ -15,15 +15,19 @@ from fanet_mw.node.contract import Port
 from fanet_mw.node.neighbors import Neighbors, neighbor_lifetime_ns
 from fanet_mw.node.queue import TxQueue, sooner_us
 from fanet_mw.routing.clustered.claimed.claimed_access import ClaimedAccess
+from fanet_mw.routing.clustered.claimed.claimed_relaying import ClaimedRelaying
 from fanet_mw.routing.clustered.claimed.claimed_release import ClaimedRelease
 from fanet_mw.routing.clustered.claimed.own_turns import OwnTurns
 from fanet_mw.routing.clustered.claimed.slot_acquisition import SlotAcquisition, geometry
 from fanet_mw.routing.clustered.clustered import Clustered, Parts
 from fanet_mw.routing.clustered.contract import HearsCopies, ScheduledAccess
+from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTiming
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
 from fanet_mw.routing.clustered.forwarding.uplink import Uplink
-from fanet_mw.routing.clustered.relaying.claimed import ClaimedRelaying
+from fanet_mw.routing.clustered.links.heard_load import HeardLoads
+from fanet_mw.routing.clustered.links.link_quality import LinkQuality
+from fanet_mw.routing.clustered.links.neighborhood import Neighborhood
 from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
 from fanet_mw.routing.clustered.relaying.gateways_cds_mpr import (
     DominatingSet,
@@ -33,9 +37,8 @@ from fanet_mw.routing.clustered.relaying.gateways_cds_mpr import (
     RelayChoice,
 )
 from fanet_mw.routing.clustered.relaying.gossip_and_counter import CounterRule, GossipRule, RelayAll, Rule
-from fanet_mw.routing.clustered.relaying.neighborhood import Neighborhood
-from fanet_mw.routing.clustered.relaying.scheduled import ScheduledRelaying
 from fanet_mw.routing.clustered.roles.assigned_roles import AssignedRoles, RoleParts
+from fanet_mw.routing.clustered.roles.contract import NoTimetable, Timetabling
 from fanet_mw.routing.clustered.roles.failover import Failover
 from fanet_mw.routing.clustered.roles.joining import Joining
 from fanet_mw.routing.clustered.roles.leader import Leader
@@ -47,20 +50,19 @@ from fanet_mw.routing.clustered.roles.no_roles import NoRoles
 from fanet_mw.routing.clustered.roles.position_updates import PositionUpdates
 from fanet_mw.routing.clustered.roles.schedule_check import ScheduleCheck
 from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
-from fanet_mw.routing.clustered.tdma.contention_timing import ContentionTiming
-from fanet_mw.routing.clustered.tdma.slot_access import SlotAccess
-from fanet_mw.routing.clustered.tdma.slot_release import SlotRelease
+from fanet_mw.routing.clustered.slots.slot_access import SlotAccess
+from fanet_mw.routing.clustered.slots.slot_release import SlotRelease
 from fanet_mw.routing.clustered.timetable.admission import Admission
 from fanet_mw.routing.clustered.timetable.call_release import CallRelease
-from fanet_mw.routing.clustered.timetable.heard_load import HeardLoads
-from fanet_mw.routing.clustered.timetable.link_quality import LinkQuality
 from fanet_mw.routing.clustered.timetable.reserved_room import reserved
 from fanet_mw.routing.clustered.timetable.root_release import RootRelease
+from fanet_mw.routing.clustered.timetable.scheduled_relaying import ScheduledRelaying
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
-from fanet_mw.routing.clustered.timetable.timetabling import FromPlaces, NoTimetable, Timetabling
+from fanet_mw.routing.clustered.timetable.timetabling import FromPlaces
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.routing.clustered.timetable.turn_allocation import leader_load
+from fanet_mw.routing.clustered.timetable.turn_size import measured_period_ns
 from fanet_mw.routing.packet_repair import Repair
 from fanet_mw.units import MS, seconds_to_ns
 
@@ -282,6 +284,7 @@ def _roles(
     make_leader = partial(
         Leader,
         scenario=ground.port.scenario,
+        measured_period_ns=measured_period_ns(ground.port.scenario),
         liveness=parts.liveness,
         needs_every_link=timetabling.needs_every_link,
         heard=heard,

@@ -24,8 +24,8 @@ from fanet_mw.routing.clustered.contract import Access, HearsCopies, Relaying, R
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
 from fanet_mw.routing.clustered.forwarding.uplink import MOST_TRIES, Uplink
+from fanet_mw.routing.clustered.links.heard_load import HeardLoads
 from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
-from fanet_mw.routing.clustered.timetable.heard_load import HeardLoads
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.packet_repair import Repair
 from fanet_mw.units import BROADCAST, US, NodeId

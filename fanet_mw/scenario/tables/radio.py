@@ -10,12 +10,12 @@ from typing import Annotated, Any, Final, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
+from fanet_mw.airtime import OFDM_RATES_MBPS, is_ofdm
 from fanet_mw.extensions import Options, OptionsOf, PartName
 from fanet_mw.scenario.tables.sections import Decibels, Length, Level, Section, SomeLength
 from fanet_mw.units import LIGHT_M_PER_S, MS
 
 DSSS_RATES_MBPS: Final = (1.0, 2.0, 5.5, 11.0)
-OFDM_RATES_MBPS: Final = (6.0, 9.0, 12.0, 18.0, 24.0, 36.0, 48.0, 54.0)
 RATES_MBPS: Final = {"b": DSSS_RATES_MBPS, "g": DSSS_RATES_MBPS + OFDM_RATES_MBPS, "a": OFDM_RATES_MBPS}
 """The rates of each `radio.standard`."""
 CHANNELS: Final = ("range", "log_distance", "friis", "two_ray", "air_to_air", "air_to_ground", "uma_av")
@@ -49,11 +49,6 @@ MOST_PAYLOAD_BYTES: Final = 2304 - 36
 Ns3Point = Literal["difs", "eifs", "sums", "onset", "window"]
 """A point in which ns-3.44 differs from IEEE 802.11."""
 MANDATORY_OFDM_MBPS: Final = (6.0, 12.0, 24.0)  # 17.1.1
-
-
-def is_ofdm(rate_mbps: float) -> bool:
-    """True if a rate is sent by OFDM (clauses 17 and 18 of IEEE 802.11-2020) and not by DSSS."""
-    return rate_mbps in OFDM_RATES_MBPS
 
 
 def noise_dbm(rate_mbps: float, noise_figure_db: float) -> float:

@@ -23,13 +23,13 @@ from fanet_mw.hosts.bus import OnSample
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record
 from fanet_mw.units import S
+from sim.records.bus_checks import BusChecks
+from sim.records.spool import Spool
+from sim.records.stored_records import RecordSpools
 from sim.results.links import LinkTotals
-from sim.run.collecting.bus_checks import BusChecks
+from sim.results.outcome import Outcome
 from sim.run.collecting.running_tally import RunningTally
-from sim.run.collecting.spool import Spool
-from sim.run.collecting.stored_records import RecordSpools
 from sim.run.collecting.taps import encoded_tap, taps_of
-from sim.run.outcome import Outcome
 
 BURST_BYTES: Final = 16 << 20
 """The number of bytes that one actor may put at once; ten hours of a UAV's trace in `rescue`."""

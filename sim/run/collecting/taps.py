@@ -10,8 +10,8 @@ from itertools import chain
 from pathlib import Path
 from typing import Final
 
-from sim.run.collecting.disk_backed_log import MOST_IN_MEMORY, DiskBackedLog
-from sim.run.collecting.spool import Spool, in_order
+from sim.records.disk_backed_log import MOST_IN_MEMORY, DiskBackedLog
+from sim.records.spool import Spool, in_order
 
 _INSTANT: Final = struct.Struct("<q")
 Tap = tuple[int, bytes]

@@ -131,11 +131,6 @@ def _start_server() -> None:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def describe(exit_code: int) -> str:
-    """An exit code in words; a signal by its name."""
-    return f"signal {signal.Signals(-exit_code).name}" if exit_code < 0 else f"exit code {exit_code}"
-
-
 class Processes:
     """The children by name; each of them can be started again."""
 

@@ -13,8 +13,8 @@ from typing import Any, Final, NamedTuple
 
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS
-from sim.run.bus.router import expected_names
 from sim.run.launcher.pauses import longest_pause_ns, processors
+from sim.run.router import expected_names
 
 _MEASURED_S: Final = 1.0
 _LEAST_MS: Final = 20

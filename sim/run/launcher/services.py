@@ -10,8 +10,8 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId
 from sim.run.launcher.child_processes import Entry
 from sim.world.__main__ import run as run_world
+from sim.world.environment.layout import positions
 from sim.world.environment.map_on_board import map_on_board
-from sim.world.mobility.layout import positions
 
 
 class Service(NamedTuple):

@@ -21,7 +21,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from emulator.kernel.compile import COMPILING_NOTICE, must_compile
+from emulator.compile_kernel import COMPILING_NOTICE, must_compile
 from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import ClockRequest
 from fanet_mw.bus.topics import Topics
@@ -33,19 +33,19 @@ from fanet_mw.hosts.realtime import SwarmAddress
 from fanet_mw.routing import module_of
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, S
-from sim.run.bus.router import ROUTER, expected_names
-from sim.run.bus.running_swarms import registered
+from sim.bus.rights import ROUTER
+from sim.bus.running_swarms import registered
+from sim.results.outcome import Outcome, described
 from sim.run.collecting.collector import Collector
 from sim.run.collecting.running_tally import Progress
 from sim.run.launcher import limits
-from sim.run.launcher.child_processes import Processes, describe, end_if_imported_by_a_child
+from sim.run.launcher.child_processes import Processes, end_if_imported_by_a_child
 from sim.run.launcher.clock_governor import ClockGovernor, Instant
 from sim.run.launcher.deaths import Deaths
 from sim.run.launcher.leads import Leads
 from sim.run.launcher.pauses import PauseWatch, processors
 from sim.run.launcher.services import Services
-from sim.run.outcome import Outcome
-from sim.run.stoppable_uav import planned_stops
+from sim.run.router import expected_names
 from sim.world.flight_recorder import FlightRecorder
 from sim.world.possible_world import require_possible
 
@@ -111,7 +111,7 @@ class SwarmRun:
         self._program_changes = sorted(
             (at_ns, f"agent-{node}", starts)
             for node in scenario.node_ids
-            for stop in planned_stops(scenario, node)
+            for stop in scenario.planned_stops(node)
             for at_ns, starts in zip(stop, (False, True), strict=True)
             if at_ns is not None
         )
@@ -322,7 +322,7 @@ class SwarmRun:
         if self._ending or (exit_code == 0 and (self._over.is_set() or self.time_is_over())):
             return
         if self._clock is None and not self._over.is_set() and self._deaths.grant_late_start(name, exit_code):
-            self._tell(f"{name} ended with {describe(exit_code)} before the start; started again")
+            self._tell(f"{name} ended with {described(exit_code)} before the start; started again")
             self.processes.restart(name)
             return
         if name in self._stopped:
@@ -331,7 +331,7 @@ class SwarmRun:
         now_ns = self._now_ns()
         node = int(name.removeprefix("agent-")) if name.startswith("agent-") else 0
         self._deaths.note(name, exit_code, node=node, now_ns=now_ns)
-        what = f"{name} ended with {describe(exit_code)} at {now_ns / S:.1f} s"
+        what = f"{name} ended with {described(exit_code)} at {now_ns / S:.1f} s"
         if self._over.is_set():
             self._broken |= not node
             self._tell(f"{what}, while the swarm was ending")

@@ -5,8 +5,8 @@ import numpy as np
 from agents.mission.navigation.onboard_map import NO_MAP, Building, OnboardMap
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
+from sim.world.environment.layout import positions
 from sim.world.environment.obstacles import obstacles
-from sim.world.mobility.layout import positions
 
 
 def map_on_board(scenario: Scenario) -> OnboardMap:

@@ -11,8 +11,8 @@ from fanet_mw.rng import stream
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import Enu
 from sim.world.arrays import Flags, Rows, Values
+from sim.world.environment.layout import positions
 from sim.world.environment.obstacles import Box, obstacles
-from sim.world.mobility.layout import positions
 
 _TRIES: Final = 200
 

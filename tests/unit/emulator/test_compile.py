@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from emulator.compile_kernel import warm_up
 from emulator.kernel import kernel
-from emulator.kernel.compile import warm_up
 from emulator.kernel.jit import cache_folder, first_writable
 
 ENTRIES = ("take_in", "next_output", "scatter", "relink")

@@ -13,8 +13,8 @@ from sim.report import finds
 from sim.report.run_records import RunRecords
 from sim.results.files import finish
 from sim.results.mission import OverflownCells
+from sim.results.outcome import Outcome
 from sim.results.run_folder import RunFolder
-from sim.run.outcome import Outcome
 
 KEYS = {
     "nodes.count": 2, "nodes.altitude_m": 60, "world.area_m": 1000, "duration_s": 60, "mission.survivors": 6,

@@ -10,7 +10,7 @@ from sim.cli.plan import judge
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
-from sim.world.mobility.layout import positions
+from sim.world.environment.layout import positions
 
 LINE = within_range({NodeId(i): Enu(200.0 * i, 0.0, 0.0) for i in range(1, 8)}, range_m=250)
 

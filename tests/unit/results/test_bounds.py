@@ -10,8 +10,8 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import BoundStated, Delivered, Generated, LikelyStated, Record
 from fanet_mw.units import MS, S
 from sim.results.metrics import summarize
+from sim.results.outcome import Outcome
 from sim.results.printed_summary import show
-from sim.run.outcome import Outcome
 
 
 @pytest.fixture

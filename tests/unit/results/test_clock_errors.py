@@ -7,10 +7,10 @@ import pytest
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import ClockSampled, Delivered, Generated, Record
 from fanet_mw.units import MS, US, S
+from sim.records.trace_log import TraceLog
 from sim.results.clocks import clock_errors, true_delays
 from sim.results.metrics import summarize
-from sim.run.collecting.trace_log import TraceLog
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 
 MakeScenario = Callable[..., Scenario]
 

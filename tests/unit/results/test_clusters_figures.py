@@ -8,7 +8,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record, RoleChanged
 from fanet_mw.units import S
 from sim.results.metrics import summarize
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 from tests.unit.results.test_reachability import poses
 
 

@@ -13,9 +13,9 @@ from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId
 from sim.results import ledger
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 from sim.run.virtual import simulate
-from sim.world.mobility.layout import positions
+from sim.world.environment.layout import positions
 from sim.world.world import WorldActor
 
 Keep = Callable[[int, TxRequest], bool]

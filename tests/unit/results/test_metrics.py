@@ -8,7 +8,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import BoundStated, Delivered, Generated, Record
 from fanet_mw.units import MS, S
 from sim.results.metrics import summarize
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 
 A_PACKET = 7
 

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from fanet_mw.scenario import config
 from fanet_mw.trace import Delivered, Generated, Record
 from fanet_mw.units import MS, S
+from sim.records.trace_log import TraceLog
+from sim.results.outcome import Outcome
 from sim.results.packets import packets_of
-from sim.run.collecting.trace_log import TraceLog
-from sim.run.outcome import Outcome
 
 NODES = 4
 APPS = ("traffic", "report", "my_app")

@@ -18,8 +18,8 @@ from fanet_mw.whole_file import write_items
 from sim.cli.out_folder import prepare
 from sim.results.file_names import RUN_FILES
 from sim.results.files import begin, finish
+from sim.results.outcome import Outcome
 from sim.results.run_folder import RunFolder
-from sim.run.outcome import Outcome
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 
@@ -133,7 +133,7 @@ def test_items_longer_than_a_batch_are_cut_between_items(tmp_path: Path, monkeyp
 
 _LIMITED = """
 import resource, sys
-from emulator.kernel.compile import warm_up
+from emulator.compile_kernel import warm_up
 from sim.cli.app import main
 warm_up()  # compiled code is kept in files too
 resource.setrlimit(resource.RLIMIT_FSIZE, (16384, resource.RLIM_INFINITY))

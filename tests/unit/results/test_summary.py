@@ -12,7 +12,7 @@ from fanet_mw.trace import Approaching, Arrived, DeadlineLost, DeadlineMet, Dete
 from fanet_mw.units import MS, S
 from sim.results.delays import summed_up
 from sim.results.metrics import summarize
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 from sim.world.environment.survivors import place
 
 MakeScenario = Callable[..., Scenario]

@@ -12,8 +12,8 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
 from sim.results import validity
 from sim.results.metrics import summarize
+from sim.results.outcome import Outcome
 from sim.results.printed_summary import show
-from sim.run.outcome import Outcome
 from sim.world.world import WorldActor
 
 SENT = 4000
@@ -209,7 +209,7 @@ def test_a_run_in_virtual_time_is_judged_by_its_ledger_alone(scenario: Scenario)
 
 
 def test_every_reason_is_printed(scenario: Scenario, capsys: pytest.CaptureFixture[str]) -> None:
-    from sim.cli.console import Console
+    from sim.console import Console
 
     outcome = good(scenario)
     outcome.ended.append(("agent-2", -9))

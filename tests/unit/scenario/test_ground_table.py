@@ -4,7 +4,7 @@ import pytest
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import config
-from sim.world.mobility.layout import positions
+from sim.world.environment.layout import positions
 
 POST = "[nodes]\ncount = 5\n[clusters]\ncount = 1\n[ground]\nat_m = [30, -40]\nantenna_m = 7\n"
 

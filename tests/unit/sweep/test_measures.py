@@ -6,7 +6,7 @@ import pytest
 
 from fanet_mw.trace import Approaching, Delivered, Detected, Generated, Record
 from fanet_mw.units import MS, S
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 from sim.scenarios import catalog
 from sim.sweep.measures import DELAY_EDGES_S, MEASURES
 

@@ -23,10 +23,10 @@ from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.claimed.claimed_release import ClaimedRelease
 from fanet_mw.routing.clustered.claimed.slot_acquisition import Change, SlotAcquisition
+from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTiming
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import NO_HEAD, Gradient
 from fanet_mw.routing.clustered.forwarding.uplink import Uplink
-from fanet_mw.routing.clustered.tdma.contention_timing import ContentionTiming
 from fanet_mw.routing.clustered.tdma.turn_timing import clocks_fit
 from fanet_mw.units import MS, US, seconds_to_ns
 from fanet_mw.wire import Kind

@@ -15,7 +15,7 @@ from fanet_mw.node.contract import Port
 from fanet_mw.node.neighbors import neighbor_lifetime_ns
 from fanet_mw.routing.clustered.claimed.own_turns import OwnTurns, Share, draws
 from fanet_mw.routing.clustered.claimed.slot_claims import SlotClaim, SlotClaims, SlotHello
-from fanet_mw.routing.clustered.relaying.neighborhood import Neighborhood
+from fanet_mw.routing.clustered.links.neighborhood import Neighborhood
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, NodeId, S, seconds_to_ns

@@ -11,7 +11,7 @@ from typing import Final
 from fanet_mw.node.contract import Port
 from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.packet import Packet
-from fanet_mw.routing.clustered.tdma.contention_timing import ContentionTiming
+from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTiming
 from fanet_mw.routing.packet_repair import Repair
 from fanet_mw.units import BROADCAST, S
 from fanet_mw.wire import FLAG_FLOOD, Kind

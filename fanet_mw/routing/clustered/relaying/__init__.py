@@ -1,5 +1,5 @@
-"""Relaying: which nodes pass on a flooded packet, and when.
+"""Relaying in contention: which nodes pass on a flooded packet, and when.
 
-`contending` relays in contention by the rules of `gossip_and_counter`, or by those of `gateways_cds_mpr`, which know
-two hops (`neighborhood`); `scheduled` relays in turns of a timetable, `claimed` in claimed turns.
+`contending` follows the rules of `gossip_and_counter`, or those of `gateways_cds_mpr`, which know two hops. Relaying in
+turns is in `timetable/` and `claimed/`.
 """

@@ -16,7 +16,7 @@ from fanet_mw.bus.messages import Reception
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.clustered.contract import Relaying
-from fanet_mw.routing.clustered.relaying.neighborhood import Neighborhood
+from fanet_mw.routing.clustered.links.neighborhood import Neighborhood
 from fanet_mw.routing.clustered.roles.membership import Membership
 from fanet_mw.units import NodeId, seconds_to_ns
 from fanet_mw.wire import Kind

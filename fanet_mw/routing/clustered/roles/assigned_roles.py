@@ -17,6 +17,8 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.node.reader import decoded
 from fanet_mw.routing.clustered.contract import ScheduledAccess
 from fanet_mw.routing.clustered.forwarding.gradient import UNREACHABLE, Gradient, RouteToHead
+from fanet_mw.routing.clustered.links.link_quality import LinkQuality
+from fanet_mw.routing.clustered.roles.contract import Timetabling
 from fanet_mw.routing.clustered.roles.failover import Failover
 from fanet_mw.routing.clustered.roles.joining import Joining
 from fanet_mw.routing.clustered.roles.leader import Leader
@@ -27,8 +29,6 @@ from fanet_mw.routing.clustered.roles.neighbor_failure_detector import NeighborF
 from fanet_mw.routing.clustered.roles.schedule_check import ScheduleCheck
 from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
 from fanet_mw.routing.clustered.roles.states import Action
-from fanet_mw.routing.clustered.timetable.link_quality import LinkQuality
-from fanet_mw.routing.clustered.timetable.timetabling import Timetabling
 from fanet_mw.units import US, NodeId
 from fanet_mw.wire import Kind
 from fanet_mw.wire.hello.beacon import Beacon

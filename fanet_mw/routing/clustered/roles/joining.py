@@ -13,8 +13,8 @@ from typing import Final
 
 from fanet_mw.motion import Motion
 from fanet_mw.node.contract import Port
+from fanet_mw.routing.clustered.links.link_quality import LinkQuality
 from fanet_mw.routing.clustered.roles.position_updates import UPDATE_NS, PositionUpdates
-from fanet_mw.routing.clustered.timetable.link_quality import LinkQuality
 from fanet_mw.units import MS, S
 from fanet_mw.wire.join import Join
 from fanet_mw.wire.links import Links

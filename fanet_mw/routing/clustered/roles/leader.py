@@ -24,14 +24,13 @@ from fanet_mw.graph.topology import Adjacency, within_range
 from fanet_mw.motion import Motion
 from fanet_mw.routing.clustered.clustering import Cluster, Swarm, succession
 from fanet_mw.routing.clustered.clustering.division import Division, drift
+from fanet_mw.routing.clustered.links.heard_load import HeardLoads
+from fanet_mw.routing.clustered.links.link_state import LinkState, adjacency, worth_a_change
 from fanet_mw.routing.clustered.roles.leader_election import Authority, silence_ns
 from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import EPOCH_BITS
 from fanet_mw.routing.clustered.roles.position_updates import lost_ns, settled_ns
 from fanet_mw.routing.clustered.roles.roster import Roster, sure_m
-from fanet_mw.routing.clustered.timetable.heard_load import HeardLoads
-from fanet_mw.routing.clustered.timetable.link_state import LinkState, adjacency, worth_a_change
-from fanet_mw.routing.clustered.timetable.turn_size import measured_period_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.serial_number import following, newer
 from fanet_mw.units import MS, US, Enu, NodeId, S, seconds_to_ns
@@ -98,6 +97,7 @@ class Leader:
         authority: Authority,
         *,
         scenario: Scenario,
+        measured_period_ns: int,
         liveness: Liveness,
         needs_every_link: bool,
         heard: HeardLoads | None = None,
@@ -105,7 +105,8 @@ class Leader:
         elected: bool,
         now_ns: int,
     ) -> None:
-        """`needs_every_link`: nodes compute a timetable from the assignment, so a new one is also needed when links
+        """`measured_period_ns`: the interval of announcements with measured links, one superframe;
+        `needs_every_link`: nodes compute a timetable from the assignment, so a new one is also needed when links
         change; `heard`: the measured loads for which the timetable is made; None if it is made
         for the loads that the scenario states.
         """
@@ -128,8 +129,7 @@ class Leader:
         )
         self._epoch = epoch
         self._estimates = _Estimates(LinkState() if scenario.measures_links else None, heard)
-        self._measured_ns = measured_period_ns(scenario)
-        """The interval of announcements with measured links: one superframe."""
+        self._measured_ns = measured_period_ns
         self._outbid = False
         """True if another node has announced an epoch in this leader's name, so that the next epoch must come after
         it."""

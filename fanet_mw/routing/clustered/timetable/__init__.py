@@ -3,8 +3,8 @@
 computed     `timetabling` (when), `turn_size` and `turn_allocation` (how many turns), `list_scheduling` and
              `redundant_scheduling` (who sends in which), `interference` (who disturbs whom), `flood_geometry`;
              the result is a `timetable`
-from         `heard_load` (what nodes send), `link_quality` and `link_state` (measured links)
 followed     `node_timetable`, `timetables_in_force`; `turn_access` sends in the turns: own packets by `root_release`,
-             whose classes have `reserved_room`, frames to neighbors alone by `call_release`
+             whose classes have `reserved_room`, frames to neighbors alone by `call_release`, relays by
+             `scheduled_relaying`
 promised     `stated_delays` by `own_bound` or `likely_delay` (from `delivery_odds`), `admission`
 """

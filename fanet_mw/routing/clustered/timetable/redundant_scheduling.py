@@ -11,7 +11,7 @@ disturbs one of a frame's receivers, that receiver is left out and served later,
 frame remains. All neighbors count for a call. Whether a node disturbs a link depends on the strength of that link
 (`InterferenceByPower`).
 
-In flight, `turn_access.py` repeats a node's own packets, and `relaying/scheduled.py` its relays. Not modeled: that a
+In flight, `turn_access.py` repeats a node's own packets, and `scheduled_relaying.py` its relays. Not modeled: that a
 relay may lack the packet although it has had enough copies (`fanet_mw/planner/flood_loss.py` includes that).
 """
 

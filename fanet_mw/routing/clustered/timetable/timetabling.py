@@ -8,12 +8,13 @@ The leader adds to each part of a schedule the positions of its members, and the
 """
 
 from collections.abc import Mapping
-from typing import Final, NamedTuple, Protocol
+from typing import Final
 
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
 from fanet_mw.node.reader import decoded
+from fanet_mw.routing.clustered.roles.contract import PartDetails
 from fanet_mw.routing.clustered.roles.leader import Leader
 from fanet_mw.routing.clustered.roles.leader_election import Authority, Lease
 from fanet_mw.routing.clustered.roles.membership import Membership, Version
@@ -32,62 +33,6 @@ from fanet_mw.wire.schedule import Schedule
 _LINKS_PART: Final = 1 << 16
 """Added to the number of a part of the links, so that it differs from those of the schedule in the store of parts that
 neighbors may lack."""
-
-
-class PartDetails(NamedTuple):
-    """What comes with a part of a schedule: the positions of its members, and their loads if the leader hears them."""
-
-    places: Places
-    loads: Loads | None = None
-
-
-class Timetabling(Protocol):
-    """What the leader adds to its schedule, and the timetable that nodes compute from both."""
-
-    needs_every_link: bool
-    """True if a silent node or a lost link cuts others off, so that the leader must be told and plan anew."""
-
-    def addition(self, part: Schedule, leader: Leader) -> bytes:
-        """The inner frames that the leader adds to a part of the schedule."""
-
-    def links_after(self, part: Schedule, leader: Leader) -> list[bytes]:
-        """The inner frames of the packets with links that follow a part of the schedule."""
-
-    def read(self, packet: Packet, schedule: Schedule) -> PartDetails | None:
-        """The positions and loads that came with a part of a schedule; raises MalformedFrameError."""
-
-    def on_schedule(self, packet: Packet, schedule: Schedule, details: PartDetails | None, *, now_ns: int) -> None:
-        """A part of a schedule was received, and the roles have accepted it."""
-
-    def on_links(self, packet: Packet, *, now_ns: int) -> None:
-        """A packet of links was received that belongs to a schedule; raises MalformedFrameError."""
-
-    def notice_ns(self, now_ns: int) -> int:
-        """How long ahead the leader must announce another schedule."""
-
-
-class NoTimetable:
-    """Schedules without a timetable: they only say who heads which cluster, and which slot it has."""
-
-    needs_every_link = False
-
-    def addition(self, part: Schedule, leader: Leader) -> bytes:
-        return b""
-
-    def links_after(self, part: Schedule, leader: Leader) -> list[bytes]:
-        return []
-
-    def read(self, packet: Packet, schedule: Schedule) -> PartDetails | None:
-        return None
-
-    def on_schedule(self, packet: Packet, schedule: Schedule, details: PartDetails | None, *, now_ns: int) -> None:
-        """Nothing is done: the roles use all that is in the schedule."""
-
-    def on_links(self, packet: Packet, *, now_ns: int) -> None:
-        """Nothing is done: links are of no use without a timetable."""
-
-    def notice_ns(self, now_ns: int) -> int:
-        return 0
 
 
 class FromPlaces:

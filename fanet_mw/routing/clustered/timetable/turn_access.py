@@ -1,4 +1,4 @@
-"""Access by a timetable: a node transmits its own packets in its own turns; its relays are in `relaying/scheduled.py`.
+"""Access by a timetable: a node transmits its own packets in its own turns; its relays are in `scheduled_relaying.py`.
 
 Until a timetable gives the node turns, it sends its packets to a head, as in the protocol with slots. Frames without a
 turn contend in the window at the beginning of each superframe: hellos, joins, unicasts to a head, and packets that
@@ -13,9 +13,9 @@ from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port
 from fanet_mw.node.duplicates import key_of_packet
 from fanet_mw.node.packet import Packet
+from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTiming
 from fanet_mw.routing.clustered.forwarding.floods import Floods
-from fanet_mw.routing.clustered.tdma.contention_timing import ContentionTiming
-from fanet_mw.routing.clustered.tdma.slot_access import SlotAccess
+from fanet_mw.routing.clustered.slots.slot_access import SlotAccess
 from fanet_mw.routing.clustered.timetable.call_release import CallRelease
 from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.root_release import RootRelease, TurnsInForce

@@ -18,10 +18,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from typing import Final, NamedTuple, TypeVar
 
+from fanet_mw.routing.clustered.links.heard_load import packets
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_ns
 from fanet_mw.routing.clustered.timetable.fitted_timetable import NO_LOADS, FittedTimetable
 from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
-from fanet_mw.routing.clustered.timetable.heard_load import packets
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, redundant_timetable, timetable
 from fanet_mw.routing.clustered.timetable.turn_size import (

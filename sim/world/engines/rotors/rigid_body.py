@@ -19,9 +19,9 @@ from sim.world.engines.contract import GRAVITY_M_S2, Engine
 from sim.world.engines.rotors.flight_control import FlightControl, allocation, body_up, cross, level_attitude, times
 from sim.world.engines.rotors.power import electrical_w, rotor_power_w
 from sim.world.engines.rotors.vehicle_types import Vehicle, hover_rad_s
+from sim.world.environment.layout import ON_GROUND_M
 from sim.world.environment.solids import Solids
 from sim.world.environment.wind import Wind
-from sim.world.mobility.layout import ON_GROUND_M
 
 STEP_HZ: Final = 200
 _DT_S: Final = 1 / STEP_HZ

@@ -39,10 +39,10 @@ from fanet_mw.trace import (
     Sighted,
 )
 from fanet_mw.units import S
+from sim.records.spool import Spool
 from sim.results.files import finish
+from sim.results.outcome import Outcome
 from sim.run.collecting.collector import BURST_BYTES, BYTES_PER_S, Allowance, Collector
-from sim.run.collecting.spool import Spool
-from sim.run.outcome import Outcome
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 

@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from sim.run.collecting.spool import Spool
+from sim.records.spool import Spool
 from sim.run.collecting.taps import TapLog, encoded_tap, taps_of
 
 

@@ -12,10 +12,10 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, S
 from sim.world.engines.pybullet import Physics
+from sim.world.environment.layout import positions
 from sim.world.environment.line_of_sight import Sight
 from sim.world.environment.obstacles import Box, Obstacles, obstacles
 from sim.world.environment.solids import Solids
-from sim.world.mobility.layout import positions
 from sim.world.world import WorldActor
 from tests.unit.emulator.hand_driven import NAMES, Air, receptions
 

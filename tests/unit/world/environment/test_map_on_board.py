@@ -7,10 +7,10 @@ import pytest
 
 from agents.mission.navigation.onboard_map import NO_MAP
 from fanet_mw.scenario import Scenario
+from sim.world.environment.layout import positions
 from sim.world.environment.map_on_board import map_on_board
 from sim.world.environment.obstacles import obstacles
 from sim.world.environment.solids import Solids
-from sim.world.mobility.layout import positions
 
 MakeScenario = Callable[..., Scenario]
 KEYS = {"world.area_m": 800, "world.buildings": 20, "world.terrain_m": 15.0, "nodes.altitude_m": 100}

@@ -22,11 +22,11 @@ from sim.world.engines.pybullet import Physics
 from sim.world.engines.rotors.rigid_body import Rotors
 from sim.world.engines.rotors.vehicle_types import IRIS
 from sim.world.environment import footprints, heightmap
+from sim.world.environment.layout import positions
 from sim.world.environment.obstacles import obstacles
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors, place
 from sim.world.incidents.no_fly_entries import NoFlyEntries
-from sim.world.mobility.layout import positions
 
 MakeScenario = Callable[..., Scenario]
 PARIS = Geodetic(48.8566, 2.3522, 0.0)

@@ -9,8 +9,8 @@ from fanet_mw.bus.messages import Reception
 from fanet_mw.node.node import Node
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing import make_protocol
+from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTiming
 from fanet_mw.routing.clustered.forwarding.floods import Floods
-from fanet_mw.routing.clustered.tdma.contention_timing import ContentionTiming
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Header, Kind, filler

@@ -7,9 +7,9 @@ import pytest
 
 from fanet_mw.node.node import Node
 from fanet_mw.routing import make_protocol
+from fanet_mw.routing.clustered.links.link_quality import LinkQuality
 from fanet_mw.routing.clustered.roles.joining import Joining
 from fanet_mw.routing.clustered.roles.position_updates import PositionUpdates
-from fanet_mw.routing.clustered.timetable.link_quality import LinkQuality
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
 

@@ -27,7 +27,7 @@ class Desk:
         self.liveness = Liveness()
         self.leader = Leader(
             Authority(0, 1), scenario=scenario, liveness=self.liveness, epoch=epoch, elected=False, now_ns=0,
-            needs_every_link=scenario.clusters.relay == "scheduled",
+            needs_every_link=scenario.clusters.relay == "scheduled", measured_period_ns=scenario.clusters.period_ns,
         )  # fmt: skip
 
     def join(self, node: int, east_m: float, *, born_ns: int, instead_of: int = 0) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final, Generic, TypeVar
 
 from fanet_mw.errors import ConfigError
-from sim.run.collecting.spool import Spool
+from sim.records.spool import Spool
 
 T = TypeVar("T")
 MOST_IN_MEMORY: Final = 1 << 9

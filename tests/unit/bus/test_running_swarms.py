@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from fanet_mw.errors import FanetError
+from sim.bus.running_swarms import DEFAULT_ENDPOINT, Running, locate, registered, running
 from sim.cli.app import app
-from sim.run.bus.running_swarms import DEFAULT_ENDPOINT, Running, locate, registered, running
 
 
 @pytest.fixture(autouse=True)
@@ -61,7 +61,7 @@ def test_two_of_one_name_are_told_apart_by_their_endpoints() -> None:
 def test_a_file_of_a_dead_process_is_ignored_and_removed(folder: Path) -> None:
     killed = [
         sys.executable, "-c",
-        "import os, signal; from sim.run.bus.running_swarms import registered\n"
+        "import os, signal; from sim.bus.running_swarms import registered\n"
         "with registered('dead', 'tcp/127.0.0.1:1'): os.kill(os.getpid(), signal.SIGKILL)",
     ]  # fmt: skip
     subprocess.run(killed, check=False)
@@ -124,7 +124,7 @@ def test_a_swarm_of_a_program_whose_name_is_no_ascii_is_found(monkeypatch: pytes
     """Linux cuts the name after 15 bytes, in the middle of a character."""
     program = (
         "import ctypes, sys\n"
-        "from sim.run.bus.running_swarms import registered\n"
+        "from sim.bus.running_swarms import registered\n"
         "from sim.run.launcher.process_title import entitle\n"
         "ctypes.CDLL(None).prctl(15, sys.argv[1].encode())\n"
         "entitle(sys.argv[1], 'fanet')\n"

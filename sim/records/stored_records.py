@@ -8,8 +8,8 @@ from typing import Final
 
 from fanet_mw import trace
 from fanet_mw.trace import Delivered, Generated, Record
-from sim.run.collecting.record_kinds import CODES
-from sim.run.collecting.spool import Spool, in_order
+from sim.records.record_kinds import CODES
+from sim.records.spool import Spool, in_order
 
 _KEY: Final = struct.Struct("<qHB")
 """The first bytes of a stored record, which are also its sort key: its instant, its node, and the number of its kind

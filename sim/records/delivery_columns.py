@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fanet_mw.trace import Delivered, Record
-from sim.run.collecting.record_kinds import records_of
+from sim.records.record_kinds import records_of
 
 _PORTION: Final = 4096
 Column = npt.NDArray[np.integer[Any]]

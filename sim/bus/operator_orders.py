@@ -11,7 +11,7 @@ from fanet_mw.errors import FanetError, MalformedFrameError
 from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.orders import Order
 from fanet_mw.trace import Ordered
-from sim.run.bus.air_control import CONFIRM_TIMEOUT_S, OPERATOR, find_swarm, scenario_of_swarm
+from sim.bus.air_control import CONFIRM_TIMEOUT_S, OPERATOR, find_swarm, scenario_of_swarm
 
 _ALL: Final = "*"
 

@@ -19,9 +19,9 @@ from typing import Any, Final
 import numpy as np
 
 from fanet_mw.trace import DELIVERED_LINE, Delivered, Record, line
-from sim.run.collecting.delivery_columns import DeliveryColumns, in_columns
-from sim.run.collecting.disk_backed_log import MOST_IN_MEMORY, MOST_PACKED_BYTES, DiskBackedLog
-from sim.run.collecting.record_kinds import CODES, KINDS
+from sim.records.delivery_columns import DeliveryColumns, in_columns
+from sim.records.disk_backed_log import MOST_IN_MEMORY, MOST_PACKED_BYTES, DiskBackedLog
+from sim.records.record_kinds import CODES, KINDS
 
 _DELIVERED: Final = CODES[Delivered]
 _IS_DELIVERED: Final = bytes(code == _DELIVERED for code in range(256))

@@ -6,7 +6,7 @@ from typing import Any
 
 from fanet_mw.trace import Delivered, kind_of
 from sim.results.files import finish
-from sim.run.outcome import Outcome
+from sim.results.outcome import Outcome
 
 
 class Result:

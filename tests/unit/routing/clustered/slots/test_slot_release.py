@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from fanet_mw.node.packet import Packet
 from fanet_mw.node.queue import TxQueue, sooner_us
-from fanet_mw.routing.clustered.tdma.slot_release import SlotRelease, Tenure
+from fanet_mw.routing.clustered.slots.slot_release import SlotRelease, Tenure
 from fanet_mw.routing.clustered.tdma.slot_timing import Superframe
 from fanet_mw.scenario import Clusters, Routing
 from fanet_mw.units import MS, US, S

@@ -7,7 +7,7 @@ import pytest
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
-from sim.world.mobility.layout import positions
+from sim.world.environment.layout import positions
 
 MakeScenario = Callable[..., Scenario]
 

@@ -10,9 +10,9 @@ import pytest
 from fanet_mw.bus.messages import SetpointKind
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, S
-from sim.world.mobility.position_estimate import PositionEstimate
 from sim.world.sensors.contract import Truth
 from sim.world.sensors.gps import GpsReceiver
+from sim.world.sensors.position_estimate import PositionEstimate
 from tests.unit.world.mobility.test_setpoints import Flying
 
 MakeScenario = Callable[..., Scenario]

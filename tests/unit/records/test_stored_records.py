@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from fanet_mw.trace import Approaching, Delivered, Dropped, Generated, LetOut, Posed, Record, kind_of
 from fanet_mw.units import MS
-from sim.run.collecting import spool as module
-from sim.run.collecting.record_kinds import lines, records_of
-from sim.run.collecting.spool import Spool, in_order
-from sim.run.collecting.stored_records import RecordSpools, StoredRecords
+from sim.records import spool as module
+from sim.records.record_kinds import lines, records_of
+from sim.records.spool import Spool, in_order
+from sim.records.stored_records import RecordSpools, StoredRecords
 
 INSTANTS = st.integers(-5, 20)
 NODES = st.integers(0, 3)

@@ -17,9 +17,11 @@ from typing import Any, Final, NamedTuple
 
 from fanet_mw.bus.topics import ROOT, Topics
 from fanet_mw.scenario import Scenario
-from sim.run.bus.air_control import OPERATOR
-from sim.run.gateway import GATEWAY
+from sim.bus.air_control import OPERATOR
 
+GATEWAY: Final = "gateway"
+ROUTER: Final = "router"
+"""The names of the certificates and configurations of a gateway's process and of the router."""
 _INTO: Final = "ingress"
 _OUT_OF: Final = "egress"
 

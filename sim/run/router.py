@@ -14,10 +14,9 @@ from fanet_mw.errors import BusError
 from fanet_mw.hosts.bus import Bus, config_of, with_port
 from fanet_mw.hosts.clock import START_PATIENCE_S, ClockKeeper, SwarmClock
 from fanet_mw.scenario import Scenario
-from sim.run.bus.running_swarms import registered
+from sim.bus.rights import ROUTER
+from sim.bus.running_swarms import registered
 
-ROUTER: Final = "router"
-"""The name of the router's configuration in a folder of configurations."""
 _STOP_HEARD_S: Final = 0.3
 """The time from telling services to stop until the bus is closed over which they are told."""
 WORD_EVERY_S: Final = 5.0

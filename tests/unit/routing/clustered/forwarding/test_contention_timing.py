@@ -1,6 +1,6 @@
 """The instants from which frames without a turn may go."""
 
-from fanet_mw.routing.clustered.tdma.contention_timing import ContentionTiming
+from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTiming
 from fanet_mw.units import MS
 
 LEAD_NS, DUE_NS = 20 * MS, 1000 * MS

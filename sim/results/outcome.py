@@ -1,5 +1,6 @@
 """The outcome of a run, in virtual or in real time: the input of metrics and files."""
 
+import signal
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -7,6 +8,11 @@ from typing import Any, Literal
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record
 from sim.results.links import LinkTotals
+
+
+def described(exit_code: int) -> str:
+    """An exit code in words; a signal by its name."""
+    return f"signal {signal.Signals(-exit_code).name}" if exit_code < 0 else f"exit code {exit_code}"
 
 
 @dataclass(slots=True)

@@ -8,9 +8,9 @@ import pytest
 
 from fanet_mw.errors import DropReason
 from fanet_mw.trace import Delivered, Dropped, Generated, Posed, Record, line
-from sim.run.collecting.delivery_columns import delivery_columns
-from sim.run.collecting.record_kinds import lines, records_of
-from sim.run.collecting.trace_log import TraceLog
+from sim.records.delivery_columns import delivery_columns
+from sim.records.record_kinds import lines, records_of
+from sim.records.trace_log import TraceLog
 
 MOST = 7
 """So few records are kept in memory here, and packed."""

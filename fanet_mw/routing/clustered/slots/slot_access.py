@@ -14,7 +14,7 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.uplink import Uplink
 from fanet_mw.routing.clustered.roles.membership import Membership
-from fanet_mw.routing.clustered.tdma.slot_release import SlotRelease, Tenure
+from fanet_mw.routing.clustered.slots.slot_release import SlotRelease, Tenure
 from fanet_mw.units import US
 from fanet_mw.wire import Kind
 

@@ -1,4 +1,4 @@
-"""Compiles the kernel ahead of its first use: `python -m emulator.kernel.compile`. numba caches the machine code."""
+"""Compiles the kernel ahead of its first use: `python -m emulator.compile_kernel`. numba caches the machine code."""
 
 import contextlib
 import sys

@@ -9,9 +9,9 @@ from fanet_mw.bus.link_stats import LOSSES, LinkRow
 from fanet_mw.trace import Record
 from fanet_mw.units import US, NodeId, S
 from sim.results.links import LinkTotals
+from sim.results.outcome import Outcome
+from sim.results.result import Result
 from sim.results.run_folder import RunFolder
-from sim.run.outcome import Outcome
-from sim.run.result import Result
 
 
 class FolderRecords(Collection[Record]):

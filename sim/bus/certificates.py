@@ -18,8 +18,7 @@ from typing import Any, Final
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
-from sim.run.bus.rights import access_control, rights
-from sim.run.bus.router import ROUTER
+from sim.bus.rights import ROUTER, access_control, rights
 
 _NEW_KEY: Final = ("req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes")
 _AT_HOME: Final = ("DNS:localhost", "IP:127.0.0.1", "IP:::1")

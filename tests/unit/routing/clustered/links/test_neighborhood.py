@@ -2,7 +2,7 @@
 
 import pytest
 
-from fanet_mw.routing.clustered.relaying.neighborhood import Neighborhood
+from fanet_mw.routing.clustered.links.neighborhood import Neighborhood
 from fanet_mw.units import NodeId, S
 from fanet_mw.wire.hello.claims import Claims, HeardNeighbor, SlotStatus
 

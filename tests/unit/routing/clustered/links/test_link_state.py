@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 from kit import examples
 
 from fanet_mw.errors import MalformedFrameError
+from fanet_mw.routing.clustered.links.link_quality import FAST, FIRST, WINDOW, LinkQuality
+from fanet_mw.routing.clustered.links.link_state import LinkState, adjacency, worth_a_change
 from fanet_mw.routing.clustered.timetable.delivery_odds import odds
 from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
 from fanet_mw.routing.clustered.timetable.interference import InterferenceByPower
-from fanet_mw.routing.clustered.timetable.link_quality import FAST, FIRST, WINDOW, LinkQuality
-from fanet_mw.routing.clustered.timetable.link_state import LinkState, adjacency, worth_a_change
 from fanet_mw.routing.clustered.timetable.redundant_scheduling import Wave, enough_for
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, redundant_timetable
 from fanet_mw.units import Enu, NodeId, S

@@ -71,6 +71,13 @@ TIMELINES: Final = (
         ns3_us=3590 + 50,
     ),
     Timeline(
+        "EIFS that is interrupted in its last DIFS begins anew",
+        (*HALF_OVERLAPPED, (4, 2820, 1024), (5, 2820, 1024)),
+        asked_us=3810,
+        standard_us=3804.667 + 364,
+        ns3_us=3810 + 50,
+    ),
+    Timeline(
         "EIFS that frames interrupt which are not detected begins anew",
         (*HALF_OVERLAPPED, (4, 2600, 1024), (5, 2600, 1024)),
         asked_us=3590,

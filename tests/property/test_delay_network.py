@@ -240,3 +240,11 @@ def test_paths_must_name_hops() -> None:
 def test_simulated_delays_of_one_queue_by_hand() -> None:
     """The simulator itself: slot [0, 3) of 10, airtime 2: arrivals 0, 1, 2 leave at 2, 12, 22."""
     assert delays(Slot(2, 3, 10), [0, 1, 2]) == [2, 11, 20]
+
+
+def test_a_frame_that_has_begun_counts_beside_what_is_more_urgent() -> None:
+    """One of ours, two more urgent and three that have begun: six frames, the first of them just too late."""
+    server = SlotServer(10, 100, 1000)
+    flow, cross = Periodic(10_000), Total((Periodic(10_000), Periodic(10_000)))
+    assert delay_any_order(flow, cross, server, blocking=3) == Bounded(1000 - 100 + 10 + 6 * 10)
+    assert delay_any_order(flow, cross, server) == Bounded(1000 - 100 + 10 + 3 * 10)

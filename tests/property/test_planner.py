@@ -49,6 +49,14 @@ def simulate(shares, arrivals, *, usable, period, start):
     return worst, waiting
 
 
+def test_an_urgent_packet_waits_for_the_less_urgent_flood_that_has_begun() -> None:
+    """Units of 10; of a slot of 140, 100 are left: 5 units after the wait for the slot, of which 4 are the flood."""
+    shares = [ClassLoad(1, 10_000, cost(10)), ClassLoad(1, 100_000, cost(40))]
+    (urgent, bulk), _ = slot_delays(shares, usable_ns=140, period_ns=1000, jitter_ns=0)
+    assert urgent == Bounded(1000 - 100 + 10 + 5 * 10)
+    assert bulk == Bounded(1000 - 100 + 10 + 5 * 10)
+
+
 @st.composite
 def heads(draw):
     classes = draw(st.integers(1, 3))

@@ -225,3 +225,13 @@ def test_a_piece_for_which_there_was_no_room_is_taken_when_it_comes_again() -> N
     hear(receiver, head(1, piece=1, pieces=2, confirm=0), BORN_NS)
     hear(receiver, head(9000), BORN_NS)
     assert numbers(receiver) == [1, 9000]
+
+
+def test_a_message_that_waits_in_one_flow_is_not_handed_over_for_one_of_another() -> None:
+    receiver = made()
+    hear(receiver, head(9, previous=6, port=5), BORN_NS)
+    hear(receiver, head(10, previous=7, port=6)._replace(flow=2), BORN_NS)
+    hear(receiver, head(7, port=6)._replace(flow=2), BORN_NS)
+    assert numbers(receiver) == [7, 10]
+    hear(receiver, head(6, port=5), BORN_NS)
+    assert numbers(receiver) == [6, 9]

@@ -10,7 +10,7 @@ from hand_driven import NAMES, PAYLOAD, Air, receptions, statuses
 from fanet_mw.airtime import frame_ns
 from fanet_mw.bus.messages import Poses, TxOutcome, TxRequest, TxStatus
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import BROADCAST, MS, US
+from fanet_mw.units import BROADCAST, MS, US, S
 
 FRAME_NS, ACK_NS, DIFS_NS, SIFS_NS, SLOT_NS = 984 * US, 203 * US, 50 * US, 10 * US, 20 * US
 MakeScenario = Callable[..., Scenario]
@@ -93,6 +93,34 @@ def test_a_frame_queued_while_the_medium_is_busy_waits_for_it_difs_and_its_backo
     backoff_ns = second[2] - first[2] - DIFS_NS - FRAME_NS - 500
     assert backoff_ns % SLOT_NS == 0
     assert 0 <= backoff_ns <= 31 * SLOT_NS
+
+
+def test_after_its_own_frame_a_station_waits_for_one_that_is_still_on_the_air(make_scenario: MakeScenario) -> None:
+    """Both begin at once; the short frame takes 312 us, the long one 984."""
+    air = Air(make_scenario(**{"nodes.count": 2, "radio.cw_min": 1, "radio.access": "standard"}), [0, 200])
+    air.send(1, 1 * MS, payload=bytes(100))
+    air.send(1, 1 * MS, payload=bytes(100))
+    air.send(2, 1 * MS)
+    (_, _, first_ns, _), (_, _, long_ns, _), (_, _, second_ns, _) = statuses(air.run())
+    assert (first_ns, long_ns) == (1 * MS + 312 * US, 1 * MS + FRAME_NS)
+    idle_ns = long_ns + 667
+    assert second_ns - 312 * US - idle_ns in (DIFS_NS, DIFS_NS + SLOT_NS)
+    assert air.medium.report()["air"]["busy"] == pytest.approx((984 + 312) * US / S, rel=0.01), "at both stations"
+
+
+def test_a_frame_whose_ack_does_not_come_is_not_repeated_while_another_is_on_the_air(
+    make_scenario: MakeScenario,
+) -> None:
+    keys = {"nodes.count": 3, "radio.cw_min": 1, "radio.max_attempts": 2, "radio.access": "standard"}
+    air = Air(make_scenario(**keys), [0, 200, -900])
+    air.send(1, 1 * MS, dst=3, payload=bytes(100))
+    air.send(2, 1 * MS)
+    found = {node: (end_ns, attempts) for node, _, end_ns, attempts in statuses(air.run())}
+    end_ns, attempts = found[1]
+    assert attempts == 2
+    began_ns = end_ns - 312 * US - (10 + 20 + 192) * US  # the frame, and the wait for its ACK
+    waited_ns = began_ns - (found[2][0] + 667) - DIFS_NS
+    assert 0 <= waited_ns <= 3 * SLOT_NS
 
 
 def test_a_backoff_freezes_while_the_medium_is_busy(make_scenario: MakeScenario) -> None:

@@ -224,6 +224,17 @@ def test_shadowing_follows_the_places_and_nothing_else(make_scenario: MakeScenar
     assert links_of(at, keys, shadowing=Shadowing(keys, seed=2)) != first
 
 
+@pytest.mark.parametrize("distance_m", [1.0, 20.0, 50.0, 400.0])
+def test_shadowing_has_its_deviation_between_near_and_far_ends(distance_m: float) -> None:
+    """Pairs that are far from each other, of several fields: the correlation is 50 m."""
+    keys = radio(channel="friis", shadowing_db=6, shadowing_corr_m=50)
+    places = np.arange(100)[:, None] * [9000.0, 0.0, 0.0]
+    at = np.concatenate([places, places + np.array([0.0, distance_m, 0.0])])
+    pairs = np.array([[n, n + 100] for n in range(100)])
+    losses = [Shadowing(keys, seed=seed).loss_db(at, pairs, np.full(100, distance_m)) for seed in range(6)]
+    assert np.std(losses) == pytest.approx(6.0, rel=0.1)
+
+
 def test_an_obstruction_costs_its_loss_and_cuts_a_link_of_the_range_channel() -> None:
     at = [[0, 0, 50], [100, 0, 50], [0, 100, 50]]
     blocked = Blocked(pair_codes(np.array([[1, 0]]), 3), np.zeros(0))

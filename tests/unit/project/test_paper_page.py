@@ -4,10 +4,13 @@ import csv
 import json
 import runpy
 
+import pyarrow as pa
 import pytest
 from test_documents import ROOT
 
 from sim.figures.all_figures import FIGURES
+from sim.figures.finished_runs import Runs
+from sim.figures.kept_tables import read_kept
 
 PICTURES = ROOT / "docs" / "results" / "pictures"
 KEPT = {path.stem: json.loads(path.read_text("utf-8")) for path in sorted(PICTURES.glob("*.json"))}
@@ -25,6 +28,28 @@ def test_every_kept_figure_has_its_picture_and_its_numbers(name: str) -> None:
     with (PICTURES / f"{name}.csv").open() as file:
         assert sum(1 for _ in csv.DictReader(file)) > 1
     assert KEPT[name]["failed"] == 0
+
+
+@pytest.mark.parametrize("name", KEPT)
+def test_every_kept_verdict_is_that_of_the_kept_table(name: str) -> None:
+    (recipe,) = [recipe for recipe in FIGURES.values() if recipe.name == name]
+    table = read_kept(ROOT / "docs" / "results" / "sweeps", recipe.sweep, "full")
+    assert table is not None
+    found = [(claim.claim, claim.verdict) for claim in recipe.claims(Runs(table))]
+    assert found == [(claim["claim"], claim["verdict"]) for claim in KEPT[name]["claims"]]
+
+
+@pytest.mark.parametrize(("few", "many", "verdict"), [(0.9, 0.3, "agrees"), (0.3, 0.9, "differs")])
+def test_figure_9_agrees_when_the_pdr_falls_and_differs_when_it_rises(few: float, many: float, verdict: str) -> None:
+    common = {"status": "ok", "code": "", "traffic.interval_s": 1.0, "copies.lost.collision": 9, "copies.lost.busy": 1}
+    rows = [
+        {**common, "seed": seed, "traffic.sources": sources, "pdr": pdr + seed / 1000}
+        for sources, pdr in ((1, few), (44, many))
+        for seed in range(5)
+    ]
+    falls, collide = FIGURES["9"].claims(Runs(pa.Table.from_pylist(rows)))
+    assert falls.verdict == verdict
+    assert collide.verdict == "agrees"
 
 
 @pytest.mark.parametrize("name", KEPT)

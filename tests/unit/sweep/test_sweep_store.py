@@ -215,6 +215,18 @@ def test_files_of_single_runs_are_made_one_before_they_are_many(sweep, tmp_path,
     assert workers.ran == []
 
 
+def test_what_is_finished_after_a_merge_leaves_the_file_with_all_others_alone(sweep, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr("sim.sweep.store._MERGE_AT", 2)
+    with pytest.raises(KeyboardInterrupt):
+        go(tmp_path, sweep, OneByOne(dies_after=2))
+    assert len(list((tmp_path / "finished").glob("*.parquet"))) == 1
+    monkeypatch.setattr("sim.sweep.store._MERGE_AT", 9)
+    go(tmp_path, sweep, OneByOne())
+    workers = OneByOne()
+    go(tmp_path, sweep, workers)
+    assert workers.ran == []
+
+
 def test_a_folder_without_results_is_an_error(tmp_path) -> None:
     with pytest.raises(ConfigError, match=r"holds neither runs\.parquet"):
         read(tmp_path)

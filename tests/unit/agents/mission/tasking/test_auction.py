@@ -38,6 +38,18 @@ def test_a_winner_that_falls_silent_makes_room_for_the_next() -> None:
     assert auction.winners(1, count=1, now_ns=20 * S) == [3]
 
 
+def test_a_bid_of_a_dead_uav_grows_older_at_each_hop_and_is_forgotten_by_all() -> None:
+    """Two neighbors tell each other of it every 0.7 s, in whole seconds of age."""
+    first, second = Auction(NodeId(5)), Auction(NodeId(6))
+    first.merge([Bid(1, 2, 10, 1)], now_ns=0)
+    for step in range(1, 40):
+        now_ns = step * 7 * S // 10
+        second.merge(first.bids_to_tell([1], now_ns=now_ns), now_ns=now_ns)
+        first.merge(second.bids_to_tell([1], now_ns=now_ns), now_ns=now_ns)
+        if now_ns > 15 * S:
+            assert first.winners(1, count=1, now_ns=now_ns) == second.winners(1, count=1, now_ns=now_ns) == []
+
+
 def test_a_bid_that_is_taken_back_no_longer_wins() -> None:
     auction = Auction(NodeId(5))
     auction.bid(1, eta_s=1.0, now_ns=0)

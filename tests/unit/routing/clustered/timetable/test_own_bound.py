@@ -23,6 +23,8 @@ def test_bulk_waits_for_a_turn_and_its_flood_between_lead_and_receipt() -> None:
         ((5,), 1, BURST * 100 + 8),
         ((5, 15), 1, 100 + 80 + 8),  # just after the turn at 70 ms: 150, 170, and 250 ms
         ((5, 15), BURST, 80 + 8),
+        ((5,), BURST - 1, 2 * 100 + 8),  # the last is alone in the second turn
+        ((5, 15), BURST - 1, 100 + 8),
     ],
 )
 def test_a_burst_is_through_with_the_turn_that_lets_out_its_last(

@@ -1,0 +1,166 @@
+"""Which tests run which blocks of the product: a pytest plugin, and the map that it writes.
+
+    each block of a function (its body, the branches of its conditions, the bodies of its loops) notes that it ran
+    ->  per test: the blocks, those of shared fixtures too, and the processor time  ->  map, as JSON
+
+`pytest -p tests.mutants.blocks --blocks FILE` writes the map. Compiled code and other processes note nothing.
+"""
+
+import ast
+import builtins
+import importlib.abc
+import importlib.machinery
+import json
+import os
+import sys
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+AREAS = {
+    "protocol": ("fanet_mw/node", "fanet_mw/routing", "fanet_mw/timesync", "fanet_mw/delivery", "fanet_mw/wire",
+                 "fanet_mw/graph"),
+    "emulator": ("emulator", "fanet_mw/airtime.py"),
+    "bounds": ("fanet_mw/bounds",),
+    "results": ("sim/results", "sim/figures/figure", "sim/figures/paper_claims.py", "sim/figures/statistics.py"),
+    "mission": ("agents/mission", "agents/applications"),
+    "world": ("sim/world",),
+}  # fmt: skip
+_BODIES = ("body", "orelse", "finalbody")
+Block = tuple[int, int]
+"""The lines of a block, first and last."""
+
+
+def area_of(path: str) -> str | None:
+    """The area of a file of the product; None if no bugs are drawn there."""
+    return next((name for name, places in AREAS.items() if path.startswith(places)), None)
+
+
+def is_compiled(source: str, path: str) -> bool:
+    """True if numba may compile functions of a file, or reads constants of it."""
+    return "from emulator.kernel.jit import" in source or path in ("emulator/kernel/state.py", "emulator/kernel/jit.py")
+
+
+def blocks_of(tree: ast.AST) -> Iterator[tuple[Block, list[ast.stmt]]]:
+    """The blocks inside the functions of a module, outer ones first."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            yield from _inside(node.body)
+
+
+def _inside(body: list[ast.stmt]) -> Iterator[tuple[Block, list[ast.stmt]]]:
+    yield (body[0].lineno, body[-1].end_lineno or body[-1].lineno), body
+    for statement in body:
+        if isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            continue  # has blocks of its own
+        for name in _BODIES:
+            if inner := getattr(statement, name, None):
+                yield from _inside(inner)
+        for handler in (*getattr(statement, "handlers", ()), *getattr(statement, "cases", ())):
+            yield from _inside(handler.body)
+
+
+class _Notes:
+    """The blocks that ran since the last look."""
+
+    def __init__(self) -> None:
+        self.names: list[str] = []
+        self.ran = bytearray()
+
+    def add(self, path: str, block: Block) -> int:
+        self.names.append(f"{path}:{block[0]}")
+        self.ran.append(0)
+        return len(self.names) - 1
+
+    def taken(self) -> set[int]:
+        found = {number for number, ran in enumerate(self.ran) if ran}
+        self.ran[:] = bytes(len(self.ran))
+        return found
+
+
+NOTES = _Notes()
+
+
+class _Loader(importlib.machinery.SourceFileLoader):
+    def get_code(self, fullname: str) -> Any:
+        source = Path(self.path).read_text(encoding="utf-8")
+        tree = ast.parse(source)
+        path = Path(self.path).relative_to(ROOT).as_posix()
+        for block, body in list(blocks_of(tree)):
+            number = NOTES.add(path, block)
+            first = body[0]
+            at = int(isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant))
+            note = ast.parse(f"__blocks_that_ran__[{number}] = 1").body[0]
+            body.insert(at, ast.fix_missing_locations(ast.copy_location(note, first)))
+        return compile(ast.fix_missing_locations(tree), self.path, "exec", dont_inherit=True)
+
+
+class _Finder(importlib.abc.MetaPathFinder):
+    def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> Any:
+        if fullname.partition(".")[0] not in ("fanet_mw", "agents", "emulator", "sim"):
+            return None
+        found = importlib.machinery.PathFinder.find_spec(fullname, path)
+        if found is None or found.origin is None or not found.origin.endswith(".py"):
+            return found
+        name = Path(found.origin).relative_to(ROOT).as_posix()
+        if area_of(name) and not is_compiled(Path(found.origin).read_text(encoding="utf-8"), name):
+            found.loader = _Loader(fullname, found.origin)
+        return found
+
+
+class Recorder:
+    """What each test has run."""
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+        self._tests: dict[str, tuple[float, set[int]]] = {}
+        self._fixtures: dict[int, set[int]] = defaultdict(set)
+
+    @pytest.hookimpl(hookwrapper=True)
+    def pytest_fixture_setup(self, fixturedef: Any) -> Iterator[None]:
+        if fixturedef.scope not in ("session", "package", "module", "class"):
+            yield
+            return
+        before = NOTES.taken()
+        yield
+        self._fixtures[id(fixturedef)] |= NOTES.taken()
+        for number in before:
+            NOTES.ran[number] = 1
+
+    @pytest.hookimpl(hookwrapper=True)
+    def pytest_runtest_protocol(self, item: Any) -> Iterator[None]:
+        NOTES.taken()
+        began_s = sum(os.times()[:4])
+        yield
+        ran = NOTES.taken()
+        for definitions in item._fixtureinfo.name2fixturedefs.values():
+            for definition in definitions:
+                ran |= self._fixtures.get(id(definition), set())
+        self._tests[item.nodeid] = sum(os.times()[:4]) - began_s, ran
+
+    def pytest_sessionfinish(self) -> None:
+        where: dict[str, list[int]] = defaultdict(list)
+        for number, (_, ran) in enumerate(self._tests.values()):
+            for block in ran:
+                where[NOTES.names[block]].append(number)
+        tests = [[name, round(took_s, 3)] for name, (took_s, _) in self._tests.items()]
+        self._file.write_text(json.dumps({"tests": tests, "blocks": where}))
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--blocks", type=Path, help="write there which test runs which blocks")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    file = config.getoption("--blocks")
+    if file is not None:
+        config.pluginmanager.register(Recorder(file.resolve()))
+
+
+if not any(isinstance(finder, _Finder) for finder in sys.meta_path):
+    builtins.__blocks_that_ran__ = NOTES.ran  # type: ignore[attr-defined]
+    sys.meta_path.insert(0, _Finder())

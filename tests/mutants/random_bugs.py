@@ -1,0 +1,310 @@
+"""Bugs that a machine draws: places and operators by chance, the tests that run the place, and the share that notices.
+
+    a block of the product, drawn by the number of its changes  ->  one change of it  ->  planted in memory
+    ->  the tests that run that block, the shortest first  ->  caught | survived | never run
+
+Which tests run which block is measured once (`blocks.py`) and kept in `tests/mutants/blocks.json` until it is asked
+for anew. Where numba compiles, bugs are planted in the uncompiled code, and tried by the tests of the emulator.
+What changes nothing that anybody could observe is named in `equivalent.toml`, each with its reason.
+"""
+
+import argparse
+import ast
+import json
+import math
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+HERE: Final = Path(__file__).resolve().parent
+ROOT: Final = HERE.parents[1]
+sys.path.insert(0, str(ROOT))
+from tests.mutants.blocks import AREAS, area_of, blocks_of, is_compiled  # noqa: E402
+
+MAP: Final = HERE / "blocks.json"
+EQUIVALENT: Final = HERE / "equivalent.toml"
+BUDGET_S: Final = 60.0
+"""The most processor time of the tests for one bug; at least `LEAST` of them."""
+LEAST: Final = 8
+LIMIT_S: Final = 300.0
+OF_COMPILED: Final = ("tests/unit/emulator", "tests/integration/test_medium_fuzz.py")
+_COMPARED: Final = {ast.Lt: "<=", ast.LtE: "<", ast.Gt: ">=", ast.GtE: ">", ast.Eq: "!=", ast.NotEq: "==",
+                    ast.Is: "is not", ast.IsNot: "is", ast.In: "not in", ast.NotIn: "in"}  # fmt: skip
+_COMPUTED: Final = {ast.Add: "-", ast.Sub: "+", ast.Mult: "/", ast.Div: "*", ast.FloorDiv: "*", ast.Mod: "*",
+                    ast.LShift: ">>", ast.RShift: "<<", ast.BitAnd: "|", ast.BitOr: "&"}  # fmt: skip
+_NOT_LOGIC: Final = (ast.Assert, ast.Raise, ast.Import, ast.ImportFrom, ast.FunctionDef, ast.AsyncFunctionDef,
+                     ast.ClassDef)  # fmt: skip
+_TOLD: Final = ("__repr__", "__str__", "describe", "sentence", "report")
+"""Functions for people's eyes, of which no bugs are drawn."""
+
+
+class Bug(NamedTuple):
+    """One change of one place."""
+
+    path: str
+    block: int
+    """The first line of its block; 0 for a constant of a module or class."""
+    line: int
+    begin: int
+    end: int
+    old: str
+    new: str
+
+    def __str__(self) -> str:
+        return f"{self.path}:{self.line}: {' '.join(self.old.split())[:60]}  ->  {' '.join(self.new.split())[:60]}"
+
+    @property
+    def key(self) -> str:
+        """By what it is known in `equivalent.toml`."""
+        return f"{self.path}: {' '.join(self.old.split())} -> {' '.join(self.new.split())}"
+
+
+class Source:
+    """One file, and the text of its nodes."""
+
+    def __init__(self, path: str) -> None:
+        self.path = path
+        self.text = (ROOT / path).read_text(encoding="utf-8")
+        self._starts = [0]
+        for line in self.text.splitlines(keepends=True):
+            self._starts.append(self._starts[-1] + len(line))
+        self._lines = self.text.splitlines()
+
+    def _at(self, line: int, column: int) -> int:
+        return self._starts[line - 1] + len(self._lines[line - 1].encode()[:column].decode())
+
+    def span(self, node: Any) -> tuple[int, int]:
+        return self._at(node.lineno, node.col_offset), self._at(node.end_lineno, node.end_col_offset)
+
+    def of(self, node: Any) -> str:
+        begin, end = self.span(node)
+        return self.text[begin:end]
+
+    def bug(self, block: int, node: Any, new: str) -> Bug:
+        begin, end = self.span(node)
+        return Bug(self.path, block, node.lineno, begin, end, self.text[begin:end], new)
+
+    def bugs(self) -> Iterator[Bug]:
+        """Every change that the operators know, in the functions of the file and in its constants."""
+        tree = ast.parse(self.text)
+        told = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) and node.name in _TOLD]
+        hidden = {id(inner) for node in told for inner in ast.walk(node)}
+        for block, body in blocks_of(tree):
+            for statement in body:
+                if id(statement) not in hidden and not isinstance(statement, _NOT_LOGIC):
+                    yield from self._of_statement(block[0], statement)
+        for node in tree.body:
+            if isinstance(node, ast.AnnAssign) and node.value is not None:  # others name types
+                yield from self._of_expression(0, node.value)
+
+    def _of_statement(self, block: int, statement: ast.stmt) -> Iterator[Bug]:
+        match statement:
+            case ast.If(test=test) | ast.While(test=test):
+                yield self.bug(block, test, f"not ({self.of(test)})")
+                yield from self._of_expression(block, test)
+            case ast.Expr(value=ast.Call() as call):
+                yield self.bug(block, statement, "pass")
+                yield from self._of_expression(block, call)
+            case ast.AugAssign(value=value, op=op):
+                yield self.bug(block, statement, "pass")
+                if type(op) in _COMPUTED:
+                    target = self.of(statement.target)
+                    yield self.bug(block, statement, f"{target} {_COMPUTED[type(op)]}= {self.of(value)}")
+                yield from self._of_expression(block, value)
+            case ast.Continue():
+                yield self.bug(block, statement, "break")
+            case ast.Assign(value=value) | ast.AnnAssign(value=value) | ast.Return(value=value) if value is not None:
+                yield from self._of_expression(block, value)
+            case ast.For(iter=iterated):
+                yield from self._of_expression(block, iterated)
+            case _:
+                return
+
+    def _of_expression(self, block: int, expression: ast.expr) -> Iterator[Bug]:
+        texts = {
+            id(inner) for node in ast.walk(expression) if isinstance(node, ast.JoinedStr) for inner in ast.walk(node)
+        }
+        for node in ast.walk(expression):
+            if id(node) in texts:
+                continue
+            match node:
+                case ast.Compare(left=left, ops=[op], comparators=[right]):
+                    yield self.bug(block, node, f"{self.of(left)} {_COMPARED[type(op)]} {self.of(right)}")
+                case ast.BinOp(left=left, op=op, right=right) if type(op) in _COMPUTED and not _is_text(node):
+                    yield self.bug(block, node, f"({self.of(left)}) {_COMPUTED[type(op)]} ({self.of(right)})")
+                case ast.BoolOp(op=op, values=values):
+                    word = " or " if isinstance(op, ast.And) else " and "
+                    yield self.bug(block, node, word.join(f"({self.of(value)})" for value in values))
+                    yield self.bug(block, node, f"({self.of(values[0])})")
+                case ast.UnaryOp(op=ast.Not(), operand=operand):
+                    yield self.bug(block, node, f"bool({self.of(operand)})")
+                case ast.UnaryOp(op=ast.USub(), operand=operand) if not isinstance(operand, ast.Constant):
+                    yield self.bug(block, node, f"({self.of(operand)})")
+                case ast.Constant(value=bool() as value):
+                    yield self.bug(block, node, str(not value))
+                case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+                    yield self.bug(block, node, f"({self.of(node)} {'+ 1' if abs(value) < 10 else '* 2'})")
+                case ast.Call(func=ast.Name(id="min" | "max" as name), args=[first, _, *_]) if not isinstance(
+                    first, ast.Starred
+                ):
+                    other = "max" if name == "min" else "min"
+                    yield self.bug(block, node, other + self.of(node)[len(name) :])
+                    yield self.bug(block, node, f"({self.of(first)})")
+                case ast.IfExp(test=test, body=body, orelse=orelse):
+                    yield self.bug(block, node, f"({self.of(body)} if not ({self.of(test)}) else {self.of(orelse)})")
+                case ast.Call(func=ast.Name(id="abs" | "round" | "sorted" | "reversed"), args=[first], keywords=[]):
+                    yield self.bug(block, node, f"({self.of(first)})")
+                case _:
+                    pass
+
+
+def _is_text(node: ast.BinOp) -> bool:
+    return any(isinstance(part, ast.JoinedStr | ast.Constant) and not isinstance(getattr(part, "value", 0), int | float)
+               for part in (node.left, node.right))  # fmt: skip
+
+
+def all_bugs(areas: Sequence[str]) -> list[Bug]:
+    """Every bug of some areas."""
+    found = []
+    for folder in ("fanet_mw", "agents", "emulator", "sim"):
+        for file in sorted((ROOT / folder).rglob("*.py")):
+            path = file.relative_to(ROOT).as_posix()
+            if area_of(path) in areas:
+                found += Source(path).bugs()
+    return found
+
+
+class Judge:
+    """Says of bugs what the tests say."""
+
+    def __init__(self, known: Any, *, budget_s: float) -> None:
+        self._tests: list[tuple[str, float]] = [(name, took_s) for name, took_s in known["tests"]]
+        self._blocks: dict[str, list[int]] = known["blocks"]
+        self._budget_s = budget_s
+
+    def tests_of(self, bug: Bug) -> list[str]:
+        """The tests that run a block, the shortest first, within the budget."""
+        if is_compiled((ROOT / bug.path).read_text(encoding="utf-8"), bug.path):
+            return list(OF_COMPILED)
+        keys = [f"{bug.path}:{bug.block}"] if bug.block else [key for key in self._blocks if key.startswith(bug.path)]
+        numbers = {number for key in keys for number in self._blocks.get(key, ())}
+        chosen, spent_s = [], 0.0
+        for name, took_s in sorted((self._tests[number] for number in numbers), key=lambda test: test[1]):
+            spent_s += took_s
+            if spent_s > self._budget_s and len(chosen) >= LEAST:
+                break
+            chosen.append(name)
+        return chosen
+
+    def verdict(self, bug: Bug) -> tuple[str, float]:
+        """`caught`, `survived`, `never run`, or why it cannot be said; and the time."""
+        began_s = time.monotonic()
+        tests = self.tests_of(bug)
+        if not tests:
+            return "never run", 0.0
+        module = bug.path.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
+        change = json.dumps({"module": module, "begin": bug.begin, "end": bug.end, "new": bug.new})
+        environment = {**os.environ, "FANET_MUTANT": change, "PYTHONPATH": str(HERE / "hook")}
+        environment["PYTHONDONTWRITEBYTECODE"] = "1"
+        if tests == list(OF_COMPILED):
+            environment["FANET_NO_NUMBA"] = "1"
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-m", "not slow", "-p", "no:cacheprovider"]
+        command += [
+            "--hypothesis-profile=mutants",
+            "--assert=plain",
+            *tests,
+        ]  # pytest would load what it rewrites itself
+        child = subprocess.Popen(
+            command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+            start_new_session=True, text=True,
+        )  # fmt: skip
+        try:
+            said, _ = child.communicate(timeout=LIMIT_S)
+        except subprocess.TimeoutExpired:
+            os.killpg(child.pid, signal.SIGKILL)
+            child.communicate()
+            return "caught", time.monotonic() - began_s
+        took_s = time.monotonic() - began_s
+        if child.returncode == 0:
+            return "survived", took_s
+        if child.returncode in (1, 2) or "ImportError" in said or "conftest" in said:  # 2: it cannot even be imported
+            return "caught", took_s
+        return f"not judged: {said[-300:]}", took_s
+
+
+def interval(caught: int, of: int) -> tuple[float, float]:
+    """Wilson's 95 % interval of a share."""
+    if not of:
+        return 0.0, 1.0
+    z, share = 1.96, caught / of
+    middle = (share + z * z / (2 * of)) / (1 + z * z / of)
+    half = z * math.sqrt(share * (1 - share) / of + z * z / (4 * of * of)) / (1 + z * z / of)
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def make_map() -> Any:
+    """Run the default tests once, and note which blocks they run."""
+    subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "tests.mutants.blocks", "--blocks", MAP, "-m",
+         "not slow and not realtime", "-p", "no:cacheprovider", "tests"],
+        cwd=ROOT, check=False,
+    )  # fmt: skip
+    return json.loads(MAP.read_text())
+
+
+def run(count: int, seed: int, areas: Sequence[str], *, jobs: int, budget_s: float, again: bool) -> int:
+    """Draw bugs, judge them, print the share."""
+    known = json.loads(MAP.read_text()) if MAP.exists() and not again else make_map()
+    reasons = tomllib.loads(EQUIVALENT.read_text(encoding="utf-8")) if EQUIVALENT.exists() else {}
+    equivalent = {entry["bug"]: entry["why"] for entry in reasons.get("bug", ())}
+    candidates = all_bugs(areas)
+    drawn = random.Random(f"bugs/{seed}").sample(candidates, min(count, len(candidates)))
+    judge = Judge(known, budget_s=budget_s)
+    tally: dict[str, list[int]] = {area: [0, 0] for area in areas}
+    survivors, skipped = [], 0
+    with ThreadPoolExecutor(jobs) as pool:
+        judged = pool.map(lambda bug: ("equivalent", 0.0) if bug.key in equivalent else judge.verdict(bug), drawn)
+        for bug, (verdict, took_s) in zip(drawn, judged, strict=True):
+            print(f"{took_s:6.1f} s  {verdict:10}  {bug}", flush=True)
+            if verdict == "equivalent":
+                skipped += 1
+                continue
+            area = area_of(bug.path)
+            assert area is not None, "bugs are drawn in areas only"
+            tally[area][0] += verdict == "caught"
+            tally[area][1] += 1
+            if verdict != "caught":
+                survivors.append(bug)
+    for area, (caught, of) in [*tally.items(), ("all", [sum(part) for part in zip(*tally.values(), strict=True)])]:
+        low, high = interval(caught, of)
+        print(
+            f"{area:10} {caught:4} of {of:4} caught" + (f": {caught / of:.0%} ({low:.0%} to {high:.0%})" if of else "")
+        )
+    print(f"{len(candidates)} bugs can be drawn, {skipped} drawn ones are equivalent; survivors:")
+    for bug in survivors:
+        print(f"  {bug.key}")
+    return 0
+
+
+def main() -> int:
+    flags = argparse.ArgumentParser(prog="scripts/mutants --random", description=__doc__.splitlines()[0])
+    flags.add_argument("--random", type=int, default=20, metavar="N", help="how many are drawn")
+    flags.add_argument("--seed", type=int, default=1)
+    flags.add_argument("--area", nargs="+", choices=list(AREAS), default=list(AREAS))
+    flags.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="bugs at a time (%(default)s)")
+    flags.add_argument("--budget", type=float, default=BUDGET_S, help="seconds of tests for one bug (%(default)s)")
+    flags.add_argument("--map", action="store_true", help="measure anew which tests run which blocks")
+    given = flags.parse_args()
+    return run(given.random, given.seed, given.area, jobs=given.jobs, budget_s=given.budget, again=given.map)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -180,11 +180,7 @@ def _announcement(name: str, wanted: "Sweep", plan: "RemainingRuns", workers: "W
         text += f", {plan.total - len(plan.todo)} finished before"
     if not plan.todo:
         return f"{text}; nothing to do"
-    from sim.sweep.cost import spoken
-
-    count = workers.workers
-    left_s = plan.time_left(workers=count, pace=workers.pace()).seconds()
-    return f"{text}; about {spoken(left_s)} with {count} process{'' if count == 1 else 'es'}"
+    return f"{text}; {workers.workers} process{'' if workers.workers == 1 else 'es'}"
 
 
 def _warn_of_codes(codes: Mapping[str, int], what_follows: str) -> None:
@@ -231,8 +227,6 @@ def _say_failures(table: "Table") -> None:
 @contextlib.contextmanager
 def _progress(name: str, *, quiet: bool) -> "Iterator[Callable[[Progress], None]]":
     """A progress bar if a person is watching, otherwise a line from time to time."""
-    from sim.sweep.cost import spoken
-
     if quiet:
         yield lambda _: None
         return
@@ -243,7 +237,7 @@ def _progress(name: str, *, quiet: bool) -> "Iterator[Callable[[Progress], None]
             nonlocal said
             if time.monotonic() - said >= _SAY_S and at.done < at.total:
                 said = time.monotonic()
-                _say(f"{name}: {at.done} of {at.total} runs, about {spoken(at.left_s)} left{_failures(at)}")
+                _say(f"{name}: {at.done} of {at.total} runs{_left(at)}{_failures(at)}")
 
         yield line
         return
@@ -256,10 +250,21 @@ def _progress(name: str, *, quiet: bool) -> "Iterator[Callable[[Progress], None]
         shown = bar.add_task(name, total=None, left="")
 
         def renew(at: "Progress") -> None:
-            left = f"about {spoken(at.left_s)} left{_failures(at)}"
+            left = f"{_left(at)}{_failures(at)}".removeprefix(", ")
             bar.update(shown, completed=at.done, total=at.total, left=left)
 
         yield renew
+
+
+def _left(at: "Progress") -> str:
+    return "" if at.left_s is None else f", about {spoken(at.left_s)} left"
+
+
+def spoken(seconds: float) -> str:
+    """A duration in words."""
+    if seconds < 90:
+        return f"{math.ceil(seconds)} s"
+    return f"{round(seconds / 60)} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
 
 
 def _failures(at: "Progress") -> str:

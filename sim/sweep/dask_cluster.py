@@ -55,9 +55,6 @@ class DaskCluster:
                 raise ConfigError(f"worker {name} has fanet-mw {theirs}, and here is {code()}: must be the same")
         return len(workers)
 
-    def pace(self) -> float:
-        return 1.0
-
     def carry_out(self, tasks: Sequence[Task]) -> Iterator[Finished]:
         """The result of each task, in the order in which they end."""
         try:

@@ -14,7 +14,6 @@ from multiprocessing.context import SpawnProcess
 from typing import Final
 
 from sim.run.launcher.parent_death import be_killed_with_parent
-from sim.sweep.cost import pace_of_workers
 from sim.sweep.one_run import Finished, carry_out
 from sim.sweep.provenance import code
 from sim.sweep.tasks import Task
@@ -52,9 +51,6 @@ class Pool:
         self.workers = workers
         self._context = multiprocessing.get_context("spawn")
         self._running: list[_Worker] = []
-
-    def pace(self) -> float:
-        return pace_of_workers(self.workers)
 
     def carry_out(self, tasks: Sequence[Task]) -> Iterator[Finished]:
         """The result of each task, in the order in which they end."""

@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Sequence
 
 from fanet_mw.scenario import config
-from sim.sweep.cost import TimeLeft, guess_s, launch_s
 from sim.sweep.one_run import Finished
 from sim.sweep.store import Store
 from sim.sweep.tasks import Task
@@ -30,20 +29,41 @@ class RemainingRuns:
         self.todo = [
             task for key, task in distinct.items() if _remains(finished[key], retry=retry, only_code=only_code)
         ]
-        self.guesses_s = {task.key: _guess_s(task) for task in self.todo}
-
-    def time_left(self, *, workers: int, pace: float) -> TimeLeft:
-        """The estimated time that the remaining runs will take."""
-        sums = dict.fromkeys((False, True), 0.0)
-        for task in self.todo:
-            sums[task.realtime] += self.guesses_s[task.key]
-        return TimeLeft(sums[False], sums[True], workers=workers, pace=pace)
+        self.sizes = {task.key: _size(task) for task in self.todo}
 
 
 def _remains(done: Finished | None, *, retry: bool, only_code: str | None) -> bool:
     return done is None or (retry and done.failed) or (only_code is not None and done.code != only_code)
 
 
-def _guess_s(task: Task) -> float:
+def _size(task: Task) -> float:
+    """By what runs are compared: seconds in real time, else simulated seconds of all nodes."""
     scenario = config.build(task.tree)
-    return launch_s(scenario) if task.realtime else guess_s(scenario)
+    return scenario.duration_s / scenario.time_scale if task.realtime else scenario.duration_s * scenario.node_count
+
+
+class TimeLeft:
+    """The remaining time of a sweep, by what its finished runs took."""
+
+    def __init__(self, plan: RemainingRuns, *, workers: int) -> None:
+        """Runs in virtual time go side by side, those in real time one after the other."""
+        self._left = {task.key: (plan.sizes[task.key], task.realtime) for task in plan.todo}
+        self._workers = workers
+        self._done = self._took_s = 0.0
+        """The sizes of finished runs in virtual time, and the seconds that they took."""
+
+    def on_end(self, key: str, took_s: float) -> None:
+        """A run has ended, after so many seconds."""
+        size, realtime = self._left.pop(key)
+        if not realtime:
+            self._done += size
+            self._took_s += took_s
+
+    def seconds(self) -> float | None:
+        """The estimated seconds until the last run ends; None as long as nothing shows how fast runs are."""
+        virtual, realtime_s = (
+            sum(size for size, realtime in self._left.values() if realtime is kind) for kind in (False, True)
+        )
+        if virtual and not self._done:
+            return None
+        return realtime_s + (virtual * self._took_s / self._done / self._workers if virtual else 0.0)

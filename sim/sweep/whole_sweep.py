@@ -12,7 +12,7 @@ from typing import Final, Protocol
 import pyarrow as pa
 
 from sim.sweep.one_run import Finished, carry_out
-from sim.sweep.remaining_runs import RemainingRuns
+from sim.sweep.remaining_runs import RemainingRuns, TimeLeft
 from sim.sweep.store import Store
 from sim.sweep.tasks import Task
 
@@ -25,9 +25,6 @@ class Workers(Protocol):
 
     workers: int
 
-    def pace(self) -> float:
-        """The share of a core that each worker gets, as it looks before they begin."""
-
     def carry_out(self, tasks: Sequence[Task]) -> Iterator[Finished]: ...
 
 
@@ -38,7 +35,8 @@ class Progress:
     done: int
     total: int
     failed: int
-    left_s: float
+    left_s: float | None
+    """The estimated time of the rest; None as long as no run has ended."""
 
 
 def run(
@@ -53,9 +51,9 @@ def run(
 
     However it ends, the table with the finished runs has been written.
     """
-    left = plan.time_left(workers=workers.workers, pace=workers.pace())
-    todo = sorted(plan.todo, key=lambda task: -plan.guesses_s[task.key])
-    waiting = {task.key: task for task in todo}
+    left = TimeLeft(plan, workers=workers.workers)
+    todo = sorted(plan.todo, key=lambda task: -plan.sizes[task.key])
+    waiting = {task.key for task in todo}
     failed = sum(
         1
         for task in plan.tasks
@@ -69,7 +67,7 @@ def run(
             store.add(done)
             count += 1
             failed += done.failed
-            left.done(plan.guesses_s[done.key], done.wall_s, realtime=waiting[done.key].realtime)
+            left.on_end(done.key, done.wall_s)
             on_progress(Progress(count, plan.total, failed, left.seconds()))
             if time.monotonic() - published > _PUBLISH_S:
                 store.publish(plan.tasks, varied)

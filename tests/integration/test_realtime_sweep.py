@@ -33,9 +33,6 @@ class OneByOne:
     def __init__(self) -> None:
         self.ran: list[str] = []
 
-    def pace(self) -> float:
-        return 1.0
-
     def carry_out(self, tasks: Sequence[Task]) -> Iterator[Finished]:
         for task in tasks:
             self.ran.append(task.case)

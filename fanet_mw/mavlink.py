@@ -51,6 +51,14 @@ _CAPABILITIES: Final = int(
     | common.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
     | common.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
 )  # fmt: skip
+_FOUND_ADDRESS: Final = 0x400000
+"""The first ADS-B address of survivors; MAVProxy draws those of this range as flags."""
+_MOST_FINDS: Final = 0x100000
+_MOST_NAMED_FIND: Final = 1000
+_FOUND_FLAGS: Final = int(
+    common.ADSB_FLAGS_VALID_COORDS | common.ADSB_FLAGS_VALID_ALTITUDE | common.ADSB_FLAGS_VALID_CALLSIGN
+    | common.ADSB_FLAGS_VALID_VELOCITY
+)  # fmt: skip
 _UNKNOWN_U16: Final = 0xFFFF
 _UNKNOWN_I16: Final = 0x7FFF
 _GPS_NO_FIX: Final = 1
@@ -184,6 +192,17 @@ class Encoder:
         """LOCAL_POSITION_NED: relative to the origin of the swarm."""
         ned, moves = to_ned(position), to_ned(velocity)
         return self.pack(common.MAVLink_local_position_ned_message(_boot_ms(now_ns), *ned, *moves))
+
+    def survivor(self, survivor: int, at: Enu) -> bytes:
+        """ADSB_VEHICLE: a survivor, as something on the surface that ground stations draw with its name."""
+        lat, lon, height_mm = _place_ints(to_geodetic(at, self._origin))
+        name = (f"FOUND{survivor}" if survivor < _MOST_NAMED_FIND else f"F{survivor}").encode()
+        return self.pack(
+            common.MAVLink_adsb_vehicle_message(
+                _FOUND_ADDRESS + survivor % _MOST_FINDS, lat, lon, common.ADSB_ALTITUDE_TYPE_GEOMETRIC, height_mm, 0, 0,
+                0, name[:8], common.ADSB_EMITTER_TYPE_EMERGENCY_SURFACE, 0, _FOUND_FLAGS, 0,
+            )
+        )  # fmt: skip
 
     def vfr_hud(self, position: Enu, velocity: Enu, *, yaw: float | None) -> bytes:
         """VFR_HUD; the air speed is that over the ground, because nothing measures another."""

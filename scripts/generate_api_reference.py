@@ -1,4 +1,8 @@
-"""Generate docs/reference/api*.md, every public name, from the source text of its module; `--check` compares."""
+"""Generate docs/reference/api*.md, every public name, from the source text of its module; `--check` compares.
+
+It reads by the standard library's `ast`: griffe 2.4 finds the same names and texts, in eight times the time, but not
+the types of attributes that a constructor sets from its parameters; signatures and tables would be ours all the same.
+"""
 
 import ast
 import sys

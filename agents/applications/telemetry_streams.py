@@ -43,7 +43,7 @@ _OPERATORS: Final = {
     common.MAVLINK_MSG_ID_BATTERY_STATUS: _SELDOM_NS, common.MAVLINK_MSG_ID_HOME_POSITION: _SELDOM_NS,
     common.MAVLINK_MSG_ID_LOCAL_POSITION_NED: _EVERY_NS, common.MAVLINK_MSG_ID_VFR_HUD: _EVERY_NS,
     common.MAVLINK_MSG_ID_MISSION_CURRENT: _EVERY_NS, common.MAVLINK_MSG_ID_SYSTEM_TIME: _SELDOM_NS,
-    common.MAVLINK_MSG_ID_RADIO_STATUS: _EVERY_NS,
+    common.MAVLINK_MSG_ID_RADIO_STATUS: _EVERY_NS, common.MAVLINK_MSG_ID_ADSB_VEHICLE: _EVERY_NS,
 }  # fmt: skip
 """The longest intervals while an operator is there."""
 
@@ -100,6 +100,9 @@ class TelemetryStreams:
         self.velocity = STILL
         self.flown = Flown(home=position)
         self.link = Link()
+        self.finds: dict[int, Enu] = {}
+        """Survivors whom this UAV has confirmed, and where; ground stations are shown one of them at a time."""
+        self._shown_find = 0
         self.height_off_m = 0.0
         """By how much the receiver is wrong in height; the flight controller tells heights without it."""
         self._acceleration = STILL
@@ -155,6 +158,7 @@ class TelemetryStreams:
             ),
             common.MAVLINK_MSG_ID_SYSTEM_TIME: lambda now_ns: encoder.system_time(now_ns),
             common.MAVLINK_MSG_ID_RADIO_STATUS: lambda _: encoder.radio_status(self.link.rssi_dbm, self.link.lost),
+            common.MAVLINK_MSG_ID_ADSB_VEHICLE: lambda _: self._find(encoder),
             common.MAVLINK_MSG_ID_AUTOPILOT_VERSION: lambda _: encoder.autopilot_version(self._node),
         }
 
@@ -204,7 +208,7 @@ class TelemetryStreams:
     def one(self, message_id: int, now_ns: int, *, over_air: bool = False) -> bytes | None:
         """One message now; None for one that is never sent."""
         encode = (self._over_air if over_air else self._messages).get(message_id)
-        return None if encode is None else encode(now_ns)
+        return None if encode is None else encode(now_ns) or None
 
     def _landed(self) -> int:
         flown = self.flown
@@ -300,6 +304,13 @@ class TelemetryStreams:
     def _estimate(self) -> Enu:
         """Where the flight controller believes to be."""
         return self.position._replace(up=self.position.up - self.height_off_m)
+
+    def _find(self, encoder: Encoder) -> bytes:
+        """The next of the survivors; nothing if there are none."""
+        if not self.finds:
+            return b""
+        self._shown_find = min((one for one in self.finds if one > self._shown_find), default=min(self.finds))
+        return encoder.survivor(self._shown_find, self.finds[self._shown_find])
 
     def _gps_raw(self, encoder: Encoder, now_ns: int) -> bytes:
         fix_ns = now_ns if self._fix_ns is None else self._fix_ns

@@ -209,11 +209,14 @@ class GroundControl(Application):
         """Something has happened on board that an operator must know."""
         text = None
         match record:
-            case Confirmed(survivor=survivor):
+            case Confirmed(survivor=survivor, east_m=east_m, north_m=north_m):
+                self._streams.finds[survivor] = Enu(east_m, north_m, 0.0)
                 text = f"Survivor {survivor} confirmed"
-            case PlacedInside(survivor=survivor):
+            case PlacedInside(survivor=survivor, east_m=east_m, north_m=north_m):
+                self._streams.finds[survivor] = Enu(east_m, north_m, 0.0)
                 text = f"Survivor {survivor} is inside a building"
             case Refuted(survivor=survivor):
+                self._streams.finds.pop(survivor, None)
                 text = f"Survivor {survivor} refuted"
             case Warned(other=other):
                 text = f"Collision warning: UAV {other}"
@@ -502,7 +505,7 @@ _PARAMS: Final = {
 _ALWAYS: Final = (common.MAVLINK_MSG_ID_HEARTBEAT, common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT)
 _IN_TURN: Final = (
     (common.MAVLINK_MSG_ID_SYS_STATUS, common.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, common.MAVLINK_MSG_ID_GPS_RAW_INT,
-     common.MAVLINK_MSG_ID_HOME_POSITION, common.MAVLINK_MSG_ID_MISSION_CURRENT),
+     common.MAVLINK_MSG_ID_HOME_POSITION, common.MAVLINK_MSG_ID_MISSION_CURRENT, common.MAVLINK_MSG_ID_ADSB_VEHICLE),
     (common.MAVLINK_MSG_ID_ATTITUDE, common.MAVLINK_MSG_ID_LOCAL_POSITION_NED, common.MAVLINK_MSG_ID_VFR_HUD,
      common.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, common.MAVLINK_MSG_ID_BATTERY_STATUS,
      common.MAVLINK_MSG_ID_RADIO_STATUS),

@@ -4,8 +4,8 @@
                what ground stations say to it, and the post on the ground to orders
     emulator   puts receptions, links, trace and report; subscribes to requests, poses, obstructions, changes of the air
     world      puts poses, obstructions, sensors, radios of crashed UAVs, trace, report; subscribes to setpoints
-    operator   puts changes of the air and of the clock's pace, and orders; subscribes to poses, links, traces, reports,
-               telemetry
+    operator   puts changes of the air and of the clock's pace, orders, and commands to UAVs; subscribes to poses,
+               links, traces, reports, telemetry
     gateway    puts what ground stations say to UAVs; subscribes to telemetry
 
 All subscribe to the clock and query it, and all but the operator and the gateway declare that they are alive. The
@@ -74,7 +74,7 @@ def rights(scenario: Scenario, names: Topics) -> dict[str, Rights]:
         ),
         **{f"agent-{node}": agent(node) for node in scenario.node_ids},
         OPERATOR: Rights(
-            puts=(names.radio_control, names.clock_control, names.orders),
+            puts=(names.radio_control, names.clock_control, names.orders, names.operator("*")),
             subscribes=(
                 names.pose,
                 names.radio_links,

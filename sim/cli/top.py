@@ -17,8 +17,9 @@ _RATE_HZ: Final = 4.0
 _SILENT_S: Final = 5.0
 _LOW_PERCENT: Final = 20
 _MOST_NAMED: Final = 6
+_CLUSTERED: Final = ("role", "head")
 _HEADINGS: Final = (
-    "UAV", "role", "head", "flight", "mission", "battery", "neighbors", "heard [s]", "queue", "received", "dropped",
+    "UAV", *_CLUSTERED, "flight", "mission", "battery", "neighbors", "heard [s]", "queue", "received", "dropped",
 )  # fmt: skip
 
 
@@ -40,13 +41,16 @@ def watch(feed: BusFeed, *, ended: Sequence[int], screens: int | None, console: 
 
 def screen(swarm: str, state: SwarmState, now_ns: int, *, most: int) -> Group:
     """A line about the swarm, and a table of the UAVs; of more than `most` those that hear the fewest others."""
-    links: dict[int, list[int]] = {node: state.neighbors(node) for node in state.uavs}
-    nodes = sorted(state.uavs)
+    links = state.neighbors()
+    nodes = sorted(links.keys() & state.uavs.keys())
     if len(nodes) > most:
         nodes = sorted(sorted(nodes, key=lambda node: len(links[node]))[:most])
-    table = Table(*_HEADINGS, box=None, header_style="bold", padding=(0, 1, 0, 0))
+    clustered = any(uav.role for uav in state.uavs.values())
+    shown = [name for name in _HEADINGS if clustered or name not in _CLUSTERED]
+    table = Table(*shown, box=None, header_style="bold", padding=(0, 1, 0, 0))
     for node in nodes:
-        table.add_row(*_row(node, state.uavs[node], state, links[node], now_ns))
+        cells = dict(zip(_HEADINGS, _row(node, state.uavs[node], state, links[node], now_ns), strict=True))
+        table.add_row(*(cells[name] for name in shown))
     left = len(state.uavs) - len(nodes)
     more = [Text(f"{left} more, which hear more others, are not shown")] if left else []
     return Group(Text(_summary(swarm, state, now_ns), style="bold"), table, *more)
@@ -60,6 +64,10 @@ def _summary(swarm: str, state: SwarmState, now_ns: int) -> str:
     if (p95_ms := metrics["delay_p95_ms"]) is not None:
         bound_ms = metrics["bound_max_ms"]
         parts.append(f"delay p95 {p95_ms:.0f} ms" + (f" (bound {bound_ms:.0f})" if bound_ms is not None else ""))
+    if (busy := metrics["airtime_lately_share"]) is not None:
+        parts.append(f"air busy {busy:.0%}")
+    if (found := state.parts()) is not None and len(found) > 1:
+        parts.append(f"in {len(found)} parts")
     if (late := metrics["late_share"]) is not None:
         parts.append(f"late {late:.2%}")
     if state.survivors.now:
@@ -67,7 +75,7 @@ def _summary(swarm: str, state: SwarmState, now_ns: int) -> str:
     return ", ".join(parts)
 
 
-def _row(node: int, uav: UavNow, state: SwarmState, links: list[int], now_ns: int) -> list[Text | str]:
+def _row(node: int, uav: UavNow, state: SwarmState, links: Sequence[int], now_ns: int) -> list[Text | str]:
     report = state.reports.get(node, {})
     silent_s = max(0.0, (now_ns - uav.heard_ns) / S)
     some = " ".join(map(str, links[:_MOST_NAMED])) + (" .." if len(links) > _MOST_NAMED else "")

@@ -207,13 +207,19 @@ class Inspector(App[None]):
 
 
 def turn_lines(found: Turns, now_ns: int) -> Text:
-    """The superframe of the moment: one line for each owner, `#` where it may send, and whose turn it is now."""
+    """The superframe of the moment: one line for each owner, `#` where it may send, `~` where all contend, and whose
+    turn it is now.
+    """
     period_ns = found.period_ns
     superframe, place_ns = divmod(now_ns - found.start_ns, period_ns)
     owners = sorted({span.node for span in found.own})
     now = found.owners(now_ns)
     text = Text(f"superframe {superframe} of {period_ns / MS:g} ms, {place_ns / MS:.1f} ms into it; ")
-    text.append(f"now: {found.called} of {', '.join(map(str, now)) or 'nobody'}\n\n", "bold")
+    free = "all contend" if found.is_contended(now_ns) else "nobody's"
+    text.append(f"now: {found.called} of {', '.join(map(str, now))}\n\n" if now else f"now: {free}\n\n", "bold")
+    if found.window[1]:
+        first, last = (at * _WIDTH // period_ns for at in (found.window[0], sum(found.window)))
+        text.append(f"{'all':>5} {'.' * first}{'~' * (last - first)}{'.' * (_WIDTH - last)}\n", "dim")
     for owner in owners:
         line = ["."] * _WIDTH
         for span in found.own:

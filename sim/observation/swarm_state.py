@@ -23,6 +23,8 @@ from agents.applications.traffic import targets_of
 from fanet_mw.bus.link_stats import LinkRow, LinkStats
 from fanet_mw.bus.messages import Poses
 from fanet_mw.errors import ConfigError, MalformedFrameError
+from fanet_mw.graph.topology import components
+from fanet_mw.mavlink import common, decode
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import (
     BoundStated,
@@ -36,7 +38,7 @@ from fanet_mw.trace import (
     Record,
     RoleChanged,
 )
-from fanet_mw.units import MS, STILL, Enu, S
+from fanet_mw.units import MS, STILL, Enu, NodeId, S
 from fanet_mw.wire import FOUND, frames
 from fanet_mw.wire.frame import Content, message_id
 from fanet_mw.wire.survivors import Found, Standing
@@ -61,6 +63,7 @@ _TRAIL: Final = 60
 _BATTERY_ID: Final = 1
 """SYS_STATUS of MAVLink, whose byte 30 is the charge in percent, -1: unknown."""
 _BATTERY_AT: Final = 10 + 30
+_ACK_ID: Final = int(common.MAVLINK_MSG_ID_COMMAND_ACK)
 Rows = npt.NDArray[np.float64]
 
 
@@ -89,6 +92,16 @@ class UavNow:
     yaw_rad: float = 0.0
     """The direction of its flight, from north clockwise; kept while it hovers."""
     acceleration: Enu = STILL
+    said: dict[int, "Said"] = field(default_factory=dict)
+    """What its MAVLink has carried, by message id."""
+
+
+class Said(NamedTuple):
+    """The messages of one kind on a UAV's tap."""
+
+    number: int
+    first_ns: int
+    last_ns: int
 
 
 class Copy(NamedTuple):
@@ -141,6 +154,8 @@ class SwarmState:
         self.reports: dict[int, Mapping[str, Any]] = {}
         """The last report of each UAV."""
         self.emulator: Mapping[str, Any] = {}
+        self._air: deque[tuple[int, float]] = deque()
+        """Instants, and the time [ns] for which the air was busy until then, of the last seconds."""
         self.packets: dict[tuple[int, int], PacketNow] = {}
         self.estimates: dict[int, Estimate] = {}
         self.events: deque[Event] = deque(maxlen=_MOST_EVENTS)
@@ -209,6 +224,7 @@ class SwarmState:
         """The counters that an actor has reported."""
         if name == "emulator":
             self.emulator = content
+            self._hear_air(content, t_ns)
         elif name.startswith("agent-"):
             node = int(name.removeprefix("agent-"))
             self.reports[node] = content
@@ -226,11 +242,15 @@ class SwarmState:
         try:
             for frame in frames(data):
                 kind = message_id(frame)
+                if node in self.uavs:
+                    self._said(self.uavs[node], kind, t_ns)
                 if kind == FOUND.msgid:
                     self._found(Found.decode_frame(Content(((kind, frame),))), t_ns)
                 elif kind == _BATTERY_ID and len(frame) > _BATTERY_AT + 2 and node in self.uavs:
                     percent = int.from_bytes(frame[_BATTERY_AT : _BATTERY_AT + 1], "little", signed=True)
                     self.uavs[node].charge_percent = percent if percent >= 0 else None
+                elif kind == _ACK_ID and (refusal := _refusal(frame)):
+                    self._tell(Event(t_ns, node, f"UAV {node} {refusal}"))
         except MalformedFrameError:
             return  # telemetry of a foreign program; the collector of the run counts it
 
@@ -245,12 +265,19 @@ class SwarmState:
         for (src, dst), (copies, received) in found.items():
             yield src, dst, copies, received
 
-    def neighbors(self, node: int) -> list[int]:
-        """Those who received at least half of what this node sent lately, and it of what they sent."""
+    def neighbors(self) -> dict[NodeId, tuple[NodeId, ...]]:
+        """Of each node those who received at least half of what it sent lately, and it of what they sent."""
         shares = {(src, dst): received / max(1, copies) for src, dst, copies, received in self.link_rows()}
-        return sorted(
-            dst for src, dst in shares if src == node and shares[src, dst] >= 0.5 and shares.get((dst, node), 0) >= 0.5
-        )
+        near: dict[NodeId, list[NodeId]] = {NodeId(node): [] for node in sorted(self.uavs)}
+        for src, dst in sorted(shares):
+            if shares[src, dst] >= 0.5 and shares.get((dst, src), 0) >= 0.5:
+                near.setdefault(NodeId(src), []).append(NodeId(dst))
+        return {node: tuple(others) for node, others in near.items()}
+
+    def parts(self) -> list[tuple[NodeId, ...]] | None:
+        """The UAVs as parts of which no two hear each other; None while nobody is known to hear anybody."""
+        near = self.neighbors()
+        return components(near) if any(near.values()) else None
 
     def lately(self) -> list[tuple[tuple[int, int], PacketNow]]:
         """The packets of the traffic's first class that had time to arrive, of the ten seconds before."""
@@ -303,6 +330,7 @@ class SwarmState:
         delays = sorted(copy.delay_ns for _, one in packets for copy in one.got.values())
         bounds = [one.bound_ns for _, one in packets if one.bound_ns]
         air, late = self.emulator.get("air", {}), self.emulator.get("late", {})
+        (since_ns, before_ns), (until_ns, after_ns) = (self._air[0], self._air[-1]) if self._air else ((0, 0), (0, 0))
         return {
             "delivered_share": had / wanted if wanted else None,
             "delay_p50_ms": delays[len(delays) // 2] / MS if delays else None,
@@ -311,6 +339,7 @@ class SwarmState:
             "bound_max_ms": max(bounds) / MS if bounds else None,
             "bounds_broken": self.broken,
             "airtime_share": air.get("busy"),
+            "airtime_lately_share": (after_ns - before_ns) / (until_ns - since_ns) if until_ns > since_ns else None,
             "late_share": late.get("late_frames", 0) / max(1, late.get("frames", 0)) if late else None,
             "late_p99_ms": late.get("p99_ms"),
             "time_scale": self.time_scale,
@@ -414,8 +443,30 @@ class SwarmState:
             case _:
                 self.survivors.take(record)
         if text := event_line(record):
-            self.events.append(Event(record.t_ns, record.node, text))
-            self.told += 1
+            self._tell(Event(record.t_ns, record.node, text))
+
+    def _tell(self, event: Event) -> None:
+        self.events.append(event)
+        self.told += 1
+
+    @staticmethod
+    def _said(uav: UavNow, kind: int, t_ns: int) -> None:
+        known = uav.said.get(kind)
+        uav.said[kind] = Said(1, t_ns, t_ns) if known is None else Said(known.number + 1, known.first_ns, t_ns)
+
+    def _hear_air(self, content: Mapping[str, Any], t_ns: int) -> None:
+        """The emulator reports the share of the time since the warm-up ended, or before that since the start."""
+        share = content.get("air", {}).get("busy")
+        begins_ns, ends_ns = self.scenario.traffic_window_ns
+        if share is None or t_ns > ends_ns:
+            return
+        since_ns = begins_ns if t_ns > begins_ns else 0
+        busy_ns = share * (t_ns - since_ns)
+        if self._air and (busy_ns < self._air[-1][1] or t_ns <= self._air[-1][0]):
+            self._air.clear()  # the warm-up has ended
+        self._air.append((t_ns, busy_ns))
+        while self._air[0][0] < t_ns - _LINKS_NS - S:
+            self._air.popleft()
 
     def _found(self, found: Found, t_ns: int) -> None:
         known = self.estimates.get(found.survivor)
@@ -434,3 +485,17 @@ class SwarmState:
         sums = found.setdefault((row.src, row.dst), [0, 0])
         sums[0] += row.copies
         sums[1] += row.received
+
+
+def _refusal(frame: bytes) -> str:
+    """What a UAV says to a command that it does not carry out; empty for one that it accepts."""
+    (ack,) = decode(frame)
+    if ack.result == common.MAV_RESULT_ACCEPTED:
+        return ""
+    command, result = (
+        name.name.removeprefix(f"{kind}_").lower().replace("_", " ")
+        if (name := common.enums[kind].get(value)) is not None
+        else str(value)
+        for kind, value in (("MAV_CMD", ack.command), ("MAV_RESULT", ack.result))
+    )
+    return f"does not {command}: {result}"

@@ -6,14 +6,15 @@ Time goes forward by feeding records; every `_EVERY_NS` the state is kept, so th
 import pickle
 from array import array
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 from fanet_mw.bus.link_stats import COUNTS, LinkStats
 from fanet_mw.bus.messages import Poses
 from fanet_mw.errors import ConfigError
-from fanet_mw.foreign_file import open_regular
+from fanet_mw.foreign_file import json_of, open_regular
+from fanet_mw.scenario import Scenario
 from fanet_mw.trace import (
     BoundStated,
     Collided,
@@ -27,18 +28,27 @@ from fanet_mw.trace import (
     Refuted,
     RoleChanged,
 )
-from fanet_mw.units import MS, US, S
-from fanet_mw.wire import FOUND
-from fanet_mw.wire.frame import message_id
+from fanet_mw.units import MS, STILL, US, S
+from sim.observation.bus_feed import makes_sense
 from sim.observation.event_text import event_line
 from sim.observation.swarm_state import Event, SwarmState
 from sim.results.replay import Replay
 from sim.results.run_folder import RunFolder
+from sim.world.mobility.layout import positions
 
 _EVERY_NS: Final = 10 * S
 _TURNS: Final = ("slots", "turns")
+_MOST_TOLD: Final = 1 << 20
 _MOST_BROKEN: Final = 50
 _NOTABLE: Final = (Confirmed, Refuted, RadioFault, ProcessEnded, Collided, FlightModeChanged, RoleChanged)
+
+
+class _Report(NamedTuple):
+    """What an actor reported."""
+
+    t_ns: int
+    name: str
+    content: Mapping[str, Any]
 
 
 class Timeline:
@@ -50,23 +60,24 @@ class Timeline:
         self.scenario = found.scenario
         records: list[Record] = sorted(found.records(), key=lambda one: one.t_ns)  # some are of a little later
         self._replay = Replay(self.scenario, [one for one in records if isinstance(one, Posed)])
-        self._posed = any(isinstance(one, Posed) for one in records)
-        if not self._posed:
-            raise ConfigError("the trace has no positions of UAVs (`posed`), so there is nothing to replay")
+        self.nodes = self._replay.nodes
+        post = self.scenario.post
+        self._post = None if post is None else (post, positions(self.scenario)[-1])
         self._records = [one for one in records if not isinstance(one, Posed)]
-        self._finds = _finds(found, found.summary.get("epoch_unix_ns", 0))
-        self._links = _links(folder, found.summary.get("epoch_unix_ns", 0))
+        epoch_ns = found.summary.get("epoch_unix_ns", 0)
+        self._taps = [(t_us * US - epoch_ns, frame) for t_us, frame in found.telemetry()]
+        self._links, self._told = _recorded(folder, epoch_ns, found.scenario)
         self.has_links = bool(self._links)
-        """True if the folder has a recording, which tells what links carried each second."""
+        """True if the folder has a recording, which tells what links carried and actors reported each second."""
         self.end_ns = max(one.t_ns for one in records)
         self.events: Sequence[Event] = sorted([*_notable(self._records), *_broken(self._records)])
         self._start = SwarmState(self.scenario)
-        for node, report in found.agents().items():
+        for node, report in found.agents().items() if not self._told else ():
             told = {name: report[name] for name in _TURNS if report.get(name)}
-            self._start.take_report(f"agent-{node}", {**told, "at_end": True}, t_ns=0)
-        self._kept: list[tuple[int, tuple[int, int, int], bytes]] = []
+            self._start.take_report(f"agent-{node}", told, t_ns=0)
+        self._kept: list[tuple[int, tuple[int, ...], bytes]] = []
         self.now_ns = 0
-        self._next = (0, 0, 0)
+        self._next: tuple[int, ...] = (0, 0, 0, 0)
         self.state = self._start
         self._restart()
 
@@ -89,25 +100,30 @@ class Timeline:
 
     def _restart(self) -> None:
         self.now_ns = 0
-        self._next = (0, 0, 0)
+        self._next = (0, 0, 0, 0)
         self.state = pickle.loads(pickle.dumps(self._start))  # noqa: S301  (made by this object)
         self._pose(0)
 
     def _go_on(self, until_ns: int) -> None:
         """Feed what happened until an instant, second by second, so that trails and coverage are those of the run."""
-        records, finds, links = self._next
+        records, taps, links, told = self._next
         for second_ns in (*range(self.now_ns // S * S + S, until_ns, S), until_ns):
             end = bisect_right(self._records, second_ns, lo=records, key=lambda one: one.t_ns)
             self._pose(second_ns)
             self.state.take_records(self._records[records:end])
             records = end
-            while finds < len(self._finds) and self._finds[finds][0] <= second_ns:
-                self.state.take_tap(self._finds[finds][1], self._finds[finds][0], self._finds[finds][2])
-                finds += 1
+            while taps < len(self._taps) and self._taps[taps][0] <= second_ns:
+                t_ns, frame = self._taps[taps]
+                self.state.take_tap(frame[5], t_ns, frame)
+                taps += 1
             while links < len(self._links) and self._links[links].t_ns <= second_ns:
                 self.state.take_links(self._links[links])
                 links += 1
-        self.now_ns, self._next = until_ns, (records, finds, links)
+            while told < len(self._told) and self._told[told].t_ns <= second_ns:
+                one = self._told[told]
+                self.state.take_report(one.name, one.content, t_ns=one.t_ns)
+                told += 1
+        self.now_ns, self._next = until_ns, (records, taps, links, told)
         if until_ns % _EVERY_NS == 0 and (not self._kept or self._kept[-1][0] < until_ns):
             self._kept.append((until_ns, self._next, pickle.dumps(self.state)))
 
@@ -118,38 +134,57 @@ class Timeline:
         for node, at in now.items():
             moved = at.minus(before[node])
             states += [*at, *((value / span_s if span_s else 0.0) for value in moved)]
-        self.state.take_poses(Poses(t_ns, array("H", now), array("d", states)))
+        ids = array("H", now)
+        if self._post is not None and self._post[0] not in now:
+            ids.append(self._post[0])
+            states += [*self._post[1], *STILL]
+        self.state.take_poses(Poses(t_ns, ids, array("d", states)))
 
 
-def _finds(folder: RunFolder, epoch_ns: int) -> list[tuple[int, int, bytes]]:
-    """The finds of survivors in the telemetry: instant, UAV, frame."""
-    return [
-        (t_us * US - epoch_ns, frame[5], frame)
-        for t_us, frame in folder.telemetry()
-        if message_id(frame) == FOUND.msgid
-    ]
-
-
-def _links(folder: Path, epoch_ns: int) -> list[LinkStats]:
-    """What links carried each second, from a recording in the folder; none without one, or without MCAP installed."""
+def _recorded(folder: Path, epoch_ns: int, scenario: Scenario) -> tuple[list[LinkStats], list[_Report]]:
+    """What links carried and actors reported each second, from a recording in the folder; nothing without one, or
+    without MCAP installed.
+    """
     try:
         from google.protobuf.message import DecodeError
         from mcap.exceptions import McapError
         from mcap.reader import make_reader
         from mcap_protobuf.decoder import DecoderFactory
     except ImportError:
-        return []
-    found: list[LinkStats] = []
+        return [], []
+    links: list[LinkStats] = []
+    told: list[_Report] = []
+    names = {"emulator", *(f"agent-{node}" for node in scenario.node_ids)}
     for path in sorted(folder.glob("*.mcap")):
         try:
             with open_regular(path, follow=False) as file:
                 reader = make_reader(file, decoder_factories=[DecoderFactory()])
-                for _, _, message, links in reader.iter_decoded_messages(topics=["/links"]):
-                    rows = [(link.src, link.dst, link.copies, link.received) for link in links.links]
-                    found.append(_stats(message.log_time - epoch_ns, round(links.span_s * S), rows))
+                for _, channel, message, one in reader.iter_decoded_messages(topics=["/links", "/reports"]):
+                    t_ns = message.log_time - epoch_ns
+                    if channel.topic == "/links":
+                        rows = [(link.src, link.dst, link.copies, link.received) for link in one.links]
+                        links.append(_stats(t_ns, round(one.span_s * S), rows))
+                    elif one.name in names:
+                        told.append(_Report(t_ns, one.name, _content(one.json, source=f"{path}: report of {one.name}")))
         except (McapError, DecodeError, OSError, ValueError, OverflowError) as error:
+            if isinstance(error, ConfigError):
+                raise
             raise ConfigError(f"{path}: cannot be read: {str(error)[:200]}") from error
-    return found
+    return links, told
+
+
+def _content(text: str, *, source: str) -> Mapping[str, Any]:
+    """What was kept of a report, checked like one that comes over the bus."""
+    content = json_of(text[:_MOST_TOLD].encode(), source=source)
+    if not isinstance(content, dict) or not makes_sense(content):
+        raise ConfigError(f"{source}: makes no sense")
+    for part in ("air", "late"):
+        values = content.get(part, {})
+        if not isinstance(values, dict) or not all(
+            value is None or isinstance(value, int | float) for value in values.values()
+        ):
+            raise ConfigError(f"{source}: {part} must hold numbers")
+    return content
 
 
 def _stats(t_ns: int, span_ns: int, rows: Sequence[tuple[int, int, int, int]]) -> LinkStats:

@@ -28,6 +28,13 @@ class Turns(NamedTuple):
     """The spans of nodes; of slots, those of clusters by number, which their heads have."""
     called: str
     """What a span is called: `slot` or `turn`."""
+    window: tuple[int, int] = (0, 0)
+    """Where all contend, in which rounds send their bulk: start and length."""
+
+    def is_contended(self, t_ns: int) -> bool:
+        """True within the window in which all contend."""
+        start_ns, length_ns = self.window
+        return (t_ns - self.start_ns - start_ns) % self.period_ns < length_ns
 
     def owners(self, t_ns: int) -> list[int]:
         """The nodes, or the clusters, whose span it is; several where turns are used again far away."""
@@ -40,12 +47,13 @@ def turns(scenario: Scenario, reports: Mapping[int, Mapping[str, Any]]) -> Turns
     if scenario.routing.protocol == "rounds":
         timing = RoundTiming.of(scenario)
         own = [Span(node, (node - 1) * timing.turn_ns, timing.turn_ns) for node in scenario.node_ids]
-        return Turns(0, timing.period_ns, own, "turn")
+        return Turns(0, timing.period_ns, own, "turn", (timing.nodes * timing.turn_ns, timing.window_ns))
     turned = {node: report["turns"] for node, report in reports.items() if report.get("turns")}
     if turned:
         newest = max(turned.values(), key=lambda frame: float(frame["start_ms"]))
         own = sorted((one for node, frame in turned.items() for one in spans_of(node, frame)), key=lambda one: one[1:])
-        return Turns(_ns(newest["start_ms"]), _ns(newest["period_ms"]), own, "turn")
+        window = (0, _ns(newest.get("contention_ms", 0.0)))
+        return Turns(_ns(newest["start_ms"]), _ns(newest["period_ms"]), own, "turn", window)
     slotted = [report["slots"] for report in reports.values() if report.get("slots")]
     if not slotted:
         return None

@@ -7,10 +7,22 @@ from sim.figures import colors
 from sim.observation.swarm_state import UavNow
 
 STATUS_COLORS: Final = {
-    "not heard": colors.GRAY, "detected": colors.SHADE, "approached": colors.ORANGE, "reached": colors.ORANGE,
-    "confirmed": colors.GREEN, "mistaken": colors.RED, "reopened": colors.PINK,
+    "not heard": colors.GRAY, "detected": colors.ORANGE, "approached": colors.BLUE, "reached": colors.PINK,
+    "confirmed": colors.GREEN, "mistaken": colors.RED, "reopened": colors.RED,
 }  # fmt: skip
 """The color of a survivor by the state of the search for him or her."""
+MODE_COLORS: Final = {
+    "": colors.BLUE, "search": colors.BLUE, "respond": colors.RED, "deploy": colors.ORANGE, "takeoff": colors.ORANGE,
+    "wait": colors.ORANGE, "errand": colors.ORANGE, "lost_link": colors.PINK,
+}  # fmt: skip
+"""The color of a UAV by the mode of its mission; in all other modes it flies home, or has landed."""
+HOMEWARD_COLOR: Final = colors.GRAY
+FALLEN_COLOR: Final = colors.DARK
+
+
+def mode_color(uav: UavNow) -> str:
+    """The color of a UAV in a swarm without clusters."""
+    return FALLEN_COLOR if uav.flight == "fallen" else MODE_COLORS.get(uav.mission, HOMEWARD_COLOR)
 
 
 def link_color(share: float) -> str:

@@ -5,16 +5,18 @@
     /uav/N/fix      LocationFix, true place on earth, once a second
     /uav/N/state    fanet.UavState, once a second
     /scene/world    SceneUpdate, once: ground, buildings, no-fly areas, true places of survivors
-    /scene/uavs     SceneUpdate, when a UAV appears or takes another role
+    /scene/uavs     SceneUpdate, when a UAV appears or takes another role; without clusters, another mode
     /scene/links    SceneUpdate, once a second: links by what they delivered, and clusters
     /scene/finds    SceneUpdate, once a second: survivors by state, estimates with their uncertainty
     /links          fanet.Links, once a second, as the emulator counts them
+    /reports        fanet.Report, once a second and actor: queue, turns, airtime, lateness; a replay reads them
     /metrics        fanet.Metrics, once a second
     /log            Log, events for people
 
 Instants are unix time: that of swarm instant 0 plus swarm time.
 """
 
+import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -49,14 +51,14 @@ from fanet_mw.units import Enu, S
 from sim.figures import colors
 from sim.observation.surroundings import Surroundings, surroundings
 from sim.observation.swarm_state import SwarmState, UavNow
-from sim.recording.drawing import STATUS_COLORS, attitude, link_color
+from sim.recording.drawing import STATUS_COLORS, attitude, link_color, mode_color
 
 FRAME: Final = "map"
 _CHUNK_BYTES: Final = 1 << 20
 _METRICS: Final = (
     "delivered_share", "delay_p50_ms", "delay_p95_ms", "delay_max_ms", "bound_max_ms", "bounds_broken",
-    "airtime_share", "late_share", "late_p99_ms", "time_scale", "confirmed", "survivors", "coverage_share",
-    "waiting_packets",
+    "airtime_share", "airtime_lately_share", "late_share", "late_p99_ms", "time_scale", "confirmed", "survivors",
+    "coverage_share", "waiting_packets",
 )  # fmt: skip
 _STATE: Final = (
     "east_m", "north_m", "up_m", "speed_m_s", "charge_percent", "cluster", "head", "waiting_packets", "delivered",
@@ -64,9 +66,11 @@ _STATE: Final = (
 )  # fmt: skip
 _STATE_TEXTS: Final = ("role", "flight_mode", "mission_mode")
 _LINK: Final = ("src", "dst", "copies", "received")
+_REPORTED: Final = ("waiting", "slots", "turns", "air", "late")
+"""What is kept of a report, as JSON."""
 
 
-def _messages() -> tuple[Any, Any, Any]:
+def _messages() -> tuple[Any, Any, Any, Any]:
     """The classes of the messages of this project: flat numbers, which plot by themselves."""
     kinds = descriptor_pb2.FieldDescriptorProto
     file = descriptor_pb2.FileDescriptorProto(name="fanet.proto", package="fanet", syntax="proto3")
@@ -85,16 +89,17 @@ def _messages() -> tuple[Any, Any, Any]:
     links.field.add(
         name="links", number=2, type=kinds.TYPE_MESSAGE, label=kinds.LABEL_REPEATED, type_name=".fanet.Link"
     )
+    add("Report", (("name", kinds.TYPE_STRING), ("json", kinds.TYPE_STRING)))
     pool = descriptor_pool.DescriptorPool()
     pool.Add(file)
-    metrics, uav, several = (
+    metrics, uav, several, report = (
         message_factory.GetMessageClass(pool.FindMessageTypeByName(f"fanet.{name}"))
-        for name in ("Metrics", "UavState", "Links")
+        for name in ("Metrics", "UavState", "Links", "Report")
     )
-    return metrics, uav, several
+    return metrics, uav, several, report
 
 
-_Metrics, _UavState, _Links = _messages()
+_Metrics, _UavState, _Links, _Report = _messages()
 
 
 class McapRecording:
@@ -107,7 +112,8 @@ class McapRecording:
         self.epoch_unix_ns = epoch_unix_ns
         self._around = surroundings(scenario)
         self._origin = Geodetic(*scenario.world.origin_deg, 0.0)
-        self._roles: dict[int, tuple[str, int]] = {}
+        self._looks: dict[int, str] = {}
+        """The color in which each UAV is shown."""
         self._second = -1
         self.count = 0
         """Messages that were written."""
@@ -175,6 +181,8 @@ class McapRecording:
 
     def take_report(self, name: str, content: Mapping[str, Any], *, t_ns: int) -> None:
         self.state.take_report(name, content, t_ns=t_ns)
+        kept = {key: content[key] for key in _REPORTED if content.get(key) is not None}
+        self._put("/reports", _Report(name=name, json=json.dumps(kept)), t_ns)
 
     def take_tap(self, node: int, t_ns: int, data: bytes) -> None:
         self.state.take_tap(node, t_ns, data)
@@ -190,7 +198,7 @@ class McapRecording:
             setattr(metrics, name, math.nan if value is None else value)
         self._put("/metrics", metrics, t_ns)
         for node, uav in sorted(self.state.uavs.items()):
-            if (uav.role, uav.head) != self._roles.get(node):
+            if self._look(uav) != self._looks.get(node):
                 self._show_uav(node, t_ns)
             self._put_uav(node, uav, t_ns)
         self._put("/scene/links", self._links_scene(t_ns), t_ns)
@@ -215,13 +223,13 @@ class McapRecording:
 
     def _show_uav(self, node: int, t_ns: int) -> None:
         uav = self.state.uavs[node]
-        self._roles[node] = (uav.role, uav.head)
+        look = self._looks[node] = self._look(uav)
         entity = self._entity(f"uav-{node}", t_ns, frame=f"uav-{node}")
         entity.frame_locked = True
         body = CubePrimitive_pb2.CubePrimitive()
         _size(body.size, 8.0, 8.0, 2.5)
         body.pose.orientation.w = 1.0
-        _paint(body.color, colors.ORANGE if uav.role == "head" else colors.BLUE)
+        _paint(body.color, look)
         entity.cubes.append(body)
         text = TextPrimitive_pb2.TextPrimitive(text=str(node), font_size=12, scale_invariant=True, billboard=True)
         text.pose.position.z = 8.0
@@ -229,6 +237,10 @@ class McapRecording:
         _paint(text.color, colors.DARK)
         entity.texts.append(text)
         self._put("/scene/uavs", SceneUpdate_pb2.SceneUpdate(entities=[entity]), t_ns)
+
+    @staticmethod
+    def _look(uav: UavNow) -> str:
+        return (colors.ORANGE if uav.role == "head" else colors.BLUE) if uav.role else mode_color(uav)
 
     def _links_scene(self, t_ns: int) -> SceneUpdate_pb2.SceneUpdate:
         entity = self._entity("links", t_ns)

@@ -22,8 +22,9 @@ th, td { text-align: left; vertical-align: top; padding: .3rem .7rem; border-bot
 td div { min-width: 16rem; margin-bottom: .5rem; }
 th { background: #f3f3f3; } figure { margin: 1rem 0; } figure img { max-width: 100%; height: auto; }
 figcaption { color: #444; font-size: .93rem; } code, pre { background: #f5f5f5; font-size: .9rem; }
-pre { padding: .7rem; overflow-x: auto; } .agrees { color: #00543d; font-weight: 600; }
+pre { padding: .7rem; overflow-x: auto; } .wide { overflow-x: auto; } .agrees { color: #00543d; font-weight: 600; }
 .partly { color: #7a4b00; font-weight: 600; } .differs { color: #9c2a00; font-weight: 600; }
+@media (max-width: 40rem) { body { margin: 1rem auto; padding: 0 .8rem; } th, td { padding: .25rem .45rem; } }
 """
 
 
@@ -84,7 +85,8 @@ def as_html(title: str, blocks: Iterable[Block]) -> str:
     """The page with its pictures inside, so that it can be mailed and opened without a network."""
     body = "\n".join(_html(block) for block in blocks)
     return (
-        f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{html.escape(title)}</title>\n'
+        f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<title>{html.escape(title)}</title>\n'
         f"<style>{_STYLE}</style>\n</head>\n<body>\n<h1>{html.escape(title)}</h1>\n{body}\n</body>\n</html>\n"
     )
 
@@ -105,7 +107,7 @@ def _html(block: Block) -> str:
         case Rows(head, rows):
             first = "".join(f"<th>{html.escape(cell)}</th>" for cell in head)
             rest = "".join(f"<tr>{''.join(_cell(cell) for cell in row)}</tr>\n" for row in rows)
-            return f"<table><thead><tr>{first}</tr></thead>\n<tbody>{rest}</tbody></table>"
+            return f'<div class="wide"><table><thead><tr>{first}</tr></thead>\n<tbody>{rest}</tbody></table></div>'
 
 
 def _cell(text: str) -> str:

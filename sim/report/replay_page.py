@@ -35,6 +35,7 @@ from fanet_mw.units import NodeId, S
 from fanet_mw.whole_file import replace_file
 from sim.figures import colors
 from sim.observation.event_text import event_text
+from sim.recording.drawing import FALLEN_COLOR, HOMEWARD_COLOR, MODE_COLORS, STATUS_COLORS
 from sim.results.replay import Replay
 from sim.world.environment.layout import positions
 from sim.world.environment.obstacles import Box, obstacles
@@ -46,7 +47,11 @@ REPLAYED: Final = (
 """The kinds of records that a replay needs: few of a trace, most of which are deliveries."""
 _MOST_POINTS: Final = 150_000
 """The greatest number of positions of UAVs in a page, which are about ten bytes each."""
-_COLORS: Final = {name: value for name, value in vars(colors).items() if name.isupper()}
+_COLORS: Final = {
+    **{name: value for name, value in vars(colors).items() if name.isupper()},
+    "MODES": json.dumps(MODE_COLORS), "STATES": json.dumps(STATUS_COLORS), "HOME": HOMEWARD_COLOR,
+    "FALLEN": FALLEN_COLOR,
+}  # fmt: skip
 
 
 def write(replay: Replay, path: Path) -> None:
@@ -64,11 +69,9 @@ def write(replay: Replay, path: Path) -> None:
 def content(replay: Replay) -> dict[str, Any]:
     """All that the page shows, as plain values: metres and seconds, lists by time."""
     scenario = replay.scenario
-    posed = sorted((one for one in replay.records if isinstance(one, Posed)), key=lambda one: one.t_ns)
-    if not posed:
-        raise ConfigError("the trace has no positions of UAVs (`posed`), so there is nothing to replay")
-    nodes = [NodeId(node) for node in sorted({one.node for one in posed})]
-    end_s = posed[-1].t_ns / S
+    nodes = replay.nodes
+    ends = [one.t_ns / S for one in replay.records if isinstance(one, Posed)]
+    end_s = max(ends, default=scenario.duration_s)
     step_s = max(1, math.ceil(end_s * len(nodes) / _MOST_POINTS))
     return {
         "name": scenario.name,
@@ -77,6 +80,7 @@ def content(replay: Replay) -> dict[str, Any]:
         "end_s": end_s,
         "step_s": step_s,
         "half_m": scenario.world.area_m / 2,
+        "post": list(scenario.ground.at_m),
         "reach_m": round(heard_m(scenario.radio)),
         "searches": scenario.mission.survivors > 0 or scenario.mission.search != "none",
         "nodes": nodes,

@@ -1,6 +1,6 @@
 """Replays a mission from the files of its run: where each UAV was, what it did, and which area was covered.
 
-position      `posed`, once a second; in between on a straight line
+position      `posed`, once a second; in between on a straight line; a swarm that stands has none, and is at its start
 cluster       `role_changed`: the role and the head
 flight        `flight_mode_changed`: the mode of the flight controller; from `fallen` on the UAV is a wreck
 mission       `mission_mode_changed`: the UAV's decision, and for which survivor; `planned`: its place in the plan
@@ -19,6 +19,7 @@ from typing import Any, NamedTuple, Self, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import (
     FlightModeChanged,
@@ -33,6 +34,7 @@ from sim.results.mission import OverflownCells, mission
 from sim.results.run_folder import RunFolder
 from sim.results.survivor_states import SurvivorState, SurvivorStates
 from sim.world.environment.survivors import place
+from sim.world.mobility.layout import positions
 
 R = TypeVar("R", FlightModeChanged, MissionModeChanged, Planned, RoleChanged)
 
@@ -69,6 +71,16 @@ class Replay:
                 self._posed[record.node].append(record)
             elif isinstance(record, FlightModeChanged | MissionModeChanged | Planned | RoleChanged):
                 self._changes[type(record), record.node].append(record)
+        if not self._posed and scenario.mobility.model == "static":
+            for node, at in enumerate(positions(scenario), 1):
+                self._posed[node] = [Posed(0, node, *at)]
+
+    @property
+    def nodes(self) -> Sequence[NodeId]:
+        """Those whose positions are known; raises ConfigError if there are none."""
+        if not self._posed:
+            raise ConfigError("the trace has no positions of UAVs (`posed`), so there is nothing to replay")
+        return [NodeId(node) for node in sorted(self._posed)]
 
     @classmethod
     def read(cls, folder: Path, *kinds: type[Any]) -> Self:

@@ -1,25 +1,41 @@
-"""What a person who looks can do to a running swarm; each action is one message on the bus, as of `fanet air`."""
+"""What a person who looks can do to a running swarm; each action is one message on the bus, as of `fanet air`.
+
+UAVs are sent by orders of the post on the ground, or where there is none by commands of MAVLink, as a ground station
+gives them; a ground station is silent when the view ends, and UAVs do then what their parameters say.
+"""
 
 import math
-from typing import Final
+import time
+from collections.abc import Callable
+from typing import Any, Final
 
 from fanet_mw.bus import codecs
-from fanet_mw.bus.messages import PACE_BOUNDS, ClockRequest
+from fanet_mw.bus.messages import PACE_BOUNDS, ClockRequest, MavlinkTap
 from fanet_mw.bus.radio_control import Control, Cut, Degrade, Jam, Mishap, MishapKind, Restore, link_label, node_label
+from fanet_mw.mavlink import AUTOPILOT_COMPONENT, Geodetic, common, to_geodetic
 from fanet_mw.orders import Order, OrderKind
 from fanet_mw.units import STILL, Enu, NodeId
+from fanet_mw.wire import system_id
 from sim.observation.bus_feed import BusFeed
 
 PAUSED: Final = PACE_BOUNDS[0]
+_GROUND_STATION: Final = 254
+_PRESENT_S: Final = 1.0
 
 
 class Actions:
     """The actions on one swarm. They return at once; the trace shows what came of them."""
 
-    def __init__(self, feed: BusFeed) -> None:
-        self._feed = feed
+    def __init__(self, feed: BusFeed, *, monotonic_s: Callable[[], float] = time.monotonic) -> None:
+        self._feed, self._monotonic_s = feed, monotonic_s
         self.has_post = bool(feed.scenario.ground.at_m)
-        """True if there is a post on the ground, which alone gives orders to UAVs."""
+        """True if there is a post on the ground, which gives orders to UAVs over the air."""
+        self._origin = Geodetic(*feed.scenario.world.origin_deg, 0.0)
+        self._voice: Any = common.MAVLink(
+            None, srcSystem=_GROUND_STATION, srcComponent=common.MAV_COMP_ID_MISSIONPLANNER
+        )
+        self._commanded: set[int] = set()
+        self._present_s = 0.0
 
     def cut(self, node: int) -> str:
         """Switch a UAV's radio off."""
@@ -56,23 +72,63 @@ class Actions:
         return "the clock stands" if scale == PAUSED else f"clock at {scale:g}"
 
     def send(self, node: int, east: float, north: float) -> str:
-        """Let the post order a UAV to stay over a place; on board it is one course among others."""
-        return self._order(Order(OrderKind.STAY, node, east, north), f"UAV {node} ordered to {east:.0f}, {north:.0f}")
+        """Send a UAV over a place, at the height at which it flies; on board it is one course among others."""
+        said = f"UAV {node} sent to {east:.0f} m E, {north:.0f} m N"
+        if self.has_post:
+            return self._order(Order(OrderKind.STAY, node, east, north), said)
+        at = to_geodetic(Enu(east, north, 0.0), self._origin)
+        return self._command(node, common.MAV_CMD_DO_REPOSITION, said, -1.0, 1.0, place=at)
 
     def recall(self, node: int) -> str:
-        """Let the post order a UAV home."""
-        return self._order(Order(OrderKind.RECALL, node), f"UAV {node} ordered home")
+        """Send a UAV home."""
+        said = f"UAV {node} sent home"
+        if self.has_post:
+            return self._order(Order(OrderKind.RECALL, node), said)
+        return self._command(node, common.MAV_CMD_NAV_RETURN_TO_LAUNCH, said)
 
     def release(self, node: int) -> str:
-        """Let a UAV take part in the search again."""
-        return self._order(Order(OrderKind.RELEASE, node), f"UAV {node} released")
+        """Let a UAV do again what the swarm does."""
+        said = f"UAV {node} released"
+        if self.has_post:
+            return self._order(Order(OrderKind.RELEASE, node), said)
+        self._commanded.discard(node)
+        return self._command(node, common.MAV_CMD_MISSION_START, said, keeps=False)
+
+    def stay_present(self) -> None:
+        """Let UAVs that were commanded hear once a second that their ground station is there."""
+        if self._commanded and self._monotonic_s() >= self._present_s + _PRESENT_S:
+            self._present_s = self._monotonic_s()
+            heartbeat = common.MAVLink_heartbeat_message(
+                common.MAV_TYPE_GCS, common.MAV_AUTOPILOT_INVALID, 0, 0, common.MAV_STATE_ACTIVE, 3
+            )
+            for node in sorted(self._commanded):
+                self._say(node, heartbeat)
 
     def _control(self, control: Control, said: str) -> str:
         self._feed.bus.put(self._feed.names.radio_control, codecs.encode([control]), reliable=True)
         return said
 
+    def _command(
+        self, node: int, number: int, said: str, *params: float, place: Geodetic | None = None, keeps: bool = True
+    ) -> str:
+        """Command a UAV; `keeps`: it is under command until it is released."""
+        nowhere = 0x7FFF_FFFF
+        lat, lon = (nowhere, nowhere) if place is None else (round(place.lat_deg * 1e7), round(place.lon_deg * 1e7))
+        four = (*params, math.nan, math.nan, math.nan, math.nan)[:4]
+        whom = (system_id(NodeId(node)), AUTOPILOT_COMPONENT)
+        self._say(
+            node,
+            common.MAVLink_command_int_message(*whom, common.MAV_FRAME_GLOBAL, number, 0, 0, *four, lat, lon, math.nan),
+        )
+        if keeps:
+            self._commanded.add(node)
+        return said
+
+    def _say(self, node: int, message: Any) -> None:  # noqa: ANN401  (pymavlink has no types)
+        frame = bytes(message.pack(self._voice))
+        self._voice.seq = (self._voice.seq + 1) % 256
+        self._feed.bus.put(self._feed.names.operator(node), codecs.encode([MavlinkTap(0, frame)]), reliable=True)
+
     def _order(self, order: Order, said: str) -> str:
-        if not self.has_post:
-            return "no post on the ground (ground.at_m) that could order it"
         self._feed.bus.put(self._feed.names.orders, codecs.encode([order]), reliable=True)
         return said

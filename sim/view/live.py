@@ -24,7 +24,8 @@ def view(
         panels: Panels
         scene = Scene(server, state, on_select=lambda node: panels.jobs.put(lambda: panels.select(node)))
         look_over(server, scene)
-        panels = Panels(server, scene, actions=Actions(feed))
+        actions = Actions(feed)
+        panels = Panels(server, scene, actions=actions)
         mark_clicks(server, scene, panels)
         tell(f"http://{HOST}:{server.get_port()} shows swarm {feed.names.swarm}")
         feed.listen()
@@ -45,6 +46,7 @@ def view(
                 note = f"{note} {feed.lost} puts were lost".strip()
             state.time_scale = feed.time_scale
             panels.run_jobs()
+            actions.stay_present()
             now_ns = feed.now_ns()
             scene.draw(now_ns)
             panels.refresh(now_ns, note=note)

@@ -14,8 +14,11 @@ import viser
 from viser import uplot
 
 from fanet_mw.bus.messages import CameraImage
-from fanet_mw.units import MS, S
-from sim.observation.swarm_state import LATELY_NS, SwarmState
+from fanet_mw.mavlink import common
+from fanet_mw.units import MS, NodeId, S
+from sim.figures import colors
+from sim.observation.swarm_state import LATELY_NS, SwarmState, UavNow
+from sim.recording.drawing import FALLEN_COLOR, HOMEWARD_COLOR, MODE_COLORS, STATUS_COLORS
 from sim.view.actions import PAUSED, Actions
 from sim.view.scene import HOP_COLORS, Scene
 
@@ -23,6 +26,7 @@ _MOST_POINTS: Final = 300
 """Of the charts, one a second."""
 _EVENTS: Final = 14
 _OWN_EVENTS: Final = 5
+_OWN_MESSAGES: Final = 8
 _STYLE: Final = "font-size:13px;line-height:1.45;padding:2px 10px;font-variant-numeric:tabular-nums"
 Job = Callable[[], None]
 
@@ -154,13 +158,12 @@ class Panels:
                 chosen(lambda node: actions.degrade(node, int(other.value), loss_share=loss.value / 100)),
             )
         with gui.add_folder("send it", expand_by_default=False):
-            if actions.has_post:
-                gui.add_html(_box("Click the map, then send."))
-                self._button("send it to the mark", chosen(lambda node: self._sent(actions, node)))
-                self._button("call it home", chosen(actions.recall))
-                self._button("release it", chosen(actions.release))
-            else:
-                gui.add_html(_box("This swarm has no post on the ground (<code>ground.at_m</code>) to order UAVs."))
+            by = "The post on the ground orders it, over the air." if actions.has_post else (
+                "By MAVLink, as a ground station does.")  # fmt: skip
+            gui.add_html(_box(f"Click the map, then send. {by}"))
+            self._button("send it to the mark", chosen(lambda node: self._sent(actions, node)))
+            self._button("call it home", chosen(actions.recall))
+            self._button("release it", chosen(actions.release))
 
     def _sent(self, actions: Actions, node: int) -> str:
         target = self._scene.target
@@ -177,8 +180,12 @@ class Panels:
             self.say(actions.pace(scale))
 
         group.on_click(self.later(turn))
-        self._button("cut a head's radio", lambda: self._on_a_head(actions.cut), color="orange")
-        self._button("let a head crash", lambda: self._on_a_head(actions.crash), color="red")
+        if self._scene.clustered:
+            self._button("cut a head's radio", lambda: self._on_a_head(actions.cut), color="orange")
+            self._button("let a head crash", lambda: self._on_a_head(actions.crash), color="red")
+        else:
+            self._button("cut the radio that most others hear", lambda: self._on_a_hub(actions.cut), color="orange")
+            self._button("let that UAV crash", lambda: self._on_a_hub(actions.crash), color="red")
         radius = gui.add_slider("jam: radius [m]", min=20, max=500, step=10, initial_value=150)
         self._button("jam at the mark, or about the UAV", lambda: self._jam(actions, radius.value), color="red")
         self._button("end all faults", actions.restore, color="green")
@@ -190,6 +197,12 @@ class Panels:
         if selected is not None and selected.head:
             return act(selected.head)
         return act(max(heads, key=lambda head: len(heads[head]))) if heads else "there is no head now"
+
+    def _on_a_hub(self, act: Callable[[int], str]) -> str:
+        """Do something to the UAV with the most neighbors, of those whose radio works."""
+        faulty = {fault.node for fault in self.state.faults.values()}
+        near = {node: len(others) for node, others in self.state.neighbors().items() if others and node not in faulty}
+        return act(max(near, key=lambda node: near[node])) if near else "nobody hears anybody now"
 
     def _jam(self, actions: Actions, radius: float) -> str:
         uav = self.state.uavs.get(self._scene.selected)
@@ -209,6 +222,8 @@ class Panels:
             "coverage": "area covered", "names": "names", "turns": "whose turn it is",
             "spreading": "a packet that spreads", "survivors": "survivors, estimates",
         }  # fmt: skip
+        if not scene.clustered:
+            del texts["clusters"]
         for name, text in texts.items():
             box = gui.add_checkbox(text, initial_value=getattr(scene.shown, name))
 
@@ -222,7 +237,7 @@ class Panels:
             scene.size_m = float(size.value)
 
         size.on_update(self.later(resize))
-        gui.add_html(_box(_LEGEND))
+        gui.add_html(_box(_legend(by_cluster=scene.clustered, links_known=not scene.by_range)))
 
     def _follow(self, wanted: bool) -> None:
         self._follows = wanted
@@ -261,16 +276,18 @@ class Panels:
         turn = self.state.turns
         lines = []
         if turn is not None:
-            owners = self.state.owners(t_ns)
-            who = ", ".join(map(str, owners)) if owners else "nobody"
-            lines.append(f"<b>{turn.called}</b> of <span style='color:#009E73'>&#9679;</span> {who}, one of "
+            shown_ns = self._scene.turn_ns(t_ns)
+            owners = self.state.owners(shown_ns)
+            free = "all, who contend" if turn.is_contended(shown_ns) else "nobody"
+            who = ", ".join(map(str, owners)) if owners else free
+            lines.append(f"<b>{turn.called}</b> of {_dot(colors.GREEN)} {who}, one of "
                          f"{len(turn.own)} in {turn.period_ns / MS:.0f} ms")  # fmt: skip
         if found is not None:
             (origin, seq), packet = found
             have, own_ns = self._scene.shown_spread(t_ns)
-            dots = "".join(f"<span style='color:{color}'>&#9679;</span>" for color in HOP_COLORS[:4])
-            lines.append(f"<b>packet {seq} of UAV {origin}</b> {dots}: {have} of {packet.targets} have it "
-                         f"{own_ns / MS:.0f} ms after it was handed over (slowed down)")  # fmt: skip
+            dots = " ".join(f"{_dot(color)}{hops}" for hops, color in enumerate(HOP_COLORS[:5]))
+            lines.append(f"<b>packet {seq} of UAV {origin}</b>: {have} of {packet.targets} have it {own_ns / MS:,.0f} "
+                         f"ms after it was handed over{_paced(self._scene.packet_pace())}; by hops {dots}")  # fmt: skip
         return _box("<br>".join(lines)) if lines else ""
 
     def _uav_text(self) -> str:
@@ -282,20 +299,26 @@ class Panels:
         at, flies = uav.position, math.hypot(*uav.velocity)
         since_s = (state.t_ns - uav.heard_ns) / S
         rows = [
-            ("role", f"{uav.role or 'none yet'}{f', cluster {uav.cluster}, head {uav.head}' if uav.head else ''}"),
+            *([("role", f"{uav.role or 'none yet'}{f', cluster {uav.cluster}, head {uav.head}' if uav.head else ''}")]
+              if self._scene.clustered or uav.role else []),
             ("mode", f"{uav.flight or '-'}; mission {uav.mission or '-'}"
                      f"{f', survivor {uav.survivor}' if uav.survivor else ''}"),
             ("place", f"{at.east:.0f} m E, {at.north:.0f} m N, {at.up:.0f} m up; {flies:.1f} m/s"),
             ("battery", "not told" if uav.charge_percent is None else f"{uav.charge_percent} %"),
-            ("neighbors", ", ".join(map(str, state.neighbors(node))) or "none"),
-            ("queue", "not in a trace" if report.get("at_end") else f"{report.get('waiting', 0)} packets wait"),
+            ("neighbors", ", ".join(map(str, state.neighbors().get(NodeId(node), ()))) or self._no_neighbor()),
+            ("queue", f"{report['waiting']} packets wait" if "waiting" in report else "not known"),
             ("packets", f"{uav.sent} sent, {uav.delivered} received"),
             ("dropped", ", ".join(f"{html.escape(str(k))} {v}" for k, v in sorted(uav.drops.items())) or "none"),
             ("last heard", f"{max(0.0, since_s):.1f} s ago"),
         ]  # fmt: skip
+        if messages := _messages(uav):
+            rows.append(("MAVLink", messages))
         said = [one for one in state.events if one.node == node][-_OWN_EVENTS:]
         lately = "<br>".join(f"{one.t_ns / S:.1f} s {html.escape(one.text)}" for one in reversed(said))
         return _box(f"<b>UAV {node}</b>{_table(rows)}{lately}")
+
+    def _no_neighbor(self) -> str:
+        return "not known: no recording" if self._scene.by_range else "none"
 
     def _chart(self, title: str, *, top: float | None = None, visible: bool = True) -> Any:  # noqa: ANN401
         scales = {"x": uplot.Scale(time=False)}
@@ -342,7 +365,11 @@ def _figures(state: SwarmState, metrics: dict[str, float | None]) -> str:
         ),
         ("delay median, longest", f"{ms('delay_p50_ms')}, {ms('delay_max_ms')}; {bound}"),
         ("bounds broken", f"{metrics['bounds_broken']:.0f}"),
-        *([("air busy", percent("airtime_share"))] if metrics["airtime_share"] is not None else []),
+        *(
+            [("air busy", f"{percent('airtime_lately_share')} lately, {percent('airtime_share')} on average")]
+            if metrics["airtime_share"] is not None
+            else []
+        ),
         *(
             [("frames late", f"{percent('late_share', 2)}, 99 of 100 below {ms('late_p99_ms')}")]
             if metrics["late_share"] is not None
@@ -350,8 +377,13 @@ def _figures(state: SwarmState, metrics: dict[str, float | None]) -> str:
         ),
         ("confirmed", f"<b>{metrics['confirmed']:.0f} of {metrics['survivors']:.0f}</b>"),
         ("area covered", percent("coverage_share")),
-        ("UAVs, clusters", f"{len(state.uavs) - (state.scenario.post in state.uavs)}, {len(state.heads())}"),
     ]
+    if not state.scenario.mission.survivors and state.scenario.mission.search == "none":
+        del rows[-2:]  # nobody is looked for
+    flown, heads, parts = len(state.uavs) - (state.scenario.post in state.uavs), len(state.heads()), state.parts()
+    rows.append(("UAVs, clusters", f"{flown}, {heads}") if heads else ("UAVs", f"{flown}"))
+    if parts is not None:
+        rows.append(("parts that hear each other", f"{len(parts)}" if len(parts) == 1 else f"<b>{len(parts)}</b>"))
     return _box(_table(rows))
 
 
@@ -368,9 +400,42 @@ def _number(text: str) -> int:
     return int(text) if text.isdigit() else 0
 
 
-_LEGEND: Final = (
-    "<b>Links</b> in the last 4 s: <span style='color:#0072B2'>&#9644;</span> 90 % received, "
-    "<span style='color:#E69F00'>&#9644;</span> half, <span style='color:#D55E00'>&#9644;</span> less. "
-    "<b>UAVs</b> by cluster, heads larger. <b>Survivors</b>: gray not heard, yellow heard, orange approached, green "
-    "confirmed, red mistaken; circles are estimates, two standard deviations wide."
-)
+def _paced(pace: float) -> str:
+    """How much faster or more slowly than it was something is shown."""
+    if 0.8 < pace < 1.25:
+        return ""
+    return f", shown {pace:.0f} times as fast" if pace > 1 else f", slowed down {1 / pace:.0f} times"
+
+
+def _messages(uav: UavNow) -> str:
+    """The MAVLink on a UAV's tap: the kinds that came last, how many of each, and how often."""
+    latest = sorted(uav.said.items(), key=lambda item: -item[1].last_ns)
+    lines = []
+    for kind, said in latest[:_OWN_MESSAGES]:
+        span_s = (said.last_ns - said.first_ns) / S
+        rate = f", {(said.number - 1) / span_s:.1f}/s" if span_s > 1 else ""
+        known = common.mavlink_map.get(kind)
+        lines.append(f"{known.msgname if known is not None else kind} {said.number}{rate}")
+    more = len(latest) - len(lines)
+    return "<br>".join([*lines, *([f"and {more} kinds more"] if more > 0 else [])])
+
+
+def _dot(color: str) -> str:
+    return f"<span style='color:{color}'>&#9679;</span>"
+
+
+def _legend(*, by_cluster: bool, links_known: bool) -> str:
+    """What the colors mean."""
+    bars = ((colors.BLUE, "90 % received"), (colors.ORANGE, "half"), (colors.RED, "less"))
+    links = ", ".join(f"<span style='color:{color}'>&#9644;</span> {said}" for color, said in bars)
+    modes = ((MODE_COLORS["search"], "search"), (MODE_COLORS["respond"], "respond"),
+             (MODE_COLORS["deploy"], "on its way"), (MODE_COLORS["lost_link"], "hears nobody"),
+             (HOMEWARD_COLOR, "homeward"))  # fmt: skip
+    found = ("not heard", "detected", "approached", "reached", "confirmed", "mistaken")
+    people = ", ".join(f"{_dot(STATUS_COLORS[status])} {status}" for status in found)
+    uavs = "by cluster, heads larger" if by_cluster else ", ".join(f"{_dot(color)} {said}" for color, said in modes)
+    lines = f"<b>Links</b> in the last 4 s: {links}." if links_known else "<b>Gray lines</b>: in each other's reach."
+    return (
+        f"{lines}<br><b>UAVs</b>: {uavs}; {_dot(FALLEN_COLOR)} fallen.<br><b>Survivors</b>: {people}; circles are "
+        "estimates, two standard deviations wide."
+    )

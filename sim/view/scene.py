@@ -15,24 +15,25 @@ import numpy as np
 import viser
 
 from emulator.channel.propagation import heard_m
-from fanet_mw.units import Enu, S
+from fanet_mw.units import MS, Enu, S
 from sim.figures import colors
 from sim.observation.surroundings import Surroundings, surroundings
 from sim.observation.swarm_state import PacketNow, SwarmState, UavNow
-from sim.recording.drawing import STATUS_COLORS, attitude, link_color
+from sim.recording.drawing import FALLEN_COLOR, STATUS_COLORS, attitude, link_color, mode_color
 from sim.view import shapes
 from sim.view.shapes import Rows, rgb
 
 CLUSTER_COLORS: Final = ("#0072B2", "#CC79A7", "#009E73", "#E69F00", "#56B4E9", "#7b4fb5", "#a0522d", "#5f9ea0")
 """Colors of clusters, in turn; the color-blind can tell the first five apart."""
 _NO_CLUSTER: Final = "#888888"
-_WRECK: Final = "#222222"
 _GROUND: Final = (214, 218, 205)
 _COVERED: Final = (164, 196, 158)
 _BUILDING: Final = (176, 169, 159)
 _FENCE_M: Final = 80.0
-_SLOWED: Final = 2 * S
-"""A packet's spreading is stretched to this much swarm time, because it takes a fraction of a second."""
+_SHOWN_NS: Final = 2 * S
+"""The spreading of a packet is stretched, or shortened, to this much swarm time."""
+_SEEN_NS: Final = 150 * MS
+"""Turns shorter than this cannot be followed by eye, and are shown at the pace of the packet that spreads."""
 _HOLDS_NS: Final = S
 _HILLS_EVERY_S: Final = 5
 """The area covered of hills is a mesh of a quarter of a megabyte, and so is drawn more rarely."""
@@ -61,6 +62,8 @@ class Scene:
         self._api = server.scene
         self.around: Surroundings = surroundings(state.scenario)
         self.shown = Shown()
+        self.clustered = state.scenario.routing.protocol == "clustered"
+        """True: UAVs are colored by cluster; otherwise by what they do."""
         self.by_range = False
         """True: links are not known; pairs in the radio's reach are drawn instead."""
         self.selected = 0
@@ -86,8 +89,8 @@ class Scene:
         """Draw the state at an instant; `all_of_it`: also what is otherwise drawn seldom."""
         with self._server.atomic():
             self._draw_uavs()
-            self._draw_turn(t_ns)
             self._draw_spreading(t_ns)
+            self._draw_turn(t_ns)
             if all_of_it or t_ns * 2 // S != self._half_second:
                 self._half_second = t_ns * 2 // S
                 self._draw_links()
@@ -110,6 +113,16 @@ class Scene:
             return 0, 0
         own_ns = self._own_time_ns(t_ns)
         return sum(copy.delay_ns <= own_ns for copy in self._packet[1].got.values()), own_ns
+
+    def turn_ns(self, t_ns: int) -> int:
+        """The instant of which it is shown whose turn it is: where turns are too short to be seen, that of the packet
+        which spreads.
+        """
+        turns = self.state.turns
+        short = turns is not None and min((span.length_ns for span in turns.own), default=_SEEN_NS) < _SEEN_NS
+        if not short or self._packet is None or not self.shown.spreading:
+            return t_ns
+        return self._packet[1].born_ns + self._own_time_ns(t_ns)
 
     # --- what stays -----------------------------------------------------------------------------------------------
 
@@ -165,7 +178,7 @@ class Scene:
         places = np.array([uavs[node].position for node in nodes], np.float32)
         turned = np.array([attitude(uavs[node]) for node in nodes], np.float32)
         post = self.state.scenario.post
-        tints = np.array([rgb(_WRECK) if node == post else self._tint(uavs[node]) for node in nodes], np.uint8)
+        tints = np.array([rgb(FALLEN_COLOR) if node == post else self._tint(uavs[node]) for node in nodes], np.uint8)
         sizes = np.array([self.size_m * (1.7 if uavs[node].role == "head" else 1.0) for node in nodes], np.float32)
         handle = self._handles.get("uavs")
         if handle is None or nodes != self._nodes:
@@ -191,11 +204,13 @@ class Scene:
 
     def _tint(self, uav: UavNow) -> tuple[int, int, int]:
         if uav.flight == "fallen":
-            return rgb(_WRECK)
-        return rgb(CLUSTER_COLORS[uav.cluster % len(CLUSTER_COLORS)] if uav.cluster >= 0 else _NO_CLUSTER)
+            return rgb(FALLEN_COLOR)
+        if uav.cluster >= 0:
+            return rgb(CLUSTER_COLORS[uav.cluster % len(CLUSTER_COLORS)])
+        return rgb(_NO_CLUSTER if self.clustered else mode_color(uav))
 
     def _draw_turn(self, t_ns: int) -> None:
-        owners = self.state.owners(t_ns) if self.shown.turns else []
+        owners = self.state.owners(self.turn_ns(t_ns)) if self.shown.turns else []
         uavs = self.state.uavs
         places = [uavs[node].position for node in owners if node in uavs]
         self._rings("turn", places, [rgb(colors.GREEN)] * len(places), 1.15)
@@ -204,7 +219,7 @@ class Scene:
         if not self.shown.spreading:
             self._rings("spread", [], [], 0.85)
             return
-        if self._packet is None or not 0 <= t_ns - self._packet_ns < _SLOWED + _HOLDS_NS:
+        if self._packet is None or not 0 <= t_ns - self._packet_ns < _SHOWN_NS + _HOLDS_NS:
             self._packet, self._packet_ns = self.state.newest(by_ns=t_ns - 3 * S), t_ns
         if self._packet is None:
             return
@@ -220,7 +235,12 @@ class Scene:
         """The time since the packet was handed over that is shown now."""
         assert self._packet is not None, "a packet is shown"
         longest = max(copy.delay_ns for copy in self._packet[1].got.values())
-        return min(longest, round(longest * (t_ns - self._packet_ns) / _SLOWED))
+        return min(longest, round(longest * (t_ns - self._packet_ns) / _SHOWN_NS))
+
+    def packet_pace(self) -> float:
+        """How many times as fast as it was the spreading of the packet is shown."""
+        assert self._packet is not None, "a packet is shown"
+        return max(1, max(copy.delay_ns for copy in self._packet[1].got.values())) / _SHOWN_NS
 
     def _rings(self, name: str, places: list[Enu], tints: list[tuple[int, int, int]], radius: float) -> None:
         """Level rings about places, in one batch; its size changes with their number."""

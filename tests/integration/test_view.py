@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import math
 import random
 import re
 import threading
@@ -17,15 +18,18 @@ import numpy as np
 import pytest
 import viser
 
+from fanet_mw.bus import codecs
 from fanet_mw.errors import ConfigError
+from fanet_mw.trace import FlightModeChanged, MissionModeChanged
 from fanet_mw.units import S
 from sim.cli.app import app
+from sim.figures import colors
 from sim.observation.bus_feed import BusFeed
 from sim.observation.swarm_state import SwarmState
 from sim.observation.timeline import Timeline
 from sim.results.result import Result
 from sim.run.api import launch
-from sim.run.virtual import simulate
+from sim.run.virtual import Observed, simulate
 from sim.scenarios import catalog
 from sim.view.actions import Actions
 from sim.view.panels import Panels
@@ -233,6 +237,85 @@ def test_a_packets_spreading_ends_with_all_who_have_it(server: viser.ViserServer
     rings = server.scene.get_handle_by_name("/spread")
     assert rings is not None
     assert len(rings.batched_positions) == len({*packet.got, origin})
+
+
+def test_a_swarm_in_rounds_is_colored_by_what_uavs_do_and_its_turns_go_with_the_packet(
+    server: viser.ViserServer,
+) -> None:
+    state = SwarmState(catalog.find("quick", ["routing.protocol=rounds", "duration_s=12"]))
+    simulate(state.scenario, observer=state)
+    state.take_records([
+        MissionModeChanged(state.t_ns, 2, "respond", 1), MissionModeChanged(state.t_ns, 3, "return"),
+        FlightModeChanged(state.t_ns, 4, "fallen"),
+    ])  # fmt: skip
+    scene = Scene(server, state, on_select=lambda _: None)
+    panels = Panels(server, scene, actions=None)
+    panels.select(2)
+    scene.draw(10 * S, all_of_it=True)
+    uavs = server.scene.get_handle_by_name("/uavs")
+    assert uavs is not None
+    wanted = [rgb(color) for color in (colors.BLUE, colors.RED, colors.GRAY, colors.DARK)]
+    assert [tuple(tint) for tint in uavs.batched_colors[:4].tolist()] == wanted
+    found = scene.spreading()
+    assert found is not None
+    _, packet = found
+    seen = set()
+    for step in range(20):
+        t_ns = 10 * S + step * S // 10
+        scene.draw(t_ns)
+        shown_ns = scene.turn_ns(t_ns)
+        assert packet.born_ns <= shown_ns <= packet.born_ns + max(copy.delay_ns for copy in packet.got.values())
+        seen.update(state.owners(shown_ns))
+    assert len(seen) >= 3, "in slow motion several turns pass"
+    panels.refresh(12 * S)
+    texts = {name: re.sub(r"<[^>]+>", " ", text) for name, text in panels.texts.items()}
+    assert "clusters" not in texts["_figures"]
+    assert "parts that hear each other 1" in " ".join(texts["_figures"].split())
+    assert "role" not in texts["_uav"]
+    assert re.search(r"HEARTBEAT \d+, [\d.]+/s", texts["_uav"])
+    assert re.search(r"queue\s+\d+ packets wait", texts["_uav"])
+    assert "slowed down" in texts["_spread"]
+
+
+class VirtualFeed:
+    """What actions need of a feed, for a swarm in virtual time."""
+
+    def __init__(self, observed: Observed) -> None:
+        self.scenario, self.names, self.bus, self._host = observed.scenario, observed.names, self, observed.host
+
+    def put(self, topic: str, payload: bytes, *, reliable: bool) -> None:
+        assert reliable
+        for message in codecs.decode(payload):
+            self._host.put(topic, message)
+
+
+def test_a_uav_is_sent_to_the_mark_without_a_post_and_released_again() -> None:
+    scenario = catalog.find("rescue", [
+        "nodes.count=12", "nodes.spacing_m=60", "world.area_m=700", "mission.survivors=0", "duration_s=60",
+        "traffic.arrivals=none",
+    ])  # fmt: skip
+    state = SwarmState(scenario)
+    observed = Observed(scenario, observer=state)
+    actions = Actions(VirtualFeed(observed), monotonic_s=lambda: observed.host.now_ns / S)  # type: ignore[arg-type]
+    observed.host.start()
+
+    def run(until_s: int) -> None:
+        for t_ns in range(observed.host.now_ns, until_s * S, S // 2):
+            actions.stay_present()
+            observed.host.run(t_ns + S // 2)
+
+    run(10)
+    assert "sent to -200 m E, 150 m N" in actions.send(5, -200.0, 150.0)
+    run(45)
+    at = state.uavs[5].position
+    assert math.hypot(at.east + 200, at.north - 150) < 15, "it is there, and stays although more than 10 s have passed"
+    actions.release(5)
+    run(58)
+    at = state.uavs[5].position
+    assert math.hypot(at.east + 200, at.north - 150) > 40, "it goes on with the search"
+    actions.send(5, 5000.0, 0.0)
+    run(60)
+    assert any("does not do reposition: denied" in event.text for event in state.events if event.node == 5)
 
 
 def test_what_is_switched_off_is_not_drawn(server: viser.ViserServer, timeline: Timeline) -> None:

@@ -26,6 +26,7 @@ from fanet_mw.trace import (
 from fanet_mw.units import S
 from sim.report import replay_page
 from sim.results.replay import Replay
+from sim.world.mobility.layout import positions
 
 KEYS = {
     "nodes.count": 2, "nodes.altitude_m": 60, "world.area_m": 600, "duration_s": 30, "mission.survivors": 3,
@@ -121,4 +122,13 @@ def test_a_description_cannot_end_the_script(make_scenario: Callable[..., Scenar
 
 def test_a_trace_without_positions_is_refused(make_scenario: Callable[..., Scenario]) -> None:
     with pytest.raises(ConfigError, match="no positions"):
-        replay_page.content(Replay(make_scenario(**KEYS), RECORDS[-3:]))
+        replay_page.content(Replay(make_scenario(**KEYS | {"mobility.model": "onboard"}), RECORDS[-3:]))
+
+
+def test_a_swarm_that_stands_has_no_positions_in_its_trace_and_is_replayed_where_it_began(
+    make_scenario: Callable[..., Scenario],
+) -> None:
+    scenario = make_scenario(**KEYS | {"mobility.model": "static", "duration_s": 30})
+    content = replay_page.content(Replay(scenario, RECORDS[-3:]))
+    assert content["end_s"] == 30
+    assert content["at"][0] == content["at"][-1] == [round(value) for at in positions(scenario) for value in at]

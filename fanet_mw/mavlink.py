@@ -54,7 +54,7 @@ _CAPABILITIES: Final = int(
 _FOUND_ADDRESS: Final = 0x400000
 """The first ADS-B address of survivors; MAVProxy draws those of this range as flags."""
 _MOST_FINDS: Final = 0x100000
-_MOST_NAMED_FIND: Final = 1000
+_CALLSIGN: Final = 8
 _FOUND_FLAGS: Final = int(
     common.ADSB_FLAGS_VALID_COORDS | common.ADSB_FLAGS_VALID_ALTITUDE | common.ADSB_FLAGS_VALID_CALLSIGN
     | common.ADSB_FLAGS_VALID_VELOCITY
@@ -196,11 +196,11 @@ class Encoder:
     def survivor(self, survivor: int, at: Enu) -> bytes:
         """ADSB_VEHICLE: a survivor, as something on the surface that ground stations draw with its name."""
         lat, lon, height_mm = _place_ints(to_geodetic(at, self._origin))
-        name = (f"FOUND{survivor}" if survivor < _MOST_NAMED_FIND else f"F{survivor}").encode()
+        name = f"FOUND{survivor}"[:_CALLSIGN] if survivor < 1000 else "PERSON"
         return self.pack(
             common.MAVLink_adsb_vehicle_message(
                 _FOUND_ADDRESS + survivor % _MOST_FINDS, lat, lon, common.ADSB_ALTITUDE_TYPE_GEOMETRIC, height_mm, 0, 0,
-                0, name[:8], common.ADSB_EMITTER_TYPE_EMERGENCY_SURFACE, 0, _FOUND_FLAGS, 0,
+                0, name.encode(), common.ADSB_EMITTER_TYPE_EMERGENCY_SURFACE, 0, _FOUND_FLAGS, 0,
             )
         )  # fmt: skip
 

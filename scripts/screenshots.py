@@ -53,6 +53,14 @@ class Photographer:
             page.close()
 
 
+def without_warning(page: Any) -> None:  # noqa: ANN401
+    """Close the notice that nothing is drawn by a graphics card here."""
+    notice = page.locator(".mantine-Notification-closeButton")
+    if notice.count():
+        notice.first.click()
+        page.wait_for_timeout(700)
+
+
 @contextmanager
 def served(folder: Path, *words: str) -> Iterator[str]:
     """The address of `fanet replay FOLDER`."""
@@ -68,12 +76,16 @@ def replay(photos: Photographer, folder: Path, at_s: float) -> None:
 
     def look(page: Any, ending: str, *, tab: str) -> None:  # noqa: ANN401
         page.get_by_text("delivered lately").first.wait_for(timeout=PATIENCE_MS, state="attached")
-        page.wait_for_timeout(6000)
-        if ending:
-            return
+        page.get_by_role("button", name="play").click()  # pause
+        page.wait_for_timeout(4000)
+        without_warning(page)
         if tab:
             page.get_by_role("tab", name=tab).click()
-            page.wait_for_timeout(2500)
+            page.wait_for_timeout(1000)
+        if tab == "UAV":
+            page.locator("input[value='none']").first.click()
+            page.get_by_role("option", name="20", exact=True).first.click()
+            page.wait_for_timeout(2000)
 
     with served(folder, "--start", str(at_s)) as address:
         photos.take("replay", address, partial(look, tab=""))
@@ -87,7 +99,12 @@ def files(photos: Photographer, folder: Path, at_s: float, *, name: str) -> None
     words = ["replay", str(folder), f"--{name}", str(path)]
     subprocess.run([sys.executable, "-m", "fanet_mw", *words], check=True)  # noqa: S603  (our own command)
     ending = f"#t={at_s:g}" if name == "map" else ""
-    photos.take(f"file-{name}", path.resolve().as_uri() + ending, lambda page, _: page.wait_for_timeout(9000))
+
+    def look(page: Any, _ending: str) -> None:  # noqa: ANN401
+        page.wait_for_timeout(9000)
+        without_warning(page)
+
+    photos.take(f"file-{name}", path.resolve().as_uri() + ending, look)
 
 
 def report(photos: Photographer, folder: Path) -> None:

@@ -29,6 +29,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Confirmed, PlacedInside, Record, Refuted, Warned
 from fanet_mw.units import MS, Enu, NodeId, S, earliest, seconds_to_ns
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_REPORT, frames, system_id
+from fanet_mw.wire.survivors import called
 
 _MOST_PER_S: Final = 200
 """A UAV looks at no more messages of operators in a second; a ground station that floods must not take its time."""
@@ -211,13 +212,13 @@ class GroundControl(Application):
         match record:
             case Confirmed(survivor=survivor, east_m=east_m, north_m=north_m):
                 self._streams.finds[survivor] = Enu(east_m, north_m, 0.0)
-                text = f"Survivor {survivor} confirmed"
+                text = f"{_named(survivor)} confirmed"
             case PlacedInside(survivor=survivor, east_m=east_m, north_m=north_m):
                 self._streams.finds[survivor] = Enu(east_m, north_m, 0.0)
-                text = f"Survivor {survivor} is inside a building"
+                text = f"{_named(survivor)} is inside a building"
             case Refuted(survivor=survivor):
                 self._streams.finds.pop(survivor, None)
-                text = f"Survivor {survivor} refuted"
+                text = f"{_named(survivor)} refuted"
             case Warned(other=other):
                 text = f"Collision warning: UAV {other}"
             case _:
@@ -496,6 +497,11 @@ class GroundControl(Application):
             mission_items=len(mission.steps), mission_flies=not mission.idle, home=pilot.home,
             fenced=bool(pilot.fence), beyond=pilot.beyond,
         )  # fmt: skip
+
+
+def _named(survivor: int) -> str:
+    name = called(survivor)
+    return name[0].upper() + name[1:]
 
 
 _PARAMS: Final = {

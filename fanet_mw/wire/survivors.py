@@ -33,6 +33,11 @@ def is_person(survivor: int) -> bool:
     return survivor >= _FIRST_PERSON
 
 
+def called(survivor: int) -> str:
+    """What people call a survivor of this number."""
+    return "a person without a phone" if is_person(survivor) else f"survivor {survivor}"
+
+
 class Survivor(NamedTuple):
     """FANET_SURVIVOR: `reporter`, at `position`, receives the phone of `survivor`."""
 

@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fanet_mw.units import S
+from fanet_mw.wire.survivors import is_person
 from sim.observation.bus_feed import BusFeed, Paced
 from sim.observation.swarm_state import SwarmState, UavNow
 
@@ -62,8 +63,9 @@ def _summary(swarm: str, state: SwarmState, now_ns: int) -> str:
     if (share := metrics["delivered_share"]) is not None:
         parts.append(f"delivered {share:.1%}")
     if (p95_ms := metrics["delay_p95_ms"]) is not None:
-        bound_ms = metrics["bound_max_ms"]
-        parts.append(f"delay p95 {p95_ms:.0f} ms" + (f" (bound {bound_ms:.0f})" if bound_ms is not None else ""))
+        parts.append(f"delay p95 {p95_ms:.0f} ms")
+    if (bound_ms := metrics["bound_max_ms"]) is not None and (kept_ms := metrics["bounded_max_ms"]) is not None:
+        parts.append(f"with a bound at most {kept_ms:.0f} ms ({bound_ms:.0f})")
     if (busy := metrics["airtime_lately_share"]) is not None:
         parts.append(f"air busy {busy:.0%}")
     if (found := state.parts()) is not None and len(found) > 1:
@@ -81,7 +83,8 @@ def _row(node: int, uav: UavNow, state: SwarmState, links: Sequence[int], now_ns
     some = " ".join(map(str, links[:_MOST_NAMED])) + (" .." if len(links) > _MOST_NAMED else "")
     charge = uav.charge_percent
     low = charge is not None and charge < _LOW_PERCENT
-    mission = uav.mission + (f" {uav.survivor}" if uav.survivor else "")
+    whom = "person" if is_person(uav.survivor) else str(uav.survivor)
+    mission = uav.mission + (f" {whom}" if uav.survivor else "")
     return [
         str(node),
         uav.role or "-",

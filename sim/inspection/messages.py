@@ -59,9 +59,9 @@ class Stream:
             return 0.0, 0.0
         return sum(entry[1] for entry in whole) / span, sum(entry[2] for entry in whole) / span
 
-    def mean_rates(self) -> tuple[float, float]:
-        """Messages and bytes per second, from the first to the last."""
-        span_s = (self.last_ns - self.first_ns) / S
+    def mean_rates(self, now_ns: int) -> tuple[float, float]:
+        """Messages and bytes per second, of all the time until now."""
+        span_s = now_ns / S
         return (self.count / span_s, self.bytes / span_s) if span_s else (0.0, 0.0)
 
 

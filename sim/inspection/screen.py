@@ -144,7 +144,7 @@ class Inspector(App[None]):
         words, now_ns = self.query_one("#filter", Input).value, self._inspection.now_ns
         rows = []
         for key, stream in self._inspection.messages.found(words):
-            hz, size = stream.rates(now_ns) if self._live else stream.mean_rates()
+            hz, size = stream.rates(now_ns) if self._live else stream.mean_rates(now_ns)
             age_s = f"{max(0, now_ns - stream.last_ns) / S:.1f}"
             cells = [
                 str(key.node),

@@ -18,6 +18,7 @@ from fanet_mw.trace import (
     Refuted,
     RoleChanged,
 )
+from fanet_mw.wire.survivors import called
 
 TOLD: Final = (
     Approaching, Arrived, Collided, Confirmed, Detected, FlightModeChanged, MissionModeChanged, PlacedInside,
@@ -27,19 +28,19 @@ TOLD: Final = (
 
 
 _ABOUT_SURVIVORS: Final[Mapping[type[Any], str]] = {
-    Detected: "hears the phone of survivor {}",
-    Approaching: "turns towards survivor {}",
-    Arrived: "arrives at survivor {}",
-    Confirmed: "confirms survivor {}",
-    PlacedInside: "takes survivor {} to be inside a building",
-    Refuted: "takes back the confirmation of survivor {}",
+    Detected: "hears the phone of {}",
+    Approaching: "turns towards {}",
+    Arrived: "arrives at {}",
+    Confirmed: "confirms {}",
+    PlacedInside: "takes {} to be inside a building",
+    Refuted: "takes back the confirmation of {}",
 }
 
 
 def event_text(record: Record) -> str:
     """The sentence without its subject; empty for what nobody needs to know."""
     if (said := _ABOUT_SURVIVORS.get(type(record))) is not None:
-        return said.format(record.survivor)  # type: ignore[union-attr]  # these kinds have a survivor
+        return said.format(called(record.survivor))  # type: ignore[union-attr]  # these kinds have a survivor
     match record:
         case Collided():
             return f"collides with {f'UAV {record.other}' if record.other else 'the ground or something solid'}"

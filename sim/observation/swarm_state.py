@@ -289,6 +289,13 @@ class SwarmState:
             if one.app == self._app and first_ns <= one.born_ns <= last_ns
         ]
 
+    def bounded(self) -> list[PacketNow]:
+        """The packets with a stated bound, of any application, that had their time to arrive lately."""
+        since_ns = self.t_ns - self.settling_ns - LATELY_NS
+        return [
+            one for one in self.packets.values() if one.bound_ns and since_ns <= one.born_ns <= self.t_ns - one.bound_ns
+        ]
+
     def newest(self, *, by_ns: int) -> tuple[tuple[int, int], PacketNow] | None:
         """The latest packet that was sent by an instant, of those that anybody received."""
         known = [(one.born_ns, name) for name, one in self.packets.items() if one.born_ns <= by_ns and one.got]
@@ -328,7 +335,8 @@ class SwarmState:
         wanted = sum(one.targets for _, one in packets)
         had = sum(min(one.targets, len(one.got)) for _, one in packets)
         delays = sorted(copy.delay_ns for _, one in packets for copy in one.got.values())
-        bounds = [one.bound_ns for _, one in packets if one.bound_ns]
+        bounded = self.bounded()
+        kept = sorted(copy.delay_ns for one in bounded for copy in one.got.values())
         air, late = self.emulator.get("air", {}), self.emulator.get("late", {})
         (since_ns, before_ns), (until_ns, after_ns) = (self._air[0], self._air[-1]) if self._air else ((0, 0), (0, 0))
         return {
@@ -336,7 +344,9 @@ class SwarmState:
             "delay_p50_ms": delays[len(delays) // 2] / MS if delays else None,
             "delay_p95_ms": delays[math.ceil(len(delays) * 0.95) - 1] / MS if delays else None,
             "delay_max_ms": delays[-1] / MS if delays else None,
-            "bound_max_ms": max(bounds) / MS if bounds else None,
+            "bounded_p95_ms": kept[math.ceil(len(kept) * 0.95) - 1] / MS if kept else None,
+            "bounded_max_ms": kept[-1] / MS if kept else None,
+            "bound_max_ms": max(one.bound_ns for one in bounded) / MS if bounded else None,
             "bounds_broken": self.broken,
             "airtime_share": air.get("busy"),
             "airtime_lately_share": (after_ns - before_ns) / (until_ns - since_ns) if until_ns > since_ns else None,

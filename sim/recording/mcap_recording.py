@@ -56,7 +56,8 @@ from sim.recording.drawing import STATUS_COLORS, attitude, link_color, mode_colo
 FRAME: Final = "map"
 _CHUNK_BYTES: Final = 1 << 20
 _METRICS: Final = (
-    "delivered_share", "delay_p50_ms", "delay_p95_ms", "delay_max_ms", "bound_max_ms", "bounds_broken",
+    "delivered_share", "delay_p50_ms", "delay_p95_ms", "delay_max_ms", "bounded_p95_ms", "bounded_max_ms",
+    "bound_max_ms", "bounds_broken",
     "airtime_share", "airtime_lately_share", "late_share", "late_p99_ms", "time_scale", "confirmed", "survivors",
     "coverage_share", "waiting_packets",
 )  # fmt: skip

@@ -148,7 +148,8 @@ def found_rows(run: RunRecords, known: Sequence[Find]) -> Rows:
         if one.at is not None:
             east, north = one.at
             at = to_geodetic(Enu(east, north, 0.0), origin)
-            place, on_earth = f"{east:.0f} E, {north:.0f} N", f"{at.lat_deg:.6f}, {at.lon_deg:.6f}"
+            place = f"{abs(east):.0f} {'E' if east >= 0 else 'W'}, {abs(north):.0f} {'N' if north >= 0 else 'S'}"
+            on_earth = f"{at.lat_deg:.6f}, {at.lon_deg:.6f}"
             if 1 <= one.survivor <= len(run.survivors):
                 truth = run.survivors[one.survivor - 1]
                 off = f"{math.hypot(truth.east - east, truth.north - north):.0f} m"

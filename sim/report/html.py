@@ -22,7 +22,8 @@ th, td { text-align: left; vertical-align: top; padding: .3rem .7rem; border-bot
 td div { min-width: 16rem; margin-bottom: .5rem; }
 th { background: #f3f3f3; } figure { margin: 1rem 0; } figure img { max-width: 100%; height: auto; }
 figcaption { color: #444; font-size: .93rem; } code, pre { background: #f5f5f5; font-size: .9rem; }
-pre { padding: .7rem; overflow-x: auto; } .wide { overflow-x: auto; } .agrees { color: #00543d; font-weight: 600; }
+pre { padding: .7rem; overflow-x: auto; } .wide { overflow-x: auto; } .short { white-space: nowrap; }
+.agrees { color: #00543d; font-weight: 600; }
 .partly { color: #7a4b00; font-weight: 600; } .differs { color: #9c2a00; font-weight: 600; }
 @media (max-width: 40rem) { body { margin: 1rem auto; padding: 0 .8rem; } th, td { padding: .25rem .45rem; } }
 """
@@ -78,6 +79,8 @@ _FIRST: Final = re.compile(r"^(\d*)([-+=.)#>])")
 """The beginning of a line that Markdown would take for that of a list, a heading or a quotation."""
 _INSIDE: Final = re.compile(r"[\\`*_\[\]|~@]|(?<=\])\(|:(?=//)|(?<=www)\.", re.IGNORECASE)
 """The characters inside a line to which Markdown gives a meaning, among them those that make addresses links."""
+_SHORT: Final = 24
+"""A cell of at most so many characters, as a pair of coordinates, is not broken into lines."""
 _VERDICTS: Final = ("agrees", "partly", "differs")
 
 
@@ -111,7 +114,7 @@ def _html(block: Block) -> str:
 
 
 def _cell(text: str) -> str:
-    kind = f' class="{text}"' if text in _VERDICTS else ""
+    kind = f' class="{text}"' if text in _VERDICTS else ' class="short"' if len(text) <= _SHORT else ""
     lines = html.escape(text).split("\n")
     inside = lines[0] if len(lines) == 1 else "".join(f"<div>{line}</div>" for line in lines)
     return f"<td{kind}>{inside}</td>"

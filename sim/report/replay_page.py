@@ -33,6 +33,7 @@ from fanet_mw.trace import (
 )
 from fanet_mw.units import NodeId, S
 from fanet_mw.whole_file import replace_file
+from fanet_mw.wire.survivors import person_id
 from sim.figures import colors
 from sim.observation.event_text import event_text
 from sim.recording.drawing import FALLEN_COLOR, HOMEWARD_COLOR, MODE_COLORS, STATUS_COLORS
@@ -82,6 +83,7 @@ def content(replay: Replay) -> dict[str, Any]:
         "half_m": scenario.world.area_m / 2,
         "post": list(scenario.ground.at_m),
         "reach_m": round(heard_m(scenario.radio)),
+        "persons_from": person_id(0, 0),
         "searches": scenario.mission.survivors > 0 or scenario.mission.search != "none",
         "nodes": nodes,
         "at": _positions(replay, nodes, end_s, step_s),

@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from emulator.channel.propagation import heard_m
+from fanet_mw.trace import Delivered
 from fanet_mw.units import MS, S
-from sim.figures.colors import BLUE, DARK, RED
+from sim.figures.colors import BLUE, DARK, GREEN, ORANGE, RED
 from sim.figures.style import canvas, legend_above
 from sim.report.run_records import RunRecords
 
@@ -35,18 +36,41 @@ class RunPicture(NamedTuple):
     caption: str
 
 
+class _Delays(NamedTuple):
+    """The packets of one application, and what of them was delivered."""
+
+    name: str
+    sent: Mapping[tuple[int, int], int]
+    delivered: Sequence[Delivered]
+    wanted: int
+    """All packets x targets."""
+    color: str
+    bound_color: str
+
+
 def delays(run: RunRecords) -> RunPicture | None:
-    """The distribution of the delays, beside that of the stated bounds."""
-    if not run.delivered:
+    """The distributions of the delays of the load and of reports, each beside that of the stated bounds."""
+    if not run.delivered and not run.reports_delivered:
         return None
     figure, (axes,) = canvas(1, width=6.5)
-    whole = sum(len(run.targets(origin)) for origin, _ in run.sent)
-    bounds = [bound for name, bound in run.bounds.items() if name in run.sent]
-    late_ns = [one.delay_ns for one in run.delivered]
-    unit, unit_ns = ("s", S) if max(late_ns + bounds) >= _LONG_NS else ("ms", MS)
-    _steps(axes, [delay / unit_ns for delay in late_ns], whole, "delay", BLUE, "-")
-    if bounds:
-        _steps(axes, [bound / unit_ns for bound in bounds], len(run.sent), "bound stated by the origin", RED, "--")
+    others = run.scenario.nodes.count - 1
+    loads = [
+        _Delays("load", run.sent, run.delivered, sum(len(run.targets(origin)) for origin, _ in run.sent), BLUE, RED),
+        _Delays("reports", run.reports, run.reports_delivered, len(run.reports) * others, GREEN, ORANGE),
+    ]
+    loads = [load for load in loads if load.delivered]
+    bounds = {load.name: [bound for name, bound in run.bounds.items() if name in load.sent] for load in loads}
+    all_ns = [one.delay_ns for load in loads for one in load.delivered] + [
+        ns for each in bounds.values() for ns in each
+    ]
+    unit, unit_ns = ("s", S) if max(all_ns) >= _LONG_NS else ("ms", MS)
+    for load in loads:
+        of = f" of {load.name}" if len(loads) > 1 else ""
+        _steps(axes, [one.delay_ns / unit_ns for one in load.delivered], load.wanted, f"delay{of}", load.color, "-")
+        if stated := bounds[load.name]:
+            label = f"bound stated{of}" if of else "bound stated by the origin"
+            _steps(axes, [bound / unit_ns for bound in stated], len(load.sent), label, load.bound_color, "--")
+    if len(loads) > 1 or any(bounds.values()):
         legend_above(figure, axes)
     axes.set_xlabel(f"end-to-end delay [{unit}]")
     axes.set_ylabel("share of packets x targets")
@@ -54,7 +78,7 @@ def delays(run: RunRecords) -> RunPicture | None:
     axes.set_ylim(0, 1.05)
     said = (
         "dashed, the share of packets for which the origin stated at most this bound."
-        if bounds
+        if any(bounds.values())
         else "no origin stated a bound."
     )
     return RunPicture(figure, f"The share of packets x targets that were delivered within a delay; {said}")

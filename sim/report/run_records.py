@@ -56,6 +56,9 @@ class RunRecords:
     """The instant at which each packet of the load was generated."""
     bounds: dict[tuple[int, int], int] = field(default_factory=dict)
     delivered: list[Delivered] = field(default_factory=list)
+    reports: dict[tuple[int, int], int] = field(default_factory=dict)
+    """The instant at which each report of a survivor was generated."""
+    reports_delivered: list[Delivered] = field(default_factory=list)
     let_out: list[LetOut] = field(default_factory=list)
     heads: dict[int, int] = field(default_factory=dict)
     """The last head of each node."""
@@ -80,6 +83,8 @@ class RunRecords:
                     self.tracks[record.node].append(record)
                 case Generated() if record.app == "traffic":
                     self.sent[record.node, record.seq] = record.t_ns
+                case Generated() if record.app == "report":
+                    self.reports[record.node, record.seq] = record.t_ns
                 case Delivered() if (record.node, record.origin, record.seq) not in had:
                     had.add((record.node, record.origin, record.seq))
                     self.delivered.append(record)
@@ -95,6 +100,9 @@ class RunRecords:
                 ):
                     self.mission.append(record)
         targets = {node: set(self.targets(node)) for node in self.scenario.node_ids}
+        self.reports_delivered = [
+            one for one in self.delivered if (one.origin, one.seq) in self.reports and one.node != one.origin
+        ]
         self.delivered = [
             one for one in self.delivered if (one.origin, one.seq) in self.sent and one.node in targets[one.origin]
         ]

@@ -36,13 +36,24 @@ def _network(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield "delivered, of packets x targets", percent(summary["pdr"])
     yield "delay, application to application: p50, p95, max", _times(delay, "p50", "p95", "max")
     if bound:
-        yield "packets x targets within the bound stated for each", percent(bound["within_share"])
+        yield from _bounds(bound)
         yield "greatest bound stated, greatest delay under one", _times(bound, "worst_ms", "observed_max_ms")
     if summary["reports"]["generated"]:
         yield "survivor reports delivered, of reports x targets", percent(summary["reports"]["pdr"])
         yield "their delay: p50, p95, max", _times(summary["reports"]["delay_ms"], "p50", "p95", "max")
     yield "time in which the air is busy", percent(air.get("busy"))
     yield "copies received, of copies in range", percent(air.get("pdr"))
+
+
+def _bounds(bound: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """How much had a bound, and how much of that was kept."""
+    within, stated = bound["within_share"], bound.get("stated_share")
+    if not stated or within is None:
+        yield "packets x targets within the bound stated for each", percent(within)
+        return
+    broken = bound.get("violations", 0) + bound.get("never", 0)
+    yield "packets x targets for which a bound was stated", percent(stated)
+    yield "of these, delivered within their bound; broken", f"{percent(min(1.0, within / stated))}; {number(broken)}"
 
 
 def _mission(found: Mapping[str, Any], *, confirms: bool) -> Iterator[tuple[str, str]]:

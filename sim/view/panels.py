@@ -16,6 +16,7 @@ from viser import uplot
 from fanet_mw.bus.messages import CameraImage
 from fanet_mw.mavlink import common
 from fanet_mw.units import MS, NodeId, S
+from fanet_mw.wire.survivors import called
 from sim.figures import colors
 from sim.observation.swarm_state import LATELY_NS, SwarmState, UavNow
 from sim.recording.drawing import FALLEN_COLOR, HOMEWARD_COLOR, MODE_COLORS, STATUS_COLORS
@@ -40,7 +41,7 @@ class Panels:
         self._server, self._scene, self.state = server, scene, scene.state
         self._actions = actions
         self._second = self._image_ns = -1
-        self._history: dict[str, list[tuple[float, float]]] = {}
+        self._history: dict[str, list[tuple[float, ...]]] = {}
         self._follows = False
         self._said = ""
         self.texts: dict[str, str] = {}
@@ -53,7 +54,7 @@ class Panels:
             self._figures = gui.add_html("")
             self._delivered = self._chart("delivered lately [%]", top=105.0)
             self._delays = self._chart("delay of 95 of 100 packets [s]")
-            self._bounds = self._chart("longest bound stated [s]", visible=False)
+            self._bounds = self._chart("delays with a bound: longest, bound [s]", second="bound", visible=False)
             self._spread = gui.add_html("")
         with tabs.add_tab("UAV"):
             nodes = [str(node) for node in scene.state.scenario.node_ids]
@@ -268,7 +269,10 @@ class Panels:
 
     def _event_list(self) -> str:
         events = self.state.latest_events(_EVENTS)
-        rows = "".join(f"<tr><td>{e.t_ns / S:.1f} s</td><td>{html.escape(e.text)}</td></tr>" for e in reversed(events))
+        rows = "".join(
+            f"<tr><td style='white-space:nowrap'>{e.t_ns / S:.1f} s</td><td>{html.escape(e.text)}</td></tr>"
+            for e in reversed(events)
+        )
         return _box(f"<table>{rows}</table>" if rows else "Nothing yet.")
 
     def _spread_text(self, t_ns: int) -> str:
@@ -302,7 +306,7 @@ class Panels:
             *([("role", f"{uav.role or 'none yet'}{f', cluster {uav.cluster}, head {uav.head}' if uav.head else ''}")]
               if self._scene.clustered or uav.role else []),
             ("mode", f"{uav.flight or '-'}; mission {uav.mission or '-'}"
-                     f"{f', survivor {uav.survivor}' if uav.survivor else ''}"),
+                     f"{f', {called(uav.survivor)}' if uav.survivor else ''}"),
             ("place", f"{at.east:.0f} m E, {at.north:.0f} m N, {at.up:.0f} m up; {flies:.1f} m/s"),
             ("battery", "not told" if uav.charge_percent is None else f"{uav.charge_percent} %"),
             ("neighbors", ", ".join(map(str, state.neighbors().get(NodeId(node), ()))) or self._no_neighbor()),
@@ -320,29 +324,31 @@ class Panels:
     def _no_neighbor(self) -> str:
         return "not known: no recording" if self._scene.by_range else "none"
 
-    def _chart(self, title: str, *, top: float | None = None, visible: bool = True) -> Any:  # noqa: ANN401
+    def _chart(self, title: str, *, top: float | None = None, second: str = "", visible: bool = True) -> Any:  # noqa: ANN401
+        """A chart of one figure, or of a `second` one, dashed, beside it."""
         scales = {"x": uplot.Scale(time=False)}
         if top is not None:
             scales["y"] = uplot.Scale(range=(0.0, top))
-        series = (uplot.Series(label="swarm s"), uplot.Series(label=title, stroke="#0072B2", width=2))
+        series = [uplot.Series(label="swarm s"), uplot.Series(label=title, stroke=colors.BLUE, width=2)]
+        if second:
+            series.append(uplot.Series(label=second, stroke=colors.RED, width=2, dash=(6, 4)))
         return self._server.gui.add_uplot(
-            (np.zeros(1), np.zeros(1)), series, title=title, scales=scales, aspect=2.6, visible=visible,
+            tuple(np.zeros(1) for _ in series), series, title=title, scales=scales, aspect=2.6, visible=visible,
             legend=uplot.Legend(show=False), padding=(14, 8, 0, 0),
         )  # fmt: skip
 
     def _plot(self, t_ns: int, metrics: dict[str, float | None]) -> None:
         """Add a point to each chart whose figure is known; a chart without any figure is not shown."""
-        for chart, name, scale in (
-            (self._delivered, "delivered_share", 100.0),
-            (self._delays, "delay_p95_ms", 1e-3),
-            (self._bounds, "bound_max_ms", 1e-3),
+        for chart, names, scale in (
+            (self._delivered, ("delivered_share",), 100.0),
+            (self._delays, ("delay_p95_ms",), 1e-3),
+            (self._bounds, ("bounded_max_ms", "bound_max_ms"), 1e-3),
         ):
-            value, points = metrics[name], self._history.setdefault(name, [])
-            if value is not None:
-                points.append((t_ns / S, value * scale))
+            values, points = [metrics[name] for name in names], self._history.setdefault(names[0], [])
+            if None not in values:
+                points.append((t_ns / S, *(value * scale for value in values if value is not None)))
                 del points[:-_MOST_POINTS]
-                times, values = np.array(points).T
-                chart.data = (times, values)
+                chart.data = tuple(np.array(points).T)
                 if not chart.visible:
                     chart.visible = True
 
@@ -356,15 +362,24 @@ def _figures(state: SwarmState, metrics: dict[str, float | None]) -> str:
         value = metrics[name]
         return "-" if value is None else f"{value:,.0f} ms"
 
-    bound = "no bound stated" if metrics["bound_max_ms"] is None else f"bound {ms('bound_max_ms')}"
     rows = [
         (
             "delivered lately",
             f"<b>{percent('delivered_share')}</b> of packets {state.settling_ns / S:.0f} to "
             f"{(state.settling_ns + LATELY_NS) / S:.0f} s old",
         ),
-        ("delay median, longest", f"{ms('delay_p50_ms')}, {ms('delay_max_ms')}; {bound}"),
-        ("bounds broken", f"{metrics['bounds_broken']:.0f}"),
+        ("delay median, longest", f"{ms('delay_p50_ms')}, {ms('delay_max_ms')}"),
+        *(
+            [
+                (
+                    "with a bound: 95 %, longest",
+                    f"{ms('bounded_p95_ms')}, {ms('bounded_max_ms')}; bound "
+                    f"{ms('bound_max_ms')}, broken {metrics['bounds_broken']:.0f}",
+                )
+            ]
+            if metrics["bound_max_ms"] is not None or metrics["bounds_broken"]
+            else []
+        ),
         *(
             [("air busy", f"{percent('airtime_lately_share')} lately, {percent('airtime_share')} on average")]
             if metrics["airtime_share"] is not None
@@ -427,13 +442,14 @@ def _dot(color: str) -> str:
 def _legend(*, by_cluster: bool, links_known: bool) -> str:
     """What the colors mean."""
     bars = ((colors.BLUE, "90 % received"), (colors.ORANGE, "half"), (colors.RED, "less"))
-    links = ", ".join(f"<span style='color:{color}'>&#9644;</span> {said}" for color, said in bars)
+    links = ", ".join(f"<nobr><span style='color:{color}'>&#9644;</span> {said}</nobr>" for color, said in bars)
     modes = ((MODE_COLORS["search"], "search"), (MODE_COLORS["respond"], "respond"),
              (MODE_COLORS["deploy"], "on its way"), (MODE_COLORS["lost_link"], "hears nobody"),
              (HOMEWARD_COLOR, "homeward"))  # fmt: skip
     found = ("not heard", "detected", "approached", "reached", "confirmed", "mistaken")
-    people = ", ".join(f"{_dot(STATUS_COLORS[status])} {status}" for status in found)
-    uavs = "by cluster, heads larger" if by_cluster else ", ".join(f"{_dot(color)} {said}" for color, said in modes)
+    people = ", ".join(f"<nobr>{_dot(STATUS_COLORS[status])} {status}</nobr>" for status in found)
+    marks = ", ".join(f"<nobr>{_dot(color)} {said}</nobr>" for color, said in modes)
+    uavs = "by cluster, heads larger" if by_cluster else marks
     lines = f"<b>Links</b> in the last 4 s: {links}." if links_known else "<b>Gray lines</b>: in each other's reach."
     return (
         f"{lines}<br><b>UAVs</b>: {uavs}; {_dot(FALLEN_COLOR)} fallen.<br><b>Survivors</b>: {people}; circles are "

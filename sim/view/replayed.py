@@ -13,7 +13,7 @@ from sim.observation.bus_feed import Paced
 from sim.observation.timeline import Timeline
 from sim.view.panels import Panels
 from sim.view.scene import Scene
-from sim.view.server import HOST, close_server, look_over, open_server
+from sim.view.server import HOST, Sight, close_server, look_over, open_server, sight
 
 _RATE_HZ: Final = 10.0
 _SPEEDS: Final = ("0.1", "0.5", "1", "2", "5", "10", "30")
@@ -115,6 +115,12 @@ def serve(folder: Path, *, port: int | None, start_s: float, ended: Sequence[int
         close_server(server)
 
 
+def _step_back(seen: Sight) -> str:
+    """A script for narrow screens: the page is opened again with a camera that is farther away."""
+    eye = ",".join(f"{value:.0f}" for value in seen.eye_for(0.5))
+    return f"if (innerWidth < innerHeight && !location.search) location.search = '?initialCameraPosition={eye}'"
+
+
 def write_html(folder: Path, path: Path, *, tell: Callable[[str], None]) -> None:
     """Write the scene of a run as one file that plays without a network; raises ConfigError."""
     timeline = Timeline(folder)
@@ -132,7 +138,7 @@ def write_html(folder: Path, path: Path, *, tell: Callable[[str], None]) -> None
             scene.write_time(t_ns)
             server.flush()
             serializer.insert_sleep(step_ns / S / FILE_SPEED)
-        page = serializer.as_html()
+        page = serializer.as_html().replace("<head>", f"<head><script>{_step_back(sight(scene))}</script>", 1)
         replace_file(path, page.encode())
     except OSError as error:
         raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error

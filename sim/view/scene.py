@@ -21,7 +21,7 @@ from sim.observation.surroundings import Surroundings, surroundings
 from sim.observation.swarm_state import PacketNow, SwarmState, UavNow
 from sim.recording.drawing import FALLEN_COLOR, STATUS_COLORS, attitude, link_color, mode_color
 from sim.view import shapes
-from sim.view.shapes import Rows, rgb
+from sim.view.shapes import Rows, linear, rgb
 
 CLUSTER_COLORS: Final = ("#0072B2", "#CC79A7", "#009E73", "#E69F00", "#56B4E9", "#7b4fb5", "#a0522d", "#5f9ea0")
 """Colors of clusters, in turn; the color-blind can tell the first five apart."""
@@ -157,7 +157,7 @@ class Scene:
                 np.array([(math.cos(b.yaw / 2), 0, 0, math.sin(b.yaw / 2)) for b in around.boxes], np.float32),
                 np.array([(b.east, b.north, b.roof / 2) for b in around.boxes], np.float32),
                 batched_scales=np.array([(b.width, b.depth, b.roof) for b in around.boxes], np.float32),
-                batched_colors=_BUILDING, flat_shading=True,
+                batched_colors=linear(_BUILDING), flat_shading=True,
             )  # fmt: skip
         for number, outline in enumerate(around.no_fly):
             low = np.array([around.on_ground(Enu(*corner, 0.0), above_m=2.0) for corner in outline], np.float32)
@@ -178,7 +178,7 @@ class Scene:
         places = np.array([uavs[node].position for node in nodes], np.float32)
         turned = np.array([attitude(uavs[node]) for node in nodes], np.float32)
         post = self.state.scenario.post
-        tints = np.array([rgb(FALLEN_COLOR) if node == post else self._tint(uavs[node]) for node in nodes], np.uint8)
+        tints = linear([rgb(FALLEN_COLOR) if node == post else self._tint(uavs[node]) for node in nodes])
         sizes = np.array([self.size_m * (1.7 if uavs[node].role == "head" else 1.0) for node in nodes], np.float32)
         handle = self._handles.get("uavs")
         if handle is None or nodes != self._nodes:
@@ -250,7 +250,7 @@ class Scene:
                 _set(handle, visible=False)
             return
         at = np.array(places, np.float32)
-        paints = np.array(tints, np.uint8)
+        paints = linear(tints)
         if handle is None or len(handle.batched_positions) != len(places):
             vertices, faces = shapes.ring(radius * self.size_m, 0.22 * self.size_m)
             upright = np.tile(np.array([1, 0, 0, 0], np.float32), (len(places), 1))
@@ -391,12 +391,12 @@ class Scene:
             self._handles["survivors"] = self._api.add_batched_meshes_simple(
                 "/survivors", vertices * 0.9 * self.size_m, faces,
                 np.tile(np.array([1, 0, 0, 0], np.float32), (len(places), 1)), np.array(places, np.float32),
-                batched_colors=np.array(tints, np.uint8), lod="off", cast_shadow=False,
+                batched_colors=linear(tints), lod="off", cast_shadow=False,
             )  # fmt: skip
         elif handle is not None:
             _set(handle, visible=bool(places))
             if places:
-                _set(handle, batched_colors=np.array(tints, np.uint8))
+                _set(handle, batched_colors=linear(tints))
         rings, paints = [], []
         for one in state.estimates.values() if self.shown.survivors else ():
             at = self.around.on_ground(Enu(one.east_m, one.north_m, 0.0), above_m=1.0)
@@ -436,7 +436,7 @@ class Scene:
                 _set(handle, visible=False)
             return
         points = np.array(segments, np.float32)
-        paints = np.repeat(np.array(tints, np.uint8)[:, None, :], 2, axis=1)
+        paints = np.repeat(linear(tints)[:, None, :], 2, axis=1)
         if handle is None or handle.points.shape != points.shape:
             self._handles[name] = self._api.add_line_segments(
                 f"/{name}", points, paints, thickness=thickness, thickness_units="screen"

@@ -4,13 +4,14 @@ import contextlib
 import io
 import math
 import socket
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import viser
 
 from fanet_mw.errors import ConfigError
 from sim.view.scene import Scene
+from sim.view.shapes import Rows
 
 HOST: Final = "127.0.0.1"
 DEFAULT_PORT: Final = 8080
@@ -45,18 +46,44 @@ def close_server(server: viser.ViserServer) -> None:
         server.stop()
 
 
+class Sight(NamedTuple):
+    """Where a camera is, and what it looks at [m]."""
+
+    eye: Rows
+    goal: Rows
+    reach: float
+
+    def eye_for(self, aspect: float) -> Rows:
+        """The place from which the whole area is seen on a screen of this width over height."""
+        return self.eye if aspect >= 1 else self.goal + (self.eye - self.goal) / max(0.4, aspect)
+
+
+def sight(scene: Scene) -> Sight:
+    """From the south on the whole area."""
+    uavs = [uav.position for uav in scene.state.uavs.values()]
+    reach = max([scene.around.half_m, *(abs(value) for at in uavs for value in at[:2])])
+    eye, goal = (np.array(at, np.float32) * reach for at in ((-0.3, -1.75, 1.35), (0.05, -0.12, 0.0)))
+    return Sight(eye, goal, reach)
+
+
 def look_over(server: viser.ViserServer, scene: Scene) -> None:
     """Let the camera see the whole area, from the south, far enough for kilometres."""
-    half = scene.around.half_m
-    uavs = [uav.position for uav in scene.state.uavs.values()]
-    reach = max([half, *(abs(value) for at in uavs for value in at[:2])])
+    seen = sight(scene)
+    eye, goal, reach = seen
     camera = server.initial_camera
-    camera.position = (-0.3 * reach, -1.75 * reach, 1.35 * reach)
-    camera.look_at = (0.05 * reach, -0.12 * reach, 0.0)
+    camera.position = eye
+    camera.look_at = goal
     camera.up = (0.0, 0.0, 1.0)
     camera.far = 30.0 * reach
     camera.near = reach / 1000
     camera.fov = math.radians(45)
+
+    def step_back(client: viser.ClientHandle) -> None:
+        """On a narrow screen, a phone's, see the whole area from farther away."""
+        if client.camera.aspect < 1:
+            client.camera.position = seen.eye_for(client.camera.aspect)
+
+    server.on_client_connect(step_back)
 
 
 def _free_port() -> int:

@@ -80,6 +80,13 @@ def rgb(web: str) -> tuple[int, int, int]:
     return int(web[1:3], 16), int(web[3:5], 16), int(web[5:7], 16)
 
 
+def linear(paints: object) -> npt.NDArray[np.uint8]:
+    """Colors as the light that they stand for, sRGB's curve undone: viser takes the colors of batches and of ends of
+    lines for light, and those of single things for colors.
+    """
+    return np.rint(255 * (np.asarray(paints, float) / 255) ** 2.2).astype(np.uint8)
+
+
 def _moved(
     length: float, width: float, height: float, *, turn: float = 0.0, at: tuple[float, float, float] = (0, 0, 0)
 ) -> tuple[Rows, Faces]:

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -14,7 +15,14 @@ import duckdb
 import nbformat
 import pandas as pd
 import pytest
-from foxglove_schemas_protobuf import FrameTransforms_pb2, Log_pb2, PosesInFrame_pb2, SceneUpdate_pb2
+from foxglove_schemas_protobuf import (
+    FrameTransforms_pb2,
+    LocationFix_pb2,
+    Log_pb2,
+    PosesInFrame_pb2,
+    SceneUpdate_pb2,
+)
+from google.protobuf import descriptor_pb2, unknown_fields
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
@@ -158,6 +166,50 @@ def test_a_recording_is_read_back_by_mcap_with_foxgloves_schemas(folder: Path) -
     assert {channel.message_encoding for channel in summary.channels.values()} == {"protobuf"}
     places = {(t_ns, pose) for _, t_ns, message in decoded(path, "/poses") for pose in range(len(message.poses))}
     assert len(places) == 201 * 9
+
+
+def test_every_message_is_whole_by_foxgloves_own_classes_and_the_schema_in_the_file_is_theirs(folder: Path) -> None:
+    kinds = {
+        kind.DESCRIPTOR.full_name: kind
+        for kind in (
+            FrameTransforms_pb2.FrameTransforms, PosesInFrame_pb2.PosesInFrame, LocationFix_pb2.LocationFix,
+            Log_pb2.Log, SceneUpdate_pb2.SceneUpdate,
+        )
+    }  # fmt: skip
+    seen: Counter[str] = Counter()
+    with (folder / "run.mcap").open("rb") as file:
+        for schema, _, message in make_reader(file).iter_messages():
+            assert schema is not None
+            kind = kinds.get(schema.name)
+            if kind is None:
+                assert schema.name.startswith("fanet.")
+                continue
+            read = kind.FromString(message.data)
+            assert not list(unknown_fields.UnknownFieldSet(read)), "no field that they do not know"
+            assert read.SerializeToString(deterministic=True) == message.data
+            if not seen[schema.name]:
+                described = descriptor_pb2.FileDescriptorSet.FromString(schema.data)
+                own = descriptor_pb2.FileDescriptorProto()
+                kind.DESCRIPTOR.file.CopyToProto(own)
+                assert own.message_type[0] in [one.message_type[0] for one in described.file if one.message_type]
+            seen[schema.name] += 1
+    assert seen.keys() == kinds.keys()
+
+
+def test_the_layout_shows_topics_and_fields_that_a_recording_has(folder: Path) -> None:
+    layout = json.loads((ROOT / "sim" / "recording" / "foxglove-layout.json").read_text())
+    panels = layout["configById"]
+    found = {topic: message for topic, _, message in decoded(folder / "run.mcap")}
+    paths = [line["value"] for panel in panels.values() for line in panel.get("paths", ())]
+    assert len(paths) >= 5
+    for path in paths:
+        topic, _, field = path.partition(".")
+        assert field in found[topic].DESCRIPTOR.fields_by_name, path
+    scenes = panels["3D!swarm"]["topics"]
+    assert {topic for topic in found if topic.startswith("/scene/")} == scenes.keys()
+    assert panels["RosOut!log"]["topicToRender"] in found
+    named = re.findall(r'"(?:first|second)": "([^"]+)"', json.dumps(layout["layout"]))
+    assert set(named) == panels.keys()
 
 
 def test_a_recording_has_the_positions_links_and_events_of_the_run(folder: Path) -> None:

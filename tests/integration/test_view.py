@@ -36,7 +36,7 @@ from sim.view.panels import Panels
 from sim.view.replayed import write_html
 from sim.view.scene import CLUSTER_COLORS, Scene
 from sim.view.server import open_server
-from sim.view.shapes import rgb
+from sim.view.shapes import linear, rgb
 
 
 @pytest.fixture(scope="module")
@@ -189,7 +189,8 @@ def test_the_scene_shows_places_clusters_turns_links_and_survivors(
     tints = [tuple(tint) for tint in handle("/uavs").batched_colors.tolist()]
     gray = (136, 136, 136)
     flown = [uav for _, uav in sorted(state.uavs.items())]
-    assert tints == [rgb(CLUSTER_COLORS[uav.cluster]) if uav.cluster >= 0 else gray for uav in flown]
+    shown = [rgb(CLUSTER_COLORS[uav.cluster]) if uav.cluster >= 0 else gray for uav in flown]
+    assert tints == [tuple(linear(color).tolist()) for color in shown]
     owners = [state.uavs[node].position for node in state.owners(t_ns)]
     assert np.allclose(handle("/turn").batched_positions, owners, atol=1e-3)
     assert np.allclose(handle("/faulty").batched_positions, [state.uavs[4].position], atol=1e-3)
@@ -254,7 +255,7 @@ def test_a_swarm_in_rounds_is_colored_by_what_uavs_do_and_its_turns_go_with_the_
     scene.draw(10 * S, all_of_it=True)
     uavs = server.scene.get_handle_by_name("/uavs")
     assert uavs is not None
-    wanted = [rgb(color) for color in (colors.BLUE, colors.RED, colors.GRAY, colors.DARK)]
+    wanted = [tuple(linear(rgb(color)).tolist()) for color in (colors.BLUE, colors.RED, colors.GRAY, colors.DARK)]
     assert [tuple(tint) for tint in uavs.batched_colors[:4].tolist()] == wanted
     found = scene.spreading()
     assert found is not None

@@ -74,7 +74,7 @@ def test_how_sure_is_what_uavs_told_each_other(make_scenario: MakeScenario, tmp_
     run = run_of(make_scenario)
     known = finds.with_estimates(finds.finds(run), finds.told(folder_of(run, taps, tmp_path)))
     rows = {row[0]: row for row in finds.found_rows(run, known).rows}
-    assert rows["survivor 3"][1] == "-95 E, 5 N"
+    assert rows["survivor 3"][1] == "95 W, 5 N"
     assert rows["survivor 3"][3] == "by phone alone, within 20 m (95 %)"
     assert rows["survivor 3"][5:] == ["13 s", "UAV 2", "7 m"]
     assert rows["survivor 1"][3] == "confirmed at close range, within 4 m (95 %)"

@@ -10,7 +10,19 @@ from kit import MakeScenario
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from fanet_mw.trace import Confirmed, Detected, Generated, KnownOnGround, LetOut, Posed, Record, Refuted, RoleChanged
+from fanet_mw.trace import (
+    BoundStated,
+    Confirmed,
+    Delivered,
+    Detected,
+    Generated,
+    KnownOnGround,
+    LetOut,
+    Posed,
+    Record,
+    Refuted,
+    RoleChanged,
+)
 from fanet_mw.units import MS, S
 from sim.report import mission_pictures, run_pictures, run_rows, slot_pictures
 from sim.report.run_records import RunRecords
@@ -220,3 +232,27 @@ def test_turns_that_nodes_claim_are_those_in_which_they_let_packets_out(make_sce
     )
     assert owned == kept > 10
     assert "lot" not in drawing.caption
+
+
+def test_reports_have_a_line_of_their_own_with_their_bounds_beside_the_load(make_scenario: MakeScenario) -> None:
+    scenario = make_scenario(**{"nodes.count": 3, "duration_s": 20})
+    records = [
+        Generated(S, 1, 1, "traffic", 100), Generated(2 * S, 2, 1, "report", 50),
+        BoundStated(2 * S, 2, 1, 900 * MS), Delivered(3 * S, 2, 1, 1, 2 * S, 1), Delivered(4 * S, 3, 1, 1, 3 * S, 1),
+        Delivered(2 * S + 300 * MS, 1, 2, 1, 300 * MS, 1), Delivered(2 * S + 700 * MS, 3, 2, 1, 700 * MS, 2),
+    ]  # fmt: skip
+    drawing = run_pictures.delays(run_of(scenario, *records))
+    assert drawing is not None
+    assert drawn(drawing.figure) == {
+        "delay of load": [(2000, 0.5), (3000, 1)], "delay of reports": [(300, 0.5), (700, 1)],
+        "bound stated of reports": [(900, 1)],
+    }  # fmt: skip
+    assert legend(drawing.figure) == [*drawn(drawing.figure)]
+
+
+def test_bounds_are_kept_of_those_that_were_stated() -> None:
+    bound = {"within_share": 0.1, "stated_share": 0.125, "violations": 3, "never": 4}
+    assert list(run_rows._bounds(bound)) == [
+        ("packets x targets for which a bound was stated", "12.5 %"),
+        ("of these, delivered within their bound; broken", "80 %; 7"),
+    ]

@@ -407,6 +407,28 @@ def test_what_an_operator_must_know_is_said_once_somebody_listens() -> None:
     assert said == [(5, "Survivor 9 confirmed"), (5, "Collision warning: UAV 2")]
 
 
+def test_survivors_are_shown_in_turn_as_something_on_the_surface_until_they_are_refuted() -> None:
+    from fanet_mw.trace import Confirmed, PlacedInside, Refuted
+
+    bench = Bench()
+
+    def shown(seconds: int) -> list[tuple[str, int, int]]:
+        before = bench.now_ns
+        bench.run(seconds)
+        frames = [bench.streams.telemetry(t_ns) for t_ns in range(before, bench.now_ns, S // 10)]
+        told = [one for one in mavlink.decode(b"".join(frames)) if one.get_type() == "ADSB_VEHICLE"]
+        assert all(abs(one.altitude) < 5 and one.emitter_type == 17 and one.tslc == 0 for one in told)
+        return [(one.callsign, one.lat, one.lon) for one in told]
+
+    assert shown(3) == []
+    bench.control.on_record(Confirmed(0, 1, 9, 120.0, -40.0), bench.now_ns)
+    bench.control.on_record(PlacedInside(0, 1, 12, 0.0, 60.0), bench.now_ns)
+    nine, twelve = ("FOUND9", *degrees(120.0, -40.0)), ("FOUND12", *degrees(0.0, 60.0))
+    assert shown(6)[:4] in ([nine, twelve] * 2, [twelve, nine] * 2)
+    bench.control.on_record(Refuted(0, 1, 9, 120.0, -40.0), bench.now_ns)
+    assert set(shown(4)) == {twelve}
+
+
 # --- parameters, files, and what else is asked --------------------------------------------------------------------
 
 

@@ -34,7 +34,7 @@ from sim.observation.event_text import event_line
 from sim.observation.swarm_state import Event, SwarmState
 from sim.results.replay import Replay
 from sim.results.run_folder import RunFolder
-from sim.world.mobility.layout import positions
+from sim.world.environment.layout import positions
 
 _EVERY_NS: Final = 10 * S
 _TURNS: Final = ("slots", "turns")

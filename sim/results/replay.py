@@ -33,8 +33,8 @@ from fanet_mw.units import Enu, NodeId, S
 from sim.results.mission import OverflownCells, mission
 from sim.results.run_folder import RunFolder
 from sim.results.survivor_states import SurvivorState, SurvivorStates
+from sim.world.environment.layout import positions
 from sim.world.environment.survivors import place
-from sim.world.mobility.layout import positions
 
 R = TypeVar("R", FlightModeChanged, MissionModeChanged, Planned, RoleChanged)
 

@@ -26,7 +26,7 @@ from fanet_mw.trace import (
 from fanet_mw.units import S
 from sim.report import replay_page
 from sim.results.replay import Replay
-from sim.world.mobility.layout import positions
+from sim.world.environment.layout import positions
 
 KEYS = {
     "nodes.count": 2, "nodes.altitude_m": 60, "world.area_m": 600, "duration_s": 30, "mission.survivors": 3,

@@ -5,11 +5,10 @@ The parts make all decisions; this file only passes inputs and outputs to their 
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from agents.applications.collision_avoidance import CollisionAvoidance
-from agents.applications.telemetry import Telemetry
-from agents.applications.telemetry_streams import TelemetryStreams
+from agents.applications.telemetry_streams import Telemetry, TelemetryStreams
 from agents.applications.traffic import Load
 from agents.ground.operator_relay import OperatorRelay
 from agents.ground.post import Post
@@ -21,7 +20,6 @@ from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.onboard import Onboard
 from agents.positioning.dead_reckoning import DeadReckoning
 from agents.positioning.steady_fix import SteadyFix
-from agents.setpoints import Setpoints
 from fanet_mw.actor import Actor
 from fanet_mw.application import Application, Course
 from fanet_mw.bus.messages import (
@@ -31,6 +29,8 @@ from fanet_mw.bus.messages import (
     Message,
     Reception,
     SensorReading,
+    Setpoint,
+    SetpointKind,
     TxStatus,
 )
 from fanet_mw.bus.topics import Topics
@@ -43,6 +43,44 @@ from fanet_mw.orders import Order
 from fanet_mw.routing import make_protocol
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, earliest, seconds_to_ns
+
+_REPEATS: Final = 3
+"""How often a setpoint is repeated within the time after which a silent computer counts as dead."""
+
+
+class Setpoints:
+    """Makes the setpoints of one UAV, and repeats the last one, so that the flight controller knows that the computer
+    is alive. A velocity is never repeated; the application that chose it has to choose one again.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._repeat_ns = seconds_to_ns(scenario.mobility.return_after_s) // _REPEATS
+        """The age at which the last setpoint is repeated; 0: never."""
+        self._last: Setpoint | None = None
+
+    def of(self, course: Course, now_ns: int) -> Setpoint:
+        """The setpoint for a course."""
+        setpoint = Setpoint(now_ns, course.position, course.speed_m_s)
+        if course.velocity is not None:
+            setpoint = setpoint._replace(kind=SetpointKind.VELOCITY, velocity=course.velocity)
+        elif course.land:
+            setpoint = setpoint._replace(kind=SetpointKind.LAND)
+        elif course.take_off:
+            setpoint = setpoint._replace(kind=SetpointKind.TAKEOFF)
+        elif course.go_home:
+            setpoint = setpoint._replace(kind=SetpointKind.RETURN)
+        self._last = setpoint
+        return setpoint
+
+    def repeated(self, now_ns: int) -> Setpoint | None:
+        """The last setpoint once more, if it is time for that."""
+        last = self._last
+        if not self._repeat_ns or last is None or last.kind is SetpointKind.VELOCITY:
+            return None
+        if now_ns - last.t_ns < self._repeat_ns:
+            return None
+        self._last = last._replace(t_ns=now_ns)
+        return self._last
 
 
 class NodeState(NamedTuple):

@@ -10,12 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from emulator.channel.fading import Waves
+from emulator.channel.propagation import Blocked, LinkTable, gains_dbi, pair_codes
+from emulator.channel.shadowing import Shadowing
 from emulator.faults import Faults
 from emulator.kernel import carrier_sense, kernel
 from emulator.kernel import state as s
 from emulator.kernel_arrays import MOST_ASKED, arrays_of
 from emulator.link_counters import LinkCounters
-from emulator.placement import Placement
 from fanet_mw.airtime import OVERHEAD_BYTES, airtime_ns
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.scenario import Scenario
@@ -25,6 +26,46 @@ _ROW: Final = struct.Struct("=6q")
 _pack, _unpack, _ROW_BYTES = _ROW.pack_into, _ROW.iter_unpack, _ROW.size
 _ASKED_N, _OUT_N = s.ASKED_N, s.OUT_N
 Rows = list[tuple[int, ...]]
+
+
+class Placement:
+    """The positions and obstructions in force; at first no station is within reach of another."""
+
+    def __init__(self, scenario: Scenario, *, stations: int) -> None:
+        self._radio = scenario.radio
+        self._gains = gains_dbi(scenario)
+        self._shadowing = Shadowing(scenario.radio, seed=scenario.seed) if scenario.radio.shadowing_db else None
+        self.at = np.full((stations, 3), np.inf)
+        """The positions [m]."""
+        self._blocked = Blocked(np.zeros(0, np.int64), np.zeros(0))
+        self._sight_changed = False
+        """True if the obstructions have changed since the stations were placed."""
+
+    def obstruct(self, pairs: npt.NDArray[np.int64], losses_db: npt.NDArray[np.float64]) -> None:
+        """Set the pairs of stations [n, 2] with something solid between them, and the loss of each, if that is known.
+
+        It takes effect at the next `place`.
+        """
+        codes, first = np.unique(pair_codes(pairs, len(self.at)), return_index=True)
+        blocked = Blocked(codes, losses_db[first] if len(losses_db) else losses_db)
+        changed = not all(map(np.array_equal, blocked, self._blocked))
+        self._sight_changed = self._sight_changed or changed
+        self._blocked = blocked
+
+    def place(self, at: npt.NDArray[np.float64]) -> bool:
+        """Take over new positions; returns False if the links stay as they are."""
+        if np.array_equal(at, self.at) and not self._sight_changed:
+            return False
+        self._sight_changed = False
+        self.at = at
+        return True
+
+    def links(self, *, spare: int) -> LinkTable:
+        """The links between the stations, with room for `spare` more."""
+        at = np.ascontiguousarray(self.at)
+        return LinkTable(
+            at, self._radio, spare=spare, shadowing=self._shadowing, blocked=self._blocked, gains=self._gains
+        )
 
 
 class KernelInterface:

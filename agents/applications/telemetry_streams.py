@@ -13,7 +13,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from fanet_mw.bus.messages import Battery, Gps
+from fanet_mw.application import Application, AppPort
+from fanet_mw.bus.messages import Battery, Gps, SensorReading
 from fanet_mw.flavors import Mode
 from fanet_mw.mavlink import AUTOPILOT_COMPONENT, ORIGIN, Attitude, BatteryState, Encoder, Geodetic, common
 from fanet_mw.units import MS, STILL, Enu, NodeId, S
@@ -315,3 +316,28 @@ class TelemetryStreams:
     def _gps_raw(self, encoder: Encoder, now_ns: int) -> bytes:
         fix_ns = now_ns if self._fix_ns is None else self._fix_ns
         return encoder.gps_raw(self.position, self.velocity, has_fix=self._fix_ns is not None, fix_ns=fix_ns)
+
+
+class Telemetry(Application):
+    """Sends the telemetry frames of one UAV at their rates."""
+
+    name: Final = "telemetry"
+
+    def __init__(self, streams: TelemetryStreams) -> None:
+        self._streams = streams
+
+    def start(self, port: AppPort, now_ns: int) -> None:
+        super().start(port, now_ns)
+        self._streams.start(now_ns)
+
+    def on_sensor(self, reading: SensorReading, now_ns: int) -> None:
+        if isinstance(reading, Battery):
+            self._streams.on_battery(reading)
+
+    def wake(self, now_ns: int) -> None:
+        frames = self._streams.telemetry(now_ns)
+        if frames:
+            self.port.tap(frames)
+
+    def next_wake_ns(self) -> int | None:
+        return self._streams.next_due_ns()

@@ -5,17 +5,19 @@ finds    reach it as floods where a chain of UAVs does, and in the hellos of UAV
 orders   are flooded several times, and said in its hellos, all in turn; UAVs tell them on (`agents/mission/orders.py`)
 """
 
+import math
 from typing import Final
 
-from agents.ground.known_uavs import KnownUavs
 from agents.mission.finding.known_survivors import KnownSurvivors
 from agents.mission.finding.plausibility import Plausibility
 from agents.mission.orders import record_of
+from agents.mission.search_formation.formation_planner import pattern_of
 from agents.mission.searcher import phone_model
 from fanet_mw.application import Application, Received
 from fanet_mw.node.reader import decoded
 from fanet_mw.orders import Order, is_told, wrong
 from fanet_mw.scenario import Scenario
+from fanet_mw.serial_number import newer
 from fanet_mw.trace import KnownOnGround
 from fanet_mw.units import US, S, seconds_to_ns
 from fanet_mw.wire import BIDS, COVERED, FOUND, ORDER, PRIORITY_SAFETY, ROLL, SEARCH, STATUS, SURVIVOR
@@ -31,6 +33,42 @@ _AGAIN_NS: Final = 5 * S
 _IN_HELLO: Final = 2
 """The greatest number of orders in one hello."""
 _MOST_ORDERS: Final = 1000
+
+
+_REVISION_BITS = 16
+
+
+class KnownUavs:
+    """The latest status of each UAV, and the newest plan."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._reach_m = scenario.radio.range_m
+        self._statuses: dict[int, SearchStatus] = {}
+        self._plan: Search | None = None
+
+    def on_status(self, status: SearchStatus) -> None:
+        """A UAV states where it is."""
+        before = self._statuses.get(status.node)
+        if before is None or status.t_us > before.t_us:
+            self._statuses[status.node] = status
+
+    def on_plan(self, plan: Search) -> None:
+        """A plan was received."""
+        if self._plan is None or newer(plan.revision, self._plan.revision, bits=_REVISION_BITS):
+            self._plan = plan
+
+    def nearest(self, east_m: float, north_m: float) -> int | None:
+        """The nearest follower that takes part in the search, otherwise the nearest UAV that does; None without any."""
+        followers: set[int] = set()
+        if self._plan is not None:
+            places = pattern_of(self._plan, reach_m=self._reach_m).followers
+            followers = {self._plan.nodes[place] for place in places if place < len(self._plan.nodes)}
+        found = [
+            (node not in followers, math.hypot(at.position.east - east_m, at.position.north - north_m), node)
+            for node, at in self._statuses.items()
+            if at.charge > 0
+        ]
+        return min(found)[2] if found else None
 
 
 class Post(Application):

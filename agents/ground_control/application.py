@@ -15,7 +15,6 @@ from typing import Any, Final
 from agents.applications.telemetry_streams import Flown, Link, TelemetryStreams
 from agents.ground_control import settings as names
 from agents.ground_control.commands import Commands
-from agents.ground_control.height_reference import HeightReference
 from agents.ground_control.pilot import Pilot
 from agents.ground_control.plan_transfer import Peer, PlanTransfer
 from agents.ground_control.plans import Ground, Item, Kind, RefusedError, fence_of, rally_of, step_of
@@ -70,6 +69,35 @@ _FTP_OPENS: Final = (3, 4, 5, 14, 15)
 """ListDirectory, the ways to open or read, and the checksum: of files, of which there are none."""
 _POSITION_IGNORED: Final = 0b111
 _VELOCITY_IGNORED: Final = 0b111000
+
+
+_WEIGHT: Final = 0.1
+_STILL_M_S: Final = 0.4
+"""What climbs or sinks faster than that does not stand; the noise of GPS velocities is a tenth of it."""
+_FIXES: Final = 10
+"""A UAV that is in the air from the start is compared with its start for so many fixes."""
+
+
+class HeightReference:
+    """By how much GPS is wrong in height, as a flight controller finds out where it starts: its height there is known.
+
+    The error is metres, and nearly the same for half an hour.
+    """
+
+    def __init__(self, start_m: float) -> None:
+        self._start_m = start_m
+        self._off_m = 0.0
+        self._count = 0
+        self._has_flown = False
+
+    def off_m(self, fix: Gps, *, stands: bool) -> float:
+        """The error, after another fix; `stands`: the UAV is not known to have taken off."""
+        moves = abs(fix.velocity.up) > _STILL_M_S
+        self._has_flown |= moves or (not stands and self._count >= _FIXES)
+        if not self._has_flown:
+            self._count += 1
+            self._off_m += max(_WEIGHT, 1 / self._count) * (fix.position.up - self._start_m - self._off_m)
+        return self._off_m
 
 
 class GroundControl(Application):

@@ -35,10 +35,9 @@ from agents.mission.flight.take_off import TakeOff, take_off_ns
 from agents.mission.flight.velocity_choice import VelocityChoice
 from agents.mission.mode_record import ModeRecord
 from agents.mission.navigation.known_obstacles import KnownObstacles
-from agents.mission.navigation.neighbor_motions import NeighborMotions
+from agents.mission.navigation.neighbor_motions import NeighborMotions, RadarWatch
 from agents.mission.navigation.onboard_map import OnboardMap
 from agents.mission.navigation.own_motion import OwnMotion
-from agents.mission.navigation.radar_watch import RadarWatch
 from agents.mission.orders import KnownOrders, record_of
 from agents.mission.outbox import Outbox
 from agents.mission.search_formation.formation_place import FormationPlace

@@ -1,5 +1,4 @@
-"""Bit error rates under noise and interference: DSSS DBPSK, DQPSK, CCK at 5.5 and 11 Mb/s (OFDM: `ofdm_error_rate`,
-`ofdm_error_tables`).
+"""Bit error rates under noise and interference: DSSS DBPSK, DQPSK, CCK at 5.5 and 11 Mb/s (OFDM: `ofdm_error_rate`).
 
 DBPSK     1/2 exp(-Eb/N0)                                               Proakis, Digital Communications, 4th ed., 5.2.8
 DQPSK     (1+sqrt2)/sqrt(8 pi sqrt2 x) exp(-(2-sqrt2) x), x = Eb/N0        (tight approximation of the same section)
@@ -15,8 +14,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from emulator.channel.ofdm_error_rate import bit_error
-from emulator.channel.ofdm_error_tables import SHORT_BYTES, TABLED_MBPS, log_success
+from emulator.channel.ofdm_error_rate import SHORT_BYTES, TABLED_MBPS, bit_error, log_success
 from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
 from fanet_mw.airtime import is_ofdm
 from fanet_mw.scenario.tables.radio import DSSS_BANDWIDTH_HZ

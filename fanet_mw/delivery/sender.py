@@ -5,7 +5,7 @@
          -> its lifetime is over -> expired: the application is told which nodes have not confirmed it
 
 The wait for a receipt follows from earlier round trips (RFC 6298). The pieces under way of all messages together are
-bounded by a window (`send_window.py`), in which repetitions hold up no message that was not sent yet. Memory is
+bounded by a window (`SendWindow`), in which repetitions hold up no message that was not sent yet. Memory is
 bounded, too: the caller asks `full` first, and refuses a message that does not fit.
 """
 
@@ -17,7 +17,6 @@ from typing import Final, NamedTuple
 
 from fanet_mw.delivery.fragmentation import FEW, MOST_NAMED, Fragmentation, Fragments
 from fanet_mw.delivery.retransmission_timeout import RetransmissionTimeout
-from fanet_mw.delivery.send_window import SendWindow
 from fanet_mw.units import BROADCAST, MS, US, NodeId
 from fanet_mw.wire import application_message
 from fanet_mw.wire.application_message import DELIVERED, Head, Receipt
@@ -29,6 +28,57 @@ EXPIRED: Final = -1
 """The outcome of a message whose lifetime is over; all other outcomes are those of receipts."""
 _MOST_DOUBLINGS: Final = 3
 _MOST_FLOWS: Final = 1024
+
+
+_MOST: Final = 32
+"""The greatest number of pieces under way: ten kilobytes and more, but no burst that fills all queues."""
+_LEAST: Final = 2
+
+
+class SendWindow:
+    """Which confirmed messages may be sent now, so that what is under way never fills all queues.
+
+        first transmissions    the most urgent first, then the oldest
+        repetitions            likewise, but those that were repeated least come before all others of their priority
+
+    Either kind may have as many pieces under way as the window says, so a target that is gone holds up no others. The
+    window is halved when something must be sent again, and grows by one whenever a target has all of a message (RFC
+    5681).
+    """
+
+    def __init__(self) -> None:
+        self._pieces = _MOST
+        self._waiting: tuple[list[tuple[int, int, int]], ...] = ([], [])
+        """Heaps of (priority, times sent, number) of the messages that were never sent, and of all others."""
+        self._under_way = [0, 0]
+        """The number of pieces of first transmissions and of repetitions for which receipts are awaited."""
+
+    def wait(self, number: int, *, priority: int, rounds: int) -> None:
+        """A message that was sent `rounds` times waits to be sent."""
+        heapq.heappush(self._waiting[rounds > 0], (priority, rounds, number))
+
+    def next(self) -> int | None:
+        """Take out the message to send now; None if there is none, or no room."""
+        for waiting, under_way in zip(self._waiting, self._under_way, strict=True):
+            if waiting and under_way < self._pieces:
+                return heapq.heappop(waiting)[2]
+        return None
+
+    def sent(self, pieces: int, *, rounds: int) -> None:
+        """A message of so many pieces was sent for the `rounds`-th time, and its receipts are awaited."""
+        self._under_way[rounds > 1] += pieces
+
+    def over(self, pieces: int, *, rounds: int) -> None:
+        """Receipts of what was said by `sent` are awaited no longer."""
+        self._under_way[rounds > 1] -= pieces
+
+    def widen(self) -> None:
+        """A target has all of a message."""
+        self._pieces = min(_MOST, self._pieces + 1)
+
+    def halve(self) -> None:
+        """A message must be sent again."""
+        self._pieces = max(_LEAST, self._pieces // 2)
 
 
 class PieceToSend(NamedTuple):

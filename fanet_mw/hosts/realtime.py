@@ -27,9 +27,8 @@ from fanet_mw.hosts.bus import JOIN_PATIENCE_S, Bus, HostBus, config_of
 from fanet_mw.hosts.clock import START_PATIENCE_S, ClockListener, SwarmClock
 from fanet_mw.hosts.inbox import Inbox
 from fanet_mw.hosts.presence import few
-from fanet_mw.hosts.process_cost import ProcessCost
 from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
-from fanet_mw.hosts.wake_lateness import WakeLateness
+from fanet_mw.hosts.wake_lateness import ProcessCost, WakeLateness
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.fingerprint import as_json, differences, fingerprint
 from fanet_mw.trace import Record

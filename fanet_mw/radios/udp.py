@@ -13,15 +13,16 @@ Nor is the true end of a frame: `end_ns` is the instant at which it was read fro
 import asyncio
 import secrets
 import socket
+import struct
 from collections import Counter
 from collections.abc import Callable
-from typing import Any, Final, NamedTuple
+from enum import IntEnum
+from typing import Any, Final, NamedTuple, Self
 
 from fanet_mw.bus.messages import Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.errors import BusError, DropReason, MalformedFrameError
 from fanet_mw.node.duplicates import DuplicateSet, key_of
-from fanet_mw.radios.datagram import SEQ_MASK, Datagram, DatagramKind
-from fanet_mw.units import BROADCAST, MS, NodeId, S
+from fanet_mw.units import BROADCAST, MAX_NODES, MS, NodeId, S
 
 PORT: Final = 14560
 ATTEMPTS: Final = 4
@@ -34,6 +35,50 @@ MOVED_NS: Final = 10 * S
 """A node may change its address when it has been silent at the former one for this long."""
 MOST_ADDRESSES: Final = 4096
 Address = tuple[str, int]
+
+
+_LAYOUT: Final = struct.Struct("!2sBBHHI")
+_MAGIC: Final = b"FN"
+_VERSION: Final = 1
+SEQ_MASK: Final = 0xFFFF_FFFF
+
+
+class DatagramKind(IntEnum):
+    """The kind of a datagram."""
+
+    FRAME = 0
+    ACK = 1
+
+
+class Datagram(NamedTuple):
+    """The payload of one UDP packet: "FN" | version | kind | source | destination | sequence number | frame.
+
+    The sequence number grows by one with each request, from a random number at the start of the radio.
+    """
+
+    kind: DatagramKind
+    src: NodeId
+    dst: NodeId
+    seq: int
+    frame: bytes = b""
+
+    def encode(self) -> bytes:
+        return _LAYOUT.pack(_MAGIC, _VERSION, self.kind, self.src, self.dst, self.seq & SEQ_MASK) + self.frame
+
+    @classmethod
+    def decode(cls, data: bytes) -> Self:
+        """Decode a UDP payload; raises MalformedFrameError."""
+        if len(data) < _LAYOUT.size:
+            raise MalformedFrameError(f"datagram of {len(data)} bytes")
+        magic, version, kind, src, dst, seq = _LAYOUT.unpack_from(data)
+        if magic != _MAGIC or version != _VERSION or kind > DatagramKind.ACK:
+            raise MalformedFrameError(f"datagram of version {version}, kind {kind}")
+        if not 1 <= src <= MAX_NODES or not (1 <= dst <= MAX_NODES or dst == BROADCAST):
+            raise MalformedFrameError(f"datagram from {src} to {dst}")
+        frame = data[_LAYOUT.size :]
+        if bool(frame) == (kind == DatagramKind.ACK):
+            raise MalformedFrameError(f"datagram of kind {kind} with {len(frame)} bytes")
+        return cls(DatagramKind(kind), NodeId(src), NodeId(dst), seq, frame)
 
 
 class _KnownAddress(NamedTuple):

@@ -36,6 +36,9 @@ app = App(
 )
 
 
+_Node = Annotated[int, Parameter(help="Node id.")]
+
+
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Life:
@@ -113,41 +116,20 @@ def jam(
 
 
 @app.command
-def cut(node: int, *, life: Life = Life(), where: SwarmFlags = SwarmFlags()) -> int:
-    """Switch a node's radio off.
-
-    Parameters
-    ----------
-    node
-        Node id.
-
-    """
+def cut(node: _Node, *, life: Life = Life(), where: SwarmFlags = SwarmFlags()) -> int:
+    """Switch a node's radio off."""
     return _do(Cut(life.label or node_label(node), NodeId(node), life.for_ns), where)
 
 
 @app.command
-def mute(node: int, *, life: Life = Life(), where: SwarmFlags = SwarmFlags()) -> int:
-    """Let a node's radio receive, and send nothing.
-
-    Parameters
-    ----------
-    node
-        Node id.
-
-    """
+def mute(node: _Node, *, life: Life = Life(), where: SwarmFlags = SwarmFlags()) -> int:
+    """Let a node's radio receive, and send nothing."""
     return _do(Cut(life.label or node_label(node), NodeId(node), life.for_ns, hears=True), where)
 
 
 @app.command
-def deaf(node: int, *, life: Life = Life(), where: SwarmFlags = SwarmFlags()) -> int:
-    """Let a node's radio send, and receive nothing.
-
-    Parameters
-    ----------
-    node
-        Node id.
-
-    """
+def deaf(node: _Node, *, life: Life = Life(), where: SwarmFlags = SwarmFlags()) -> int:
+    """Let a node's radio send, and receive nothing."""
     return _do(Cut(life.label or node_label(node), NodeId(node), life.for_ns, sends=True), where)
 
 
@@ -180,26 +162,17 @@ def partition(
 
 
 @app.command
-def crash(node: int, *, where: SwarmFlags = SwarmFlags()) -> int:
-    """Let a UAV's motors stop for good; its radio dies on the ground.
-
-    Parameters
-    ----------
-    node
-        Node id.
-
-    """
+def crash(node: _Node, *, where: SwarmFlags = SwarmFlags()) -> int:
+    """Let a UAV's motors stop for good; its radio dies on the ground."""
     return _do(Mishap(node_label(node), NodeId(node), MishapKind.CRASH, STILL), where)
 
 
 @app.command
-def battery(node: int, charge: float, *, where: SwarmFlags = SwarmFlags()) -> int:
+def battery(node: _Node, charge: float, *, where: SwarmFlags = SwarmFlags()) -> int:
     """Take charge from a UAV's battery.
 
     Parameters
     ----------
-    node
-        Node id.
     charge
         Share of the capacity that is left, at most.
 
@@ -209,7 +182,7 @@ def battery(node: int, charge: float, *, where: SwarmFlags = SwarmFlags()) -> in
 
 @app.command
 def gps(
-    node: int,
+    node: _Node,
     *,
     offset_m: tuple[float, float, float] | None = None,
     life: Life = Life(),
@@ -219,8 +192,6 @@ def gps(
 
     Parameters
     ----------
-    node
-        Node id.
     offset_m
         By how much it is wrong: east, north, up [m]; by default it gives no position.
 

@@ -38,6 +38,8 @@ def inspect(what: str | None = None, *, where: SwarmFlags = SwarmFlags()) -> int
 
 
 _Count = Annotated[int | None, Parameter(validator=Number(gte=1))]
+_Lines = Annotated[_Count, Parameter(help="End after this many lines; by default when interrupted.")]
+_Topic = Annotated[str, Parameter(help="The topic, whole or without fanet/SWARM/; * stands for any part.")]
 
 
 @topic.command(name="list")
@@ -58,13 +60,11 @@ def list_(
 
 
 @topic.command
-def echo(name: str, *, count: _Count = None, where: SwarmFlags = SwarmFlags()) -> int:
+def echo(name: _Topic, *, count: _Count = None, where: SwarmFlags = SwarmFlags()) -> int:
     """Print what is said on a topic, one JSON object a line; MAVLink is decoded.
 
     Parameters
     ----------
-    name
-        The topic, whole or without fanet/SWARM/; * stands for any part.
     count
         End after this many messages; by default when interrupted.
 
@@ -75,34 +75,16 @@ def echo(name: str, *, count: _Count = None, where: SwarmFlags = SwarmFlags()) -
 
 
 @topic.command
-def hz(name: str, *, count: _Count = None, where: SwarmFlags = SwarmFlags()) -> int:
-    """Print once a second how often a topic is put on: mean, least and greatest interval, standard deviation.
-
-    Parameters
-    ----------
-    name
-        The topic, whole or without fanet/SWARM/; * stands for any part.
-    count
-        End after this many lines; by default when interrupted.
-
-    """
+def hz(name: _Topic, *, count: _Lines = None, where: SwarmFlags = SwarmFlags()) -> int:
+    """Print once a second how often a topic is put on: mean, least and greatest interval, standard deviation."""
     from sim.inspection.topics import show_rate
 
     return show_rate(*where.located(), name=name, count=count, zenoh_config=where.zenoh_config, of_bytes=False)
 
 
 @topic.command
-def bw(name: str, *, count: _Count = None, where: SwarmFlags = SwarmFlags()) -> int:
-    """Print once a second how many bytes a topic carries: mean, least and greatest put.
-
-    Parameters
-    ----------
-    name
-        The topic, whole or without fanet/SWARM/; * stands for any part.
-    count
-        End after this many lines; by default when interrupted.
-
-    """
+def bw(name: _Topic, *, count: _Lines = None, where: SwarmFlags = SwarmFlags()) -> int:
+    """Print once a second how many bytes a topic carries: mean, least and greatest put."""
     from sim.inspection.topics import show_rate
 
     return show_rate(*where.located(), name=name, count=count, zenoh_config=where.zenoh_config, of_bytes=True)

@@ -50,7 +50,7 @@ def record(
     """
     from fanet_mw.hosts import interrupts
     from sim.observation.bus_feed import BusFeed
-    from sim.recording.recorder import record as carry_out
+    from sim.recording.from_result import record as carry_out
 
     if file.suffix != ".mcap":
         raise ConfigError(f"{file}: must be a file whose name ends in .mcap")

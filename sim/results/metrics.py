@@ -10,13 +10,18 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
+
 from fanet_mw.errors import DropReason
 from fanet_mw.trace import (
+    ConflictForeseen,
     DeadlineLost,
     DeadlineMet,
+    Delivered,
     Dropped,
+    Warned,
 )
-from fanet_mw.units import S
+from fanet_mw.units import MS, S
 from sim.records.record_kinds import records_of
 from sim.results import delays, ledger, validity
 from sim.results.bounds import against_bounds, likely
@@ -27,7 +32,6 @@ from sim.results.mission import mission
 from sim.results.outcome import Outcome
 from sim.results.packets import OTHER_APPS, AppPackets, packets_of, targets_by_source
 from sim.results.reachability import reachability
-from sim.results.separation import separation
 from sim.scenarios.notes import notes
 
 
@@ -194,3 +198,28 @@ def _admission(outcome: Outcome) -> dict[str, Any]:
         "met": sum(isinstance(record, DeadlineMet) for record in said),
         "nodes_without": sum(not met for met in last.values()),
     }
+
+
+def separation(outcome: Outcome) -> dict[str, Any]:
+    """The true separation, and the conflicts that UAVs foresaw; empty if separation was not watched."""
+    seen = outcome.reports.get("world", {}).get("separation")
+    if not seen:
+        return {}
+    foreseen = [*records_of(outcome.records, ConflictForeseen)]
+    about = {(r.node, r.seq): r.other for r in records_of(outcome.records, Warned)}
+    delivered = records_of(outcome.records, Delivered) if about else ()
+    delays_ms = [r.delay_ns / MS for r in delivered if about.get((r.origin, r.seq)) == r.node]
+    ahead_s = sorted(r.closest_ms / 1000 for r in foreseen)
+    return {
+        **seen,
+        "foreseen": len(foreseen),
+        "told": sum(r.told for r in foreseen),
+        "ahead_s": {"least": ahead_s[0], "p50": ahead_s[len(ahead_s) // 2]} if ahead_s else {},
+        "warnings": len(about),
+        "reached_the_other": round(len(delays_ms) / len(about), 6) if about else None,
+        "to_the_other_ms": {
+            "p50": round(float(np.percentile(delays_ms, 50)), 3),
+            "p95": round(float(np.percentile(delays_ms, 95)), 3),
+            "max": round(max(delays_ms), 3),
+        } if delays_ms else {},
+    }  # fmt: skip

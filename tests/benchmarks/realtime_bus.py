@@ -17,8 +17,8 @@ from fanet_mw.bus.messages import MavlinkTap, Message
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper
-from fanet_mw.hosts.duration_histogram import DurationHistogram
 from fanet_mw.hosts.realtime import SwarmAddress, run_actor
+from fanet_mw.hosts.wake_lateness import DurationHistogram
 from fanet_mw.units import S
 from sim.run.launcher.child_processes import Processes
 from sim.run.launcher.swarm import Collector, free_endpoint

@@ -23,9 +23,9 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper, ClockListener, SwarmClock
-from fanet_mw.hosts.duration_histogram import DurationHistogram
 from fanet_mw.hosts.realtime import SwarmAddress, run_actor
 from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
+from fanet_mw.hosts.wake_lateness import DurationHistogram
 from fanet_mw.trace import ProcessEnded
 from fanet_mw.units import MS, NodeId, S
 from sim.run.launcher.swarm import free_endpoint

@@ -17,8 +17,7 @@ from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import Message, Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.bus.topics import Topics, node_of
 from fanet_mw.hosts.virtual import VirtualHost
-from fanet_mw.radios.datagram import Datagram, DatagramKind
-from fanet_mw.radios.udp import MOST_ADDRESSES, MOVED_NS, TOO_LATE_NS, UdpRadio
+from fanet_mw.radios.udp import MOST_ADDRESSES, MOVED_NS, TOO_LATE_NS, Datagram, DatagramKind, UdpRadio
 from fanet_mw.scenario import config
 from fanet_mw.units import BROADCAST, MS, NodeId
 from sim.world.world import WorldActor

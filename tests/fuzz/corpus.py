@@ -41,7 +41,7 @@ from fanet_mw.errors import MalformedFrameError
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.mavlink import Encoder
 from fanet_mw.orders import Order, OrderKind
-from fanet_mw.radios.datagram import Datagram, DatagramKind
+from fanet_mw.radios.udp import Datagram, DatagramKind
 from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.trace import Record
 from fanet_mw.units import BROADCAST, Enu, NodeId, S

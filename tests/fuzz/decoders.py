@@ -26,7 +26,7 @@ from fanet_mw.bus import codecs
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import MavlinkTap, Report, TraceBatch
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.radios.datagram import Datagram
+from fanet_mw.radios.udp import Datagram
 from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.routing.aodv import messages as aodv
 from fanet_mw.routing.dsdv import messages as dsdv

@@ -6,7 +6,7 @@
 
 If two people lie side by side, many powers are needed to tell their phones apart. A UAV that is not certain therefore
 waits and receives more, and after a while it is content with less certainty. What becomes of a confirmation is decided
-in `contradictions.py` and `known_survivors.py`.
+in `sightings.py` and `known_survivors.py`.
 """
 
 from typing import Final

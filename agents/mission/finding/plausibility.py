@@ -5,7 +5,7 @@
     place       a reporter not so far from the area that no phone there can be received; a survivor in the area
 
 A message is refused by what it says alone. Whether one that could be true is true, only other measurements tell
-(`contradictions.py`), or signatures.
+(`sightings.py`), or signatures.
 """
 
 import math

@@ -1,7 +1,11 @@
 """The positions and velocities of a UAV's neighbors, from their hellos."""
 
+from collections.abc import Sequence
 from typing import Final
 
+from agents.mission.navigation.known_obstacles import KnownObstacles
+from agents.mission.navigation.own_motion import OwnMotion
+from fanet_mw.bus.messages import Echo
 from fanet_mw.motion import Motion
 from fanet_mw.node.neighbors import neighbor_lifetime_ns
 from fanet_mw.units import seconds_to_ns
@@ -34,3 +38,27 @@ class NeighborMotions:
     def by_node(self, *, now_ns: int) -> list[tuple[int, Motion]]:
         """The neighbors that were received recently, each with its motion."""
         return [item for item in sorted(self._motions.items()) if now_ns - item[1].at_ns <= self._lifetime_ns]
+
+
+class RadarWatch:
+    """The radar of one UAV, and the neighbors that the UAV avoids by their hellos."""
+
+    def __init__(
+        self,
+        own_motion: OwnMotion,
+        obstacles: KnownObstacles,
+        neighbors: NeighborMotions,
+        avoid_by: Sequence[str],
+    ) -> None:
+        """`avoid_by`: by what the UAV detects the UAVs to avoid: `hellos`, `radar`, or both."""
+        self._own_motion, self._obstacles = own_motion, obstacles
+        self._looks = "radar" in avoid_by
+        self.avoided = neighbors if "hellos" in avoid_by else NeighborMotions()
+        """The neighbors that the UAV avoids by their hellos; none if hellos are not used for that."""
+
+    def scan(self, echoes: Sequence[Echo], *, now_ns: int) -> None:
+        """A scan of the radar."""
+        if self._looks:
+            own = self._own_motion
+            others = [motion.position_at(now_ns) for motion in self.avoided.all(now_ns=now_ns)]
+            self._obstacles.radar(echoes, at=own.position, velocity=own.velocity, neighbors=others, now_ns=now_ns)

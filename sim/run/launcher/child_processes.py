@@ -8,6 +8,7 @@ server ends, and the server ends with the launcher, however the launcher ends.
 import asyncio
 import atexit
 import contextlib
+import ctypes
 import multiprocessing
 import os
 import signal
@@ -16,12 +17,12 @@ import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.context import ForkServerContext, ForkServerProcess
+from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from fanet_mw.errors import FanetError, HostError
 from fanet_mw.hosts.service import BUS_EXIT_CODE
 from sim.run.launcher.parent_death import be_killed_with_parent
-from sim.run.launcher.process_title import entitle
 
 _PRELOAD: Final = ["agents.__main__", "emulator.__main__", "sim.world.__main__"]
 _NICENESS: Final = 4
@@ -31,6 +32,26 @@ _FOR_THE_LAUNCHER: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _LAUNCHES_WHEN_IMPORTED: Final = 79
 """The exit code of a child whose import of the main program starts a swarm."""
 Entry = Callable[..., int]
+
+
+_PR_SET_NAME: Final = 15
+_NAME_BYTES: Final = 15
+_ARG_START, _ARG_END = 48 - 3, 49 - 3
+"""The indices of fields of /proc/PID/stat (proc_pid_stat(5)), counted from the field after the command's closing
+parenthesis."""
+
+
+def entitle(name: str, title: str) -> None:
+    """Name this process `name` (its first 15 characters), and make its command line `title`, as far
+    as there is room.
+    """
+    if sys.platform != "linux":
+        return
+    ctypes.CDLL(None).prctl(_PR_SET_NAME, name.encode()[:_NAME_BYTES], 0, 0, 0)
+    fields = Path("/proc/self/stat").read_text(encoding="latin-1").rpartition(")")[2].split()
+    start, end = int(fields[_ARG_START]), int(fields[_ARG_END])
+    if start:  # the last byte stays zero; otherwise the kernel would add the environment to the command line
+        ctypes.memmove(start, title.encode()[: end - start - 1].ljust(end - start, b"\0"), end - start)
 
 
 class ChildRecipe(NamedTuple):

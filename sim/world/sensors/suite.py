@@ -1,8 +1,8 @@
 """All sensors that UAVs carry in a scenario, each read when it is due."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
-from fanet_mw.bus.messages import Message
+from fanet_mw.bus.messages import Battery, Message
 from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.routing import PROTOCOLS
@@ -13,7 +13,6 @@ from sim.world.environment.obstacles import Obstacles
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors
 from sim.world.sensors.altimeter import AltimeterSensor
-from sim.world.sensors.battery import BatterySensor
 from sim.world.sensors.camera import CameraSensor
 from sim.world.sensors.contract import Sensor, Truth
 from sim.world.sensors.gps import GpsReceiver
@@ -22,6 +21,29 @@ from sim.world.sensors.inertial import InertialSensor
 from sim.world.sensors.phone import PhoneSensor
 from sim.world.sensors.radar import RadarSensor
 from sim.world.sensors.voice import VoiceSensor
+
+
+class BatterySensor(Sensor):
+    """One power module per UAV."""
+
+    kind = "battery"
+
+    def __init__(self, scenario: Scenario, drain: BatteryDrain) -> None:
+        self.period_ns = round(S / scenario.sensors.battery_hz)
+        self._batteries = drain.batteries
+
+    def read(self, truth: Truth, rows: Sequence[int]) -> Iterator[tuple[int, Message]]:
+        batteries = self._batteries
+        for row in rows:
+            yield (
+                row,
+                Battery(
+                    truth.now_ns,
+                    float(batteries.voltage_v[row]),
+                    float(batteries.current_a[row]),
+                    float(batteries.charge[row]),
+                ),
+            )
 
 
 def sensors_of(

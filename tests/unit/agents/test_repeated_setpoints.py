@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from agents.setpoints import Setpoints
+from agents.uav import Setpoints
 from fanet_mw.application import Course
 from fanet_mw.bus.messages import SetpointKind
 from fanet_mw.scenario import Scenario

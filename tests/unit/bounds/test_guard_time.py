@@ -2,7 +2,7 @@
 
 from fanet_mw.bounds import guard_ns
 from fanet_mw.bounds.guard_time import slot_guard_ns
-from fanet_mw.bounds.mac import Dcf
+from fanet_mw.bounds.slot_service import Dcf
 from fanet_mw.scenario import config
 from fanet_mw.units import MS, US, S
 

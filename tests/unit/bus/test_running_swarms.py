@@ -125,7 +125,7 @@ def test_a_swarm_of_a_program_whose_name_is_no_ascii_is_found(monkeypatch: pytes
     program = (
         "import ctypes, sys\n"
         "from sim.bus.running_swarms import registered\n"
-        "from sim.run.launcher.process_title import entitle\n"
+        "from sim.run.launcher.child_processes import entitle\n"
         "ctypes.CDLL(None).prctl(15, sys.argv[1].encode())\n"
         "entitle(sys.argv[1], 'fanet')\n"
         "entitle(sys.argv[1], 'fanet ' + sys.argv[1])\n"

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fanet_mw.hosts.duration_histogram import DurationHistogram
+from fanet_mw.hosts.wake_lateness import DurationHistogram
 from fanet_mw.units import MS, US
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from seeing_uav import UP_M, Uav, mean_dbm
 
-from agents.mission.finding.contradictions import Contradictions
+from agents.mission.finding.sightings import Contradictions
 from fanet_mw.units import US, Enu, S
 from fanet_mw.wire.survivors import Found, Standing
 

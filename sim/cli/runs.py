@@ -206,7 +206,7 @@ def plan(
         Print the plan as JSON.
 
     """
-    from sim.cli.plan import show
+    from sim.planner.answer import show
 
     return show(choice.scenario(scenario), deadline=deadline, search=search, as_json=json)
 

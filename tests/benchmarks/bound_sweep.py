@@ -31,10 +31,10 @@ from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import Message
 from fanet_mw.errors import DropReason
 from fanet_mw.graph.topology import components, within_range
-from fanet_mw.planner import ScenarioPlan, plan
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.trace import Dropped
 from fanet_mw.units import Enu, NodeId, S
+from sim.planner import ScenarioPlan, plan
 from sim.records.record_kinds import records_of
 from sim.results.bounds import Column, delays_under_bound, likely
 from sim.results.outcome import Outcome

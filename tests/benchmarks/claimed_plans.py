@@ -9,8 +9,8 @@ import sys
 from collections.abc import Iterator
 
 from agents.applications.traffic import sources_of
-from fanet_mw.planner import ScenarioPlan, plan
 from fanet_mw.units import NodeId
+from sim.planner import ScenarioPlan, plan
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog

@@ -8,10 +8,10 @@ import sys
 from typing import NamedTuple
 
 from fanet_mw.bounds import Bounded
-from fanet_mw.planner import ScenarioPlan, plan
 from fanet_mw.scenario import config
 from fanet_mw.trace import Delivered
 from fanet_mw.units import NodeId, S
+from sim.planner import ScenarioPlan, plan
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.world.environment.layout import positions

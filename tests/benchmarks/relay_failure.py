@@ -13,12 +13,12 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from agents.applications.traffic import sources_of
-from fanet_mw.planner.timetable_plan import table_for
 from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.config import build
 from fanet_mw.trace import Delivered, Generated
 from fanet_mw.units import NodeId, S
+from sim.planner.timetable_plan import table_for
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 from sim.world.environment.layout import positions

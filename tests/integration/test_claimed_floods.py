@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from sim.cli.plan import judge
+from sim.planner.answer import judge
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog

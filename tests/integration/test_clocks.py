@@ -13,11 +13,11 @@ from fanet_mw.bounds import Bounded
 from fanet_mw.bounds.guard_time import slot_guard_ns
 from fanet_mw.bus.messages import Reception
 from fanet_mw.bus.topics import Topics
-from fanet_mw.planner import plan
 from fanet_mw.routing.clustered.tdma.turn_timing import clocks_fit
 from fanet_mw.trace import Delivered, Generated
 from fanet_mw.units import MS, US, Enu, NodeId
-from sim.cli.plan import judge
+from sim.planner import plan
+from sim.planner.answer import judge
 from sim.records.record_kinds import lines
 from sim.results.files import finish
 from sim.results.outcome import Outcome

@@ -2,9 +2,9 @@
 
 import pytest
 
-from fanet_mw.planner import plan
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.units import NodeId
+from sim.planner import plan
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.world.environment.layout import positions

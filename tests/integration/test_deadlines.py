@@ -7,7 +7,7 @@ import pytest
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario.config import build
 from fanet_mw.trace import DeadlineLost, DeadlineMet, Dropped
-from sim.cli.plan import judge
+from sim.planner.answer import judge
 from sim.results.files import finish
 from sim.results.outcome import Outcome
 from sim.run.virtual import simulate

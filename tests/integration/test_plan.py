@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from fanet_mw.planner.plan import plan
-from fanet_mw.planner.scenario_plan import ScenarioPlan
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.units import NodeId
 from fanet_mw.wire.places import rounded
 from sim.cli.app import app
-from sim.cli.plan import judge
+from sim.planner.answer import judge
+from sim.planner.plan import plan
+from sim.planner.scenario_plan import ScenarioPlan
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog

@@ -4,7 +4,7 @@ import pytest
 
 from fanet_mw.trace import Delivered, Generated, LikelyStated
 from fanet_mw.units import MS
-from sim.cli.plan import judge
+from sim.planner.answer import judge
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from kit import examples
 
 from fanet_mw.graph.topology import components, within_range
-from fanet_mw.planner.goodput_bound import fewest_transmissions, goodput_bound
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.timetable import Geometry, timetable
 from fanet_mw.units import Enu, NodeId, S
+from sim.planner.goodput_bound import fewest_transmissions, goodput_bound
 
 
 def swarm(points):

@@ -10,17 +10,17 @@ from fanet_mw import wire
 from fanet_mw.bounds import Bounded, Refused
 from fanet_mw.graph.topology import within_range
 from fanet_mw.mavlink import Encoder
-from fanet_mw.planner import ScenarioPlan, cheapest_change, describe, describe_change, plan
-from fanet_mw.planner.cheapest_change import _changes
-from fanet_mw.planner.demand import TrafficClass, demands
-from fanet_mw.planner.flood_cost import FloodCost
-from fanet_mw.planner.head_slot import ClassLoad, slot_delays, work_ns
-from fanet_mw.planner.site import Site
-from fanet_mw.planner.timetable_plan import table_for
-from fanet_mw.planner.uplink_delay import ways
 from fanet_mw.rng import stream
 from fanet_mw.trace import Delivered
 from fanet_mw.units import Enu, NodeId, S
+from sim.planner import ScenarioPlan, cheapest_change, describe, describe_change, plan
+from sim.planner.cheapest_change import _changes
+from sim.planner.demand import TrafficClass, demands
+from sim.planner.flood_cost import FloodCost
+from sim.planner.head_slot import ClassLoad, slot_delays, work_ns
+from sim.planner.site import Site
+from sim.planner.timetable_plan import table_for
+from sim.planner.uplink_delay import ways
 from sim.run.virtual import simulate as simulate_swarm
 from sim.scenarios import catalog
 from sim.world.environment.layout import positions

@@ -9,11 +9,11 @@ from kit import examples
 
 from fanet_mw.bounds import Refused
 from fanet_mw.graph.topology import two_hop, within_range
-from fanet_mw.planner import ScenarioPlan, cheapest_change, describe, plan
-from fanet_mw.planner.claimed_turns import converged_slots
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.scenario import config
 from fanet_mw.units import Enu, NodeId, S
+from sim.planner import ScenarioPlan, cheapest_change, describe, plan
+from sim.planner.claimed_turns import converged_slots
 from sim.world.environment.layout import positions
 
 

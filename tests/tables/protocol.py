@@ -23,7 +23,7 @@ _SEEDS: Final = (1, 2, 3)
 _DEATHS: Final = 20
 """Relays that fall silent, one per run."""
 _MOST_PER_S: Final = 776
-"""Packets of 1024 B a second that can reach all of the 9 x 5 grid (`fanet_mw/planner/goodput_bound.py`)."""
+"""Packets of 1024 B a second that can reach all of the 9 x 5 grid (`sim/planner/goodput_bound.py`)."""
 _LOADED: Final = {
     "scheduled, period 4 s, `cw_min` 1, `turn_slack_us` 20, `contention_ms` 20, `hello_interval_s` 2": (
         "clusters.flooding_period_s=4", "radio.cw_min=1", "clusters.turn_slack_us=20", "clusters.contention_ms=20",

@@ -3,10 +3,10 @@
 import pytest
 
 from fanet_mw.graph.topology import within_range
-from fanet_mw.planner.contention_window import claimed_hellos_ns, hellos_ns, too_short, too_short_for_claims
 from fanet_mw.units import MS, Enu, NodeId
 from fanet_mw.wire.hello.claims import MESSAGE_BYTES
-from sim.cli.plan import judge
+from sim.planner.answer import judge
+from sim.planner.contention_window import claimed_hellos_ns, hellos_ns, too_short, too_short_for_claims
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog

@@ -5,11 +5,11 @@ from typing import Any
 import pytest
 
 from fanet_mw.graph.topology import within_range
-from fanet_mw.planner.flood_hops import flood_hops, too_many
 from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.units import Enu, NodeId
-from sim.cli.plan import judge
+from sim.planner.answer import judge
+from sim.planner.flood_hops import flood_hops, too_many
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog

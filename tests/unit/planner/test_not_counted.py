@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from fanet_mw.scenario import Scenario, config
-from sim.cli.plan import judge
+from sim.planner.answer import judge
 from sim.scenarios import catalog
 
 NINE = ("nodes.count=9", "clusters.count=8", "traffic.sources=8")

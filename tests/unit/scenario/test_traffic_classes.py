@@ -8,10 +8,10 @@ import tomli_w
 
 import fanet_mw
 from fanet_mw.errors import ConfigError
-from fanet_mw.planner.variant import vary
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.scenario.commented import commented
 from fanet_mw.scenario.reference import json_schema
+from sim.planner.variant import vary
 
 TWO = """
 duration_s = 20

@@ -12,7 +12,7 @@ frame remains. All neighbors count for a call. Whether a node disturbs a link de
 (`InterferenceByPower`).
 
 In flight, `turn_access.py` repeats a node's own packets, and `scheduled_relaying.py` its relays. Not modeled: that a
-relay may lack the packet although it has had enough copies (`fanet_mw/planner/flood_loss.py` includes that).
+relay may lack the packet although it has had enough copies (`sim/planner/flood_loss.py` includes that).
 """
 
 import math

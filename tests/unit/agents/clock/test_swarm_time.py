@@ -7,10 +7,10 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from agents.clock.swarm_time import GpsTime, oscillator, swarm_time
-from fanet_mw.planner.problems_and_notes import clocks_apart
 from fanet_mw.routing.clustered.tdma.turn_timing import clocks_fit
 from fanet_mw.scenario import Clock, Scenario
 from fanet_mw.units import MS, US, NodeId, S
+from sim.planner.problems_and_notes import clocks_apart
 from sim.scenarios import catalog
 
 MakeScenario = Callable[..., Scenario]

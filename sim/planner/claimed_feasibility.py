@@ -4,16 +4,16 @@ import math
 from collections.abc import Iterator, Sequence
 
 from fanet_mw.bounds import Bounded, Refused
-from fanet_mw.planner import contention_window, flood_hops, problems_and_notes, reachability
-from fanet_mw.planner.claimed_turns import ClaimedPlan, NodeTurns
-from fanet_mw.planner.demand import ClassPlan, TrafficClass
-from fanet_mw.planner.feasibility import goodput
-from fanet_mw.planner.flood_cost import FloodCost
-from fanet_mw.planner.head_slot import ClusterPlan
-from fanet_mw.planner.scenario_plan import ScenarioPlan
-from fanet_mw.planner.site import Site
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS
+from sim.planner import contention_window, flood_hops, problems_and_notes, reachability
+from sim.planner.claimed_turns import ClaimedPlan, NodeTurns
+from sim.planner.demand import ClassPlan, TrafficClass
+from sim.planner.feasibility import goodput
+from sim.planner.flood_cost import FloodCost
+from sim.planner.head_slot import ClusterPlan
+from sim.planner.scenario_plan import ScenarioPlan
+from sim.planner.site import Site
 
 _NO_BOUND = Refused("nothing bounds how many packets queue at a relay")
 

@@ -3,13 +3,13 @@
 from typing import NamedTuple
 
 from fanet_mw.bounds import Bounded, DelayBound
-from fanet_mw.planner.claimed_turns import ClaimedPlan
-from fanet_mw.planner.demand import ClassPlan
-from fanet_mw.planner.goodput_bound import Goodput
-from fanet_mw.planner.head_slot import ClusterPlan
-from fanet_mw.planner.timetable_plan import TimetablePlan
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, S
+from sim.planner.claimed_turns import ClaimedPlan
+from sim.planner.demand import ClassPlan
+from sim.planner.goodput_bound import Goodput
+from sim.planner.head_slot import ClusterPlan
+from sim.planner.timetable_plan import TimetablePlan
 
 
 class ScenarioPlan(NamedTuple):

@@ -5,17 +5,17 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from fanet_mw.bounds import Bounded, DelayBound, Refused
-from fanet_mw.planner.cheapest_change import ScenarioChange
-from fanet_mw.planner.claimed_turns import ClaimedPlan
-from fanet_mw.planner.demand import ClassPlan
-from fanet_mw.planner.flood_loss import Loss
-from fanet_mw.planner.head_slot import ClusterPlan
-from fanet_mw.planner.lossy_plan import Drawn, LossyPlan
-from fanet_mw.planner.optimum import Optimum
-from fanet_mw.planner.scenario_plan import ScenarioPlan
-from fanet_mw.planner.timetable_plan import TimetablePlan
 from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE
 from fanet_mw.units import MS, S
+from sim.planner.cheapest_change import ScenarioChange
+from sim.planner.claimed_turns import ClaimedPlan
+from sim.planner.demand import ClassPlan
+from sim.planner.flood_loss import Loss
+from sim.planner.head_slot import ClusterPlan
+from sim.planner.lossy_plan import Drawn, LossyPlan
+from sim.planner.optimum import Optimum
+from sim.planner.scenario_plan import ScenarioPlan
+from sim.planner.timetable_plan import TimetablePlan
 
 _SHOWN: Final = 8
 """The greatest number of heads that are listed, the fullest first."""

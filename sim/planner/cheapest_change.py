@@ -13,17 +13,17 @@ from typing import Final, NamedTuple
 
 from fanet_mw.bounds import Refused
 from fanet_mw.graph.topology import Adjacency
-from fanet_mw.planner import contention_window, problems_and_notes
-from fanet_mw.planner.demand import demands
-from fanet_mw.planner.goodput_bound import in_turns
-from fanet_mw.planner.plan import judge
-from fanet_mw.planner.scenario_plan import ScenarioPlan
-from fanet_mw.planner.site import Site
-from fanet_mw.planner.variant import Value, Variant, vary
 from fanet_mw.routing.clustered.tdma.turn_timing import turn_slack_ns
 from fanet_mw.routing.clustered.timetable.turn_size import distance_error_m, most_together, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import US, Enu, NodeId
+from sim.planner import contention_window, problems_and_notes
+from sim.planner.demand import demands
+from sim.planner.goodput_bound import in_turns
+from sim.planner.plan import judge
+from sim.planner.scenario_plan import ScenarioPlan
+from sim.planner.site import Site
+from sim.planner.variant import Value, Variant, vary
 
 _COUNTS: Final = (1, 2, 3, 4, 5, 6, 8, 11, 15, 22, 30, 44, 64)
 _PERIODS: Final = (0.1, 0.2, 0.4, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0, 5.0, 10.0)

@@ -29,11 +29,11 @@ from typing import NamedTuple
 
 from fanet_mw.airtime import Timing
 from fanet_mw.graph.topology import Adjacency, components
-from fanet_mw.planner.flood_cost import frame_ns
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.turn_size import most_together
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, S
+from sim.planner.flood_cost import frame_ns
 
 
 class Goodput(NamedTuple):

@@ -7,12 +7,12 @@ from typing import Final
 from fanet_mw import wire
 from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.graph.topology import Adjacency, levels
-from fanet_mw.planner.demand import ClassPlan, TrafficClass
-from fanet_mw.planner.head_slot import ClusterPlan
 from fanet_mw.routing.clustered.tdma.turn_timing import least_slack_ns, turn_slack_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.timesync.ftsp import MOST_STATED_NS
 from fanet_mw.units import MS, US, NodeId, S
+from sim.planner.demand import ClassPlan, TrafficClass
+from sim.planner.head_slot import ClusterPlan
 
 _JOINED_S: Final = 6.0
 _JOINED_HELLOS: Final = 4

@@ -16,18 +16,18 @@ from typing import Final, NamedTuple
 
 from fanet_mw.airtime import Timing
 from fanet_mw.bounds import Refused
-from fanet_mw.planner.cheapest_change import WINDOWS, hopeless
-from fanet_mw.planner.demand import TrafficClass, demands
-from fanet_mw.planner.feasibility import members_of
-from fanet_mw.planner.flood_cost import frame_ns
-from fanet_mw.planner.plan import judge
-from fanet_mw.planner.scenario_plan import ScenarioPlan
-from fanet_mw.planner.site import Site
-from fanet_mw.planner.uplink_delay import ways
-from fanet_mw.planner.variant import Value, Variant, vary
 from fanet_mw.routing.clustered.timetable.turn_size import schedule_bytes
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S, seconds_to_ns
+from sim.planner.cheapest_change import WINDOWS, hopeless
+from sim.planner.demand import TrafficClass, demands
+from sim.planner.feasibility import members_of
+from sim.planner.flood_cost import frame_ns
+from sim.planner.plan import judge
+from sim.planner.scenario_plan import ScenarioPlan
+from sim.planner.site import Site
+from sim.planner.uplink_delay import ways
+from sim.planner.variant import Value, Variant, vary
 
 _HELLO_BYTES: Final = 140
 """The length of a hello without digests."""

@@ -10,14 +10,14 @@ from typing import Final
 
 from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.graph.topology import Adjacency
-from fanet_mw.planner.claimed_feasibility import evaluate_claims
-from fanet_mw.planner.demand import demands
-from fanet_mw.planner.feasibility import evaluate, heads_of
-from fanet_mw.planner.scenario_plan import ScenarioPlan
-from fanet_mw.planner.site import Site
 from fanet_mw.routing.clustered.timetable.turn_allocation import least_interval_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId
+from sim.planner.claimed_feasibility import evaluate_claims
+from sim.planner.demand import demands
+from sim.planner.feasibility import evaluate, heads_of
+from sim.planner.scenario_plan import ScenarioPlan
+from sim.planner.site import Site
 
 _TURNS: Final = 50_000
 """The number of turns of all timetables that are computed for reported positions; a thousand take a tenth of a

@@ -23,7 +23,7 @@ from fanet_mw.bounds import (
     delay_any_order,
     delay_fifo,
 )
-from fanet_mw.planner.flood_cost import FloodCost
+from sim.planner.flood_cost import FloodCost
 
 _PARTS: Final = 4
 """The number of units in the longest spacing; with more, bounds are tighter and take longer to compute."""

@@ -1,5 +1,4 @@
-"""What `fanet plan` does: is a scenario feasible, before take-off? The planner is `fanet_mw.planner`; `runs.py` parses
-the command.
+"""What `fanet plan` answers: is a scenario feasible, before take-off?
 
 Exit codes: 0 feasible, 1 not feasible, 2 the scenario or a flag is wrong (as with every command).
 """
@@ -17,7 +16,16 @@ from agents.positioning.steady_fix import error_m
 from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.errors import ConfigError
 from fanet_mw.graph.topology import levels, within_range
-from fanet_mw.planner import (
+from fanet_mw.rng import stream
+from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE
+from fanet_mw.routing.clustered.timetable.turn_size import links
+from fanet_mw.routing.rounds.delay_law import DelayLaw
+from fanet_mw.routing.rounds.round_timing import RoundTiming
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
+from fanet_mw.wire import HEADER_BYTES
+from fanet_mw.wire.places import rounded
+from sim.planner import (
     ClassPlan,
     Loss,
     LossyPlan,
@@ -40,19 +48,10 @@ from fanet_mw.planner import (
     plan_lossy,
     with_capacity,
 )
-from fanet_mw.planner.claimed_turns import ClaimedPlan
-from fanet_mw.planner.plan_text import item
-from fanet_mw.rng import stream
-from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE
-from fanet_mw.routing.clustered.timetable.turn_size import links
-from fanet_mw.routing.rounds.delay_law import DelayLaw
-from fanet_mw.routing.rounds.round_timing import RoundTiming
-from fanet_mw.scenario import Scenario
-from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
-from fanet_mw.wire import HEADER_BYTES
-from fanet_mw.wire.places import rounded
-from sim.expected_channel.expected_links import expected_links
-from sim.expected_channel.reception_probability import chance_of
+from sim.planner.claimed_turns import ClaimedPlan
+from sim.planner.expected_links import expected_links
+from sim.planner.plan_text import item
+from sim.planner.reception_probability import chance_of
 from sim.world.environment.layout import positions
 
 _DRAWS: Final = 3

@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from functools import cache
 
 from fanet_mw.airtime import OVERHEAD_BYTES, Timing
-from fanet_mw.planner.flood_loss import Chance
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId
+from sim.planner.flood_loss import Chance
 
 
 def chance_of(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance | None:

@@ -4,12 +4,12 @@ from collections.abc import Mapping, Sequence
 
 from fanet_mw.bounds.guard_time import PLANNED_ERROR_NS, slot_guard_ns
 from fanet_mw.graph.topology import Adjacency, within_range
-from fanet_mw.planner.claimed_turns import Claimants
-from fanet_mw.planner.flood_cost import FloodCost, flood_cost
 from fanet_mw.routing.clustered.claimed.slot_acquisition import geometry
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId
 from fanet_mw.wire.places import rounded
+from sim.planner.claimed_turns import Claimants
+from sim.planner.flood_cost import FloodCost, flood_cost
 
 
 class Site:

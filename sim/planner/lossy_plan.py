@@ -10,8 +10,6 @@ one.
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
-from fanet_mw.planner import flood_hops
-from fanet_mw.planner.demand import TrafficClass
 from fanet_mw.routing.clustered.tdma.turn_timing import receipt_ns
 from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
 from fanet_mw.routing.clustered.timetable.likely_delay import likely_delay_ns
@@ -20,6 +18,8 @@ from fanet_mw.routing.clustered.timetable.turn_allocation import Places, fit_mea
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.links import Link, frames_of
+from sim.planner import flood_hops
+from sim.planner.demand import TrafficClass
 
 _NOTES: Final = (
     "links are expected, not measured: nodes at rest where they start, the mean over fading, shadowing drawn anew for "

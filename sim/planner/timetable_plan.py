@@ -19,9 +19,6 @@ from fanet_mw.bounds import (
     delay_any_order,
     delay_fifo,
 )
-from fanet_mw.planner.flood_cost import FloodCost
-from fanet_mw.planner.head_slot import ClassLoad, ClusterPlan
-from fanet_mw.planner.variant import vary
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_slack_ns
 from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort
@@ -31,6 +28,9 @@ from fanet_mw.routing.clustered.timetable.turn_allocation import Places, fit
 from fanet_mw.routing.clustered.timetable.turn_size import links, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import US, NodeId
+from sim.planner.flood_cost import FloodCost
+from sim.planner.head_slot import ClassLoad, ClusterPlan
+from sim.planner.variant import vary
 
 _MOST_TURNS: Final = 20_000
 _LEAST_SLACK_US: Final = 20

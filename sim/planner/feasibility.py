@@ -16,15 +16,6 @@ from typing import Final, NamedTuple
 from fanet_mw import wire
 from fanet_mw.bounds import Bounded, DelayBound, Refused, paper
 from fanet_mw.graph.topology import levels, within_range
-from fanet_mw.planner import contention_window, flood_hops, problems_and_notes, reachability
-from fanet_mw.planner.demand import ClassPlan, TrafficClass
-from fanet_mw.planner.flood_cost import FloodCost
-from fanet_mw.planner.goodput_bound import Goodput, any_protocol
-from fanet_mw.planner.head_slot import ClassLoad, ClusterPlan, slot_delays, work_ns
-from fanet_mw.planner.scenario_plan import ScenarioPlan
-from fanet_mw.planner.site import Site
-from fanet_mw.planner.timetable_plan import Candidate, TimetablePlan, judge, table_for
-from fanet_mw.planner.uplink_delay import Ways, access_outcome, ways
 from fanet_mw.routing.clustered.clustering import Cluster, Swarm
 from fanet_mw.routing.clustered.clustering.division import Division
 from fanet_mw.routing.clustered.tdma.turn_timing import receipt_ns
@@ -33,6 +24,15 @@ from fanet_mw.routing.clustered.timetable.reserved_room import reserved
 from fanet_mw.routing.clustered.timetable.turn_size import links, schedule_parts, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S
+from sim.planner import contention_window, flood_hops, problems_and_notes, reachability
+from sim.planner.demand import ClassPlan, TrafficClass
+from sim.planner.flood_cost import FloodCost
+from sim.planner.goodput_bound import Goodput, any_protocol
+from sim.planner.head_slot import ClassLoad, ClusterPlan, slot_delays, work_ns
+from sim.planner.scenario_plan import ScenarioPlan
+from sim.planner.site import Site
+from sim.planner.timetable_plan import Candidate, TimetablePlan, judge, table_for
+from sim.planner.uplink_delay import Ways, access_outcome, ways
 
 _ASSUMED_UPLINK_NS: Final = 1 * S
 

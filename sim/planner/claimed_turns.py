@@ -19,7 +19,6 @@ from typing import Final, NamedTuple
 from fanet_mw.bounds import TurnServer
 from fanet_mw.graph.connected_dominating_set import dominates
 from fanet_mw.graph.topology import Adjacency, two_hop
-from fanet_mw.planner.demand import TrafficClass
 from fanet_mw.routing.clustered.claimed.own_turns import Share
 from fanet_mw.routing.clustered.claimed.slot_acquisition import IDLE, LISTEN_HELLOS, geometry, longest_superframe
 from fanet_mw.routing.clustered.claimed.slot_claims import SlotClaims
@@ -27,6 +26,7 @@ from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, S, seconds_to_ns
 from fanet_mw.wire.hello.claims import MOST_LOTS
+from sim.planner.demand import TrafficClass
 
 _ROUNDS: Final = 60
 """The number of hello intervals in which claims converge; 2 d + 6 are needed, with d the length of the longest chain of

@@ -13,10 +13,10 @@ from typing import Final, NamedTuple
 
 from fanet_mw.bounds import Bounded, Dcf, DelayBound, Refused
 from fanet_mw.graph.topology import Adjacency, two_hop
-from fanet_mw.planner.demand import TrafficClass
-from fanet_mw.planner.flood_cost import frame_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, seconds_to_ns
+from sim.planner.demand import TrafficClass
+from sim.planner.flood_cost import frame_ns
 
 _HELLO_BYTES: Final = 700
 """The length of the longest hello, one with digests of 45 origins (docs/explanation/protocol.md, Repair)."""

@@ -14,12 +14,12 @@ from types import MappingProxyType
 from typing import Final
 
 from fanet_mw.graph.topology import Adjacency, two_hop
-from fanet_mw.planner.demand import TrafficClass
-from fanet_mw.planner.flood_cost import contended_ns
 from fanet_mw.routing.clustered.tdma.turn_timing import TAIL_NS
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, NodeId, S, seconds_to_ns
 from fanet_mw.wire.hello.claims import CAPACITY, MESSAGE_BYTES
+from sim.planner.demand import TrafficClass
+from sim.planner.flood_cost import contended_ns
 
 _NONE: Final[Mapping[NodeId, int]] = MappingProxyType({})
 MOST: Final = 0.75

@@ -2,19 +2,19 @@
 
 `plan` judges a scenario with given positions and returns a `ScenarioPlan`. `cheapest_change` finds a change that
 makes a scenario feasible, `optimum` the configuration that meets a deadline with the least airtime. `describe` turns
-results into text.
+results into text, and `answer` is what `fanet plan` says of a scenario.
 """
 
-from fanet_mw.planner.cheapest_change import ScenarioChange, cheapest_change
-from fanet_mw.planner.demand import ClassPlan, TrafficClass, demands
-from fanet_mw.planner.feasibility import evaluate
-from fanet_mw.planner.flood_loss import Loss, loss
-from fanet_mw.planner.head_slot import ClusterPlan
-from fanet_mw.planner.lossy_plan import LossyPlan, plan_lossy
-from fanet_mw.planner.not_counted import not_counted
-from fanet_mw.planner.optimum import Optimum, optimum
-from fanet_mw.planner.plan import plan, with_capacity
-from fanet_mw.planner.plan_text import (
+from sim.planner.cheapest_change import ScenarioChange, cheapest_change
+from sim.planner.demand import ClassPlan, TrafficClass, demands
+from sim.planner.feasibility import evaluate
+from sim.planner.flood_loss import Loss, loss
+from sim.planner.head_slot import ClusterPlan
+from sim.planner.lossy_plan import LossyPlan, plan_lossy
+from sim.planner.not_counted import not_counted
+from sim.planner.optimum import Optimum, optimum
+from sim.planner.plan import plan, with_capacity
+from sim.planner.plan_text import (
     describe,
     describe_change,
     describe_loss,
@@ -22,9 +22,9 @@ from fanet_mw.planner.plan_text import (
     describe_not_counted,
     describe_optimum,
 )
-from fanet_mw.planner.scenario_plan import ScenarioPlan
-from fanet_mw.planner.site import Site
-from fanet_mw.planner.variant import Variant, vary
+from sim.planner.scenario_plan import ScenarioPlan
+from sim.planner.site import Site
+from sim.planner.variant import Variant, vary
 
 __all__ = [
     "ClassPlan",

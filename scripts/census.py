@@ -6,7 +6,9 @@
 
 import ast
 import io
+import os
 import statistics
+import subprocess
 import sys
 import tokenize
 from collections import Counter, defaultdict
@@ -136,6 +138,32 @@ def files_entered(tree: Path) -> Iterator[tuple[str, str]]:
         yield f"files a packet enters, {kind}", f"{len(set().union(*passes))} (in one call {max(map(len, passes))})"
 
 
+COMPANION: Final = """
+import resource, sys, time
+began_s = time.perf_counter()
+import agents.__main__
+from agents.clock.clocked_uav import make_uav
+from fanet_mw.scenario import config
+from fanet_mw.units import Enu, NodeId
+make_uav(config.build({}), NodeId(2), "swarm", position=Enu(0.0, 0.0, 50.0))
+took_s = time.perf_counter() - began_s
+parts = ("fanet_mw", "agents", "emulator", "sim")
+files = {m.__file__ for n, m in list(sys.modules.items()) if n.partition(".")[0] in parts and getattr(m, "__file__", 0)}
+lines = sum(len(open(file).readlines()) for file in files if not file.endswith("dialect/fanet.py"))
+print(len(files), lines, round(took_s, 2), round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024))
+"""
+
+
+def companion(tree: Path) -> Iterator[tuple[str, str]]:
+    """What a companion computer loads for one UAV: files and lines of the product, time and memory."""
+    done = subprocess.run(  # noqa: S603
+        [sys.executable, "-c", COMPANION], cwd=tree, env={**os.environ, "PYTHONPATH": str(tree)}, capture_output=True,
+        text=True, check=True,
+    )  # fmt: skip
+    names = ("files", "lines without the dialect", "seconds to start", "MB of memory")
+    yield from zip((f"a companion computer, {name}" for name in names), done.stdout.split(), strict=True)
+
+
 def words(tree: Path) -> Iterator[tuple[str, str]]:
     """Words of the documents by folder, and how many stand in generated pages (their first lines say so)."""
     counted: Counter[str] = Counter()
@@ -175,6 +203,7 @@ def census(tree: Path) -> dict[str, str]:
     count, where = max(signatures(tree, paths))
     found["longest signature"] = f"{count} ({where})"
     found |= dict(files_entered(tree))
+    found |= dict(companion(tree))
     rounds = circles(needs)
     found["circles of folders and files"] = str(len(rounds))
     found |= {f"  {circle}": "" for circle in rounds}

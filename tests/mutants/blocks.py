@@ -26,7 +26,8 @@ AREAS = {
                  "fanet_mw/graph"),
     "emulator": ("emulator", "fanet_mw/airtime.py"),
     "bounds": ("fanet_mw/bounds",),
-    "results": ("sim/results", "sim/records", "sim/figures/figure", "sim/figures/paper_claims.py", "sim/figures/statistics.py"),
+    "results": ("sim/results", "sim/records", "sim/figures/figure", "sim/figures/paper_claims.py",
+                "sim/figures/statistics.py"),
     "mission": ("agents/mission", "agents/applications"),
     "world": ("sim/world",),
 }  # fmt: skip

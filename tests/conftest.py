@@ -26,6 +26,21 @@ settings.register_profile(
 )  # fmt: skip
 """For `scripts/mutants`: as many as in a default run, and none made smaller: that a test fails is enough."""
 
+settings.register_profile("fast", deadline=None, max_examples=5, derandomize=True)
+"""For `scripts/test --fast`."""
+
+_FAST = ("unit/", "property/")
+_NOT_FAST = (
+    "unit/cli/",
+    "unit/figures/",
+    "unit/project/",
+    "unit/world/",
+    "unit/sweep/",
+    "unit/run/",
+    "property/test_ground.py",
+)
+"""Folders below `tests/` of what `--fast` tries, and what it leaves out of them: processes, pictures, flights."""
+
 _REALTIME = (
     "test_realtime", "test_host_realtime", "test_hosts", "test_radios", "test_real_radio", "test_time_scale",
     "test_back_pressure", "test_air_control",
@@ -34,10 +49,18 @@ _REALTIME = (
 asks how late this machine is: frames are announced long ahead, and what ends soon by itself is waited for."""
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--fast", action="store_true", help="only what an inner loop needs")
+
+
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
     """Leave out modules of which `-m` chooses no test, where it ends as in `scripts/test`: each of the processes there
     would take some seconds to read them all.
     """
+    if config.getoption("--fast") and collection_path.suffix == ".py" and collection_path.name.startswith("test_"):
+        name = collection_path.relative_to(Path(__file__).parent).as_posix()
+        if not name.startswith(_FAST) or name.startswith(_NOT_FAST):
+            return True
     chosen = str(config.getoption("markexpr"))
     if collection_path.suffix != ".py" or not chosen.endswith("realtime"):
         return None

@@ -4,9 +4,7 @@ The names of the fields are the flags and their docstrings the help text; the co
 `--set KEY=VALUE` changes a file's values is in `fanet_mw/scenario/config.py`.
 """
 
-import contextlib
 import os
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,14 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 from cyclopts import Parameter, Token
 
-from emulator.pcap_file import NAME as CAPTURE
-from emulator.pcap_file import captures
 from fanet_mw.errors import ConfigError
 from sim.bus.running_swarms import DEFAULT_ENDPOINT, locate
 from sim.cli.completion import keys
 from sim.console import Console
-from sim.report import names
-from sim.results.file_names import RESERVED, RUN_FILES
 
 if TYPE_CHECKING:
     from fanet_mw.gateway.gateway import Doors
@@ -32,39 +26,6 @@ _err = Console(stderr=True)
 _LEAD_MS: Final = 40
 """The lead in real time of a scenario without one, because asyncio's timers and the bus are late by
 some milliseconds."""
-
-
-_MOST_SAID: Final = 8
-
-
-def prepare(out: Path, *, force: bool) -> None:
-    """Make the folder; with `force`, remove what an earlier run has left in it, and nothing else.
-
-    Raises ConfigError if it cannot be written, or if it has files of an earlier run and `force` is not given.
-    """
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=out) as file:
-            file.write(b"a run would be lost")
-        named = (out / name for name in (*RUN_FILES, *names.PAGES, *RESERVED))
-        used = [path for path in (*named, *captures(out / CAPTURE), *names.pictures(out)) if os.path.lexists(path)]
-        if used and not force:
-            raise ConfigError(
-                f"--out {out}: holds the result of another run ({_said(used)}); "
-                "choose another folder, or replace it with --force"
-            )
-        for path in used:
-            path.unlink()
-        with contextlib.suppress(OSError):  # the file is missing, or belongs to another program
-            (out / names.PICTURES).rmdir()
-    except OSError as error:
-        raise ConfigError(f"--out {out}: cannot be written: {error.strerror}") from error
-
-
-def _said(paths: Sequence[Path]) -> str:
-    """The names of some files, and the number of the others."""
-    others = len(paths) - _MOST_SAID
-    return ", ".join(path.name for path in paths[:_MOST_SAID]) + (f" and {others} more" if others > 0 else "")
 
 
 def _seconds(_type: object, tokens: Sequence[Token]) -> float:
@@ -156,7 +117,7 @@ class OutputFlags:
         if self.record is not None:
             self._prepare_recording(self.record)
         if self.out is not None:
-            from sim.cli.options import prepare
+            from sim.cli.out_folder import prepare
 
             prepare(self.out, force=self.force)
 

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from kit import slow
 
 ROOT = Path(__file__).parents[2]
 
@@ -17,8 +18,16 @@ def run(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("package", ["agents", "sim", "emulator"])
-@pytest.mark.parametrize("kind", ["package", "folder", "module"])
+@pytest.mark.parametrize(
+    ("package", "kind"),
+    [
+        ("agents", "package"), ("sim", "folder"), ("emulator", "module"),
+        *slow(
+            ("agents", "folder"), ("agents", "module"), ("sim", "package"), ("sim", "module"), ("emulator", "package"),
+            ("emulator", "folder"),
+        ),
+    ],
+)  # fmt: skip
 def test_a_package_of_ones_own_with_our_name_fails_the_tests_that_ask_for_a_swarm(
     tmp_path: Path, package: str, kind: str
 ) -> None:

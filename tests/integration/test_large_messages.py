@@ -65,12 +65,12 @@ class Courier(Application):
             self.lost.append(status)
 
 
-_LIKE_MPR = ("cds", "heads")
-"""These relays are chosen as those of `mpr` are, by what neighbors say of their neighbors."""
+_ALIKE = ("cds", "heads", "gossip", "counter")
+"""The first two choose relays as `mpr` does, by what neighbors say of theirs; the others contend as `all` does."""
 
 
 @pytest.mark.parametrize(
-    "relay", [pytest.param(name, marks=pytest.mark.slow) if name in _LIKE_MPR else name for name in sorted(RELAYS)]
+    "relay", [pytest.param(name, marks=pytest.mark.slow) if name in _ALIKE else name for name in sorted(RELAYS)]
 )
 def test_whatever_relays_messages_of_all_lengths_reach_everyone(relay: str) -> None:
     couriers: dict[int, Courier] = {}

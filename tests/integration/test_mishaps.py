@@ -24,6 +24,19 @@ def flown(*faults: Mapping[str, object], keys: tuple[str, ...] = ()) -> Outcome:
     return simulate(config.build({**tree, "faults": json.loads(json.dumps(faults))}))
 
 
+STOPS = ({"at_s": 12, "kind": "stop", "node": 3, "for_s": 8}, {"at_s": 20, "kind": "stop", "node": 5})
+
+
+@pytest.fixture(scope="module")
+def plain() -> Outcome:
+    return flown()
+
+
+@pytest.fixture(scope="module")
+def stopped() -> Outcome:
+    return flown(*STOPS)
+
+
 def begun(outcome: Outcome) -> list[tuple[float, int, str, bool]]:
     return [(r.t_ns / S, r.node, r.kind, r.active) for r in outcome.records if isinstance(r, RadioFault)]
 
@@ -53,8 +66,8 @@ def test_a_weak_battery_takes_a_uav_home() -> None:
     assert 15 <= left_s[3] <= 45
 
 
-def test_a_program_that_ends_says_nothing_and_takes_part_again_when_it_is_started_anew() -> None:
-    outcome = flown({"at_s": 12, "kind": "stop", "node": 3, "for_s": 8}, {"at_s": 20, "kind": "stop", "node": 5})
+def test_a_program_that_ends_says_nothing_and_takes_part_again_when_it_is_started_anew(stopped: Outcome) -> None:
+    outcome = stopped
     assert set(begun(outcome)) == {(12.0, 3, "stop", True), (20.0, 3, "stop", False), (20.0, 5, "stop", True)}
     assert not [t_s for t_s in born(outcome, 3) if 12 <= t_s < 20]
     assert [t_s for t_s in born(outcome, 3) if t_s > 20]
@@ -67,9 +80,11 @@ def test_a_program_that_ends_says_nothing_and_takes_part_again_when_it_is_starte
 
 
 @pytest.mark.parametrize("offset_m", [[30, 0, 0], None])
-def test_a_receiver_that_is_wrong_leads_astray_and_one_that_is_silent_says_nothing(offset_m: list[int] | None) -> None:
+def test_a_receiver_that_is_wrong_leads_astray_and_one_that_is_silent_says_nothing(
+    plain: Outcome, offset_m: list[int] | None
+) -> None:
     fault = {"at_s": 20, "kind": "gps", "node": 3, "for_s": 15}
-    plain, wrong = flown(), flown({**fault, **({} if offset_m is None else {"offset_m": offset_m})})
+    wrong = flown({**fault, **({} if offset_m is None else {"offset_m": offset_m})})
     assert begun(wrong) == [(20.0, 3, "gps", True), (35.0, 3, "gps", False)]
 
     def east_m(outcome: Outcome, t_s: int) -> float:
@@ -82,6 +97,5 @@ def test_a_receiver_that_is_wrong_leads_astray_and_one_that_is_silent_says_nothi
         assert east_m(plain, 34) != east_m(wrong, 34)
 
 
-def test_it_is_the_same_run_again() -> None:
-    fault = {"at_s": 12, "kind": "stop", "node": 3, "for_s": 8}
-    assert list(flown(fault).records) == list(flown(fault).records)
+def test_it_is_the_same_run_again(stopped: Outcome) -> None:
+    assert list(flown(*STOPS).records) == list(stopped.records)

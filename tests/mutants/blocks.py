@@ -3,7 +3,8 @@
     each block of a function (its body, the branches of its conditions, the bodies of its loops) notes that it ran
     ->  per test: the blocks, those of shared fixtures too, and the processor time  ->  map, as JSON
 
-`pytest -p tests.mutants.blocks --blocks FILE` writes the map. Compiled code and other processes note nothing.
+`pytest -p tests.mutants.blocks --blocks FILE TESTS` adds these tests to the map. Compiled code and other processes note
+nothing.
 """
 
 import ast
@@ -144,12 +145,12 @@ class Recorder:
         self._tests[item.nodeid] = sum(os.times()[:4]) - began_s, ran
 
     def pytest_sessionfinish(self) -> None:
-        where: dict[str, list[int]] = defaultdict(list)
-        for number, (_, ran) in enumerate(self._tests.values()):
-            for block in ran:
-                where[NOTES.names[block]].append(number)
-        tests = [[name, round(took_s, 3)] for name, (took_s, _) in self._tests.items()]
-        self._file.write_text(json.dumps({"tests": tests, "blocks": where}))
+        known = json.loads(self._file.read_text()) if self._file.exists() else {"blocks": [], "tests": {}}
+        numbers = {name: number for number, name in enumerate(known["blocks"])}
+        for test, (took_s, ran) in self._tests.items():
+            names = sorted(NOTES.names[block] for block in ran)
+            known["tests"][test] = [round(took_s, 3), [numbers.setdefault(name, len(numbers)) for name in names]]
+        self._file.write_text(json.dumps({"blocks": list(numbers), "tests": known["tests"]}))
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -186,19 +186,22 @@ class Judge:
     """Says of bugs what the tests say."""
 
     def __init__(self, known: Any, *, budget_s: float) -> None:
-        self._tests: list[tuple[str, float]] = [(name, took_s) for name, took_s in known["tests"]]
-        self._blocks: dict[str, list[int]] = known["blocks"]
+        self._took_s: dict[str, float] = {name: took_s for name, (took_s, _) in known["tests"].items()}
+        self._tests: dict[str, list[str]] = {name: [] for name in known["blocks"]}
+        for test, (_, blocks) in known["tests"].items():
+            for block in blocks:
+                self._tests[known["blocks"][block]].append(test)
         self._budget_s = budget_s
 
     def tests_of(self, bug: Bug) -> list[str]:
         """The tests that run a block, the shortest first, within the budget."""
         if is_compiled((ROOT / bug.path).read_text(encoding="utf-8"), bug.path):
             return list(OF_COMPILED)
-        keys = [f"{bug.path}:{bug.block}"] if bug.block else [key for key in self._blocks if key.startswith(bug.path)]
-        numbers = {number for key in keys for number in self._blocks.get(key, ())}
+        keys = [f"{bug.path}:{bug.block}"] if bug.block else [key for key in self._tests if key.startswith(bug.path)]
+        tests = {test for key in keys for test in self._tests.get(key, ())}
         chosen, spent_s = [], 0.0
-        for name, took_s in sorted((self._tests[number] for number in numbers), key=lambda test: test[1]):
-            spent_s += took_s
+        for name in sorted(tests, key=lambda test: (self._took_s[test], test)):
+            spent_s += self._took_s[name]
             if spent_s > self._budget_s and len(chosen) >= LEAST:
                 break
             chosen.append(name)

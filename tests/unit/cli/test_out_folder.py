@@ -10,7 +10,7 @@ import pytest
 from fanet_mw import tlog
 from fanet_mw.errors import ConfigError
 from sim.cli.app import app
-from sim.cli.options import prepare
+from sim.cli.out_folder import prepare
 from sim.report.names import PAGES
 from sim.results.file_names import RUN_FILES
 

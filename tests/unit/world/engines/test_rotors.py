@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from kit import slow
 
 from fanet_mw.bus.messages import Battery, Poses, Setpoint, SetpointKind
 from fanet_mw.bus.topics import Topics
@@ -211,7 +212,7 @@ def test_a_cruising_uav_keeps_its_speed_and_brakes_at_once() -> None:
     assert stop[:, 3].min() > -0.5, "and does not fly back"
 
 
-@pytest.mark.parametrize("wind_m_s", [8, 15])
+@pytest.mark.parametrize("wind_m_s", [15, *slow(8)])
 def test_uavs_that_stand_on_their_pads_stay_there_in_wind(make_scenario: MakeScenario, wind_m_s: float) -> None:
     keys = {"world.engine": "rotors", "world.wind_m_s": (wind_m_s, 0.0), "world.gusts_m_s": wind_m_s,
             "mobility.model": "onboard", "nodes.on_ground": True, "nodes.count": 4}  # fmt: skip

@@ -28,7 +28,7 @@ def flying(make_scenario: MakeScenario, seed: int = 1, **keys: Any) -> Flying:
 
 def misses_m(make_scenario: MakeScenario, **keys: Any) -> np.ndarray:
     """By how much UAVs miss the places to which they were sent [runs, 3]; one UAV of each run."""
-    return np.array([flying(make_scenario, seed, **keys).fly(60).at(1) - [100, 20, 40] for seed in range(24)])
+    return np.array([flying(make_scenario, seed, **keys).fly(60).at(1) - [100, 20, 40] for seed in range(12)])
 
 
 def test_a_uav_flies_to_where_its_gps_says_that_the_place_is(make_scenario: MakeScenario) -> None:

@@ -1,0 +1,49 @@
+"""Prepares the folder of `--out` before a run: it must be writable, and must not contain the result of another run.
+
+It is checked first, because a run may take an hour, and its result has nowhere else to go.
+"""
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from emulator.pcap_file import NAME as CAPTURE
+from emulator.pcap_file import captures
+from fanet_mw.errors import ConfigError
+from sim.report import names
+from sim.results.file_names import RESERVED, RUN_FILES
+
+_MOST_SAID: Final = 8
+
+
+def prepare(out: Path, *, force: bool) -> None:
+    """Make the folder; with `force`, remove what an earlier run has left in it, and nothing else.
+
+    Raises ConfigError if it cannot be written, or if it has files of an earlier run and `force` is not given.
+    """
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=out) as file:
+            file.write(b"a run would be lost")
+        named = (out / name for name in (*RUN_FILES, *names.PAGES, *RESERVED))
+        used = [path for path in (*named, *captures(out / CAPTURE), *names.pictures(out)) if os.path.lexists(path)]
+        if used and not force:
+            raise ConfigError(
+                f"--out {out}: holds the result of another run ({_said(used)}); "
+                "choose another folder, or replace it with --force"
+            )
+        for path in used:
+            path.unlink()
+        with contextlib.suppress(OSError):  # the file is missing, or belongs to another program
+            (out / names.PICTURES).rmdir()
+    except OSError as error:
+        raise ConfigError(f"--out {out}: cannot be written: {error.strerror}") from error
+
+
+def _said(paths: Sequence[Path]) -> str:
+    """The names of some files, and the number of the others."""
+    others = len(paths) - _MOST_SAID
+    return ", ".join(path.name for path in paths[:_MOST_SAID]) + (f" and {others} more" if others > 0 else "")

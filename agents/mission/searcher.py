@@ -47,6 +47,7 @@ from agents.mission.search_formation.pattern import Pattern, fastest, fitted
 from agents.mission.search_formation.plan_exchange import PlanExchange
 from agents.mission.search_formation.roll_call import RollCall
 from agents.mission.search_formation.shapes.contract import Demands, ShapeName
+from agents.mission.tasking.absence import Absence
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import Bidding
 from agents.mission.tasking.voice_descent import VoiceDescent
@@ -107,17 +108,18 @@ class Searcher:
             pattern=formation(scenario, nodes.count), random=self._random,
         )  # fmt: skip
         coverage = coverage_map(scenario)
-        self._reception = PhoneReception(scenario, node, survivors, own_motion, outbox, coverage)
+        self._reception = PhoneReception(scenario, node, survivors, own_motion, outbox, coverage, neighbors)
         self._sightings = Sightings(scenario, node, survivors, own_motion, outbox)
         self._announcing = Announcing(node, survivors, outbox)
         self._map = onboard_map
         self._approach = approach = Approach(
-            node, survivors, own_motion, outbox,
+            node, survivors, own_motion, neighbors, outbox,
             arrival_m=mission.arrival_m, speed_m_s=speed_m_s, look_m=min(_view_m(scenario)),
         )  # fmt: skip
+        absence = Absence(place, mission.connection, speed_m_s=speed_m_s)
         self._bidding = Bidding(
             scenario, node, survivors=survivors, own_motion=own_motion, formation=place, approach=approach,
-            outbox=outbox, speed_m_s=speed_m_s,
+            absence=absence, outbox=outbox, speed_m_s=speed_m_s,
         )  # fmt: skip
         self._return_home = ReturnHome(
             position, own_motion, outbox,
@@ -129,7 +131,7 @@ class Searcher:
             obstacles,
             most_m_s=speed_m_s,
             hard=[ReciprocalAvoidance(own_motion, self._radar.avoided, obstacles)],
-            soft=[ConnectivityMaintenance(own_motion, neighbors, place, reach_m=reach_m)],
+            soft=[ConnectivityMaintenance(own_motion, neighbors, place, self._bidding, reach_m=reach_m)],
         )
         missed_cells = None if coverage is None else MissedCells(coverage, place)
         heard = scenario.sensors.voice_hz > 0
@@ -140,7 +142,7 @@ class Searcher:
             orders, own_motion,
             height_m=nodes.altitude_m, speed_m_s=scenario.mobility.speed_m_s, look_m=min(_view_m(scenario)),
         )  # fmt: skip
-        goal = Goal(survivors, own_motion, place, approach, missed_cells, listening, errand)
+        goal = Goal(survivors, own_motion, place, approach, missed_cells, listening, errand, absence=absence)
         take_off = TakeOff(
             node, position,
             own_motion=own_motion, neighbors=neighbors, outbox=outbox, height_m=nodes.altitude_m,
@@ -187,6 +189,8 @@ class Searcher:
         if not self._return_home.leaves and self._orders.errand is None:
             self._bidding.bid(now_ns, delay_s=self._flight.take_off_s)
             self._bidding.choose(now_ns)
+            goes = self._bidding.is_absent(now_ns) or (self._place.plan is None and self._bidding.survivor is not None)
+            self._plans.be_absent(goes, self._percent, now_ns)
         self._mode.review(self._bidding.survivor, now_ns)
 
     @property

@@ -1290,22 +1290,22 @@ class MAVLink_fanet_status_message(MAVLink_message):
 
     id = MAVLINK_MSG_ID_FANET_STATUS
     msgname = "FANET_STATUS"
-    fieldnames = ["t_us", "east", "north", "up", "node", "revision", "charge", "version"]
-    ordered_fieldnames = ["t_us", "east", "north", "up", "node", "revision", "charge", "version"]
-    fieldtypes = ["uint64_t", "float", "float", "float", "uint16_t", "uint16_t", "uint8_t", "uint8_t"]
+    fieldnames = ["t_us", "east", "north", "up", "node", "revision", "charge", "absent", "version"]
+    ordered_fieldnames = ["t_us", "east", "north", "up", "node", "revision", "charge", "absent", "version"]
+    fieldtypes = ["uint64_t", "float", "float", "float", "uint16_t", "uint16_t", "uint8_t", "uint8_t", "uint8_t"]
     fielddisplays_by_name: Dict[str, str] = {}
     fieldenums_by_name: Dict[str, str] = {}
     fieldunits_by_name: Dict[str, str] = {"t_us": "us", "east": "m", "north": "m", "up": "m", "charge": "%"}
-    native_format = bytearray(b"<QfffHHBB")
-    orders = [0, 1, 2, 3, 4, 5, 6, 7]
-    lengths = [1, 1, 1, 1, 1, 1, 1, 1]
-    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0]
-    crc_extra = 199
-    unpacker = struct.Struct("<QfffHHBB")
+    native_format = bytearray(b"<QfffHHBBB")
+    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8]
+    lengths = [1, 1, 1, 1, 1, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0, 0]
+    crc_extra = 210
+    unpacker = struct.Struct("<QfffHHBBB")
     instance_field = None
     instance_offset = -1
 
-    def __init__(self, t_us: int, east: float, north: float, up: float, node: int, revision: int, charge: int, version: int):
+    def __init__(self, t_us: int, east: float, north: float, up: float, node: int, revision: int, charge: int, absent: int, version: int):
         MAVLink_message.__init__(self, MAVLink_fanet_status_message.id, MAVLink_fanet_status_message.msgname)
         self._fieldnames = MAVLink_fanet_status_message.fieldnames
         self._instance_field = MAVLink_fanet_status_message.instance_field
@@ -1317,10 +1317,11 @@ class MAVLink_fanet_status_message(MAVLink_message):
         self.node = node
         self.revision = revision
         self.charge = charge
+        self.absent = absent
         self.version = version
 
     def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
-        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.t_us, self.east, self.north, self.up, self.node, self.revision, self.charge, self.version), force_mavlink1=force_mavlink1)
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.t_us, self.east, self.north, self.up, self.node, self.revision, self.charge, self.absent, self.version), force_mavlink1=force_mavlink1)
 
 
 # Define name on the class for backwards compatibility (it is now msgname).
@@ -2662,7 +2663,7 @@ class MAVLink(object):
         """
         self.send(self.fanet_search_encode(start_us, half_width, first, last, height, speed, deploy_ds, revision, planner, nodes, lanes, relays, followers, shape, teams, version), force_mavlink1=force_mavlink1)
 
-    def fanet_status_encode(self, t_us: int, east: float, north: float, up: float, node: int, revision: int, charge: int, version: int) -> MAVLink_fanet_status_message:
+    def fanet_status_encode(self, t_us: int, east: float, north: float, up: float, node: int, revision: int, charge: int, absent: int, version: int) -> MAVLink_fanet_status_message:
         """
         A UAV says where it is and how it is, for those who plan.
 
@@ -2673,12 +2674,13 @@ class MAVLink(object):
         node                      : Which node. (type:uint16_t)
         revision                  : The plan it flies by; 0: none. (type:uint16_t)
         charge                    : What it may spend of its battery, above the way home and a reserve; 0: it flies home. [%] (type:uint8_t)
+        absent                    : 1: it is out of its place for a survivor, and comes back; 0: it is not. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """
-        return MAVLink_fanet_status_message(t_us, east, north, up, node, revision, charge, version)
+        return MAVLink_fanet_status_message(t_us, east, north, up, node, revision, charge, absent, version)
 
-    def fanet_status_send(self, t_us: int, east: float, north: float, up: float, node: int, revision: int, charge: int, version: int, force_mavlink1: bool = False) -> None:
+    def fanet_status_send(self, t_us: int, east: float, north: float, up: float, node: int, revision: int, charge: int, absent: int, version: int, force_mavlink1: bool = False) -> None:
         """
         A UAV says where it is and how it is, for those who plan.
 
@@ -2689,10 +2691,11 @@ class MAVLink(object):
         node                      : Which node. (type:uint16_t)
         revision                  : The plan it flies by; 0: none. (type:uint16_t)
         charge                    : What it may spend of its battery, above the way home and a reserve; 0: it flies home. [%] (type:uint8_t)
+        absent                    : 1: it is out of its place for a survivor, and comes back; 0: it is not. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """
-        self.send(self.fanet_status_encode(t_us, east, north, up, node, revision, charge, version), force_mavlink1=force_mavlink1)
+        self.send(self.fanet_status_encode(t_us, east, north, up, node, revision, charge, absent, version), force_mavlink1=force_mavlink1)
 
     def fanet_bids_encode(self, survivors: Sequence[int], bidders: Sequence[int], etas_ds: Sequence[int], serials: Sequence[int], node: int, ages_s: Sequence[int], count: int, version: int) -> MAVLink_fanet_bids_message:
         """

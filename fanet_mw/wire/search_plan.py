@@ -96,6 +96,8 @@ class SearchStatus(NamedTuple):
     charge: int
     """The percentage of the battery that may still be spent, above the way home and a reserve; 0:
     the UAV flies home."""
+    absent: bool = False
+    """True while the UAV is out of its place for a survivor, so that others close ranks until it comes back."""
 
     def encode_frame(self, node: int) -> bytes:
         payload = STATUS.layout.pack(self.t_us, *self.position, *self[2:], VERSION)
@@ -109,14 +111,15 @@ class SearchStatus(NamedTuple):
     @classmethod
     def checked(cls, fields: tuple[Any, ...]) -> Self:
         """The status of these fields; raises MalformedFrameError."""
-        t_us, east, north, up, node, revision, charge, version = fields
+        t_us, east, north, up, node, revision, charge, absent, version = fields
         position = Enu(east, north, up)
         refuse_unless(
             version == VERSION
             and 0 < node < ANY_NODE
             and t_us <= LATEST_US
             and charge <= 100
+            and absent <= 1
             and position.is_within(FARTHEST_M),
-            f"status of {node}: {position}, {charge} %",
+            f"status of {node}: {position}, {charge} %, absent {absent}",
         )
-        return cls(t_us, position, node, revision, charge)
+        return cls(t_us, position, node, revision, charge, bool(absent))

@@ -193,16 +193,15 @@ class Lost(Around):
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_what_a_lost_uav_would_have_searched_is_searched_by_another() -> None:
-    """The holder of a corner lane is lost when the sweep begins; nobody else would come near that corner."""
+def test_what_a_lost_uav_would_have_searched_is_searched_by_those_beside_it() -> None:
+    """The holder of a corner lane is lost when the sweep begins; nobody takes its place, and its row closes ranks."""
     before = flown(lambda uav, _: uav, seconds=20)
     plans = [record for record in before.records if isinstance(record, Planned)]
     corner = next(record.node for record in plans if record.place == 0 and record.node != 1)
     after = flown(
         lambda uav, names: Lost(uav, names, at_ns=16 * S) if uav.name == f"agent-{corner}" else uav, seconds=150
     )
-    takers = [r for r in after.records if isinstance(r, Planned) and r.place == 0 and r.node != corner]
-    assert takers, "a follower was given the place"
+    assert {r.node for r in after.records if isinstance(r, Planned) and r.place == 0} == {corner}
     found = mission_of(after)
     assert found["coverage"] >= 0.99
     assert found["confirmed"] == 3
@@ -210,18 +209,13 @@ def test_what_a_lost_uav_would_have_searched_is_searched_by_another() -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_who_shares_what_has_been_searched_searches_the_lanes_of_lost_uavs_before_they_are_given_up() -> None:
-    """The outermost two of a line are lost before the sweep; the plan gives their places away after 70 s of silence."""
+def test_the_lanes_of_two_that_are_lost_at_the_ends_of_a_line_are_searched_in_the_first_sweep() -> None:
+    """The outermost two of a line are lost before the sweep; without closing ranks 92 % would be covered."""
     wide = ("nodes.count=20", "traffic.sources=19", "world.area_m=1000")
     plans = [r for r in flown(lambda uav, _: uav, seconds=20, keys=wide).records if isinstance(r, Planned)]
     names = {f"agent-{plan.node}" for plan in plans if plan.place in (0, 5)}
     assert len(names) == 2
-
-    def covered(share: bool) -> float:
-        keys = (*wide, f"mission.coverage_map={str(share).lower()}")
-        after = flown(
-            lambda uav, topics: Lost(uav, topics, at_ns=32 * S) if uav.name in names else uav, seconds=98, keys=keys
-        )
-        return float(mission_of(after)["coverage"])
-
-    assert covered(share=True) >= covered(share=False) + 0.02
+    after = flown(
+        lambda uav, topics: Lost(uav, topics, at_ns=32 * S) if uav.name in names else uav, seconds=98, keys=wide
+    )
+    assert mission_of(after)["coverage"] >= 0.955

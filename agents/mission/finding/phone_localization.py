@@ -7,8 +7,11 @@
     b         offset of this phone's power, by burial, antenna and battery [dB]
     d_i       distance of the phone from place i [m]
 
-The offset b is integrated out in closed form, so that the filter keeps only the sum of the residuals of each cell, the
-sum of their squares, and the likelihood of the places without reception. The filter is a histogram filter (Thrun,
+Shadowing at places near each other is nearly the same (Gudmundson, 1991), so that ten powers from one side tell little
+more than one. Each power is therefore compared with what those received nearest to its place let expect (Vecchia,
+Journal of the Royal Statistical Society B 50(2), 1988): the residuals are whitened, one after the other. The offset b
+is integrated out in closed form, so that the filter keeps only the sum of the whitened residuals of each cell, the sum
+of their squares, and the likelihood of the places without reception. The filter is a histogram filter (Thrun,
 Burgard, Fox: Probabilistic Robotics, 2005, chapter 4). Unlike least squares it needs no initial estimate. If a UAV
 flies straight, the powers cannot tell on which side of its course the phone is; both places then stay probable until a
 power received elsewhere excludes one of them.
@@ -21,7 +24,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache, reduce
 from itertools import compress
-from operator import add, and_, mul
+from operator import add, and_, mul, sub
 from typing import Final, NamedTuple
 
 from fanet_mw.units import Enu
@@ -40,7 +43,15 @@ _ROWS: Final = tuple(float(cell // _WIDTH) for cell in range(_WIDTH * _WIDTH))
 _OFF_CENTER_M: Final = 120.0
 """A new grid is made when the strongest power was received farther than this from the middle of the present one."""
 CORRELATION_FACTOR: Final = 1.5
-"""Samples near each other share shadowing, so that this many of them count like one independent sample."""
+"""Places near each other share shadowing, so that this many without reception count like one independent one."""
+_CORRELATION_M: Final = 50.0
+"""The distance over which the correlation of shadowing falls to 1 / e."""
+_READING_DB: Final = 2.5
+"""The standard deviation of one reading at a place: fast fading and the receiver's own error."""
+_COMPARED: Final = 4
+"""The number of earlier powers, those from the nearest places, with which a power is compared."""
+_COMPARED_M: Final = 150.0
+"""Powers from places farther away than this are independent of it."""
 _SILENCE_M: Final = 450.0
 """A place without reception is ignored if it is farther than this from the middle of the grid."""
 _NEVER: Final = 0.02
@@ -128,9 +139,14 @@ class PhoneFilter:
         self._pending: list[tuple[Enu, float | None]] = []
         """The samples that the cells do not include yet; they are added when an estimate is asked for."""
         self._sums: list[float] = []
-        """For each cell, the sum of the residuals of the received powers."""
+        """For each cell, the sum of the whitened residuals of the received powers, each times what the offset adds to
+        it."""
         self._squares: list[float] = []
-        """For each cell, the sum of the squared residuals."""
+        """For each cell, the sum of the squared whitened residuals."""
+        self._gains = 0.0
+        """The sum of the squares of what an offset of 1 dB adds to the whitened residuals."""
+        self._received: list[tuple[Enu, float]] = []
+        """The received powers that the cells include."""
         self._count = 0
         self._taken: dict[int, list[Enu]] = {}
         """For each node, the places at which it received the phone."""
@@ -218,6 +234,7 @@ class PhoneFilter:
         strongest = max((s for s in self._samples if s[1] is not None), key=lambda s: s[1] or 0.0)[0]
         if not self._sums or _ground_m(self._middle, strongest) > _OFF_CENTER_M:
             self._middle, fresh, self._count = strongest, self._samples, 0
+            self._gains, self._received = 0.0, []
             cells = _WIDTH * _WIDTH
             self._sums, self._squares, self._scores = [0.0] * cells, [0.0] * cells, [0.0] * cells
         for position, rssi_dbm in fresh:
@@ -265,9 +282,19 @@ class PhoneFilter:
     def _update(self, position: Enu, rssi_dbm: float) -> None:
         """Add a received power to the sums of all cells."""
         assert self._middle is not None, "the grid has a middle before samples are added"
-        residuals = _residuals_db(self._middle, position, rssi_dbm, self._model)
-        self._sums = list(map(add, self._sums, residuals))
-        self._squares = list(map(add, self._squares, map(mul, residuals, residuals)))
+        middle, model = self._middle, self._model
+        compared = sorted((_ground_m(at, position), at, dbm) for at, dbm in self._received)[:_COMPARED]
+        beside = [(at, dbm) for away_m, at, dbm in compared if away_m <= _COMPARED_M]
+        weights, sigma_db = _expectation(position, [at for at, _ in beside], model.shadowing_db)
+        residuals: Iterable[float] = _residuals_db(middle, position, rssi_dbm, model)
+        for weight, (at, dbm) in zip(weights, beside, strict=True):
+            residuals = map(sub, residuals, [weight * off for off in _residuals_db(middle, at, dbm, model)])
+        whitened = [off / sigma_db for off in residuals]
+        gain = (1 - math.fsum(weights)) / sigma_db
+        self._sums = [total + gain * off for total, off in zip(self._sums, whitened, strict=True)]
+        self._squares = list(map(add, self._squares, map(mul, whitened, whitened)))
+        self._gains += gain * gain
+        self._received.append((position, rssi_dbm))
 
     def _rule_out(self, position: Enu) -> None:
         """Multiply the likelihood of each cell by the probability that a phone there is not received at a place."""
@@ -284,11 +311,9 @@ class PhoneFilter:
         """Compute the posterior of all cells; returns its mean and covariance within the area."""
         assert self._middle is not None, "the grid has a middle before its cells are used"
         model = self._model
-        per = 1 / (CORRELATION_FACTOR * max(model.shadowing_db, 1.0) ** 2)
-        shrink = per * per / (per * self._count + 1 / max(model.offset_db, 0.1) ** 2)
+        shrink = 1 / (self._gains + 1 / max(model.offset_db, 0.1) ** 2)
         scores = [
-            shrink * s * s - per * q + silence
-            for s, q, silence in zip(self._sums, self._squares, self._scores, strict=True)
+            shrink * s * s - q + silence for s, q, silence in zip(self._sums, self._squares, self._scores, strict=True)
         ]
         self._totals = scores
         possible = _inside(self._middle, model.half_m + CELL_M / 2)
@@ -328,6 +353,31 @@ def _inside(middle: Enu, half_m: float) -> Sequence[bool]:
     return found if any(found) else _EVERY_CELL
 
 
+def _expectation(position: Enu, beside: Sequence[Enu], shadowing_db: float) -> tuple[list[float], float]:
+    """The weights with which the residuals at places `beside` another one let expect the residual there, and the
+    standard deviation of what is left.
+    """
+    variance = max(shadowing_db, 1.0) ** 2
+    own = variance + _READING_DB * _READING_DB
+
+    def shared(a: Enu, b: Enu) -> float:
+        return variance * math.exp(-_ground_m(a, b) / _CORRELATION_M)
+
+    towards = [shared(position, at) for at in beside]
+    rows = [
+        [*(shared(a, b) if i != j else own for j, b in enumerate(beside)), towards[i]] for i, a in enumerate(beside)
+    ]
+    for i, row in enumerate(rows):  # Gauss and Jordan; a covariance matrix needs no pivots
+        pivot = row[i]
+        row[:] = [value / pivot for value in row]
+        for other in rows:
+            if other is not row:
+                factor = other[i]
+                other[:] = [value - factor * share for value, share in zip(other, row, strict=True)]
+    weights = [row[-1] for row in rows]
+    return weights, math.sqrt(own - math.fsum(w * c for w, c in zip(weights, towards, strict=True)))
+
+
 def _ground_m(a: Enu, b: Enu) -> float:
     return math.hypot(a.east - b.east, a.north - b.north)
 
@@ -359,7 +409,7 @@ def _calibrated(model: PhoneModel, offset: PhoneOffset) -> PhoneModel:
     )
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=256)
 def _residuals_db(middle: Enu, position: Enu, rssi_dbm: float, model: PhoneModel) -> Sequence[float]:
     """For each cell of the grid around `middle`, the received power less the one that is expected from a phone there.
 

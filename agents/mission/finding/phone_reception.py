@@ -1,6 +1,7 @@
 """Handles the phones that a UAV's own receiver detects: each power goes into the phone's filter, and out as a report.
 
-A receiver that detects no phone says nothing. If no scan has come for a while, a scan without phones is assumed.
+A receiver that detects no phone says nothing. If no scan has come for a while, a scan without phones is assumed. A
+neighbor that does not report a phone does not receive it where it flies, which tells as much.
 """
 
 from collections.abc import Sequence
@@ -8,6 +9,7 @@ from typing import Final
 
 from agents.mission.finding.coverage_map import CoverageMap
 from agents.mission.finding.known_survivors import KnownSurvivors
+from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox, ReportFormat
 from fanet_mw.scenario import Scenario
@@ -18,6 +20,14 @@ from fanet_mw.wire.survivors import Survivor
 
 MISSED_SCANS: Final = 1.5
 """After this number of scan intervals without a scan, the receiver is taken to detect no phone."""
+_OTHERS_NS: Final = 3 * S
+"""How often it is noted where neighbors receive nothing."""
+_UNREPORTED_NS: Final = 7 * S
+"""A neighbor that receives a phone has reported it within this time."""
+_NEAR_M: Final = 450.0
+"""Phones that are farther away than this concern others."""
+_ENOUGH: Final = 12
+"""A phone that was received so often is placed by its powers."""
 
 
 class PhoneReception:
@@ -31,8 +41,11 @@ class PhoneReception:
         own_motion: OwnMotion,
         outbox: Outbox,
         coverage: CoverageMap | None,
+        neighbors: NeighborMotions,
     ) -> None:
         """`coverage`: the map of searched cells, for UAVs that share one."""
+        self._neighbors = neighbors
+        self._others_ns = 0
         self._node = node
         self._survivors, self._own_motion, self._outbox = survivors, own_motion, outbox
         self._format = ReportFormat(scenario, node)
@@ -48,6 +61,24 @@ class PhoneReception:
             self._coverage.fly_over(self._own_motion.position)
         if now_ns - self._scan_ns > self._silent_after_ns:
             self.scan((), now_ns=now_ns)
+        if now_ns - self._others_ns >= _OTHERS_NS:
+            self._others_ns = now_ns
+            self._note_silent_neighbors(now_ns)
+
+    def _note_silent_neighbors(self, now_ns: int) -> None:
+        """Take in that neighbors do not receive phones that are hardly placed yet."""
+        vague = [
+            known
+            for survivor in self._survivors.sought()
+            if (known := self._survivors.by_id[survivor]).filter.received_powers < _ENOUGH
+            and known.filter.near(self._own_motion.position, within_m=_NEAR_M)
+            and now_ns - known.first_ns > _OTHERS_NS
+        ]
+        for node, motion in self._neighbors.by_node(now_ns=now_ns) if vague else ():
+            for known in vague:
+                report = known.latest.get(node)
+                if report is None or now_ns - report.t_us * US > _UNREPORTED_NS:
+                    known.filter.on_silence(motion.position)
 
     def scan(self, heard: Sequence[tuple[int, float]], *, now_ns: int) -> None:
         """The receiver detects these phones with these powers [dBm], and no others."""

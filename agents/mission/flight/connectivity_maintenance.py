@@ -9,6 +9,7 @@ from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.pattern import Pattern
+from agents.mission.tasking.bidding import Bidding
 from fanet_mw.motion import Motion
 from fanet_mw.units import Enu
 
@@ -30,15 +31,21 @@ class ConnectivityMaintenance:
     """
 
     def __init__(
-        self, own_motion: OwnMotion, neighbors: NeighborMotions, formation: FormationPlace, *, reach_m: float
+        self,
+        own_motion: OwnMotion,
+        neighbors: NeighborMotions,
+        formation: FormationPlace,
+        bidding: Bidding,
+        *,
+        reach_m: float,
     ) -> None:
         self._own_motion, self._neighbors = own_motion, neighbors
-        self._formation = formation
+        self._formation, self._bidding = formation, bidding
         self._tether_m = _TETHER * reach_m
 
     def planes(self, now_ns: int) -> list[HalfPlane]:
         plan, pattern, place = self._formation.plan, self._formation.pattern, self._formation.place
-        if plan is not None and place is None:
+        if (plan is not None and place is None) or self._bidding.is_absent(now_ns):
             return []
         ties: list[Motion | None]
         if plan is not None and pattern is not None and place is not None and self._formation.is_taken_up(now_ns):
@@ -65,7 +72,8 @@ class ConnectivityMaintenance:
     def _nearest_motions(self, now_ns: int) -> list[Motion | None]:
         """The nearest neighbors of a UAV on the way to its place, within whose reach it stays when it responds."""
         here = self._own_motion.position
-        heard = self._neighbors.all(now_ns=now_ns)
+        absent = self._bidding.responders(now_ns) if self._bidding.may_be_absent else ()
+        heard = [motion for node, motion in self._neighbors.by_node(now_ns=now_ns) if node not in absent]
         return [*sorted(heard, key=lambda motion: motion.offset_from(here, now_ns).norm())[:_EARLY_TIES]]
 
     def _tied_to(self, pattern: Pattern, place: int, now_ns: int) -> tuple[int, ...]:

@@ -9,6 +9,7 @@ from agents.mission.flight.errand import Errand
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.search_formation.formation_place import FormationPlace, along
 from agents.mission.search_formation.missed_cells import MissedCells
+from agents.mission.tasking.absence import Absence
 from agents.mission.tasking.approach import VAGUE_M, Approach
 from agents.mission.tasking.bidding import FAR_M
 from agents.mission.tasking.voice_descent import VoiceDescent
@@ -30,12 +31,14 @@ class Goal:
         missed_cells: MissedCells | None,
         listening: VoiceDescent | None,
         errand: Errand | None = None,
+        *,
+        absence: Absence,
     ) -> None:
         """`missed_cells`: the cells that the formation has left unsearched; None if UAVs do not share what
         they have searched. `listening`: takes a UAV with microphones down; None for a UAV without.
         `errand`: what the post on the ground orders.
         """
-        self._errand = errand
+        self._errand, self._absence = errand, absence
         self._survivors, self._own_motion = survivors, own_motion
         self._formation, self._approach = formation, approach
         self._missed_cells, self._listening = missed_cells, listening
@@ -52,7 +55,8 @@ class Goal:
         if not leaves:
             place = None if task is None else self._survivors.by_id[task].place()
             if task is None or not formation.leads_by(place, lane, moves):
-                survivor = self._in_lane(lane, moves, now_ns)
+                leaves = task is not None and self._absence.is_permitted
+                survivor = task if leaves else self._in_lane(lane, moves, now_ns)
         place = None if survivor is None else self._survivors.by_id[survivor].place()
         if survivor is None or place is None:
             missed = self._missed_place(now_ns)

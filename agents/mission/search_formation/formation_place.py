@@ -127,6 +127,24 @@ class FormationPlace:
         ahead_m, aside_m = along(moves, estimate.east_m - lane.east, estimate.north_m - lane.north)
         return abs(aside_m) <= _LEASH_M + self._aside_m and -_LAG_M <= ahead_m <= _AHEAD_M
 
+    def is_near(self, now_ns: int) -> bool:
+        """True if this UAV is as near to its place as the swarm needs it to stay connected."""
+        lane, moves = self.lane(now_ns)
+        here = self._own_motion.position
+        ahead_m, aside_m = along(moves, here.east - lane.east, here.north - lane.north)
+        return abs(aside_m) <= _LEASH_M and abs(ahead_m) <= _LAG_M
+
+    def can_be_spared(self, now_ns: int) -> bool:
+        """True if the others of its row can close ranks without this UAV, and the row stays as long as it is."""
+        pattern, place, at_s = self.pattern, self.place, self.swept_s(now_ns)
+        if pattern is None or place is None or at_s is None:
+            return False
+        closed = pattern.closed(pattern.vacant | {place})
+        row = next((row for row in pattern.shape.rows() if place in row.places), None)
+        return row is None or all(
+            closed.shape.at(end, at_s) == pattern.shape.at(end, at_s) for end in (row.places[0], row.places[-1])
+        )
+
     def misses_m(self, estimate: Estimate, lane: Enu, moves: Enu, now_ns: int) -> float:
         """How far from an estimated place this UAV has to stay, wherever its moving place takes it; 0 if it can get
         there, or if its lane turns and may come nearer again.
@@ -167,6 +185,22 @@ class FormationPlace:
             pattern.shape.apart_m(team, east_m, north_m, at_s + ahead_s) <= self._most_m
             for ahead_s in (within_s, within_s + 5.0)
         )
+
+    def beyond_reach_m(self, east_m: float, north_m: float, now_ns: int) -> float:
+        """How far a position is from where this UAV's team receives it at an instant of the sweep; without a plan, from
+        where this UAV waits for one.
+        """
+        pattern, place, at_s = self.pattern, self.place, self.swept_s(now_ns)
+        if pattern is None or place is None or at_s is None:
+            lane, _ = self.lane(now_ns)
+            apart_m = math.hypot(lane.east - east_m, lane.north - north_m)
+        else:
+            apart_m = pattern.shape.apart_m(pattern.dimensions.team_of(place), east_m, north_m, at_s)
+        return max(0.0, apart_m - self._most_m)
+
+    def sweep_starts_ns(self) -> int | None:
+        """The instant at which the sweep begins, when all should be at their places; None without a plan."""
+        return None if self.plan is None else _taken_up_ns(self.plan)
 
     def is_swept(self, now_ns: int, *, times: int) -> bool:
         """True once the formation has swept the area so often; the way back is a sweep, too."""

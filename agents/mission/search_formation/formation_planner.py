@@ -14,7 +14,8 @@
                 that follow the newest plan, the one with the lowest id stands in as the planner until then
 
 The first assignment minimizes the sum of the squared distances flown. If all UAVs leave and arrive at the same
-instants, their ways then do not cross, and UAVs that were near each other remain so. The words place, team, relay and
+instants, their ways then do not cross, and UAVs that were near each other remain so. UAVs that are out for survivors
+become followers, on whom nothing depends. The words place, team, relay and
 follower are explained in `shapes/contract.py`; how the area is split into lanes is in `shapes/`.
 """
 
@@ -47,6 +48,8 @@ _BEHIND_NS: Final = 15 * S
 """A node whose status names an older plan this long after this node began to follow its own cannot be the planner."""
 _ASKS_NS: Final = 60 * S
 """How long a node without a plan waits to be told that of the others before it makes one that replaces theirs."""
+_BUSY_M2: Final = 500.0**2
+"""By how much longer a way, squared, a UAV may have that becomes a follower because it is out for a survivor."""
 _REVISION_BITS: Final = 16
 
 
@@ -57,6 +60,8 @@ class _HeardUav(NamedTuple):
     """The plan that the node follows, by its latest status; 0 if it has none."""
     leaves: bool
     """True for a node that flies home: it has no place any more, and does not plan any more."""
+    absent: bool = False
+    """True while the node is out of its place for a survivor, by its latest status."""
     stated_ns: int | None = None
     """The instant of the latest status; None for a node of which only hellos were received."""
 
@@ -94,7 +99,12 @@ class FormationPlanner:
         if before is None or status.t_us * US >= before.heard_ns - S:
             stated_ns = min(now_ns, status.t_us * US)
             self._members[status.node] = _HeardUav(
-                status.position, stated_ns, status.revision, leaves=status.charge == 0, stated_ns=stated_ns
+                status.position,
+                stated_ns,
+                status.revision,
+                leaves=status.charge == 0,
+                absent=status.absent,
+                stated_ns=stated_ns,
             )
 
     def on_neighbor(self, node: int, position: Enu, *, now_ns: int) -> None:
@@ -199,7 +209,16 @@ class FormationPlanner:
         places = [(nodes[0] - 1) % pattern.places] if alone else list(range(pattern.places))
         goals = [pattern.at(place, 0.0) for place in places]
         costs = [[_distance2(self._members[node].position, goal) for goal in goals] for node in nodes]
-        chosen = assign(costs)
+        absent = self.absent
+        chosen = assign(
+            [
+                [
+                    cost + _BUSY_M2 * (node in absent and place not in pattern.followers)
+                    for place, cost in zip(places, row, strict=True)
+                ]
+                for node, row in zip(nodes, costs, strict=True)
+            ]
+        )
         holders = [0] * pattern.places
         for node, column in zip(nodes, chosen, strict=True):
             holders[places[column]] = node
@@ -242,6 +261,11 @@ class FormationPlanner:
     def leavers(self) -> set[int]:
         """The nodes that fly home."""
         return {node for node, member in self._members.items() if member.leaves}
+
+    @property
+    def absent(self) -> set[int]:
+        """The nodes that are out of their places for survivors."""
+        return {node for node, member in self._members.items() if member.absent}
 
     def _newest_revision(self) -> int:
         """The number of the newest plan that a status has named; 0 if none has named any."""

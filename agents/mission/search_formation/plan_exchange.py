@@ -46,6 +46,8 @@ class PlanExchange:
         """The instant at which this UAV began to follow its plan."""
         self._flies_home = False
         """True if this UAV takes no place any more, whatever the plan says."""
+        self._absent = False
+        """True while this UAV is out of its place for a survivor."""
 
     def start(self, now_ns: int) -> None:
         """Choose the instant of the first status."""
@@ -59,7 +61,7 @@ class PlanExchange:
             self._adopt(now_ns)
         if self._place.plan is not None:
             self._roll_call.review(self._place.plan, since_ns=self._adopted_ns, now_ns=now_ns)
-            self._place.close_ranks({*self._roll_call.lost, *self._planner.leavers})
+            self._place.close_ranks({*self._roll_call.lost, *self._planner.leavers, *self._planner.absent})
         plans, self._planner.to_tell = self._planner.to_tell, []
         self._outbox.packets += [OutgoingPacket(plan.encode_frame(self._node)) for plan in plans]
 
@@ -67,11 +69,18 @@ class PlanExchange:
         """Send this UAV's status: its position, its plan, and the percentage of its battery that it may still spend."""
         plan = self._planner.plan
         status = SearchStatus(
-            now_ns // US, self._own_motion.position, self._node, plan.revision if plan else 0, percent
+            now_ns // US, self._own_motion.position, self._node, plan.revision if plan else 0, percent, self._absent
         )
         self._planner.status(status, now_ns=now_ns)
         self._outbox.packets.append(OutgoingPacket(status.encode_frame(self._node)))
         self._next_status_ns = now_ns + round((0.8 + 0.4 * self._random()) * STATUS_S * S)
+
+    def be_absent(self, goes: bool, percent: int, now_ns: int) -> None:
+        """Tell all when this UAV goes out of its place for a survivor (`goes`), and when it is back."""
+        absent = goes or (self._absent and not self._place.is_near(now_ns))
+        if absent != self._absent:
+            self._absent = absent
+            self.say_status(percent, now_ns)
 
     def leave(self) -> None:
         """Give up the place in the formation, and take none until this UAV comes back."""

@@ -9,7 +9,8 @@ import math
 from typing import Final
 
 from agents.mission.finding.known_survivors import KnownSurvivors
-from agents.mission.finding.phone_localization import Estimate
+from agents.mission.finding.phone_localization import Estimate, PhoneFilter
+from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
 from agents.mission.tasking.look_around import LookAround
@@ -27,6 +28,11 @@ _IN_VIEW_M: Final = 40.0
 """The greatest radius of the circle around a person: from there a camera still sees the person in its middle."""
 _FIRST_RADIUS_M: Final = 14.0
 """The radius at which spiral and circle begin."""
+_BESIDE_M: Final = 350.0
+"""Others at most this far from the middle of a phone's probable places look there, too."""
+_MEASURED_M: Final = 200.0
+"""A responder that is this near to the mean of a vague estimate goes round from one probable place to the next, which
+tells the powers there as well; it has come to no place yet."""
 VAGUE_M: Final = 50.0
 """An estimate with a greater standard deviation makes no UAV leave its place in a team; a follower may go there."""
 
@@ -39,6 +45,7 @@ class Approach:
         node: NodeId,
         survivors: KnownSurvivors,
         own_motion: OwnMotion,
+        neighbors: NeighborMotions,
         outbox: Outbox,
         *,
         arrival_m: float,
@@ -49,7 +56,7 @@ class Approach:
         infinite for a UAV without a camera.
         """
         self._node = node
-        self._survivors, self._own_motion = survivors, own_motion
+        self._survivors, self._own_motion, self._neighbors = survivors, own_motion, neighbors
         self._outbox = outbox
         self._arrival_m = arrival_m
         self._along_m_s = _SPEED_SHARE * speed_m_s
@@ -74,14 +81,18 @@ class Approach:
         """
         arrived_ns = self.arrived_ns.get(survivor)
         if arrived_ns is None:
-            if place.distance_m(self._own_motion.position) > self._arrival_m:
+            away_m = place.distance_m(self._own_motion.position)
+            if responding and place.sigma_m > VAGUE_M and away_m < _MEASURED_M:
+                phone = self._survivors.by_id[survivor].filter
+                return self._place_to_look_at(survivor, phone, now_ns) or (place.east_m, place.north_m)
+            if away_m > self._arrival_m:
                 return place.east_m, place.north_m
             arrived_ns = self.arrived_ns[survivor] = now_ns
             if responding:
                 self._outbox.records.append(Arrived(now_ns, self._node, survivor))
         phone = self._survivors.by_id[survivor].filter
         seen = phone.is_seen
-        looked_for = None if seen else self.look_around.next_place(survivor, phone, self._own_motion.position, now_ns)
+        looked_for = None if seen else self._place_to_look_at(survivor, phone, now_ns)
         if looked_for is not None:
             return looked_for
         searched_s = (now_ns - arrived_ns) / S
@@ -90,6 +101,12 @@ class Approach:
         radius = min(_IN_VIEW_M, radius) if seen else radius
         angle = self._node * GOLDEN_ANGLE + turned
         return place.east_m + radius * math.cos(angle), place.north_m + radius * math.sin(angle)
+
+    def _place_to_look_at(self, survivor: int, phone: PhoneFilter, now_ns: int) -> tuple[float, float] | None:
+        """East and north of the next place at which nobody has looked yet; None if there is none."""
+        motions = self._neighbors.all(now_ns=now_ns)
+        others = [at for motion in motions if phone.near(at := motion.position_at(now_ns), within_m=_BESIDE_M)]
+        return self.look_around.next_place(survivor, phone, self._own_motion.position, now_ns, others=others)
 
     def _turned_rad(self, radius: float) -> float:
         """The angle by which the spiral has turned when it reaches a radius.

@@ -13,9 +13,11 @@ from collections.abc import Iterable
 from typing import Final
 
 from agents.mission.finding.known_survivors import KnownSurvivor, KnownSurvivors
+from agents.mission.finding.phone_localization import Estimate
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
 from agents.mission.search_formation.formation_place import FormationPlace, along
+from agents.mission.tasking.absence import Absence
 from agents.mission.tasking.approach import VAGUE_M, Approach
 from agents.mission.tasking.auction import Auction
 from agents.mission.tasking.voice_descent import descent_ns
@@ -30,6 +32,8 @@ _SCOUT_AFTER_NS: Final = 4 * S
 """How long a survivor may have too few reporters before another UAV is sent to report it."""
 _RETURN_AFTER_NS: Final = 45 * S
 """How long a responder searches for a survivor in vain before it withdraws its bid, without the time of a descent."""
+_MEASURES_NS: Final = 30 * S
+"""How long a responder is assumed to go round until a vague estimate has become a place."""
 _AGAIN_NS: Final = 20 * S
 """How long a UAV that has withdrawn its bid does not bid again."""
 _LONG_AGO_NS: Final = -(10**18)
@@ -39,6 +43,16 @@ _ASTRAY_M: Final = 100.0
 """Before the sweep a responder stays within this distance of where it would be on the way to its place, so that it is
 there in time and the swarm does not fall apart.
 """
+_LOOKS_S: Final = 15.0
+"""How long a UAV that leaves the formation for a survivor is assumed to look there."""
+_PASSED_M: Final = 30.0
+"""A UAV of a team leaves it for a survivor who is this far behind its place: those ahead will be passed."""
+_LEAVES_S: Final = 10.0
+"""By how much later a UAV that would leave its team bids, so that one goes that is free."""
+_ABSENT: Final = 1
+"""The number of UAVs that may leave the formation for a survivor."""
+_ABSENT_VAGUE: Final = 2
+"""The same where the powers do not tell the place yet: two that look on different sides need half the time."""
 
 
 class Bidding:
@@ -53,6 +67,7 @@ class Bidding:
         own_motion: OwnMotion,
         formation: FormationPlace,
         approach: Approach,
+        absence: Absence,
         outbox: Outbox,
         speed_m_s: float,
     ) -> None:
@@ -60,7 +75,7 @@ class Bidding:
         self._config = scenario.mission
         self._cruise_m_s = max(0.1, scenario.mobility.speed_m_s)
         self._survivors, self._own_motion, self._formation = survivors, own_motion, formation
-        self._approach = approach
+        self._approach, self._absence = approach, absence
         self._outbox = outbox
         self._speed_m_s = speed_m_s
         self._patience_ns = _RETURN_AFTER_NS + descent_ns(scenario)
@@ -134,7 +149,10 @@ class Bidding:
                 self._announced = False
                 if now_ns - self._approach.arrived_ns.get(self.survivor, now_ns) > self._patience_ns:
                     self._approach.forget(self.survivor)
-                self._due_ns = now_ns + (round(distance_m / self._cruise_m_s * S) if math.isfinite(distance_m) else 0)
+                place = self._survivors.by_id[self.survivor].place()
+                measures_ns = _MEASURES_NS if place is not None and place.sigma_m > VAGUE_M else 0
+                self._due_ns = now_ns + measures_ns
+                self._due_ns += round(distance_m / self._cruise_m_s * S) if math.isfinite(distance_m) else 0
         if self.survivor is not None and not self._announced:
             self._announce(self.survivor, now_ns)
 
@@ -146,21 +164,50 @@ class Bidding:
         known = self._survivors.by_id[survivor]
         lost = not self._wins(survivor, known, now_ns)
         there_ns = self._approach.arrived_ns.get(survivor, self._due_ns)
-        late = now_ns - there_ns > self._patience_ns or not self._may_stay(known, now_ns)
+        late = now_ns - there_ns > self._patience_ns or not self._may_stay(survivor, now_ns)
         if late:
             self._auction.withdraw(survivor, now_ns=now_ns)
             self._taken_back_ns[survivor] = now_ns
         if lost or late:
             self.survivor = None
 
-    def _may_stay(self, known: KnownSurvivor, now_ns: int) -> bool:
-        """True while this UAV may be with a survivor, by its place in the formation."""
+    def _may_stay(self, survivor: int, now_ns: int) -> bool:
+        """True while this UAV may be with a survivor, by its place in the formation or because it may be absent."""
+        known = self._survivors.by_id[survivor]
+        place = known.place()
+        if place is None or self._is_within_limits(place, now_ns) or not self._absence.permits(place, now_ns):
+            return self._is_within_limits(place, now_ns)
+        return self._node in self._auction.winners(survivor, count=_absent(place), now_ns=now_ns)
+
+    def _is_within_limits(self, place: Estimate | None, now_ns: int) -> bool:
+        """True while this UAV may be at a survivor's place without leaving the formation."""
         formation, here = self._formation, self._own_motion.position
         if not formation.is_taken_up(now_ns):
             return formation.lane(now_ns)[0].minus(here).horizontal() <= _ASTRAY_M
         if formation.is_free(now_ns):
-            return formation.holds_together(known.place(), now_ns, within_s=-5.0)
-        return formation.leads_by(known.place(), *formation.lane(now_ns))
+            return formation.holds_together(place, now_ns, within_s=-5.0)
+        return formation.leads_by(place, *formation.lane(now_ns))
+
+    @property
+    def may_be_absent(self) -> bool:
+        """True if UAVs may leave the formation."""
+        return self._absence.is_permitted
+
+    def is_absent(self, now_ns: int) -> bool:
+        """True while this UAV has left the formation for a survivor."""
+        if self.survivor is None or not self._absence.is_permitted:
+            return False
+        return not self._is_within_limits(self._survivors.by_id[self.survivor].place(), now_ns)
+
+    def responders(self, now_ns: int) -> set[int]:
+        """The UAVs that have won a task, as far as this one knows."""
+        return {
+            node
+            for survivor in self._survivors.sought()
+            for node in self._auction.winners(
+                survivor, count=self._wanted(self._survivors.by_id[survivor], now_ns), now_ns=now_ns
+            )
+        }
 
     def _announce(self, survivor: int, now_ns: int) -> None:
         """Record that this UAV approaches a survivor, once a place is known."""
@@ -180,7 +227,9 @@ class Bidding:
         """The number of UAVs that a survivor needs now."""
         if self._is_reported(known):
             return self._config.responders
-        return min(self._config.responders, 1 if now_ns - known.first_ns < _SCOUT_AFTER_NS else 2)
+        if now_ns - known.first_ns < _SCOUT_AFTER_NS:
+            return 1
+        return self._config.responders if self._absence.is_permitted else min(self._config.responders, 2)
 
     def _wins(self, survivor: int, known: KnownSurvivor, now_ns: int) -> bool:
         return self._node in self._auction.winners(survivor, count=self._wanted(known, now_ns), now_ns=now_ns)
@@ -199,15 +248,26 @@ class Bidding:
             return None
         busy_s = 0.0 if self.survivor is None else _HANDOVER_S + self._distance_m(self.survivor) / self._speed_m_s
         eta_s = delay_s + busy_s + place.distance_m(here) / self._speed_m_s
+        leaves = self._absence.permits(place, now_ns, after_s=eta_s + _LOOKS_S) and self._auction.would_win(
+            survivor, eta_s=eta_s, count=_absent(place), now_ns=now_ns
+        )
         if not formation.is_taken_up(now_ns):
             lane, _ = formation.lane(now_ns + round(eta_s * S))
-            return eta_s if place.distance_m(lane) <= _ASTRAY_M else None
-        if place.sigma_m > VAGUE_M and not formation.is_free(now_ns):
-            return None
+            if place.distance_m(lane) <= _ASTRAY_M:
+                return eta_s
+            return eta_s + self._absence.late_s(place, now_ns, after_s=eta_s + _LOOKS_S) if leaves else None
         if formation.is_free(now_ns):
-            return eta_s if formation.holds_together(place, now_ns, within_s=eta_s) else None
+            return eta_s if leaves or formation.holds_together(place, now_ns, within_s=eta_s) else None
         lane, moves = formation.lane(now_ns)
-        if not formation.leads_by(place, lane, moves):
-            return None
-        ahead_m, _ = along(moves, place.east_m - here.east, place.north_m - here.north)
-        return max(eta_s, abs(ahead_m) / self._cruise_m_s) if moves.norm() else eta_s
+        ahead_m, _ = along(moves, place.east_m - lane.east, place.north_m - lane.north)
+        if place.sigma_m <= VAGUE_M and formation.leads_by(place, lane, moves):
+            ahead_m, _ = along(moves, place.east_m - here.east, place.north_m - here.north)
+            return max(eta_s, abs(ahead_m) / self._cruise_m_s) if moves.norm() else eta_s
+        if leaves and formation.searches and ahead_m < -_PASSED_M and formation.can_be_spared(now_ns):
+            return eta_s + _LEAVES_S
+        return None
+
+
+def _absent(place: Estimate) -> int:
+    """The number of UAVs that may leave the formation for a survivor who is estimated there."""
+    return _ABSENT_VAGUE if place.sigma_m > VAGUE_M else _ABSENT

@@ -1,10 +1,12 @@
 """Where a responder looks that has come to a survivor's estimated place and sees nobody there.
 
-It flies to the most probable place of the phone at which its camera has not looked yet, the nearer ones first, and from
-there to the next one. The powers that it receives on the way change what is probable.
+It flies to the most probable place of the phone at which no camera has looked yet, the nearer ones first and those that
+are nearer to another UAV last, and from there to the next one. The powers that it receives on the way change what is
+probable.
 """
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 from agents.mission.finding.phone_localization import PhoneFilter
@@ -16,6 +18,8 @@ _LIKELY: Final = 9.0
 """Places less probable than the most probable one by more than this are not looked at (twice a log-likelihood)."""
 _PER_M: Final = 1 / 40.0
 """By how much a place must be more probable to be chosen although it is a metre farther away."""
+_OTHERS: Final = 2.0
+"""By how much a place must be more probable to be chosen although another UAV is nearer to it."""
 _EVERY_NS: Final = 1 * S
 """The interval at which the next place is chosen anew."""
 _THERE_M: Final = 10.0
@@ -32,9 +36,11 @@ class LookAround:
         self._next: tuple[float, float] | None = None
         self._chosen_ns = 0
 
-    def next_place(self, survivor: int, phone: PhoneFilter, here: Enu, now_ns: int) -> tuple[float, float] | None:
+    def next_place(
+        self, survivor: int, phone: PhoneFilter, here: Enu, now_ns: int, *, others: Sequence[Enu] = ()
+    ) -> tuple[float, float] | None:
         """East and north of the place to look at next; None if all that are probable have been looked at, or for a UAV
-        without a camera.
+        without a camera. `others`: where other UAVs are, which look likewise.
         """
         if math.isinf(self._look_m):
             return None
@@ -44,7 +50,9 @@ class LookAround:
         self._look(here)
         there = self._next is not None and math.hypot(self._next[0] - here.east, self._next[1] - here.north) < _THERE_M
         if self._next is None or there or now_ns - self._chosen_ns >= _EVERY_NS:
-            self._next, self._chosen_ns = self._choose(phone, here), now_ns
+            for other in others:
+                self._look(other)
+            self._next, self._chosen_ns = self._choose(phone, here, others), now_ns
         return self._next
 
     def has_looked_at(self, east_m: float, north_m: float) -> bool:
@@ -52,7 +60,7 @@ class LookAround:
         return _cell(east_m, north_m) in self._looked
 
     def _look(self, here: Enu) -> None:
-        """Note the cells whose middles the camera shows from here."""
+        """Note the cells whose middles a camera shows from a place."""
         column, row, reach = *_cell(here.east, here.north), math.floor(self._look_m / _CELL_M)
         for i in range(-reach, reach + 1):
             for j in range(-reach, reach + 1):
@@ -60,12 +68,15 @@ class LookAround:
                 if math.hypot(east, north) <= self._look_m:
                     self._looked.add((column + i, row + j))
 
-    def _choose(self, phone: PhoneFilter, here: Enu) -> tuple[float, float] | None:
+    def _choose(self, phone: PhoneFilter, here: Enu, others: Sequence[Enu]) -> tuple[float, float] | None:
         best: tuple[float, float, float] | None = None
         for east, north, deficit in phone.likely_cells(_LIKELY):
             if _cell(east, north) in self._looked:
                 continue
-            cost = deficit / 2 + _PER_M * math.hypot(east - here.east, north - here.north)
+            away_m = math.hypot(east - here.east, north - here.north)
+            cost = deficit / 2 + _PER_M * away_m
+            if any(math.hypot(east - other.east, north - other.north) < away_m for other in others):
+                cost += _OTHERS
             if best is None or (cost, east, north) < best:
                 best = cost, east, north
         return None if best is None else best[1:]

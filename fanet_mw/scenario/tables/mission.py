@@ -82,6 +82,10 @@ class Mission(Section):
     at the latest after one more sweep. 0: they search until their batteries take them home."""
     responders: Annotated[int, Field(ge=1, le=1000)] = 3
     """`search`: the number of UAVs that fly to each survivor, chosen by auction; the others go on searching."""
+    connection: Literal["always", "none"] | Annotated[float, Field(gt=0, le=3600)] = "always"
+    """`search`: how far UAVs may go from the others for a survivor. `always`: never out of their reach. A number: so
+    far that they are within reach again, and tell what they have found, so many seconds after they have left the
+    survivor. `none`: as far as they like. Who has no survivor to go to stays in reach."""
     report_interval_s: Interval = 5.0
     """The interval at which a UAV repeats its report of a survivor whose phone it still receives."""
     report_bytes: Annotated[int, Field(ge=0, le=2304)] = 0

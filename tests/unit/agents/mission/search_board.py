@@ -15,6 +15,7 @@ from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.formation_planner import plan_of
 from agents.mission.search_formation.pattern import fitted
 from agents.mission.search_formation.shapes.contract import Demands
+from agents.mission.tasking.absence import Absence, Connection
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import Bidding
 from fanet_mw.scenario import config
@@ -46,19 +47,22 @@ FOLLOWER, LINE = NodeId(COUNT), NodeId(5)
 class Board:
     """The parts of one UAV, wired as in a search."""
 
-    def __init__(self, node: NodeId, at: Enu, *, planned: bool = True) -> None:
+    def __init__(self, node: NodeId, at: Enu, *, planned: bool = True, connection: Connection = "always") -> None:
         self.out = Outbox()
         self.survivors = KnownSurvivors(MODEL)
         self.own_motion, self.neighbors = OwnMotion(at, OPEN), NeighborMotions()
         self.place = FormationPlace(node, self.own_motion, reach_m=REACH_M)
         if planned:
             self.place.adopt(PLAN, 0)
-        self.approach = Approach(node, self.survivors, self.own_motion, self.out, arrival_m=30, speed_m_s=10.0)
+        self.approach = Approach(
+            node, self.survivors, self.own_motion, self.neighbors, self.out, arrival_m=30, speed_m_s=10.0
+        )
+        absence = Absence(self.place, connection, speed_m_s=10.0)
         self.tasks = Bidding(
             SCENARIO, node, survivors=self.survivors, own_motion=self.own_motion, formation=self.place,
-            approach=self.approach, outbox=self.out, speed_m_s=10.0,
+            approach=self.approach, absence=absence, outbox=self.out, speed_m_s=10.0,
         )  # fmt: skip
-        self.goal = Goal(self.survivors, self.own_motion, self.place, self.approach, None, None)
+        self.goal = Goal(self.survivors, self.own_motion, self.place, self.approach, None, None, absence=absence)
         self.announcing = Announcing(node, self.survivors, self.out)
 
     def hear(self, survivor: int, truth: Enu, reporters: range, *, now_ns: int) -> None:

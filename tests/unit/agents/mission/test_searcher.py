@@ -190,9 +190,10 @@ def test_a_responder_that_falls_silent_is_replaced(make_scenario: Callable[..., 
     flight = Flight(make_scenario, node=20)
     flight.fly(20)
     now_ns = flight.now_ns
-    for reporter in (1, 2, 3):
-        place = Enu(flight.at.east + 60 * reporter - 120, flight.at.north + 30.0 * (reporter % 2), 65.0)
-        flight.searcher.on_message(Survivor(now_ns // US, 1, reporter, place, -75.0), now_ns=now_ns)
+    for step, (east, north) in enumerate(((-60, 0), (60, 0), (0, 60), (0, -60), (90, 90), (-90, -90))):
+        place = Enu(flight.at.east + east, flight.at.north + north, 65.0)
+        rssi_dbm = 15 - 40.05 - 30 * math.log10(math.hypot(east, north, 65.0))
+        flight.searcher.on_message(Survivor(now_ns // US, 1, 1 + step % 3, place, rssi_dbm), now_ns=now_ns)
     flight.searcher.on_message(Bids((Bid(1, 2, 1, 1), Bid(1, 3, 1, 1), Bid(1, 4, 1, 1, 9))), now_ns=now_ns)
     flight.fly(5)
     assert flight.modes[-1] == "search", "three others are nearer"

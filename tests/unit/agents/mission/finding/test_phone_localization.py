@@ -49,6 +49,32 @@ def test_the_same_place_counts_once_for_a_node() -> None:
     assert phone.on_rssi(2, Enu(5, 5, 50), -60)
 
 
+def test_many_powers_that_share_one_shadow_do_not_rule_the_true_place_out() -> None:
+    """A hill weakens the phone by 5 dB wherever it is received from the west: 15 powers from there tell less than 15."""
+    truth, phone = Enu(120, 0, 0), PhoneFilter(MODEL)
+    for north in range(-60, 61, 30):
+        for east in (-30, 0, 30):
+            at = Enu(east, north, 50)
+            phone.on_rssi(1 + (east + 30) // 30, at, rssi_dbm(truth, at) - 5)
+    assert phone.received_powers == 15
+    assert phone.estimate() is not None
+    assert phone.deficit(truth.east, truth.north) < 6, "if each counted for itself it would be 9.6"
+    assert phone.deficit(0, 0) > 15, "it is not among them"
+
+
+def test_powers_received_far_from_each_other_count_for_themselves() -> None:
+    truth = Enu(0, 0, 0)
+    places = [Enu(100 * math.cos(angle), 100 * math.sin(angle), 50) for angle in (0, 1.57, 3.14, 4.71)]
+    few, many = PhoneFilter(MODEL), PhoneFilter(MODEL)
+    for node, at in enumerate(places, start=1):
+        many.on_rssi(node, at, rssi_dbm(truth, at))
+        few.on_rssi(node, places[0]._replace(north=6.0 * node), rssi_dbm(truth, places[0]))
+    near, vague = many.estimate(), few.estimate()
+    assert near is not None
+    assert vague is not None
+    assert near.sigma_m < 55 < 90 < vague.sigma_m
+
+
 @given(st.floats(-1000, 1000), st.floats(-1000, 1000), st.floats(20, 100), st.floats(-80, 80), st.floats(-80, 80))
 def test_a_camera_looks_at_the_ground_where_its_angles_lead(
     east: float, north: float, up: float, along: float, across: float

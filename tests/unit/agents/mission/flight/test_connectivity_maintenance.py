@@ -24,14 +24,14 @@ def test_a_uav_of_a_line_is_tied_to_those_beside_it_and_a_follower_to_the_neares
         for other in range(1, COUNT + 1):
             if other != node:
                 board.neighbors.on_hello(other, Motion(lane_of(other, now_ns), Enu(0, 0, 0), now_ns))
-        tied = ConnectivityMaintenance(board.own_motion, board.neighbors, board.place, reach_m=REACH_M)
+        tied = ConnectivityMaintenance(board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M)
         assert len(tied.planes(now_ns)) == ties
 
 
 def test_who_is_on_the_way_to_its_place_stays_within_reach_of_the_two_nearest() -> None:
     now_ns = 20 * S
     board = Board(LINE, Enu(0.0, 0.0, 65.0))
-    tied = ConnectivityMaintenance(board.own_motion, board.neighbors, board.place, reach_m=REACH_M)
+    tied = ConnectivityMaintenance(board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M)
     assert tied.planes(now_ns) == []
     for other, east in ((1, 230.0), (2, -200.0), (3, 240.0)):
         board.neighbors.on_hello(other, Motion(Enu(east, 0.0, 65.0), Enu(0, 0, 0), now_ns))

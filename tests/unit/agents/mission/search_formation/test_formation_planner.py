@@ -122,6 +122,21 @@ def test_the_first_plan_begins_when_all_have_had_time_to_take_off() -> None:
     assert begins_s == [10, 10, 31], "from the notice of 7 s, or from the first review"
 
 
+def test_who_is_out_for_a_survivor_becomes_a_follower_and_until_it_is_back_others_close_ranks() -> None:
+    planner, pattern = planner_with(45), formation()
+    planner.status(SearchStatus(1, Enu(0.0, 0.0, 50), 23, 0, 100, absent=True), now_ns=0)
+    assert planner.absent == {23}
+    assert planner.review(pattern, now_ns=S)
+    assert planner.plan is not None
+    assert planner.plan.nodes.index(23) in pattern.followers
+    undisturbed = planner_with(45)
+    undisturbed.review(pattern, now_ns=S)
+    assert undisturbed.plan is not None
+    assert undisturbed.plan.nodes.index(23) not in pattern.followers
+    planner.status(SearchStatus(2, Enu(0.0, 0.0, 50), 23, 1, 100), now_ns=2 * S)
+    assert planner.absent == set()
+
+
 def planned(lost_place: int) -> tuple[FormationPlanner, Search, int]:
     """A planner that has followed its plan for 20 s when the UAV of this place is lost: with the plan and that UAV."""
     planner, pattern = planner_with(45), formation()

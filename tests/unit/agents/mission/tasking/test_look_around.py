@@ -45,3 +45,17 @@ def test_what_was_looked_at_for_one_survivor_is_looked_at_again_for_another() ->
 
 def test_without_a_camera_there_is_nothing_to_look_at() -> None:
     assert LookAround(math.inf).next_place(1, heard_once(Enu(0, 0, 0), Enu(0, 0, UP_M)), Enu(0, 0, UP_M), 0) is None
+
+
+def test_where_another_uav_has_looked_nobody_looks_again_and_each_takes_the_places_nearer_to_it() -> None:
+    phone, here, other = heard_once(Enu(80, 0, 0), Enu(0, 0, UP_M)), Enu(30, 0, UP_M), Enu(-30, 0, UP_M)
+    mine, theirs = LookAround(LOOK_M), LookAround(LOOK_M)
+    for step in range(12):
+        next_mine = mine.next_place(1, phone, here, step * 2 * S, others=[other])
+        next_theirs = theirs.next_place(1, phone, other, step * 2 * S, others=[here])
+        assert next_mine is not None
+        assert next_theirs is not None
+        if step < 4:
+            assert next_mine[0] > next_theirs[0], "east and west"
+        assert not theirs.has_looked_at(*next_mine) or step == 0
+        here, other = Enu(*next_mine, UP_M), Enu(*next_theirs, UP_M)

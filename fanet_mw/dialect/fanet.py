@@ -2627,7 +2627,7 @@ class MAVLink(object):
         lanes                     : Places of each team. (type:uint8_t)
         relays                    : Places of the chain. (type:uint8_t)
         followers                 : Places behind the teams. (type:uint8_t)
-        shape                     : 0: lines, 1: spiral, 2: sectors, 3: ring. (type:uint8_t)
+        shape                     : 0: lines, 1: spiral, 2: sectors, 3: ring, 4: circuit. (type:uint8_t)
         teams                     : Lines abreast; 2 for lines. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
@@ -2656,7 +2656,7 @@ class MAVLink(object):
         lanes                     : Places of each team. (type:uint8_t)
         relays                    : Places of the chain. (type:uint8_t)
         followers                 : Places behind the teams. (type:uint8_t)
-        shape                     : 0: lines, 1: spiral, 2: sectors, 3: ring. (type:uint8_t)
+        shape                     : 0: lines, 1: spiral, 2: sectors, 3: ring, 4: circuit. (type:uint8_t)
         teams                     : Lines abreast; 2 for lines. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 

@@ -15,7 +15,7 @@ MOST_PLACES: Final = 79
 """The number of places of a formation that one message can assign."""
 _LINES: Final = 0
 _SPIRAL: Final = 1
-_LAST_SHAPE: Final = 3
+_LAST_SHAPE: Final = 4
 _LEAST_M: Final = 1.0
 """The least value of those lengths of a formation that must not be 0."""
 _FASTEST_M_S: Final = 1000.0
@@ -39,7 +39,7 @@ class Search(NamedTuple):
     relays: int
     followers: int
     shape: int = 0
-    """0: lines, 1: spiral, 2: sectors, 3: ring."""
+    """0: lines, 1: spiral, 2: sectors, 3: ring, 4: circuit."""
     teams: int = 2
 
     def encode_frame(self, node: int) -> bytes:

@@ -6,7 +6,8 @@ The words place, team, lane, relay and follower are explained in `shapes/contrac
 from collections.abc import Callable, Mapping
 from typing import Final, assert_never
 
-from agents.mission.search_formation.shapes import lines, ring, sectors, spiral
+from agents.mission.search_formation.shapes import circuit, lines, ring, sectors, spiral
+from agents.mission.search_formation.shapes.circuit import Circuit
 from agents.mission.search_formation.shapes.contract import Demands, Dimensions, Shape, ShapeName
 from agents.mission.search_formation.shapes.lines import Lines
 from agents.mission.search_formation.shapes.ring import Ring
@@ -20,6 +21,7 @@ _SHAPES: Final[Mapping[ShapeName, Callable[[Dimensions], Shape]]] = {
     ShapeName.SPIRAL: Spiral,
     ShapeName.SECTORS: Sectors,
     ShapeName.RING: Ring,
+    ShapeName.CIRCUIT: Circuit,
 }
 _STEP_S: Final = 0.05
 """The time step over which the velocity of a place is computed."""
@@ -113,7 +115,11 @@ def fastest(count: int, demands: Demands) -> Pattern | None:
     are too few for any. More UAVs are never slower: those for whom there is no use become followers.
     """
     count = min(count, MOST_PLACES)
-    found = [lines.fitted(count, demands), *(sectors.fitted(count, teams, demands) for teams in range(1, count + 1))]
+    found = [
+        lines.fitted(count, demands),
+        circuit.fitted(count, demands),
+        *(sectors.fitted(count, teams, demands) for teams in range(1, count + 1)),
+    ]
     for some in range(1, count + 1):
         arms = spiral.fitted(some, demands)
         found.append(arms._replace(followers=arms.followers + count - some))
@@ -137,6 +143,8 @@ def fitted(
             made = sectors.fitted(count, sectors_wanted, demands)
         case ShapeName.RING:
             made = ring.fitted(count, demands) or lines.fitted(count, demands)
+        case ShapeName.CIRCUIT:
+            made = circuit.fitted(count, demands)
         case _:
             assert_never(shape)
     return None if made is None else Pattern(made, reach_m=demands.reach_m)

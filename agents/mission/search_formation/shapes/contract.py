@@ -9,6 +9,7 @@
     lines      two lines abreast part from the middle of the area; a chain of relays keeps the swarm connected
     spiral     arms turn about the middle, or one arm winds outward from it; any number of UAVs will do
     sectors    one team sweeps each sector; more UAVs are free for survivors, but the swarm does not stay connected
+    circuit    one team on a closed way over the whole area; any number of UAVs is used, and nobody need hear anybody
     ring       one team on a square that grows from the middle to the edge; no single loss separates anybody
 
 In all of them places of teams come first (team 0 lane by lane, team 1, ...), then relays, then followers. No place
@@ -51,6 +52,7 @@ class ShapeName(IntEnum):
     SPIRAL = 1
     SECTORS = 2
     RING = 3
+    CIRCUIT = 4
 
 
 class RowKind(IntEnum):
@@ -147,7 +149,7 @@ class Dimensions(NamedTuple):
     @property
     def turns(self) -> bool:
         """True if lanes change their direction in the middle of a sweep, as those of a spiral do at its corners."""
-        return self.shape is ShapeName.SPIRAL
+        return self.shape in (ShapeName.SPIRAL, ShapeName.CIRCUIT)
 
     @property
     def places(self) -> int:

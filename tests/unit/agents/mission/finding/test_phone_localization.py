@@ -50,7 +50,7 @@ def test_the_same_place_counts_once_for_a_node() -> None:
 
 
 def test_many_powers_that_share_one_shadow_do_not_rule_the_true_place_out() -> None:
-    """A hill weakens the phone by 5 dB wherever it is received from the west: 15 powers from there tell less than 15."""
+    """A hill weakens the phone by 5 dB to the west: 15 powers received there tell less than 15."""
     truth, phone = Enu(120, 0, 0), PhoneFilter(MODEL)
     for north in range(-60, 61, 30):
         for east in (-30, 0, 30):

@@ -1,5 +1,6 @@
 """The fastest formation uses every UAV that helps: one more is never slower, and many come near the physical bound."""
 
+import math
 from itertools import pairwise
 
 import pytest
@@ -23,10 +24,14 @@ def test_one_more_uav_is_never_slower() -> None:
     assert all(more <= fewer for fewer, more in pairwise(times))
 
 
-@pytest.mark.parametrize("count", [6, 12, 20, 40, 64])
-def test_where_uavs_fill_rows_the_time_is_within_a_fifth_of_area_over_swath_and_speed(count: int) -> None:
-    bound_s = 1000**2 / (count * DEMANDS.apart_m(250) * 7.5)
-    assert sweep_s(count) <= 1.2 * bound_s
+@pytest.mark.parametrize("area_m", [1000, 1600, 2500])
+def test_any_number_of_uavs_is_near_the_bound_of_area_over_swath_and_speed(area_m: float) -> None:
+    demands = DEMANDS._replace(area_m=area_m)
+    for count in range(1, MOST_PLACES + 1):
+        pattern = fastest(count, demands)
+        assert pattern is not None
+        bound_s = area_m**2 / (count * demands.apart_m(math.inf) * demands.speed_m_s)
+        assert pattern.shape.sweep_s <= 1.2 * bound_s, count
 
 
 def test_80_uavs_sweep_a_square_kilometre_in_a_fifth_of_the_time_of_two_lines() -> None:

@@ -204,7 +204,7 @@ def test_a_swarm_without_some_of_its_uavs_is_one_piece_that_turns_back_before_it
 @pytest.mark.parametrize(
     "impossible",
     [
-        {"shape": 4}, {"teams": 3}, {"shape": 1, "teams": 0}, {"shape": 2, "relays": 1}, {"shape": 1, "first_m": 0.5},
+        {"shape": 5}, {"teams": 3}, {"shape": 1, "teams": 0}, {"shape": 2, "relays": 1}, {"shape": 1, "first_m": 0.5},
         {"shape": 2, "half_width_m": 0.5}, {"shape": 2, "teams": 40}, {"lanes": 1},
     ],
 )  # fmt: skip

@@ -77,7 +77,7 @@ class Messenger:
         if confirm and self._sender.full:
             return self._refused(application, DropReason.QUEUE_FULL, now_ns)
         if deadline_ns is not None:
-            in_time, interval_ns = self._admission(deadline_ns, born_ns)
+            in_time, interval_ns = self._admission(deadline_ns, born_ns, priority)
             if not in_time:
                 return self._refused(application, DropReason.ADMISSION, now_ns, interval_ns=interval_ns)
         if plain:
@@ -116,13 +116,13 @@ class Messenger:
             priority=submission.priority,
         )  # fmt: skip
 
-    def _admission(self, deadline_ns: int, born_ns: int) -> tuple[bool, int | None]:
+    def _admission(self, deadline_ns: int, born_ns: int, priority: int) -> tuple[bool, int | None]:
         """Whether a message can arrive in time, and the least interval between such messages if that is known.
 
-        If the network states no bound, every message is accepted. Accepted messages are at least the interval apart, as
-        the bound assumes.
+        If the network states no bound for this priority, every message is accepted. Accepted messages are at least the
+        interval apart, as the bound assumes.
         """
-        if self._node.bound_ns() is None:
+        if self._node.bound_ns() is None or not self._node.bounds(priority):
             return True, None
         interval_ns = self._node.least_interval_ns(deadline_ns)
         if interval_ns is None or (self._in_time_ns is not None and born_ns < self._in_time_ns + interval_ns):

@@ -1,7 +1,7 @@
 #!/usr/bin/env python
 """Takes pictures of what people look at, on a desktop (1440 x 860) and a phone (390 x 844): view, files, report, site.
 
-    scripts/screenshots.py FOLDER OUT [--at 129] [--only replay html map report inspect site]
+    scripts/screenshots.py FOLDER OUT [--at 129] [--only scene panel html map report inspect site]
 
 FOLDER is a run of `fanet simulate --out`; OUT gets NAME.png and NAME-phone.png. Needs a headless Chromium, and
 playwright of the development group; the site must have been built (scripts/build_site.py).
@@ -15,7 +15,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
@@ -71,8 +71,8 @@ def served(folder: Path, *words: str) -> Iterator[str]:
         process.terminate()
 
 
-def replay(photos: Photographer, folder: Path, at_s: float) -> None:
-    """The scene with each tab of its panel."""
+def replay(photos: Photographer, folder: Path, at_s: float, tabs: Sequence[str]) -> None:
+    """The scene, with these tabs of its panel."""
 
     def look(page: Any, ending: str, *, tab: str) -> None:  # noqa: ANN401
         page.get_by_text("delivered lately").first.wait_for(timeout=PATIENCE_MS, state="attached")
@@ -88,9 +88,8 @@ def replay(photos: Photographer, folder: Path, at_s: float) -> None:
             page.wait_for_timeout(2000)
 
     with served(folder, "--start", str(at_s)) as address:
-        photos.take("replay", address, partial(look, tab=""))
-        for tab in ("UAV", "Events", "Show"):
-            photos.take(f"replay-{tab.lower()}", address, partial(look, tab=tab))
+        for tab in tabs:
+            photos.take(f"replay-{tab.lower()}" if tab else "replay", address, partial(look, tab=tab))
 
 
 def files(photos: Photographer, folder: Path, at_s: float, *, name: str) -> None:
@@ -161,7 +160,7 @@ def main() -> None:
     flags.add_argument("folder", type=Path)
     flags.add_argument("out", type=Path)
     flags.add_argument("--at", type=float, default=129.0, help="the instant that is shown [s]")
-    names = ("replay", "html", "map", "report", "inspect", "site")
+    names = ("scene", "panel", "html", "map", "report", "inspect", "site")
     flags.add_argument("--only", nargs="+", choices=names, default=names)
     given = flags.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
@@ -170,7 +169,8 @@ def main() -> None:
         browser = started.chromium.launch(executable_path=chromium, args=SOFTWARE)
         photos = Photographer(browser, given.out)
         takes: dict[str, Callable[[], None]] = {
-            "replay": lambda: replay(photos, given.folder, given.at),
+            "scene": lambda: replay(photos, given.folder, given.at, [""]),
+            "panel": lambda: replay(photos, given.folder, given.at, ["UAV", "Events", "Show"]),
             "html": lambda: files(photos, given.folder, given.at, name="html"),
             "map": lambda: files(photos, given.folder, given.at, name="map"),
             "report": lambda: report(photos, given.folder),

@@ -161,6 +161,10 @@ class RoutingProtocol(ABC):
         """The delay within which all nodes have the next packet of this node; None if no bound is stated."""
         return None
 
+    def bounds(self, priority: int) -> bool:
+        """True if `bound_ns` is of packets of this priority, too."""
+        return True
+
     def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
         """The nodes of each cluster by its head, the head first, as far as this node knows; empty if there are no
         clusters.

@@ -338,6 +338,10 @@ class Node:
         """The delay within which all nodes have the next packet of this node; None: the protocol states none."""
         return self._protocol.bound_ns()
 
+    def bounds(self, priority: int) -> bool:
+        """True if the bound is of packets of this priority, too."""
+        return self._protocol.bounds(priority)
+
     def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
         """The nodes of each cluster as far as this node knows, by head."""
         return self._protocol.clusters()

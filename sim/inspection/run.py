@@ -1,6 +1,7 @@
 """Runs the inspector on a swarm or on the folder of a run."""
 
 from collections import deque
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -8,6 +9,7 @@ from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import TxRequest
 from fanet_mw.bus.topics import node_of
 from fanet_mw.errors import BusError, MalformedFrameError
+from fanet_mw.hosts import interrupts
 from sim.inspection.inspection import Inspection, of_folder
 from sim.inspection.screen import Inspector
 from sim.observation.bus_feed import BusFeed
@@ -58,12 +60,20 @@ def live(endpoint: str, swarm: str | None, *, zenoh_config: Path | None) -> int:
 
         feed.listen()
         feed.bus.subscribe(feed.names.all_tx, frames.keep)
-        Inspector(inspection, title=f"swarm {feed.names.swarm}", pump=pump, live=True).run()
+        _run(lambda ended: Inspector(inspection, title=f"swarm {feed.names.swarm}", pump=pump, live=True, ended=ended))
     return 0
 
 
 def recorded(folder: Path) -> int:
     """Inspect the folder of a run."""
     inspection = of_folder(RunFolder(folder))
-    Inspector(inspection, title=str(folder), pump=lambda _: "a recording: rates are of the whole run", live=False).run()
+    note = "a recording: rates are of the whole run"
+    _run(lambda ended: Inspector(inspection, title=str(folder), pump=lambda _: note, live=False, ended=ended))
     return 0
+
+
+def _run(made: Callable[[Sequence[int]], Inspector]) -> None:
+    """Run the screen until its user or a signal ends it; a signal that interrupted its event loop would not."""
+    signals: list[int] = []
+    with interrupts.handed_to(signals.append):
+        made(signals).run()

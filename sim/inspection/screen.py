@@ -3,7 +3,7 @@
 Whatever could not be looked at in time is counted in the last line.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import ClassVar, Final
 
 from rich.text import Text
@@ -45,8 +45,12 @@ class Inspector(App[None]):
         *(Binding(str(number), f"tab('{name}')", name.title()) for number, name in enumerate(_TABS, start=1)),
     ]
 
-    def __init__(self, inspection: Inspection, *, title: str, pump: Pump, live: bool) -> None:
+    def __init__(
+        self, inspection: Inspection, *, title: str, pump: Pump, live: bool, ended: Sequence[int] = ()
+    ) -> None:
+        """`ended`: signals that have come; the first one ends the application."""
         super().__init__()
+        self._ended = ended
         self.title = title
         self._inspection, self._pump, self._live = inspection, pump, live
         self.frozen = False
@@ -120,6 +124,9 @@ class Inspector(App[None]):
     # --- what is shown --------------------------------------------------------------------------------------------
 
     def refresh_all(self) -> None:
+        if self._ended:
+            self.exit()
+            return
         if not self.frozen:
             self._skipped = self._pump(self._inspection)
         shown = {

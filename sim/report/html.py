@@ -23,6 +23,7 @@ td div { min-width: 16rem; margin-bottom: .5rem; }
 th { background: #f3f3f3; } figure { margin: 1rem 0; } figure img { max-width: 100%; height: auto; }
 figcaption { color: #444; font-size: .93rem; } code, pre { background: #f5f5f5; font-size: .9rem; }
 pre { padding: .7rem; overflow-x: auto; } .wide { overflow-x: auto; } .short { white-space: nowrap; }
+.wide td:not([class]) { min-width: 10rem; }
 .agrees { color: #00543d; font-weight: 600; }
 .partly { color: #7a4b00; font-weight: 600; } .differs { color: #9c2a00; font-weight: 600; }
 @media (max-width: 40rem) { body { margin: 1rem auto; padding: 0 .8rem; } th, td { padding: .25rem .45rem; } }
@@ -79,7 +80,7 @@ _FIRST: Final = re.compile(r"^(\d*)([-+=.)#>])")
 """The beginning of a line that Markdown would take for that of a list, a heading or a quotation."""
 _INSIDE: Final = re.compile(r"[\\`*_\[\]|~@]|(?<=\])\(|:(?=//)|(?<=www)\.", re.IGNORECASE)
 """The characters inside a line to which Markdown gives a meaning, among them those that make addresses links."""
-_SHORT: Final = 24
+_SHORT: Final = 21
 """A cell of at most so many characters, as a pair of coordinates, is not broken into lines."""
 _VERDICTS: Final = ("agrees", "partly", "differs")
 

@@ -68,7 +68,7 @@ def delays(run: RunRecords) -> RunPicture | None:
         of = f" of {load.name}" if len(loads) > 1 else ""
         _steps(axes, [one.delay_ns / unit_ns for one in load.delivered], load.wanted, f"delay{of}", load.color, "-")
         if stated := bounds[load.name]:
-            label = f"bound stated{of}" if of else "bound stated by the origin"
+            label = f"bound{of}" if of else "bound stated by the origin"
             _steps(axes, [bound / unit_ns for bound in stated], len(load.sent), label, load.bound_color, "--")
     if len(loads) > 1 or any(bounds.values()):
         legend_above(figure, axes)

@@ -32,6 +32,8 @@ _BUILDING: Final = (176, 169, 159)
 _FENCE_M: Final = 80.0
 _SHOWN_NS: Final = 2 * S
 """The spreading of a packet is stretched, or shortened, to this much swarm time."""
+_MOST_THICK: Final = 150.0
+"""More links than this are drawn thinner, so that they do not hide the UAVs."""
 _SEEN_NS: Final = 150 * MS
 """Turns shorter than this cannot be followed by eye, and are shown at the pace of the packet that spreads."""
 _HOLDS_NS: Final = S
@@ -61,7 +63,8 @@ class Scene:
         self._server, self.state = server, state
         self._api = server.scene
         self.around: Surroundings = surroundings(state.scenario)
-        self.shown = Shown()
+        mission = state.scenario.mission
+        self.shown = Shown(coverage=mission.survivors > 0 or mission.search != "none")
         self.clustered = state.scenario.routing.protocol == "clustered"
         """True: UAVs are colored by cluster; otherwise by what they do."""
         self.by_range = False
@@ -280,7 +283,7 @@ class Scene:
             for (a, b), share in best.items():
                 segments.append((uavs[a].position, uavs[b].position))
                 tints.append(rgb(link_color(share)))
-        self._lines("links", segments, tints, 1.2)
+        self._lines("links", segments, tints, round(max(0.5, min(1.5, _MOST_THICK / max(1, len(segments)))), 1))
 
     def _in_reach(self) -> tuple[list[Any], list[Any]]:
         """The pairs of UAVs in each other's reach."""
@@ -435,6 +438,8 @@ class Scene:
             if handle is not None:
                 _set(handle, visible=False)
             return
+        if handle is not None and handle.thickness != thickness:
+            _set(handle, thickness=thickness)
         points = np.array(segments, np.float32)
         paints = np.repeat(linear(tints)[:, None, :], 2, axis=1)
         if handle is None or handle.points.shape != points.shape:

@@ -79,9 +79,11 @@ def look_over(server: viser.ViserServer, scene: Scene) -> None:
     camera.fov = math.radians(45)
 
     def step_back(client: viser.ClientHandle) -> None:
-        """On a narrow screen, a phone's, see the whole area from farther away."""
+        """On a narrow screen, a phone's, see the whole area from farther away, in its upper part."""
         if client.camera.aspect < 1:
             client.camera.position = seen.eye_for(client.camera.aspect)
+            below = np.array((0.0, 0.0, 0.25 * math.dist(eye, goal) / client.camera.aspect))
+            client.camera.look_at = goal - below  # the panel covers the lower part of such a screen
 
     server.on_client_connect(step_back)
 

@@ -1,6 +1,6 @@
 """What looking at a swarm costs it: its lateness without and with onlookers, in turns, and what each of them takes.
 
-    python tests/benchmarks/onlookers.py [SECONDS] [TURNS] [--only view gateway inspect]
+    python tests/benchmarks/onlookers.py [SECONDS] [TURNS] [--only view gateway inspect] [--of SCENARIO]
                                       the demo of 45 UAVs, SECONDS each (40), TURNS times (3): nobody, view, doors
     python tests/benchmarks/onlookers.py virtual [SECONDS]     200 UAVs in virtual time: CPU per frame, bytes a second
 
@@ -128,10 +128,12 @@ def cpu_s(pid: int) -> float | None:
     return None if fields[0] == "Z" else (int(fields[11]) + int(fields[12])) / TICKS
 
 
-def flight(seconds: float, who: tuple[str, ...]) -> dict[str, Any]:
-    """One flight of the demo with these onlookers."""
+def flight(seconds: float, who: tuple[str, ...], *, of: str) -> dict[str, Any]:
+    """One flight of the demo, or of a scenario, with these onlookers."""
     swarm = f"looked-at-{os.getpid()}"
-    words = ["bash", str(ROOT / "scripts" / "demo"), "--duration", str(seconds), "--json", "--swarm", swarm]
+    demo = of == "demo"
+    words = ["bash", str(ROOT / "scripts" / "demo")] if demo else [sys.executable, "-m", "fanet_mw", "launch", of]
+    words += ["--duration", str(seconds), "--json", "--swarm", swarm]
     used: dict[str, list[tuple[float, float, int]]] = {name: [] for name in who}
     with (
         subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process,
@@ -219,6 +221,7 @@ def main() -> None:
     flags.add_argument("seconds", nargs="?", default="40", help="seconds of a flight, or `virtual`")
     flags.add_argument("turns", nargs="?", type=float, default=3)
     flags.add_argument("--only", nargs="+", choices=("view", "gateway", "inspect"), help="these instead, each alone")
+    flags.add_argument("--of", default="demo", help="a scenario instead of the demo")
     given = flags.parse_args()
     if given.seconds == "virtual":
         print(json.dumps(virtual(given.turns if len(sys.argv) > 2 else 30.0)))
@@ -227,7 +230,7 @@ def main() -> None:
     rows = []
     for _ in range(round(given.turns)):
         for who in companies:
-            rows.append(flight(float(given.seconds), who))
+            rows.append(flight(float(given.seconds), who, of=given.of))
             print(json.dumps(rows[-1]), flush=True)
     print(medians(rows))
 

@@ -207,6 +207,9 @@ PLAN = """QGC WPL 110
 3\t0\t3\t21\t0\t0\t0\t0\t37.5665\t126.9784\t0\t1
 """
 
+LAST_ITEM = re.compile(rb"\xfd\x01...\x02\x01\x2e\x00\x00\x03", re.DOTALL)
+"""MISSION_ITEM_REACHED of system 2 with item 3, as a MAVLink 2 frame without trailing zeros."""
+
 
 class Terminal:
     """A program on a pseudo-terminal, to which a person types."""
@@ -275,13 +278,18 @@ def test_mavproxy_links_arms_loads_waypoints_and_flies_them(field: Field, tmp_pa
             time.sleep(0.5)
         link = terminal.type("link", r"\d lost, .*loss")
         assert " 0 lost" in link
+        log, end_s = tmp_path / "mav.tlog", time.monotonic() + PATIENCE_S
+        while not LAST_ITEM.search(log.read_bytes()):  # it is written in portions of some seconds
+            assert time.monotonic() < end_s, "the last item that was reached is not in the log"
+            terminal.type("link", "lost")
+            time.sleep(0.5)
     finally:
         terminal.close()
     keep(
         "mavproxy",
         "".join(line for line in terminal.said.replace("\r", "").splitlines(keepends=True) if "module" not in line),
     )
-    check_tools(tmp_path / "mav.tlog")
+    check_tools(log)
 
 
 def check_tools(log: Path) -> None:
@@ -312,13 +320,16 @@ def test_topics_of_a_running_swarm_are_listed_and_measured(field: Field) -> None
         command = [sys.executable, "-m", "fanet_mw", "topic", *words, "--swarm", field.name]
         return subprocess.run(command, capture_output=True, text=True, check=True, timeout=60).stdout
 
-    listed = topic("list", "--seconds", "1.5")
-    assert re.search(r"^mavlink/3 +MavlinkTap +\d", listed, re.MULTILINE)
-    assert re.search(r"^world/pose +Poses +[234]\d\.", listed, re.MULTILINE)  # 10 Hz, four times as fast
-    assert '"message": "HEARTBEAT"' in topic("echo", "mavlink/2", "--count", "3")
-    rate = re.search(r"average rate: (\d+\.\d+)", topic("hz", "world/pose", "--count", "2").splitlines()[-1])
-    assert rate is not None
-    assert 25 < float(rate[1]) < 45
+    def until(pattern: str, *words: str) -> None:
+        """Ask until the answer is as it should be: a busy machine holds back what a second should have had."""
+        end_s = time.monotonic() + PATIENCE_S
+        while not re.search(pattern, said := topic(*words), re.MULTILINE):
+            assert time.monotonic() < end_s, f"{pattern} is not in {said}"
+
+    until(r"^mavlink/3 +MavlinkTap +\d", "list", "--seconds", "1.5")
+    until(r"^world/pose +Poses +[234]\d\.", "list", "--seconds", "1.5")  # 10 Hz, four times as fast
+    until('"message": "HEARTBEAT"', "echo", "mavlink/2", "--count", "3")
+    until(r"average rate: (2[5-9]|3\d|4[0-4])\.\d+", "hz", "world/pose", "--count", "2")
 
 
 def test_a_connection_that_cannot_be_is_one_message(capsys: pytest.CaptureFixture[str]) -> None:

@@ -164,7 +164,7 @@ class RoundFlooding(RoutingProtocol):
 
     def _in_turns(self, packet: Packet) -> bool:
         """True for a packet that travels in turns; bulk does only where no window is left to it."""
-        return packet.header.priority < PRIORITY_BULK or not self._timing.window_ns
+        return self.bounds(packet.header.priority)
 
     def _hold(self, packet: Packet, now_ns: int) -> None:
         if self._repair is not None and packet.header.destination == BROADCAST and self._in_turns(packet):
@@ -392,8 +392,15 @@ class RoundFlooding(RoutingProtocol):
     def bound_ns(self) -> int | None:
         return self._law.bound_ns(self._topology, now_ns=self._now_ns)
 
+    def bounds(self, priority: int) -> bool:
+        return priority < PRIORITY_BULK or not self._timing.window_ns
+
+    def least_interval_ns(self, deadline_ns: int) -> int | None:
+        bound_ns = self.bound_ns()
+        return None if bound_ns is None or bound_ns > deadline_ns else self._timing.period_ns
+
     def most_packet_bytes(self, priority: int) -> int:
-        if priority < PRIORITY_BULK or not self._timing.window_ns:
+        if self.bounds(priority):
             return self._timing.turn_bytes
         return self._timing.bulk_bytes
 

@@ -245,7 +245,7 @@ def test_reports_have_a_line_of_their_own_with_their_bounds_beside_the_load(make
     assert drawing is not None
     assert drawn(drawing.figure) == {
         "delay of load": [(2000, 0.5), (3000, 1)], "delay of reports": [(300, 0.5), (700, 1)],
-        "bound stated of reports": [(900, 1)],
+        "bound of reports": [(900, 1)],
     }  # fmt: skip
     assert legend(drawing.figure) == [*drawn(drawing.figure)]
 

@@ -1,5 +1,10 @@
 """The inspector counts, decodes and follows what a swarm says, and shows it."""
 
+import contextlib
+import os
+import pty
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -169,6 +174,30 @@ async def test_a_frozen_screen_takes_nothing_in(folder: Path) -> None:
         assert "FROZEN" in str(app.query_one("#status", Static).render())
         await pilot.press("f")
         assert len(pumps) > count
+
+
+def test_sigterm_ends_it_at_once(folder: Path) -> None:
+    ours, terminal = pty.openpty()
+    command = [sys.executable, "-m", "fanet_mw", "inspect", str(folder)]
+    environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "120", "LINES": "40"}
+    with subprocess.Popen(command, stdin=terminal, stdout=terminal, stderr=terminal, env=environment) as process:
+        os.close(terminal)
+        said = b""
+        while b"HEARTBEAT" not in said:
+            said += os.read(ours, 65_536)
+        process.terminate()
+        with contextlib.suppress(OSError):  # its end has closed the terminal
+            while os.read(ours, 65_536):
+                pass
+        assert process.wait(20) == 0
+
+
+def test_where_all_contend_is_drawn_above_the_turns() -> None:
+    frame = Turns(0, 100 * MS, [Span(1, 0, 20 * MS), Span(2, 20 * MS, 20 * MS)], "turn", (40 * MS, 60 * MS))
+    lines = turn_lines(frame, 150 * MS).plain.splitlines()
+    assert lines[0].endswith("now: all contend")
+    assert lines[2] == "  all " + "." * 40 + "~" * 60
+    assert turn_lines(frame, 110 * MS).plain.splitlines()[0].endswith("now: turn of 1")
 
 
 # --- topics -------------------------------------------------------------------------------------------------------

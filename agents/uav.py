@@ -15,6 +15,7 @@ from agents.ground.post import Post
 from agents.ground_control.application import GroundControl
 from agents.hello_schedule import HelloSchedule, HelloTime
 from agents.mission.applications import PlannedSearch, Rescue
+from agents.mission.flight.search_limits import SearchLimits
 from agents.mission.formation_flight.application import FormationFlight
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.onboard import Onboard
@@ -144,8 +145,14 @@ class Uav(Actor):
         self._ground_control: GroundControl | None = None
         asked_for: Sequence[Application]
         if self._post is None:
-            self._ground_control = GroundControl(scenario, node, self._streams, position=position)
-            asked_for = [*_asked_for(scenario, node, self._streams, position, onboard_map), self._ground_control]
+            limits = SearchLimits(scenario)
+            self._ground_control = GroundControl(
+                scenario, node, self._streams, position=position, on_mission_key=limits.change
+            )
+            asked_for = [
+                *_asked_for(scenario, node, self._streams, position, onboard_map, limits),
+                self._ground_control,
+            ]
         else:
             asked_for = [*_loads(scenario, node), self._post, OperatorRelay(scenario)]
         self._built_in = tuple(application.name for application in asked_for)
@@ -307,13 +314,18 @@ class Uav(Actor):
 
 
 def _asked_for(
-    scenario: Scenario, node: NodeId, streams: TelemetryStreams, position: Enu, onboard_map: OnboardMap
+    scenario: Scenario,
+    node: NodeId,
+    streams: TelemetryStreams,
+    position: Enu,
+    onboard_map: OnboardMap,
+    limits: SearchLimits,
 ) -> Sequence[Application]:
     """The applications of a UAV that a scenario asks for, in the order in which they are called."""
     mission = scenario.mission
     applications: list[Application]
     rescue = (
-        PlannedSearch(scenario, node, position=position, onboard_map=onboard_map)
+        PlannedSearch(scenario, node, position=position, onboard_map=onboard_map, limits=limits)
         if mission.search != "none"
         else Rescue(scenario, node)
     )

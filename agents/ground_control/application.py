@@ -9,7 +9,7 @@ says.
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from agents.applications.telemetry_streams import Flown, Link, TelemetryStreams
@@ -106,7 +106,17 @@ class GroundControl(Application):
     name: Final = "operator"
     follows = (Fate.REFUSED,)
 
-    def __init__(self, scenario: Scenario, node: NodeId, streams: TelemetryStreams, *, position: Enu) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        node: NodeId,
+        streams: TelemetryStreams,
+        *,
+        position: Enu,
+        on_mission_key: Callable[[str, float], None] = lambda _key, _value: None,
+    ) -> None:
+        """`on_mission_key`: takes a key of `[mission]` and its new value, when an operator changes one."""
+        self._on_mission_key = on_mission_key
         self._node, self._streams = node, streams
         self._post = scenario.post
         self.listens = _OVER_AIR if scenario.post is not None else ()
@@ -388,6 +398,8 @@ class GroundControl(Application):
             self._say_param_error(message, peer, at, common.MAV_PARAM_ERROR_TYPE_MISMATCH)
         elif not self._settings.change(message.param_id, message.param_value):
             self._say_param_error(message, peer, at, common.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
+        elif key := self._settings.known[at].mission_key:
+            self._on_mission_key(key, message.param_value)
         self._say_param(at)
 
     def _say_param(self, at: int) -> None:

@@ -20,6 +20,8 @@ class Setting(NamedTuple):
     default: float
     least: float
     most: float
+    mission_key: str = ""
+    """The key of `[mission]` that it changes; empty for those of the flight controller."""
 
 
 SPEED: Final = "MPC_XY_CRUISE"
@@ -36,11 +38,17 @@ SILENCE: Final = "COM_DL_LOSS_T"
 """An operator who is not heard for so long counts as lost [s]."""
 SILENCE_ACTION: Final = "NAV_DLL_ACT"
 """What a UAV that flies by an operator's commands does then: 0 goes on, 1 holds, 2 returns, 3 lands (PX4's numbers)."""
+RESERVE: Final = "SRCH_RESERVE"
+"""The share of its charge with which a searching UAV comes home."""
+LOST_LINK: Final = "SRCH_LINK_T"
+"""A searching UAV that hears nobody for so long flies home [s]; 0: it searches on."""
+SWEEPS: Final = "SRCH_SWEEPS"
+"""After so many sweeps of the area the search ends; 0: it does not end by itself."""
 
 
 def settings_of(scenario: Scenario, node: NodeId) -> Sequence[Setting]:
     """The parameters of a node, by name; what they are at the start is the scenario's."""
-    mobility = scenario.mobility
+    mobility, mission = scenario.mobility, scenario.mission
     fastest = max(20.0, mobility.speed_m_s)
     return sorted([
         Setting(SPEED, min(fastest, max(0.5, mobility.speed_m_s)), 0.5, fastest),
@@ -50,6 +58,11 @@ def settings_of(scenario: Scenario, node: NodeId) -> Sequence[Setting]:
         Setting(FENCE_ACTION, 2.0, 0.0, 5.0),
         Setting(SILENCE, 10.0, 1.0, 300.0),
         Setting(SILENCE_ACTION, 1.0, 0.0, 3.0),
+        *([
+            Setting(RESERVE, mission.reserve_charge, 0.0, 1.0, "reserve_charge"),
+            Setting(LOST_LINK, mission.lost_link_s, 0.0, 3600.0, "lost_link_s"),
+            Setting(SWEEPS, mission.sweeps, 0.0, 1000.0, "sweeps"),
+        ] if mission.search != "none" else []),
     ])  # fmt: skip
 
 

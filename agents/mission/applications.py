@@ -9,6 +9,7 @@ from typing import Final
 
 from agents.mission.courses import course_at
 from agents.mission.finding.plausibility import Plausibility
+from agents.mission.flight.search_limits import SearchLimits
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.mission.outbox import Outbox
 from agents.mission.paper_rule import PaperRule
@@ -71,10 +72,21 @@ class PlannedSearch(Application):
         SURVIVOR.msgid, SEARCH.msgid, STATUS.msgid, BIDS.msgid, FOUND.msgid, COVERED.msgid, ROLL.msgid, ORDER.msgid,
     )  # fmt: skip
 
-    def __init__(self, scenario: Scenario, node: NodeId, *, position: Enu, onboard_map: OnboardMap = NO_MAP) -> None:
-        """`onboard_map`: the map that the UAV carries."""
+    def __init__(
+        self,
+        scenario: Scenario,
+        node: NodeId,
+        *,
+        position: Enu,
+        onboard_map: OnboardMap = NO_MAP,
+        limits: SearchLimits | None = None,
+    ) -> None:
+        """`onboard_map`: the map that the UAV carries. `limits`: what an operator may change in flight."""
         self._outbox = Outbox()
-        self._searcher = Searcher(scenario, node, position=position, outbox=self._outbox, onboard_map=onboard_map)
+        self._searcher = Searcher(
+            scenario, node, position=position, outbox=self._outbox, onboard_map=onboard_map,
+            limits=limits or SearchLimits(scenario),
+        )  # fmt: skip
         self._plausibility = Plausibility(phone_model(scenario))
         self._origin = Geodetic(*scenario.world.origin_deg, 0.0)
         self._bad_positions = 0

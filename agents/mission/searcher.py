@@ -31,6 +31,7 @@ from agents.mission.flight.flight import Flight
 from agents.mission.flight.goal import Goal
 from agents.mission.flight.reciprocal_avoidance import ReciprocalAvoidance
 from agents.mission.flight.return_home import ReturnHome, ReturnReason
+from agents.mission.flight.search_limits import SearchLimits
 from agents.mission.flight.take_off import TakeOff, take_off_ns
 from agents.mission.flight.velocity_choice import VelocityChoice
 from agents.mission.mode_record import ModeRecord
@@ -56,7 +57,7 @@ from fanet_mw.motion import Motion
 from fanet_mw.orders import OrderKind
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import Enu, NodeId, S, seconds_to_ns
+from fanet_mw.units import Enu, NodeId, S
 from fanet_mw.wire.bids import Bids, encode_bids
 from fanet_mw.wire.roll import Roll
 from fanet_mw.wire.search_messages import Told
@@ -84,7 +85,14 @@ class Searcher:
     """
 
     def __init__(
-        self, scenario: Scenario, node: NodeId, *, position: Enu, outbox: Outbox, onboard_map: OnboardMap
+        self,
+        scenario: Scenario,
+        node: NodeId,
+        *,
+        position: Enu,
+        outbox: Outbox,
+        onboard_map: OnboardMap,
+        limits: SearchLimits,
     ) -> None:
         mission, reach_m, speed_m_s = scenario.mission, scenario.radio.range_m, approach_speed_m_s(scenario, node)
         self._random = stream(scenario.seed, "mission", node).random
@@ -123,8 +131,7 @@ class Searcher:
         )  # fmt: skip
         self._return_home = ReturnHome(
             position, own_motion, outbox,
-            speed_m_s=speed_m_s, height_m=scenario.nodes.altitude_m, reserve=mission.reserve_charge,
-            lost_link_ns=seconds_to_ns(mission.lost_link_s),
+            speed_m_s=speed_m_s, height_m=scenario.nodes.altitude_m, limits=limits,
         )  # fmt: skip
         velocity_choice = VelocityChoice(
             own_motion,
@@ -153,7 +160,7 @@ class Searcher:
         self._mode = ModeRecord(node, place, self._flight, self._return_home, orders, outbox)
         self._node, self._post = node, scenario.post
         self._outbox = outbox
-        self._sweeps = mission.sweeps
+        self._limits = limits
         self._next_review_ns: int | None = None
 
     # --- time -----------------------------------------------------------------------------------------------------
@@ -226,7 +233,7 @@ class Searcher:
 
     def _is_over(self, now_ns: int) -> bool:
         """True once the area was swept often enough, and nobody is sought or it was swept once more."""
-        sweeps, place = self._sweeps, self._place
+        sweeps, place = self._limits.sweeps, self._place
         if not sweeps or not place.is_swept(now_ns, times=sweeps):
             return False
         return not self._survivors.sought() or place.is_swept(now_ns, times=sweeps + 1)

@@ -25,7 +25,8 @@ class Endurance:
     def __init__(self, home: Enu, *, speed_m_s: float, reserve: float) -> None:
         self._home = home
         self._speed_m_s = speed_m_s
-        self._reserve = reserve
+        self.reserve = reserve
+        """The share of the charge with which the UAV is to land."""
         self._readings: deque[tuple[int, float]] = deque()
 
     def read(self, charge: float, *, now_ns: int) -> None:
@@ -41,7 +42,7 @@ class Endurance:
         if not self._readings:
             return 1.0
         charge = self._readings[-1][1]
-        return max(0.0, min(1.0, charge - self._reserve - self._rate_per_s() * self._home_s(here)))
+        return max(0.0, min(1.0, charge - self.reserve - self._rate_per_s() * self._home_s(here)))
 
     def _rate_per_s(self) -> float:
         (first_ns, first), (last_ns, last) = self._readings[0], self._readings[-1]

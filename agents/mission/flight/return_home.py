@@ -7,6 +7,7 @@ from enum import StrEnum
 from typing import Final
 
 from agents.mission.flight.endurance import Endurance
+from agents.mission.flight.search_limits import SearchLimits
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
 from fanet_mw.application import Course
@@ -44,16 +45,15 @@ class ReturnHome:
         *,
         speed_m_s: float,
         height_m: float,
-        reserve: float,
-        lost_link_ns: int,
+        limits: SearchLimits,
     ) -> None:
-        """`height_m`: the height of the lanes above ground. `reserve`: the share of the charge with which it is to
-        land. `lost_link_ns`: how long it may hear nobody; 0 for as long as it likes.
+        """`height_m`: the height of the lanes above ground. `limits`: with which charge it is to land, and how long it
+        may hear nobody.
         """
         self._home = home._replace(up=height_m + _HIGHER_M)
         self._own_motion, self._outbox = own_motion, outbox
-        self._endurance = Endurance(home, speed_m_s=speed_m_s, reserve=reserve)
-        self._lost_link_ns = lost_link_ns
+        self._endurance = Endurance(home, speed_m_s=speed_m_s, reserve=limits.reserve)
+        self._limits = limits
         self._heard_ns: int | None = None
         """The instant at which another UAV was last heard; None before the first time: there is no link to lose."""
         self.reason: ReturnReason | None = None
@@ -63,6 +63,7 @@ class ReturnHome:
 
     def on_battery(self, charge: float, *, now_ns: int) -> bool:
         """A reading of the battery; returns True if the UAV must leave now."""
+        self._endurance.reserve = self._limits.reserve
         self._endurance.read(charge, now_ns=now_ns)
         if self.reason is ReturnReason.BATTERY or self._endurance.margin(self._own_motion.position) > 0.0:
             return False
@@ -79,8 +80,8 @@ class ReturnHome:
 
     def loses_link(self, now_ns: int) -> bool:
         """True if the UAV must leave now, because it has not heard anybody for too long."""
-        heard_ns = self._heard_ns
-        if not self._lost_link_ns or heard_ns is None or self.leaves or now_ns - heard_ns < self._lost_link_ns:
+        heard_ns, most_ns = self._heard_ns, self._limits.lost_link_ns
+        if not most_ns or heard_ns is None or self.leaves or now_ns - heard_ns < most_ns:
             return False
         self.reason = ReturnReason.LOST_LINK
         return True

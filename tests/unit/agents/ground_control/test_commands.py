@@ -452,6 +452,30 @@ def test_parameters_are_listed_read_written_and_bounded() -> None:
     assert error.get_type() == "PARAM_ERROR"
 
 
+def test_an_operator_changes_when_a_search_ends_within_bounds() -> None:
+    from agents.ground_control.application import GroundControl
+    from agents.mission.flight.search_limits import SearchLimits
+
+    chosen = scenario(
+        nodes={"count": 12, "altitude_m": 65}, world={"area_m": 600}, sensors={"battery_hz": 1},
+        mission={"search": "lines", "survivors": 1, "reserve_charge": 0.25},
+    )  # fmt: skip
+    limits = SearchLimits(chosen)
+    bench = Bench(chosen)
+    bench.control = GroundControl(
+        chosen, bench.node, bench.streams, position=bench.position, on_mission_key=limits.change
+    )
+    bench.control.start(bench, 0)  # type: ignore[arg-type]
+    listed = {value.param_id: value.param_value for value in bench.say(common.MAVLink_param_request_list_message(1, 1))}
+    assert (listed["SRCH_RESERVE"], listed["SRCH_LINK_T"], listed["SRCH_SWEEPS"]) == (0.25, 0.0, 0.0)
+    for name, value in ((b"SRCH_RESERVE", 0.5), (b"SRCH_LINK_T", 30.0), (b"SRCH_SWEEPS", 2.0)):
+        bench.say(common.MAVLink_param_set_message(1, 1, name, value, 9))
+    assert (limits.reserve, limits.lost_link_ns, limits.sweeps) == (0.5, 30 * S, 2)
+    error, _ = bench.say(common.MAVLink_param_set_message(1, 1, b"SRCH_RESERVE", 1.5, 9))
+    assert error.error == common.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
+    assert limits.reserve == 0.5
+
+
 @pytest.mark.parametrize(
     ("opcode", "answer", "why"), [(4, 129, 10), (3, 129, 10), (7, 129, 7), (2, 128, 0), (1, 128, 0)]
 )

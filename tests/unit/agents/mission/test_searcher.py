@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
+from agents.mission.flight.search_limits import SearchLimits
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.mission.outbox import Outbox
 from agents.mission.search_formation.formation_planner import plan_of
@@ -46,7 +47,10 @@ class Flight:
         }  # fmt: skip
         scenario = make_scenario(**keys)
         self.outbox = Outbox()
-        self.searcher = Searcher(scenario, NodeId(node), position=home, outbox=self.outbox, onboard_map=onboard_map)
+        self.searcher = Searcher(
+            scenario, NodeId(node), position=home, outbox=self.outbox, onboard_map=onboard_map,
+            limits=SearchLimits(scenario),
+        )  # fmt: skip
         self.searcher.start(0)
         self.at, self.now_ns = home, 0
         pattern = formation(scenario, 20)

@@ -9,12 +9,14 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from fanet_mw.wire.checks import refuse_unless
-from fanet_mw.wire.frame import ANY_NODE, HEARD, HELD, OVERHEAD, VERSION, Packed, decode_every, encode_inner
+from fanet_mw.wire.frame import HEARD, HELD, OVERHEAD, VERSION, Packed, decode_every, encode_inner
 
 HEARD_BYTES: Final = OVERHEAD + HEARD.layout.size
 HELD_BYTES: Final = OVERHEAD + HELD.layout.size
 _DATA_BYTES: Final = 64
 _ENTRY: Final = struct.Struct("<HB")
+_OFTEN: Final = 1 << 15
+"""The bit beside a node's number that stands for `often`."""
 MOST_NODES: Final = 8 * (_DATA_BYTES - _ENTRY.size)
 """The number of nodes about which FANET_HEARD can tell."""
 CAPACITY: Final = 16
@@ -29,6 +31,8 @@ class HeardNodes(NamedTuple):
     """The number of the hello interval, modulo 256."""
     heard: int
     """Bit i: it hears node i + 1."""
+    often: bool = False
+    """True for a node that takes part in all bulk slots."""
 
 
 def heard_capacity(count: int) -> int:
@@ -49,7 +53,9 @@ def encode_heard(entries: Sequence[HeardNodes], node: int, *, count: int) -> byt
     messages = []
     for at in range(0, len(entries), most):
         part = entries[at : at + most]
-        data = b"".join(_ENTRY.pack(e.node, e.epoch) + e.heard.to_bytes(bits, "little") for e in part)
+        data = b"".join(
+            _ENTRY.pack(e.node | _OFTEN * e.often, e.epoch) + e.heard.to_bytes(bits, "little") for e in part
+        )
         payload = data.ljust(_DATA_BYTES, b"\0") + bytes((len(part), _ENTRY.size + bits, VERSION))
         messages.append(encode_inner(HEARD, payload, node=node))
     return b"".join(messages)
@@ -67,8 +73,8 @@ def decode_heard(packed: Packed) -> list[HeardNodes]:
         for at in range(0, count * length, length):
             heard = int.from_bytes(entries[at + _ENTRY.size : at + length], "little")
             node, epoch = _ENTRY.unpack_from(entries, at)
-            found.append(HeardNodes(node, epoch, heard))
-    refuse_unless(all(0 < each.node < ANY_NODE for each in found), "what a node hears that cannot exist")
+            found.append(HeardNodes(node & ~_OFTEN, epoch, heard, bool(node & _OFTEN)))
+    refuse_unless(all(0 < each.node <= MOST_NODES for each in found), "what a node hears that cannot exist")
     return found
 
 

@@ -141,7 +141,7 @@ def _judge_rounds(
     hops = max(max(hops_to.values()) for hops_to in ways)
     bound_ns = law.over_ns(hops)
     urgent = {
-        name: each for name, each in scenario.traffic_classes.items() if each.priority != "bulk" or not timing.window_ns
+        name: each for name, each in scenario.traffic_classes.items() if each.priority != "bulk" or not timing.slots
     }
     offered = sum(
         len(sources_of(scenario, name)) / each.interval_s * (each.longest_bytes + HEADER_BYTES)
@@ -162,7 +162,8 @@ def _judge_rounds(
     bound = "none: the channel loses frames" if bound_ns is None else f"at most {bound_ns / MS:.0f} ms over {hops} hops"
     text = [
         f"{'FEASIBLE' if feasible else 'NOT FEASIBLE'}  {scenario.name}: {scenario.nodes.count} nodes, a round of "
-        f"{timing.period_ns / MS:.1f} ms: turns of {timing.turn_ns / MS:.2f}, {timing.window_ns / MS:.1f} for bulk",
+        f"{timing.period_ns / MS:.1f} ms: turns of {timing.turn_ns / MS:.2f}, {timing.slots} slots of "
+        f"{timing.slot_ns / MS:.2f} for bulk",
         *(item("problem", problem) for problem in problems),
         item(
             "urgent",
@@ -170,11 +171,14 @@ def _judge_rounds(
             f"{scenario.rounds.burst_bytes} B are under way; from {law.silent_ns / S:.1f} s on, when links are known",
         ),
         item("turns", f"carry {carried / 1000:.1f} kB/s of urgent packets, the traffic has {offered / 1000:.1f} kB/s"),
-        item("bulk", "contends in the window, without a bound" if timing.window_ns else "goes in turns, too"),
+        item(
+            "bulk",
+            "goes in slots that nodes within two hops share, without a bound" if timing.slots else "goes in turns, too",
+        ),
     ]
     content: dict[str, Any] = {
         "feasible": feasible, "problems": problems, "period_ms": timing.period_ns / MS, "turn_ms": timing.turn_ns / MS,
-        "window_ms": timing.window_ns / MS, "hop_ms": law.hop_ns / MS, "hops": hops,
+        "slots": timing.slots, "slot_ms": timing.slot_ns / MS, "hop_ms": law.hop_ns / MS, "hops": hops,
         "bound_ms": None if bound_ns is None else bound_ns / MS, "from_s": law.silent_ns / S,
         "carried_bytes_per_s": carried, "offered_bytes_per_s": offered,
     }  # fmt: skip

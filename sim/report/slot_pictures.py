@@ -139,15 +139,15 @@ def _in_turns(
 def _in_rounds(run: RunRecords) -> RunPicture:
     timing = RoundTiming.of(run.scenario)
     own = [Span(node, (node - 1) * timing.turn_ns, timing.turn_ns) for node in run.scenario.node_ids]
-    frame = _Frame(0, timing.period_ns, (timing.nodes * timing.turn_ns, timing.window_ns), own)
+    frame = _Frame(0, timing.period_ns, (timing.nodes * timing.turn_ns, timing.slots * timing.slot_ns), own)
     kept = frame.kept(run.let_out)
     bulk = sum(frame.place_ns(one) >= frame.window[0] for one in run.let_out)
-    window = (", and the window in which bulk is sent", f", {bulk:,} in the window") if timing.window_ns else ("", "")
+    window = (", and the slots in which bulk is sent", f", {bulk:,} in the slots") if timing.slots else ("", "")
     said = (
         f"When packets were let out first. Shaded: the turn of each node, on its line{window[0]}. Of "
         f"{len(run.let_out):,} packets, {kept:,} were let out in a turn of the origin{window[1]}."
     )
-    return RunPicture(_by_node(run, frame, run.let_out, "round", ("packets", ""), "window of bulk"), said)
+    return RunPicture(_by_node(run, frame, run.let_out, "round", ("packets", ""), "slots of bulk"), said)
 
 
 def _by_node(

@@ -2,11 +2,13 @@
 
 import contextlib
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from fanet_mw import wire
 from fanet_mw.errors import MalformedFrameError
+from fanet_mw.routing.rounds.bulk_slots import BulkSlots
 from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.routing.rounds.topology import Topology
 from fanet_mw.scenario import config
@@ -55,20 +57,45 @@ def test_turns_of_two_nodes_never_overlap(timing: RoundTiming, from_ns: int, dat
     assert all(abs(turn_ns - start_ns) >= timing.turn_ns for turn_ns in around)
 
 
-@given(timings().filter(lambda timing: timing.window_ns > 0), INSTANTS, st.integers(0, 10 * S))
-def test_bulk_that_waits_for_one_other_frame_ends_before_the_next_turn(
-    timing: RoundTiming, from_ns: int, wait_ns: int
-) -> None:
-    start_ns = timing.window_start_ns(from_ns, wait_ns=wait_ns)
-    assert start_ns >= from_ns
-    assert timing.in_window_ns(start_ns) + 2 * timing.bulk_ns <= timing.window_ns
+@given(timings().filter(lambda timing: timing.slots > 0), INSTANTS)
+def test_bulk_slots_follow_the_turns_and_each_other(timing: RoundTiming, from_ns: int) -> None:
+    slot = timing.slot_from(from_ns)
+    start_ns = timing.slot_start_ns(slot)
+    assert timing.slot_start_ns(slot - 1) < from_ns <= start_ns
+    assert start_ns - timing.slot_start_ns(slot - 1) >= timing.slot_ns
+    within_ns = start_ns % timing.period_ns
+    assert timing.nodes * timing.turn_ns <= within_ns <= timing.period_ns - timing.slot_ns
 
 
-@given(timings().filter(lambda timing: timing.window_ns > 0), INSTANTS)
-def test_the_wait_for_bulk_is_of_windows_and_not_of_turns(timing: RoundTiming, from_ns: int) -> None:
-    usable_ns = timing.window_ns - 2 * timing.bulk_ns
-    first_ns = timing.window_start_ns(from_ns, wait_ns=0)
-    assert timing.window_start_ns(from_ns, wait_ns=3 * usable_ns) - first_ns == 3 * timing.period_ns
+@given(timings().filter(lambda timing: timing.slots > 0), INSTANTS, st.data())
+def test_of_nodes_within_two_hops_one_owns_a_bulk_slot(timing: RoundTiming, from_ns: int, data: st.DataObject) -> None:
+    nodes = data.draw(st.lists(st.integers(1, 488), min_size=2, max_size=12, unique=True))
+    often = {node: data.draw(st.booleans()) for node in nodes}
+    owned = [
+        BulkSlots(node, timing).next_ns(
+            from_ns, often=often[node], rivals=[(other, often[other]) for other in nodes if other != node]
+        )
+        for node in nodes
+    ]
+    assert len(set(owned)) == len(nodes)
+
+
+def test_a_node_with_little_to_send_owns_few_slots_and_leaves_the_others_alone() -> None:
+    timing = RoundTiming.of(config.build({"nodes": {"count": 10}, "routing": {"protocol": "rounds"}}))
+
+    def owned(rivals: list[tuple[int, bool]], *, often: bool = True) -> set[int]:
+        found, at_ns = set[int](), 0
+        slots = BulkSlots(1, timing)
+        while (at_ns := slots.next_ns(at_ns, often=often, rivals=rivals)) < 100 * timing.period_ns:
+            found.add(at_ns)
+            at_ns += 1
+        return found
+
+    every = 100 * timing.slots
+    assert len(owned([])) == every
+    assert len(owned([], often=False)) == pytest.approx(every / 8, rel=0.15)
+    assert len(owned([(node, False) for node in range(2, 6)])) > 0.7 * every
+    assert len(owned([(node, True) for node in range(2, 6)])) == pytest.approx(every / 5, rel=0.15)
 
 
 def on_air(inner: bytes) -> bytes:
@@ -78,7 +105,9 @@ def on_air(inner: bytes) -> bytes:
 
 @given(st.integers(1, 488), st.data())
 def test_links_survive_the_air(count: int, data: st.DataObject) -> None:
-    entry = st.builds(HeardNodes, st.integers(1, count), st.integers(0, 255), st.integers(0, 2**count - 1))
+    entry = st.builds(
+        HeardNodes, st.integers(1, count), st.integers(0, 255), st.integers(0, 2**count - 1), st.booleans()
+    )
     entries = data.draw(st.lists(entry, min_size=1, max_size=40))
     assert decode_heard(on_air(encode_heard(entries, 3, count=count))) == entries
 
@@ -105,7 +134,7 @@ def test_a_link_counts_if_both_its_ends_state_it(heard: set[tuple[int, int]], ep
     topology = Topology(NodeId(1), count=12, epoch_ns=250 * MS, lifetime_ns=10 * S)
     now_ns = epoch * 250 * MS + 1
     states = {n: {b for a, b in heard if a == n and b != n} for n in range(1, 13)}
-    topology.state([NodeId(n) for n in states[1]], now_ns=now_ns)
+    topology.state(sum(1 << (n - 1) for n in states[1]), often=True, now_ns=now_ns)
     topology.hear(told_by(states, epoch=epoch), now_ns=now_ns)
     hops = topology.hops(now_ns)
     reached, ring, far = {1: 0}, [1], 0
@@ -120,7 +149,7 @@ def test_a_link_counts_if_both_its_ends_state_it(heard: set[tuple[int, int]], ep
 def test_a_statement_from_the_future_or_too_old_is_not_believed(short: int, epoch: int) -> None:
     topology = Topology(NodeId(1), count=3, epoch_ns=250 * MS, lifetime_ns=2 * S)
     now_ns = epoch * 250 * MS
-    topology.state([NodeId(2)], now_ns=now_ns)
+    topology.state(0b10, often=True, now_ns=now_ns)
     topology.hear([HeardNodes(2, short, 0b1)], now_ns=now_ns)
     age = (epoch + 1 - short) % 256 - 1
     assert (NodeId(2) in topology.hops(now_ns)) is (age <= 8)

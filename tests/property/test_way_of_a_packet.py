@@ -6,6 +6,7 @@ Every call that is handed the packet is traced, and where it came from. What ARC
 import itertools
 import sys
 from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -103,9 +104,12 @@ def in_rounds() -> dict[str, Way]:
     node = node_of(2, config.build({"nodes": {"count": 5}, "routing": {"protocol": "rounds"}}))
     over = way(lambda: send(node, 0, priority=PRIORITY_REPORT))
     heard = way(lambda: hear(node, 10 * MS, origin=3, priority=PRIORITY_REPORT))
-    wake_ns = node.next_wake_ns()
-    assert wake_ns is not None
-    return {"handed over": over, "heard": heard, "let out": way(lambda: node.wake(wake_ns))}
+    out = Way()
+    while not node.requests:
+        wake_ns = node.next_wake_ns()
+        assert wake_ns is not None
+        out = way(partial(node.wake, wake_ns))
+    return {"handed over": over, "heard": heard, "let out": out}
 
 
 def scheduled() -> dict[str, Way]:

@@ -58,8 +58,8 @@ class DelayLaw:
             self._recent_bytes -= self._recent.popleft()[1]
         if self._recent_bytes > self._burst_bytes or self.absent(topology, now_ns=now_ns) is None:
             return None
-        hops = topology.hops(now_ns)
-        return self.over_ns(max(hops.values())) if len(hops) > 1 else None
+        hops = topology.most_hops(now_ns)
+        return self.over_ns(hops) if hops else None
 
     def over_ns(self, hops: int) -> int | None:
         """The bound over so many hops; None if the channel loses frames."""

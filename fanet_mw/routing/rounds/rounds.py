@@ -1,7 +1,7 @@
 """Rounds: a protocol whose delays do not depend on the topology. Each node has one turn in every round, by its number.
 
     urgent packet   waits for the own turn; whoever hears it first sends it in the own next turn
-    bulk            contends for the rest of the round, as long as a neighbor is not known to have it
+    bulk            goes in slots of the rest of the round, as long as a neighbor is not known to have it
     topology        each node states its neighbors when they change, and all pass that on in turns (`topology.py`)
     hello           goes in a turn; holds a digest, so that neighbors send what was missed (`Repair`)
 
@@ -12,6 +12,7 @@ nodes that use the same turn far apart.
 """
 
 from collections.abc import Mapping
+from itertools import takewhile
 from typing import ClassVar, Final
 
 from fanet_mw.bus.messages import Reception, TxStatus
@@ -22,7 +23,7 @@ from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.packet import Packet
 from fanet_mw.node.reader import decoded
 from fanet_mw.routing.packet_repair import FLOOD_OVER_NS, Repair
-from fanet_mw.routing.rounds.bulk_pacing import BulkPacing
+from fanet_mw.routing.rounds.bulk_slots import BulkSlots
 from fanet_mw.routing.rounds.delay_law import MOST_HOPS, DelayLaw
 from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.routing.rounds.spreading import Spreading
@@ -48,13 +49,14 @@ _STORE_PACKETS: Final = 4096
 """The most packets that a node keeps for repair."""
 _MOST_HELD: Final = 512
 _MOST_TOLD: Final = 4096
-_FIRST_WINDOWS: Final = 0.25
-"""A new bulk packet is sent at a random instant within so much of a window, and twice the time for which nodes do not
-know of each other's decisions, which keeps apart those that heard it together."""
 _SPARE_HOPS: Final = 2
 """The hops for which a node that is not in the dominating set waits for others to send a new bulk packet."""
-_MOST_WINDOWS: Final = 8
-"""The most windows over which a repetition is spread."""
+_MOST_ROUNDS: Final = 8
+"""The rounds that a node lets pass at most before it repeats bulk once more."""
+_FLOOD_HOPS: Final = 4
+"""A node that comes near has got elsewhere what is older than so many hops."""
+_MUCH_BULK: Final = 4
+"""A node with so many bulk packets takes part in all bulk slots until they are sent."""
 _BEFORE_TURN_NS: Final = 1 * US
 """A hello is made just before the turn in which it goes is filled."""
 _PATIENT_TURNS: Final = 2
@@ -81,7 +83,7 @@ class RoundFlooding(RoutingProtocol):
         )
         self._spreading = Spreading(
             capacity=scenario.routing.queue_frames, repeats=rounds.repeats, patience_ns=self._law.hop_ns,
-            neighbors_of=self._topology.neighbors_of,
+            links_of=self._topology.links_of,
         )  # fmt: skip
         self._repair = None
         if rounds.repair_s:
@@ -89,12 +91,15 @@ class RoundFlooding(RoutingProtocol):
                 window_ns=seconds_to_ns(rounds.repair_s), capacity=_STORE_PACKETS,
                 random=port.stream("repair").random, flood_over_ns=max(4 * FLOOD_OVER_NS, 16 * self._law.hop_ns),
             )  # fmt: skip
-        self._pacing = BulkPacing(timing, port.stream("rounds").random)
+        self._slots = BulkSlots(port.node, timing)
         self._blind_ns = self._lead_ns + radio.handover_ns
         """The time that passes from the decision to send until others know of it, airtime and waiting left out."""
-        self._first_windows = _FIRST_WINDOWS + 2 * self._blind_ns / max(1, timing.window_ns)
-        self._bulk_ns: int | None = None
-        """The next instant at which this node contends with bulk; None if it has none."""
+        self._often = False
+        """Whether this node takes part in all bulk slots, as it has stated."""
+        self._slot_ns: int | None = None
+        """The next own bulk slot; None if there is no bulk."""
+        self._slot_from_ns = 0
+        """The instant from which that slot was sought."""
         self._clock_hellos: set[int] = set()
         """The requests of hellos of which the clock wants to know when they ended."""
         self._held: dict[HeldPacket, None] = {}
@@ -106,13 +111,17 @@ class RoundFlooding(RoutingProtocol):
         """The number of turns in which the hello found no room."""
         self._heard_ns: dict[NodeId, int] = {}
         """The instant at which each neighbor was last heard."""
+        self._near = 0
+        """The nodes that were heard lately, as a set of bits (`topology.nodes_of`)."""
+        self._near_until_ns = 0
+        """The instant until which none of them can become silent."""
         self._turn_ns = 0
         """The next own turn that may still be filled."""
         self._stated = 0
         self._now_ns = 0
 
     def start(self, now_ns: int) -> None:
-        self._topology.state((), now_ns=now_ns)
+        self._topology.state(0, often=False, now_ns=now_ns)
         self._turn_ns = self._timing.turn_start_ns(self._port.node, from_ns=now_ns + self._lead_ns)
 
     # --- packets --------------------------------------------------------------------------------------------------
@@ -127,7 +136,7 @@ class RoundFlooding(RoutingProtocol):
 
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         src, header = reception.src, packet.header
-        self._heard_ns[src] = now_ns
+        self._hears(src, now_ns)
         if header.kind == Kind.ROUND:
             self._on_round(packet, src, now_ns)
             return
@@ -144,7 +153,7 @@ class RoundFlooding(RoutingProtocol):
             self._take_bulk(packet, src=src, from_ns=now_ns + self._lead_ns, now_ns=now_ns)
 
     def on_copy(self, key: int, src: NodeId, *, now_ns: int) -> None:
-        self._heard_ns[src] = now_ns
+        self._hears(src, now_ns)
         if self._repair is not None and key in self._repair.pending:
             self._repair.on_copy(key, now_ns=now_ns)
         if self._spreading.on_copy(key, src, now_ns=now_ns):
@@ -186,6 +195,8 @@ class RoundFlooding(RoutingProtocol):
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
         self._reach_turn(now_ns)
+        if self._timing.slots:
+            self._reach_slot(now_ns, now_ns)
 
     def _reach_turn(self, now_ns: int) -> None:
         """Something waits: the next turn that can still be announced in time is the one to fill."""
@@ -272,49 +283,77 @@ class RoundFlooding(RoutingProtocol):
         """A bulk packet may be sent from an instant on."""
         if src is not None and not self._topology.dominates(now_ns):
             from_ns += _SPARE_HOPS * self._law.hop_ns
-        start_ns = self._pacing.start_ns(from_ns, windows=self._first_windows)
-        evicted = self._spreading.take(packet, src=src, now_ns=now_ns, bulk_from_ns=start_ns)
+        evicted = self._spreading.take(packet, src=src, now_ns=now_ns, bulk_from_ns=from_ns)
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
-        if self._bulk_ns is None or start_ns < self._bulk_ns:
-            self._bulk_ns = start_ns
+        self._reach_slot(from_ns, now_ns)
 
-    def _send_bulk(self, now_ns: int) -> None:
-        """Announce the bulk whose start was drawn, and see later who still lacks it."""
-        start_ns = self._bulk_ns
-        assert start_ns is not None, "bulk is sent when it is due"
-        room, together = self._timing.bulk_bytes, list[Packet]()
-        wanted, later = self._spreading.bulk_wanted(self._neighbors(now_ns), start_ns=start_ns)
-        for packet, _, from_ns in later:
-            self._spreading.look_again(packet, from_ns=self._pacing.start_ns(from_ns, windows=_FIRST_WINDOWS))
-        for packet, again, _ in wanted:
-            if self._expired(packet, start_ns):
+    def _reach_slot(self, from_ns: int, now_ns: int) -> None:
+        """Something may be sent from an instant on: the first own slot that can be announced in time is to be used."""
+        from_ns = max(from_ns, now_ns + self._lead_ns)
+        if self._slot_ns is None or from_ns < self._slot_from_ns:
+            self._seek_slot(from_ns, now_ns)
+
+    def _seek_slot(self, from_ns: int, now_ns: int) -> None:
+        """Find the first own bulk slot at or after an instant."""
+        self._slot_from_ns = from_ns
+        rivals = self._topology.rivals(self._neighbors(now_ns), now_ns)
+        self._slot_ns = self._slots.next_ns(self._slot_from_ns, often=self._often, rivals=rivals)
+
+    def _use_slot(self, slot_ns: int, now_ns: int) -> None:
+        """Announce the frame of a bulk slot, if it is still this node's own, and seek the next one."""
+        rivals = self._topology.rivals(self._neighbors(now_ns), now_ns)
+        if slot_ns < now_ns or self._slots.next_ns(slot_ns, often=self._often, rivals=rivals) != slot_ns:
+            self._seek_slot(max(slot_ns, now_ns + self._lead_ns), now_ns)
+            return
+        room, together = self._timing.slot_bytes, list[Packet]()
+        for packet in self._spreading.take_hasty(self._timing.hasty_bytes):
+            if not self._expired(packet, slot_ns):
+                room -= len(packet.frame)
+                together.append(packet)
+        neighbors = self._neighbors(now_ns)
+        while (packet := self._spreading.next_bulk(neighbors, start_ns=slot_ns)) is not None:
+            if self._expired(packet, slot_ns):
                 continue
-            size = len(packet.frame)
-            if size > room or (not together and not self._pacing.take(start_ns, again=again)):
-                next_ns = start_ns + self._timing.period_ns - self._timing.in_window_ns(start_ns)
-                self._spreading.look_again(packet, from_ns=self._pacing.start_ns(next_ns, windows=1 + again))
-                continue
-            room -= size
+            if len(packet.frame) > room:
+                self._spreading.look_again(packet, from_ns=slot_ns)
+                break
+            room -= len(packet.frame)
             together.append(packet)
-            times = self._spreading.sent(packet, start_ns=start_ns)
-            spread = min(_MOST_WINDOWS, 1 << times)
-            again_ns = self._pacing.start_ns(start_ns + 2 * (self._law.hop_ns + self._blind_ns), windows=spread)
+            times = self._spreading.sent(packet, start_ns=slot_ns)
+            rounds = min(_MOST_ROUNDS, 1 << times)
+            again_ns = slot_ns + 2 * (self._law.hop_ns + self._blind_ns) + rounds * self._timing.period_ns
             self._spreading.look_again(packet, from_ns=again_ns)
         if together:
-            self._port.transmit_together(together, flags=FLAG_FLOOD, at_ns=(start_ns,), wants_status=True)
-        self._bulk_ns = self._spreading.bulk_due_ns()
+            self._port.transmit_together(together, flags=FLAG_FLOOD, at_ns=(slot_ns,))
+        due_ns = self._spreading.bulk_due_ns(neighbors)
+        self._slot_ns = None
+        if due_ns is not None:
+            soonest_ns = max(slot_ns + self._timing.slot_ns, now_ns + self._lead_ns // 2)  # it was woken late, perhaps
+            self._seek_slot(max(due_ns, soonest_ns), now_ns)
 
     def on_status(self, status: TxStatus, *, now_ns: int) -> None:
-        if status.seq in self._clock_hellos:
-            self._clock_hellos.discard(status.seq)
-        else:
-            self._pacing.ended(status.end_ns)
+        self._clock_hellos.discard(status.seq)
 
-    def _neighbors(self, now_ns: int) -> set[NodeId]:
+    def _hears(self, src: NodeId, now_ns: int) -> None:
+        """A frame came from a node. One that was not near before cannot know what this node has told lately."""
+        self._heard_ns[src] = now_ns
+        if not self._near >> (src - 1) & 1:
+            self._near |= 1 << (src - 1)
+            old_ns = now_ns - _FLOOD_HOPS * (self._law.hop_ns + self._blind_ns)
+            if self._topology.reaches(src, now_ns):
+                self._spreading.assume(src, until_ns=old_ns)
+            told_ns = self._told_ns
+            self._held.update(dict.fromkeys(takewhile(lambda held: told_ns[held] > old_ns, reversed(told_ns))))
+
+    def _neighbors(self, now_ns: int) -> int:
         """The nodes that were heard lately."""
-        horizon_ns = now_ns - self._law.silent_ns
-        return {node for node, heard_ns in self._heard_ns.items() if heard_ns >= horizon_ns}
+        if now_ns > self._near_until_ns:
+            horizon_ns = now_ns - self._law.silent_ns
+            near = {node: heard_ns for node, heard_ns in self._heard_ns.items() if heard_ns >= horizon_ns}
+            self._near = sum(1 << (node - 1) for node in near)
+            self._near_until_ns = min(near.values(), default=now_ns) + self._law.silent_ns
+        return self._near
 
     # --- hellos ---------------------------------------------------------------------------------------------------
 
@@ -341,7 +380,7 @@ class RoundFlooding(RoutingProtocol):
         return request
 
     def on_hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
-        self._heard_ns[reception.src] = now_ns
+        self._hears(reception.src, now_ns)
         digest = decoded(packet.frame, Digest.decode_frames) if self._repair else None
         if self._repair and digest:
             self._repair.on_digest(digest, now_ns=now_ns)
@@ -352,8 +391,8 @@ class RoundFlooding(RoutingProtocol):
         first_ns = self._topology.next_epoch_ns()
         if self._spreading.has_urgent or self._hello is not None or self._held or self._topology.has_news:
             first_ns = min(first_ns, self._turn_ns - self._lead_ns)
-        if self._bulk_ns is not None and self._bulk_ns - self._lead_ns < first_ns:
-            first_ns = self._bulk_ns - self._lead_ns
+        if self._slot_ns is not None and self._slot_ns - self._lead_ns < first_ns:
+            first_ns = self._slot_ns - self._lead_ns
         due_ns = None if self._repair is None else self._repair.next_wake_ns()
         if due_ns is not None and due_ns < first_ns:
             first_ns = due_ns
@@ -362,10 +401,12 @@ class RoundFlooding(RoutingProtocol):
     def wake(self, now_ns: int) -> None:
         self._now_ns = now_ns
         if now_ns >= self._topology.next_epoch_ns():
-            self._topology.state(self._neighbors(now_ns), now_ns=now_ns)
+            waiting = self._spreading.ready_bulk()
+            self._often = self._topology.dominates(now_ns) or waiting >= (1 if self._often else _MUCH_BULK)
+            self._topology.state(self._neighbors(now_ns), often=self._often, now_ns=now_ns)
         self._repair_due(now_ns)
-        if self._bulk_ns is not None and self._bulk_ns - self._lead_ns <= now_ns:
-            self._send_bulk(now_ns)
+        if self._slot_ns is not None and self._slot_ns - self._lead_ns <= now_ns:
+            self._use_slot(self._slot_ns, now_ns)
         turn_ns = self._turn_ns
         if turn_ns - self._lead_ns > now_ns:
             return
@@ -393,7 +434,7 @@ class RoundFlooding(RoutingProtocol):
         return self._law.bound_ns(self._topology, now_ns=self._now_ns)
 
     def bounds(self, priority: int) -> bool:
-        return priority < PRIORITY_BULK or not self._timing.window_ns
+        return priority < PRIORITY_BULK or not self._timing.slots
 
     def least_interval_ns(self, deadline_ns: int) -> int | None:
         bound_ns = self.bound_ns()
@@ -402,7 +443,7 @@ class RoundFlooding(RoutingProtocol):
     def most_packet_bytes(self, priority: int) -> int:
         if self.bounds(priority):
             return self._timing.turn_bytes
-        return self._timing.bulk_bytes
+        return self._timing.slot_bytes
 
     def waiting(self) -> int:
         return self._spreading.waiting()

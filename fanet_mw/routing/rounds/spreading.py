@@ -1,6 +1,7 @@
 """What one node passes on: each packet until every neighbor is known to have it.
 
-    urgent   heard -> own next turn -> a neighbor not known to have it a round later -> own turn again
+    urgent   heard -> own bulk slot, if one comes first -> own next turn
+                   -> a neighbor is not known to have it a round later -> own turn again
     bulk     heard -> an instant in a bulk window -> every neighbor hears one that sent it: not sent; else sent
                    -> a round later -> a neighbor is not known to have it: sent (again)
 
@@ -8,18 +9,21 @@ A neighbor is known to have a packet when it was heard to send it (passive ackno
 that it holds it (FANET_HELD). Urgent packets are sent by every node, so hearing them is enough. Bulk is sent only where
 a neighbor is out of reach of all that were heard to send it (scalable broadcast; Peng and Lu, MobiHoc 2000), so every
 node tells in its turns which bulk it has received. Before a packet is repeated a whole
-round must have passed in which nobody else sent it, so that mostly one node repeats.
+round must have passed in which nobody else sent it, so that mostly one node repeats. Sets of nodes are integers: bit i
+stands for node i + 1.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from heapq import heappop, heappush
-from typing import Final, NamedTuple
+from typing import Final
 
 from fanet_mw.node.duplicates import key_of
 from fanet_mw.node.packet import Packet
 
-NeighborsOf = Callable[[int, int], Collection[int]]
+LinksOf = Callable[[int, int], int]
 """The nodes with which a node has links at an instant: of (node, instant)."""
+_MOST_EARLY: Final = 1024
+_MOST_DONE: Final = 1024
 _WAY_ROUND: Final = 2
 """The hops that a flood may need to reach a neighbor by relays that this node does not hear."""
 
@@ -28,35 +32,49 @@ def _key(packet: Packet) -> int:
     return key_of(packet.header.origin, packet.header.seq)
 
 
-class Bulk(NamedTuple):
-    """A bulk packet, whether it was sent or left to others before, and the instant from which it may be sent."""
-
-    packet: Packet
-    again: bool
-    from_ns: int
-
-
 class _Spread:
     """A packet, and what is known of it."""
 
-    __slots__ = ("copy_ns", "from_ns", "having", "left", "packet", "rank", "reached", "sent", "sent_ns")
+    __slots__ = (
+        "copy_ns",
+        "from_ns",
+        "having",
+        "left",
+        "packet",
+        "rank",
+        "reached",
+        "senders",
+        "sent",
+        "sent_ns",
+        "taken_ns",
+    )
 
-    def __init__(self, packet: Packet, rank: tuple[int, int], src: int | None, from_ns: int) -> None:
+    def __init__(self, packet: Packet, rank: tuple[int, int], src: int | None, from_ns: int, taken_ns: int) -> None:
         self.packet = packet
+        self.taken_ns = taken_ns
         self.rank = rank
         self.sent = 0
         """How often this node has sent it."""
         self.sent_ns = 0
         self.copy_ns = 0
         """The instant at which a copy was last heard."""
-        self.having: set[int] = set() if src is None else {src}
+        self.having = 0 if src is None else 1 << (src - 1)
         """The neighbors that are known to have it."""
-        self.reached: set[int] = set()
+        self.senders = self.having
+        """The neighbors that were heard to send it."""
+        self.reached = 0
         """Bulk: the nodes in reach of those that were heard to send it."""
         self.left = False
         """Bulk: true once it was left to others, because nobody lacked it."""
         self.from_ns = from_ns
         """Bulk: the instant before which it need not be looked at."""
+
+    def dispensable(self) -> tuple[int, bool, int]:
+        """Of two packets the greater one is missed less: it is less urgent, or was sent before, or is the older one of
+        two that were sent, or the newer one of two that were not.
+        """
+        priority, order = self.rank
+        return priority, self.sent > 0, -order if self.sent else order
 
     @property
     def again(self) -> bool:
@@ -67,24 +85,32 @@ class _Spread:
 class Spreading:
     """The packets that one node passes on."""
 
-    def __init__(self, *, capacity: int, repeats: int, patience_ns: int, neighbors_of: NeighborsOf) -> None:
+    def __init__(self, *, capacity: int, repeats: int, patience_ns: int, links_of: LinksOf) -> None:
         """`capacity`: the most packets that are kept.
         `patience_ns`: the time after which a neighbor that has received a packet was heard to say so.
-        `neighbors_of`: the nodes that a neighbor has told to hear.
+        `links_of`: the nodes with which a neighbor has links.
         """
         self._capacity = capacity
         self._repeats = repeats
         self._patience_ns = patience_ns
-        self._neighbors_of = neighbors_of
+        self._links_of = links_of
         self._entries: dict[int, _Spread] = {}
         self._urgent: dict[int, _Spread] = {}
         """The urgent ones among them."""
         self._waiting: set[int] = set()
         """The urgent ones that wait for a turn."""
+        self._hasty: dict[int, _Spread] = {}
+        """The urgent ones that may go in a bulk slot if that comes before the turn."""
         self._bulk: dict[int, _Spread] = {}
         self._due: list[tuple[int, int]] = []
         """A heap of the instants and keys at which bulk is looked at; outdated entries are skipped."""
+        self._ready: list[tuple[bool, tuple[int, int], int]] = []
+        """A heap of the bulk whose instant has come: sent before, rank, key."""
         self._order = 0
+        self._done: dict[int, int] = {}
+        """The neighbors that were heard to send a packet which all have, the latest last."""
+        self._early: dict[int, int] = {}
+        """The neighbors that say to hold packets which this node does not have, the latest last."""
         self.repeated = 0
 
     def __contains__(self, key: object) -> bool:
@@ -102,6 +128,10 @@ class Spreading:
         """The number of bulk packets that have not been sent yet."""
         return sum(1 for entry in self._bulk.values() if not entry.sent)
 
+    def ready_bulk(self) -> int:
+        """The number of bulk packets, about, that wait for a slot only."""
+        return len(self._ready)
+
     # --- what is heard --------------------------------------------------------------------------------------------
 
     def take(self, packet: Packet, *, src: int | None, now_ns: int, bulk_from_ns: int | None = None) -> Packet | None:
@@ -110,9 +140,12 @@ class Spreading:
         """
         self._order += 1
         key = _key(packet)
-        entry = self._entries[key] = _Spread(packet, (packet.header.priority, self._order), src, bulk_from_ns or 0)
+        entry = self._entries[key] = _Spread(
+            packet, (packet.header.priority, self._order), src, bulk_from_ns or 0, now_ns
+        )
+        entry.having |= self._early.pop(key, 0)
         if bulk_from_ns is None:
-            self._urgent[key] = entry
+            self._urgent[key] = self._hasty[key] = entry
             self._waiting.add(key)
         else:
             self._bulk[key] = entry
@@ -120,49 +153,67 @@ class Spreading:
             self._reach(entry, src, now_ns)
         if len(self._entries) <= self._capacity:
             return None
-        last, evicted = max(self._entries.items(), key=lambda item: item[1].rank)
+        last, evicted = max(self._entries.items(), key=lambda item: item[1].dispensable())
         self._remove(last)
         return None if evicted.sent else evicted.packet
 
     def _remove(self, key: int) -> None:
         del self._entries[key]
         self._urgent.pop(key, None)
+        self._hasty.pop(key, None)
         self._bulk.pop(key, None)
         self._waiting.discard(key)
 
     def on_copy(self, key: int, src: int, *, now_ns: int) -> bool:
         """A copy was heard from a neighbor; True if the neighbor does not know that this node has the packet."""
         entry = self._entries.get(key)
+        own = 1 << (src - 1)
         if entry is None:
-            return True
+            senders = self._done.get(key)
+            if senders is None:
+                return True
+            self._done[key] = senders | own
+            return bool(senders & own)
         entry.copy_ns = now_ns
         self._reach(entry, src, now_ns)
-        again = src in entry.having and entry.sent > 0
-        entry.having.add(src)
+        again = bool(entry.senders & own)
+        entry.senders |= own
+        entry.having |= own
         return again
 
     def _reach(self, entry: _Spread, src: int | None, now_ns: int) -> None:
         """A neighbor was heard to send a bulk packet, which those that hear the neighbor have, too."""
         if src is not None and not entry.again:
-            entry.reached.add(src)
-            entry.reached.update(self._neighbors_of(src, now_ns))
+            entry.reached |= 1 << (src - 1) | self._links_of(src, now_ns)
 
     def on_held(self, key: int, src: int) -> None:
         """A neighbor says that it holds a packet."""
         entry = self._entries.get(key)
         if entry is not None:
-            entry.having.add(src)
+            entry.having |= 1 << (src - 1)
+            return
+        if key in self._done:
+            return
+        self._early[key] = self._early.pop(key, 0) | 1 << (src - 1)
+        if len(self._early) > _MOST_EARLY:
+            del self._early[next(iter(self._early))]
+
+    def assume(self, node: int, *, until_ns: int) -> None:
+        """A node that was elsewhere in the swarm has come near: what is older than an instant it has got there."""
+        for entry in self._bulk.values():
+            if entry.taken_ns <= until_ns and (entry.sent or entry.left):
+                entry.having |= 1 << (node - 1)
 
     # --- what is sent ---------------------------------------------------------------------------------------------
 
-    def wanted(self, neighbors: Collection[int], *, start_ns: int) -> list[Packet]:
+    def wanted(self, neighbors: int, *, start_ns: int) -> list[Packet]:
         """The urgent packets for the turn at `start_ns`, in order; those that nobody lacks are forgotten."""
         patient_ns = start_ns - self._patience_ns
         done = []
         for key, entry in self._urgent.items():
             if key in self._waiting:
                 continue
-            if entry.sent > self._repeats or entry.having.issuperset(neighbors):
+            if entry.sent > self._repeats or not neighbors & ~entry.having:
                 done.append(key)
             elif entry.sent_ns <= patient_ns and entry.copy_ns <= patient_ns:
                 self._waiting.add(key)
@@ -180,7 +231,20 @@ class Spreading:
         entry.sent += 1
         entry.sent_ns = start_ns
         self._waiting.discard(key)
+        self._hasty.pop(key, None)
         return entry.sent
+
+    def take_hasty(self, room: int) -> list[Packet]:
+        """The urgent packets that go in a bulk slot now, the most urgent first, as they fit; and in the turn as well
+        unless all neighbors are known to have them by then.
+        """
+        taken = []
+        for entry in sorted(self._hasty.values(), key=lambda entry: entry.rank):
+            if len(entry.packet.frame) <= room:
+                room -= len(entry.packet.frame)
+                taken.append(entry.packet)
+                del self._hasty[_key(entry.packet)]
+        return taken
 
     def forget(self, packet: Packet) -> bool:
         """Forget a packet that has expired; True if it was never sent."""
@@ -189,33 +253,43 @@ class Spreading:
         self._remove(key)
         return fresh
 
-    def bulk_wanted(self, neighbors: Collection[int], *, start_ns: int) -> tuple[list[Bulk], list[Bulk]]:
-        """The bulk for a frame that starts at `start_ns`, what is new first, and what is to be looked at later.
-
-        What nobody lacks is forgotten.
-        """
-        chosen, later = list[_Spread](), list[Bulk]()
+    def next_bulk(self, neighbors: int, *, start_ns: int) -> Packet | None:
+        """The bulk packet for a frame that starts at `start_ns`, what is new first; what nobody lacks is forgotten."""
         while self._due and self._due[0][0] <= start_ns:
             from_ns, key = heappop(self._due)
             entry = self._bulk.get(key)
-            if entry is None or entry.from_ns != from_ns:
+            if entry is not None and entry.from_ns == from_ns:
+                heappush(self._ready, (entry.again, entry.rank, key))
+        while self._ready:
+            _, _, key = heappop(self._ready)
+            entry = self._bulk.get(key)
+            if entry is None:
                 continue
-            if entry.sent > self._repeats or (entry.having and entry.having.issuperset(neighbors)):
-                self._remove(key)
+            if self._is_done(entry, neighbors):
+                self._settle(key, entry)
                 continue
             next_ns = self._not_before_ns(entry, neighbors, start_ns)
-            if next_ns > start_ns:
-                later.append(Bulk(entry.packet, entry.again, next_ns))
-            else:
-                chosen.append(entry)
-        chosen.sort(key=lambda entry: (entry.again, entry.rank))
-        return [Bulk(entry.packet, entry.again, start_ns) for entry in chosen], later
+            if next_ns <= start_ns:
+                return entry.packet
+            self._look(entry, key, next_ns)
+        return None
 
-    def _not_before_ns(self, entry: _Spread, neighbors: Collection[int], start_ns: int) -> int:
+    def _is_done(self, entry: _Spread, neighbors: int) -> bool:
+        """Bulk: True if nobody lacks it, or it was sent often enough."""
+        return entry.sent > self._repeats or (entry.having != 0 and not neighbors & ~entry.having)
+
+    def _settle(self, key: int, entry: _Spread) -> None:
+        """A packet need not be sent any more."""
+        self._remove(key)
+        self._done[key] = entry.senders
+        if len(self._done) > _MOST_DONE:
+            del self._done[next(iter(self._done))]
+
+    def _not_before_ns(self, entry: _Spread, neighbors: int, start_ns: int) -> int:
         """The instant before which others may do what sending this packet would."""
         if entry.again:
             return entry.copy_ns + self._patience_ns  # somebody else is at it
-        if neighbors and entry.reached.issuperset(neighbors):
+        if neighbors and not neighbors & ~entry.reached:
             entry.left = True
             return start_ns + _WAY_ROUND * self._patience_ns
         return start_ns
@@ -223,15 +297,32 @@ class Spreading:
     def look_again(self, packet: Packet, *, from_ns: int) -> None:
         """Look at a bulk packet again from an instant on: does a neighbor still lack it?"""
         key = _key(packet)
-        self._bulk[key].from_ns = from_ns
+        self._look(self._bulk[key], key, from_ns)
+
+    def _look(self, entry: _Spread, key: int, from_ns: int) -> None:
+        entry.from_ns = from_ns
         heappush(self._due, (from_ns, key))
 
-    def bulk_due_ns(self) -> int | None:
-        """The instant before which no bulk need be looked at; None if there is none."""
+    def bulk_due_ns(self, neighbors: int) -> int | None:
+        """The instant before which no bulk need be looked at; None if there is none. What nobody lacks is forgotten."""
+        if self._hasty:
+            return 0
+        while self._ready and not self._lacking(self._ready[0][2], neighbors):
+            heappop(self._ready)
+        if self._ready:
+            return 0
         while self._due:
             from_ns, key = self._due[0]
-            entry = self._bulk.get(key)
+            entry = self._lacking(key, neighbors)
             if entry is not None and entry.from_ns == from_ns:
                 return from_ns
             heappop(self._due)
         return None
+
+    def _lacking(self, key: int, neighbors: int) -> _Spread | None:
+        """A bulk packet that a neighbor may lack; what nobody lacks is forgotten."""
+        entry = self._bulk.get(key)
+        if entry is not None and self._is_done(entry, neighbors):
+            self._settle(key, entry)
+            return None
+        return entry

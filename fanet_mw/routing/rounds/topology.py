@@ -5,32 +5,34 @@ and whenever a node was started. A node states at the beginning of an epoch whet
 per second in any case. A link counts if both its ends state it.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
 from fanet_mw.graph.connected_dominating_set import dominates
-from fanet_mw.graph.topology import Adjacency
 from fanet_mw.units import NodeId, S
 from fanet_mw.wire.rounds import HeardNodes
 
 _MODULUS: Final = 256
 
 
-def _nodes(heard: int) -> Iterator[NodeId]:
-    """The nodes of a set of bits, in order."""
-    while heard:
-        last = heard & -heard
-        yield NodeId(last.bit_length())
-        heard ^= last
+def nodes_of(bits: int) -> list[NodeId]:
+    """The nodes of a set, in order: bit i stands for node i + 1."""
+    nodes = []
+    while bits:
+        last = bits & -bits
+        nodes.append(NodeId(last.bit_length()))
+        bits ^= last
+    return nodes
 
 
 class _Stated(NamedTuple):
     epoch: int
     heard: int
+    often: bool
 
 
 class Topology:
-    """The links of the swarm, as one node knows them."""
+    """The links of the swarm, as one node knows them. Sets of nodes are integers: bit i stands for node i + 1."""
 
     def __init__(self, node: NodeId, *, count: int, epoch_ns: int, lifetime_ns: int) -> None:
         """`lifetime_ns`: how long a statement counts."""
@@ -40,17 +42,20 @@ class Topology:
         self._lifetime = min(_MODULUS // 2, -(-lifetime_ns // epoch_ns))
         self._refresh = max(1, S // epoch_ns)
         self._stated: dict[NodeId, _Stated] = {}
+        self._links = [0] * (count + 1)
+        """The nodes with which each node has links; the first entry is of no node."""
         self._news: dict[NodeId, None] = {}
         """The nodes of which something is to be passed on, in the order in which it was heard."""
         self._own_epoch = -1
-        self._links: Adjacency = {}
-        self._hops: Mapping[NodeId, int] = {node: 0}
-        self._dominates: bool | None = None
-        """Whether this node is in the dominating set; None if that must be computed anew."""
+        self._rings: list[int] = [1 << (node - 1)]
+        """The nodes that are so many hops away."""
+        self._dominates = True
+        self._dominates_by: tuple[int, ...] = ()
+        """The links by which this node decided whether it is in the dominating set."""
         self._unreached_ns: dict[NodeId, int] = {}
         """The instant since which each node without a way is known to have none."""
         self._arranged_for = -1
-        """The epoch for which links and hops were computed; -1: they must be computed anew."""
+        """The epoch for which the rings were computed; -1: they must be computed anew."""
 
     # --- what is stated -------------------------------------------------------------------------------------------
 
@@ -58,33 +63,54 @@ class Topology:
         """The instant at which the next epoch begins."""
         return (self._own_epoch + 1) * self._epoch_ns
 
-    def state(self, neighbors: Iterable[NodeId], *, now_ns: int) -> None:
-        """An epoch has begun in which this node has these neighbors."""
+    def state(self, heard: int, *, often: bool, now_ns: int) -> None:
+        """An epoch has begun in which this node hears these neighbors, and takes part in bulk slots often or not."""
         self._own_epoch = now_ns // self._epoch_ns
-        heard = 0
-        for neighbor in neighbors:
-            heard |= 1 << (neighbor - 1)
         known = self._stated.get(self._node)
-        if known is None or known.heard != heard or self._own_epoch - known.epoch >= self._refresh:
-            self._note(self._node, self._own_epoch, heard)
+        if (
+            known is None
+            or (known.heard, known.often) != (heard, often)
+            or self._own_epoch - known.epoch >= self._refresh
+        ):
+            self._note(self._node, _Stated(self._own_epoch, heard, often))
 
     def hear(self, told: Sequence[HeardNodes], *, now_ns: int) -> None:
         """A neighbor passes on what nodes have stated."""
         current = now_ns // self._epoch_ns
-        for node, short, heard in told:
+        for node, short, heard, often in told:
             behind = (current + 1 - short) % _MODULUS - 1  # one epoch ahead is possible, because clocks differ
             if node == self._node or node > self._count or behind > self._lifetime or heard >> self._count:
                 continue
             known = self._stated.get(NodeId(node))
             if known is None or current - behind > known.epoch:
-                self._note(NodeId(node), current - behind, heard)
+                self._note(NodeId(node), _Stated(current - behind, heard, often))
 
-    def _note(self, node: NodeId, epoch: int, heard: int) -> None:
+    def _note(self, node: NodeId, stated: _Stated) -> None:
         known = self._stated.get(node)
-        if known is None or known.heard != heard:
-            self._arranged_for = -1
-        self._stated[node] = _Stated(epoch, heard)
+        self._stated[node] = stated
         self._news[node] = None
+        changed = stated.heard if known is None else stated.heard ^ known.heard
+        if changed or known is None:
+            self._arranged_for = -1
+            self._relink(node, stated.heard, changed)
+
+    def _relink(self, node: NodeId, heard: int, changed: int) -> None:
+        """A node hears some others now, or no longer."""
+        own, links = 1 << (node - 1), self._links
+        for other in nodes_of(changed):
+            stated = self._stated.get(other)
+            if stated is not None and stated.heard & own and heard >> (other - 1) & 1:
+                links[node] |= 1 << (other - 1)
+                links[other] |= own
+            else:
+                links[node] &= ~(1 << (other - 1))
+                links[other] &= ~own
+
+    def _forget(self, node: NodeId) -> None:
+        """What a node has stated is too old."""
+        heard = self._stated.pop(node).heard
+        self._news.pop(node, None)
+        self._relink(node, 0, heard)
 
     @property
     def has_news(self) -> bool:
@@ -96,46 +122,68 @@ class Topology:
         for node in nodes:
             del self._news[node]
         stated = ((node, self._stated[node]) for node in nodes)
-        return [HeardNodes(node, one.epoch % _MODULUS, one.heard) for node, one in stated]
+        return [HeardNodes(node, one.epoch % _MODULUS, one.heard, one.often) for node, one in stated]
 
     # --- what follows from it -------------------------------------------------------------------------------------
 
     def _arrange(self, now_ns: int) -> None:
-        """Compute the links and the hops anew if something has changed, or nodes are gone."""
+        """Compute the rings anew if something has changed, or nodes are gone."""
         epoch = now_ns // self._epoch_ns
         if self._arranged_for == epoch:
             return
-        self._arranged_for, self._dominates = epoch, None
-        alive = {n: one.heard for n, one in sorted(self._stated.items()) if one.epoch >= epoch - self._lifetime}
-        self._links = {
-            n: tuple(m for m in _nodes(heard) if alive.get(m, 0) >> (n - 1) & 1) for n, heard in alive.items()
-        }
-        hops, ring = {self._node: 0}, [self._node]
+        for node in [n for n, one in self._stated.items() if one.epoch < epoch - self._lifetime]:
+            self._forget(node)
+        self._arranged_for = epoch
+        ring = reached = 1 << (self._node - 1)
+        self._rings = []
         while ring:
-            near = {m: hops[n] + 1 for n in ring for m in self._links.get(n, ()) if m not in hops}
-            hops.update(near)
-            ring = list(near)
-        self._hops = hops
-        since = self._unreached_ns
-        self._unreached_ns = {
-            NodeId(n): since.get(NodeId(n), now_ns) for n in range(1, self._count + 1) if n not in hops
-        }
+            self._rings.append(ring)
+            near = 0
+            for node in nodes_of(ring):
+                near |= self._links[node]
+            ring = near & ~reached
+            reached |= ring
+        since, away = self._unreached_ns, nodes_of(~reached & (1 << self._count) - 1)
+        self._unreached_ns = {node: since.get(node, now_ns) for node in away}
 
     def hops(self, now_ns: int) -> Mapping[NodeId, int]:
         """The hops to each node to which a way is known, this node included."""
         self._arrange(now_ns)
-        return self._hops
+        return {node: hops for hops, ring in enumerate(self._rings) for node in nodes_of(ring)}
 
-    def neighbors_of(self, node: int, now_ns: int) -> Sequence[NodeId]:
+    def most_hops(self, now_ns: int) -> int:
+        """The hops to the farthest node to which a way is known."""
+        self._arrange(now_ns)
+        return len(self._rings) - 1
+
+    def reaches(self, node: NodeId, now_ns: int) -> bool:
+        """True if a way to a node is known."""
+        self._arrange(now_ns)
+        return node not in self._unreached_ns
+
+    def links_of(self, node: int, now_ns: int) -> int:
         """The nodes with which a node has links."""
         self._arrange(now_ns)
-        return self._links.get(NodeId(node), ())
+        return self._links[node]
+
+    def rivals(self, near: int, now_ns: int) -> list[tuple[NodeId, bool]]:
+        """The nodes within two hops, if this node hears `near`, and whether each takes part in bulk slots often."""
+        self._arrange(now_ns)
+        reached = near
+        for node in nodes_of(near):
+            reached |= self._links[node]
+        stated = self._stated
+        others = nodes_of(reached & ~(1 << (self._node - 1)))
+        return [(node, node not in stated or stated[node].often) for node in others]
 
     def dominates(self, now_ns: int) -> bool:
         """True if this node is one of the connected dominating set whose transmissions reach all nodes."""
         self._arrange(now_ns)
-        if self._dominates is None:
-            self._dominates = self._node not in self._links or dominates(self._node, self._links)
+        near = [self._node, *nodes_of(self._links[self._node])]
+        links = tuple(self._links[node] for node in near)
+        if self._dominates_by != links:
+            self._dominates_by = links
+            self._dominates = dominates(self._node, {n: tuple(nodes_of(self._links[n])) for n in near})
         return self._dominates
 
     def absent(self, now_ns: int, *, doubt_ns: int) -> Sequence[NodeId] | None:

@@ -1,5 +1,7 @@
 """What one node passes on, as timelines: urgent packets in turns, bulk where a neighbor is not known to have it."""
 
+from collections.abc import Iterable
+
 from fanet_mw import wire
 from fanet_mw.node.duplicates import key_of_packet
 from fanet_mw.node.packet import Packet
@@ -8,8 +10,12 @@ from fanet_mw.units import BROADCAST, MS, NodeId
 from fanet_mw.wire import Header, Kind
 
 ROUND = 100 * MS
-NEAR: dict[int, set[int]] = {2: {1, 5}, 3: {1}}
+NEAR = {2: (1, 5), 3: (1,)}
 """The neighbors of this node (1), and whom they hear."""
+
+
+def nodes(numbers: Iterable[int]) -> int:
+    return sum(1 << (number - 1) for number in numbers)
 
 
 def packet(seq: int, *, priority: int = wire.PRIORITY_REPORT) -> Packet:
@@ -21,11 +27,11 @@ def packet(seq: int, *, priority: int = wire.PRIORITY_REPORT) -> Packet:
 
 
 def spreading(*, repeats: int = 3) -> Spreading:
-    return Spreading(capacity=8, repeats=repeats, patience_ns=ROUND, neighbors_of=lambda node, _: NEAR.get(node, set()))
+    return Spreading(capacity=8, repeats=repeats, patience_ns=ROUND, links_of=lambda node, _: nodes(NEAR.get(node, ())))
 
 
 def sent_in_turn(made: Spreading, turn: int, *, neighbors: tuple[int, ...] = (2, 3)) -> list[int]:
-    packets = made.wanted(neighbors, start_ns=turn * ROUND)
+    packets = made.wanted(nodes(neighbors), start_ns=turn * ROUND)
     for each in packets:
         made.sent(each, start_ns=turn * ROUND)
     return [each.header.seq for each in packets]
@@ -84,13 +90,12 @@ def bulk(seq: int) -> Packet:
 
 
 def bulk_sent(made: Spreading, at_ns: int, *, neighbors: tuple[int, ...] = (2, 3)) -> list[int]:
-    chosen, later = made.bulk_wanted(neighbors, start_ns=at_ns)
-    for each in later:
-        made.look_again(each.packet, from_ns=each.from_ns)
-    for each in chosen:
-        made.sent(each.packet, start_ns=at_ns)
-        made.look_again(each.packet, from_ns=at_ns + 2 * ROUND)
-    return [each.packet.header.seq for each in chosen]
+    sent = []
+    while (each := made.next_bulk(nodes(neighbors), start_ns=at_ns)) is not None:
+        made.sent(each, start_ns=at_ns)
+        made.look_again(each, from_ns=at_ns + 2 * ROUND)
+        sent.append(each.header.seq)
+    return sent
 
 
 def test_bulk_is_not_sent_where_those_who_sent_it_reach_every_neighbor() -> None:
@@ -106,7 +111,7 @@ def test_bulk_that_all_are_known_to_have_is_forgotten() -> None:
     assert bulk_sent(made, 10 * MS) == [1]
     made.on_held(key_of_packet(bulk(1)), 3)
     assert bulk_sent(made, 5 * ROUND) == []
-    assert made.bulk_due_ns() is None
+    assert made.bulk_due_ns(nodes((2, 3))) is None
 
 
 def test_new_bulk_goes_before_what_is_sent_again() -> None:
@@ -124,3 +129,41 @@ def test_the_least_important_packet_is_evicted_when_too_many_are_kept() -> None:
     evicted = made.take(bulk(5000), src=None, now_ns=0, bulk_from_ns=0)
     assert evicted is not None
     assert evicted.header.seq == 5000
+
+
+def test_what_a_neighbor_holds_counts_also_if_it_said_so_first() -> None:
+    made = spreading()
+    made.on_held(key_of_packet(bulk(1)), 3)
+    made.take(bulk(1), src=2, now_ns=0, bulk_from_ns=10 * MS)
+    assert bulk_sent(made, 10 * MS) == []
+
+
+def test_who_sends_bulk_a_second_time_does_not_know_that_this_node_has_it() -> None:
+    made = spreading()
+    key = key_of_packet(bulk(1))
+    made.take(bulk(1), src=2, now_ns=0, bulk_from_ns=10 * MS)
+    made.on_held(key, 3)
+    assert bulk_sent(made, 10 * MS) == [], "all have it"
+    assert not made.on_copy(key, 3, now_ns=ROUND), "3 sends it for the first time"
+    assert made.on_copy(key, 3, now_ns=2 * ROUND)
+
+
+def test_who_comes_near_has_got_elsewhere_what_is_old() -> None:
+    made = spreading()
+    for seq, taken_ns in ((1, 0), (2, 5 * ROUND)):
+        made.take(bulk(seq), src=None, now_ns=taken_ns, bulk_from_ns=taken_ns)
+    assert bulk_sent(made, 5 * ROUND, neighbors=(2,)) == [1, 2]
+    for seq in (1, 2):
+        made.on_held(key_of_packet(bulk(seq)), 2)
+    made.assume(3, until_ns=ROUND)
+    assert bulk_sent(made, 8 * ROUND) == [2]
+
+
+def test_bulk_that_was_sent_is_evicted_before_bulk_that_was_not() -> None:
+    made = spreading()
+    for seq in range(8):
+        made.take(bulk(seq), src=None, now_ns=0, bulk_from_ns=seq)
+    assert bulk_sent(made, 0) == [0]
+    assert made.take(bulk(9), src=None, now_ns=1, bulk_from_ns=1) is None
+    assert key_of_packet(bulk(0)) not in made
+    assert key_of_packet(bulk(7)) in made

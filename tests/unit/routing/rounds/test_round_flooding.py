@@ -1,0 +1,93 @@
+"""One node that floods in rounds: what it sends in its turns and in its bulk slots, and what it tells its neighbors."""
+
+from collections.abc import Callable
+
+import pytest
+from kit import MakeScenario
+
+from fanet_mw import wire
+from fanet_mw.bus.messages import Reception, TxRequest
+from fanet_mw.node.node import Node
+from fanet_mw.routing import make_protocol
+from fanet_mw.routing.rounds.round_timing import RoundTiming
+from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
+from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, PRIORITY_CONTROL, PRIORITY_REPORT, Header, Kind, filler
+from fanet_mw.wire.aggregation import unbundle
+from fanet_mw.wire.rounds import HeldPacket, decode_held
+
+OURS, NEAR, NEW = NodeId(2), NodeId(3), NodeId(4)
+MakeNode = Callable[..., Node]
+
+
+@pytest.fixture
+def make_node(make_scenario: MakeScenario) -> MakeNode:
+    def make(**keys: object) -> Node:
+        keys = {"nodes.count": 10, "routing.protocol": "rounds", "radio.lead_ms": 0, **keys}
+        node = Node(OURS, make_scenario(**keys), make_protocol, position=Enu(0.0, 0.0, 50.0))
+        node.start(0)
+        return node
+
+    return make
+
+
+def hear(
+    node: Node, seq: int, *, src: NodeId, at_ns: int, kind: Kind = Kind.DATA, priority: int = PRIORITY_BULK
+) -> None:
+    header = Header(at_ns // 1000, seq, src, BROADCAST, src, kind, 8, 0, priority, FLAG_FLOOD)
+    node.hear(Reception(header.encode() + filler(40), src, at_ns, -60.0), at_ns)
+
+
+def run(node: Node, until_ns: int, *, from_ns: int = 0) -> list[TxRequest]:
+    """Wake the node whenever it asks for it; returns what it sent."""
+    sent = []
+    while (wake_ns := node.next_wake_ns()) is not None and wake_ns < until_ns:
+        node.wake(max(wake_ns, from_ns))
+        sent += node.requests
+        node.requests.clear()
+    return sent
+
+
+def held_in(sent: list[TxRequest]) -> list[HeldPacket]:
+    return [held for each in sent for packet in unbundle(each.frame) for held in decode_held(packet)]
+
+
+def test_bulk_goes_in_a_slot_and_is_told_in_the_turn(make_node: MakeNode) -> None:
+    node = make_node()
+    timing = RoundTiming.of(node.scenario)
+    run(node, 1 * S)
+    hear(node, 7, src=NEAR, at_ns=1 * S)
+    sent = run(node, 2 * S, from_ns=1 * S)
+    assert held_in(sent)[0] == HeldPacket(7, NEAR)
+    hear(node, 8, src=NEW, at_ns=2 * S)
+    slots = [each for each in run(node, 3 * S, from_ns=2 * S) if wire.decode_header(each.frame).kind == Kind.DATA]
+    assert slots, "the neighbor 3 was not heard to have packet 8"
+    assert all(each.start_ns == timing.slot_start_ns(timing.slot_from(each.start_ns)) for each in slots)
+
+
+def test_an_urgent_packet_goes_in_the_bulk_slot_before_the_turn_and_in_the_turn(make_node: MakeNode) -> None:
+    node = make_node()
+    timing = RoundTiming.of(node.scenario)
+    run(node, 1 * S)
+    hear(node, 7, src=NEAR, at_ns=1 * S)
+    run(node, 2 * S, from_ns=1 * S)
+    born_ns = timing.turn_start_ns(OURS, from_ns=2 * S) + 1 * MS
+    hear(node, 9, src=NEAR, at_ns=born_ns, priority=PRIORITY_REPORT)
+    hear(node, 4, src=NEW, at_ns=born_ns, kind=Kind.ROUND, priority=PRIORITY_CONTROL)
+    turn_ns = timing.turn_start_ns(OURS, from_ns=born_ns)
+    starts = [
+        each.start_ns
+        for each in run(node, turn_ns + 1, from_ns=born_ns)
+        if any(wire.decode_header(packet).seq == 9 for packet in unbundle(each.frame))
+    ]
+    assert starts[-1] == turn_ns, "the neighbor 4 was not heard to have it"
+    assert any(born_ns < start_ns < turn_ns for start_ns in starts)
+
+
+def test_who_comes_near_is_told_of_recent_bulk(make_node: MakeNode) -> None:
+    node = make_node()
+    run(node, 1 * S)
+    hear(node, 7, src=NEAR, at_ns=1 * S)
+    assert HeldPacket(7, NEAR) in held_in(run(node, 1080 * MS, from_ns=1 * S))
+    assert not held_in(run(node, 1130 * MS)), "once is enough"
+    hear(node, 1, src=NEW, at_ns=1130 * MS, kind=Kind.ROUND, priority=PRIORITY_CONTROL)
+    assert HeldPacket(7, NEAR) in held_in(run(node, 1200 * MS, from_ns=1130 * MS))

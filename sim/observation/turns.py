@@ -47,7 +47,7 @@ def turns(scenario: Scenario, reports: Mapping[int, Mapping[str, Any]]) -> Turns
     if scenario.routing.protocol == "rounds":
         timing = RoundTiming.of(scenario)
         own = [Span(node, (node - 1) * timing.turn_ns, timing.turn_ns) for node in scenario.node_ids]
-        return Turns(0, timing.period_ns, own, "turn", (timing.nodes * timing.turn_ns, timing.window_ns))
+        return Turns(0, timing.period_ns, own, "turn", (timing.nodes * timing.turn_ns, timing.slots * timing.slot_ns))
     turned = {node: report["turns"] for node, report in reports.items() if report.get("turns")}
     if turned:
         newest = max(turned.values(), key=lambda frame: float(frame["start_ms"]))

@@ -340,7 +340,7 @@ def test_a_run_has_a_page_with_its_delays_links_and_mission(scenario: str, tmp_p
     assert kept is not None, "the protocol has slots, or turns"
     assert kept[1] == kept[3] != "0"
     assert html.count("data:image/png;base64,") == len(pictures)
-    assert ("within the bound stated" in markdown) == (scenario == "clusters")
+    assert ("delivered within their bound" in markdown) == (scenario == "clusters")
 
 
 @pytest.mark.slow

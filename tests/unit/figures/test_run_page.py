@@ -172,7 +172,7 @@ def test_packets_are_held_against_the_slots_of_their_heads_in_the_whole_run(make
     ]  # fmt: skip
 
 
-def test_packets_in_rounds_are_let_out_in_the_turn_of_their_origin_or_in_the_window(
+def test_packets_in_rounds_are_let_out_in_the_turn_of_their_origin_or_in_a_bulk_slot(
     make_scenario: MakeScenario,
 ) -> None:
     scenario = make_scenario(**{
@@ -183,14 +183,14 @@ def test_packets_in_rounds_are_let_out_in_the_turn_of_their_origin_or_in_the_win
     drawing = slot_pictures.slots(run_of(scenario, *simulate(scenario).records), {})
     assert drawing is not None
     found = re.search(
-        r"Of (\d+) packets, (\d+) were let out in a turn of the origin, (\d+) in the window", drawing.caption
+        r"Of (\d+) packets, (\d+) were let out in a turn of the origin, (\d+) in the slots", drawing.caption
     )
     assert found is not None
     whole, urgent, bulk = map(int, found.groups())
     assert urgent > 5
     assert bulk > 5
     assert whole == urgent + bulk
-    assert set(legend(drawing.figure)) == {"packets", "window of bulk", "the owner's turn"}
+    assert set(legend(drawing.figure)) == {"packets", "slots of bulk", "the owner's turn"}
 
 
 def test_claimed_turns_are_shaded_behind_the_contention_window_each_on_the_line_of_its_owner(

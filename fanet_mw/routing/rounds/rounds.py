@@ -307,10 +307,10 @@ class RoundFlooding(RoutingProtocol):
             self._seek_slot(max(slot_ns, now_ns + self._lead_ns), now_ns)
             return
         room, together = self._timing.slot_bytes, list[Packet]()
-        for packet in self._spreading.take_hasty(self._timing.hasty_bytes):
-            if not self._expired(packet, slot_ns):
-                room -= len(packet.frame)
-                together.append(packet)
+        for urgent in self._spreading.take_hasty(self._timing.hasty_bytes):
+            if not self._expired(urgent, slot_ns):
+                room -= len(urgent.frame)
+                together.append(urgent)
         neighbors = self._neighbors(now_ns)
         while (packet := self._spreading.next_bulk(neighbors, start_ns=slot_ns)) is not None:
             if self._expired(packet, slot_ns):

@@ -22,7 +22,7 @@ from sim.run.virtual import simulate
 from sim.scenarios import catalog
 
 
-@pytest.mark.parametrize("seed", [0, *range(2, 8)])  # 1 takes ten times as long as another, and is in the long run
+@pytest.mark.parametrize("seed", [0, 2, 5, 7])  # 1 takes ten times as long as another; the long run has a thousand
 def test_a_random_valid_scenario_ends_wakes_within_bounds_and_its_ledger_closes(seed: int) -> None:
     assert scenario_draws.check(seed, limit_s=60) == ""
 

@@ -21,6 +21,7 @@ import time
 import tomllib
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -35,6 +36,8 @@ BUDGET_S: Final = 60.0
 """The most processor time of the tests for one bug; at least `LEAST` of them."""
 LEAST: Final = 8
 LIMIT_S: Final = 300.0
+USAGE: Final = 4
+"""The exit code of pytest for a test that is not there."""
 OF_COMPILED: Final = ("tests/unit/emulator", "tests/integration/test_medium_fuzz.py")
 _COMPARED: Final = {ast.Lt: "<=", ast.LtE: "<", ast.Gt: ">=", ast.GtE: ">", ast.Eq: "!=", ast.NotEq: "==",
                     ast.Is: "is not", ast.IsNot: "is", ast.In: "not in", ast.NotIn: "in"}  # fmt: skip
@@ -200,7 +203,7 @@ class Judge:
         keys = [f"{bug.path}:{bug.block}"] if bug.block else [key for key in self._tests if key.startswith(bug.path)]
         tests = {test for key in keys for test in self._tests.get(key, ())}
         chosen, spent_s = [], 0.0
-        for name in sorted(tests, key=lambda test: (self._took_s[test], test)):
+        for name in sorted(filter(_is_there, tests), key=lambda test: (self._took_s[test], test)):
             spent_s += self._took_s[name]
             if spent_s > self._budget_s and len(chosen) >= LEAST:
                 break
@@ -211,8 +214,9 @@ class Judge:
         """`caught`, `survived`, `never run`, or why it cannot be said; and the time."""
         began_s = time.monotonic()
         tests = self.tests_of(bug)
-        if not tests:
-            return "never run", 0.0
+        return self._verdict(bug, tests, began_s) if tests else ("never run", 0.0)
+
+    def _verdict(self, bug: Bug, tests: Sequence[str], began_s: float) -> tuple[str, float]:
         module = bug.path.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
         change = json.dumps({"module": module, "begin": bug.begin, "end": bug.end, "new": bug.new})
         environment = {**os.environ, "FANET_MUTANT": change, "PYTHONPATH": str(HERE / "hook")}
@@ -238,9 +242,19 @@ class Judge:
         took_s = time.monotonic() - began_s
         if child.returncode == 0:
             return "survived", took_s
+        if child.returncode == USAGE and any("[" in test for test in tests):  # parameters have changed since
+            return self._verdict(bug, sorted({test.partition("[")[0] for test in tests}), began_s)
         if child.returncode in (1, 2) or "ImportError" in said or "conftest" in said:  # 2: it cannot even be imported
             return "caught", took_s
         return f"not judged: {said[-300:]}", took_s
+
+
+@cache
+def _is_there(test: str) -> bool:
+    """False for a test that has gone since the map was made."""
+    file, _, name = test.partition("::")
+    path = ROOT / file
+    return path.exists() and f"def {name.rpartition('::')[2].partition('[')[0]}(" in path.read_text(encoding="utf-8")
 
 
 def interval(caught: int, of: int) -> tuple[float, float]:

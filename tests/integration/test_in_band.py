@@ -217,7 +217,7 @@ slow = pytest.mark.slow
     ("protocol", "count"),
     [
         ("flooding", 1), pytest.param("flooding", 9, marks=slow), pytest.param("flooding", 45, marks=slow),
-        pytest.param("rounds", 1, marks=slow), ("rounds", 9), pytest.param("rounds", 45, marks=slow),
+        ("rounds", 1), pytest.param("rounds", 9, marks=slow), pytest.param("rounds", 45, marks=slow),
     ],
 )  # fmt: skip
 def test_how_long_commands_take(protocol: str, count: int, faults: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -230,7 +230,7 @@ def test_how_long_commands_take(protocol: str, count: int, faults: str, capsys: 
     station.run(6)
     began_ns, before = station.now_ns, len(station.heard)
     took = []
-    for number in range(100 if count > 9 or faults != "-" else 50):
+    for number in range(100):
         result, seconds = station.command(1 + number % count, 400, 1)
         assert result == 0
         took.append(seconds)
@@ -241,11 +241,11 @@ def test_how_long_commands_take(protocol: str, count: int, faults: str, capsys: 
     kept = bounded(station)
     bound = f"{max(ns for _, ns in kept) / MS:.0f} | {max(ns for ns, _ in kept) / MS:.0f}" if kept else "- | -"
     with capsys.disabled():
-        median, worst = 1000 * took[len(took) // 2], 1000 * took[len(took) * 99 // 100]
+        median, worst = 1000 * took[50], 1000 * took[98]
         print(f"| {protocol} | {count} | {faults} | {rate:.2f} | {median:.1f} | {worst:.0f} | {bound} |")
-    assert took[len(took) // 2] < 0.5
+    assert took[50] < 0.5
     if faults == "-":
-        assert took[-1] < 1.0
+        assert took[98] < 1.0
         assert all(delay_ns <= bound_ns for delay_ns, bound_ns in kept)
         assert (protocol == "rounds") == bool(kept)
 

@@ -197,7 +197,7 @@ class Searcher:
             self._bidding.bid(now_ns, delay_s=self._flight.take_off_s)
             self._bidding.choose(now_ns)
             goes = self._bidding.is_absent(now_ns) or (self._place.plan is None and self._bidding.survivor is not None)
-            self._plans.be_absent(goes, self._percent, now_ns)
+            self._plans.be_absent(self._percent, now_ns, goes=goes)
         self._mode.review(self._bidding.survivor, now_ns)
 
     @property

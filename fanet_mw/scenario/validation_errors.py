@@ -63,7 +63,7 @@ def _key(item: dict[str, Any]) -> str:
 
 def _is_branch(part: str) -> bool:
     """True for a part of a location that names the member of a union; pydantic adds it, and users do not know it."""
-    return "[" in part or part in {"int", "float", "constrained-int", "literal"}
+    return "[" in part or part in {"int", "float", "constrained-int", "constrained-float", "literal"}
 
 
 def _suggestion(path: list[str]) -> str:

@@ -75,7 +75,7 @@ class PlanExchange:
         self._outbox.packets.append(OutgoingPacket(status.encode_frame(self._node)))
         self._next_status_ns = now_ns + round((0.8 + 0.4 * self._random()) * STATUS_S * S)
 
-    def be_absent(self, goes: bool, percent: int, now_ns: int) -> None:
+    def be_absent(self, percent: int, now_ns: int, *, goes: bool) -> None:
         """Tell all when this UAV goes out of its place for a survivor (`goes`), and when it is back."""
         absent = goes or (self._absent and not self._place.is_near(now_ns))
         if absent != self._absent:

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Final, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from fanet_mw.scenario.tables.sections import (
     Coordinate,
@@ -17,6 +17,7 @@ from fanet_mw.scenario.tables.sections import (
 
 LEAST_REPORT_BYTES: Final = 96
 """The least length of a report: 79 bytes, and the shortest filler."""
+_LONGEST_APART_S: Final = 3600
 ApproachSpeed = Annotated[float, Field(ge=1e-3, le=1000)]
 
 
@@ -84,7 +85,7 @@ class Mission(Section):
     at the latest after one more sweep. 0: they search until their batteries take them home."""
     responders: Annotated[int, Field(ge=1, le=1000)] = 3
     """`search`: the number of UAVs that fly to each survivor, chosen by auction; the others go on searching."""
-    connection: Literal["always", "none"] | Annotated[float, Field(gt=0, le=3600)] = "always"
+    connection: Literal["always", "none"] | Annotated[float, Field(gt=0, le=_LONGEST_APART_S)] = "always"
     """`search`: how far UAVs may go from the others for a survivor. `always`: never out of their reach. A number: so
     far that they are within reach again, and tell what they have found, so many seconds after they have left the
     survivor. `none`: as far as they like. Who has no survivor to go to stays in reach."""
@@ -124,6 +125,16 @@ class Mission(Section):
     warnings."""
     collision_repeat_s: Annotated[float, Field(gt=0, le=120)] = 1.0
     """The interval at which a warning is repeated until the closest point of approach."""
+
+    @field_validator("connection", mode="before")
+    @classmethod
+    def _connection_is_known(cls, value: object) -> object:
+        seconds = isinstance(value, int | float) and not isinstance(value, bool) and 0 < value <= _LONGEST_APART_S
+        if value in ("always", "none") or seconds:
+            return value
+        raise ValueError(
+            f"mission.connection = {value!r} must be always, none, or a number of seconds in (0, {_LONGEST_APART_S}]"
+        )
 
     @property
     def approach_speeds_m_s(self) -> tuple[float, float]:

@@ -1,5 +1,6 @@
 """Scenario files: every mistake at once, by file, key, value and bound."""
 
+import math
 import re
 from pathlib import Path
 
@@ -229,3 +230,11 @@ def test_the_command_that_init_recommends_works_whatever_the_file_is_called(
     monkeypatch.chdir(tmp_path)
     assert app(["init", "mine.txt", "--short"], result_action="return_value") == 0
     assert app(["check", "mine.txt"], result_action="return_value") == 0
+
+
+@pytest.mark.parametrize("wrong", [0, -5, 1e9, math.nan, "sometimes"])
+def test_a_connection_that_is_none_of_its_kinds_is_told_in_one_sentence(wrong: object) -> None:
+    with pytest.raises(ConfigError, match=r"mission\.connection = .* must be always, none, or a number of seconds"):
+        config.build({"mission": {"connection": wrong}})
+    for right in ("always", "none", 20):
+        assert config.build({"mission": {"connection": right}}).mission.connection == right

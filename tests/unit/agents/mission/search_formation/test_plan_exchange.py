@@ -1,0 +1,64 @@
+"""Who is out for a survivor says so, and the others close ranks until it is back."""
+
+from search_board import COUNT, LINE, OPEN, PLAN, REACH_M, TAKEN_UP_NS, lane_of
+
+from agents.mission.navigation.own_motion import OwnMotion
+from agents.mission.outbox import Outbox
+from agents.mission.search_formation.formation_place import FormationPlace
+from agents.mission.search_formation.formation_planner import FormationPlanner
+from agents.mission.search_formation.plan_exchange import PlanExchange
+from agents.mission.search_formation.roll_call import RollCall
+from fanet_mw.units import Enu, NodeId, S
+from fanet_mw.wire import HEADER_BYTES
+from fanet_mw.wire.search_plan import SearchStatus
+
+NOW_NS = TAKEN_UP_NS + 40 * S
+
+
+class Exchange:
+    """One UAV's part in the exchange, with the plan."""
+
+    def __init__(self, node: NodeId) -> None:
+        self.out, self.motion = Outbox(), OwnMotion(lane_of(node, NOW_NS), OPEN)
+        self.place = FormationPlace(node, self.motion, reach_m=REACH_M)
+        roll_call = RollCall(node, hello_interval_s=1.0)
+        planner = FormationPlanner(node, roll_call, expected=COUNT, deploy_speed_m_s=9.0)
+        self.plans = PlanExchange(
+            node, planner, roll_call, self.place, self.motion, self.out, pattern=None, random=lambda: 0.5
+        )
+        self.plans.on_plan(PLAN, now_ns=NOW_NS)
+
+    def said(self) -> list[SearchStatus]:
+        packets, self.out.packets = self.out.packets, []
+        return [SearchStatus.decode_frame(bytes(HEADER_BYTES) + packet.frames) for packet in packets]
+
+
+def test_it_is_absent_from_when_it_goes_until_it_is_near_its_place_again() -> None:
+    exchange = Exchange(LINE)
+    there = exchange.motion.position
+    exchange.plans.be_absent(80, NOW_NS, goes=False)
+    assert exchange.said() == []
+    exchange.plans.be_absent(80, NOW_NS, goes=True)
+    exchange.motion.position = there._replace(north=there.north - 200)
+    exchange.plans.be_absent(80, NOW_NS, goes=False)  # it has found somebody, and is on its way back
+    exchange.motion.position = there._replace(north=there.north - 130)
+    exchange.plans.be_absent(80, NOW_NS, goes=False)
+    assert [status.absent for status in exchange.said()] == [True, False]
+
+
+def test_the_others_close_ranks_while_it_is_absent() -> None:
+    exchange, out = Exchange(LINE), 7
+    for absent, vacant in ((True, {PLAN.nodes.index(out)}), (False, set())):
+        status = SearchStatus(NOW_NS // 1000 + (not absent), Enu(0, 0, 65), out, 1, 80, absent)
+        exchange.plans.on_status(status, now_ns=NOW_NS)
+        exchange.plans.review(80, NOW_NS)
+        assert exchange.place.pattern is not None
+        assert exchange.place.pattern.vacant == vacant
+
+
+def test_who_is_absent_keeps_its_own_place_in_its_plan() -> None:
+    exchange = Exchange(LINE)
+    exchange.plans.be_absent(80, NOW_NS, goes=True)
+    exchange.plans.review(80, NOW_NS)
+    assert exchange.place.pattern is not None
+    assert exchange.place.pattern.vacant == frozenset()

@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from fanet_mw.application import HOME, Course
-from fanet_mw.closest_approach import ClosestApproach, closest
 from fanet_mw.mavlink import Collision
 from fanet_mw.motion import Motion
 from fanet_mw.node.neighbors import neighbor_lifetime_ns
@@ -45,6 +44,34 @@ _SOON_S: Final = 2.0
 """The time within which a near height or goal is to be reached."""
 _LEAST_M_S: Final = 0.5
 _EVER_S: Final = 1e6
+
+
+class ClosestApproach(NamedTuple):
+    """The instant at which two bodies are closest to each other, and the vector between them at that instant."""
+
+    closest_s: float
+    """The time until then, from now; 0 when they are nearest now."""
+    apart: Enu
+    """The vector from one body to the other at that time [m]."""
+
+    @property
+    def distance_m(self) -> float:
+        return self.apart.norm()
+
+
+def closest(position: Enu, velocity: Enu, *, within_s: float) -> ClosestApproach:
+    """The closest approach in [0, `within_s`] of a body whose position and velocity relative to the other are given."""
+    speed2 = velocity.east**2 + velocity.north**2 + velocity.up**2
+    closing = -(position.east * velocity.east + position.north * velocity.north + position.up * velocity.up)
+    at_s = min(max(0.0, closing / speed2), within_s) if speed2 > 0 else 0.0
+    return ClosestApproach(
+        at_s,
+        Enu(
+            position.east + velocity.east * at_s,
+            position.north + velocity.north * at_s,
+            position.up + velocity.up * at_s,
+        ),
+    )
 
 
 class Alert(NamedTuple):

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.world.arrays import Rows, Values
+from sim.world.engines.battery_drain import Batteries
 from sim.world.engines.contract import Engine
 from sim.world.engines.kinematic import Kinematic
-from sim.world.engines.rotors.battery import Batteries
 from sim.world.engines.rotors.power import trimmed_w
 from sim.world.engines.rotors.rigid_body import Rotors
 from sim.world.engines.rotors.vehicle_types import CRAZYFLIE, IRIS, Vehicle

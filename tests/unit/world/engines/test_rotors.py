@@ -15,10 +15,9 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.world import FASTEST_AIR_M_S
 from fanet_mw.units import Enu, S
 from sim.world.arrays import Rows
-from sim.world.engines.battery_drain import BatteryDrain
+from sim.world.engines.battery_drain import Batteries, BatteryDrain
 from sim.world.engines.contract import GRAVITY_M_S2
 from sim.world.engines.kinematic import Kinematic
-from sim.world.engines.rotors.battery import Batteries
 from sim.world.engines.rotors.flight_control import allocation, body_up, conjugate, level_attitude, times
 from sim.world.engines.rotors.power import induced_m_s, trimmed_w
 from sim.world.engines.rotors.rigid_body import Rotors

@@ -237,6 +237,17 @@ def test_paths_must_name_hops() -> None:
         path_bounds([Flow(Periodic(5), (7,))], {0: Hop(SlotServer(1, 2, 9))})
 
 
+def test_a_slot_longer_than_its_period_is_refused_by_every_bound() -> None:
+    server, flow = SlotServer(1, 10, 9), Periodic(100)
+    for bound in (
+        lambda: delay_fifo(flow, server),
+        lambda: backlog(flow, server),
+        lambda: delay_any_order(flow, Total(()), server),
+    ):
+        with pytest.raises(LocalProtocolError, match="slot_ns = 10"):
+            bound()
+
+
 def test_simulated_delays_of_one_queue_by_hand() -> None:
     """The simulator itself: slot [0, 3) of 10, airtime 2: arrivals 0, 1, 2 leave at 2, 12, 22."""
     assert delays(Slot(2, 3, 10), [0, 1, 2]) == [2, 11, 20]

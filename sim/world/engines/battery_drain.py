@@ -26,7 +26,7 @@ _CELL_V: Final = np.array([3.27, 3.61, 3.69, 3.73, 3.80, 3.87, 4.02, 4.20])
 
 
 class Batteries:
-    """The lithium polymer batteries of all UAVs: an open-circuit voltage that falls with the charge, behind a resistance.
+    """The lithium polymer batteries of all UAVs: an open-circuit voltage that falls with the charge, and a resistance.
 
         P = V I,  V = V0(charge) - R I      ->      I = (V0 - sqrt(V0^2 - 4 R P)) / (2 R)
 

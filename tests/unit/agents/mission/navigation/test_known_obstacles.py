@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from kit import examples
 
 from agents.mission.navigation.half_planes import nearest
-from agents.mission.navigation.known_obstacles import KnownObstacles
+from agents.mission.navigation.known_obstacles import OVER_M, KnownObstacles
 from agents.mission.navigation.onboard_map import NO_MAP, Building, OnboardMap, cell_of, middle_of
 from agents.mission.navigation.shortest_way import is_clear, nearest_free, way_around
 from fanet_mw.bus.messages import Echo
@@ -82,6 +82,15 @@ def test_roofs_well_below_are_flown_over_and_nobody_sinks_onto_them() -> None:
     assert obstacles.way_to(at, Enu(100, 0, 60), STILL, now_ns=0) is None
     assert obstacles.least_up_m(at, velocity) == pytest.approx(47.0)
     assert obstacles.least_up_m(Enu(-100.0, 0.0, 60.0), velocity) == -math.inf
+
+
+def test_the_least_height_is_that_over_the_roofs_ahead_and_not_behind() -> None:
+    """A roof of 20 m, 25 m east: reached within 3 s at 10 m/s, and not by who flies away from it or below it."""
+    obstacles = KnownObstacles(OnboardMap((Building(25.0, 0.0, 10.0, 10.0, 20.0),)))
+    over_m = obstacles.least_up_m(Enu(0.0, 0.0, 60.0), Enu(10.0, 0.0, 0.0))
+    assert over_m == 20.0 + OVER_M
+    for up_m, east_m_s in ((60.0, -10.0), (60.0, 0.0), (20.0 + OVER_M - 1, 10.0)):
+        assert obstacles.least_up_m(Enu(0.0, 0.0, up_m), Enu(east_m_s, 0.0, 0.0)) == -math.inf
 
 
 def test_nobody_flies_into_an_area_that_is_forbidden_however_high() -> None:

@@ -58,6 +58,17 @@ def test_a_bid_that_is_taken_back_no_longer_wins() -> None:
     assert [bid.eta_ds for bid in auction.bids_to_tell([1], now_ns=0)] == [WITHDRAWN]
 
 
+def test_a_bid_that_is_withdrawn_twice_is_withdrawn_once() -> None:
+    auction = Auction(NodeId(5))
+    auction.withdraw(1, now_ns=0)
+    assert auction.bids_to_tell([1], now_ns=0) == []
+    auction.bid(1, eta_s=1.0, now_ns=0)
+    auction.withdraw(1, now_ns=S)
+    (told,) = auction.bids_to_tell([1], now_ns=S)
+    auction.withdraw(1, now_ns=2 * S)
+    assert auction.bids_to_tell([1], now_ns=2 * S) == [told], "it has no newer serial number"
+
+
 def test_after_the_last_serial_number_the_next_bid_is_still_newer() -> None:
     auction = Auction(NodeId(5))
     auction.merge([Bid(1, 2, 10, 0xFFFF)], now_ns=0)

@@ -67,6 +67,14 @@ def test_bulk_slots_follow_the_turns_and_each_other(timing: RoundTiming, from_ns
     assert timing.nodes * timing.turn_ns <= within_ns <= timing.period_ns - timing.slot_ns
 
 
+@given(timings().filter(lambda timing: timing.slots > 0), INSTANTS)
+def test_what_is_sent_at_once_starts_between_the_turns_and_ends_before_them(timing: RoundTiming, from_ns: int) -> None:
+    start_ns = timing.between_turns_ns(from_ns)
+    assert from_ns <= start_ns < from_ns + timing.period_ns
+    within_ns = start_ns % timing.period_ns
+    assert timing.nodes * timing.turn_ns <= within_ns <= timing.period_ns - 2 * timing.slot_ns
+
+
 @given(timings().filter(lambda timing: timing.slots > 0), INSTANTS, st.data())
 def test_of_nodes_within_two_hops_one_owns_a_bulk_slot(timing: RoundTiming, from_ns: int, data: st.DataObject) -> None:
     nodes = data.draw(st.lists(st.integers(1, 488), min_size=2, max_size=12, unique=True))

@@ -16,6 +16,7 @@ from tests.tables import (
     installations,
     mission,
     missions,
+    motion,
     paper_rescue,
     plans,
     protocol,
@@ -53,6 +54,11 @@ TABLES: Final[Mapping[str, Table]] = {
     "phones": Table("explanation/finding.md", protocol.phones, Tolerance(absolute=1, relative=0.1)),
     "warnings": Table("explanation/protocol.md", protocol.warnings, Tolerance(absolute=0.1, relative=0.3)),
     "lasting-heads": Table("explanation/clusters.md", clusters.lasting_heads, Tolerance(absolute=0.2, relative=0.02)),
+    "methods-in-motion": Table("results/motion.md", motion.methods, Tolerance(absolute=0.02, relative=0.1)),
+    "urgent-in-motion": Table("results/motion.md", motion.urgent, Tolerance(absolute=0.02, relative=0.1)),
+    "cost-of-rounds": Table(
+        "results/motion.md", motion.costs, Tolerance(absolute=0.01, relative=0.1), ("CPU a UAV [ms/s]",)
+    ),
     "new-clusters": Table("explanation/clusters.md", clusters.new_clusters, Tolerance(absolute=0.02, relative=0.1)),
     "silent-neighbors": Table(
         "explanation/roles.md", clusters.silent_neighbors, Tolerance(absolute=0.02, relative=0.1)

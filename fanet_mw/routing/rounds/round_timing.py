@@ -71,3 +71,9 @@ class RoundTiming(NamedTuple):
         """The number of the first bulk slot that starts at or after an instant."""
         round_number, within_ns = divmod(from_ns - self.nodes * self.turn_ns, self.period_ns)
         return round_number * self.slots + min(self.slots, -(-within_ns // self.slot_ns))
+
+    def between_turns_ns(self, from_ns: int) -> int:
+        """The first instant, at or after another one, from which a frame ends before the next turn."""
+        within_ns = (from_ns - self.nodes * self.turn_ns) % self.period_ns
+        usable_ns = max(1, self.slots - 2) * self.slot_ns
+        return from_ns if within_ns < usable_ns else from_ns + self.period_ns - within_ns

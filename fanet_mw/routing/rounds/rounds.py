@@ -30,7 +30,7 @@ from fanet_mw.routing.rounds.spreading import Spreading
 from fanet_mw.routing.rounds.topology import Topology
 from fanet_mw.trace import BoundExcludes, BoundStated
 from fanet_mw.units import BROADCAST, US, NodeId, seconds_to_ns
-from fanet_mw.wire import FLAG_FLOOD, HEADER_BYTES, PRIORITY_BULK, Kind
+from fanet_mw.wire import FLAG_FLOOD, HEADER_BYTES, PRIORITY_BULK, PRIORITY_SAFETY, Kind
 from fanet_mw.wire.hello.digest import MESSAGE_BYTES, Digest, capacity
 from fanet_mw.wire.rounds import (
     CAPACITY,
@@ -57,6 +57,8 @@ _FLOOD_HOPS: Final = 4
 """A node that comes near has got elsewhere what is older than so many hops."""
 _MUCH_BULK: Final = 4
 """A node with so many bulk packets takes part in all bulk slots until they are sent."""
+_SPREAD_SLOTS: Final = 1.0
+"""Neighbors that pass on the same warning start within so many slots."""
 _BEFORE_TURN_NS: Final = 1 * US
 """A hello is made just before the turn in which it goes is filled."""
 _PATIENT_TURNS: Final = 2
@@ -92,6 +94,7 @@ class RoundFlooding(RoutingProtocol):
                 random=port.stream("repair").random, flood_over_ns=max(4 * FLOOD_OVER_NS, 16 * self._law.hop_ns),
             )  # fmt: skip
         self._slots = BulkSlots(port.node, timing)
+        self._random = port.stream("rounds").random
         self._blind_ns = self._lead_ns + radio.handover_ns
         """The time that passes from the decision to send until others know of it, airtime and waiting left out."""
         self._often = False
@@ -195,8 +198,17 @@ class RoundFlooding(RoutingProtocol):
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
         self._reach_turn(now_ns)
-        if self._timing.slots:
+        if self._timing.slots and packet.header.priority == PRIORITY_SAFETY:
+            self._send_at_once(packet, now_ns)
+        elif self._timing.slots:
             self._reach_slot(now_ns, now_ns)
+
+    def _send_at_once(self, packet: Packet, now_ns: int) -> None:
+        """A warning contends between the turns, whoever owns the slot, and goes in the turn as well."""
+        start_ns = now_ns + self._lead_ns + int(self._random() * _SPREAD_SLOTS * self._timing.slot_ns)
+        if not self._expired(packet, start_ns):
+            self._spreading.went_ahead(packet)
+            self._port.transmit_together([packet], flags=FLAG_FLOOD, at_ns=(self._timing.between_turns_ns(start_ns),))
 
     def _reach_turn(self, now_ns: int) -> None:
         """Something waits: the next turn that can still be announced in time is the one to fill."""

@@ -246,6 +246,10 @@ class Spreading:
                 del self._hasty[_key(entry.packet)]
         return taken
 
+    def went_ahead(self, packet: Packet) -> None:
+        """An urgent packet was sent at once, and goes in the turn as well."""
+        self._hasty.pop(_key(packet), None)
+
     def forget(self, packet: Packet) -> bool:
         """Forget a packet that has expired; True if it was never sent."""
         key = _key(packet)

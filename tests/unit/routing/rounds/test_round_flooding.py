@@ -11,7 +11,16 @@ from fanet_mw.node.node import Node
 from fanet_mw.routing import make_protocol
 from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
-from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, PRIORITY_CONTROL, PRIORITY_REPORT, Header, Kind, filler
+from fanet_mw.wire import (
+    FLAG_FLOOD,
+    PRIORITY_BULK,
+    PRIORITY_CONTROL,
+    PRIORITY_REPORT,
+    PRIORITY_SAFETY,
+    Header,
+    Kind,
+    filler,
+)
 from fanet_mw.wire.aggregation import unbundle
 from fanet_mw.wire.rounds import HeldPacket, decode_held
 
@@ -91,3 +100,15 @@ def test_who_comes_near_is_told_of_recent_bulk(make_node: MakeNode) -> None:
     assert not held_in(run(node, 1130 * MS)), "once is enough"
     hear(node, 1, src=NEW, at_ns=1130 * MS, kind=Kind.ROUND, priority=PRIORITY_CONTROL)
     assert HeldPacket(7, NEAR) in held_in(run(node, 1200 * MS, from_ns=1130 * MS))
+
+
+def test_a_warning_goes_at_once_and_in_the_turn(make_node: MakeNode) -> None:
+    node = make_node()
+    timing = RoundTiming.of(node.scenario)
+    run(node, 1 * S)
+    hear(node, 4, src=NEW, at_ns=1 * S, kind=Kind.ROUND, priority=PRIORITY_CONTROL)
+    born_ns = timing.slot_start_ns(timing.slot_from(1 * S)) + 1
+    hear(node, 9, src=NEAR, at_ns=born_ns, priority=PRIORITY_SAFETY)
+    assert [each.start_ns - born_ns < timing.slot_ns for each in node.requests] == [True]
+    turns = [each.start_ns for each in run(node, born_ns + timing.period_ns, from_ns=born_ns)]
+    assert timing.turn_start_ns(OURS, from_ns=born_ns) in turns

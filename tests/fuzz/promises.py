@@ -1,0 +1,99 @@
+"""Draws settings at random, flies them, and looks for a bound that was stated and not kept.
+
+    python tests/fuzz/promises.py 500 --seed 1
+
+A line per setting that broke a promise; the exit status is 1 if one did. Drawn are the number of UAVs, their grid,
+rates, loads, leads, protocols with bounds, and motion: at rest or in formation to 20 m/s.
+"""
+
+import argparse
+import random
+import sys
+import time
+from typing import Any
+
+from fanet_mw.errors import ConfigError
+from fanet_mw.scenario import config
+from sim.results.files import finish
+from sim.run.virtual import simulate
+
+_DURATION_S, _WARMUP_S, _DRAIN_S, _LIFETIME_S = 26, 8, 8, 8
+
+
+def drawn(numbers: random.Random) -> dict[str, Any]:
+    """The tables of one scenario."""
+    count = numbers.randint(4, 28)
+    payload = numbers.randint(40, 500)
+    in_rounds = numbers.random() < 0.6
+    speed = numbers.choice([0.0, 0.0, numbers.uniform(1, 20)])
+    standard, rate = numbers.choice([("b", 2), ("b", 5.5), ("b", 11), ("g", 6), ("g", 24), ("g", 54)])
+    lead_ms = numbers.choice([0, 0, numbers.randint(5, 60)])
+    tree: dict[str, Any] = {
+        "name": "drawn", "seed": numbers.randint(1, 10**6), "duration_s": _DURATION_S, "warmup_s": _WARMUP_S,
+        "drain_s": _DRAIN_S,
+        "nodes": {
+            "count": count, "layout": "grid", "columns": numbers.randint(1, count), "telemetry_hz": 0,
+            "spacing_m": numbers.uniform(80, 235),
+        },
+        "traffic": {
+            "payload_bytes": payload, "interval_s": numbers.uniform(0.7, 4), "sources": numbers.randint(1, count - 1),
+            "arrivals": numbers.choice(["cbr", "poisson"]),
+        },
+        "radio": {
+            "channel": "range", "range_m": 250, "cw_min": numbers.choice([7, 15]), "standard": standard,
+            "rate_mbps": rate, "lead_ms": lead_ms, "handover_ms": lead_ms / 3,
+        },
+        "mobility": {"model": "formation" if speed else "static", "speed_m_s": max(speed, 1.0)},
+    }  # fmt: skip
+    if in_rounds:
+        share = numbers.choice([0.0, 0.4, 0.7])
+        tree["traffic"]["priority"] = "report"
+        tree["routing"] = {"protocol": "rounds", "lifetime_s": _LIFETIME_S, "report_lifetime_s": _LIFETIME_S}
+        tree["rounds"] = {"turn_bytes": payload + numbers.randint(200, 700), "bulk_share": share}
+        if share and numbers.random() < 0.5:
+            bulk = {"name": "bulk", "payload_bytes": 1024, "interval_s": numbers.uniform(0.1, 2), "sources": count - 1}
+            tree["further_traffic"] = [bulk]
+    else:
+        tree["routing"] = {"protocol": "clustered", "lifetime_s": _LIFETIME_S}
+        tree["clusters"] = {
+            "relay": "scheduled", "count": count - 1, "flooding_period_s": numbers.uniform(0.3, 1.5), "guard_ms": 1,
+        }  # fmt: skip
+    return tree
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("settings", type=int)
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+    flown = refused = deliveries = broken = 0
+    stated: dict[str, list[float]] = {}
+    began = time.monotonic()
+    for number in range(options.settings):
+        tree = drawn(random.Random(f"{options.seed}/{number}"))
+        try:
+            scenario = config.build(tree)
+        except ConfigError:
+            refused += 1
+            continue
+        bound = finish(simulate(scenario), out=None)["bound"]
+        flown += 1
+        deliveries += bound.get("deliveries") or 0
+        kind = (
+            f"{tree['routing']['protocol']}, {'in motion' if tree['mobility']['model'] == 'formation' else 'at rest'}"
+        )
+        stated.setdefault(kind, []).append(bound.get("stated_share") or 0.0)
+        if bound.get("violations"):
+            broken += bound["violations"]
+            print(f"setting {number} of seed {options.seed}: {bound['violations']} pairs broken: {tree}", flush=True)
+    shares = "; ".join(f"{kind}: {len(all_of)} flown, {sum(all_of) / len(all_of):.3f} of packets had a bound"
+                       for kind, all_of in sorted(stated.items()))  # fmt: skip
+    print(
+        f"{flown} settings flown, {refused} refused, {deliveries:,} deliveries under a bound, {broken} pairs broken; "
+        f"{shares}; {time.monotonic() - began:.0f} s"
+    )
+    return 1 if broken else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -28,7 +28,9 @@ MOTIONS: Final[Mapping[str, tuple[str, ...]]] = {
 }
 _DURATION: Final = ("duration_s=50", "drain_s=12", "routing.lifetime_s=10")
 """Drains last longer than packets live, so nothing that is late counts as lost."""
-_URGENT: Final = (*_ROUNDS, *_DURATION, "traffic.payload_bytes=100", "traffic.priority=report")
+_URGENT: Final = (
+    *_ROUNDS, *_DURATION, "traffic.payload_bytes=100", "traffic.priority=report", "rounds.bulk_share=0"
+)  # fmt: skip
 _SIZES: Final = (10, 45, 100, 200)
 
 
@@ -98,10 +100,11 @@ def urgent() -> Rows:
 
 
 def costs() -> Rows:
-    """What rounds cost as swarms grow: one urgent packet of 100 bytes a second from each UAV, and nothing else."""
+    """What rounds cost as swarms grow: an urgent packet of 100 bytes every 5 s from each UAV, and nothing else."""
     rows = [["UAVs", "round [ms]", "hop of the bound [ms]", "air busy", "p95 [ms]", "worst [ms]", "CPU a UAV [ms/s]"]]
     for count in _SIZES:
-        keys = (*_URGENT, f"nodes.count={count}", f"traffic.sources={count - 1}", "clusters.count=1")
+        keys = (*_URGENT, "rounds.bulk_share=0.7", "traffic.interval_s=5", f"nodes.count={count}")
+        keys += (f"traffic.sources={count - 1}", "clusters.count=1")
         scenario = catalog.find("clusters", [*keys, "duration_s=40"])
         timing = RoundTiming.of(scenario)
         began = time.process_time()

@@ -288,6 +288,8 @@ class RoundFlooding(RoutingProtocol):
         self._topology.hear(decoded(packet.frame, decode_heard), now_ns=now_ns)
         if self._topology.has_news:
             self._reach_turn(now_ns)
+            if self._timing.slots and self._topology.is_partial:
+                self._reach_slot(now_ns, now_ns)
 
     # --- bulk -----------------------------------------------------------------------------------------------------
 
@@ -336,6 +338,9 @@ class RoundFlooding(RoutingProtocol):
             rounds = min(_MOST_ROUNDS, 1 << times)
             again_ns = slot_ns + 2 * (self._law.hop_ns + self._blind_ns) + rounds * self._timing.period_ns
             self._spreading.look_again(packet, from_ns=again_ns)
+        if together or self._topology.is_partial:
+            told = self._told(room, now_ns)
+            together += [told] if told is not None else []
         if together:
             self._port.transmit_together(together, flags=FLAG_FLOOD, at_ns=(slot_ns,))
         due_ns = self._spreading.bulk_due_ns(neighbors)

@@ -161,6 +161,11 @@ class Topology:
         self._arrange(now_ns)
         return node not in self._unreached_ns
 
+    @property
+    def is_partial(self) -> bool:
+        """True while this node has links, and there are nodes of which it has not heard, or has not heard for long."""
+        return len(self._stated) < self._count and self._links[self._node] != 0
+
     def links_of(self, node: int, now_ns: int) -> int:
         """The nodes with which a node has links."""
         self._arrange(now_ns)

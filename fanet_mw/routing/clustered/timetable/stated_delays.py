@@ -26,7 +26,7 @@ from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.own_bound import RootTurns
 from fanet_mw.routing.clustered.timetable.root_release import RootRelease
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
-from fanet_mw.trace import BoundStated, LikelyStated
+from fanet_mw.trace import BoundExcludes, BoundStated, LikelyStated
 from fanet_mw.units import MS, US, NodeId, seconds_to_ns
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY
 from fanet_mw.wire.loads import AS_EXPECTED, interval_ns_of
@@ -186,6 +186,10 @@ class StatedDelays:
             expires_ns = born_ns + self._port.scenario.routing.lifetime_ns(packet.header.priority)
             if had_ns <= min(due_ns, known_ns, expires_ns):
                 self._port.record(BoundStated(now_ns, self._port.node, packet.header.seq, bound_ns))
+                for other in range(1, self._port.scenario.node_count + 1):
+                    if other not in newest.table.spans:  # it has not joined, or is gone: no turn reaches it for sure
+                        excluded = NodeId(other)
+                        self._port.record(BoundExcludes(now_ns, self._port.node, packet.header.seq, excluded))
                 self._promised[packet.header.seq] = through_ns, due_ns - receipt_ns(self._port.scenario)
                 self._forget_overdue(now_ns)
         likely_ns = self.likely_ns() if packet.header.priority == PRIORITY_BULK else None

@@ -12,7 +12,6 @@ nodes that use the same turn far apart.
 """
 
 from collections.abc import Mapping
-from itertools import takewhile
 from typing import ClassVar, Final
 
 from fanet_mw.bus.messages import Reception, TxStatus
@@ -191,10 +190,10 @@ class RoundFlooding(RoutingProtocol):
 
     # --- turns ----------------------------------------------------------------------------------------------------
 
-    def _take(self, packet: Packet, *, src: int | None, now_ns: int) -> None:
+    def _take(self, packet: Packet, *, src: int | None, now_ns: int, once: bool = False) -> None:
         """A packet is to go in the node's next turn."""
         self._law.count(len(packet.frame), now_ns=now_ns)
-        evicted = self._spreading.take(packet, src=src, now_ns=now_ns)
+        evicted = self._spreading.take(packet, src=src, now_ns=now_ns, once=once)
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
         self._reach_turn(now_ns)
@@ -360,8 +359,9 @@ class RoundFlooding(RoutingProtocol):
             old_ns = now_ns - _FLOOD_HOPS * (self._law.hop_ns + self._blind_ns)
             if self._topology.reaches(src, now_ns):
                 self._spreading.assume(src, until_ns=old_ns)
-            told_ns = self._told_ns
-            self._held.update(dict.fromkeys(takewhile(lambda held: told_ns[held] > old_ns, reversed(told_ns))))
+            for key in self._spreading.recent(old_ns):
+                origin, seq = origin_and_seq(key)
+                self._held[HeldPacket(seq, origin)] = None
 
     def _neighbors(self, now_ns: int) -> int:
         """The nodes that were heard lately."""
@@ -441,7 +441,7 @@ class RoundFlooding(RoutingProtocol):
             if key_of_packet(packet) in self._spreading:
                 continue
             if self._in_turns(packet):
-                self._take(packet, src=None, now_ns=now_ns)
+                self._take(packet, src=None, now_ns=now_ns, once=True)
             else:
                 self._take_bulk(packet, src=None, from_ns=due_ns + self._lead_ns, now_ns=now_ns)
 

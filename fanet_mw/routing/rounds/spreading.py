@@ -78,7 +78,7 @@ class _Spread:
 
     @property
     def again(self) -> bool:
-        """Bulk: True if it was sent, or left to others, before."""
+        """True if it was sent, or left to others, before."""
         return self.left or self.sent > 0
 
 
@@ -107,8 +107,8 @@ class Spreading:
         self._ready: list[tuple[bool, tuple[int, int], int]] = []
         """A heap of the bulk whose instant has come: sent before, rank, key."""
         self._order = 0
-        self._done: dict[int, int] = {}
-        """The neighbors that were heard to send a packet which all have, the latest last."""
+        self._done: dict[int, _Spread] = {}
+        """The packets that need not be sent any more, the latest last."""
         self._early: dict[int, int] = {}
         """The neighbors that say to hold packets which this node does not have, the latest last."""
         self.repeated = 0
@@ -134,9 +134,11 @@ class Spreading:
 
     # --- what is heard --------------------------------------------------------------------------------------------
 
-    def take(self, packet: Packet, *, src: int | None, now_ns: int, bulk_from_ns: int | None = None) -> Packet | None:
-        """A new packet, heard from the neighbor `src`; bulk may be sent from an instant on. Returns a packet that was
-        evicted for it.
+    def take(
+        self, packet: Packet, *, src: int | None, now_ns: int, bulk_from_ns: int | None = None, once: bool = False
+    ) -> Packet | None:
+        """A new packet, heard from the neighbor `src`; bulk may be sent from an instant on. What is sent `once` is not
+        repeated. Returns a packet that was evicted for it.
         """
         self._order += 1
         key = _key(packet)
@@ -144,6 +146,7 @@ class Spreading:
             packet, (packet.header.priority, self._order), src, bulk_from_ns or 0, now_ns
         )
         entry.having |= self._early.pop(key, 0)
+        entry.sent = self._repeats if once else 0
         if bulk_from_ns is None:
             self._urgent[key] = self._hasty[key] = entry
             self._waiting.add(key)
@@ -169,11 +172,12 @@ class Spreading:
         entry = self._entries.get(key)
         own = 1 << (src - 1)
         if entry is None:
-            senders = self._done.get(key)
-            if senders is None:
+            done = self._done.get(key)
+            if done is None:
                 return True
-            self._done[key] = senders | own
-            return bool(senders & own)
+            again = bool(done.senders & own)
+            done.senders |= own
+            return again
         entry.copy_ns = now_ns
         self._reach(entry, src, now_ns)
         again = bool(entry.senders & own)
@@ -200,9 +204,15 @@ class Spreading:
 
     def assume(self, node: int, *, until_ns: int) -> None:
         """A node that was elsewhere in the swarm has come near: what is older than an instant it has got there."""
-        for entry in self._bulk.values():
-            if entry.taken_ns <= until_ns and (entry.sent or entry.left):
+        for entry in self._entries.values():
+            if entry.taken_ns <= until_ns and entry.again:
                 entry.having |= 1 << (node - 1)
+
+    def recent(self, from_ns: int) -> list[int]:
+        """The keys of the packets that this node got after an instant."""
+        return [key for key, entry in self._entries.items() if entry.taken_ns > from_ns] + [
+            key for key, done in self._done.items() if done.taken_ns > from_ns
+        ]
 
     # --- what is sent ---------------------------------------------------------------------------------------------
 
@@ -214,13 +224,13 @@ class Spreading:
             if key in self._waiting:
                 continue
             if entry.sent > self._repeats or not neighbors & ~entry.having:
-                done.append(key)
+                done.append((key, entry))
             elif entry.sent_ns <= patient_ns and entry.copy_ns <= patient_ns:
                 self._waiting.add(key)
-        for key in done:
-            self._remove(key)
+        for key, entry in done:
+            self._settle(key, entry)
         chosen = [self._entries[key] for key in self._waiting]
-        chosen.sort(key=lambda entry: entry.rank)
+        chosen.sort(key=lambda entry: (entry.rank[0], entry.again, entry.rank))
         return [entry.packet for entry in chosen]
 
     def sent(self, packet: Packet, *, start_ns: int) -> int:
@@ -285,7 +295,7 @@ class Spreading:
     def _settle(self, key: int, entry: _Spread) -> None:
         """A packet need not be sent any more."""
         self._remove(key)
-        self._done[key] = entry.senders
+        self._done[key] = entry
         if len(self._done) > _MOST_DONE:
             del self._done[next(iter(self._done))]
 

@@ -167,3 +167,17 @@ def test_bulk_that_was_sent_is_evicted_before_bulk_that_was_not() -> None:
     assert made.take(bulk(9), src=None, now_ns=1, bulk_from_ns=1) is None
     assert key_of_packet(bulk(0)) not in made
     assert key_of_packet(bulk(7)) in made
+
+
+def test_what_is_sent_once_is_not_repeated_though_somebody_may_lack_it() -> None:
+    made = spreading(repeats=3)
+    made.take(packet(1), src=None, now_ns=0, once=True)
+    assert [sent_in_turn(made, turn) for turn in range(1, 6)] == [[1], [], [], [], []]
+
+
+def test_new_urgent_packets_go_before_those_that_are_sent_again() -> None:
+    made = spreading()
+    made.take(packet(1), src=None, now_ns=0)
+    assert sent_in_turn(made, 1) == [1]
+    made.take(packet(2), src=None, now_ns=ROUND)
+    assert sent_in_turn(made, 3) == [2, 1]

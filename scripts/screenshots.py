@@ -113,9 +113,13 @@ def report(photos: Photographer, folder: Path) -> None:
         photos.take("report", (Path(out) / "report.html").as_uri(), whole=True)
 
 
+class _Silent(SimpleHTTPRequestHandler):
+    def log_message(self, *_: object) -> None:
+        """Say nothing."""
+
+
 def site(photos: Photographer) -> None:
-    handler = partial(SimpleHTTPRequestHandler, directory=str(ROOT / "site"))
-    handler.log_message = lambda *_: None  # type: ignore[attr-defined]
+    handler = partial(_Silent, directory=str(ROOT / "site"))
     with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         for page in SITE_PAGES:

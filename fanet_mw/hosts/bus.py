@@ -156,6 +156,8 @@ class Bus:
         """
         _require_endpoint(endpoint)
         settings = _config(mode="router", listen=endpoint, connect=None, file=config)
+        if endpoint.startswith("tls/") and (off := _clock_outside_certificate(config)) is not None:
+            raise BusError(f"cannot serve on {endpoint}: {off}")
         try:
             return cls(zenoh.open(settings), endpoint)
         except zenoh.ZError as error:

@@ -186,6 +186,15 @@ def test_a_clock_by_which_the_certificates_are_not_valid_is_named(
     assert "no Zenoh router at tls/127.0.0.1:" in str(caught.value)
 
 
+def test_a_router_by_whose_clock_its_certificates_are_not_valid_does_not_wait_for_anybody(
+    keys: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    off = THIS_MACHINE._replace(unix_ns=lambda: time.time_ns() - 3600 * S)
+    monkeypatch.setattr("fanet_mw.hosts.bus.THIS_MACHINE", off)
+    with pytest.raises(BusError, match="cannot serve on tls/.*: the clock of this machine says .* valid from"):
+        Bus.serve(free_endpoint("tls"), keys / "router.json5")
+
+
 async def test_an_agent_cannot_answer_for_the_keeper_of_the_clock(keys: Path) -> None:
     forged = ClockEpoch(123, 2.0, ClockState.STOPPED)
     with sessions(keys, "agent-1", "agent-2") as bus:

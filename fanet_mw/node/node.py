@@ -28,6 +28,9 @@ from fanet_mw.wire import Kind
 
 _DATA: Final = int(Kind.DATA)
 _HELLO: Final = int(Kind.HELLO)
+_PREV_HOP: Final = 6
+"""The index of the transmitter among the fields of a header (`wire.Fields`). A copy that another station transmits says
+nothing about who has the packet."""
 _NONE: Final[Sequence[Relay]] = ()
 _new: Final = tuple.__new__  # for what is made once per frame
 
@@ -226,7 +229,7 @@ class Node:
             known = handled.old.get(packet_hash, 0)
         if known & phase:
             self._copies += 1
-            if self._on_copy is not None:
+            if self._on_copy is not None and reader.fields[_PREV_HOP] == reception.src:
                 self._on_copy(reader.key, reception.src, now_ns=now_ns)
             return True
         self._others += 1
@@ -266,7 +269,7 @@ class Node:
         known = self._duplicates.bits(reader.hash)
         if known & reader.phase:
             self.port.dropped[DropReason.DUPLICATE] += 1
-            if self._on_copy is not None:
+            if self._on_copy is not None and reader.fields[_PREV_HOP] == reception.src:
                 self._on_copy(reader.key, reception.src, now_ns=now_ns)
             return _NONE
         try:

@@ -7,16 +7,17 @@ Packets are kept in a bounded store, so parts of a swarm that were separated for
 they meet. A packet is repaired only when its own flood should be over. After epidemic routing (Vahdat and Becker,
 2000), with suppression as in Trickle (RFC 6206). A packet stays lost if it is older than `window_s`, or if its origin
 has sent 32 packets since. A way to the head that broke is found again by hellos (`Gradient`).
+In a timetable over links that lose nothing, hellos state nothing until a node misses a packet (`missing_packets.py`).
 """
 
 import heapq
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import compress
 from operator import ne
 from typing import Final, NamedTuple
 
-from fanet_mw.node.duplicates import key_of, origin_and_seq
+from fanet_mw.node.duplicates import key_of, key_of_packet, origin_and_seq
 from fanet_mw.node.packet import Packet
 from fanet_mw.units import MS, US
 from fanet_mw.wire.hello.digest import CAPACITY, Digest, Holding
@@ -50,10 +51,19 @@ class Repair:
     """The store of packets of one node, and the repairs that it plans."""
 
     def __init__(
-        self, *, window_ns: int, capacity: int, random: Callable[[], float], flood_over_ns: int = FLOOD_OVER_NS
+        self,
+        *,
+        window_ns: int,
+        capacity: int,
+        random: Callable[[], float],
+        flood_over_ns: int = FLOOD_OVER_NS,
+        begin_ns: Callable[[int], int] | None = None,
     ) -> None:
-        """`flood_over_ns`: the time after which a received flood is taken to be over everywhere."""
+        """`flood_over_ns`: the time after which a received flood is taken to be over everywhere. `begin_ns`: draws the
+        instant of a repair that is due from an instant on; None: within ASSESS_NS.
+        """
         self._window_ns = window_ns
+        self._begin_ns = begin_ns or self._within_assessment_ns
         self._flood_over_ns = flood_over_ns
         self._capacity = capacity
         self._random = random
@@ -105,6 +115,11 @@ class Repair:
             if not of_origin:
                 del store[origin]
 
+    @property
+    def holds_any(self) -> bool:
+        """True if there is a packet in the store."""
+        return bool(self._store)
+
     def digest(self, *, now_ns: int, most: int = _MOST_ORIGINS) -> Digest:
         """The digest for this node's hello: of all origins, or of the next `most` of them."""
         most = min(most, _MOST_ORIGINS)
@@ -116,6 +131,13 @@ class Repair:
         self._turn = at + most
         turn = (origins + origins)[at : at + most]
         return Digest(tuple(self._holdings[origin] for origin in turn), complete=False)
+
+    def lacks(self, digest: Digest) -> Iterator[tuple[int, int]]:
+        """The packets that a neighbor has and this node lacks, by origin and number."""
+        for theirs in digest.holdings:
+            mine = self._holdings.get(theirs.origin)
+            if mine is None or (mine.newest, mine.held) != (theirs.newest, theirs.held):
+                yield from ((theirs.origin, seq) for seq in theirs.beyond(mine))
 
     # --- what a neighbor lacks ------------------------------------------------------------------------------------
 
@@ -139,10 +161,19 @@ class Repair:
                     if planned == _PER_HELLO:
                         return
 
+    def pass_on(self, packet: Packet, now_ns: int) -> None:
+        """Flood a stored packet again soon, unless another node does, because its own flood may have ended here."""
+        key = key_of_packet(packet)
+        if key not in self.pending and packet.header.seq in self._store.get(packet.header.origin, ()):
+            self._plan(key, now_ns)
+
     def _plan(self, key: int, now_ns: int) -> None:
-        due_ns = now_ns + int(self._random() * ASSESS_NS)
+        due_ns = self._begin_ns(now_ns)
         self.pending[key] = due_ns
         heapq.heappush(self._due, (due_ns, key))
+
+    def _within_assessment_ns(self, now_ns: int) -> int:
+        return now_ns + int(self._random() * ASSESS_NS)
 
     def on_copy(self, key: int, *, now_ns: int) -> None:
         """Another node has sent this packet, so the nodes around have it, and the plan to send it is cancelled."""

@@ -22,6 +22,10 @@ KEYS = (
 )  # fmt: skip
 
 
+WITHOUT = ("clock.counter=false", "clusters.resume=false")
+"""What a frozen node held back would otherwise come late."""
+
+
 @pytest.mark.parametrize("by_ms", [-10_000, -300.0, 0.25, 1.0, 5_000])
 def test_a_clock_that_jumps_shows_each_instant_back(by_ms: float) -> None:
     clock = LocalClock(Clock(offset_ms=5, drift_ppm=20, jumps=((3, 40.0, by_ms),)), seed=1, node=NodeId(3))
@@ -90,9 +94,7 @@ def test_a_node_whose_counter_shows_the_jump_loses_nothing(node: int, by_ms: flo
 def test_without_a_counter_nothing_comes_late_and_the_swarm_is_together_again_or_says_who_is_not(
     node: int, by_ms: float
 ) -> None:
-    outcome = simulate(
-        catalog.find("clusters", [*KEYS, "clock.counter=false", f"clock.jumps=[[{node}, {AT_S}.0, {by_ms}]]"])
-    )
+    outcome = simulate(catalog.find("clusters", [*KEYS, *WITHOUT, f"clock.jumps=[[{node}, {AT_S}.0, {by_ms}]]"]))
     summary = finish(outcome, out=None)
     assert summary["bound"]["violations"] == summary["bound"]["never"], "what a frozen node held back is lost, not late"
     stated_s = [record.t_ns / S - AT_S for record in outcome.records if isinstance(record, BoundStated)]

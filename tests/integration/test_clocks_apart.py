@@ -12,7 +12,7 @@ from sim.world.environment.layout import positions
 TREE = {
     "duration_s": 70, "warmup_s": 40, "drain_s": 5, "nodes": {"count": 6, "layout": "line", "spacing_m": 200},
     "traffic": {"sources": [2], "payload_bytes": 200},
-    "clusters": {"count": 2, "flooding_period_s": 1, "relay": "scheduled", "turn_slack_us": 250},
+    "clusters": {"count": 2, "flooding_period_s": 1, "relay": "scheduled", "turn_slack_us": 250, "resume": False},
 }  # fmt: skip
 
 

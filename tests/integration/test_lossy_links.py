@@ -44,7 +44,7 @@ def test_each_packet_over_lossy_links_arrives_within_what_was_stated_for_it(loss
 
 def test_the_same_swarm_with_places_leaves_out_a_part() -> None:
     """What the test above would not notice if the channel lost nothing."""
-    outcome = simulate(scenario(*LOSSY, 'clusters.links="places"'))
+    outcome = simulate(scenario(*LOSSY, 'clusters.links="places"', "clusters.resume=false"))
     born = sum(isinstance(record, Generated) for record in outcome.records)
     arrived = sum(isinstance(record, Delivered) for record in outcome.records)
     assert arrived / (11 * born) < 0.9

@@ -54,6 +54,7 @@ def test_bounds_hold_the_lead_and_the_handover(handover_ms: int) -> None:
 def test_new_timetables_break_no_promise() -> None:
     """A swarm that moves gets another timetable every few seconds, while packets are promised all the time."""
     keys = ('mobility.model="random_waypoint"', "mobility.speed_m_s=5", "clusters.reassign_s=2", "duration_s=36")
+    keys += ("clusters.resume=false",)
     bound = summary_of(*keys)["bound"]
     assert bound["deliveries"] > 1000
     assert bound["stated_share"] > 0.5

@@ -55,6 +55,7 @@ from fanet_mw.routing.clustered.slots.slot_release import SlotRelease
 from fanet_mw.routing.clustered.timetable.admission import Admission
 from fanet_mw.routing.clustered.timetable.call_release import CallRelease
 from fanet_mw.routing.clustered.timetable.reserved_room import reserved
+from fanet_mw.routing.clustered.timetable.resumed_floods import ResumedFloods
 from fanet_mw.routing.clustered.timetable.root_release import RootRelease
 from fanet_mw.routing.clustered.timetable.scheduled_relaying import ScheduledRelaying
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
@@ -63,11 +64,15 @@ from fanet_mw.routing.clustered.timetable.timetabling import FromPlaces
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.routing.clustered.timetable.turn_allocation import leader_load
 from fanet_mw.routing.clustered.timetable.turn_size import measured_period_ns
-from fanet_mw.routing.packet_repair import Repair
-from fanet_mw.units import MS, seconds_to_ns
+from fanet_mw.routing.missing_packets import MissingPackets
+from fanet_mw.routing.packet_repair import FLOOD_OVER_NS, Repair
+from fanet_mw.units import MS, S, seconds_to_ns
 
 _STORE_PACKETS: Final = 4096
 """The most packets that a node keeps for repair; they take 4 MB at 1024 B."""
+_ASKED_NS: Final = 10 * S
+"""How long a node with a timetable asks for a packet that it lacks, unless the scenario says how long packets are
+repaired."""
 _JITTER: Final = 0.25
 """The greatest random wait of a relay, as a share of the contention window. If relays waited longer than the window
 lasts, a flood would advance by only one hop in each superframe."""
@@ -87,6 +92,7 @@ class _Ground(NamedTuple):
     uplink: Uplink
     repair: Repair | None
     floods: Floods
+    missing: MissingPackets | None
 
     @property
     def hello_ns(self) -> int:
@@ -115,9 +121,15 @@ def _ground(port: Port) -> _Ground:
     neighbors = Neighbors(lifetime_ns=neighbor_lifetime_ns(scenario.routing.hello_interval_s))
     gradient = Gradient(node=port.node, neighbors=neighbors, hello_ns=hello_ns)
     contention = ContentionTiming(lead_ns=scenario.radio.lead_ns, jitter=random, window=port.stream("window").random)
-    repair = None
+    repair, missing, random_repair = None, None, port.stream("repair").random
     if scenario.repair_ns:
-        repair = Repair(window_ns=scenario.repair_ns, capacity=_STORE_PACKETS, random=port.stream("repair").random)
+        repair = Repair(window_ns=scenario.repair_ns, capacity=_STORE_PACKETS, random=random_repair)
+    elif scenario.clusters.resume and scenario.clusters.relay == "scheduled":
+        missing = MissingPackets(patience_ns=FLOOD_OVER_NS, window_ns=_ASKED_NS)
+        repair = Repair(
+            window_ns=_ASKED_NS, capacity=_STORE_PACKETS, random=random_repair,
+            begin_ns=contention.announced_ns,
+        )  # fmt: skip
     return _Ground(
         port=port,
         random=random,
@@ -127,6 +139,7 @@ def _ground(port: Port) -> _Ground:
         uplink=Uplink(port, gradient),
         repair=repair,
         floods=Floods(port, repair, contention),
+        missing=missing,
     )
 
 
@@ -213,20 +226,23 @@ def _by_timetable(ground: _Ground) -> Clustered:
     roots = RootRelease(port.node, ground.queue(), reserved=reserved(scenario), lead_ns=lead_ns)
     calls = CallRelease(TxQueue(capacity=scenario.routing.queue_frames), lead_ns=lead_ns)
     delays = StatedDelays(port, timetables=timetables, roots=roots, lease=parts.lease, admission=_admission(port))
+    resumed = None if ground.missing is None else ResumedFloods(port, timetables, ground.floods)
     access = TurnAccess(
         port, timetables=timetables, roots=roots, calls=calls, slots=_slots(ground, parts.membership), delays=delays,
-        floods=ground.floods, contention=ground.contention,
+        floods=ground.floods, contention=ground.contention, resumed=resumed,
     )  # fmt: skip
     timetabling = FromPlaces(
         port, lease=parts.lease, membership=parts.membership, refresh=parts.refresh, delays=delays, access=access
     )
     contending = ContendingRelaying(port, RelayAll(), ground.contention)
-    relaying = ScheduledRelaying(port, timetables, contending)
+    relaying = ScheduledRelaying(
+        port, timetables, contending, resumed=resumed, repair=ground.repair, missing=ground.missing
+    )
     heard = HeardLoads(interval_s=scenario.traffic.interval_s) if scenario.hears_load else None
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
         floods=ground.floods, roles=_roles(ground, parts, access, timetabling, heard), access=access, relaying=relaying,
-        contending=contending, two_hops=None, loads=heard, delays=delays,
+        contending=contending, two_hops=None, loads=heard, delays=delays, missing=ground.missing,
     )  # fmt: skip
     return _protocol(ground, whole, parts.refresh, calls)
 

@@ -27,11 +27,13 @@ from fanet_mw.routing.clustered.forwarding.uplink import MOST_TRIES, Uplink
 from fanet_mw.routing.clustered.links.heard_load import HeardLoads
 from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
+from fanet_mw.routing.missing_packets import MissingPackets
 from fanet_mw.routing.packet_repair import Repair
 from fanet_mw.units import BROADCAST, US, NodeId
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, HEADER_BYTES, Kind
 from fanet_mw.wire.hello.beacon import Beacon
 from fanet_mw.wire.hello.claims import MESSAGE_BYTES, Claims
+from fanet_mw.wire.hello.digest import MESSAGE_BYTES as DIGEST_BYTES
 from fanet_mw.wire.hello.digest import Digest, capacity
 
 _DATA: Final = int(Kind.DATA)
@@ -59,6 +61,9 @@ class Parts(NamedTuple):
     """The loads of the nodes, as this node hears them; None if timetables are made for what the scenario says."""
     delays: StatedDelays | None = None
     """The delay bounds and likely delays of the node's packets; None if this access states no bound."""
+    missing: MissingPackets | None = None
+    """What the node lacks; its hellos state what it has only while it lacks something. None if they always do, or
+    never."""
 
 
 class Clustered(RoutingProtocol):
@@ -97,8 +102,11 @@ class Clustered(RoutingProtocol):
         parts, header = self.parts, packet.header
         origin_us, seq, origin, _, _, kind, _, _, _, flags = header
         parts.roles.on_sign_of_life(origin, born_ns=origin_us * US, now_ns=now_ns)
-        if parts.loads is not None and kind == _DATA:
-            parts.loads.on_packet(origin, seq, born_ns=origin_us * US, now_ns=now_ns)
+        if kind == _DATA:
+            if parts.loads is not None:
+                parts.loads.on_packet(origin, seq, born_ns=origin_us * US, now_ns=now_ns)
+            if parts.missing is not None:
+                parts.missing.receive(origin, seq, now_ns=now_ns)
         parts.floods.keep(packet, flooded=bool(flags & FLAG_FLOOD), now_ns=now_ns)
         if flags & FLAG_FLOOD:
             at_once = kind != _DATA and parts.roles.on_control(packet, reception.src, now_ns=now_ns)
@@ -162,13 +170,23 @@ class Clustered(RoutingProtocol):
         route = parts.gradient.route(now_ns=now_ns)
         parts.roles.before_hello(now_ns)
         inner = parts.roles.beacon(route, now_ns=now_ns).encode_frame(self._port.node)
-        if parts.repair is not None:
-            left = room - len(inner) - (0 if claims is None else MESSAGE_BYTES)
-            inner += parts.repair.digest(most=capacity(left), now_ns=now_ns).encode_frames(self._port.node)
+        left = room - len(inner) - (0 if claims is None else MESSAGE_BYTES)
+        digest = None if parts.repair is None else self._digest(parts.repair, left, now_ns)
+        if digest is not None:
+            inner += digest.encode_frames(self._port.node)
         if claims is not None:
             inner += claims.encode_frames(room - len(inner))
         self._hello_bytes = HEADER_BYTES + _POSITION_BYTES + len(inner)
         return inner
+
+    def _digest(self, repair: Repair, room: int, now_ns: int) -> Digest | None:
+        """What the node's hello states of packets; None if it states nothing."""
+        missing = self.parts.missing
+        if missing is not None:
+            fits = room >= DIGEST_BYTES and repair.holds_any
+            if not fits or not missing.states(now_ns=now_ns):
+                return None
+        return repair.digest(most=capacity(room), now_ns=now_ns)
 
     def on_hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         parts, count = self.parts, self._port.scenario.node_count
@@ -182,6 +200,8 @@ class Clustered(RoutingProtocol):
         parts.gradient.on_hello(neighbor, now_ns=now_ns)
         if parts.repair and digest:
             parts.repair.on_digest(digest, now_ns=now_ns)
+            if parts.missing is not None:
+                parts.missing.notice(parts.repair.lacks(digest), now_ns=now_ns)
         for held in parts.uplink.released(now_ns=now_ns):
             parts.access.forward(held, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
         if parts.two_hops is not None:

@@ -73,6 +73,9 @@ class Clusters(Section):
     repair_s: Duration = 0.0
     """Neighbors send packets again that a node lacks, as its hellos show, if they are newer than this; 0: no repair,
     except 10 s with measured links."""
+    resume: bool = True
+    """`scheduled`: whether floods that ended early because a frame was lost go on in later superframes, when nodes miss
+    the packet; it then comes later than its bound. Without effect where packets are repaired all the time."""
 
     @property
     def period_ns(self) -> int:

@@ -37,6 +37,11 @@ class ContentionTiming:
         turns = None if self.turns_at is None else self.turns_at(start_ns)
         return start_ns if turns is None else turns.contending_ns(start_ns, self._window)
 
+    def announced_ns(self, from_ns: int) -> int:
+        """A random instant from `from_ns` on, at which a frame is to be announced that then contends at once."""
+        jitter_ns = 0 if self.most_jitter_ns is None else int(self._jitter() * self.most_jitter_ns)
+        return self.not_before(from_ns + jitter_ns + self._lead_ns) - self._lead_ns
+
     def by_chance(self, share: float) -> bool:
         """True with the given probability."""
         return self._window() < share

@@ -2,12 +2,14 @@
 it.
 
 The turn follows from the instant at which the reception ended; the flood follows from the turn and the sender. If this
-node's clock is behind the sender's, a frame may seem to end before its turn begins, by at most the slack of a turn.
-Data that is received outside of any turn of its flood is counted and not relayed. Control packets, and all packets as
-long as no timetable is in force, are relayed by another rule.
+node's clock is behind the sender's, a frame may seem to end before its turn begins, by at most the slack of a turn. A
+frame that found the medium busy, because of somebody who keeps no turns, ends some turns later. What was heard too late
+for this node's own turn is counted and passed on in contention, if the node would have relayed it and nobody else does.
+Control packets, and all packets as long as no timetable is in force, are relayed by another rule.
 """
 
 from collections.abc import Mapping, Sequence
+from typing import Final
 
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
@@ -17,18 +19,36 @@ from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.clustered.contract import Relaying
 from fanet_mw.routing.clustered.tdma.turn_timing import turn_slack_ns
 from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
+from fanet_mw.routing.clustered.timetable.resumed_floods import ResumedFloods
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
+from fanet_mw.routing.missing_packets import MissingPackets
+from fanet_mw.routing.packet_repair import Repair
 from fanet_mw.units import NodeId
 from fanet_mw.wire import Kind
+
+_MOST_LATE_TURNS: Final = 8
+"""A frame that ends more turns after its own one is taken for none of its flood."""
 
 
 class ScheduledRelaying:
     """The relays of one node, in the turns of its timetables."""
 
-    def __init__(self, port: Port, timetables: TimetablesInForce, otherwise: Relaying) -> None:
+    def __init__(
+        self,
+        port: Port,
+        timetables: TimetablesInForce,
+        otherwise: Relaying,
+        *,
+        resumed: ResumedFloods | None,
+        repair: Repair | None,
+        missing: MissingPackets | None,
+    ) -> None:
         self._port = port
         self._timetables = timetables
         self._otherwise = otherwise
+        self._resumed = resumed
+        self._repair = repair
+        self._missing = missing
         self._slack_ns = turn_slack_ns(port.scenario)
         self._missed = 0
         """The number of packets that arrived only after the node's turn to relay them had begun."""
@@ -46,20 +66,52 @@ class ScheduledRelaying:
             heard = None if turn is None else timetable.heard.get((turn, reception.src))
             if heard is None:
                 continue
-            if not timetable.whole or packet.header.origin == heard[1] or not timetable.has_turns(packet.origin):
-                return self._in_turn(packet, timetable, heard, instant_ns, now_ns)
-            foreign = True  # the sender follows another timetable
+            if _is_of(packet, heard, timetable):
+                return self._in_turn(packet, timetable, heard, instant_ns, end_ns=reception.end_ns, now_ns=now_ns)
+            foreign = True  # the sender follows another timetable, or is late
         if not foreign and packet.header.kind != Kind.DATA:
             return self._otherwise.on_flood(packet, reception, at_once=at_once, now_ns=now_ns)
+        late = None
+        if self._missing is not None:
+            self._missing.suspect(now_ns)
+            late = self._late(packet, timetable, reception)
+        if late is not None:
+            return self._in_turn(packet, timetable, *late, end_ns=reception.end_ns, now_ns=now_ns)
         if packet.origin != self._port.node:  # a copy of an own packet that comes back changes nothing
             self._port.drop(DropReason.OUT_OF_TURN, packet, now_ns=now_ns)
+            if any(root == packet.header.origin for root, _ in timetable.mine):
+                self._pass_on(packet, now_ns)
         return ()
 
+    def _late(
+        self, packet: Packet, timetable: NodeTimetable, reception: Reception
+    ) -> tuple[tuple[int, NodeId, int], int] | None:
+        """The flood of a frame that ended after its turn, and an instant in that turn; None if it is of no flood.
+
+        Over lossy links a late frame may as well be an answer to a neighbor.
+        """
+        turns = timetable.turns
+        for instant_ns in range(
+            reception.end_ns - turns.turn_ns, reception.end_ns - _MOST_LATE_TURNS * turns.turn_ns - 1, -turns.turn_ns
+        ):
+            turn = turns.turn_at(instant_ns)
+            heard = None if turn is None else timetable.heard.get((turn, reception.src))
+            if heard is not None and timetable.odds is None and _is_of(packet, heard, timetable):
+                return heard, instant_ns
+        return None
+
     def _in_turn(
-        self, packet: Packet, timetable: NodeTimetable, heard: tuple[int, NodeId, int], heard_ns: int, now_ns: int
+        self,
+        packet: Packet,
+        timetable: NodeTimetable,
+        heard: tuple[int, NodeId, int],
+        heard_ns: int,
+        *,
+        end_ns: int,
+        now_ns: int,
     ) -> Sequence[Relay]:
         """The relays of this flood in those turns of the node that are still to come; `heard_ns` lies in the turn of
-        reception.
+        the sender, and the reception ended at `end_ns`.
         """
         offset, root, instance = heard
         own = timetable.mine.get((root, instance), ())
@@ -79,7 +131,21 @@ class ScheduledRelaying:
             # that arrives may be one that was sent after the node's own turns.
             self._missed += 1
             self._port.drop(DropReason.MISSED_TURN, packet, now_ns=now_ns)
+            self._pass_on(packet, now_ns)
+        if self._resumed is not None and not all(self._resumed.take(at_ns, heard_ns=end_ns) for at_ns in ahead_ns):
+            self._pass_on(packet, now_ns)
+            return ()
         return [(packet, start_ns) for start_ns in ahead_ns]
+
+    def _pass_on(self, packet: Packet, now_ns: int) -> None:
+        """Flood a packet that came too late for the node's turn, unless another node does."""
+        if self._repair is not None:
+            self._repair.pass_on(packet, now_ns)
 
     def report(self) -> Mapping[str, object]:
         return {"missed_turns": self._missed}
+
+
+def _is_of(packet: Packet, heard: tuple[int, NodeId, int], timetable: NodeTimetable) -> bool:
+    """True if a packet may be of a flood that this node hears in some turn."""
+    return not timetable.whole or packet.header.origin == heard[1] or not timetable.has_turns(packet.origin)

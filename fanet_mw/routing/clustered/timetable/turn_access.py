@@ -18,6 +18,7 @@ from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.slots.slot_access import SlotAccess
 from fanet_mw.routing.clustered.timetable.call_release import CallRelease
 from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
+from fanet_mw.routing.clustered.timetable.resumed_floods import ResumedFloods
 from fanet_mw.routing.clustered.timetable.root_release import RootRelease, TurnsInForce
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
@@ -43,6 +44,7 @@ class TurnAccess:
         delays: StatedDelays,
         floods: Floods,
         contention: ContentionTiming,
+        resumed: ResumedFloods | None,
     ) -> None:
         self._port = port
         self._timetables = timetables
@@ -52,6 +54,7 @@ class TurnAccess:
         self._delays = delays
         self._floods = floods
         self._contention = contention
+        self._resumed = resumed
         self._lead_ns = port.scenario.radio.lead_ns
         self._lifetime_ns = seconds_to_ns(port.scenario.routing.lifetime_s)
 
@@ -179,6 +182,8 @@ class TurnAccess:
             return
         timetable = self._timetables.at(now_ns)
         crowded = len(self._calls) >= _MOST_ANSWERS
+        if self._resumed is not None and self._resumed.resume(packet, now_ns=now_ns):
+            return
         if timetable is None or not timetable.calls or crowded or len(packet.frame) > timetable.frame_bytes:
             self._floods.contend_again(packet, due_ns=due_ns, now_ns=now_ns)
         elif not self._calls.holds(key):
@@ -200,11 +205,14 @@ class TurnAccess:
             self._roots.next_wake_ns(),
             self._calls.next_wake_ns(),
             self._delays.next_wake_ns(),
+            None if self._resumed is None else self._resumed.next_wake_ns(),
         )
 
     def wake(self, now_ns: int) -> None:
         self._slots.wake(now_ns)
         self._delays.wake(now_ns)
+        if self._resumed is not None:
+            self._resumed.wake(now_ns)
         for packet in self._roots.expire(before_us=(now_ns - self._lifetime_ns) // US):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         for packets, start_ns in self._roots.due(now_ns=now_ns):

@@ -22,17 +22,19 @@ from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import BoundStated, Dropped
-from fanet_mw.units import BROADCAST, MS, Enu, NodeId
+from fanet_mw.units import BROADCAST, MS, Enu, NodeId, earliest
 from fanet_mw.wire import (
     FLAG_FLOOD,
     FLAG_TO_HEAD,
     PRIORITY_BULK,
     PRIORITY_REPORT,
     PRIORITY_SAFETY,
+    Content,
     Header,
     Kind,
     filler,
 )
+from fanet_mw.wire.hello.digest import Digest, Holding
 
 US, ROOT, BEFORE, AFTER = NodeId(2), NodeId(3), NodeId(4), NodeId(5)
 TURNS = Turns(origin_ns=0, period_ns=100 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_superframe=29)
@@ -190,6 +192,106 @@ def test_what_is_heard_in_no_turn_of_its_flood_is_not_relayed_and_counted(node: 
     assert relays(node) == []
     assert node.dropped[DropReason.OUT_OF_TURN] == 1
     assert [r.reason for r in node.records if isinstance(r, Dropped)] == [DropReason.OUT_OF_TURN]
+
+
+def hear(node: Node, sender: NodeId, end_ns: int, *, seq: int = 1) -> None:
+    """A packet of the root that ends at an instant."""
+    hops = 0 if sender == ROOT else 1
+    header = Header(end_ns // 1000 - 5000, seq, ROOT, BROADCAST, sender, Kind.DATA, 9, hops, 3, FLAG_FLOOD)
+    node.hear(Reception(header.encode() + filler(40), sender, end_ns, -60.0), end_ns)
+
+
+@pytest.mark.parametrize(("late", "starts_ms"), [(0, [1056.0]), (2, [1056.0]), (3, []), (8, []), (9, [])])
+def test_a_frame_that_found_the_medium_busy_is_relayed_in_our_turn_if_that_is_still_to_come(
+    node: Node, late: int, starts_ms: list[float]
+) -> None:
+    """The root's turn is the fifth, ours the eighth; where the frame ended nothing is planned."""
+    hear(node, ROOT, TURNS.start_ns(5 + late, superframe_start_ns=1000 * MS) + MS)
+    assert relays(node) == starts_ms
+    assert node.dropped == ({} if starts_ms else {DropReason.MISSED_TURN if late <= 8 else DropReason.OUT_OF_TURN: 1})
+
+
+def test_a_late_frame_of_a_sender_whose_turn_is_of_another_flood_is_relayed_too(node: Node) -> None:
+    access_of(node)._timetables.in_order = [planned((*FLOODS[:2], Turn(6, ROOT, AFTER, 0), Turn(7, US, AFTER, 0)))]
+    hear(node, ROOT, TURNS.start_ns(6, superframe_start_ns=1000 * MS) + MS)
+    assert relays(node) == [1056.0]
+
+
+def copied(node: Node, end_ns: int, *, by: NodeId, transmitter: NodeId) -> None:
+    """A copy of what `hear` gave the node, as the node `by` sends it, heard from a station."""
+    header = Header(end_ns // 1000 - 5000, 1, ROOT, BROADCAST, by, Kind.DATA, 9, by != ROOT, 3, FLAG_FLOOD)
+    node.hear(Reception(header.encode() + filler(40), transmitter, end_ns + 5 * MS, -60.0), end_ns + 5 * MS)
+
+
+@pytest.mark.parametrize("heard_again", [False, True])
+def test_what_came_too_late_goes_in_our_turn_of_the_next_superframe_unless_another_node_has_sent_it(
+    node: Node, *, heard_again: bool
+) -> None:
+    access_of(node)._timetables.in_order = [planned(FLOODS[:2])]
+    end_ns = TURNS.start_ns(9, superframe_start_ns=1000 * MS) + MS
+    hear(node, ROOT, end_ns)
+    if heard_again:
+        copied(node, end_ns, by=AFTER, transmitter=AFTER)
+    while (due_ns := access_and_repair_due(node)) is not None and due_ns < 1400 * MS:
+        node.wake(due_ns)
+    assert relays(node) == ([] if heard_again else [1156.0])
+
+
+def access_and_repair_due(node: Node) -> int | None:
+    protocol = node._protocol
+    assert isinstance(protocol, Clustered)
+    assert protocol.parts.repair is not None
+    resumed = access_of(node)._resumed
+    assert resumed is not None
+    return earliest(protocol.parts.repair.next_wake_ns(), resumed.next_wake_ns())
+
+
+def test_a_turn_in_which_something_newer_is_relayed_is_not_taken_for_what_was_missed(node: Node) -> None:
+    """What was missed waits for the next one; what is newer and comes then is not sent in the same turn."""
+    access_of(node)._timetables.in_order = [planned(FLOODS[:2])]
+    hear(node, ROOT, TURNS.start_ns(9, superframe_start_ns=1000 * MS) + MS)
+    while (due_ns := access_and_repair_due(node)) is not None and due_ns < 1140 * MS:
+        node.wake(due_ns)
+    hear_in_turn(node, ROOT, 5, superframe=11)
+    node.wake(1154 * MS)
+    assert relays(node) == [1156.0], "what is newer"
+    node.wake(1254 * MS)
+    assert relays(node) == [1156.0, 1256.0]
+    hear_in_turn(node, ROOT, 5, superframe=12)
+    assert relays(node) == [1156.0, 1256.0]
+
+
+def test_what_was_missed_contends_where_the_node_has_no_turn_of_its_flood(node: Node) -> None:
+    access_of(node)._timetables.in_order = [planned((Turn(5, ROOT, ROOT, 0), Turn(12, US, US, 0)))]
+    hear(node, ROOT, TURNS.start_ns(5, superframe_start_ns=1000 * MS) + MS)
+    (packet,) = node.deliveries
+    access_of(node).answer(packet, due_ns=1500 * MS, now_ns=1500 * MS)
+    (start_ms,) = relays(node)
+    assert TURNS.turn_at(round(start_ms * MS)) is None
+
+
+def test_a_hello_asks_for_a_packet_that_was_missed_and_states_nothing_before(node: Node) -> None:
+    def asked(at_ns: int) -> Digest | None:
+        node.requests.clear()
+        node.say_hello(b"", start_ns=at_ns, now_ns=at_ns)
+        return Digest.decode_frames(Content.of(node.requests[-1].frame))
+
+    hear(node, ROOT, 1051 * MS, seq=1)
+    assert asked(1600 * MS) is None
+    hear(node, ROOT, 1651 * MS, seq=3)
+    assert asked(2100 * MS) is None, "it may be under way"
+    assert asked(2151 * MS) == Digest((Holding(ROOT, 3, 0b10),), complete=True)
+    hear(node, ROOT, 2251 * MS, seq=2)
+    assert asked(3000 * MS) is None
+
+
+def test_a_copy_that_another_station_repeats_as_it_is_cancels_nothing(node: Node) -> None:
+    end_ns = TURNS.start_ns(9, superframe_start_ns=1000 * MS) + MS
+    hear(node, ROOT, end_ns)
+    copied(node, end_ns, by=ROOT, transmitter=AFTER)
+    assert access_and_repair_due(node) is not None
+    copied(node, end_ns, by=ROOT, transmitter=ROOT)
+    assert access_and_repair_due(node) is None
 
 
 @pytest.mark.parametrize(("early_us", "is_relayed"), [(0, True), (50, True), (51, False)])

@@ -1,19 +1,25 @@
 """A foreign station repeats, byte for byte and later, what it heard: no clock follows it, and nearly all arrives.
 
-    python tests/hostile/replays.py [DRAWS [FIRST SEED [SCENARIO]]]     by default 40 of all combinations
+    python tests/hostile/replays.py [SECONDS [SCENARIO]]    fly what is missing of the matrix, for so long at most
 
-The station takes the place of a node. Each draw is a scenario with a seed, a place (corner or middle), a kind of frame,
-an address (the station's own, or that of whom it repeats) and a delay of 0.2 to 60 s. It is compared with the same run
-in which the station is silent, and with one in which it sends nonsense of the same lengths at the same instants:
-whoever sends takes airtime from others, and no check of a node can give it back.
+The station takes the place of a node. The matrix has each scenario with five seeds, both places (corner and middle),
+every kind of frame and both addresses (the station's own, or that of whom it repeats); the delays of 0.2 to 60 s go
+round. A run is compared with the same one in which the station is silent; where less arrives than is promised, also
+with one in which it sends nonsense of the same lengths at the same instants: whoever sends takes airtime from others,
+and no check of a node gives it back. What was flown is kept (`docs/results/data/replays.jsonl`), and
+`scripts/tables replays` writes the table of it.
 """
 
 import contextlib
+import itertools
+import json
 import math
 import sys
+import time
 from collections import Counter, defaultdict
 from collections.abc import Mapping
 from functools import cache
+from pathlib import Path
 from random import Random
 from typing import Any, Final, NamedTuple
 
@@ -46,7 +52,13 @@ PLACES: Final = {"clusters": {"corner": 15, "middle": 8}, "rescue": {"corner": 4
 DELAYS_S: Final = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0)
 REPEATING_S: Final = 12
 """How long data of the longest delay are repeated: they begin after the warm-up."""
-KINDS: Final = (Kind.HELLO, Kind.DATA, Kind.JOIN, Kind.SCHEDULE)
+KINDS: Final[Mapping[str, tuple[Kind, ...]]] = {
+    "clusters": (Kind.HELLO, Kind.DATA, Kind.JOIN, Kind.SCHEDULE),
+    "rescue": (Kind.HELLO, Kind.DATA, Kind.ROUND),
+}
+"""The kinds of frames of the protocol of each scenario."""
+SEEDS: Final = range(1, 6)
+KEPT: Final = Path(__file__).parents[2] / "docs" / "results" / "data" / "replays.jsonl"
 LEAST_SHARE: Final = 0.99
 """Of what arrives without the station."""
 
@@ -198,42 +210,96 @@ def silent(attack: Attack) -> Seen:
     return _silent(attack._replace(kind=Kind.HELLO, spoofed=False, delay_s=max(20.0, attack.delay_s)))
 
 
-def drawn(seed: int, scenario: str | None = None) -> Attack:
-    random = Random(f"replay/{seed}")
-    name = scenario or random.choice(sorted(SCENARIOS))
-    return Attack(
-        name, random.randint(1, 5), random.choice(["corner", "middle"]), random.choice(KINDS),
-        random.random() < 0.5, random.choice(DELAYS_S),
+def matrix() -> list[Attack]:
+    """All runs, in an order in which the first ones already have something of everything."""
+    delays = itertools.cycle(DELAYS_S)
+    return [
+        Attack(scenario, seed, place, kind, spoofed, next(delays))
+        for seed in SEEDS
+        for scenario in SCENARIOS
+        for kind in KINDS[scenario]
+        for place in ("corner", "middle")
+        for spoofed in (False, True)
+    ]
+
+
+class Verdict(NamedTuple):
+    """What became of one run, beside the one without the station."""
+
+    attack: Attack
+    sent: int
+    share: float
+    """What arrived of what arrives without the station."""
+    noise_share: float | None
+    """The same with nonsense of the same lengths; None if that was not flown."""
+    apart_us: float
+    apart_without_us: float
+    beyond: int
+    """The samples of clocks whose true error was beyond the stated one, above those without the station."""
+    refused: Mapping[str, int]
+
+    @property
+    def kept(self) -> bool:
+        """True if clocks and deliveries are those without the station, or else those beside as much nonsense."""
+        least = LEAST_SHARE if self.noise_share is None else min(LEAST_SHARE, 0.995 * self.noise_share)
+        return self.beyond <= 0 and self.apart_us < max(2 * self.apart_without_us, 100) and self.share >= least
+
+    def __str__(self) -> str:
+        beside = "" if self.noise_share is None else f", {self.noise_share:.4f} with nonsense"
+        refused = ", ".join(f"{count} {why}" for why, count in sorted(self.refused.items()))
+        return (
+            f"{self.attack}: {self.sent} sent, {self.share:.4f} of what arrives without{beside}, clocks apart "
+            f"{self.apart_us:.0f} us (without {self.apart_without_us:.0f}), {self.beyond} beyond their error; "
+            f"{refused}: {'kept' if self.kept else 'NOT KEPT'}"
+        )
+
+
+def judged(attack: Attack) -> Verdict:
+    """Fly it, without the station if that was not flown yet, and with nonsense if too little arrives."""
+    seen, without = run(attack), silent(attack)
+    pdr = without.summary["pdr"]
+    noise = run(attack, nonsense=True).summary["pdr"] / pdr if seen.summary["pdr"] < LEAST_SHARE * pdr else None
+    return Verdict(
+        attack, seen.sent, round(seen.summary["pdr"] / pdr, 4), noise and round(noise, 4), round(seen.apart_ns / US, 1),
+        round(without.apart_ns / US, 1), seen.beyond - without.beyond, dict(sorted(seen.refused().items())),
     )  # fmt: skip
 
 
-def judged(attack: Attack, seen: Seen, without: Seen, noise: Seen | None) -> tuple[str, bool]:
-    """One line about a run, and whether it kept what is promised."""
-    share = seen.summary["pdr"] / without.summary["pdr"]
-    beside = "" if noise is None else f", nonsense instead {noise.summary['pdr'] / without.summary['pdr']:.4f}"
-    kept = seen.beyond <= without.beyond and seen.apart_ns < max(2 * without.apart_ns, 100 * US)
-    least = LEAST_SHARE if noise is None else min(LEAST_SHARE, 0.995 * noise.summary["pdr"] / without.summary["pdr"])
-    kept &= share >= least
-    refused = ", ".join(f"{count} {why}" for why, count in sorted(seen.refused().items()))
-    return (
-        f"{attack}: {seen.sent} sent, PDR {seen.summary['pdr']:.4f} of {without.summary['pdr']:.4f} = {share:.4f}"
-        f"{beside}, clocks apart {seen.apart_ns / US:.0f} us (without {without.apart_ns / US:.0f}), "
-        f"{seen.beyond} beyond their error; {refused}: {'kept' if kept else 'NOT KEPT'}"
-    ), kept
+def kept() -> dict[Attack, Verdict]:
+    """What was flown."""
+    found = {}
+    for line in KEPT.read_text(encoding="utf-8").splitlines() if KEPT.exists() else ():
+        *attack, kind = json.loads(line)["attack"]
+        key = Attack(*attack[:3], Kind[kind], *attack[3:])
+        found[key] = Verdict(key, **json.loads(line)["seen"])
+    return found
+
+
+def keep(verdicts: Mapping[Attack, Verdict]) -> None:
+    """Write what was flown, in the order of the matrix."""
+    lines = []
+    for attack in matrix():
+        if attack in verdicts:
+            scenario, seed, place, kind, spoofed, delay_s = attack
+            seen = {name: value for name, value in verdicts[attack]._asdict().items() if name != "attack"}
+            lines.append(json.dumps({"attack": [scenario, seed, place, spoofed, delay_s, kind.name], "seen": seen}))
+    KEPT.write_text("".join(line + "\n" for line in lines), encoding="utf-8")
 
 
 def main() -> int:
-    count, first = (int(text) for text in (sys.argv[1:3] + ["40", "1"][len(sys.argv) - 1 :])[:2])
-    name = sys.argv[3] if len(sys.argv) > 3 else None
-    wrong = 0
-    for seed in range(first, first + count):
-        attack = drawn(seed, name)
-        seen, without = run(attack), silent(attack)
-        less = seen.summary["pdr"] < LEAST_SHARE * without.summary["pdr"]
-        line, kept = judged(attack, seen, without, run(attack, nonsense=True) if less else None)
-        wrong += not kept
-        print(line, flush=True)
-    print(f"{count} runs, {wrong} not kept")
+    until_s = time.monotonic() + (float(sys.argv[1]) if len(sys.argv) > 1 else math.inf)
+    verdicts = kept()
+    for attack in matrix():
+        if attack in verdicts or attack.scenario not in (sys.argv[2:3] or SCENARIOS):
+            continue
+        if time.monotonic() > until_s:
+            break
+        verdicts[attack] = judged(attack)
+        keep(kept() | {attack: verdicts[attack]})
+        print(verdicts[attack], flush=True)
+    missing = len(matrix()) - len(verdicts)
+    wrong = sum(not verdict.kept for verdict in verdicts.values())
+    print(f"{len(verdicts)} runs, {wrong} not kept, {missing} not flown")
     return min(wrong, 1)
 
 

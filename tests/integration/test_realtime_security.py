@@ -191,7 +191,7 @@ def test_a_router_by_whose_clock_its_certificates_are_not_valid_does_not_wait_fo
 ) -> None:
     off = THIS_MACHINE._replace(unix_ns=lambda: time.time_ns() - 3600 * S)
     monkeypatch.setattr("fanet_mw.hosts.bus.THIS_MACHINE", off)
-    with pytest.raises(BusError, match="cannot serve on tls/.*: the clock of this machine says .* valid from"):
+    with pytest.raises(BusError, match=r"cannot serve on tls/.*: the clock of this machine says .* valid from"):
         Bus.serve(free_endpoint("tls"), keys / "router.json5")
 
 

@@ -5,7 +5,9 @@ simulation, which has none; and a simulated process does not die. The tests' own
 needed: whoever only wants to know which tables there are has no use for them.
 """
 
+import itertools
 import sys
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from signal import Signals
@@ -16,6 +18,7 @@ from tests.tables.markdown import Rows
 
 MACHINE: Final = ("seen as real processes",)
 _REFUSALS: Final = ("malformed", "forged", "unknown_node", "own")
+_REFUSED: Final = ("old", "relayed", "repeated", "forged", "duplicate", "expired", "own")
 _REAL: Final = ("radio.lead_ms=150", "duration_s=17")
 """Of real processes: not asked is whether this machine is on time, and half of the attack is enough."""
 
@@ -43,9 +46,41 @@ def over_the_air() -> Rows:
 
 def _find_tests() -> None:
     """Let the modules of the tests be found by the names by which they import each other."""
-    folder = str(Path(__file__).parents[1] / "integration")
-    if folder not in sys.path:
-        sys.path.append(folder)
+    for name in ("integration", "hostile"):
+        folder = str(Path(__file__).parents[1] / name)
+        if folder not in sys.path:
+            sys.path.append(folder)
+
+
+def replays() -> Rows:
+    """One row for each scenario, kind of frame and address, of the runs that `tests/hostile/replays.py` has flown."""
+    _find_tests()
+    import replays as flown
+
+    verdicts, matrix = flown.kept(), flown.matrix()
+    rows = [[
+        "scenario", "repeated", "under the address", "runs", "frames sent", "least share delivered", "with nonsense",
+        "clocks apart [us]", "without it", "beyond their error", "refused",
+    ]]  # fmt: skip
+    for scenario, kinds in flown.KINDS.items():
+        for kind, spoofed in itertools.product(kinds, (False, True)):
+            of = [v for a, v in verdicts.items() if (a.scenario, a.kind, a.spoofed) == (scenario, kind, spoofed)]
+            if not of:
+                continue
+            planned = sum((a.scenario, a.kind, a.spoofed) == (scenario, kind, spoofed) for a in matrix)
+            least = min(of, key=lambda verdict: verdict.share)
+            refused: Counter[str] = Counter()
+            for verdict in of:
+                refused.update(verdict.refused)
+            rows.append([
+                scenario, kind.name.lower(), "of whom it repeats" if spoofed else "its own", f"{len(of)} of {planned}",
+                f"{sum(verdict.sent for verdict in of):,}", f"{least.share:.4f}",
+                "-" if least.noise_share is None else f"{least.noise_share:.4f}",
+                f"{max(verdict.apart_us for verdict in of):.0f}", f"{max(v.apart_without_us for v in of):.0f}",
+                str(sum(max(0, verdict.beyond) for verdict in of)),
+                ", ".join(f"{count:,} {why}" for why, count in sorted(refused.items()) if why in _REFUSED),
+            ])  # fmt: skip
+    return rows
 
 
 def _seen(

@@ -113,6 +113,7 @@ TABLES: Final[Mapping[str, Table]] = {
     "attacks": Table(
         "results/attacks.md", attacks.over_the_air, Tolerance(absolute=0.02, relative=0.2), attacks.MACHINE
     ),
+    "replays": Table("results/attacks.md", attacks.replays, Tolerance()),
     "faults": Table("results/attacks.md", attacks.on_the_bus_and_to_processes, Tolerance(), attacks.MACHINE),
     "clocks": Table("explanation/time.md", protocol.clocks, Tolerance(absolute=0.02, relative=0.2)),
 }

@@ -15,7 +15,7 @@ import pytest
 from fanet_mw import tlog
 from fanet_mw.errors import ConfigError
 from fanet_mw.whole_file import write_items
-from sim.cli.options import prepare
+from sim.cli.out_folder import prepare
 from sim.results.file_names import RUN_FILES
 from sim.results.files import begin, finish
 from sim.results.outcome import Outcome

@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from fanet_mw.errors import ConfigError
-from sim.cli.options import prepare
+from sim.cli.out_folder import prepare
 from sim.report import page, replay_page
 from sim.results.files import finish
 from sim.results.replay import Replay

@@ -28,7 +28,7 @@ from sim.figures.colors import BLUE, GRAY, RED  # noqa: E402
 from sim.figures.style import applied, canvas  # noqa: E402
 from sim.results.mission import OverflownCells  # noqa: E402
 from sim.scenarios import catalog  # noqa: E402
-from sim.world.mobility.layout import positions  # noqa: E402
+from sim.world.environment.layout import positions  # noqa: E402
 
 OUT: Final = ROOT / "docs" / "explanation" / "search-curve.png"
 AIR: Final = ("nodes.spacing_m=100",)

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from fanet_mw.units import MS
 from sim.records.delivery_columns import Column
@@ -89,7 +90,8 @@ def _judged(apps: list[AppPackets], ended_ns: int) -> dict[str, Any]:
 
 def _never_there(app: AppPackets, ended_ns: int) -> int:
     """The number of targets that a packet never reached although the bound that was stated for it is over."""
-    arrived = np.bincount(app.deliveries.packet, minlength=len(app.sent)).tolist()
+    promised = app.deliveries.packet[_not_excluded(app)]
+    arrived = np.bincount(promised, minlength=len(app.sent)).tolist()
     return sum(
         max(0, sent.targets - count)
         for sent, count in zip(app.sent.values(), arrived, strict=True)
@@ -98,10 +100,18 @@ def _never_there(app: AppPackets, ended_ns: int) -> int:
 
 
 def delays_under_bound(app: AppPackets) -> tuple[Column, Column]:
-    """The delays of all deliveries whose packet had a bound, and those bounds."""
+    """The delays of all deliveries for which a bound was stated, and those bounds."""
     delays_ns, bounds_ns = _beside(app, [-1 if sent.bound_ns is None else sent.bound_ns for sent in app.sent.values()])
-    promised = bounds_ns >= 0
+    promised = (bounds_ns >= 0) & _not_excluded(app)
     return delays_ns[promised], bounds_ns[promised]
+
+
+def _not_excluded(app: AppPackets) -> npt.NDArray[np.bool_]:
+    """For each delivery, whether the packet's bound was stated for the node."""
+    pairs = [
+        number << 16 | node for number, sent in enumerate(app.sent.values()) if sent.excluded for node in sent.excluded
+    ]
+    return ~np.isin(app.deliveries.packet.astype(np.int64) << 16 | app.deliveries.node, np.array(pairs, np.int64))
 
 
 def _beside(app: AppPackets, of_packets: list[int]) -> tuple[Column, Column]:

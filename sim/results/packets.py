@@ -5,7 +5,6 @@ same node is `repeated`: the node's process was restarted, and has forgotten the
 if no node sent it at the instant that its header states: it is forged, or its origin's record is lost.
 """
 
-from collections import Counter
 from collections.abc import Mapping
 from typing import Final, NamedTuple
 
@@ -37,7 +36,9 @@ class SentPacket(NamedTuple):
     likely: tuple[int, float] | None = None
     """The likely delay, and the share of copies that the origin stated to arrive within it; None if it stated none."""
     targets: int = 0
-    """The number of nodes for which it was meant; 0 if the trace does not tell."""
+    """The number of nodes for which it was meant, less those that its bound excludes; 0 if the trace does not tell."""
+    excluded: frozenset[int] = frozenset()
+    """The nodes for which its bound does not hold."""
 
 
 class Deliveries(NamedTuple):
@@ -88,13 +89,16 @@ def packets_of(outcome: Outcome) -> Mapping[str, AppPackets]:
             row_of[traffic_class, node] = len(targets)
             targets.append(meant)
     packets: dict[Name, _Known] = {}
-    excluded = Counter((record.node, record.seq) for record in records_of(outcome.records, BoundExcludes))
+    excluded: dict[Name, set[int]] = {}
+    for record in records_of(outcome.records, BoundExcludes):
+        excluded.setdefault((record.node, record.seq), set()).add(record.other)
     for name, app_name, sent in _sent(outcome):
         app = found.setdefault(app_name, AppPackets())
         row = row_of.get((app_name, name[0]), _EVERYONE)
         packets[name] = _Known(app_name, len(app.sent), sent.born_ns, row)
         copies = len(targets[row]) if row != _EVERYONE else len(everyone) - 1 if app_name in OTHER_APPS else 0
-        app.sent[name] = sent._replace(targets=max(0, copies - excluded[name]))
+        without = frozenset(excluded.get(name, ()))
+        app.sent[name] = sent._replace(targets=max(0, copies - len(without)), excluded=without)
         app.wanted += copies
     counting = _DeliveryCount(packets, list(found), targets, exact=not outcome.scenario.clock.modelled)
     for columns in delivery_columns(outcome.records):

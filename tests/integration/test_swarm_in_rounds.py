@@ -7,6 +7,8 @@ from typing import Any
 import pytest
 
 from fanet_mw.scenario import config
+from fanet_mw.trace import BoundExcludes, BoundStated
+from fanet_mw.units import S
 from sim.results.files import finish
 from sim.run.virtual import simulate
 
@@ -93,3 +95,15 @@ def test_receivers_tell_soon_enough_what_they_hold_where_many_hear_each_other() 
     assert summary["pdr"] == 1.0
     repeated = sum(report.get("repeated", 0) for report in outcome.reports.values())
     assert repeated < 0.1 * summary["generated"]
+
+
+def test_bounds_are_whole_again_a_second_after_the_air_is() -> None:
+    """Two halves of the swarm do not hear each other for 4 s: meanwhile bounds exclude the other half."""
+    cut = {"kind": "partition", "at_s": 6, "for_s": 5, "nodes": [1, 2, 6, 7, 11, 12]}
+    outcome = simulate(config.build({**BASE, "duration_s": 20, "faults": [cut], "rounds": {"bulk_share": 0}}))
+    stated = {(each.node, each.seq): each.t_ns / S for each in outcome.records if isinstance(each, BoundStated)}
+    excludes = {(each.node, each.seq) for each in outcome.records if isinstance(each, BoundExcludes)}
+    assert {name for name, at_s in stated.items() if 9 < at_s < 11} <= excludes
+    whole = {name for name, at_s in stated.items() if at_s > 12}
+    assert len(whole) > 50
+    assert not whole & excludes

@@ -6,7 +6,7 @@
 A packet that was heard is announced one lead before the next own turn, at most one period later; its frame ends within
 the turn, and is handed over. `h` is the greatest distance that the node knows to another; `margin` is for a topology
 that changes meanwhile. All urgent packets that are under way together, `B` bytes, delay each other once: every node
-serves them at the same rate, one frame of `room` bytes per round, so what waited for one node's turn does not wait
+serves them at the same rate, `room` bytes of a frame per round, so what waited for one node's turn does not wait
 again for the next one's (tandem of equal servers; Le Boudec and Thiran, Network Calculus, 1.4.3).
 Assumed: no frame is lost, so over any channel but `range` no bound is stated. None is stated either while more than B
 bytes were heard in the time that they take, or while a node has been out of reach for less than the silence by which it
@@ -21,6 +21,8 @@ from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.routing.rounds.topology import Topology
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, S, seconds_to_ns
+from fanet_mw.wire import HEADER_BYTES
+from fanet_mw.wire.rounds import HEARD_BYTES
 
 MARGIN_HOPS: Final = 2
 MOST_HOPS: Final = 32
@@ -35,7 +37,9 @@ class DelayLaw:
         self._timing = timing
         self._loses_frames = scenario.radio.channel != "range" or scenario.radio.fading != "none"
         self._burst_bytes = scenario.rounds.burst_bytes
-        self._burst_ns = -(-self._burst_bytes // timing.turn_bytes) * timing.period_ns
+        self.kept_bytes = min(HEADER_BYTES + HEARD_BYTES, timing.turn_bytes // 2)
+        """The part of a turn that is kept for news of links, which urgent packets must not crowd out."""
+        self._burst_ns = -(-self._burst_bytes // (timing.turn_bytes - self.kept_bytes)) * timing.period_ns
         self.hop_ns = timing.period_ns + timing.turn_ns + scenario.radio.lead_ns + scenario.radio.handover_ns
         if scenario.clock.sync == "beacons":
             self.hop_ns += timing.period_ns  # hellos have turns of their own

@@ -220,11 +220,12 @@ class RoundFlooding(RoutingProtocol):
         hello = self._hello
         if hello is not None and self._hello_waits >= _PATIENT_TURNS:
             room -= self._add_hello(together)
+        kept = self._law.kept_bytes if self._topology.has_news else 0
         for packet in self._spreading.wanted(self._neighbors(now_ns), start_ns=turn_ns):
             if self._expired(packet, turn_ns):
                 continue
             size = len(packet.frame)
-            if size <= room:
+            if size <= room - kept or (size <= room and not together):
                 room -= size
                 together.append(packet)
                 self._spreading.sent(packet, start_ns=turn_ns)

@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import BoundStated, Delivered, Generated, LikelyStated, Record
+from fanet_mw.trace import BoundExcludes, BoundStated, Delivered, Generated, LikelyStated, Record
 from fanet_mw.units import MS, S
 from sim.results.metrics import summarize
 from sim.results.outcome import Outcome
@@ -64,6 +64,16 @@ def test_what_never_arrives_breaks_its_bound_at_each_target_as_what_arrives_too_
     assert (bound["violations"], bound["deliveries"], bound["within_share"]) == (3, 1, 0.25)
     late = bound_of(scenario, packet(1, bound_ms=100, delays_ms={2: 101}))
     assert (late["violations"], late["deliveries"]) == (2, 1), "one came too late, one never"
+
+
+@pytest.mark.parametrize(
+    ("delays_ms", "violations"), [({2: 90, 3: 9000}, 0), ({2: 90}, 0), ({3: 10}, 1), ({2: 101}, 1)]
+)
+def test_a_bound_counts_for_those_for_whom_it_was_stated(
+    scenario: Scenario, delays_ms: dict[int, float], violations: int
+) -> None:
+    without = [BoundExcludes(1 * S, 1, 1, 3)]
+    assert bound_of(scenario, packet(1, bound_ms=100, delays_ms=delays_ms), without)["violations"] == violations
 
 
 @pytest.mark.parametrize("delays_ms", [{2: 101, 3: 10}, {2: 10}])

@@ -214,7 +214,7 @@ class Inspector(App[None]):
 
 
 def turn_lines(found: Turns, now_ns: int) -> Text:
-    """The superframe of the moment: one line for each owner, `#` where it may send, `~` where all contend, and whose
+    """The superframe of the moment: one line for each owner, `#` where it may send, `~` what is left, and whose
     turn it is now.
     """
     period_ns = found.period_ns
@@ -222,7 +222,7 @@ def turn_lines(found: Turns, now_ns: int) -> Text:
     owners = sorted({span.node for span in found.own})
     now = found.owners(now_ns)
     text = Text(f"superframe {superframe} of {period_ns / MS:g} ms, {place_ns / MS:.1f} ms into it; ")
-    free = "all contend" if found.is_contended(now_ns) else "nobody's"
+    free = found.window_called if found.in_window(now_ns) else "nobody's"
     text.append(f"now: {found.called} of {', '.join(map(str, now))}\n\n" if now else f"now: {free}\n\n", "bold")
     if found.window[1]:
         first, last = (at * _WIDTH // period_ns for at in (found.window[0], sum(found.window)))

@@ -29,10 +29,11 @@ class Turns(NamedTuple):
     called: str
     """What a span is called: `slot` or `turn`."""
     window: tuple[int, int] = (0, 0)
-    """Where all contend, in which rounds send their bulk: start and length."""
+    """What is left beside the spans, for contention or bulk: start and length."""
+    window_called: str = "all contend"
 
-    def is_contended(self, t_ns: int) -> bool:
-        """True within the window in which all contend."""
+    def in_window(self, t_ns: int) -> bool:
+        """True within the window."""
         start_ns, length_ns = self.window
         return (t_ns - self.start_ns - start_ns) % self.period_ns < length_ns
 
@@ -47,7 +48,8 @@ def turns(scenario: Scenario, reports: Mapping[int, Mapping[str, Any]]) -> Turns
     if scenario.routing.protocol == "rounds":
         timing = RoundTiming.of(scenario)
         own = [Span(node, (node - 1) * timing.turn_ns, timing.turn_ns) for node in scenario.node_ids]
-        return Turns(0, timing.period_ns, own, "turn", (timing.nodes * timing.turn_ns, timing.slots * timing.slot_ns))
+        window = (timing.nodes * timing.turn_ns, timing.slots * timing.slot_ns)
+        return Turns(0, timing.period_ns, own, "turn", window, "bulk slots")
     turned = {node: report["turns"] for node, report in reports.items() if report.get("turns")}
     if turned:
         newest = max(turned.values(), key=lambda frame: float(frame["start_ms"]))

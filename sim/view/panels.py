@@ -282,7 +282,7 @@ class Panels:
         if turn is not None:
             shown_ns = self._scene.turn_ns(t_ns)
             owners = self.state.owners(shown_ns)
-            free = "all, who contend" if turn.is_contended(shown_ns) else "nobody"
+            free = f"nobody ({turn.window_called})" if turn.in_window(shown_ns) else "nobody"
             who = ", ".join(map(str, owners)) if owners else free
             lines.append(f"<b>{turn.called}</b> of {_dot(colors.GREEN)} {who}, one of "
                          f"{len(turn.own)} in {turn.period_ns / MS:.0f} ms")  # fmt: skip

@@ -7,7 +7,7 @@ from rival_bench import Bench
 
 from fanet_mw import wire
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import MS, S
+from fanet_mw.units import MS, NodeId, S
 
 MakeBench = Callable[..., Bench]
 CROWD = [(a, b) for a in range(1, 9) for b in range(a + 1, 9)]
@@ -68,9 +68,9 @@ def test_a_node_that_has_heard_enough_copies_stays_silent(bench: MakeBench) -> N
 def test_the_copy_that_makes_the_count_is_the_first_one_too_many(bench: MakeBench, copies: int, relayed: int) -> None:
     found = bench("counter", [], **{"routing.counter": 3})
     found.protocol(1)._random = lambda: 0.99
-    frame = wire.Header(0, 1, 8, 0xFFFF, 2, wire.Kind.DATA, 5, 1, 3, wire.FLAG_FLOOD).encode() + wire.filler(20)
     for previous in range(2, 2 + copies):
-        found.hear(1, frame, src=previous)
+        header = wire.Header(0, 1, NodeId(8), 0xFFFF, NodeId(previous), wire.Kind.DATA, 5, 1, 3, wire.FLAG_FLOOD)
+        found.hear(1, header.encode() + wire.filler(20), src=previous)
     found.advance(1 * S)
     assert len(found.data(1, 8)) == relayed
 

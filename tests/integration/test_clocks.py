@@ -58,7 +58,7 @@ def test_with_time_beacons_every_packet_arrives_within_the_bound(offset_ms: int)
 def test_a_plan_says_how_long_time_beacons_take_and_before_that_packets_are_lost() -> None:
     """Six nodes in a line, five hops, a hello every second: the slack of turns is less than clocks differ."""
     line = ["nodes.layout=line", "nodes.count=6", "clusters.count=5", "traffic.sources=5", "clock.sync=beacons",
-            "clock.offset_ms=20", "clusters.flooding_period_s=0.5", "drain_s=4"]  # fmt: skip
+            "clock.offset_ms=20", "clusters.flooding_period_s=0.5", "drain_s=4", "clusters.resume=false"]  # fmt: skip
     for warmup_s, told in ((6, True), (19, False)):
         scenario = catalog.find("clusters", [*line, f"warmup_s={warmup_s}", f"duration_s={warmup_s + 8}"])
         _, plan, feasible = judge(scenario, change=False)
@@ -78,7 +78,7 @@ def test_with_gps_too() -> None:
 
 
 def test_clocks_that_only_drift_soon_collide_and_the_summary_says_how_wrong_they_were() -> None:
-    summary = summary_of("clock.sync=none", "clusters.turn_slack_us=50", "clock.offset_ms=5")
+    summary = summary_of("clock.sync=none", "clusters.turn_slack_us=50", "clock.offset_ms=5", "clusters.resume=false")
     assert summary["pdr"] < 0.7
     assert 1000 < summary["clock"]["error_us"]["max"] < 6000
     assert summary["clock"]["synced_after_s"] is None

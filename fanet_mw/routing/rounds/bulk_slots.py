@@ -6,7 +6,7 @@ networks", MobiCom 2001). A node that has little to send takes part in a few of 
 do not know of each other yet, carrier sensing and repetitions remain.
 """
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Final
 
 from fanet_mw.routing.rounds.round_timing import RoundTiming
@@ -15,13 +15,14 @@ _SELDOM: Final = 8
 """A node with little to send takes part in one of so many slots."""
 _MOST_SEARCHED: Final = 4096
 _MASK: Final = 0xFFFFFFFF
+_OF_NODE, _OF_SLOT, _MIX, _MIX_AGAIN = 0x9E3779B1, 0x85EBCA77, 0x2C1B3C6D, 0x297A2D39
 
 
 def _bid(node: int, slot: int) -> int:
     """What a node bids for a slot: the highest bid wins it."""
-    mixed = (node * 0x9E3779B1 + slot * 0x85EBCA77) & _MASK
-    mixed = (mixed ^ mixed >> 15) * 0x2C1B3C6D & _MASK
-    mixed = (mixed ^ mixed >> 12) * 0x297A2D39 & _MASK
+    mixed = (node * _OF_NODE + slot * _OF_SLOT) & _MASK
+    mixed = (mixed ^ mixed >> 15) * _MIX & _MASK
+    mixed = (mixed ^ mixed >> 12) * _MIX_AGAIN & _MASK
     return mixed ^ mixed >> 15
 
 
@@ -32,18 +33,21 @@ class BulkSlots:
         self._node = node
         self._timing = timing
 
-    def next_ns(self, from_ns: int, *, often: bool, rivals: Iterable[tuple[int, bool]]) -> int:
+    def next_ns(self, from_ns: int, *, often: bool, rivals: Sequence[tuple[int, bool]]) -> int:
         """The start of the first own slot at or after an instant; `rivals`: the other nodes within two hops, and
         whether each takes part in all slots. The others take part where the last bits of their bids are 0.
         """
         first = self._timing.slot_from(from_ns)
-        others = tuple(rivals)
         for slot in range(first, first + _MOST_SEARCHED):
             own = _bid(self._node, slot)
             if own % _SELDOM and not often:
                 continue
-            for node, takes_part in others:
-                theirs = _bid(node, slot)
+            of_slot = slot * _OF_SLOT
+            for node, takes_part in rivals:
+                theirs = (node * _OF_NODE + of_slot) & _MASK  # `_bid`, written out: this is done for every frame
+                theirs = (theirs ^ theirs >> 15) * _MIX & _MASK
+                theirs = (theirs ^ theirs >> 12) * _MIX_AGAIN & _MASK
+                theirs ^= theirs >> 15
                 if theirs >= own and (takes_part or not theirs % _SELDOM):
                     break
             else:

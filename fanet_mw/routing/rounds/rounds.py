@@ -102,6 +102,8 @@ class RoundFlooding(RoutingProtocol):
         """The next own bulk slot; None if there is no bulk."""
         self._slot_from_ns = 0
         """The instant from which that slot was sought."""
+        self._slot_by: tuple[int, int, bool] | None = None
+        """The neighbors, the state of the topology, and the part in slots, by which it was found."""
         self._clock_hellos: set[int] = set()
         """The requests of hellos of which the clock wants to know when they ended."""
         self._held: dict[HeldPacket, None] = {}
@@ -313,11 +315,14 @@ class RoundFlooding(RoutingProtocol):
         self._slot_from_ns = from_ns
         rivals = self._topology.rivals(self._neighbors(now_ns), now_ns)
         self._slot_ns = self._slots.next_ns(self._slot_from_ns, often=self._often, rivals=rivals)
+        self._slot_by = self._near, self._topology.changes, self._often
 
     def _use_slot(self, slot_ns: int, now_ns: int) -> None:
         """Announce the frame of a bulk slot, if it is still this node's own, and seek the next one."""
         rivals = self._topology.rivals(self._neighbors(now_ns), now_ns)
-        if slot_ns < now_ns or self._slots.next_ns(slot_ns, often=self._often, rivals=rivals) != slot_ns:
+        changed = self._slot_by != (self._near, self._topology.changes, self._often)
+        lost = changed and self._slots.next_ns(slot_ns, often=self._often, rivals=rivals) != slot_ns
+        if slot_ns < now_ns or lost:
             self._seek_slot(max(slot_ns, now_ns + self._lead_ns), now_ns)
             return
         room, together = self._timing.slot_bytes, list[Packet]()
@@ -338,7 +343,7 @@ class RoundFlooding(RoutingProtocol):
             rounds = min(_MOST_ROUNDS, 1 << times)
             again_ns = slot_ns + 2 * (self._law.hop_ns + self._blind_ns) + rounds * self._timing.period_ns
             self._spreading.look_again(packet, from_ns=again_ns)
-        if together or self._topology.is_partial:
+        if self._topology.is_partial:  # else turns tell all at once
             told = self._told(room, now_ns)
             together += [told] if told is not None else []
         if together:

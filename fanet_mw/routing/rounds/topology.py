@@ -54,6 +54,11 @@ class Topology:
         """The links by which this node decided whether it is in the dominating set."""
         self._unreached_ns: dict[NodeId, int] = {}
         """The instant since which each node without a way is known to have none."""
+        self._rivals: list[tuple[NodeId, bool]] = []
+        self._rivals_for: tuple[int, int] | None = None
+        """The neighbors, and the state of what is known, for which the rivals were found."""
+        self.changes = 0
+        """How often links, or who takes part in bulk slots often, have changed."""
         self._arranged_for = -1
         """The epoch for which the rings were computed; -1: they must be computed anew."""
 
@@ -90,6 +95,7 @@ class Topology:
         self._stated[node] = stated
         self._news[node] = None
         changed = stated.heard if known is None else stated.heard ^ known.heard
+        self.changes += changed != 0 or known is None or known.often != stated.often
         if changed or known is None:
             self._arranged_for = -1
             self._relink(node, stated.heard, changed)
@@ -108,6 +114,7 @@ class Topology:
 
     def _forget(self, node: NodeId) -> None:
         """What a node has stated is too old."""
+        self.changes += 1
         heard = self._stated.pop(node).heard
         self._news.pop(node, None)
         self._relink(node, 0, heard)
@@ -174,12 +181,15 @@ class Topology:
     def rivals(self, near: int, now_ns: int) -> list[tuple[NodeId, bool]]:
         """The nodes within two hops, if this node hears `near`, and whether each takes part in bulk slots often."""
         self._arrange(now_ns)
-        reached = near
-        for node in nodes_of(near):
-            reached |= self._links[node]
-        stated = self._stated
-        others = nodes_of(reached & ~(1 << (self._node - 1)))
-        return [(node, node not in stated or stated[node].often) for node in others]
+        if self._rivals_for != (near, self.changes):
+            self._rivals_for = near, self.changes
+            reached = near
+            for node in nodes_of(near):
+                reached |= self._links[node]
+            stated = self._stated
+            others = nodes_of(reached & ~(1 << (self._node - 1)))
+            self._rivals = [(node, node not in stated or stated[node].often) for node in others]
+        return self._rivals
 
     def dominates(self, now_ns: int) -> bool:
         """True if this node is one of the connected dominating set whose transmissions reach all nodes."""

@@ -362,6 +362,7 @@ class RoundFlooding(RoutingProtocol):
         self._heard_ns[src] = now_ns
         if not self._near >> (src - 1) & 1:
             self._near |= 1 << (src - 1)
+            self._spreading.neighbors = self._near
             old_ns = now_ns - _FLOOD_HOPS * (self._law.hop_ns + self._blind_ns)
             if self._topology.reaches(src, now_ns):
                 self._spreading.assume(src, until_ns=old_ns)
@@ -375,6 +376,7 @@ class RoundFlooding(RoutingProtocol):
             horizon_ns = now_ns - self._law.silent_ns
             near = {node: heard_ns for node, heard_ns in self._heard_ns.items() if heard_ns >= horizon_ns}
             self._near = sum(1 << (node - 1) for node in near)
+            self._spreading.neighbors = self._near
             self._near_until_ns = min(near.values(), default=now_ns) + self._law.silent_ns
         return self._near
 

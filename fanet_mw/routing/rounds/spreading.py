@@ -107,6 +107,8 @@ class Spreading:
         self._ready: list[tuple[bool, tuple[int, int], int]] = []
         """A heap of the bulk whose instant has come: sent before, rank, key."""
         self._order = 0
+        self.neighbors = 0
+        """The nodes that this node hears, as `RoundFlooding` knows them."""
         self._done: dict[int, _Spread] = {}
         """The packets that need not be sent any more, the latest last."""
         self._early: dict[int, int] = {}
@@ -178,7 +180,8 @@ class Spreading:
             again = bool(done.senders & own)
             done.senders |= own
             return again
-        entry.copy_ns = now_ns
+        if self.neighbors & self._links_of(src, now_ns) & ~entry.having:
+            entry.copy_ns = now_ns  # who lacks it may have heard that copy
         self._reach(entry, src, now_ns)
         again = bool(entry.senders & own)
         entry.senders |= own

@@ -61,11 +61,22 @@ def test_a_neighbor_that_does_not_pass_it_on_gets_it_again_but_not_for_ever() ->
 
 def test_nobody_repeats_what_another_node_has_just_sent() -> None:
     made = spreading()
+    made.neighbors = nodes((2, 3, 5))  # 5 may have heard 2
     made.take(packet(1), src=2, now_ns=0)
     sent_in_turn(made, 1)
     made.on_copy(key_of_packet(packet(1)), 2, now_ns=ROUND + 60 * MS)
     assert sent_in_turn(made, 2) == []
     assert sent_in_turn(made, 3) == [1]
+
+
+def test_a_copy_that_nobody_who_lacks_the_packet_can_have_heard_delays_nothing() -> None:
+    """Node 2 hears this node and 5 only, and repeats what it does not know this node to have; 3 still lacks it."""
+    made = spreading()
+    made.neighbors = nodes((2, 3))
+    made.take(packet(1), src=2, now_ns=0)
+    sent_in_turn(made, 1)
+    made.on_copy(key_of_packet(packet(1)), 2, now_ns=ROUND + 60 * MS)
+    assert sent_in_turn(made, 2) == [1]
 
 
 def test_a_neighbor_that_says_it_holds_the_packet_needs_no_repeat() -> None:

@@ -15,14 +15,13 @@ _SELDOM: Final = 8
 """A node with little to send takes part in one of so many slots."""
 _MOST_SEARCHED: Final = 4096
 _MASK: Final = 0xFFFFFFFF
-_OF_NODE, _OF_SLOT, _MIX, _MIX_AGAIN = 0x9E3779B1, 0x85EBCA77, 0x2C1B3C6D, 0x297A2D39
 
 
 def _bid(node: int, slot: int) -> int:
     """What a node bids for a slot: the highest bid wins it."""
-    mixed = (node * _OF_NODE + slot * _OF_SLOT) & _MASK
-    mixed = (mixed ^ mixed >> 15) * _MIX & _MASK
-    mixed = (mixed ^ mixed >> 12) * _MIX_AGAIN & _MASK
+    mixed = (node * 0x9E3779B1 + slot * 0x85EBCA77) & _MASK
+    mixed = (mixed ^ mixed >> 15) * 0x2C1B3C6D & _MASK
+    mixed = (mixed ^ mixed >> 12) * 0x297A2D39 & _MASK
     return mixed ^ mixed >> 15
 
 
@@ -42,12 +41,8 @@ class BulkSlots:
             own = _bid(self._node, slot)
             if own % _SELDOM and not often:
                 continue
-            of_slot = slot * _OF_SLOT
             for node, takes_part in rivals:
-                theirs = (node * _OF_NODE + of_slot) & _MASK  # `_bid`, written out: this is done for every frame
-                theirs = (theirs ^ theirs >> 15) * _MIX & _MASK
-                theirs = (theirs ^ theirs >> 12) * _MIX_AGAIN & _MASK
-                theirs ^= theirs >> 15
+                theirs = _bid(node, slot)
                 if theirs >= own and (takes_part or not theirs % _SELDOM):
                     break
             else:

@@ -70,8 +70,8 @@ class DelayLaw:
             return None
         if self.absent(topology, now_ns=now_ns) is None:
             return None
-        hops = topology.most_hops(now_ns)
-        return self.over_ns(hops) if hops else None
+        hops = topology.hops(now_ns)
+        return self.over_ns(max(hops.values())) if len(hops) > 1 else None
 
     def _turns_for(self, sizes: Sequence[int]) -> int:
         """The turns that packets need at most: none is divided, so the end of each turn may be empty."""

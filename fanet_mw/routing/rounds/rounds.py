@@ -160,7 +160,7 @@ class RoundFlooding(RoutingProtocol):
         self._hears(src, now_ns)
         if self._repair is not None and key in self._repair.pending:
             self._repair.on_copy(key, now_ns=now_ns)
-        if self._spreading.on_copy(key, src, now_ns=now_ns):
+        if self._spreading.on_copy(key, src, neighbors=self._near, now_ns=now_ns):
             origin, seq = origin_and_seq(key)
             self._tell_held(seq, origin, now_ns)
 
@@ -362,7 +362,6 @@ class RoundFlooding(RoutingProtocol):
         self._heard_ns[src] = now_ns
         if not self._near >> (src - 1) & 1:
             self._near |= 1 << (src - 1)
-            self._spreading.neighbors = self._near
             old_ns = now_ns - _FLOOD_HOPS * (self._law.hop_ns + self._blind_ns)
             if self._topology.reaches(src, now_ns):
                 self._spreading.assume(src, until_ns=old_ns)
@@ -376,7 +375,6 @@ class RoundFlooding(RoutingProtocol):
             horizon_ns = now_ns - self._law.silent_ns
             near = {node: heard_ns for node, heard_ns in self._heard_ns.items() if heard_ns >= horizon_ns}
             self._near = sum(1 << (node - 1) for node in near)
-            self._spreading.neighbors = self._near
             self._near_until_ns = min(near.values(), default=now_ns) + self._law.silent_ns
         return self._near
 

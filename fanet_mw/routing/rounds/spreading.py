@@ -107,8 +107,6 @@ class Spreading:
         self._ready: list[tuple[bool, tuple[int, int], int]] = []
         """A heap of the bulk whose instant has come: sent before, rank, key."""
         self._order = 0
-        self.neighbors = 0
-        """The nodes that this node hears, as `RoundFlooding` knows them."""
         self._done: dict[int, _Spread] = {}
         """The packets that need not be sent any more, the latest last."""
         self._early: dict[int, int] = {}
@@ -169,7 +167,7 @@ class Spreading:
         self._bulk.pop(key, None)
         self._waiting.discard(key)
 
-    def on_copy(self, key: int, src: int, *, now_ns: int) -> bool:
+    def on_copy(self, key: int, src: int, *, neighbors: int, now_ns: int) -> bool:
         """A copy was heard from a neighbor; True if the neighbor does not know that this node has the packet."""
         entry = self._entries.get(key)
         own = 1 << (src - 1)
@@ -180,7 +178,7 @@ class Spreading:
             again = bool(done.senders & own)
             done.senders |= own
             return again
-        if self.neighbors & self._links_of(src, now_ns) & ~entry.having:
+        if neighbors & self._links_of(src, now_ns) & ~entry.having:
             entry.copy_ns = now_ns  # who lacks it may have heard that copy
         self._reach(entry, src, now_ns)
         again = bool(entry.senders & own)

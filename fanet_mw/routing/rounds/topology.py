@@ -158,11 +158,6 @@ class Topology:
         self._arrange(now_ns)
         return {node: hops for hops, ring in enumerate(self._rings) for node in nodes_of(ring)}
 
-    def most_hops(self, now_ns: int) -> int:
-        """The hops to the farthest node to which a way is known."""
-        self._arrange(now_ns)
-        return len(self._rings) - 1
-
     def reaches(self, node: NodeId, now_ns: int) -> bool:
         """True if a way to a node is known."""
         self._arrange(now_ns)

@@ -41,7 +41,7 @@ def test_an_urgent_packet_goes_in_the_next_turn_and_once_if_all_neighbors_pass_i
     made = spreading()
     made.take(packet(1), src=2, now_ns=0)
     assert sent_in_turn(made, 1) == [1]
-    made.on_copy(key_of_packet(packet(1)), 3, now_ns=ROUND + 10)
+    made.on_copy(key_of_packet(packet(1)), 3, neighbors=nodes((2, 3)), now_ns=ROUND + 10)
     assert [sent_in_turn(made, turn) for turn in range(2, 6)] == [[], [], [], []]
     assert key_of_packet(packet(1)) not in made
 
@@ -61,10 +61,9 @@ def test_a_neighbor_that_does_not_pass_it_on_gets_it_again_but_not_for_ever() ->
 
 def test_nobody_repeats_what_another_node_has_just_sent() -> None:
     made = spreading()
-    made.neighbors = nodes((2, 3, 5))  # 5 may have heard 2
     made.take(packet(1), src=2, now_ns=0)
     sent_in_turn(made, 1)
-    made.on_copy(key_of_packet(packet(1)), 2, now_ns=ROUND + 60 * MS)
+    made.on_copy(key_of_packet(packet(1)), 2, neighbors=nodes((2, 3, 5)), now_ns=ROUND + 60 * MS)  # 5 may have heard 2
     assert sent_in_turn(made, 2) == []
     assert sent_in_turn(made, 3) == [1]
 
@@ -72,10 +71,9 @@ def test_nobody_repeats_what_another_node_has_just_sent() -> None:
 def test_a_copy_that_nobody_who_lacks_the_packet_can_have_heard_delays_nothing() -> None:
     """Node 2 hears this node and 5 only, and repeats what it does not know this node to have; 3 still lacks it."""
     made = spreading()
-    made.neighbors = nodes((2, 3))
     made.take(packet(1), src=2, now_ns=0)
     sent_in_turn(made, 1)
-    made.on_copy(key_of_packet(packet(1)), 2, now_ns=ROUND + 60 * MS)
+    made.on_copy(key_of_packet(packet(1)), 2, neighbors=nodes((2, 3)), now_ns=ROUND + 60 * MS)
     assert sent_in_turn(made, 2) == [1]
 
 
@@ -92,8 +90,8 @@ def test_who_sends_again_what_this_node_has_sent_is_told_that_it_is_here() -> No
     key = key_of_packet(packet(1))
     made.take(packet(1), src=2, now_ns=0)
     sent_in_turn(made, 1)
-    assert not made.on_copy(key, 3, now_ns=ROUND + 1)
-    assert made.on_copy(key, 3, now_ns=2 * ROUND)
+    assert not made.on_copy(key, 3, neighbors=nodes((2, 3)), now_ns=ROUND + 1)
+    assert made.on_copy(key, 3, neighbors=nodes((2, 3)), now_ns=2 * ROUND)
 
 
 def bulk(seq: int) -> Packet:
@@ -155,8 +153,8 @@ def test_who_sends_bulk_a_second_time_does_not_know_that_this_node_has_it() -> N
     made.take(bulk(1), src=2, now_ns=0, bulk_from_ns=10 * MS)
     made.on_held(key, 3)
     assert bulk_sent(made, 10 * MS) == [], "all have it"
-    assert not made.on_copy(key, 3, now_ns=ROUND), "3 sends it for the first time"
-    assert made.on_copy(key, 3, now_ns=2 * ROUND)
+    assert not made.on_copy(key, 3, neighbors=nodes((2, 3)), now_ns=ROUND), "3 sends it for the first time"
+    assert made.on_copy(key, 3, neighbors=nodes((2, 3)), now_ns=2 * ROUND)
 
 
 def test_who_comes_near_has_got_elsewhere_what_is_old() -> None:

@@ -7,6 +7,7 @@
 import ast
 import io
 import os
+import re
 import statistics
 import subprocess
 import sys
@@ -19,6 +20,8 @@ from typing import Final
 PRODUCT: Final = ("fanet_mw", "agents", "emulator", "sim")
 GENERATED: Final = ("fanet_mw/dialect/fanet.py",)
 SMALL_LINES: Final = 60
+WRITTEN: Final = re.compile(r"<!-- (?:[a-z]+: )?([\w-]+):? (?:generated )?by scripts/.*?<!-- end of \1 -->", re.DOTALL)
+"""A part of a page that a command of ours writes between its marks."""
 
 
 def python_files(tree: Path, folder: str) -> list[Path]:
@@ -165,14 +168,17 @@ def companion(tree: Path) -> Iterator[tuple[str, str]]:
 
 
 def words(tree: Path) -> Iterator[tuple[str, str]]:
-    """Words of the documents by folder, and how many stand in generated pages (their first lines say so)."""
+    """Words of the documents by folder, and how many were generated: whole pages (their first lines say so), and what
+    stands between the marks of a command.
+    """
     counted: Counter[str] = Counter()
     generated: Counter[str] = Counter()
     for path in [*sorted(tree.glob("*.md")), *sorted((tree / "docs").rglob("*.md"))]:
         text = path.read_text()
         folder = path.relative_to(tree).parent.as_posix()
-        made = "generated" in text[:600].lower()
-        (generated if made else counted)[folder] += len(text.split())
+        by_hand = "" if "generated" in text[:600].lower() else WRITTEN.sub("", text)
+        counted[folder] += len(by_hand.split())
+        generated[folder] += len(text.split()) - len(by_hand.split())
     for folder, count in sorted(counted.items()):
         yield f"words by hand, {folder}", f"{count}"
     yield "words by hand, all", f"{sum(counted.values())}"

@@ -1,13 +1,11 @@
 """The dialect: the module is what the XML gives, the XML stands beside common.xml, and the document says the same."""
 
 import importlib.util
-import re
 import shutil
 import struct
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import common
@@ -141,24 +139,27 @@ def test_the_last_byte_on_the_wire_is_the_version(spec: wire.Spec) -> None:
 
 # --- the document -------------------------------------------------------------------------------------------------
 
-SIZES = {"uint64": "Q", "uint32": "I", "uint16": "H", "int16": "h", "uint8": "B", "int8": "b", "float": "f"}
-ROW = re.compile(r"^\| (\d+) \| `(\w+)` \| (\w+)(?:\[(\d+)\])? \| ([\w/%]*) ?\| .+ \|$", re.MULTILINE)
+
+@pytest.fixture
+def generate_tables() -> Callable[..., int]:
+    main: Callable[..., int] = load(ROOT / "scripts" / "generate_air_reference.py", "generate_air_reference").main
+    return main
 
 
-@pytest.mark.parametrize("spec", wire.SPECS, ids=lambda spec: str(spec.msgid))
-def test_the_document_has_every_field_with_its_offset_type_and_unit(spec: wire.Spec) -> None:
-    message: Any = fanet.mavlink_map[spec.msgid]
-    (section,) = re.findall(rf"^## {message.msgname} \({spec.msgid}\)\n(.*?)(?=^##? |\Z)", DOCUMENT, re.S | re.M)
-    size = spec.layout.size
-    assert f"Payload {size} bytes, frame {size + wire.OVERHEAD}, CRC_EXTRA {spec.crc_extra}." in section
-    rows = ROW.findall(section)
-    assert [name for _, name, *_ in rows] == message.ordered_fieldnames
-    layout = "<"
-    for offset, name, kind, count, unit in rows:
-        assert struct.calcsize(layout) == int(offset), name
-        layout += count + SIZES[kind]
-        assert message.fieldunits_by_name.get(name, "") == unit, name
-    assert layout == spec.layout.format
+def test_the_tables_of_fields_checked_in_are_what_dialect_and_codecs_give(generate_tables: Callable[..., int]) -> None:
+    assert generate_tables(["--check"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("| 8 | `survivor`", "| 4 | `survivor`"), ("fields: FANET_TIME by", "FANET_TIME by")]
+)
+def test_a_table_edited_by_hand_or_missing_fails_the_check(
+    generate_tables: Callable[..., int], tmp_path: Path, old: str, new: str
+) -> None:
+    for page in _PAGES:
+        shutil.copy(ROOT / "docs" / "reference" / page, tmp_path)
+    edit(tmp_path / "air-messages.md", old=old, new=new)
+    assert generate_tables(["--check"], folder=tmp_path) == 1
 
 
 def test_the_document_sums_up_every_message() -> None:

@@ -1,0 +1,85 @@
+"""Generate the tables of fields in docs/reference/air-*.md, from the dialect and the codecs; `--check` compares."""
+
+import re
+import struct
+import sys
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from fanet_mw import wire
+from fanet_mw.dialect import fanet
+
+ROOT: Final = Path(__file__).resolve().parent.parent
+PAGES: Final = ("air-format.md", "air-messages.md", "air-messages-clusters.md", "air-messages-search.md")
+TYPES: Final = {
+    "uint64_t": "Q",
+    "uint32_t": "I",
+    "uint16_t": "H",
+    "int16_t": "h",
+    "uint8_t": "B",
+    "int8_t": "b",
+    "float": "f",
+}
+PART: Final = re.compile(
+    r"(<!-- fields: (\w+) by scripts/generate_air_reference.py -->\n).*?(<!-- end of \2 -->\n)", re.DOTALL
+)
+
+
+def described(spec: wire.Spec, entry: ET.Element) -> str:
+    """What the dialect says of a message, its sizes, and its fields in the order of the wire."""
+    message: Any = fanet.mavlink_map[spec.msgid]
+    size = spec.layout.size
+    text = [
+        f"{entry.findtext('description')}",
+        f"Payload {size} bytes, frame {size + wire.OVERHEAD}, CRC_EXTRA {spec.crc_extra}.",
+        "",
+        "| offset | field | type | unit | meaning |",
+        "|--:|---|---|---|---|",
+    ]
+    fields = {field.get("name", ""): field for field in entry.iter("field")}
+    layout = "<"
+    for name in message.ordered_fieldnames:
+        field = fields[name]
+        kind, _, count = field.get("type", "").removesuffix("]").partition("[")
+        shown = kind.removesuffix("_t") + (f"[{count}]" if count else "")
+        unit = field.get("units", "")
+        text.append(f"| {struct.calcsize(layout)} | `{name}` | {shown} | {unit + ' ' if unit else ''}| {field.text} |")
+        layout += count + TYPES[kind]
+    assert layout == spec.layout.format, f"the codec of {message.msgname} is not that of the dialect"
+    return "\n".join(text) + "\n"
+
+
+def main(arguments: Sequence[str], *, folder: Path = ROOT / "docs" / "reference") -> int:
+    """Write the tables, or with --check say which page is not what would be written."""
+    if arguments not in ([], ["--check"]):
+        sys.stderr.write(f"usage: generate_air_reference.py [--check]; got {' '.join(arguments)}\n")
+        return 2
+    entries = {
+        entry.get("name", ""): entry
+        for entry in ET.parse(ROOT / "fanet_mw/dialect/fanet.xml").iter("message")  # noqa: S314 - our own file
+    }
+    tables = {
+        name: described(spec, entries[name]) for spec in wire.SPECS for name in [fanet.mavlink_map[spec.msgid].msgname]
+    }
+    found, wrong = [], []
+    for page in (folder / name for name in PAGES):
+        text = page.read_text(encoding="utf-8")
+        found += [name for _, name, _ in PART.findall(text)]
+        wanted = PART.sub(lambda part: part[1] + tables[part[2]] + part[3], text)
+        if wanted != text:
+            wrong.append(page.name)
+            if not arguments:
+                page.write_text(wanted, encoding="utf-8")
+    if sorted(found) != sorted(tables):
+        sys.stderr.write(f"without a table, or with two: {sorted(set(tables) ^ set(found)) or found}\n")
+        return 1
+    if arguments and wrong:
+        sys.stderr.write(f"run scripts/generate_air_reference.py and check in {', '.join(wrong)}\n")
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

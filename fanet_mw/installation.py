@@ -37,25 +37,16 @@ def damage() -> str | None:
     """What is wrong with this installation, and how to repair it; None if it is complete. No package is imported."""
     for package in PACKAGES:
         spec = find_spec(package)
-        if spec is not None and spec.origin is None and spec.submodule_search_locations:
-            return f"{next(iter(spec.submodule_search_locations))} {_in_the_way(package)}"
-        if spec is None or spec.origin is None:
+        if spec is None or (spec.origin is None and not spec.submodule_search_locations):
             return f"the package {package!r} of fanet-mw is not there (another distribution removed it?); {_REMEDY}"
-        path = Path(spec.origin)
-        if _MARK not in path.read_text(encoding="utf-8", errors="replace"):
-            owner = _owner(package)
+        path = Path(spec.origin or next(iter(spec.submodule_search_locations or ())))
+        if spec.origin is None or _MARK not in path.read_text(encoding="utf-8", errors="replace"):
             place = path.parent if path.name == "__init__.py" else path
-            if not owner:
-                return f"{place} {_in_the_way(package)}"
-            return f"{place} is not the package {package!r} of fanet-mw{owner}; {_REMEDY}"
+            return (
+                f"{place} is not the package {package!r} of fanet-mw, and comes before it on sys.path or has overwritten "
+                f"it; if it is yours, give it another name or take its folder off the path, else {_REMEDY}"
+            )
     return None
-
-
-def _in_the_way(package: str) -> str:
-    return (
-        f"is not the package {package!r} of fanet-mw, and comes before it on sys.path; if it is yours, give it another "
-        "name or take its folder off the path"
-    )
 
 
 def missing_extra(error: ModuleNotFoundError, what: str = "this command") -> str | None:
@@ -64,11 +55,3 @@ def missing_extra(error: ModuleNotFoundError, what: str = "this command") -> str
     if extra is None:
         return None
     return f"{what} needs {error.name}, which is not installed: pip install 'fanet-mw[{extra}]'"
-
-
-def _owner(package: str) -> str:
-    """The other distributions that contain a package of this name."""
-    from importlib.metadata import packages_distributions  # imported only here, because it takes long
-
-    others = sorted({name for name in packages_distributions().get(package, ()) if name != "fanet-mw"})
-    return f": it was installed by {', '.join(others)}" if others else ""

@@ -27,7 +27,6 @@ from sim.results.links import LinkTotals
 from sim.results.outcome import Outcome
 from sim.run.collecting.taps import TapLog
 from sim.run.garbage import GARBAGE
-from sim.run.huge_pages import HugePages
 from sim.run.stoppable_uav import StoppableUav
 from sim.world.environment.layout import positions
 from sim.world.environment.map_on_board import map_on_board
@@ -45,8 +44,7 @@ def no_applications(_: int) -> Sequence[Application]:
 
 
 _STEP_NS: Final = 100 * MS
-"""The time between two checks for signals, and for memory to be kept in huge pages. The result of a run does not depend
-on it."""
+"""The time between two checks for signals. The result of a run does not depend on it."""
 
 
 def actors_of(
@@ -196,11 +194,9 @@ def _run(observed: Observed, on_progress: Callable[[float], None], signals: Sequ
     if signals:
         raise KeyboardInterrupt(signals[0])
     host.start()
-    pages = HugePages()
     for until_ns in range(_STEP_NS, scenario.duration_ns + _STEP_NS, _STEP_NS):
         host.run(min(until_ns, scenario.duration_ns))
         observed.tell_reports()
-        pages.keep_up()
         on_progress(host.now_ns / S)
         if signals:
             break

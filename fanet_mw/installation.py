@@ -43,8 +43,8 @@ def damage() -> str | None:
         if spec.origin is None or _MARK not in path.read_text(encoding="utf-8", errors="replace"):
             place = path.parent if path.name == "__init__.py" else path
             return (
-                f"{place} is not the package {package!r} of fanet-mw, and comes before it on sys.path or has overwritten "
-                f"it; if it is yours, give it another name or take its folder off the path, else {_REMEDY}"
+                f"{place} is not the package {package!r} of fanet-mw, and comes before it on sys.path or has "
+                f"overwritten it; if it is yours, give it another name or take its folder off the path, else {_REMEDY}"
             )
     return None
 

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """The size of the house: lines by kind, files, words of documents, files that a packet enters, circles of folders.
 
-`scripts/census.py [TREE]` counts a tree; `scripts/census.py TREE TREE` prints two of them beside each other.
+`scripts/census.py [TREE]` counts a tree; `scripts/census.py TREE TREE` prints two of them beside each other;
+`--small` lists files that could go into their one reader, `--questions` what a reviewer might ask about.
 """
 
 import ast
@@ -20,6 +21,9 @@ from typing import Final
 PRODUCT: Final = ("fanet_mw", "agents", "emulator", "sim")
 GENERATED: Final = ("fanet_mw/dialect/fanet.py",)
 SMALL_LINES: Final = 60
+WORDS: Final = 10
+SENTENCES: Final = 4
+ATTRIBUTES: Final = 15
 WRITTEN: Final = re.compile(r"<!-- (?:[a-z]+: )?([\w-]+):? (?:generated )?by scripts/.*?<!-- end of \1 -->", re.DOTALL)
 """A part of a page that a command of ours writes between its marks."""
 
@@ -217,8 +221,41 @@ def census(tree: Path) -> dict[str, str]:
     return found
 
 
+def questions(tree: Path) -> Iterator[str]:
+    """Places that a reviewer may ask about; no number here is a limit."""
+    for folder in (*PRODUCT, "tests"):
+        for path in python_files(tree, folder):
+            for node in ast.walk(ast.parse(path.read_text())):
+                if not isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+                    continue
+                where = f"{path.relative_to(tree)}:{node.lineno}: {node.name}"
+                said = ast.get_docstring(node) or ""
+                if folder == "tests":
+                    words = len(node.name.split("_")) - 1
+                    if node.name.startswith("test_") and words > WORDS:
+                        yield f"{where}: {words} words"
+                    continue
+                if re.search(r"\b(we|our|ours)\b", said, re.IGNORECASE):
+                    yield f"{where}: speaks of its authors"
+                if len(re.findall(r"[.!?](?:\s|$)", said.replace("e.g.", ""))) > SENTENCES:
+                    yield f"{where}: more than {SENTENCES} sentences"
+                if isinstance(node, ast.ClassDef):
+                    stored = {
+                        target.attr
+                        for inner in ast.walk(node)
+                        for target in ast.walk(inner)
+                        if isinstance(target, ast.Attribute) and isinstance(target.ctx, ast.Store)
+                        and isinstance(target.value, ast.Name) and target.value.id == "self"
+                    }  # fmt: skip
+                    if len(stored) > ATTRIBUTES:
+                        yield f"{where}: {len(stored)} attributes"
+
+
 def main() -> int:
     here = Path(__file__).parents[1]
+    if sys.argv[1:] == ["--questions"]:
+        print(*questions(here), sep="\n")
+        return 0
     if sys.argv[1:] == ["--small"]:  # what could be folded into its one reader
         paths = [path for folder in PRODUCT for path in python_files(here, folder)]
         needs = imports(here, paths)

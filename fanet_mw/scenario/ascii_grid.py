@@ -5,6 +5,7 @@ degrees, as OpenTopography delivers them. The heights themselves are read where 
 """
 
 import math
+import re
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
@@ -15,6 +16,9 @@ _KEYS: Final = {
     "xllcorner": "xllcorner", "yllcorner": "yllcorner", "xllcenter": "xllcenter", "yllcenter": "yllcenter",
     "nodata_value": "nodata", "nodata": "nodata",
 }  # fmt: skip
+_SIDES: Final = ("cellsize", "dx", "dy")
+THOUSANDS: Final = re.compile(r"[1-9]\d{0,2},\d{3}")
+"""A comma that may be one of thousands."""
 COMMENTS: Final = ("#", "//", "!")
 _COARSEST_DEG: Final = 0.02
 """A grid with places in degrees has cells of at most this; cells of less than 2 cm there are none."""
@@ -66,7 +70,14 @@ def parse(data: bytes) -> AsciiGrid:
             break
         if len(words) != 2:
             raise ValueError(f"line {at + 1}: {line.strip()[:60]!r} must be a key and one number")
-        found[key] = number(words[1], line=at + 1)
+        value = number(words[1], line=at + 1)
+        if key in _SIDES and THOUSANDS.fullmatch(words[1]):
+            raise ValueError(f"line {at + 1}: {words[1]} may be thousands or a decimal comma; write {words[0]} without")
+        if found.setdefault(key, value) != value and not math.isnan(value):
+            raise ValueError(f"line {at + 1}: {words[0]} = {words[1]}, and {found[key]:g} in a line above")
+    for key in ("dx", "dy"):
+        if key in found and found.get("cellsize", found[key]) != found[key]:
+            raise ValueError(f"{key} = {found[key]:g} contradicts cellsize = {found['cellsize']:g}")
     columns, rows = _count(found, "ncols"), _count(found, "nrows")
     cell = _side(found, "dx"), _side(found, "dy")
     middle = (
@@ -86,7 +97,10 @@ def number(text: str, *, line: int) -> float:
 
 def _text(data: bytes) -> str:
     """The text of a file; byte-order marks say in which encoding it is, and comments may be in any."""
-    text = decoded(data, otherwise="latin-1")
+    try:
+        text = decoded(data)
+    except UnicodeDecodeError:
+        text = decoded(data, otherwise="latin-1")
     if "\0" in text[:4096]:
         raise ValueError("it is binary")
     return text

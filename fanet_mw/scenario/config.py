@@ -9,7 +9,7 @@ import re
 import unicodedata
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -18,13 +18,11 @@ from fanet_mw.extensions import AS_TEXT
 from fanet_mw.foreign_file import require_plain, toml_of
 from fanet_mw.scenario import Scenario, map_files
 from fanet_mw.scenario.overrides import apply_override
+from fanet_mw.scenario.packets_csv import packets_of
 from fanet_mw.scenario.quantities import in_unit_of, unit_of
 from fanet_mw.scenario.tables.world import FILE_KEYS
 from fanet_mw.scenario.text_files import read_text
 from fanet_mw.scenario.validation_errors import sentences
-
-_LIKE_A_NUMBER: Final = re.compile(r"[-+.\d]")
-_DECIMAL: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,2})?")
 
 
 def load(path: Path, overrides: Iterable[str] = ()) -> Scenario:
@@ -105,7 +103,7 @@ def _from_folder(tree: dict[str, Any], folder: Path) -> None:
     traffic = tree.get("traffic")
     for number, table in enumerate(traffic if isinstance(traffic, list) else [traffic]):
         if isinstance(table, dict) and isinstance(table.get("packets_csv"), str) and table["packets_csv"]:
-            table["packets"] = _packets(folder / table.pop("packets_csv"), f"traffic.{number}.packets_csv")
+            table["packets"] = packets_of(folder / table.pop("packets_csv"), key=f"traffic.{number}.packets_csv")
     map_files.take_in(tree, folder)
     world = tree.get("world")
     if not isinstance(world, dict):
@@ -113,38 +111,6 @@ def _from_folder(tree: dict[str, Any], folder: Path) -> None:
     for key in FILE_KEYS:
         if isinstance(world.get(key), str) and world[key]:
             world[key] = str(folder.absolute() / world[key])
-
-
-def _packets(path: Path, key: str) -> list[tuple[float, int]]:
-    """The packets of a file with `seconds,bytes` on each line, as spreadsheets write it: also with semicolons or tabs,
-    and then with decimal commas; raises ConfigError with the line that is wrong.
-    """
-    text = read_text(path, what=f"{key} = {path}")
-    between = next((mark for mark in (";", "\t") if mark in text), ",")
-    found: list[tuple[float, int]] = []
-    may_be_heading = True
-    for number, line in enumerate(text.splitlines(), start=1):
-        cells = [cell.strip().strip("\"'").strip() for cell in line.rstrip(f"{between} \t").split(between)]
-        if not "".join(cells) or line.startswith("#"):
-            continue
-        if between != ",":
-            cells = [cell.replace(",", ".", 1) for cell in cells]
-        is_heading = may_be_heading and not any(_LIKE_A_NUMBER.match(cell) for cell in cells)
-        may_be_heading = False
-        if is_heading:
-            continue
-        seconds, size = map(_number, cells) if len(cells) == 2 else (None, None)
-        if seconds is None or size is None or seconds < 0 or size != int(size):
-            raise ConfigError(
-                f"{key} = {path}, line {number}: {line!r} must be seconds,bytes: a number >= 0 and a whole one"
-            )
-        found.append((seconds, int(size)))
-    return found
-
-
-def _number(text: str) -> float | None:
-    """A finite number as people write it; None for anything else."""
-    return float(text) if _DECIMAL.fullmatch(text) else None
 
 
 def _plain(key: str, value: object, problems: list[str], path: str) -> object:

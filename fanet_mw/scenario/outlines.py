@@ -5,6 +5,7 @@ Read are collections of features, single ones and one a line (RFC 8142), with ta
 that it is no building, such as a park.
 """
 
+import contextlib
 import json
 import math
 import re
@@ -19,6 +20,8 @@ _NO_BUILDINGS: Final = (
 """Tags of areas that are no buildings, unless they have the tag `building`, too."""
 _BUILDING: Final = ("building", "building:part")
 _OTHER_TAG: Final = re.compile(r'"([^"]+)"=>"([^"]*)"')
+_WGS84: Final = re.compile(r"WGS ?84|CRS84|4326|4979|4258", re.IGNORECASE)
+"""What names a reference system in longitude and latitude, as GeoJSON of 2008 still does."""
 _TURN_DEG: Final = 360.0
 _MOST_LON_DEG: Final = 190.0
 """Towns across 180 degrees are also written with longitudes that run on."""
@@ -90,6 +93,14 @@ def _tree(data: bytes) -> Any:  # noqa: ANN401  (JSON)
         raise ValueError("it is the JSON of Overpass; export it as GeoJSON")
     if not isinstance(tree, dict) or "type" not in tree:
         raise ValueError("it is no object with a type")
+    crs = tree.get("crs") or "WGS84"
+    if isinstance(crs, dict) and isinstance(crs.get("properties"), dict):
+        crs = crs["properties"].get("name", crs)
+    if not _WGS84.search(str(crs)):
+        raise ValueError(
+            f"its crs is {str(crs)[:80]}; convert the file to EPSG:4326: "
+            "ogr2ogr -t_srs EPSG:4326 town.geojson in.geojson"
+        )
     return tree
 
 
@@ -142,10 +153,13 @@ def _tags(properties: object) -> Mapping[str, Any]:
     if isinstance(others, str):
         found.update(_OTHER_TAG.findall(others))
     nested = properties.get("tags")
+    if isinstance(nested, str) and nested.startswith("{"):
+        with contextlib.suppress(ValueError):
+            nested = json.loads(nested)
     if isinstance(nested, dict):
         found.update(nested)
     found.update((key, value) for key, value in properties.items() if value is not None)
-    return found
+    return {**{key.lower(): value for key, value in found.items()}, **found}  # shapefiles have HEIGHT
 
 
 def _is_building(tags: Mapping[str, Any]) -> bool:

@@ -96,3 +96,6 @@ def _guessed(scenario: Scenario) -> Iterator[str]:
             others = f"; and {len(found) - _NAMED} others" if len(found) > _NAMED else ""
             noun = "buildings " if found is town.guessed else ""
             yield f"world.buildings_geojson: {len(found)} {noun}{what}: {'; '.join(found[:_NAMED])}{others}"
+    if town.untold:
+        default_m = sum(world.building_height_m) / 2
+        yield f"world.buildings_geojson: {town.untold} buildings state no height: taken as {default_m:g} m"

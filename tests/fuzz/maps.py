@@ -62,14 +62,19 @@ def grid(random: Random) -> Sample:
     elif fate < 0.35:
         cells[random.randrange(side)][random.randrange(side)] = random.choice(("x", "1.2.3", "--5", "1'000", "10m"))
         meaning = None
+    elif fate < 0.37:
+        header.insert(random.randrange(len(header)), (random.choice(("cellsize", "dx")), "20"))
+        meaning = None
     elif fate < 0.4:
         header = [line for line in header if line[0].lower() != random.choice(("ncols", "nrows"))]
         meaning = meaning if len(header) >= 5 + ("dx" in dict(header)) + (declared is not None) else None
-    between = random.choice((" ", "  ", "\t", ";", ", " if meaning is not None else " "))
+    between = random.choice((" ", "  ", "\t", ";", "\u00a0", ", " if meaning is not None else " "))
     comma = between != ", " and random.random() < 0.25
     lines = [f"{key}{random.choice((' ', '     ', chr(9)))}{value}" for key, value in header]
     if random.random() < 0.3:
         lines.insert(random.randrange(len(lines)), random.choice(("# made by hand", "// metres above the sea", "")))
+    if comma and all(len(cell) == 5 and cell[1] == "." and cell[0] > "0" for row in cells for cell in row):
+        meaning = None  # "1,234" may be thousands
     text = "\n".join([*lines, *(between.join(row) for row in cells)]) + random.choice(("\n", "", "\n\n"))
     return Sample(written(random, text.replace(".", ",") if comma else text), meaning)
 
@@ -87,6 +92,9 @@ HEIGHTS: tuple[tuple[dict[str, object], float], ...] = (
     ({"building:levels": "4F"}, 12.0), ({"building:levels": "3 storeys"}, 9.0), ({"height": "12."}, 12.0),
     ({"height": "12 mt"}, 12.0), ({"height": "9 m (est.)"}, 9.0), ({"height": "1,200"}, 19.0),
     ({"height": True}, 19.0), ({"height": "NaN"}, 19.0), ({"height": "12 стор."}, 19.0), ({"height": "١٢"}, 12.0),
+    ({"HEIGHT": 12}, 12.0), ({"height": "40\u2019"}, 12.192), ({"height": "12m50"}, 19.0), ({"height": "12 cm"}, 19.0),
+    ({"height": "6 ft 6 in"}, 1.9812), ({"building:levels": "G+3"}, 19.0), ({"building:levels": "3;roof"}, 9.0),
+    ({"building:levels": "-1"}, 19.0), ({"height": "10,000"}, 19.0), ({"height": "nicht bekannt"}, 19.0),
 )  # fmt: skip
 """Tags of a building, and its height; 19 m is the default."""
 
@@ -127,7 +135,7 @@ def town(random: Random) -> Sample:
             }
         properties: dict[str, object] = {"building": "yes", "@id": f"way/{number}", **tags}
         if random.random() < 0.2:
-            properties = {"type": "way", "tags": properties}
+            properties = {"type": "way", "tags": random.choice((properties, json.dumps(properties)))}
         features.append({"type": "Feature", "id": number, "properties": properties, "geometry": geometry})
         heights.append(height)
     for odd in ODD:
@@ -168,8 +176,20 @@ def trace(random: Random) -> Sample:
     elif random.random() < 0.1:
         lines[0] = between.join(("l.5", "100"))
         meaning = None
+    if between == "," and random.random() < 0.1 and meaning is not None:
+        lines = [f'"{seconds:.4f}","{size}"'.replace(".", ",") for seconds, size in packets]
+    headings = [(("seconds", "bytes"), True), (("t [s]", "size"), True), (("Zeit", "Größe"), True)]
+    headings += [(("t_ms", "bytes"), False), (("bytes", "seconds"), False), (("s", "kB"), False)]
     if random.random() < 0.5:
-        lines.insert(0, between.join(random.choice((("seconds", "bytes"), ("t [s]", "size"), ("Zeit", "Größe")))))
+        heading, is_right = headings[random.choice((0, 0, 1, 1, 2, 2, 3, 4, 5))]
+        lines.insert(0, between.join(heading))
+        meaning = meaning if is_right else None
+    if random.random() < 0.1:
+        lines.insert(random.randrange(len(lines) + 1), f"{random.choice(('#N/A', '#VALUE!', '#DIV/0!'))}{between}100")
+        meaning = None
     if random.random() < 0.3:
-        lines.insert(random.randrange(len(lines) + 1), random.choice(("", "# pause", "   ")))
+        remark = random.choice(("", "# pause", "   ", "# a pause; long", "  # of a\tpause"))
+        lines.insert(random.randrange(len(lines) + 1), remark)
+    if random.random() < 0.1:
+        lines.insert(0, f"sep={between.strip(' ')}")
     return Sample(written(random, "\n".join(lines) + random.choice(("\n", ""))), meaning)

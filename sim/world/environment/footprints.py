@@ -40,7 +40,7 @@ _KEYS: Final = (
 _NUMBER: Final = r"\+?(?:\d+(?:\.\d*|,(?!\d{3}(?!\d))\d*)?|[.,]\d+)"
 """A comma before three digits may be one of thousands, so that number is not read."""
 _FEET: Final = re.compile(
-    rf"({_NUMBER})\s*(?:'|ft\.?|feet|foot|\u2032)\s*(?:({_NUMBER})\s*(?:\"|in\.?|inch(?:es)?|\u2033|'')?)?"
+    rf"({_NUMBER})\s*(?:['\u2019\u00b4\u2032]|ft\.?|feet|foot)\s*(?:({_NUMBER})\s*(?:[\"\u201d\u2033]|in\.?|inch(?:es)?|''|\u2019\u2019)?)?"
 )
 _METRES: Final = re.compile(
     rf"({_NUMBER})\s*(?:m\.?|mt|mts|mtrs?|metres?|meters?|mètres?|\u043c\.?|\u043c\u0435\u0442\u0440\w*)?"
@@ -70,6 +70,8 @@ class Town(NamedTuple):
     """The number of buildings in the file."""
     guessed: tuple[str, ...]
     """The buildings within the area of which a tag could not be read as it is written."""
+    untold: int
+    """The number of buildings within the area of which no tag states a height."""
     broken: tuple[str, ...]
     """The outlines of the file that enclose nothing."""
 
@@ -93,6 +95,7 @@ def read(path: Path, *, origin_deg: tuple[float, float], height_m: float, area_m
     origin = Geodetic(*origin_deg, 0.0)
     boxes: list[Footprint] = []
     guessed: list[str] = []
+    untold = 0
     for outline in found.buildings:
         ring = _plane(outline.ring, origin)
         whole = _rectangle(ring, 0.0)
@@ -102,22 +105,29 @@ def read(path: Path, *, origin_deg: tuple[float, float], height_m: float, area_m
         boxes += _parts(ring, whole, height)
         if why:
             guessed.append(f"{outline.name}: {why}")
-    return Town(tuple(boxes), len(found.buildings), tuple(guessed), tuple(found.broken))
+        untold += not any(_said(outline.tags, key) for key, _ in _KEYS)
+    return Town(tuple(boxes), len(found.buildings), tuple(guessed), untold, tuple(found.broken))
 
 
 def height_of(tags: Mapping[str, Any], default_m: float) -> tuple[float, str]:
     """The height that the tags of a building state, and what had to be guessed, if anything."""
     passed: list[str] = []
     for key, unit_m in _KEYS:
-        if (said := tags.get(key)) is None or not str(said).strip():
+        said = _said(tags, key)
+        if not said:
             continue
-        values = _values(str(said), in_levels=unit_m != 1.0)
+        values = _values(said, in_levels=unit_m != 1.0)
         height = max((value for value in values if value is not None), default=0.0) * unit_m
         if 0 < height <= _HIGHEST_M:
             passed += [f"{key} = {said}"] if len(values) > 1 else []
             return height, f"{', '.join(passed)}: taken as {height:g} m" if passed else ""
         passed.append(f"{key} = {said}")
     return default_m, f"{', '.join(passed)}: taken as {default_m:g} m" if passed else ""
+
+
+def _said(tags: Mapping[str, Any], key: str) -> str:
+    """The text of a tag; empty if there is none."""
+    return "" if tags.get(key) is None else str(tags[key]).strip()
 
 
 def _values(text: str, *, in_levels: bool) -> list[float | None]:

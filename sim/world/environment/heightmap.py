@@ -31,6 +31,8 @@ _MOST_CELLS: Final = 64_000_000
 _LOWEST_M: Final = -500.0
 _HIGHEST_M: Final = 9000.0
 """Land lies between the shore of the Dead Sea, -430 m, and Mount Everest, 8849 m."""
+_THOUSANDS_M: Final = re.compile(r"[1-9],\d{3}")
+"""A height with a comma that may be one of thousands; no land is higher."""
 _TIFF: Final = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _TILE: Final = re.compile(r"([NS])(\d\d)([EW])(\d\d\d)", re.IGNORECASE)
 
@@ -260,7 +262,13 @@ def _numbers(grid: ascii_grid.AsciiGrid) -> Rows:
     lines = [line for line in grid.lines if not line.lstrip().startswith(ascii_grid.COMMENTS)]
     text = "\n".join(lines).replace(";", " ").replace("\t", " ")
     if "," in text:  # between two heights, unless each of them may have one as its decimal comma
-        is_decimal = len(text.split()) == count and not re.search(r",\s|\.", text)
+        words = text.split()
+        is_decimal = len(words) == count and not re.search(r",\s|\.", text)
+        if is_decimal and all("," not in word or _THOUSANDS_M.fullmatch(word) for word in words):
+            height = next(word for word in words if "," in word)
+            raise ValueError(
+                f"the comma in {height}, and in all other heights, may be one of thousands or a decimal one"
+            )
         text = text.replace(",", "." if is_decimal else " ")
     words = re.sub(r"-?1\.#\w+", "nan", text).split() if "#" in text else text.split()
     try:

@@ -176,6 +176,9 @@ def test_a_contention_window_that_leaves_one_claimed_turn_is_accepted() -> None:
         "0,5;200\n1,5;300\n",
         "Zeit;Bytes\n0,5;200;\n1,5;300;\n",
         "0.5\t200\n1.5\t300\n",
+        "sep=;\nZeit;Bytes\n0,5;200\n1,5;300\n",
+        'seconds,bytes\n"0,5","200"\n"1,5","300"\n',
+        "# by hand; for a try\n0.5,200\n  # a pause\n1.5,300\n",
     ],
 )
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
@@ -196,6 +199,13 @@ def test_no_packet_of_a_spreadsheet_is_lost(tmp_path: Path, text: str, encoding:
         ("0.5,nan\n", "line 1: '0.5,nan'"),
         ("0,5,200\n", "line 1: '0,5,200'"),
         ("0.5,1_000\n", "line 1: '0.5,1_000'"),
+        ("0.5," + "9" * 400, "line 1: '0.5,999"),
+        ('"1,500","200"\n', 'line 1: \'"1,500","200"\''),
+        ("0.5,200\n#N/A,300\n", "line 2: '#N/A,300'"),
+        ("t [ms],bytes\n500,200\n", "'t [ms],bytes': the cells of each line must be seconds and bytes, in this order"),
+        ("size;time\n1500;100\n", "line 1: 'size;time': the cells of each line must be seconds and bytes"),
+        ("seconds,kB\n1,100\n", "line 1: 'seconds,kB': the cells"),
+        ("seconds,bytes\n", "load.csv: holds no line seconds,bytes"),
     ],
 )
 def test_a_line_of_a_packet_file_that_is_none_is_named(tmp_path: Path, text: str, wrong: str) -> None:

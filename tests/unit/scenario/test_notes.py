@@ -93,6 +93,18 @@ def test_a_guessed_height_is_noted_before_the_run_and_in_its_summary(
     assert summary["notes"] == [f"world.buildings_geojson: {said}"]
 
 
+def test_buildings_without_a_height_are_counted(tmp_path: Path) -> None:
+    ring = [[2.3538, 48.8564], [2.3542, 48.8564], [2.3542, 48.8568], [2.3538, 48.8564]]
+    houses = [
+        {"type": "Feature", "properties": tags, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+        for tags in ({"building": "yes"}, {"height": " "}, {"height": "9"}, {"building:levels": "3"})
+    ]
+    (tmp_path / "town.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": houses}))
+    (tmp_path / "s.toml").write_text(TOWN)
+    said = "world.buildings_geojson: 2 buildings state no height: taken as 19 m"
+    assert notes(config.load(tmp_path / "s.toml")) == [said]
+
+
 @pytest.mark.parametrize(
     ("changes", "told"),
     [((), True), (("radio.scatterer_speed_m_s=1",), False), (("mobility.model=random_waypoint",), False)],

@@ -66,6 +66,7 @@ CORNER = "xllcorner 448000\nyllcorner 5411000\ncellsize 10"
         (grid(CORNER, [[f"{v:.3f}".replace(".", ",") for v in row] for row in hill()]), "decimal commas"),
         (grid(CORNER, [[f"{v:.3f}".replace(".", ",") for v in row] for row in hill()], between=";"), "both"),
         (grid(CORNER, hill()).replace("\n201", " 201"), "one long line"),
+        (grid(CORNER, hill(), between="\u00a0"), "hard spaces"),
     ],
     ids=lambda value: value if len(value) < 30 else "",
 )
@@ -123,6 +124,10 @@ def test_a_declared_void_is_recognized_in_other_digits_and_counts_for_nothing_ou
         (grid(CORNER, hill()).replace("cellsize 10", "cellsize ten"), r"line 5: 'ten' is no number"),
         (grid(CORNER, hill()).replace("ncols 11", "columns 11"), r"line 1: 'columns 11' is no line of the header"),
         (grid(CORNER, hill()).replace("cellsize 10\n", ""), r"no cellsize, nor dx and dy"),
+        (grid(f"{CORNER}\ncellsize 20", hill()), r"line 6: cellsize = 20, and 10 in a line above"),
+        (grid(f"{CORNER}\ndx 20\ndy 20", hill()), r"dx = 20 contradicts cellsize = 10"),
+        (grid(CORNER, hill()).replace("cellsize 10", "cellsize 1,000"), r"line 5: 1,000 may be thousands or"),
+        (grid(CORNER, [[f"1,{i:03}" for i in range(j, j + 11)] for j in range(11)]), r"comma in 1,000, .* thousands"),
         ("\0\1\2" * 99, "it is binary"),
     ],
 )
@@ -287,6 +292,10 @@ def town(path: Path, origin: Geodetic = PARIS) -> footprints.Town:
         ({"levels": "many"}, 19.0, True),
         ({"building": "yes"}, 19.0, False),
         ({"tags": {"height": "30"}}, 30.0, False),
+        ({"tags": '{"height": "30"}'}, 30.0, False),
+        ({"HEIGHT": 30}, 30.0, False),
+        ({"height": "40\u2019"}, 12.192, False),
+        ({"height": "5\u20196\u201d"}, 1.6764, False),
         ({"other_tags": '"height"=>"30 ft","name"=>"a"'}, 9.144, False),
     ],
 )
@@ -418,6 +427,7 @@ def test_the_smallest_rectangle_may_lie_along_a_side_of_the_hull_alone(tmp_path:
         ('{"type": "FeatureCollection"}', "features are no list"),
         ('\ufeff<?xml version="1.0"?><osm/>', "it is XML or HTML: export it"),
         ("PK\x03\x04", "it is a ZIP archive: unpack it"),
+        ('{"type": "Polygon", "crs": {"properties": {"name": "EPSG:3857"}}}', "its crs is EPSG:3857; convert the file"),
         ("SQLite format 3\0", "a GeoPackage or another SQLite database"),
     ],
 )

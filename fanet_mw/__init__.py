@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         Battery,
         Camera,
         CameraImage,
+        FlightState,
         Gps,
         Inertial,
         Radar,
@@ -54,8 +55,8 @@ _HOMES: Final = {
         "ANY", "HOME", "AppPort", "Application", "Course", "Data", "Fate", "Received", "Status",
     ),
     "fanet_mw.bus.messages": (
-        "Altimeter", "Battery", "Camera", "CameraImage", "Gps", "Inertial", "Radar", "SensorReading", "Voice",
-        "WifiScan",
+        "Altimeter", "Battery", "Camera", "CameraImage", "FlightState", "Gps", "Inertial", "Radar", "SensorReading",
+        "Voice", "WifiScan",
     ),
     "fanet_mw.errors": (
         "BusError", "ConfigError", "DropReason", "FanetError", "LocalProtocolError", "MalformedFrameError",
@@ -72,10 +73,10 @@ _HOME_OF: Final = {name: module for module, names in _HOMES.items() for name in 
 
 __all__ = [
     "Altimeter", "ANY", "Application", "AppPort", "Battery", "BROADCAST", "BusError", "Camera", "CameraImage",
-    "ConfigError", "Course", "Data", "DropReason", "Emulated", "Enu", "FanetError", "Fate", "Gps", "HOME", "Inertial",
-    "Launched", "LocalProtocolError", "MalformedFrameError", "Message", "Node", "NodeClosedError", "NodeId", "OnAir",
-    "Radar", "Received", "Result", "Scenario", "SensorReading", "Sent", "Status", "VirtualSwarm", "Voice", "WifiScan",
-    "__version__", "join", "launch", "load_result", "load_scenario", "simulate",
+    "ConfigError", "Course", "Data", "DropReason", "Emulated", "Enu", "FanetError", "Fate", "FlightState", "Gps",
+    "HOME", "Inertial", "Launched", "LocalProtocolError", "MalformedFrameError", "Message", "Node", "NodeClosedError",
+    "NodeId", "OnAir", "Radar", "Received", "Result", "Scenario", "SensorReading", "Sent", "Status", "VirtualSwarm",
+    "Voice", "WifiScan", "__version__", "join", "launch", "load_result", "load_scenario", "simulate",
 ]  # fmt: skip
 
 

@@ -224,9 +224,9 @@ class Encoder:
         shown = max(0, min(at, items - 1))
         return self.pack(common.MAVLink_mission_current_message(shown, items or _UNKNOWN_U16, state, int(flies)))
 
-    def system_time(self, now_ns: int) -> bytes:
-        """SYSTEM_TIME: swarm time, counted from 1970 by a swarm that knows no other epoch."""
-        return self.pack(common.MAVLink_system_time_message(now_ns // US, _boot_ms(now_ns)))
+    def system_time(self, now_ns: int, *, unix_ns: int = 0) -> bytes:
+        """SYSTEM_TIME: unix time; 0: swarm time, counted from 1970 by a swarm that knows no other epoch."""
+        return self.pack(common.MAVLink_system_time_message((unix_ns or now_ns) // US, _boot_ms(now_ns)))
 
     def radio_status(self, rssi_dbm: float | None, lost: int) -> bytes:
         """RADIO_STATUS as SiK radios give it: 1.9 x (dBm + 127); 0: nobody is heard."""
@@ -257,8 +257,17 @@ class Encoder:
             )
         )
 
-    def gps_raw(self, position: Enu, velocity: Enu, *, has_fix: bool, fix_ns: int) -> bytes:
-        """GPS_RAW_INT: the last reading of the receiver."""
+    def gps_raw(
+        self,
+        position: Enu,
+        velocity: Enu,
+        *,
+        has_fix: bool,
+        fix_ns: int,
+        satellites: int = 255,
+        hdop: float | None = None,
+    ) -> bytes:
+        """GPS_RAW_INT: the last reading of the receiver; 255 satellites and no `hdop`: its quality is not known."""
         ground_m_s = velocity.horizontal()
         course = math.atan2(velocity.east, velocity.north) if ground_m_s else None
         return self.pack(
@@ -266,11 +275,11 @@ class Encoder:
                 max(0, fix_ns // US),
                 _GPS_3D_FIX if has_fix else _GPS_NO_FIX,
                 *_place_ints(to_geodetic(position, self._origin)),
-                _UNKNOWN_U16,
+                _UNKNOWN_U16 if hdop is None else max(0, min(round(100 * hdop), _UNKNOWN_U16 - 1)),
                 _UNKNOWN_U16,
                 min(round(100 * ground_m_s), _UNKNOWN_U16 - 1),
                 _centidegrees(course),
-                255,
+                satellites,
             )
         )
 

@@ -86,6 +86,7 @@ NAMED: Final[dict[type[Any], Names]] = {
     m.Altimeter: Names("world/<id>/sensor/altimeter", "t_ns up_m above_ground_m"),
     m.Inertial: Names("world/<id>/sensor/inertial", f"t_ns {_MOVES}"),
     m.Battery: Names("world/<id>/sensor/battery", "t_ns voltage_v current_a charge"),
+    m.FlightState: Names("world/<id>/sensor/flight", "t_ns roll_rad pitch_rad yaw_rad satellites hdop unix_ns"),
 }  # fmt: skip
 
 

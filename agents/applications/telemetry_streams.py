@@ -3,9 +3,10 @@
 Without an operator the streams are those that a log needs. An operator who is heard gets all that a ground station
 draws, and changes the rate of each by message.
 
-Position and velocity are those of the receiver. The attitude is inferred: a multirotor tilts so that thrust and gravity
-add up to its acceleration, and it faces where it flies. The battery is as its sensor reads it; without a sensor nothing
-is known of it.
+Position and velocity are those of the receiver. Attitude, time and the quality of GPS are those of a real flight
+controller. Without one the attitude is inferred: a multirotor tilts so that thrust and gravity add up to its
+acceleration, and it faces where it flies. The battery is as its sensor reads it; without a sensor nothing is known of
+it.
 """
 
 import math
@@ -14,7 +15,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from fanet_mw.application import Application, AppPort
-from fanet_mw.bus.messages import Battery, Gps, SensorReading
+from fanet_mw.bus.messages import Battery, FlightState, Gps, SensorReading
 from fanet_mw.flavors import Mode
 from fanet_mw.mavlink import AUTOPILOT_COMPONENT, ORIGIN, Attitude, BatteryState, Encoder, Geodetic, common
 from fanet_mw.units import MS, STILL, Enu, NodeId, S
@@ -111,6 +112,8 @@ class TelemetryStreams:
         """The heading; it is unknown until the UAV has flown. A heading of 0 would also shorten hellos, because MAVLink
         drops trailing zeros."""
         self._fix_ns: int | None = None
+        self._flight: FlightState | None = None
+        """What a real flight controller said lately."""
         self._battery: BatteryState | None = None
         self._read_ns: int | None = None
         self._consumed_mah = 0.0
@@ -157,7 +160,9 @@ class TelemetryStreams:
             common.MAVLINK_MSG_ID_MISSION_CURRENT: lambda _: encoder.mission_current(
                 self.flown.mission_at, items=self.flown.mission_items, flies=self.flown.mission_flies
             ),
-            common.MAVLINK_MSG_ID_SYSTEM_TIME: lambda now_ns: encoder.system_time(now_ns),
+            common.MAVLINK_MSG_ID_SYSTEM_TIME: lambda now_ns: encoder.system_time(
+                now_ns, unix_ns=self._unix_ns(now_ns)
+            ),
             common.MAVLINK_MSG_ID_RADIO_STATUS: lambda _: encoder.radio_status(self.link.rssi_dbm, self.link.lost),
             common.MAVLINK_MSG_ID_ADSB_VEHICLE: lambda _: self._find(encoder),
             common.MAVLINK_MSG_ID_AUTOPILOT_VERSION: lambda _: encoder.autopilot_version(self._node),
@@ -237,7 +242,9 @@ class TelemetryStreams:
             change = gps.velocity.minus(self.velocity)
             self._acceleration = Enu(change.east * per_s, change.north * per_s, change.up * per_s)
         self.position, self.velocity, self._fix_ns = gps.position, gps.velocity, gps.t_ns
-        if gps.velocity.horizontal() >= TURNING_M_S:
+        if self._flight is not None and gps.t_ns - self._flight.t_ns > _FIX_LASTS_NS:
+            self._flight = None
+        if self._flight is None and gps.velocity.horizontal() >= TURNING_M_S:
             self._yaw = math.atan2(gps.velocity.east, gps.velocity.north)
 
     @property
@@ -249,6 +256,13 @@ class TelemetryStreams:
         """Turn a UAV that hovers: the vehicles of the world have no heading of their own, so this is told alone."""
         if self.velocity.horizontal() < TURNING_M_S:
             self._yaw = math.remainder(yaw, math.tau)
+
+    def on_flight(self, reading: FlightState) -> None:
+        """A real flight controller has told its attitude."""
+        angles = (reading.roll_rad, reading.pitch_rad, reading.yaw_rad)
+        roll, pitch, yaw = (math.remainder(angle, math.tau) for angle in angles)
+        self._flight = reading._replace(roll_rad=roll, pitch_rad=pitch, yaw_rad=yaw)
+        self._yaw = yaw
 
     def on_battery(self, reading: Battery) -> None:
         """The sensor of the battery has given a reading; consumption counts from the first reading."""
@@ -262,7 +276,11 @@ class TelemetryStreams:
 
     @property
     def attitude(self) -> Attitude:
-        """The tilt that the present acceleration needs, facing the direction of flight."""
+        """That of the flight controller, or the tilt that the present acceleration needs, facing the direction of
+        flight.
+        """
+        if self._flight is not None:
+            return Attitude(self._flight.roll_rad, self._flight.pitch_rad, self._flight.yaw_rad)
         east, north, up = self._acceleration
         yaw = self._yaw or 0.0
         forward = east * math.sin(yaw) + north * math.cos(yaw)
@@ -315,7 +333,19 @@ class TelemetryStreams:
 
     def _gps_raw(self, encoder: Encoder, now_ns: int) -> bytes:
         fix_ns = now_ns if self._fix_ns is None else self._fix_ns
-        return encoder.gps_raw(self.position, self.velocity, has_fix=self._fix_ns is not None, fix_ns=fix_ns)
+        satellites, hdop = (255, None) if self._flight is None else (self._flight.satellites, self._flight.hdop)
+        return encoder.gps_raw(
+            self.position,
+            self.velocity,
+            has_fix=self._fix_ns is not None,
+            fix_ns=fix_ns,
+            satellites=satellites,
+            hdop=hdop,
+        )
+
+    def _unix_ns(self, now_ns: int) -> int:
+        flight = self._flight
+        return flight.unix_ns + now_ns - flight.t_ns if flight is not None and flight.unix_ns else 0
 
 
 class Telemetry(Application):
@@ -333,6 +363,8 @@ class Telemetry(Application):
     def on_sensor(self, reading: SensorReading, now_ns: int) -> None:
         if isinstance(reading, Battery):
             self._streams.on_battery(reading)
+        elif isinstance(reading, FlightState):
+            self._streams.on_flight(reading)
 
     def wake(self, now_ns: int) -> None:
         frames = self._streams.telemetry(now_ns)

@@ -1,7 +1,7 @@
 """The link of a companion computer to one flight controller, PX4 or ArduPilot. Sans-IO.
 
     in     its MAVLink (`on_bytes`), the setpoints of the computer (`command`), time (`wake`)
-    out    MAVLink for it (`out`), position and battery for the computer (`readings`), what happened (`events`)
+    out    MAVLink for it (`out`), what it measures for the computer (`readings`), what happened (`events`)
 
     POSITION, VELOCITY, HOLD   setpoints, four a second, and the guided mode (OFFBOARD, GUIDED) once they flow
     TAKEOFF                    arm, then NAV_TAKEOFF
@@ -15,7 +15,7 @@ import math
 from collections import Counter, deque
 from typing import Any, Final, NamedTuple
 
-from fanet_mw.bus.messages import VELOCITY_LASTS_NS, Battery, Gps, Setpoint, SetpointKind
+from fanet_mw.bus.messages import VELOCITY_LASTS_NS, Battery, FlightState, Gps, Setpoint, SetpointKind
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.flavors import Flavor, Mode, mode_of, number_of
 from fanet_mw.gateway.framing import Framing
@@ -35,13 +35,19 @@ _LEAD_SETPOINTS: Final = 3
 _STREAMS: Final = {
     common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 200 * MS, common.MAVLINK_MSG_ID_GPS_RAW_INT: S,
     common.MAVLINK_MSG_ID_SYS_STATUS: S, common.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: S,
+    common.MAVLINK_MSG_ID_ATTITUDE: 200 * MS, common.MAVLINK_MSG_ID_SYSTEM_TIME: S,
 }  # fmt: skip
 """What is asked for, and how often."""
 _3D_FIX: Final = 3
+_UNKNOWN_U16: Final = 65_535
+_FIRST_GPS_UNIX_US: Final = 315_964_800_000_000
+"""1980-01-06: what claims to be earlier is no time of GPS."""
+_LAST_UNIX_US: Final = 1 << 52
+"""The year 2112."""
 _POSITION_MASK: Final = 0b110111111000
 _VELOCITY_MASK: Final = 0b110111000111
 _HOLD_M_S: Final = 5.0
-_MISSING: Final = (65_535, -1)
+_MISSING: Final = (_UNKNOWN_U16, -1)
 
 
 class _Waiting(NamedTuple):
@@ -52,6 +58,9 @@ class _Waiting(NamedTuple):
     what: str
 
 
+Reading = Gps | Battery | FlightState
+
+
 class AutopilotLink:
     """One flight controller."""
 
@@ -59,7 +68,7 @@ class AutopilotLink:
         self._flavor, self._origin = flavor, origin
         self.counts: Counter[str] = Counter()
         self.out = b""
-        self.readings: list[Gps | Battery] = []
+        self.readings: list[Reading] = []
         self.events: list[str] = []
         self.system: int | None = None
         """Its MAVLink system; None before it was heard."""
@@ -71,6 +80,8 @@ class AutopilotLink:
         self.position: Enu | None = None
         """Its position by its own estimate, in the swarm's frame, up from home."""
         self.velocity = STILL
+        self.unix_off_ns: int | None = None
+        """Its unix time less swarm time; None: it knows no time of GPS."""
         self.yielded = False
         """True while it flies by itself or by a pilot, and is not commanded."""
         self._guided = False
@@ -80,7 +91,8 @@ class AutopilotLink:
         self._heard_ns = 0
         self._beat_ns: int | None = None
         self._home_amsl_m = 0.0
-        self._fix_type = _3D_FIX
+        self._fix_type, self._satellites = _3D_FIX, 255
+        self._hdop: float | None = None
         self._waiting: deque[_Waiting] = deque()
         self._sent_ns, self._times = 0, 0
         self._wanted: Setpoint | None = None
@@ -151,7 +163,20 @@ class AutopilotLink:
             self.counts["no_fix"] += 1
 
     def _on_gps(self, message: Any, _now_ns: int) -> None:  # noqa: ANN401
-        self._fix_type = message.fix_type
+        self._fix_type, self._satellites = message.fix_type, message.satellites_visible
+        self._hdop = None if message.eph == _UNKNOWN_U16 else message.eph / 100
+
+    def _on_attitude(self, message: Any, now_ns: int) -> None:  # noqa: ANN401
+        angles = message.roll, message.pitch, message.yaw
+        if not all(map(math.isfinite, angles)):
+            self.counts["no_attitude"] += 1
+            return
+        unix_ns = 0 if self.unix_off_ns is None else now_ns + self.unix_off_ns
+        self.readings.append(FlightState(now_ns, *angles, self._satellites, self._hdop, unix_ns))
+
+    def _on_time(self, message: Any, now_ns: int) -> None:  # noqa: ANN401
+        known = _FIRST_GPS_UNIX_US < message.time_unix_usec < _LAST_UNIX_US
+        self.unix_off_ns = 1000 * message.time_unix_usec - now_ns if known else None
 
     def _on_status(self, message: Any, now_ns: int) -> None:  # noqa: ANN401
         if message.voltage_battery not in _MISSING and message.battery_remaining >= 0:
@@ -189,6 +214,8 @@ class AutopilotLink:
         "GLOBAL_POSITION_INT": _on_position,
         "GPS_RAW_INT": _on_gps,
         "SYS_STATUS": _on_status,
+        "ATTITUDE": _on_attitude,
+        "SYSTEM_TIME": _on_time,
         "EXTENDED_SYS_STATE": _on_landed,
         "COMMAND_ACK": _on_ack,
         "STATUSTEXT": _on_text,

@@ -6,18 +6,22 @@ from array import array
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from fanet_mw.autopilot.link import AutopilotLink
+from fanet_mw.autopilot.link import AutopilotLink, Reading
 from fanet_mw.bus import codecs
-from fanet_mw.bus.messages import Battery, Gps, Poses, Setpoint
+from fanet_mw.bus.messages import Battery, FlightState, Gps, Poses, Setpoint
 from fanet_mw.bus.topics import Topics, node_of
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.gateway.connections import Address, Connection
 from fanet_mw.hosts.bus import HostBus, OnSample
-from fanet_mw.units import STILL, Enu, NodeId
+from fanet_mw.hosts.timebase import THIS_MACHINE
+from fanet_mw.units import MS, STILL, Enu, NodeId, S
 
 _TICK_S: Final = 0.05
 _POSE_EVERY: Final = 2
 """Ticks between two reports of all positions."""
+_SENSORS: Final = {Gps: "gps", Battery: "battery", FlightState: "flight"}
+_CLOCK_OFF_NS: Final = S
+"""A computer whose clock differs by more from its flight controller's GPS is told so."""
 Tell = Callable[[str], None]
 
 
@@ -29,6 +33,7 @@ class Autopilot:
     ) -> None:
         self.link = link
         self._name, self._now_ns, self._tell = name, now_ns, tell
+        self._clock_off = False
         whole = address.kind.startswith("udp")
         self.connection = Connection(address, lambda _, data: self._hear(data, whole=whole))
 
@@ -36,7 +41,7 @@ class Autopilot:
         self.link.on_bytes(data, self._now_ns(), whole=whole)
         return b""
 
-    def tick(self) -> list[Gps | Battery]:
+    def tick(self) -> list[Reading]:
         """Send what is due; returns what has been read since the last tick."""
         link = self.link
         link.wake(self._now_ns())
@@ -46,8 +51,21 @@ class Autopilot:
         events, link.events = link.events, []
         for event in events:
             self._tell(f"{self._name}: {event}")
+        self._compare_clocks()
         readings, link.readings = link.readings, []
         return readings
+
+    def _compare_clocks(self) -> None:
+        """Say how far the computer's clock is from GPS, when that begins or ends to matter."""
+        if self.link.unix_off_ns is None:
+            return
+        behind_ns = self._now_ns() + self.link.unix_off_ns - THIS_MACHINE.unix_ns()
+        self.link.counts["clock_behind_gps_ms"] = round(behind_ns / MS)
+        is_off = abs(behind_ns) > _CLOCK_OFF_NS
+        if is_off != self._clock_off:
+            self._clock_off = is_off
+            how = f"differs by {behind_ns / S:+.1f} s from" if is_off else "agrees with"
+            self._tell(f"{self._name}: this computer's clock {how} the flight controller's GPS")
 
 
 class AutopilotBus:
@@ -60,7 +78,7 @@ class AutopilotBus:
         self._inner = inner
         self._sensors = names.sensors(node)
         self._setpoint = names.setpoint(node)
-        self._gps, self._battery = names.sensor(node, "gps"), names.sensor(node, "battery")
+        self._topics = {kind: names.sensor(node, name) for kind, name in _SENSORS.items()}
         self._on_sensor: OnSample | None = None
         self.autopilot: Autopilot | None = None
 
@@ -95,9 +113,8 @@ class AutopilotBus:
             while True:
                 if running():
                     for reading in autopilot.tick():
-                        topic = self._gps if isinstance(reading, Gps) else self._battery
                         if self._on_sensor is not None:
-                            self._on_sensor(topic, codecs.encode([reading]))
+                            self._on_sensor(self._topics[type(reading)], codecs.encode([reading]))
                 await asyncio.sleep(_TICK_S)
         finally:
             autopilot.connection.close()
@@ -131,8 +148,7 @@ async def serve_world(
     while True:
         for node, autopilot in autopilots.items():
             for reading in autopilot.tick():
-                kind = "gps" if isinstance(reading, Gps) else "battery"
-                bus.put(names.sensor(node, kind), codecs.encode([reading]))
+                bus.put(names.sensor(node, _SENSORS[type(reading)]), codecs.encode([reading]))
         if ticks % _POSE_EVERY == 0:
             known = {node: (a.link.position, a.link.velocity) for node, a in autopilots.items() if a.link.position}
             known |= {node: (place, STILL) for node, place in standing.items()}

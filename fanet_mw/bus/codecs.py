@@ -22,6 +22,7 @@ from fanet_mw.bus.messages import (
     ClockEpoch,
     ClockRequest,
     ClockState,
+    FlightState,
     Gps,
     Inertial,
     MavlinkTap,
@@ -294,6 +295,7 @@ _CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[byte
     26: (Mishap, _encode_mishap, _decode_mishap),
     27: (Order, _encode_order, _decode_order),
     28: (ClockRequest, _encode_request, _decode_request),
+    29: (FlightState, sensor_codecs.encode_flight, sensor_codecs.decode_flight),
 }
 HEADS: Final[dict[type[Any], tuple[struct.Struct, ...]]] = {
     TxRequest: (_TX,), Reception: (_RX,), TxStatus: (_STATUS,), Poses: (_POSES,), Setpoint: (_SETPOINT,),

@@ -249,6 +249,25 @@ class Battery(NamedTuple):
     """Share of the capacity that is left, 0 to 1."""
 
 
+class FlightState(NamedTuple):
+    """Flight controller -> the UAV's computer: its attitude, time and quality of GPS; the simulated world has none."""
+
+    t_ns: int
+    """The swarm instant of the reading."""
+    roll_rad: float
+    """To the right."""
+    pitch_rad: float
+    """Nose up."""
+    yaw_rad: float
+    """From north, clockwise."""
+    satellites: int = 255
+    """How many its receiver uses; 255: not known."""
+    hdop: float | None = None
+    """Horizontal dilution of precision; None: not known."""
+    unix_ns: int = 0
+    """Unix time at `t_ns` by GPS; 0: not known."""
+
+
 class MavlinkTap(NamedTuple):
     """UAV -> inspectors and ground stations: MAVLink bytes as the node produced or delivered them."""
 
@@ -305,7 +324,7 @@ class Report:
     json: str
 
 
-SensorReading = WifiScan | Camera | CameraImage | Voice | Radar | Altimeter | Inertial | Battery
+SensorReading = WifiScan | Camera | CameraImage | Voice | Radar | Altimeter | Inertial | Battery | FlightState
 """Any reading of a sensor other than the position fix; a new kind of sensor is one more member of this union."""
 
 Message = (

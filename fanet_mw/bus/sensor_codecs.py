@@ -15,6 +15,7 @@ from fanet_mw.bus.messages import (
     Camera,
     CameraImage,
     Echo,
+    FlightState,
     Gps,
     Inertial,
     Person,
@@ -34,6 +35,7 @@ _ECHO = struct.Struct("<5d")
 _ALTIMETER = struct.Struct("<q2d")
 _INERTIAL = struct.Struct("<q3d")
 _BATTERY = struct.Struct("<q3d")
+_FLIGHT = struct.Struct("<q3dBdq")
 MAX_HEARD: Final = 10_000
 """The greatest number of phones in a scan, people in an image, or voices: the most survivors that a
 scenario may have."""
@@ -153,8 +155,23 @@ def decode_battery(body: bytes) -> Battery:
     return Battery(t_ns, *values)
 
 
+def encode_flight(m: FlightState) -> bytes:
+    hdop = math.nan if m.hdop is None else m.hdop
+    return _FLIGHT.pack(m.t_ns, m.roll_rad, m.pitch_rad, m.yaw_rad, m.satellites, hdop, m.unix_ns)
+
+
+def decode_flight(body: bytes) -> FlightState:
+    t_ns, roll_rad, pitch_rad, yaw_rad, satellites, hdop, unix_ns = _FLIGHT.unpack(body)
+    if unix_ns < 0:
+        raise ValueError("time")
+    unknown = math.isnan(hdop)
+    _finite((roll_rad, pitch_rad, yaw_rad, *(() if unknown else (hdop,))))
+    return FlightState(t_ns, roll_rad, pitch_rad, yaw_rad, satellites, None if unknown else hdop, unix_ns)
+
+
 HEADS: Final[dict[type[Any], tuple[struct.Struct, ...]]] = {
     Gps: (_GPS,), WifiScan: (_SCAN, _HEARD), Camera: (_SCAN, _PERSON), Voice: (_SCAN, _CALL), Radar: (_SCAN, _ECHO),
     Altimeter: (_ALTIMETER,), Inertial: (_INERTIAL,), Battery: (_BATTERY,), CameraImage: (_IMAGE,),
+    FlightState: (_FLIGHT,),
 }  # fmt: skip
 """The structs of each kind of reading, as in `codecs.HEADS`."""

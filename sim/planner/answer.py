@@ -182,15 +182,17 @@ def _judge_rounds(
         "bound_ms": None if bound_ns is None else bound_ns / MS, "from_s": law.silent_ns / S,
         "carried_bytes_per_s": carried, "offered_bytes_per_s": offered,
     }  # fmt: skip
-    operator = _operator(scenario, [] if bound_ns is None else [bound_ns])
+    operator = _operator(scenario, [] if bound_ns is None else [bound_ns], known_gone_ns=law.silent_ns)
     if operator is not None:
         text.append(item("operator", operator))
         content["operator"] = operator
     return "\n".join(text), content, feasible
 
 
-def _operator(scenario: Scenario, bounds: list[int]) -> str | None:
-    """What a ground station in band may count on; None without a post on the ground."""
+def _operator(scenario: Scenario, bounds: list[int], *, known_gone_ns: int = 0) -> str | None:
+    """What a ground station in band may count on; None without a post on the ground. `known_gone_ns`: after so long
+    the swarm knows that a node is off the air.
+    """
     if scenario.post is None:
         return None
     pace = pace_of(scenario)
@@ -200,6 +202,8 @@ def _operator(scenario: Scenario, bounds: list[int]) -> str | None:
         if bounds
         else "no bound for a command"
     )
+    if bounds and known_gone_ns:
+        delay += f", but to a UAV that has left the air, which is known after {known_gone_ns / S:.1f} s"
     return (
         f"telemetry of each UAV every {pace.interval_ns / S:.1f} s or less often ({pace.share:.0%} of the air); {delay}"
     )

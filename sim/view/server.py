@@ -16,6 +16,13 @@ from sim.view.shapes import Rows
 HOST: Final = "127.0.0.1"
 DEFAULT_PORT: Final = 8080
 _TRIED_PORTS: Final = 20
+_PHONE: Final = (
+    "<style>@media (max-width: 576px) {"
+    "div[style*='width: 20em'] {width: 100% !important}"
+    "div[style*='max-height: 60%'] {max-height: 46% !important}"
+    "}</style>"
+)
+"""On a phone viser has a sheet of fixed width in a corner; this lets it take the lower part of the screen."""
 _SKY: Final = np.full((2, 2, 3), (236, 240, 245), np.uint8)
 
 
@@ -30,6 +37,7 @@ def open_server(port: int | None) -> viser.ViserServer:
         server = viser.ViserServer(host=HOST, port=chosen, verbose=False)
     server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(0, 114, 178))
     server.gui.main_panel.dock_right()
+    server.gui.add_html(_PHONE)
     server.scene.set_up_direction("+z")
     server.scene.world_axes.visible = False
     server.scene.configure_environment_map(None)
@@ -62,7 +70,7 @@ def sight(scene: Scene) -> Sight:
     """From the south on the whole area."""
     uavs = [uav.position for uav in scene.state.uavs.values()]
     reach = max([scene.around.half_m, *(abs(value) for at in uavs for value in at[:2])])
-    eye, goal = (np.array(at, np.float32) * reach for at in ((-0.3, -1.75, 1.35), (0.05, -0.12, 0.0)))
+    eye, goal = (np.array(at, np.float32) * reach for at in ((-0.2, -2.0, 1.5), (0.04, -0.1, 0.0)))
     return Sight(eye, goal, reach)
 
 

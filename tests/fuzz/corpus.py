@@ -23,6 +23,7 @@ from fanet_mw.bus.messages import (
     ClockRequest,
     ClockState,
     Echo,
+    FlightState,
     Inertial,
     Message,
     Obstructions,
@@ -206,6 +207,7 @@ _BY_HAND: Final[tuple[Message, ...]] = (
     Altimeter(S, 50.0, 49.0),
     Inertial(S, Enu(1.0, 2.0, 3.0)),
     Battery(S, 15.0, 20.0, 0.5),
+    FlightState(S, 0.1, -0.2, 3.0, 14, 0.8, 1_800_000_000 * S),
 )
 
 

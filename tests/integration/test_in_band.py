@@ -2,16 +2,20 @@
 
 import math
 from collections import Counter
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import pytest
 
 from fanet_mw import mavlink
 from fanet_mw.bus.messages import MavlinkTap
 from fanet_mw.mavlink import Geodetic, common
+from fanet_mw.routing.rounds.delay_law import DelayLaw
+from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.scenario import Scenario, config
-from fanet_mw.trace import BoundStated, Delivered
+from fanet_mw.trace import BoundExcludes, BoundStated, Delivered, Generated
 from fanet_mw.units import MS, Enu, NodeId, S
+from sim.planner.answer import judge
 from sim.run.virtual import Observed
 
 GCS = (255, 190)
@@ -175,6 +179,13 @@ def test_telemetry_comes_at_the_stated_pace_from_every_uav_and_stops_with_the_op
     assert max(later) < 30 * S + 12 * S + 2 * pace.interval_ns
 
 
+def test_a_plan_says_within_what_a_command_comes_and_to_whom_not() -> None:
+    _, content, _ = judge(line(3, routing={"protocol": "rounds"}))
+    known_s = content["from_s"]
+    assert f"within {content['bound_ms']:.0f} ms" in content["operator"]
+    assert f"but to a UAV that has left the air, which is known after {known_s:.1f} s" in content["operator"]
+
+
 def test_a_command_reaches_a_cut_uav_when_the_cut_is_over() -> None:
     scenario = line(2, faults=[{"kind": "cut", "node": 2, "at_s": 6, "for_s": 6}])
     station = Station(scenario)
@@ -199,6 +210,56 @@ def test_a_forged_command_of_another_node_is_counted_and_not_obeyed() -> None:
     control.on_message(Received(NodeId(2), NodeId(1), 1, station.now_ns, 1, b"", content=frame), station.now_ns)
     assert control.report()["operator_not_from_the_post"] == 1
     assert not control._pilot.armed
+
+
+def flown(*, floods: bool) -> tuple[float, int, list["Pair"], Mapping[str, Any]]:
+    """Nine UAVs with traffic for 12 s: the share of it that is delivered, its longest delay, the post's packets with
+    bounds, and its counters.
+
+    `floods`: a ground station says 2,000 commands a second.
+    """
+    places = [[100.0 + 100.0 * (n % 3), 100.0 * (n // 3), 0.0] for n in range(9)]
+    station = Station(
+        line(
+            1,
+            nodes={"count": 9, "layout": "explicit", "positions_m": places, "on_ground": True},
+            routing={"protocol": "rounds"},
+            radio={"channel": "range", "range_m": 220, "lead_ms": 0},
+            traffic={"interval_s": 0.5, "sources": 4, "payload_bytes": 200, "start_s": 2},
+        )
+    )
+    for step in range(1200):
+        station.run(0.01)
+        for number in range(20 if floods else 0):
+            seven = (step % 256, number, 0, 0, 0, 0, 0)
+            station.say(common.MAVLink_command_long_message(1 + number % 9, 1, 400, 0, *seven))
+    sent = {
+        (record.node, record.seq)
+        for record in station.observed.records
+        if isinstance(record, Generated) and record.app == "traffic" and record.t_ns < 9 * S
+    }
+    took = [
+        record.delay_ns
+        for record in station.observed.records
+        if isinstance(record, Delivered) and (record.origin, record.seq) in sent and record.node != station.post
+    ]
+    (post,) = (actor for actor in station.observed.actors if actor.name == f"agent-{station.post}")
+    return len(took) / len(sent) / 8, max(took), bounded(station), post.report()
+
+
+@pytest.mark.slow
+def test_a_ground_station_that_floods_cannot_starve_the_swarm(capsys: pytest.CaptureFixture[str]) -> None:
+    quiet, flooded = flown(floods=False), flown(floods=True)
+    with capsys.disabled():
+        for name, (share, longest_ns, pairs, post) in (("quiet", quiet), ("flooded", flooded)):
+            late = sum(pair.delay_ns > pair.bound_ns for pair in pairs)
+            print(f"{name}: {share:.4f} of the swarm's own traffic delivered, the last after {longest_ns / MS:.0f} ms;")
+            print(f"  {post['operator_sent']} packets of the operator on the air, {late} of {len(pairs)} bounds broken")
+    assert flooded[3]["operator_sent"] < 13 * 41
+    assert flooded[3]["operator_too_many"] > 20_000
+    assert flooded[0] > quiet[0] - 0.005
+    assert flooded[1] < 3 * S
+    assert all(pair.delay_ns <= pair.bound_ns for pair in flooded[2])
 
 
 FAULTS = {
@@ -238,25 +299,59 @@ def test_how_long_commands_take(protocol: str, count: int, faults: str, capsys: 
     beats = sum(m.get_type() == "HEARTBEAT" for _, m in station.heard[before:])
     rate = beats / count / ((station.now_ns - began_ns) / S)
     took.sort()
-    kept = bounded(station)
-    bound = f"{max(ns for _, ns in kept) / MS:.0f} | {max(ns for ns, _ in kept) / MS:.0f}" if kept else "- | -"
+    pairs = bounded(station)
+    kept = [pair for pair in pairs if pair.delay_ns <= pair.bound_ns]
+    broken = [pair for pair in pairs if pair.delay_ns > pair.bound_ns]
+    bound = (
+        f"{max(pair.bound_ns for pair in pairs) / MS:.0f} | {max(pair.delay_ns for pair in kept) / MS:.0f} "
+        f"| {len(kept)} | {len(broken)}"
+        if kept
+        else "- | - | - | -"
+    )
     with capsys.disabled():
         median, worst = 1000 * took[50], 1000 * took[98]
         print(f"| {protocol} | {count} | {faults} | {rate:.2f} | {median:.1f} | {worst:.0f} | {bound} |")
     assert took[50] < 0.5
+    assert (protocol == "rounds") == bool(kept)
+    assert not [pair for pair in broken if not was_cut(station.scenario, pair)]
     if faults == "-":
         assert took[98] < 1.0
-        assert all(delay_ns <= bound_ns for delay_ns, bound_ns in kept)
-        assert (protocol == "rounds") == bool(kept)
 
 
-def bounded(station: Station) -> list[tuple[int, int]]:
-    """Delay and stated bound of each packet of the post that came to the UAV for which it was meant."""
-    stated: dict[int, int] = {}
+class Pair(NamedTuple):
+    """A packet of the post that came to the UAV for which it was meant, and for which a bound was stated."""
+
+    node: int
+    said_ns: int
+    delay_ns: int
+    bound_ns: int
+
+
+def bounded(station: Station) -> list[Pair]:
+    """All pairs; a bound does not hold for nodes that it excludes."""
+    stated: dict[int, BoundStated] = {}
+    excluded: set[tuple[int, int]] = set()
     found = []
     for record in station.observed.records:
-        if isinstance(record, BoundStated) and record.node == station.post:
-            stated[record.seq] = record.bound_ns
-        elif isinstance(record, Delivered) and record.origin == station.post and record.seq in stated:
-            found.append((record.delay_ns, stated[record.seq]))
+        match record:
+            case BoundStated() if record.node == station.post:
+                stated[record.seq] = record
+            case BoundExcludes() if record.node == station.post:
+                excluded.add((record.seq, record.other))
+            case Delivered() if record.origin == station.post and (record.seq, record.node) not in excluded:
+                if (bound := stated.get(record.seq)) is not None:
+                    found.append(Pair(record.node, bound.t_ns, record.delay_ns, bound.bound_ns))
     return found
+
+
+def was_cut(scenario: Scenario, pair: Pair) -> bool:
+    """True if the UAV left the air before the bound was over, so lately that the swarm could not know it when the bound
+    was stated.
+    """
+    known_ns = DelayLaw(RoundTiming.of(scenario), scenario).silent_ns
+    return any(
+        fault.kind == "cut"
+        and fault.node == pair.node
+        and pair.said_ns - known_ns <= round(fault.at_s * S) <= pair.said_ns + pair.bound_ns
+        for fault in scenario.faults
+    )

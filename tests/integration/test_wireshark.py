@@ -2,8 +2,11 @@
 
 import csv
 import io
+import os
+import re
 import shutil
 import subprocess
+from pathlib import Path
 
 import pytest
 
@@ -21,21 +24,50 @@ FIELDS = (
 Row = dict[str, str]
 
 
+TRANSCRIPT = Path(__file__).parents[2] / "docs" / "how-to" / "transcripts" / "tshark.txt"
+
+
 @pytest.fixture(scope="module")
-def rows(tmp_path_factory: pytest.TempPathFactory) -> list[Row]:
-    """Nine UAVs on a channel with path loss, receptions included: what tshark shows of each frame."""
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A capture of nine UAVs on a channel with path loss, receptions included, and the dissector."""
     folder = tmp_path_factory.mktemp("capture")
     arguments = ["--duration", "10", "--set", "radio.channel=log_distance", "--pcap-receptions", "--json"]
     with pytest.raises(SystemExit) as ended:
         app(["simulate", "quick", "--out", str(folder), *arguments])
     assert ended.value.code == 0
     app(["dissector", str(folder)], exit_on_error=False, result_action="return_value")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def rows(folder: Path) -> list[Row]:
+    """What tshark shows of each frame."""
     command = [str(TSHARK), "-r", str(folder / "air.pcap"), "-X", f"lua_script:{folder / 'mavlink.lua'}"]
     command += [part for check in CHECKS for part in ("-o", f"{check}:TRUE")]
     command += ["-T", "fields", "-E", "separator=,", "-E", "quote=d", "-E", "aggregator=;", "-E", "header=y"]
     command += [part for field in FIELDS for part in ("-e", field)]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
     return list(csv.DictReader(io.StringIO(done.stdout)))
+
+
+def test_a_frame_is_shown_field_by_field(folder: Path) -> None:
+    """With FANET_TRANSCRIPTS=1 what is said is written to docs/how-to/transcripts/."""
+    said = []
+    for words in ("-c 6", "-c 1 -O mavlink_proto", "-q -z io,phs"):
+        command = ["-r", "air.pcap", "-X", "lua_script:mavlink.lua", *words.split()]
+        done = subprocess.run(
+            [str(TSHARK), *command], cwd=folder, capture_output=True, text=True, check=True, timeout=60
+        )
+        said.append(f"$ tshark {' '.join(command)}\n{done.stdout.rstrip()}\n")
+    frames, fields, kinds = said
+    assert re.search(
+        r"10\.0\.0\.\d+ .* MAVLink 2\.0 .*FANET_ROUTE +HEARTBEAT +GLOBAL_POSITION_INT +FANET_BEACON", frames
+    )
+    assert re.search(r"Payload: FANET_ROUTE \(53000\)\n +origin_us \(uint64_t\) \[us\]: \d+", fields)
+    assert "type (MAV_TYPE): MAV_TYPE_QUADROTOR (2)" in fields
+    assert "mavlink_proto" in kinds
+    if os.environ.get("FANET_TRANSCRIPTS"):
+        TRANSCRIPT.write_text("\n".join(said), encoding="utf-8")
 
 
 def test_every_frame_is_whole_from_its_frame_check_sequence_to_its_mavlink(rows: list[Row]) -> None:

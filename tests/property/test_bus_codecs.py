@@ -19,6 +19,7 @@ from fanet_mw.bus.messages import (
     ClockRequest,
     ClockState,
     Echo,
+    FlightState,
     Gps,
     Inertial,
     MavlinkTap,
@@ -95,6 +96,16 @@ messages: st.SearchStrategy[Message] = st.one_of(
     st.builds(Altimeter, instants, finite, st.none() | finite),
     st.builds(Inertial, instants, st.builds(Enu, finite, finite, finite)),
     st.builds(Battery, instants, finite, finite, finite),
+    st.builds(
+        FlightState,
+        instants,
+        finite,
+        finite,
+        finite,
+        st.integers(0, 255),
+        st.none() | finite,
+        st.integers(0, (1 << 63) - 1),
+    ),
     st.builds(Gps, instants, vectors, vectors),
     st.builds(WifiScan, instants, st.lists(st.tuples(u32, singles), max_size=5).map(tuple)),
     st.builds(MavlinkTap, instants, st.binary(max_size=50)),
@@ -159,6 +170,8 @@ def test_a_changed_byte_is_one_error_or_other_messages(batch: list[Message], dat
         Altimeter(0, 0.0, float("inf")),
         Inertial(0, Enu(0.0, float("nan"), 0.0)),
         Battery(0, 11.1, 5.0, float("nan")),
+        FlightState(0, 0.0, float("inf"), 0.0),
+        FlightState(0, 0.0, 0.0, 0.0, unix_ns=-1),
     ],
 )
 def test_a_reading_that_is_no_number_is_malformed(reading: Message) -> None:

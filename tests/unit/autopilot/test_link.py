@@ -12,9 +12,10 @@ from pymavlink.dialects.v20 import ardupilotmega
 
 from fanet_mw.autopilot.link import AutopilotLink
 from fanet_mw.autopilot.serving import Autopilot
-from fanet_mw.bus.messages import Battery, Gps, Setpoint, SetpointKind
+from fanet_mw.bus.messages import Battery, FlightState, Gps, Setpoint, SetpointKind
 from fanet_mw.flavors import Flavor, Mode, number_of
 from fanet_mw.gateway.connections import Address
+from fanet_mw.hosts.timebase import THIS_MACHINE
 from fanet_mw.mavlink import Geodetic, common, decode, to_geodetic
 from fanet_mw.rng import stream
 from fanet_mw.units import MS, STILL, Enu, S
@@ -93,20 +94,20 @@ def places(said: list[Any]) -> list[Any]:
 def test_streams_are_asked_for_one_by_one_and_each_answer_is_checked() -> None:
     controller = Controller()
     controller.result = 3
-    said = controller.run(6)
+    said = controller.run(9)
     asked = [(message.param1, message.param2) for message in said if message.get_type() == "COMMAND_LONG"]
-    assert asked == [(33, 200_000), (24, 1_000_000), (1, 1_000_000), (245, 1_000_000)]
-    assert controller.link.counts["refused"] == 4
+    assert asked == [(33, 200_000), (24, 1_000_000), (1, 1_000_000), (245, 1_000_000), (30, 200_000), (2, 1_000_000)]
+    assert controller.link.counts["refused"] == 6
     assert any("refused (3): message 33" in event for event in controller.link.events)
 
 
 def test_what_is_not_answered_is_said_again_and_given_up() -> None:
     controller = Controller()
     controller.answers = False
-    said = controller.run(14)
-    assert commands(said) == [511] * 12
-    assert [message.confirmation for message in said if message.get_type() == "COMMAND_LONG"] == [0, 1, 2] * 4
-    assert controller.link.counts["unanswered"] == 4
+    said = controller.run(20)
+    assert commands(said) == [511] * 18
+    assert [message.confirmation for message in said if message.get_type() == "COMMAND_LONG"] == [0, 1, 2] * 6
+    assert controller.link.counts["unanswered"] == 6
 
 
 def test_position_velocity_and_battery_come_in_the_swarms_frame() -> None:
@@ -118,6 +119,52 @@ def test_position_velocity_and_battery_come_in_the_swarms_frame() -> None:
     assert fix.velocity == pytest.approx((2, 1, 3))
     controller.tell(common.MAVLink_sys_status_message(0, 0, 0, 0, 15_200, 820, 63, 0, 0, 0, 0, 0, 0))
     assert controller.link.readings[-1] == Battery(controller.now_ns, 15.2, 8.2, 0.63)
+
+
+def test_attitude_time_and_the_quality_of_gps_come_from_the_flight_controller() -> None:
+    controller = Controller()
+    controller.run(2)
+    unix_us = 1_800_000_000_000_000
+    controller.tell(common.MAVLink_attitude_message(0, 0.1, -0.2, 3.0, 0, 0, 0))
+    assert controller.link.readings[-1] == pytest.approx((controller.now_ns, 0.1, -0.2, 3.0, 255, None, 0))
+    controller.tell(common.MAVLink_gps_raw_int_message(0, 3, 0, 0, 0, 80, 65_535, 0, 0, 14))
+    controller.tell(common.MAVLink_system_time_message(unix_us, 7))
+    controller.now_ns += S
+    controller.tell(common.MAVLink_attitude_message(0, 0.1, -0.2, 3.0, 0, 0, 0))
+    state = controller.link.readings[-1]
+    assert isinstance(state, FlightState)
+    assert (state.satellites, state.hdop, state.unix_ns) == (14, 0.8, 1000 * unix_us + S)
+
+
+@pytest.mark.parametrize("unix_us", [0, 86_400_000_000, 1 << 60, (1 << 64) - 1])
+def test_a_clock_that_was_never_set_is_no_time_of_gps(unix_us: int) -> None:
+    controller = Controller()
+    controller.run(2)
+    controller.tell(common.MAVLink_system_time_message(unix_us, 7))
+    assert controller.link.unix_off_ns is None
+
+
+def test_an_attitude_that_is_no_number_is_counted() -> None:
+    controller = Controller()
+    controller.run(2)
+    controller.link.readings.clear()
+    controller.tell(common.MAVLink_attitude_message(0, math.nan, 0, 0, 0, 0, 0))
+    assert not controller.link.readings
+    assert controller.link.counts["no_attitude"] == 1
+
+
+@pytest.mark.parametrize(("off_s", "tells"), [(0.5, 0), (3600.0, 1)])
+def test_a_computer_whose_clock_is_wrong_is_told_so_once(off_s: float, tells: int) -> None:
+    controller = Controller()
+    controller.run(2)
+    said: list[str] = []
+    autopilot = Autopilot(
+        "UAV 1", controller.link, Address("udpin", "127.0.0.1", 0), now_ns=lambda: controller.now_ns, tell=said.append
+    )
+    controller.tell(common.MAVLink_system_time_message(round((THIS_MACHINE.unix_ns() / S + off_s) * 1e6), 7))
+    autopilot.tick()
+    autopilot.tick()
+    assert sum("this computer's clock differs by +36" in line or "by +3599" in line for line in said) == tells
 
 
 def test_without_a_fix_there_is_no_position() -> None:

@@ -25,6 +25,7 @@ SAMPLES = [
     m.ClockEpoch(10, 2.0, m.ClockState.RUNNING, 11, 12),
     m.Altimeter(1, 50.0, 40.0),
     m.Battery(1, 15.2, 8.0, 0.5),
+    m.FlightState(1, 0.1, 0.2, 0.3, 12, 0.7, 99),
     Degrade("link", NodeId(1), NodeId(2), both=True, loss_db=3.0, loss_share=0.25, for_ns=9),
     Cut("node", NodeId(4), 10, hears=True),
     Mishap("node", NodeId(4), MishapKind.GPS, Enu(1, 2, 3), 10),

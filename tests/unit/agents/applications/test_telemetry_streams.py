@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from agents.applications.telemetry_streams import GRAVITY_M_S2, MAX_TILT, TelemetryStreams
 from fanet_mw import mavlink
-from fanet_mw.bus.messages import Battery, Gps
+from fanet_mw.bus.messages import Battery, FlightState, Gps
 from fanet_mw.mavlink import Attitude
 from fanet_mw.units import MS, Enu, NodeId, S
 
@@ -41,6 +41,20 @@ def latest(streams: TelemetryStreams, name: str, *, now_ns: int = 0) -> Any:
     found = [m for m in mavlink.decode(streams.telemetry(now_ns + 60 * S)) if m.get_type() == name]
     (message,) = found
     return message
+
+
+def test_what_a_real_flight_controller_says_beats_what_is_inferred_while_it_is_heard() -> None:
+    streams = make()
+    fly(streams, STILL, Enu(5, 0, 0), Enu(10, 0, 0))
+    streams.on_flight(FlightState(400 * MS, 0.1, -0.2, 1.0, 14, 0.8, 1_800_000_000 * S))
+    streams.fix(Gps(600 * MS, START, Enu(10, 0, 0)))
+    assert streams.attitude == Attitude(0.1, -0.2, 1.0)
+    assert streams.yaw == 1.0
+    gps, (clock,) = latest(streams, "GPS_RAW_INT"), mavlink.decode(streams.one(2, 1400 * MS) or b"")
+    assert (gps.satellites_visible, gps.eph) == (14, 80)
+    assert clock.time_unix_usec == 1_800_000_001_000_000
+    streams.fix(Gps(4 * S, START, Enu(10, 0, 0)))
+    assert streams.yaw == pytest.approx(math.pi / 2)
 
 
 # --- rates --------------------------------------------------------------------------------------------------------

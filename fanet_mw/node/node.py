@@ -20,7 +20,7 @@ from fanet_mw.node.header_check import HeaderCheck
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.node.packet_numbering import PacketNumbering
 from fanet_mw.node.port import NodePort
-from fanet_mw.node.reader import BUNDLE, Reader
+from fanet_mw.node.reader import BUNDLE, Looked, Reader
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Delivered, Generated, Record
 from fanet_mw.units import BROADCAST, US, Enu, NodeId
@@ -221,74 +221,68 @@ class Node:
     def hear(self, reception: Reception, now_ns: int) -> bool:
         """Handle a reception; returns True if it was only a copy of a packet that was handled before."""
         reader, frame, handled = self._reader, reception.frame, self._duplicates
-        if frame is not reader.frame:
-            reader.look(frame)
-        packet_hash, phase = reader.hash, reader.phase
+        seen = reader.last
+        if frame is not seen.frame:
+            seen = reader.look(frame)
+        phase = seen.phase
+        if phase == BUNDLE:
+            self._others += 1
+            self._hear_bundle(seen, reception, now_ns)
+            return False
+        packet_hash = seen.hash
         known = handled.young.get(packet_hash)  # as handled.bits(packet_hash), without a call for each copy
         if known is None:
             known = handled.old.get(packet_hash, 0)
         if known & phase:
             self._copies += 1
-            if self._on_copy is not None and reader.fields[_PREV_HOP] == reception.src:
-                self._on_copy(reader.key, reception.src, now_ns=now_ns)
+            if self._on_copy is not None and seen.fields[_PREV_HOP] == reception.src:
+                self._on_copy(seen.key, reception.src, now_ns=now_ns)
             return True
         self._others += 1
-        if phase == BUNDLE:
-            self._hear_bundle(reception, now_ns)
-            return False
-        try:
-            relays = self._first_copy(reader.packet or reader.read(), reception, known, now_ns)
-        except MalformedFrameError:
-            self.port.dropped[DropReason.MALFORMED] += 1
-            return False
-        for relay in relays:
+        for relay in self._first_copy(seen, reception, known, now_ns):
             self.port.relay(relay)
         return False
 
-    def _hear_bundle(self, reception: Reception, now_ns: int) -> None:
+    def _hear_bundle(self, seen: Looked, reception: Reception, now_ns: int) -> None:
         """Handle each packet of a frame as if it had come alone.
 
         The relays of these packets are transmitted together again: all first transmissions in one frame, all second
         ones in another, and so on.
         """
         try:
-            packets = wire.unbundle(reception.frame)
+            parts = self._reader.parts(seen)
         except MalformedFrameError:
             self.port.dropped[DropReason.MALFORMED] += 1
             return
         relays: list[Sequence[Relay]] = []
-        for frame in packets:
-            self._reader.look(frame, alone=True)
-            relays.append(self._hear_one(reception._replace(frame=frame), now_ns))
-        for together in zip_longest(*relays):
-            self.port.relay_together([relay for relay in together if relay is not None])
-
-    def _hear_one(self, reception: Reception, now_ns: int) -> Sequence[Relay]:
-        """Handle the packet that the reader holds, one of several in a frame; returns its relays."""
-        reader = self._reader
-        known = self._duplicates.bits(reader.hash)
-        if known & reader.phase:
+        for part in parts:
+            known = self._duplicates.bits(part.hash)
+            if not known & part.phase:
+                relays.append(self._first_copy(part, reception, known, now_ns))
+                continue
             self.port.dropped[DropReason.DUPLICATE] += 1
-            if self._on_copy is not None and reader.fields[_PREV_HOP] == reception.src:
-                self._on_copy(reader.key, reception.src, now_ns=now_ns)
-            return _NONE
+            if self._on_copy is not None and part.fields[_PREV_HOP] == reception.src:
+                self._on_copy(part.key, reception.src, now_ns=now_ns)
+        if any(relays):
+            for together in zip_longest(*relays):
+                self.port.relay_together([relay for relay in together if relay is not None])
+
+    def _first_copy(self, seen: Looked, reception: Reception, before: int, now_ns: int) -> Sequence[Relay]:
+        """Handle a packet that is new in its phase; returns its relays.
+
+        `reception`: that of its frame, which may hold further packets. `before`: the bits of the phases in which the
+        packet was handled before.
+        """
         try:
-            return self._first_copy(reader.packet or reader.read(), reception, known, now_ns)
+            packet = seen.packet or seen.read()
         except MalformedFrameError:
             self.port.dropped[DropReason.MALFORMED] += 1
             return _NONE
-
-    def _first_copy(self, packet: Packet, reception: Reception, before: int, now_ns: int) -> Sequence[Relay]:
-        """Handle a packet that is new in its phase; returns its relays.
-
-        The reader holds the packet; `before` has the bits of the phases in which it was handled before.
-        """
-        reader = self._reader
-        packet_hash, bits = reader.hash, before | reader.phase
-        _, _, origin_us, seq, origin, destination, _, kind, _, hops, priority, _, _, _ = reader.fields
+        packet_hash, bits = seen.hash, before | seen.phase
+        _, _, origin_us, seq, origin, destination, _, kind, _, hops, priority, _, _, _ = seen.fields
         end_ns = reception.end_ns
         age_ns = end_ns - origin_us * US
-        why = self._header_check.why_not(reader.fields, before, reception.src, age_ns)
+        why = self._header_check.why_not(seen.fields, before, reception.src, age_ns)
         if why is not None:
             self._disbelieve(why, packet, now_ns)
             return _NONE

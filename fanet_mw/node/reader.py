@@ -7,7 +7,7 @@ The caches of this module belong to the process. They depend on nothing but the 
 threads may share them.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any, Final, TypeVar
 
@@ -21,9 +21,11 @@ from fanet_mw.wire import (
     NO_FIELDS,
     PHASE_MASK,
     Content,
+    Fields,
     Kind,
     checked,
     fields_of,
+    unbundle,
 )
 
 _new: Final = tuple.__new__  # faster than the constructor, for objects that are made once per frame
@@ -44,28 +46,28 @@ _REMEMBERED: Final = 512
 """The number of packets whose hash a reader remembers: as many as plain flooding by 44 nodes carries in one second."""
 
 
-class Reader:
-    """The frame that was looked at last, and what has been read of it so far.
+class Looked:
+    """What has been read of one packet, or of a frame with several, so far.
 
-    `look` reads the header and checks nothing; `read` checks the header and gives the packet.
+    Nothing is checked until `read`, which gives the packet.
     """
 
-    def __init__(self) -> None:
-        self.frame = b""
-        self.hash = 0
-        """The hash of the frame's packet (`duplicates.hash_of`), by which duplicates are found; 0 if the frame holds
-        several packets."""
-        self.phase = 0
+    __slots__ = ("fields", "frame", "hash", "packet", "parts", "phase")
+
+    def __init__(self, frame: bytes, fields: Fields, packet_hash: int, phase: int) -> None:
+        self.frame = frame
+        self.fields = fields
+        """The fields of the header, which may be nonsense until `read` has checked them."""
+        self.hash = packet_hash
+        """The hash of the packet (`duplicates.hash_of`), by which duplicates are found; 0 if the frame holds several
+        packets."""
+        self.phase = phase
         """The bit of the packet's phase (`duplicates.PHASES`); 0 if the phase flags are invalid; BUNDLE if the frame
         holds several packets."""
         self.packet: Packet | None = None
         """The packet in the frame; None until `read` has been called."""
-        self.fields = NO_FIELDS
-        """The fields of the header, which may be nonsense until `read` has checked them."""
-        self._hashes: dict[bytes, tuple[int, bytes, int]] = {}
-        """The length, the inner frames and the hash of packets that were looked at lately, by what no hop changes in
-        their headers. A packet is looked at once for each node that relays it, and to compare its bytes takes a third
-        of the time that hashing them takes."""
+        self.parts: Sequence[Looked] | None = None
+        """The packets of a frame that holds several; None until `Reader.parts` has been asked."""
 
     @property
     def key(self) -> int:
@@ -74,33 +76,6 @@ class Reader:
         """
         _, _, _, seq, origin, *_ = self.fields
         return 0 if self.phase == BUNDLE else key_of(origin, seq)
-
-    def look(self, frame: bytes, *, alone: bool = False) -> None:
-        """Go on to another frame.
-
-        `alone`: these bytes were cut out of a frame with several packets and hold one of them; the flag that says
-        that more packets follow is ignored.
-        """
-        self.frame, self.packet = frame, None
-        fields = self.fields = fields_of(frame)
-        flags = fields[_FLAGS]
-        if flags & FLAG_MORE and not alone:
-            self.hash, self.phase = 0, BUNDLE
-        else:
-            name = frame[END_TO_END]
-            size, inner, packet_hash = self._hashes.get(name, _UNKNOWN)
-            # packets that differ only in their inner frames are told apart by them: no copy is taken for another packet
-            same = len(frame) == size and frame.endswith(inner)
-            self.hash = packet_hash if same else self._remember(name, frame)
-            self.phase = PHASES.get(flags & PHASE_MASK, 0)
-
-    def _remember(self, name: bytes, frame: bytes) -> int:
-        """Compute the hash of a packet, and keep it for its further copies."""
-        if len(self._hashes) >= _REMEMBERED:
-            self._hashes.clear()
-        packet_hash = hash_of(frame)
-        self._hashes[name] = len(frame), frame[HEADER_BYTES:], packet_hash
-        return packet_hash
 
     def read(self, cached: bool = True) -> Packet:
         """Check the header and return the packet in the frame; raises MalformedFrameError if the check fails.
@@ -117,6 +92,53 @@ class Reader:
             packet = _new(Packet, (checked(frame, fields), frame))
         self.packet = packet
         return packet
+
+
+class Reader:
+    """Looks at one frame after another, and knows the last one and the latest packets again."""
+
+    def __init__(self) -> None:
+        self.last = Looked(b"", NO_FIELDS, 0, 0)
+        """The frame that was looked at last."""
+        self._hashes: dict[bytes, tuple[int, bytes, int]] = {}
+        """The length, the inner frames and the hash of packets that were looked at lately, by what no hop changes in
+        their headers. A packet is looked at once for each node that relays it, and to compare its bytes takes a third
+        of the time that hashing them takes."""
+
+    def look(self, frame: bytes) -> Looked:
+        """Go on to another frame."""
+        fields = fields_of(frame)
+        if fields[_FLAGS] & FLAG_MORE:
+            self.last = Looked(frame, fields, 0, BUNDLE)
+        else:
+            self.last = self._packet(frame, fields)
+        return self.last
+
+    def parts(self, looked: Looked) -> Sequence[Looked]:
+        """The packets of a frame with several; raises MalformedFrameError.
+
+        The flag that says that more packets follow is ignored in each.
+        """
+        if looked.parts is None:
+            looked.parts = [self._packet(part, fields_of(part)) for part in unbundle(looked.frame)]
+        return looked.parts
+
+    def _packet(self, frame: bytes, fields: Fields) -> Looked:
+        """Look at the bytes of one packet."""
+        name = frame[END_TO_END]
+        size, inner, packet_hash = self._hashes.get(name, _UNKNOWN)
+        # packets that differ only in their inner frames are told apart by them: no copy is taken for another packet
+        if len(frame) != size or not frame.endswith(inner):
+            packet_hash = self._remember(name, frame)
+        return Looked(frame, fields, packet_hash, PHASES.get(fields[_FLAGS] & PHASE_MASK, 0))
+
+    def _remember(self, name: bytes, frame: bytes) -> int:
+        """Compute the hash of a packet, and keep it for its further copies."""
+        if len(self._hashes) >= _REMEMBERED:
+            self._hashes.clear()
+        packet_hash = hash_of(frame)
+        self._hashes[name] = len(frame), frame[HEADER_BYTES:], packet_hash
+        return packet_hash
 
 
 T = TypeVar("T")
@@ -160,6 +182,4 @@ decoded: Final = Decoded().of
 @lru_cache(maxsize=_LATEST)
 def packet_of(frame: bytes) -> Packet:
     """The packet in a frame, checked; raises MalformedFrameError. The latest packets are cached."""
-    reader = Reader()
-    reader.look(frame)
-    return reader.read(cached=False)
+    return Reader().look(frame).read(cached=False)

@@ -8,7 +8,7 @@ order of the queue.
 from collections.abc import Iterable, Iterator, Sequence
 
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.wire.frame import ROUTE, frames, message_id, with_more
+from fanet_mw.wire.frame import ROUTE_ID, end_of_frame, with_more
 
 
 def aggregated(packets: Iterable[tuple[int, bytes]], *, most_bytes: int) -> Iterator[tuple[int, bytes, int]]:
@@ -37,11 +37,12 @@ def bundle(packets: Sequence[bytes]) -> bytes:
 
 def unbundle(frame: bytes) -> list[bytes]:
     """The packets in a radio frame, each as if it had come alone except for its flag; raises MalformedFrameError."""
-    starts, at = [], 0
-    for inner in frames(frame):
-        if message_id(inner) == ROUTE.msgid:
+    starts, at, size = list[int](), 0, len(frame)
+    while at < size:
+        end = end_of_frame(frame, at)
+        if frame[at + 7 : at + 10] == ROUTE_ID:
             starts.append(at)
-        at += len(inner)
+        at = end
     if not starts or starts[0]:
         raise MalformedFrameError("a bundle that does not begin with a routing header")
-    return [frame[begin:end] for begin, end in zip(starts, [*starts[1:], len(frame)], strict=True)]
+    return [frame[begin:end] for begin, end in zip(starts, [*starts[1:], size], strict=True)]

@@ -105,9 +105,10 @@ def message_id(frame: bytes, at: int = 0) -> int:
 ROUTE: Final = Spec(53000, 34, struct.Struct("<QIHHHBBBBBB"))
 HEADER_BYTES: Final = ROUTE.layout.size + OVERHEAD
 _ROUTE_MARK: Final = bytes((MAGIC, ROUTE.layout.size, 0))
-_ROUTE_ID: Final = ROUTE.msgid.to_bytes(3, "little")
+ROUTE_ID: Final = ROUTE.msgid.to_bytes(3, "little")
+"""The message id of a routing header, as it stands in a frame."""
 _ROUTE_BEFORE: Final = _ROUTE_MARK + b"\0"
-_ROUTE_SENDER: Final = bytes((COMPONENT,)) + _ROUTE_ID
+_ROUTE_SENDER: Final = bytes((COMPONENT,)) + ROUTE_ID
 _EXTRA: Final = bytes((ROUTE.crc_extra,))
 ANY_NODE: Final = 0xFFFF
 """An id that no node has."""
@@ -186,12 +187,12 @@ def fields_of(frame: bytes) -> Fields:
     if len(frame) < HEADER_BYTES:
         return NO_FIELDS
     fields: Fields = _CHECKED.unpack_from(frame)
-    return fields if fields[0] == _ROUTE_MARK and fields[1] == _ROUTE_ID else NO_FIELDS
+    return fields if fields[0] == _ROUTE_MARK and fields[1] == ROUTE_ID else NO_FIELDS
 
 
 def peek_kind(frame: bytes) -> int | None:
     """The kind of a packet, unchecked; None if these bytes cannot begin with a routing header."""
-    whole = len(frame) >= HEADER_BYTES and frame[:3] == _ROUTE_MARK and frame[7:10] == _ROUTE_ID
+    whole = len(frame) >= HEADER_BYTES and frame[:3] == _ROUTE_MARK and frame[7:10] == ROUTE_ID
     return frame[_KIND_AT] if whole else None
 
 
@@ -248,17 +249,21 @@ def with_more(packet: bytes) -> bytes:
 # --- inner frames -------------------------------------------------------------------------------------------------
 
 
+def end_of_frame(data: bytes, at: int) -> int:
+    """Where the MAVLink 2 frame at an offset ends, found by its length alone; raises MalformedFrameError."""
+    if len(data) - at < OVERHEAD or data[at] != MAGIC or data[at + 2] & ~_SIGNED:
+        raise MalformedFrameError(f"no MAVLink 2 frame at byte {at}")
+    end = at + OVERHEAD + data[at + 1] + (_SIGNATURE if data[at + 2] else 0)
+    if end > len(data):
+        raise MalformedFrameError(f"frame at byte {at} ends beyond the end")
+    return end
+
+
 def frames(data: bytes, *, start: int = 0) -> Iterator[bytes]:
-    """Each of several successive MAVLink 2 frames, found by their lengths alone; raises MalformedFrameError at a broken
-    one.
-    """
+    """Each of several successive MAVLink 2 frames; raises MalformedFrameError at a broken one."""
     at = start
     while at < len(data):
-        if len(data) - at < OVERHEAD or data[at] != MAGIC or data[at + 2] & ~_SIGNED:
-            raise MalformedFrameError(f"no MAVLink 2 frame at byte {at}")
-        end = at + OVERHEAD + data[at + 1] + (_SIGNATURE if data[at + 2] else 0)
-        if end > len(data):
-            raise MalformedFrameError(f"frame at byte {at} ends beyond the end")
+        end = end_of_frame(data, at)
         yield data[at:end]
         at = end
 

@@ -84,7 +84,7 @@ class RoundFlooding(RoutingProtocol):
         )
         self._spreading = Spreading(
             capacity=scenario.routing.queue_frames, repeats=rounds.repeats, patience_ns=self._law.hop_ns,
-            links_of=self._topology.links_of,
+            links=self._topology.links,
         )  # fmt: skip
         self._repair = None
         if rounds.repair_s:
@@ -285,8 +285,7 @@ class RoundFlooding(RoutingProtocol):
         """A neighbor tells of links and of packets that it holds."""
         if packet.header.origin != src:
             return
-        for seq, origin in decoded(packet.frame, decode_held):
-            self._spreading.on_held(key_of(origin, seq), src)
+        self._spreading.on_held([key_of(origin, seq) for seq, origin in decoded(packet.frame, decode_held)], src)
         self._topology.hear(decoded(packet.frame, decode_heard), now_ns=now_ns)
         if self._topology.has_news:
             self._reach_turn(now_ns)

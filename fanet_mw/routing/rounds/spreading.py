@@ -13,15 +13,13 @@ round must have passed in which nobody else sent it, so that mostly one node rep
 stands for node i + 1.
 """
 
-from collections.abc import Callable
+from collections.abc import Iterable, Sequence
 from heapq import heappop, heappush
 from typing import Final
 
 from fanet_mw.node.duplicates import key_of
 from fanet_mw.node.packet import Packet
 
-LinksOf = Callable[[int, int], int]
-"""The nodes with which a node has links at an instant: of (node, instant)."""
 _MOST_EARLY: Final = 1024
 _MOST_DONE: Final = 1024
 _WAY_ROUND: Final = 2
@@ -85,15 +83,15 @@ class _Spread:
 class Spreading:
     """The packets that one node passes on."""
 
-    def __init__(self, *, capacity: int, repeats: int, patience_ns: int, links_of: LinksOf) -> None:
+    def __init__(self, *, capacity: int, repeats: int, patience_ns: int, links: Sequence[int]) -> None:
         """`capacity`: the most packets that are kept.
         `patience_ns`: the time after which a neighbor that has received a packet was heard to say so.
-        `links_of`: the nodes with which a neighbor has links.
+        `links`: the nodes with which each node has links, by its id; they change.
         """
         self._capacity = capacity
         self._repeats = repeats
         self._patience_ns = patience_ns
-        self._links_of = links_of
+        self._links = links
         self._entries: dict[int, _Spread] = {}
         self._urgent: dict[int, _Spread] = {}
         """The urgent ones among them."""
@@ -153,7 +151,7 @@ class Spreading:
         else:
             self._bulk[key] = entry
             heappush(self._due, (bulk_from_ns, key))
-            self._reach(entry, src, now_ns)
+            self._reach(entry, src)
         if len(self._entries) <= self._capacity:
             return None
         last, evicted = max(self._entries.items(), key=lambda item: item[1].dispensable())
@@ -178,30 +176,30 @@ class Spreading:
             again = bool(done.senders & own)
             done.senders |= own
             return again
-        if neighbors & self._links_of(src, now_ns) & ~entry.having:
+        if neighbors & self._links[src] & ~entry.having:
             entry.copy_ns = now_ns  # who lacks it may have heard that copy
-        self._reach(entry, src, now_ns)
+        self._reach(entry, src)
         again = bool(entry.senders & own)
         entry.senders |= own
         entry.having |= own
         return again
 
-    def _reach(self, entry: _Spread, src: int | None, now_ns: int) -> None:
+    def _reach(self, entry: _Spread, src: int | None) -> None:
         """A neighbor was heard to send a bulk packet, which those that hear the neighbor have, too."""
         if src is not None and not entry.again:
-            entry.reached |= 1 << (src - 1) | self._links_of(src, now_ns)
+            entry.reached |= 1 << (src - 1) | self._links[src]
 
-    def on_held(self, key: int, src: int) -> None:
-        """A neighbor says that it holds a packet."""
-        entry = self._entries.get(key)
-        if entry is not None:
-            entry.having |= 1 << (src - 1)
-            return
-        if key in self._done:
-            return
-        self._early[key] = self._early.pop(key, 0) | 1 << (src - 1)
-        if len(self._early) > _MOST_EARLY:
-            del self._early[next(iter(self._early))]
+    def on_held(self, keys: Iterable[int], src: int) -> None:
+        """A neighbor says that it holds packets."""
+        theirs, early = 1 << (src - 1), self._early
+        for key in keys:
+            entry = self._entries.get(key)
+            if entry is not None:
+                entry.having |= theirs
+            elif key not in self._done:
+                early[key] = early.pop(key, 0) | theirs
+        while len(early) > _MOST_EARLY:
+            del early[next(iter(early))]
 
     def assume(self, node: int, *, until_ns: int) -> None:
         """A node that was elsewhere in the swarm has come near: what is older than an instant it has got there."""

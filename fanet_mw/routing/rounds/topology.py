@@ -42,16 +42,16 @@ class Topology:
         self._lifetime = min(_MODULUS // 2, -(-lifetime_ns // epoch_ns))
         self._refresh = max(1, S // epoch_ns)
         self._stated: dict[NodeId, _Stated] = {}
-        self._links = [0] * (count + 1)
-        """The nodes with which each node has links; the first entry is of no node."""
+        self.links = [0] * (count + 1)
+        """The nodes with which each node has links, by its id; the first entry is of no node."""
         self._news: dict[NodeId, None] = {}
         """The nodes of which something is to be passed on, in the order in which it was heard."""
         self._own_epoch = -1
         self._rings: list[int] = [1 << (node - 1)]
         """The nodes that are so many hops away."""
         self._dominates = True
-        self._dominates_by: tuple[int, ...] = ()
-        """The links by which this node decided whether it is in the dominating set."""
+        self._dominates_for = -1
+        """The state of the links for which this node decided whether it is in the dominating set."""
         self._unreached_ns: dict[NodeId, int] = {}
         """The instant since which each node without a way is known to have none."""
         self._rivals: list[tuple[NodeId, bool]] = []
@@ -71,6 +71,7 @@ class Topology:
     def state(self, heard: int, *, often: bool, now_ns: int) -> None:
         """An epoch has begun in which this node hears these neighbors, and takes part in bulk slots often or not."""
         self._own_epoch = now_ns // self._epoch_ns
+        self._arrange(now_ns)
         known = self._stated.get(self._node)
         if (
             known is None
@@ -102,7 +103,7 @@ class Topology:
 
     def _relink(self, node: NodeId, heard: int, changed: int) -> None:
         """A node hears some others now, or no longer."""
-        own, links = 1 << (node - 1), self._links
+        own, links = 1 << (node - 1), self.links
         for other in nodes_of(changed):
             stated = self._stated.get(other)
             if stated is not None and stated.heard & own and heard >> (other - 1) & 1:
@@ -147,7 +148,7 @@ class Topology:
             self._rings.append(ring)
             near = 0
             for node in nodes_of(ring):
-                near |= self._links[node]
+                near |= self.links[node]
             ring = near & ~reached
             reached |= ring
         since, away = self._unreached_ns, nodes_of(~reached & (1 << self._count) - 1)
@@ -166,12 +167,7 @@ class Topology:
     @property
     def is_partial(self) -> bool:
         """True while this node has links, and there are nodes of which it has not heard, or has not heard for long."""
-        return len(self._stated) < self._count and self._links[self._node] != 0
-
-    def links_of(self, node: int, now_ns: int) -> int:
-        """The nodes with which a node has links."""
-        self._arrange(now_ns)
-        return self._links[node]
+        return len(self._stated) < self._count and self.links[self._node] != 0
 
     def rivals(self, near: int, now_ns: int) -> list[tuple[NodeId, bool]]:
         """The nodes within two hops, if this node hears `near`, and whether each takes part in bulk slots often."""
@@ -180,7 +176,7 @@ class Topology:
             self._rivals_for = near, self.changes
             reached = near
             for node in nodes_of(near):
-                reached |= self._links[node]
+                reached |= self.links[node]
             stated = self._stated
             others = nodes_of(reached & ~(1 << (self._node - 1)))
             self._rivals = [(node, node not in stated or stated[node].often) for node in others]
@@ -189,11 +185,10 @@ class Topology:
     def dominates(self, now_ns: int) -> bool:
         """True if this node is one of the connected dominating set whose transmissions reach all nodes."""
         self._arrange(now_ns)
-        near = [self._node, *nodes_of(self._links[self._node])]
-        links = tuple(self._links[node] for node in near)
-        if self._dominates_by != links:
-            self._dominates_by = links
-            self._dominates = dominates(self._node, {n: tuple(nodes_of(self._links[n])) for n in near})
+        if self._dominates_for != self.changes:
+            self._dominates_for = self.changes
+            near = [self._node, *nodes_of(self.links[self._node])]
+            self._dominates = dominates(self._node, {n: tuple(nodes_of(self.links[n])) for n in near})
         return self._dominates
 
     def absent(self, now_ns: int, *, doubt_ns: int) -> Sequence[NodeId] | None:

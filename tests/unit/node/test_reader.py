@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from fanet_mw import wire
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.node import duplicates
-from fanet_mw.node.reader import Decoded, Reader
+from fanet_mw.node.reader import BUNDLE, Decoded, Reader
 
 FLOODED = wire.Header(5, 7, 3, 0xFFFF, 3, 0, 32, 0, 3, wire.FLAG_FLOOD)
 
@@ -35,12 +35,12 @@ def inner_frames(content: wire.Content) -> int:
     return len(content.inner)
 
 
-def what(reader: Reader, frame: bytes) -> object:
-    reader.look(frame)
+def what(reader: Reader, frame: bytes) -> tuple[object, ...]:
+    seen = reader.look(frame)
     try:
-        return reader.hash, reader.key, reader.phase, reader.packet or reader.read()
+        return seen.hash, seen.key, seen.phase, seen.packet or seen.read()
     except MalformedFrameError as error:
-        return reader.hash, reader.key, reader.phase, str(error)
+        return seen.hash, seen.key, seen.phase, str(error)
 
 
 @given(order=st.lists(st.sampled_from(FRAMES), max_size=12))
@@ -50,21 +50,29 @@ def test_what_is_read_of_a_frame_does_not_depend_on_what_was_read_before(order: 
 
 
 def test_all_who_hear_one_frame_hold_one_packet() -> None:
-    reader = Reader()
-    reader.look(FLOODED.encode())
-    assert (reader.key, reader.phase, reader.packet) == (duplicates.key_of(3, 7), duplicates.FLOODED, None)
-    assert reader.read() is reader.packet
-    assert reader.packet.header == FLOODED
+    seen = Reader().look(FLOODED.encode())
+    assert (seen.key, seen.phase, seen.packet) == (duplicates.key_of(3, 7), duplicates.FLOODED, None)
+    assert seen.read() is seen.packet
+    assert seen.packet.header == FLOODED
+
+
+def test_a_frame_with_several_packets_is_opened_once_and_holds_each_as_if_it_had_come_alone() -> None:
+    reader, packets = Reader(), FRAMES[:2]
+    seen = reader.look(wire.bundle(packets))
+    assert (seen.phase, seen.key) == (BUNDLE, 0)
+    parts = reader.parts(seen)
+    assert reader.parts(seen) is parts
+    assert [(part.hash, part.key, part.phase) for part in parts] == [what(Reader(), frame)[:3] for frame in packets]
+    assert parts[1].read().frame == packets[1]
 
 
 @pytest.mark.parametrize("frame", FRAMES[7:], ids=["two phases", "no header", "wrong CRC", "nothing"])
 def test_a_frame_without_a_packet_is_named_each_time(frame: bytes) -> None:
-    reader = Reader()
-    reader.look(frame)
+    seen = Reader().look(frame)
     for _ in range(2):
         with pytest.raises(MalformedFrameError):
-            reader.read()
-        assert reader.packet is None
+            seen.read()
+        assert seen.packet is None
 
 
 def test_what_was_decoded_of_one_packet_is_not_taken_for_another_s() -> None:
@@ -100,13 +108,11 @@ def test_copies_have_one_hash_and_other_packets_of_that_name_have_others_also_wh
     packet, copy, longer, forged = FRAMES[1:5]
     found = []
     for frame in (packet, copy, longer, forged, copy):
-        reader.look(frame)
-        found.append(reader.hash)
-        assert reader.hash == duplicates.hash_of(frame)
+        found.append(reader.look(frame).hash)
+        assert found[-1] == duplicates.hash_of(frame)
     assert found[0] == found[1] == found[4]
     assert len(set(found)) == 3
     for seq in range(2000):
         reader.look(FLOODED._replace(seq=seq).encode())
-    reader.look(copy)
-    assert reader.hash == found[0]
+    assert reader.look(copy).hash == found[0]
     assert len(reader._hashes) < 1000

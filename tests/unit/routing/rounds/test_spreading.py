@@ -27,7 +27,7 @@ def packet(seq: int, *, priority: int = wire.PRIORITY_REPORT) -> Packet:
 
 
 def spreading(*, repeats: int = 3) -> Spreading:
-    return Spreading(capacity=8, repeats=repeats, patience_ns=ROUND, links_of=lambda node, _: nodes(NEAR.get(node, ())))
+    return Spreading(capacity=8, repeats=repeats, patience_ns=ROUND, links=[nodes(NEAR.get(node, ())) for node in range(9)])
 
 
 def sent_in_turn(made: Spreading, turn: int, *, neighbors: tuple[int, ...] = (2, 3)) -> list[int]:
@@ -81,7 +81,7 @@ def test_a_neighbor_that_says_it_holds_the_packet_needs_no_repeat() -> None:
     made = spreading()
     made.take(packet(1), src=2, now_ns=0)
     sent_in_turn(made, 1)
-    made.on_held(key_of_packet(packet(1)), 3)
+    made.on_held([key_of_packet(packet(1))], 3)
     assert sent_in_turn(made, 2) == []
 
 
@@ -118,7 +118,7 @@ def test_bulk_that_all_are_known_to_have_is_forgotten() -> None:
     made = spreading()
     made.take(bulk(1), src=2, now_ns=0, bulk_from_ns=10 * MS)
     assert bulk_sent(made, 10 * MS) == [1]
-    made.on_held(key_of_packet(bulk(1)), 3)
+    made.on_held([key_of_packet(bulk(1))], 3)
     assert bulk_sent(made, 5 * ROUND) == []
     assert made.bulk_due_ns(nodes((2, 3))) is None
 
@@ -142,7 +142,7 @@ def test_the_least_important_packet_is_evicted_when_too_many_are_kept() -> None:
 
 def test_what_a_neighbor_holds_counts_also_if_it_said_so_first() -> None:
     made = spreading()
-    made.on_held(key_of_packet(bulk(1)), 3)
+    made.on_held([key_of_packet(bulk(1))], 3)
     made.take(bulk(1), src=2, now_ns=0, bulk_from_ns=10 * MS)
     assert bulk_sent(made, 10 * MS) == []
 
@@ -151,7 +151,7 @@ def test_who_sends_bulk_a_second_time_does_not_know_that_this_node_has_it() -> N
     made = spreading()
     key = key_of_packet(bulk(1))
     made.take(bulk(1), src=2, now_ns=0, bulk_from_ns=10 * MS)
-    made.on_held(key, 3)
+    made.on_held([key], 3)
     assert bulk_sent(made, 10 * MS) == [], "all have it"
     assert not made.on_copy(key, 3, neighbors=nodes((2, 3)), now_ns=ROUND), "3 sends it for the first time"
     assert made.on_copy(key, 3, neighbors=nodes((2, 3)), now_ns=2 * ROUND)
@@ -163,7 +163,7 @@ def test_who_comes_near_has_got_elsewhere_what_is_old() -> None:
         made.take(bulk(seq), src=None, now_ns=taken_ns, bulk_from_ns=taken_ns)
     assert bulk_sent(made, 5 * ROUND, neighbors=(2,)) == [1, 2]
     for seq in (1, 2):
-        made.on_held(key_of_packet(bulk(seq)), 2)
+        made.on_held([key_of_packet(bulk(seq))], 2)
     made.assume(3, until_ns=ROUND)
     assert bulk_sent(made, 8 * ROUND) == [2]
 

@@ -26,6 +26,10 @@ RECEIPT_NS: Final = 20 * MS
 """A receipt waits this long for other receipts to the same node, and at random up to `_SPREAD_NS` longer, because nodes
 that have received the same broadcast must not all answer at the same instant."""
 _SPREAD_NS: Final = 80 * MS
+_PAUSE_NS: Final = 250 * MS
+"""What is missing of a message is told when no piece has come for this long, because until then more may be coming."""
+_PATIENT_NS: Final = 600 * MS
+"""It is told after this time in any case: before the sender, which waits for a second or longer, sends all again."""
 _MOST_DONE: Final = 8192
 """The number of messages that are remembered as handed over."""
 _MOST_FLOWS: Final = 4096
@@ -65,6 +69,16 @@ class _Incoming:
         return not self.wanted or len(self.pieces) == self.head.pieces
 
 
+class _Owed(NamedTuple):
+    """A receipt that is to be sent."""
+
+    receipt: Receipt
+    priority: int
+    since_ns: int
+    """When the first piece came that it confirms."""
+    due_ns: int
+
+
 class Receiver:
     """The messages from other nodes' applications to one node."""
 
@@ -82,9 +96,10 @@ class Receiver:
         """The last receipt of each message whose sender may not have received it."""
         self._last: dict[tuple[NodeId, int], int] = {}
         """The number of the last message that was handed over, by flow."""
-        self._receipts: dict[NodeId, dict[int, tuple[Receipt, int]]] = {}
-        """The messages to acknowledge, each with its priority, by the node to which the receipts go."""
+        self._receipts: dict[NodeId, dict[int, _Owed]] = {}
+        """The receipts by the node to which they go, and by the number of their message."""
         self._receipts_ns: int | None = None
+        """The instant at which one of them is due, or sooner."""
         self._sweep_ns: int | None = None
         self.arrived: list[Whole] = []
         """The messages to hand over, in order; the caller empties this list."""
@@ -224,9 +239,17 @@ class Receiver:
         origin, number = name
         message = self._incoming.get(name)
         held = message.held if message is not None else 0
-        self._receipts.setdefault(origin, {})[number] = Receipt(held, number, outcome), priority
-        if self._receipts_ns is None:
-            self._receipts_ns = now_ns + RECEIPT_NS + int(self._random.random() * _SPREAD_NS)
+        owed = self._receipts.setdefault(origin, {})
+        before = owed.get(number)
+        since_ns = now_ns if before is None else before.since_ns
+        wait_ns = RECEIPT_NS
+        if outcome == MISSING and message is not None and not message.whole:
+            wait_ns = max(RECEIPT_NS, min(_PAUSE_NS, since_ns + _PATIENT_NS - now_ns))
+        due_ns = now_ns + wait_ns + int(self._random.random() * _SPREAD_NS)
+        if before is not None and before.receipt.outcome == outcome != MISSING:
+            due_ns = min(due_ns, before.due_ns)
+        owed[number] = _Owed(Receipt(held, number, outcome), priority, since_ns, due_ns)
+        self._receipts_ns = earliest(self._receipts_ns, due_ns)
 
     # --- out ------------------------------------------------------------------------------------------------------
 
@@ -236,13 +259,27 @@ class Receiver:
             self._sweep(now_ns)
         if self._receipts_ns is None or now_ns < self._receipts_ns:
             return []
-        self._receipts_ns = None
-        receipts, self._receipts = self._receipts, {}
         found = []
-        for origin, of_origin in receipts.items():
-            latest = [self._latest(origin, receipt) for receipt, _ in of_origin.values()]
-            found.append((origin, latest, min(priority for _, priority in of_origin.values())))
+        for origin, owed in list(self._receipts.items()):
+            if all(each.due_ns > now_ns for each in owed.values()):
+                continue
+            # what is known goes along; a message of which pieces are still coming waits for them
+            ready = {
+                number: each for number, each in owed.items() if each.due_ns <= now_ns or self._is_over(origin, number)
+            }
+            for number in ready:
+                del owed[number]
+            if not owed:
+                del self._receipts[origin]
+            latest = [self._latest(origin, each.receipt) for each in ready.values()]
+            found.append((origin, latest, min(each.priority for each in ready.values())))
+        self._receipts_ns = min(
+            (each.due_ns for owed in self._receipts.values() for each in owed.values()), default=None
+        )
         return found
+
+    def _is_over(self, origin: NodeId, number: int) -> bool:
+        return (origin, number) in self._done
 
     def _latest(self, origin: NodeId, receipt: Receipt) -> Receipt:
         """The receipt as it must be sent now, because the message may have been handed over since it was made."""

@@ -274,10 +274,12 @@ class Node:
         packet was handled before.
         """
         try:
-            packet = seen.packet or seen.read()
+            return self._handle(seen, seen.packet or seen.read(), reception, before, now_ns)
         except MalformedFrameError:
             self.port.dropped[DropReason.MALFORMED] += 1
             return _NONE
+
+    def _handle(self, seen: Looked, packet: Packet, reception: Reception, before: int, now_ns: int) -> Sequence[Relay]:
         packet_hash, bits = seen.hash, before | seen.phase
         _, _, origin_us, seq, origin, destination, _, kind, _, hops, priority, _, _, _ = seen.fields
         end_ns = reception.end_ns

@@ -107,3 +107,39 @@ def test_bounds_are_whole_again_a_second_after_the_air_is() -> None:
     whole = {name for name, at_s in stated.items() if at_s > 12}
     assert len(whole) > 50
     assert not whole & excludes
+
+
+ONE: dict[str, Any] = {"priority": "bulk", "payload_bytes": 1024, "destination": 1, "interval_s": 0.5}
+
+
+def to_one(**tables: Any) -> Mapping[str, Any]:
+    return flown(**{"rounds": {"turn_bytes": 600}, **tables})
+
+
+def test_bulk_for_a_neighbor_takes_one_frame_and_no_wait_for_a_slot() -> None:
+    silent = to_one(traffic={"arrivals": "none"})
+    summary = to_one(traffic={**ONE, "sources": [2]})
+    assert summary["pdr"] == 1.0
+    assert summary["frames"]["sent"] - silent["frames"]["sent"] <= 1.2 * summary["generated"]
+    assert summary["delay_ms"]["p50"] <= 20
+
+
+@pytest.mark.parametrize("speed_m_s", [10.0, 20.0])
+def test_bulk_for_one_finds_its_way_in_a_swarm_that_mixes(speed_m_s: float) -> None:
+    mixing = {"model": "random_waypoint", "speed_m_s": speed_m_s}
+    lives = {"duration_s": 30, "drain_s": 7, "routing": {"lifetime_s": 6}}
+    summary = to_one(traffic=ONE, mobility=mixing, world={"area_m": 500}, **lives)
+    assert summary["reachable"]["traffic"]["pdr"] == 1.0
+    assert summary["frames"]["closes"]
+
+
+def test_bulk_for_one_goes_another_way_when_a_relay_falls_silent() -> None:
+    fallen = [{"kind": "mute", "at_s": 8, "node": node} for node in (2, 7)]
+    summary = to_one(traffic={**ONE, "sources": [3, 9, 15]}, faults=fallen)
+    assert summary["pdr"] == 1.0
+    assert summary["delay_ms"]["max"] <= 1500
+
+
+def test_bulk_for_one_of_whom_nothing_is_known_yet_is_flooded() -> None:
+    summary = to_one(traffic={**ONE, "sources": [15]}, warmup_s=0.1, duration_s=5)
+    assert summary["pdr"] == 1.0

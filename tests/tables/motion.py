@@ -1,4 +1,4 @@
-"""Measured tables of the ways to reach everybody, in motion: five methods, urgent packets, deaths, costs of rounds."""
+"""Measured tables of packets in motion: five methods, urgent packets, deaths, one receiver, costs of rounds."""
 
 import time
 from collections.abc import Mapping
@@ -115,4 +115,22 @@ def costs() -> Rows:
             str(count), f"{timing.period_ns / MS:.0f}", f"{(timing.period_ns + timing.turn_ns) / MS:.0f}",
             f"{found['air']['busy']:.3f}", _ms(delay["p95"]), _ms(delay["max"]), f"{cpu_ms:.1f}",
         ])  # fmt: skip
+    return rows
+
+
+def one_receiver() -> Rows:
+    """Packets for one node, in rounds and by protocols that keep routes: 44 sources of 1,024 bytes a second."""
+    rows = [[
+        "motion", "protocol", "delivered", "of reachable", "p50 [ms]", "p95 [ms]", "worst [ms]",
+        "frames, control included",
+    ]]  # fmt: skip
+    for motion, moves in MOTIONS.items():
+        for protocol in ("rounds", "aodv", "olsr", "dsdv", "geographic"):
+            keys = (f"routing.protocol={protocol}", "traffic.destination=12")
+            found = summarized("clusters", *keys, *moves, *_DURATION)
+            delay = found["delay_ms"]
+            rows.append([
+                motion, f"`{protocol}`", _share(found["pdr"]), _share(found["reachable"]["traffic"]["pdr"]),
+                *(_ms(delay[name]) for name in ("p50", "p95", "max")), f"{found['frames']['sent']:,}",
+            ])  # fmt: skip
     return rows

@@ -56,6 +56,7 @@ TABLES: Final[Mapping[str, Table]] = {
     "lasting-heads": Table("explanation/clusters.md", clusters.lasting_heads, Tolerance(absolute=0.2, relative=0.02)),
     "methods-in-motion": Table("results/motion.md", motion.methods, Tolerance(absolute=0.02, relative=0.1)),
     "urgent-in-motion": Table("results/motion.md", motion.urgent, Tolerance(absolute=0.02, relative=0.1)),
+    "one-receiver": Table("results/motion.md", motion.one_receiver, Tolerance(absolute=0.02, relative=0.1)),
     "cost-of-rounds": Table(
         "results/motion.md", motion.costs, Tolerance(absolute=0.01, relative=0.1), ("CPU a UAV [ms/s]",)
     ),

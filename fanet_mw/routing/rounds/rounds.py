@@ -1,7 +1,8 @@
 """Rounds: a protocol whose delays do not depend on the topology. Each node has one turn in every round, by its number.
 
     urgent packet   waits for the own turn; whoever hears it first sends it in the own next turn
-    bulk            goes in slots of the rest of the round, as long as a neighbor is not known to have it
+    bulk for all    goes in slots of the rest of the round, as long as a neighbor is not known to have it
+    bulk for one    goes hop by hop between the turns, acknowledged (`one_way.py`)
     topology        each node states its neighbors when they change, and all pass that on in turns (`topology.py`)
     hello           goes in a turn; holds a digest, so that neighbors send what was missed (`Repair`)
 
@@ -24,6 +25,7 @@ from fanet_mw.node.reader import decoded
 from fanet_mw.routing.packet_repair import FLOOD_OVER_NS, Repair
 from fanet_mw.routing.rounds.bulk_slots import BulkSlots
 from fanet_mw.routing.rounds.delay_law import MOST_HOPS, DelayLaw
+from fanet_mw.routing.rounds.one_way import OneWay
 from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.routing.rounds.spreading import Spreading
 from fanet_mw.routing.rounds.topology import Topology
@@ -94,6 +96,9 @@ class RoundFlooding(RoutingProtocol):
             )  # fmt: skip
         self._slots = BulkSlots(port.node, timing)
         self._random = port.stream("rounds").random
+        self._heard_ns: dict[NodeId, int] = {}
+        """The instant at which each neighbor was last heard."""
+        self._one_way = OneWay(port, timing, self._topology, self._heard_ns)
         self._blind_ns = self._lead_ns + radio.handover_ns
         """The time that passes from the decision to send until others know of it, airtime and waiting left out."""
         self._often = False
@@ -113,8 +118,6 @@ class RoundFlooding(RoutingProtocol):
         self._hello: Packet | None = None
         self._hello_waits = 0
         """The number of turns in which the hello found no room."""
-        self._heard_ns: dict[NodeId, int] = {}
-        """The instant at which each neighbor was last heard."""
         self._near = 0
         """The nodes that were heard lately, as a set of bits (`topology.nodes_of`)."""
         self._near_until_ns = 0
@@ -136,7 +139,7 @@ class RoundFlooding(RoutingProtocol):
             self._state_bound(packet, now_ns)
             self._take(packet, src=None, now_ns=now_ns)
         else:
-            self._take_bulk(packet, src=None, from_ns=due_ns, now_ns=now_ns)
+            self._send_bulk(packet, from_ns=due_ns, now_ns=now_ns)
 
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         src, header = reception.src, packet.header
@@ -152,6 +155,8 @@ class RoundFlooding(RoutingProtocol):
             self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
         elif self._in_turns(packet):
             self._take(packet, src=src, now_ns=now_ns)
+        elif not header.flags & FLAG_FLOOD:
+            self._send_bulk(packet, from_ns=now_ns + self._lead_ns, now_ns=now_ns)
         else:
             self._tell_held(packet.header.seq, packet.header.origin, now_ns)
             self._take_bulk(packet, src=src, from_ns=now_ns + self._lead_ns, now_ns=now_ns)
@@ -252,12 +257,15 @@ class RoundFlooding(RoutingProtocol):
 
     def _expired(self, packet: Packet, at_ns: int) -> bool:
         """True, and the packet is forgotten, if it is older than its lifetime at an instant."""
-        header = packet.header
-        if at_ns - header.origin_us * US <= self._port.scenario.routing.lifetime_ns(header.priority):
+        if not self._is_too_old(packet, at_ns):
             return False
         if self._spreading.forget(packet):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=at_ns)
         return True
+
+    def _is_too_old(self, packet: Packet, at_ns: int) -> bool:
+        header = packet.header
+        return at_ns - header.origin_us * US > self._port.scenario.routing.lifetime_ns(header.priority)
 
     def _told(self, room: int, now_ns: int) -> Packet | None:
         """What this node tells its neighbors of links and held packets, if there is anything and room for it."""
@@ -293,6 +301,15 @@ class RoundFlooding(RoutingProtocol):
                 self._reach_slot(now_ns, now_ns)
 
     # --- bulk -----------------------------------------------------------------------------------------------------
+
+    def _send_bulk(self, packet: Packet, *, from_ns: int, now_ns: int, tried: int = 0) -> None:
+        """Bulk for one receiver goes one way, if a way is known; all other bulk is flooded from here."""
+        one = packet.header.destination != BROADCAST
+        if one and self._one_way.send(
+            packet, near=self._neighbors(now_ns), from_ns=from_ns, now_ns=now_ns, tried=tried
+        ):
+            return
+        self._take_bulk(packet, src=None, from_ns=from_ns, now_ns=now_ns)
 
     def _take_bulk(self, packet: Packet, *, src: int | None, from_ns: int, now_ns: int) -> None:
         """A bulk packet may be sent from an instant on."""
@@ -355,6 +372,13 @@ class RoundFlooding(RoutingProtocol):
 
     def on_status(self, status: TxStatus, *, now_ns: int) -> None:
         self._clock_hellos.discard(status.seq)
+        attempt = self._one_way.failed(status)
+        if attempt is None:
+            return
+        if self._is_too_old(attempt.packet, now_ns):
+            self._port.drop(DropReason.EXPIRED, attempt.packet, now_ns=now_ns)
+        else:
+            self._send_bulk(attempt.packet, from_ns=now_ns, now_ns=now_ns, tried=attempt.tried)
 
     def _hears(self, src: NodeId, now_ns: int) -> None:
         """A frame came from a node. One that was not near before cannot know what this node has told lately."""
@@ -468,7 +492,7 @@ class RoundFlooding(RoutingProtocol):
         return self._timing.slot_bytes
 
     def waiting(self) -> int:
-        return self._spreading.waiting()
+        return self._spreading.waiting() + self._one_way.waiting()
 
     def report(self) -> Mapping[str, object]:
         return {

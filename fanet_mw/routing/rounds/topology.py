@@ -57,6 +57,10 @@ class Topology:
         self._rivals: list[tuple[NodeId, bool]] = []
         self._rivals_for: tuple[int, int] | None = None
         """The neighbors, and the state of what is known, for which the rivals were found."""
+        self._nearer: dict[NodeId, int] = {}
+        """The nodes next to this one that are nearer to each destination."""
+        self._nearer_for = -1
+        """The state of the links for which they were found."""
         self.changes = 0
         """How often links, or who takes part in bulk slots often, have changed."""
         self._arranged_for = -1
@@ -146,10 +150,7 @@ class Topology:
         self._rings = []
         while ring:
             self._rings.append(ring)
-            near = 0
-            for node in nodes_of(ring):
-                near |= self.links[node]
-            ring = near & ~reached
+            ring = self._around(ring) & ~reached
             reached |= ring
         since, away = self._unreached_ns, nodes_of(~reached & (1 << self._count) - 1)
         self._unreached_ns = {node: since.get(node, now_ns) for node in away}
@@ -158,6 +159,33 @@ class Topology:
         """The hops to each node to which a way is known, this node included."""
         self._arrange(now_ns)
         return {node: hops for hops, ring in enumerate(self._rings) for node in nodes_of(ring)}
+
+    def nearer(self, destination: NodeId, now_ns: int) -> int:
+        """The nodes with links to this one from which a node is fewer hops away than from here; none if no way is
+        known.
+        """
+        self._arrange(now_ns)
+        if self._nearer_for != self.changes:
+            self._nearer_for, self._nearer = self.changes, {}
+        found = self._nearer.get(destination)
+        if found is None:
+            found = self._nearer[destination] = self._toward(destination)
+        return found
+
+    def _toward(self, destination: NodeId) -> int:
+        own = self.links[self._node]
+        ring = reached = 1 << (destination - 1)
+        while ring and not ring & own:
+            ring = self._around(ring) & ~reached
+            reached |= ring
+        return ring & own
+
+    def _around(self, nodes: int) -> int:
+        """The nodes with links to some of these."""
+        around = 0
+        for node in nodes_of(nodes):
+            around |= self.links[node]
+        return around
 
     def reaches(self, node: NodeId, now_ns: int) -> bool:
         """True if a way to a node is known."""
@@ -174,9 +202,7 @@ class Topology:
         self._arrange(now_ns)
         if self._rivals_for != (near, self.changes):
             self._rivals_for = near, self.changes
-            reached = near
-            for node in nodes_of(near):
-                reached |= self.links[node]
+            reached = near | self._around(near)
             stated = self._stated
             others = nodes_of(reached & ~(1 << (self._node - 1)))
             self._rivals = [(node, node not in stated or stated[node].often) for node in others]

@@ -15,7 +15,7 @@ class Rounds(Section):
     turn_slack_us: Annotated[float, Field(ge=0, le=1e6)] = 50.0
     """By how much a turn is longer than its frame, for errors of clocks and for propagation."""
     bulk_share: Annotated[float, Field(ge=0, le=0.95)] = 0.7
-    """Share of a round that is left to bulk, which contends for it (0 to 0.95); 0: bulk goes in turns, too."""
+    """Share of a round whose slots are for bulk (0 to 0.95); 0: bulk goes in turns, too."""
     least_period_ms: Milliseconds = 0.0
     """The shortest round; 0: as short as the turns and `bulk_share` allow."""
     repeats: Annotated[int, Field(ge=0, le=64)] = 16

@@ -106,6 +106,24 @@ def test_a_message_does_not_wait_for_one_to_which_nobody_listens() -> None:
     assert receiver._incoming == {}
 
 
+def test_a_message_of_which_pieces_keep_coming_is_answered_once_when_it_is_whole() -> None:
+    receiver, last_ns = made(), BORN_NS + 4 * 100 * MS
+    for piece in range(5):
+        hear(receiver, head(piece=piece, pieces=5), BORN_NS + piece * 100 * MS)
+        assert said(receiver, BORN_NS + (piece + 1) * 100 * MS - 1) == ({} if piece < 4 else {7: (DELIVERED, 0)})
+    assert said(receiver, last_ns + S) == {}
+
+
+def test_the_sender_of_a_long_message_hears_of_it_before_it_sends_all_again() -> None:
+    receiver, heard = made(), []
+    for piece in range(12):
+        hear(receiver, head(piece=piece, pieces=60), BORN_NS + piece * 40 * MS)
+        heard += [BORN_NS + piece * 40 * MS for _ in said(receiver, BORN_NS + piece * 40 * MS)]
+    heard += [at_ns for at_ns in range(BORN_NS + 480 * MS, BORN_NS + S, 10 * MS) if said(receiver, at_ns)]
+    assert heard
+    assert heard[0] <= BORN_NS + 700 * MS
+
+
 def test_a_message_to_which_nobody_listens_keeps_the_place_of_those_before_it() -> None:
     """7 is still on its way: 9 may not overtake it because nobody listens to 8."""
     receiver = made()
@@ -158,15 +176,13 @@ def test_a_message_that_comes_twice_is_handed_over_once_and_confirmed_twice() ->
     assert numbers(receiver) == [7]
 
 
-def test_a_receipt_says_which_pieces_are_held_and_waits_for_others() -> None:
-    receiver = made()
-    hear(receiver, head(piece=0, pieces=3), BORN_NS)
-    due_ns = receiver.next_wake_ns()
-    assert due_ns is not None
-    assert BORN_NS + RECEIPT_NS <= due_ns <= BORN_NS + LATEST_RECEIPT_NS
-    hear(receiver, head(piece=2, pieces=3), due_ns - 1, priority=1)
-    assert receiver.next_wake_ns() == due_ns, "the first that waits decides"
-    assert receiver.due(due_ns - 1) == []
+def test_what_is_missing_is_told_once_no_more_pieces_come() -> None:
+    receiver, at_ns = made(), BORN_NS
+    for piece in (0, 2):
+        hear(receiver, head(piece=piece, pieces=4), at_ns, priority=3 - piece)
+        at_ns += 200 * MS
+        assert receiver.due(at_ns) == []
+    due_ns = BORN_NS + 200 * MS + 250 * MS + 80 * MS
     ((origin, receipts, priority),) = receiver.due(due_ns)
     assert (origin, priority) == (FROM, 1)
     assert [(r.number, r.held, r.outcome) for r in receipts] == [(7, 0b101, MISSING)]

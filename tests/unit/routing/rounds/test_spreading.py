@@ -27,7 +27,9 @@ def packet(seq: int, *, priority: int = wire.PRIORITY_REPORT) -> Packet:
 
 
 def spreading(*, repeats: int = 3) -> Spreading:
-    return Spreading(capacity=8, repeats=repeats, patience_ns=ROUND, links=[nodes(NEAR.get(node, ())) for node in range(9)])
+    return Spreading(
+        capacity=8, repeats=repeats, patience_ns=ROUND, links=[nodes(NEAR.get(node, ())) for node in range(9)]
+    )
 
 
 def sent_in_turn(made: Spreading, turn: int, *, neighbors: tuple[int, ...] = (2, 3)) -> list[int]:

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
         SensorReading,
         Voice,
         WifiScan,
+        WindEstimate,
     )
     from fanet_mw.errors import BusError, ConfigError, DropReason, FanetError, LocalProtocolError, MalformedFrameError
     from fanet_mw.scenario import Scenario
@@ -56,7 +57,7 @@ _HOMES: Final = {
     ),
     "fanet_mw.bus.messages": (
         "Altimeter", "Battery", "Camera", "CameraImage", "FlightState", "Gps", "Inertial", "Radar", "SensorReading",
-        "Voice", "WifiScan",
+        "Voice", "WifiScan", "WindEstimate",
     ),
     "fanet_mw.errors": (
         "BusError", "ConfigError", "DropReason", "FanetError", "LocalProtocolError", "MalformedFrameError",
@@ -76,7 +77,8 @@ __all__ = [
     "ConfigError", "Course", "Data", "DropReason", "Emulated", "Enu", "FanetError", "Fate", "FlightState", "Gps",
     "HOME", "Inertial", "Launched", "LocalProtocolError", "MalformedFrameError", "Message", "Node", "NodeClosedError",
     "NodeId", "OnAir", "Radar", "Received", "Result", "Scenario", "SensorReading", "Sent", "Status", "VirtualSwarm",
-    "Voice", "WifiScan", "__version__", "join", "launch", "load_result", "load_scenario", "simulate",
+    "Voice", "WifiScan", "WindEstimate", "__version__", "join", "launch", "load_result", "load_scenario",
+    "simulate",
 ]  # fmt: skip
 
 

@@ -44,7 +44,7 @@ PAGES: Final = {
         "Applications": ("Application", "AppPort", "Data", "Received", "Status", "Fate", "Course", "ANY", "HOME"),
         "What a vehicle perceives": (
             "Gps", "SensorReading", "WifiScan", "Camera", "CameraImage", "Voice", "Radar", "Altimeter", "Inertial",
-            "Battery", "FlightState",
+            "Battery", "FlightState", "WindEstimate",
         ),
     }),
 }  # fmt: skip

@@ -16,7 +16,17 @@ from agents.mission.paper_rule import PaperRule
 from agents.mission.searcher import Searcher, phone_model
 from agents.positioning.received_motion import motion_in
 from fanet_mw.application import Application, AppPort, Received
-from fanet_mw.bus.messages import Altimeter, Battery, Camera, Gps, Radar, SensorReading, Voice, WifiScan
+from fanet_mw.bus.messages import (
+    Altimeter,
+    Battery,
+    Camera,
+    Gps,
+    Radar,
+    SensorReading,
+    Voice,
+    WifiScan,
+    WindEstimate,
+)
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.mavlink import Geodetic
 from fanet_mw.node.reader import decoded
@@ -142,6 +152,8 @@ class PlannedSearch(Application):
             self._searcher.voice(calls, now_ns=now_ns)
         elif isinstance(reading, Battery):
             self._searcher.on_battery(reading.charge, now_ns=now_ns)
+        elif isinstance(reading, WindEstimate):
+            self._searcher.on_wind(reading.velocity)
         elif isinstance(reading, Radar):
             self._searcher.radar(reading.echoes, now_ns=now_ns)
         self._settle()

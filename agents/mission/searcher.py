@@ -57,6 +57,7 @@ from fanet_mw.motion import Motion
 from fanet_mw.orders import OrderKind
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
+from fanet_mw.scenario.tables.world import FASTEST_AIR_M_S
 from fanet_mw.units import Enu, NodeId, S
 from fanet_mw.wire.bids import Bids, encode_bids
 from fanet_mw.wire.roll import Roll
@@ -129,9 +130,11 @@ class Searcher:
             scenario, node, survivors=survivors, own_motion=own_motion, formation=place, approach=approach,
             absence=absence, outbox=outbox, speed_m_s=speed_m_s,
         )  # fmt: skip
+        beside: set[int] = set()
         self._return_home = ReturnHome(
-            position, own_motion, outbox,
-            speed_m_s=speed_m_s, height_m=scenario.nodes.altitude_m, limits=limits,
+            node, position, own_motion, neighbors, outbox, speed_m_s=speed_m_s,
+            airspeed_m_s=FASTEST_AIR_M_S[scenario.world.vehicle], height_m=scenario.nodes.altitude_m, limits=limits,
+            beside=beside,
         )  # fmt: skip
         velocity_choice = VelocityChoice(
             own_motion,
@@ -153,6 +156,7 @@ class Searcher:
         take_off = TakeOff(
             node, position,
             own_motion=own_motion, neighbors=neighbors, outbox=outbox, height_m=nodes.altitude_m,
+            beside=beside,
         ) if nodes.on_ground else None  # fmt: skip
         self._flight = Flight(
             own_motion, place, goal, velocity_choice, take_off=take_off, return_home=self._return_home
@@ -220,6 +224,10 @@ class Searcher:
         """A reading of the battery; a UAV that must leave gives up its place and its task at once."""
         if self._return_home.on_battery(charge, now_ns=now_ns):
             self._leave(now_ns)
+
+    def on_wind(self, velocity: Enu) -> None:
+        """An estimate of the wind."""
+        self._return_home.on_wind(velocity)
 
     def _leave(self, now_ns: int) -> None:
         """Give up the place and the task, tell all, and fly home."""

@@ -40,6 +40,7 @@ from fanet_mw.bus.messages import (
     TxStatus,
     Voice,
     WifiScan,
+    WindEstimate,
 )
 from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Mishap, MishapKind, Partition, Restore
 from fanet_mw.errors import MalformedFrameError
@@ -296,6 +297,7 @@ _CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[byte
     27: (Order, _encode_order, _decode_order),
     28: (ClockRequest, _encode_request, _decode_request),
     29: (FlightState, sensor_codecs.encode_flight, sensor_codecs.decode_flight),
+    30: (WindEstimate, sensor_codecs.encode_wind, sensor_codecs.decode_wind),
 }
 HEADS: Final[dict[type[Any], tuple[struct.Struct, ...]]] = {
     TxRequest: (_TX,), Reception: (_RX,), TxStatus: (_STATUS,), Poses: (_POSES,), Setpoint: (_SETPOINT,),

@@ -268,6 +268,15 @@ class FlightState(NamedTuple):
     """Unix time at `t_ns` by GPS; 0: not known."""
 
 
+class WindEstimate(NamedTuple):
+    """World -> one UAV: the mean wind by its flight controller, from how far it leans; needs no airspeed sensor."""
+
+    t_ns: int
+    """The swarm instant of the reading."""
+    velocity: Enu
+    """The velocity of the air over ground [m/s]."""
+
+
 class MavlinkTap(NamedTuple):
     """UAV -> inspectors and ground stations: MAVLink bytes as the node produced or delivered them."""
 
@@ -324,7 +333,9 @@ class Report:
     json: str
 
 
-SensorReading = WifiScan | Camera | CameraImage | Voice | Radar | Altimeter | Inertial | Battery | FlightState
+SensorReading = (
+    WifiScan | Camera | CameraImage | Voice | Radar | Altimeter | Inertial | Battery | FlightState | WindEstimate
+)
 """Any reading of a sensor other than the position fix; a new kind of sensor is one more member of this union."""
 
 Message = (

@@ -22,6 +22,7 @@ from fanet_mw.bus.messages import (
     Radar,
     Voice,
     WifiScan,
+    WindEstimate,
 )
 from fanet_mw.units import Enu
 
@@ -169,9 +170,18 @@ def decode_flight(body: bytes) -> FlightState:
     return FlightState(t_ns, roll_rad, pitch_rad, yaw_rad, satellites, None if unknown else hdop, unix_ns)
 
 
+def encode_wind(m: WindEstimate) -> bytes:
+    return _INERTIAL.pack(m.t_ns, *m.velocity)
+
+
+def decode_wind(body: bytes) -> WindEstimate:
+    return WindEstimate(*decode_inertial(body))
+
+
 HEADS: Final[dict[type[Any], tuple[struct.Struct, ...]]] = {
     Gps: (_GPS,), WifiScan: (_SCAN, _HEARD), Camera: (_SCAN, _PERSON), Voice: (_SCAN, _CALL), Radar: (_SCAN, _ECHO),
     Altimeter: (_ALTIMETER,), Inertial: (_INERTIAL,), Battery: (_BATTERY,), CameraImage: (_IMAGE,),
     FlightState: (_FLIGHT,),
+    WindEstimate: (_INERTIAL,),
 }  # fmt: skip
 """The structs of each kind of reading, as in `codecs.HEADS`."""

@@ -218,7 +218,7 @@ def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
     post = np.array(positions(scenario)[-1]) if scenario.post is not None else None
     nearly_all_ns: int | None = None
     nearest: list[Values] = []
-    for t_ns, at, searching in _instants(records):
+    for t_ns, at, searching in searching_instants(records):
         apart = np.linalg.norm(at[:, None] - at[None], axis=2)
         linked = apart[np.ix_(searching, searching)] <= range_m
         graphs.append(coherence(linked))
@@ -264,7 +264,7 @@ def _usual(values: list[int]) -> dict[str, float]:
     return {"p50": statistics.median(values), "most": max(values)}
 
 
-def _instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows, Flags]]:
+def searching_instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows, Flags]]:
     """The instants with positions in the trace, the positions of the UAVs alive then, and which of
     these UAVs search.
     """

@@ -142,7 +142,9 @@ class WorldActor(Actor):
         survivors = Survivors(scenario, solids.ground_m)
         self._mishaps = Mishaps(scenario)
         gps = GpsReceiver(scenario, self._mishaps)
-        self._suite = Suite(scenario, sensors_of(scenario, survivors, solids, self._drain, solid, gps), topics)
+        self._suite = Suite(
+            scenario, sensors_of(scenario, survivors, solids, self._drain, solid, gps, self._engine), topics
+        )
         self._estimate = PositionEstimate(scenario, gps) if scenario.world.navigation == "estimated" else None
         self._flies = np.ones(len(self._ids), bool)
         """The UAVs that have not crashed."""

@@ -38,6 +38,7 @@ from fanet_mw.bus.messages import (
     TxStatus,
     Voice,
     WifiScan,
+    WindEstimate,
 )
 from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
 from fanet_mw.errors import MalformedFrameError
@@ -95,6 +96,7 @@ messages: st.SearchStrategy[Message] = st.one_of(
     st.builds(Radar, instants, st.lists(st.builds(Echo, *[finite] * 5), max_size=4).map(tuple)),
     st.builds(Altimeter, instants, finite, st.none() | finite),
     st.builds(Inertial, instants, st.builds(Enu, finite, finite, finite)),
+    st.builds(WindEstimate, instants, st.builds(Enu, finite, finite, finite)),
     st.builds(Battery, instants, finite, finite, finite),
     st.builds(
         FlightState,

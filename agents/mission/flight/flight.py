@@ -41,10 +41,10 @@ class Flight:
         elif not self._return_home.leaves:
             goal, feed = self._goal.at(survivor, now_ns)
             self.velocity = self._velocity_choice.velocity(goal, feed, now_ns)
-        elif self._return_home.land_if_there():
+        elif self._return_home.land_if_there(now_ns):
             self.velocity = None
         else:
-            self.velocity = self._velocity_choice.velocity(self._return_home.goal, STILL, now_ns)
+            self.velocity = self._velocity_choice.velocity(self._return_home.goal(now_ns), STILL, now_ns)
 
     @property
     def takes_off(self) -> bool:
@@ -59,6 +59,8 @@ class Flight:
     def _climbs(self, now_ns: int) -> bool:
         """Go on with the take-off; returns False once it is over, and the UAV departs for its place."""
         assert self._take_off is not None, "who takes off stood on the ground"
+        if self._take_off.stands:
+            self._return_home.stands_on_pad()
         self._take_off.fix(now_ns)
         if not self._take_off.lasts:
             self._place.depart(now_ns)

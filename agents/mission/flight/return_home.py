@@ -1,22 +1,41 @@
 """The return of a UAV whose battery runs low, that hears nobody any more, or whose search is over: it flies home above
 all UAVs that search, then lands straight down. Its task and its place in the formation are handed on before
 (`agents/mission/searcher.py`, `agents/mission/search_formation/formation_planner.py`).
+
+UAVs whose pads are beside each other land in turns: who comes waits `_HOLD_M` from its pad while another one is over
+the pads and has not begun to sink, or while one with a lower id waits as well.
 """
 
+from collections.abc import Set as AbstractSet
 from enum import StrEnum
 from typing import Final
 
 from agents.mission.flight.endurance import Endurance
+from agents.mission.flight.reciprocal_avoidance import CLEARANCE_M
 from agents.mission.flight.search_limits import SearchLimits
+from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
 from fanet_mw.application import Course
-from fanet_mw.units import Enu
+from fanet_mw.units import Enu, NodeId
 
 _HIGHER_M: Final = 18.0
 """A UAV flies home this far above the lanes; relays and followers fly below it."""
-_HOME_M: Final = 4.0
-"""The UAV lands once it is within this horizontal distance of its base."""
+_HOME_M: Final = 1.5
+"""The UAV lands once it is within this horizontal distance of its base, and nearly stands."""
+_STANDS_M_S: Final = 0.5
+_HOLD_M: Final = 40.0
+"""The distance from its pad at which a UAV waits for its turn."""
+_OVER_M: Final = 15.0
+"""A UAV this near to its pad has its turn."""
+_SUNK_M: Final = 3.0
+"""The next one comes when the one before has sunk so far; it sinks on while that one comes."""
+_SINKS_M_S: Final = 0.7
+"""Who is lower and does not sink at this speed is still on its way up, or stands."""
+_LOW_M: Final = 25.0
+"""Who is lower by this stands at home, or has nothing to do there."""
+_TURN_S: Final = 11.0
+"""The time between two landings beside each other."""
 _LAND_M_S: Final = 1.5
 """The speed of the landing."""
 
@@ -39,20 +58,25 @@ class ReturnHome:
 
     def __init__(
         self,
+        node: NodeId,
         home: Enu,
         own_motion: OwnMotion,
+        neighbors: NeighborMotions,
         outbox: Outbox,
         *,
         speed_m_s: float,
+        airspeed_m_s: float,
         height_m: float,
         limits: SearchLimits,
+        beside: AbstractSet[int] = frozenset(),
     ) -> None:
-        """`height_m`: the height of the lanes above ground. `limits`: with which charge it is to land, and how long it
-        may hear nobody.
+        """`airspeed_m_s`: the greatest one. `height_m`: the height of the lanes above ground. `limits`: with which
+        charge it is to land, and how long it may hear nobody. `beside`: the UAVs whose pads are beside its own.
         """
+        self._node, self._neighbors, self._beside = node, neighbors, beside
         self._home = home._replace(up=height_m + _HIGHER_M)
         self._own_motion, self._outbox = own_motion, outbox
-        self._endurance = Endurance(home, speed_m_s=speed_m_s, reserve=limits.reserve)
+        self._endurance = Endurance(home, speed_m_s=speed_m_s, reserve=limits.reserve, airspeed_m_s=airspeed_m_s)
         self._limits = limits
         self._heard_ns: int | None = None
         """The instant at which another UAV was last heard; None before the first time: there is no link to lose."""
@@ -64,11 +88,21 @@ class ReturnHome:
     def on_battery(self, charge: float, *, now_ns: int) -> bool:
         """A reading of the battery; returns True if the UAV must leave now."""
         self._endurance.reserve = self._limits.reserve
-        self._endurance.read(charge, now_ns=now_ns)
+        self._endurance.wait_s = _TURN_S * len(self._beside)
+        self._endurance.read(charge, now_ns=now_ns, velocity=self._own_motion.velocity)
         if self.reason is ReturnReason.BATTERY or self._endurance.margin(self._own_motion.position) > 0.0:
             return False
         self.reason = ReturnReason.BATTERY
         return True
+
+    def on_wind(self, velocity: Enu) -> None:
+        """An estimate of the wind."""
+        self._endurance.on_wind(velocity)
+
+    def stands_on_pad(self) -> None:
+        """The base is where the receiver says that this UAV stands, so that errors which last are the same later."""
+        here = self._own_motion.position
+        self._home = self._home._replace(east=here.east, north=here.north)
 
     def on_heard(self, now_ns: int) -> bool:
         """Another UAV was heard; returns True if this one therefore takes part in the mission again."""
@@ -111,18 +145,42 @@ class ReturnHome:
             return 0
         return max(1, round(100 * self._endurance.margin(self._own_motion.position)))
 
-    @property
-    def goal(self) -> Enu:
-        """The place above its base to which the UAV flies."""
-        return self._home
+    def goal(self, now_ns: int) -> Enu:
+        """The place above its base to which the UAV flies, or beside it while others land."""
+        if not self._waits(now_ns):
+            return self._home
+        off = self._own_motion.position.minus(self._home)
+        away_m = off.horizontal()
+        if away_m < 1.0:
+            return self._home._replace(east=self._home.east + _HOLD_M)
+        out = _HOLD_M / away_m
+        return self._home._replace(east=self._home.east + out * off.east, north=self._home.north + out * off.north)
 
-    def land_if_there(self) -> bool:
-        """Command the landing if the UAV has reached its goal; returns True once it lands.
+    def _waits(self, now_ns: int) -> bool:
+        """True while it is the turn of another UAV whose pad is beside that of this one."""
+        here = self._own_motion.position
+        has_turn = here.minus(self._home).horizontal() <= _OVER_M
+        for node in sorted(self._beside):
+            motion = self._neighbors.motion(node, now_ns=now_ns)
+            other = None if motion is None else motion.position_at(now_ns)
+            if motion is None or other is None or other.up < here.up - _LOW_M:
+                continue
+            if other.up < here.up - _SUNK_M and motion.velocity.up <= -_SINKS_M_S:
+                continue
+            away_m = other.minus(self._home).horizontal()
+            is_over, waits = away_m <= _OVER_M + CLEARANCE_M, away_m <= 2 * _HOLD_M
+            if (is_over and (node < self._node or not has_turn)) or (waits and node < self._node and not has_turn):
+                return True
+        return False
+
+    def land_if_there(self, now_ns: int) -> bool:
+        """Command the landing if the UAV has reached its base and it is its turn; returns True once it lands.
 
         Each call commands it again, because a setpoint may get lost on its way to the flight controller.
         """
         here = self._own_motion.position
-        if here.minus(self._home).horizontal() <= _HOME_M:
+        nearly = here.minus(self._home).horizontal() <= _HOME_M
+        if nearly and self._own_motion.velocity.horizontal() <= _STANDS_M_S and not self._waits(now_ns):
             self.lands = True
         if self.lands:
             self._outbox.course = Course(here, _LAND_M_S, land=True)

@@ -43,8 +43,12 @@ class TakeOff:
         neighbors: NeighborMotions,
         outbox: Outbox,
         height_m: float,
+        beside: set[int] | None = None,
     ) -> None:
-        """`pad`: the place on which the UAV stands. `height_m`: the height of the lanes above ground."""
+        """`pad`: the place on which the UAV stands. `height_m`: the height of the lanes above ground. `beside`: gets
+        the UAVs that stand beside this one.
+        """
+        self._beside = set[int]() if beside is None else beside
         self._node, self._pad = node, pad
         self._own_motion, self._neighbors, self._outbox = own_motion, neighbors, outbox
         self._height_m = height_m
@@ -53,6 +57,11 @@ class TakeOff:
         """The instant at which the take-off was last commanded; None while the UAV waits on its pad."""
         self.lasts = True
         """True until the UAV has taken off."""
+
+    @property
+    def stands(self) -> bool:
+        """True while the UAV waits on its pad."""
+        return self._told_ns is None
 
     @property
     def left_s(self) -> float:
@@ -79,13 +88,10 @@ class TakeOff:
 
     def _is_clear(self, waited_ns: int, now_ns: int) -> bool:
         """True once no neighbor with a lower id stands or climbs right beside this UAV."""
-        return waited_ns >= _PATIENCE_NS or (
-            waited_ns >= _LISTEN_NS
-            and not any(
-                node < self._node and self._is_beside(motion.position_at(now_ns))
-                for node, motion in self._neighbors.by_node(now_ns=now_ns)
-            )
-        )
+        heard = self._neighbors.by_node(now_ns=now_ns)
+        now = {node for node, motion in heard if self._is_beside(motion.position_at(now_ns))}
+        self._beside |= now
+        return waited_ns >= _PATIENCE_NS or (waited_ns >= _LISTEN_NS and not any(node < self._node for node in now))
 
     def _is_beside(self, other: Enu) -> bool:
         off = other.minus(self._pad)

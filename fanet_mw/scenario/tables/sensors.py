@@ -107,6 +107,10 @@ class Sensors(Section):
     """Standard deviation of the slow error along each axis, with a correlation time of 100 s."""
     battery_hz: Rate = 0.0
     """Readings per second of the battery's voltage, current and charge."""
+    wind_hz: Rate = 0.0
+    """Readings per second of the mean wind, as flight controllers estimate it from how far they lean."""
+    wind_sigma_m_s: Length = 1.0
+    """Standard deviation of its slow error along each horizontal axis, with a correlation time of 30 s."""
     map_share: Annotated[float, Field(ge=0, le=1)] = 1.0
     """Share of the buildings on the map that each UAV of a planned search carries; the map has all hills."""
     gps_common_m: Length = 2.0

@@ -50,5 +50,9 @@ class Engine(ABC):
         """The power that each battery delivers now; None for an engine without rotors."""
         return None
 
+    def air_m_s(self) -> Rows | None:
+        """The velocity of the air around each body; None for an engine without wind."""
+        return None
+
     def close(self) -> None:  # noqa: B027  (only physics holds anything)
         """Release the resources of the engine."""

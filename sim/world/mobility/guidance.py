@@ -80,6 +80,8 @@ class _Land(NamedTuple):
     """Sink straight down, and stay on the ground."""
 
     speed_m_s: float
+    place: Enu | None = None
+    """The place above which it sinks; None for one that does not know its place, and drifts."""
 
 
 _Command = _GoTo | _FlyAt | _Land | Homeward
@@ -171,7 +173,9 @@ class Guidance:
             self.steer(node, Enu(here.east, here.north, place.up), speed_m_s=max(_LEAST_CLIMB_M_S, speed_m_s))
             self._enter(row, FlightMode.TAKEOFF)
         elif kind is SetpointKind.LAND:
-            self._command(row, _Land(max(_TOUCHDOWN_M_S, speed_m_s)))
+            landing = self._commands.get(row)
+            over = landing.place if isinstance(landing, _Land) else None
+            self._command(row, _Land(max(_TOUCHDOWN_M_S, speed_m_s), over or here))
             self._enter(row, FlightMode.LAND)
         elif kind is SetpointKind.RETURN:
             self._command(row, self._returns.way(row, here, speed_m_s))
@@ -273,11 +277,14 @@ class Guidance:
         for row, command in [*self._commands.items()]:
             if isinstance(command, Homeward):
                 goal = command.goal(Enu(*at[row].tolist()))
-                self._command(row, _Land(_FORCED_M_S) if goal is None else command)
+                self._command(row, _Land(_FORCED_M_S, Enu(*at[row].tolist())) if goal is None else command)
                 places[row], limit[row] = goal or at[row], command.speed_m_s
                 feed[row] = 0.0
             elif isinstance(command, _GoTo):
                 places[row], limit[row] = command
+                feed[row] = 0.0
+            elif isinstance(command, _Land):
+                places[row], limit[row] = command.place or at[row], HOLD_M_S
                 feed[row] = 0.0
         wish = feed + _GAIN * (places - at)
         speed = np.linalg.norm(wish, axis=1)
@@ -313,13 +320,13 @@ class Guidance:
     def _near_the_ground(self, wish: Rows, at: Rows, landings: Mapping[int, float]) -> None:
         """Set the velocities of UAVs that land or stand on the ground.
 
-        Landing UAVs (`landings`: sinking speed by row) sink straight down, more slowly near the ground. UAVs that wait
+        Landing UAVs (`landings`: sinking speed by row) sink over their places, slowly near the ground. Those that wait
         for take-off stand still. A UAV that has climbed clear of the ground leaves `_grounded`.
         """
         height = at[:, 2] - self._surface_m(at)
         for row, speed_m_s in landings.items():
             sink = min(speed_m_s, max(_TOUCHDOWN_M_S, _FLARE_PER_S * float(height[row])))
-            wish[row] = [0.0, 0.0, -sink if height[row] > _ON_GROUND_M else 0.0]
+            wish[row] = [*wish[row, :2], -sink] if height[row] > _ON_GROUND_M else [0.0, 0.0, 0.0]
         for row in [row for row in self._grounded if height[row] > CLEAR_M]:
             self._grounded.discard(row)
         wish[self._waiting()] = 0.0

@@ -9,6 +9,7 @@ from fanet_mw.scenario.tables.routing import PROTOCOLS
 from fanet_mw.units import S
 from sim.world.arrays import Flags
 from sim.world.engines.battery_drain import BatteryDrain
+from sim.world.engines.contract import Engine
 from sim.world.environment.obstacles import Obstacles
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors
@@ -21,6 +22,7 @@ from sim.world.sensors.inertial import InertialSensor
 from sim.world.sensors.phone import PhoneSensor
 from sim.world.sensors.radar import RadarSensor
 from sim.world.sensors.voice import VoiceSensor
+from sim.world.sensors.wind import WindSensor
 
 
 class BatterySensor(Sensor):
@@ -53,11 +55,12 @@ def sensors_of(
     drain: BatteryDrain | None = None,
     obstacles: Obstacles | None = None,
     gps: GpsReceiver | None = None,
+    engine: Engine | None = None,
 ) -> list[Sensor]:
     """The sensors that a scenario asks for, in the order in which their readings are sent.
 
     `drain`: the batteries; None if UAVs have none. `obstacles`: the same obstacles as in `solids`, for rendered
-    images; None if there are none. `gps`: receivers that flight controllers use, too.
+    images; None if there are none. `gps`: receivers that flight controllers use, too. `engine`: its air is measured.
     """
     config = scenario.sensors
     found: list[Sensor] = []
@@ -79,6 +82,8 @@ def sensors_of(
         found.append(InertialSensor(scenario))
     if config.battery_hz and drain is not None:
         found.append(BatterySensor(scenario, drain))
+    if config.wind_hz and engine is not None:
+        found.append(WindSensor(scenario, engine))
     return found
 
 

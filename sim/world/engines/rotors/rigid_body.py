@@ -182,5 +182,8 @@ class Rotors(Engine):
     def power_w(self) -> Values:
         return self._power_w
 
+    def air_m_s(self) -> Rows:
+        return self._air.T
+
     def contacts(self) -> list[tuple[int, int]]:
         return self._contacts.take()

@@ -114,6 +114,24 @@ def test_a_uav_takes_off_flies_and_lands_without_a_collision(make_scenario: Make
     assert flying.world.report()["crashed"] == 0
 
 
+def test_who_lands_stays_over_its_place_although_its_estimate_of_its_velocity_drifts(
+    make_scenario: MakeScenario,
+) -> None:
+    flying = Flying(make_scenario, **{
+        "nodes.count": 10, "nodes.altitude_m": 90, "world.navigation": "estimated", "mission.survivors": 1,
+        "sensors.gps_common_m": 0, "sensors.gps_bias_m": 0,
+    })  # fmt: skip
+    flying.fly(2.0)
+    before = [flying.at(node) for node in range(1, 11)]
+    for _ in range(300):  # as a companion computer asks again and again
+        for node in range(1, 11):
+            flying.ask(node, SetpointKind.LAND, speed_m_s=1.5)
+        flying.fly(0.25)
+    off_m = [float(np.linalg.norm((flying.at(node) - was)[:2])) for node, was in enumerate(before, start=1)]
+    assert max(flying.at(node)[2] for node in range(1, 11)) < 0.5
+    assert max(off_m) < 1.5
+
+
 def test_who_is_told_to_land_while_it_takes_off_lands_and_takes_off_again(make_scenario: MakeScenario) -> None:
     flying = Flying(make_scenario, **{"nodes.on_ground": True, "world.crash": "falls"})
     flying.ask(1, SetpointKind.TAKEOFF, Enu(0.0, 0.0, 30.0), speed_m_s=2.0)

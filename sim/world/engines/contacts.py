@@ -4,6 +4,10 @@ A step moves bodies straight, and a contact is the closest approach within it, a
 pass each other between two instants have touched, too.
 """
 
+import math
+from functools import cache
+from typing import Final
+
 import numpy as np
 import numpy.typing as npt
 
@@ -12,20 +16,31 @@ from sim.world.environment.solids import Solids
 
 Indices = npt.NDArray[np.int64]
 
+_ASKEW: Final = np.array([1.0, math.sqrt(2) - 1, math.sqrt(3) - 1])
+_SWEEP: Final = _ASKEW / (2 * np.linalg.norm(_ASKEW))
+"""The direction, by half of a unit vector: it is multiplied by twice the middle of a step."""
+_NO_PAIRS: Final = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
+
+
+@cache
+def _numbers(count: int) -> Indices:
+    return np.arange(1, count + 1)
+
 
 def approaches(before: Rows, after: Rows, *, within_m: float) -> tuple[Indices, Indices, Values]:
     """The pairs of bodies that come nearer than this to each other in a step, and how near.
 
-    Candidates are found by sorting the middles of all steps along the axis along which they are spread most (sweep and
-    prune; Cohen et al., I-COLLIDE, 1995).
+    Candidates are found by sorting the middles of all steps along one direction (sweep and prune; Cohen et al.,
+    I-COLLIDE, 1995), in which no two places of a grid lie beside each other.
     """
     way = after - before
-    middle = before + way / 2
-    reach = within_m + float(np.linalg.norm(way, axis=1).max(initial=0.0))
-    along = middle[:, int(np.ptp(middle, axis=0).argmax())] if len(middle) else middle[:, 0]
+    reach = within_m + math.sqrt(float((way * way).sum(axis=1).max(initial=0.0)))
+    along = (before + after) @ _SWEEP
     order = np.argsort(along, kind="stable")
-    ends = np.searchsorted(along[order], along[order] + reach, side="right")
-    counts = ends - np.arange(len(order)) - 1
+    along = along[order]
+    counts = np.searchsorted(along, along + reach, side="right") - _numbers(len(order))
+    if not counts.any():
+        return _NO_PAIRS
     first = np.repeat(np.arange(len(order)), counts)
     second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
     a, b = order[first], order[second]

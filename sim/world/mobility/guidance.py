@@ -227,6 +227,8 @@ class Guidance:
         off = np.zeros(len(at), bool)
         landing = [row for row, command in self._commands.items() if isinstance(command, _Land)]
         off[[*landing, *self._waiting()]] = True
+        if not off.any():
+            return off
         return np.asarray(off & (at[:, 2] - self._surface_m(at) <= _ON_GROUND_M))
 
     def commanded(self, count: int) -> Flags:

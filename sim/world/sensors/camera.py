@@ -23,7 +23,7 @@ import numpy.typing as npt
 from fanet_mw.bus.messages import Camera, Message, Person
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import S
-from sim.world.arrays import Rows, Values
+from sim.world.arrays import Flags, Rows, Values
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors
 from sim.world.sensors.contract import Sensor, Truth, angles, generator, shaken
@@ -61,8 +61,13 @@ class CameraSensor(Sensor):
         self._random = generator(scenario.seed, "camera")
 
     def read(self, truth: Truth, rows: Sequence[int]) -> Iterator[tuple[int, Message]]:
-        for row in rows:
-            people = [*self._true_people(truth.at[row]), *self._false_people(truth.at[row])]
+        inside = self._in_view(truth.at[list(rows)])
+        some = np.asarray(inside.any(axis=1))
+        for index, row in enumerate(rows):
+            if not some[index] and not self._false_per_image:
+                continue
+            at = truth.at[row]
+            people = [*self._true_people(at, np.flatnonzero(inside[index])), *self._false_people(at)]
             if people:
                 yield row, Camera(truth.now_ns, tuple(people))
 
@@ -70,19 +75,17 @@ class CameraSensor(Sensor):
         """The number of pixels across a person at a depth below the camera."""
         return np.asarray(PERSON_M * self._width / (2 * np.maximum(depth_m, 0.1) * self._tan_half_fov))
 
-    def _in_view(self, offset: Rows) -> npt.NDArray[np.intp]:
-        """The indices of the survivors, at `offset` [n, 3] from the camera, who are inside the image."""
-        depth = -offset[:, 2]
-        inside = (np.abs(offset[:, 0]) <= depth * self._tan_half_fov) & (
-            np.abs(offset[:, 1]) <= depth * self._tan_half_fov_height
-        )
-        return np.flatnonzero(inside & (depth > 0) & ~self._survivors.buried)
+    def _in_view(self, at: Rows) -> Flags:
+        """Which survivors are inside the image of a camera at each place [n, survivors]."""
+        offset = self._survivors.places - at[:, None]
+        east, north, depth = offset[..., 0], offset[..., 1], -offset[..., 2]
+        inside = (np.abs(east) <= depth * self._tan_half_fov) & (np.abs(north) <= depth * self._tan_half_fov_height)
+        return np.asarray(inside & (depth > 0) & ~self._survivors.buried)
 
-    def _true_people(self, at: Values) -> Iterator[Person]:
-        offset = self._survivors.places - at
-        found = self._in_view(offset)
+    def _true_people(self, at: Values, found: npt.NDArray[np.intp]) -> Iterator[Person]:
         if not len(found):
             return
+        offset = self._survivors.places - at
         target = self._survivors.places[found] + [0.0, 0.0, _EYE_M]
         found = found[~self._solids.blocked(np.broadcast_to(at, target.shape), target)]
         pixels = self.pixels(-offset[found, 2])

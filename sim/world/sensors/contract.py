@@ -7,9 +7,11 @@ change the readings of others. A UAV that gets a reading learns nothing else of 
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from fanet_mw.bus.messages import Message
 from fanet_mw.rng import stream_seed
@@ -45,13 +47,16 @@ class Sensor(ABC):
         """The rows that have an instant in (before, now]."""
         period_ns = self.period_ns
         if not self.spread:
-            return list(range(count)) if _due(now_ns, before_ns, period_ns, 0) else []
-        return [row for row in range(count) if _due(now_ns, before_ns, period_ns, row * period_ns // count)]
+            return list(range(count)) if now_ns // period_ns > before_ns // period_ns else []
+        phases_ns = _phases_ns(count, period_ns)
+        due = (now_ns - phases_ns) // period_ns > (before_ns - phases_ns) // period_ns
+        return np.flatnonzero(due).tolist()
 
 
-def _due(now_ns: int, before_ns: int, period_ns: int, phase_ns: int) -> bool:
-    """True if a periodic instant, shifted by a phase, lies in (before, now]."""
-    return (now_ns - phase_ns) // period_ns > (before_ns - phase_ns) // period_ns
+@cache
+def _phases_ns(count: int, period_ns: int) -> npt.NDArray[np.int64]:
+    """The first instant of each UAV, spread over the period."""
+    return np.array([row * period_ns // count for row in range(count)], np.int64)
 
 
 def generator(seed: int, *names: str) -> np.random.Generator:

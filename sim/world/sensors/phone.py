@@ -48,8 +48,9 @@ class PhoneSensor(Sensor):
         )
         random = generator(scenario.seed, "phone_shadowing")
         self._waves = _wave_vectors(random) / scenario.radio.shadowing_corr_m
-        self._phases = self._places @ _wave_vectors(random) / scenario.radio.shadowing_corr_m
-        self._phases += random.uniform(0.0, 2 * math.pi, _WAVES)
+        phases = self._places @ _wave_vectors(random) / scenario.radio.shadowing_corr_m
+        phases += random.uniform(0.0, 2 * math.pi, _WAVES)
+        self._cos, self._sin = np.cos(phases), np.sin(phases)
         self._random = generator(scenario.seed, "phone_readings")
 
     def read(self, truth: Truth, rows: Sequence[int]) -> Iterator[tuple[int, Message]]:
@@ -63,16 +64,22 @@ class PhoneSensor(Sensor):
         mission = self._mission
         if not len(self._places):
             return ()
-        distance = np.maximum(1.0, np.linalg.norm(self._places - at, axis=1))
-        mean_dbm = self._power_dbm - REFERENCE_LOSS_DB - 10 * mission.phone_exponent * np.log10(distance)
+        offset = self._places - at
+        distance2 = np.maximum(1.0, (offset * offset).sum(axis=1))
+        mean_dbm = self._power_dbm - REFERENCE_LOSS_DB - 5 * mission.phone_exponent * np.log10(distance2)
         near = np.flatnonzero(mean_dbm >= mission.detection_dbm - 5 * max(mission.shadowing_db, 2.0))
-        told_dbm = np.round(mean_dbm[near] + self._shadowing_db(near, at) + self._reading_db(len(near)))
-        heard = [(int(i) + 1, float(dbm)) for i, dbm in zip(near, told_dbm, strict=True)]
-        return tuple(sorted((h for h in heard if h[1] >= mission.detection_dbm), key=lambda h: (-h[1], h[0])))
+        if not len(near):
+            return ()
+        told_dbm = np.round(mean_dbm[near] + self._shadowing_db(near, at) + self._reading_db(len(near))).tolist()
+        heard = [(i + 1, dbm) for i, dbm in zip(near.tolist(), told_dbm, strict=True) if dbm >= mission.detection_dbm]
+        return tuple(sorted(heard, key=lambda h: (-h[1], h[0])))
 
     def _shadowing_db(self, survivors: npt.NDArray[np.intp], at: npt.NDArray[np.float64]) -> Values:
-        """The shadowing between these survivors and a place, which is the same each time."""
-        waves = np.cos(self._phases[survivors] + at @ self._waves).sum(axis=1)
+        """The shadowing between these survivors and a place, which is the same each time: the sum of the cosines of
+        both phases together.
+        """
+        here = at @ self._waves
+        waves = self._cos[survivors] @ np.cos(here) - self._sin[survivors] @ np.sin(here)
         return np.asarray(self._mission.shadowing_db * math.sqrt(2 / _WAVES) * waves)
 
     def _reading_db(self, count: int) -> Values:

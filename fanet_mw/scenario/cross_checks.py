@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 from fanet_mw.airtime import longest_access_ns
 from fanet_mw.bus.radio_control import EVERY, Degrade, Mishap, MishapKind, Partition, Restore, nodes_of
 from fanet_mw.orders import wrong
+from fanet_mw.scenario.tables.world import NO_AID_S
 from fanet_mw.units import MAX_NODES, MS, US
 
 if TYPE_CHECKING:
@@ -77,6 +78,7 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
         if node > count
     ]
     found += _too_frequent_readings(scenario)
+    found += _too_rare_fixes(scenario)
     found += _too_small_frames(scenario)
     found += _unkept_deadline(scenario)
     found += _blind_warnings(scenario)
@@ -108,6 +110,17 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
             )
         found += _no_claimed_turns(scenario)
     return found
+
+
+def _too_rare_fixes(scenario: Scenario) -> Iterator[str]:
+    """A flight controller that knows of no fix for `NO_AID_S` lands."""
+    world, least_hz = scenario.world, 1 / NO_AID_S
+    by_fixes = world.navigation == "estimated" and not scenario.sensors.inertial_hz
+    if by_fixes and scenario.mobility.model == "onboard" and world.gps_hz < least_hz:
+        yield (
+            f"world.gps_hz = {world.gps_hz:g} must be >= {least_hz:g}: a flight controller without any fix for "
+            f'{NO_AID_S:g} s lands; world.navigation = "perfect" or optical flow (sensors.inertial_hz) needs none'
+        )
 
 
 def _too_frequent_readings(scenario: Scenario) -> Iterator[str]:

@@ -2,6 +2,7 @@
 something else. No run is refused for it.
 """
 
+import math
 import re
 from collections.abc import Iterator
 from typing import Final, get_args
@@ -12,6 +13,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.routing import PROTOCOLS
 from fanet_mw.scenario.tables.sections import Section
+from fanet_mw.scenario.tables.world import FASTEST_AIR_M_S
 from fanet_mw.units import S
 
 _NAMED: Final = 3
@@ -20,12 +22,14 @@ _NAMED: Final = 3
 
 _ONLY_WITH: Final = re.compile(r"`\w+`(?:(?:, | and |, and )`\w+`)*: ")
 _WORDS: Final = re.compile(r"`(\w+)`")
+_BETWEEN_BANDS_MHZ: Final = 3700.0
 _CLUSTERED: Final = frozenset({"clustered"})
 
 
 def notes(scenario: Scenario) -> list[str]:
     """One sentence for each."""
-    return [*_after_the_end(scenario), *_without_effect(scenario), *_still_waves(scenario), *_guessed(scenario)]
+    kinds = (_after_the_end, _without_effect, _still_waves, _beyond_the_vehicle, _odd_band, _guessed)
+    return [note for kind in kinds for note in kind(scenario)]
 
 
 def _after_the_end(scenario: Scenario) -> Iterator[str]:
@@ -71,6 +75,28 @@ def _still_waves(scenario: Scenario) -> Iterator[str]:
         yield (
             f"radio.fading = {radio.fading!r}: nothing moves, so each link keeps one gain for the whole run; "
             "radio.scatterer_speed_m_s lets them change"
+        )
+
+
+def _beyond_the_vehicle(scenario: Scenario) -> Iterator[str]:
+    world, asked_m_s = scenario.world, scenario.mobility.speed_m_s
+    airspeed_m_s, most_m_s = asked_m_s + math.hypot(*world.wind_m_s), FASTEST_AIR_M_S[world.vehicle]
+    if world.engine == "rotors" and scenario.mobility.model != "static" and airspeed_m_s > most_m_s:
+        against = " against the wind" if any(world.wind_m_s) else ""
+        yield (
+            f"mobility.speed_m_s = {asked_m_s:g}: world.vehicle = {world.vehicle} flies at most "
+            f"{most_m_s:g} m/s through the air, and needs {airspeed_m_s:g}{against}"
+        )
+
+
+def _odd_band(scenario: Scenario) -> Iterator[str]:
+    """DSSS and CCK are those of the band at 2.4 GHz (802.11-2020, 15 and 16), and `a` is that at 5 GHz (17)."""
+    radio = scenario.radio
+    low = radio.frequency_mhz < _BETWEEN_BANDS_MHZ
+    if radio.channel != "range" and (radio.standard == "a") == low:
+        yield (
+            f"radio.frequency_mhz = {radio.frequency_mhz:g}: IEEE 802.11{radio.standard} is sent at "
+            f"{'5 GHz' if low else '2.4 GHz'}"
         )
 
 

@@ -26,6 +26,9 @@ FASTEST_AIR_M_S: Final = {"iris": 19.0, "crazyflie": 10.0}
 """The airspeed in level flight at the tilt limit of each type of vehicle, rounded down
 (`sim/world/engines/rotors/vehicle_types.py`)."""
 
+NO_AID_S: Final = 5.0
+"""A flight controller that has had no position for so long does not know its place (PX4's EKF2_NOAID_TOUT)."""
+
 
 class World(Section):
     """The engine that moves the bodies, the area in which they move, and the obstacles in it."""

@@ -61,19 +61,19 @@ class Wind:
         self._state[:, [1, 3]] *= math.sqrt(0.5)
         self._state[:, [2, 4]] = 0.5 * self._state[:, [1, 3]] + math.sqrt(0.125) * random.normal(0, 1, (count, 2))
 
-    def advance(self, dt_s: float, at: Rows, velocity: Rows) -> Rows:
-        """The wind after `dt_s` at the places `at`, for bodies that fly at `velocity` [n, 3]."""
+    def advance(self, dt_s: float, above_m: Values, velocity: Rows) -> Rows:
+        """The wind after `dt_s`, for bodies so high above the ground [n] that fly at `velocity` [n, 3]."""
         if not self._w20:
-            return np.broadcast_to(self._mean, at.shape)
+            return np.broadcast_to(self._mean, velocity.shape)
         airspeed = np.maximum(np.linalg.norm(velocity - self._mean, axis=1), _LEAST_AIRSPEED_M_S)
-        level_m, up_m = lengths_m(at[:, 2])
-        state, noise = self._state, self._random.normal(0.0, 1.0, (len(at), 5))
+        level_m, up_m = lengths_m(above_m)
+        state, noise = self._state, self._random.normal(0.0, 1.0, (len(above_m), 5))
         kept = np.exp(-airspeed * dt_s / level_m)
         state[:, 0] = kept * state[:, 0] + np.sqrt(1 - kept * kept) * noise[:, 0]
         for first, length in ((1, level_m), (3, up_m)):
             self._advance_pair(first, airspeed * dt_s / length, noise[:, first : first + 2])
         gust = np.stack([state[:, 0], self._output(1), self._output(3)], axis=1)
-        level, up = intensities_m_s(at[:, 2], w20_m_s=self._w20)
+        level, up = intensities_m_s(above_m, w20_m_s=self._w20)
         return np.asarray(self._mean + (gust * np.stack([level, level, up], axis=1)) @ self._axes)
 
     def _advance_pair(self, first: int, d: Values, noise: Values) -> None:

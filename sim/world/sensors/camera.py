@@ -99,7 +99,7 @@ class CameraSensor(Sensor):
             return
         for _ in range(int(self._random.poisson(self._false_per_image))):
             x, y = self._random.uniform(-1.0, 1.0, 2).tolist()
-            depth_m = np.array([max(0.1, float(at[2]))])
+            depth_m = np.maximum(0.1, at[2:] - self._solids.ground_m(at[None]))
             yield Person(
                 *angles(np.array([x * self._tan_half_fov, y * self._tan_half_fov_height, -1.0])),
                 self._counted(float(self.pixels(depth_m)[0])),

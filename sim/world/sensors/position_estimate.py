@@ -18,6 +18,7 @@ from typing import Final
 import numpy as np
 
 from fanet_mw.scenario import Scenario
+from fanet_mw.scenario.tables.world import NO_AID_S
 from fanet_mw.units import S
 from sim.world.arrays import Flags, Rows
 from sim.world.sensors.altimeter import DRIFT_S as BAROMETER_S
@@ -30,7 +31,6 @@ _VELOCITY_GAIN: Final = 0.3
 _HEIGHT_S: Final = 2.0
 _BIAS_M_S2: Final = 0.05
 _BIAS_S: Final = 100.0
-_NO_AID_S: Final = 5.0
 
 
 class PositionEstimate:
@@ -55,7 +55,7 @@ class PositionEstimate:
 
     def lost(self, now_ns: int) -> Flags:
         """The UAVs that do not know their place."""
-        return np.asarray(now_ns - self._aided_ns > _NO_AID_S * S)
+        return np.asarray(now_ns - self._aided_ns > NO_AID_S * S)
 
     def advance(self, truth: Truth) -> None:
         """Let time pass until the instant of `truth`; after a time in which nobody flew the filter begins anew."""

@@ -65,6 +65,7 @@ class VoiceSensor(Sensor):
         self.period_ns = round(S / self._config.voice_hz)
         self._sigma_rad = math.radians(self._config.voice_sigma_deg)
         self._survivors, self._solids = survivors, solids
+        self._wind = np.array([*scenario.world.wind_m_s, 0.0])
         self._buried_db = np.where(survivors.buried, self._config.burial_voice_db, 0.0)
         self._random = generator(scenario.seed, "voice")
         self._loudness_db = generator(scenario.seed, "loudness").normal(
@@ -73,8 +74,8 @@ class VoiceSensor(Sensor):
 
     def read(self, truth: Truth, rows: Sequence[int]) -> Iterator[tuple[int, Message]]:
         config, places = self._config, self._survivors.places
-        speed = np.linalg.norm(truth.velocity, axis=1)
-        noise_db = power_sum_db(config.voice_rotor_db, wind_noise_db(speed))
+        airspeed = np.linalg.norm(truth.velocity - self._wind, axis=1)
+        noise_db = power_sum_db(config.voice_rotor_db, wind_noise_db(airspeed))
         for row in rows:
             calling = self._random.random(len(places)) < config.voice_share
             offset = places - truth.at[row]

@@ -113,3 +113,17 @@ def test_links_that_keep_one_gain_are_told(changes: tuple[str, ...], *, told: bo
     fading = ("radio.channel=friis", "radio.fading=rician")
     found = [note for note in notes(catalog.find("flooding", [*fading, *changes])) if note.startswith("radio.fading")]
     assert len(found) == told
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        (["world.engine=rotors", "mobility.speed_m_s=30"], "iris flies at most 19 m/s through the air, and needs 30"),
+        (["world.engine=rotors", "mobility.speed_m_s=7.5", "world.wind_m_s=[0, 14]"], "needs 21.5 against the wind"),
+        (["radio.channel=friis", "radio.frequency_mhz=5180"], "IEEE 802.11b is sent at 2.4 GHz"),
+        (["radio.channel=friis", "radio.standard=a", "radio.frequency_mhz=2412"], "IEEE 802.11a is sent at 5 GHz"),
+    ],
+)
+def test_what_no_vehicle_and_no_radio_does_is_said(keys: list[str], said: str) -> None:
+    assert any(said in note for note in notes(catalog.find("crossing", keys)))
+    assert not any("at most" in note or "is sent at" in note for note in notes(catalog.find("crossing")))

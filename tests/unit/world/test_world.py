@@ -126,6 +126,14 @@ def test_a_rate_that_no_tick_can_keep_is_refused(make_scenario: MakeScenario, ke
         make_scenario(**keys)
 
 
+def test_a_receiver_too_slow_to_fly_by_is_refused(make_scenario: MakeScenario) -> None:
+    slow = {"mobility.model": "onboard", "world.gps_hz": 0.1}
+    with pytest.raises(ConfigError, match=r"world.gps_hz = 0.1 must be >= 0.2: .* lands"):
+        make_scenario(**slow)
+    make_scenario(**slow, **{"sensors.inertial_hz": 5})
+    make_scenario(**slow, **{"world.navigation": "perfect"})
+
+
 @pytest.mark.parametrize("model", ["static", "formation"])
 def test_readings_come_at_their_rate_whether_anything_moves_or_not(make_scenario: MakeScenario, model: str) -> None:
     keys = {"sensors.inertial_hz": 10, "mobility.model": model}

@@ -71,7 +71,8 @@ class Rotors(Engine):
 
     def advance(self, dt_s: float, wanted_m_s: Rows) -> None:
         if self._wind is not None:
-            self._air = np.ascontiguousarray(self._wind.advance(dt_s, self._at.T, self._velocity.T).T)
+            above = self._at[2] if self._solids is None else self._at[2] - self._solids.ground_m(self._at.T)
+            self._air = np.ascontiguousarray(self._wind.advance(dt_s, above, self._velocity.T).T)
         self._left_s += dt_s
         before = self._at.T
         wanted = np.ascontiguousarray(wanted_m_s.T)

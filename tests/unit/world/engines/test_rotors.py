@@ -14,7 +14,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.world import FASTEST_AIR_M_S
 from fanet_mw.units import Enu, S
-from sim.world.arrays import Rows
+from sim.world.arrays import Rows, Values
 from sim.world.engines.battery_drain import Batteries, BatteryDrain
 from sim.world.engines.contract import GRAVITY_M_S2
 from sim.world.engines.kinematic import Kinematic
@@ -30,6 +30,8 @@ from sim.world.engines.rotors.vehicle_types import (
     Vehicle,
     hover_rad_s,
 )
+from sim.world.environment.obstacles import Hills, Obstacles
+from sim.world.environment.solids import Solids
 from sim.world.environment.wind import Wind, intensities_m_s, lengths_m
 from sim.world.world import WorldActor
 
@@ -262,12 +264,23 @@ def test_gusts_have_the_strength_and_the_length_of_the_standard() -> None:
     assert along[0] == pytest.approx(164.04 / (0.177 + 0.000823 * 164.04) ** 1.2 * 0.3048, rel=1e-3)
 
 
+def test_gusts_over_a_hill_are_those_of_the_height_above_it() -> None:
+    def strength(hill_m: float) -> Values:
+        wind = Wind(np.random.default_rng(5), 400, mean_m_s=(6.0, 0.0), w20_m_s=10.0)
+        engine = Rotors(IRIS, wind=wind, solids=Solids(Obstacles(Hills(np.full((3, 3), hill_m), 100.0), ())))
+        engine.reset(np.tile([0.0, 0, hill_m + 20], (400, 1)) + np.arange(400)[:, None] * [9.0, 0, 0])
+        engine.advance(0.05, np.zeros((400, 3)))
+        return np.asarray(engine._air - [[6.0], [0], [0]])
+
+    assert strength(300.0) == pytest.approx(strength(0.0)), "20 m above the ground either way"
+
+
 @pytest.mark.parametrize("dt_s", [0.05, 2.0])
 def test_gusts_vary_and_last_as_the_dryden_spectra_say_whatever_the_step(dt_s: float) -> None:
     count = 4000
     wind = Wind(np.random.default_rng(5), count, mean_m_s=(0.0, 6.0), w20_m_s=10.0)
-    at, still = np.full((count, 3), 50.0), np.zeros((count, 3))
-    gusts = np.array([wind.advance(dt_s, at, still) for _ in range(1 + round(2.0 / dt_s))]) - [0.0, 6.0, 0.0]
+    high, still = np.full(count, 50.0), np.zeros((count, 3))
+    gusts = np.array([wind.advance(dt_s, high, still) for _ in range(1 + round(2.0 / dt_s))]) - [0.0, 6.0, 0.0]
     level, up = (float(s[0]) for s in intensities_m_s(np.array([50.0]), w20_m_s=10.0))
     along, vertical = (float(s[0]) for s in lengths_m(np.array([50.0])))
     first, last = gusts[0], gusts[-1]

@@ -12,7 +12,7 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, S, direction
-from sim.world.environment.obstacles import Box, Obstacles
+from sim.world.environment.obstacles import Box, Hills, Obstacles
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors
 from sim.world.sensors.camera import PERSON_M, CameraSensor, recognized_share
@@ -124,6 +124,15 @@ def test_false_people_come_at_their_rate(make_scenario: MakeScenario) -> None:
     assert abs(sum(told) - 150) <= SIGMAS * math.sqrt(150)
 
 
+def test_a_false_person_is_as_large_as_one_on_the_ground_below(make_scenario: MakeScenario) -> None:
+    plateau = Solids(Obstacles(Hills(np.full((3, 3), 60.0), 500.0), ()))
+    keys = {"sensors.camera_false_per_hour": 3600.0, "world.area_m": 1000.0}
+    for solids, up in ((PLAIN, 40.0), (plateau, 100.0)):
+        told = readings(camera(make_scenario, (400, 400, 0), solids=solids, **keys), (0, 0, up), 400)
+        pixels = [person.pixels for image in told if image for person in image.people]
+        assert np.mean(pixels) == pytest.approx(PERSON_M * 1920 / (2 * 40 * math.tan(math.radians(35))), rel=0.05)
+
+
 # --- voice ------------------------------------------------------------------------------------------------------------
 
 
@@ -154,6 +163,9 @@ def test_a_call_is_heard_as_far_as_its_level_is_above_the_noise(make_scenario: M
     calm = {**sure, "sensors.voice_rotor_db": 40.0}
     assert all(readings(voice(make_scenario, (0, 0, 0), **calm), (0, 0, 300), 10))
     assert not any(readings(voice(make_scenario, (0, 0, 0), **calm), (0, 0, 300), 10, velocity=(20, 0, 0)))
+    windy = {**calm, "world.engine": "rotors", "world.wind_m_s": (19.0, 0.0)}
+    assert not any(readings(voice(make_scenario, (0, 0, 0), **windy), (0, 0, 300), 10)), "hovering in wind is noisy"
+    assert all(readings(voice(make_scenario, (0, 0, 0), **windy), (0, 0, 300), 10, velocity=(19, 0, 0)))
     buried = {**sure, "mission.buried": 1.0, "sensors.burial_voice_db": 6.0}
     assert all(readings(voice(make_scenario, (0, 0, 0), **buried), (0, 0, 6.9), 10))
     assert not any(readings(voice(make_scenario, (0, 0, 0), **buried), (0, 0, 7.2), 10))

@@ -38,11 +38,18 @@ class Placement:
         self.at = np.full((stations, 3), np.inf)
         """The positions [m]."""
         self._blocked = Blocked(np.zeros(0, np.int64), np.zeros(0))
+        self._ground_m = np.zeros(stations)
         self._sight_changed = False
         """True if the obstructions have changed since the stations were placed."""
 
-    def obstruct(self, pairs: npt.NDArray[np.int64], losses_db: npt.NDArray[np.float64]) -> None:
-        """Set the pairs of stations [n, 2] with something solid between them, and the loss of each, if that is known.
+    def obstruct(
+        self,
+        pairs: npt.NDArray[np.int64],
+        losses_db: npt.NDArray[np.float64],
+        ground_m: npt.NDArray[np.float64] | float = 0.0,
+    ) -> None:
+        """Set the pairs of stations [n, 2] with something solid between them, and the loss of each, if that is known;
+        and the height of the ground below each station.
 
         It takes effect at the next `place`.
         """
@@ -51,6 +58,7 @@ class Placement:
         changed = not all(map(np.array_equal, blocked, self._blocked))
         self._sight_changed = self._sight_changed or changed
         self._blocked = blocked
+        self._ground_m[:] = ground_m
 
     def place(self, at: npt.NDArray[np.float64]) -> bool:
         """Take over new positions; returns False if the links stay as they are."""
@@ -64,8 +72,9 @@ class Placement:
         """The links between the stations, with room for `spare` more."""
         at = np.ascontiguousarray(self.at)
         return LinkTable(
-            at, self._radio, spare=spare, shadowing=self._shadowing, blocked=self._blocked, gains=self._gains
-        )
+            at, self._radio, spare=spare, ground_m=self._ground_m, shadowing=self._shadowing, blocked=self._blocked,
+            gains=self._gains,
+        )  # fmt: skip
 
 
 class KernelInterface:
@@ -89,12 +98,18 @@ class KernelInterface:
         """A lower bound of the next instant at which `advance` returns rows; NEVER when nothing is planned."""
         self._entry = self.arrays.entry()
 
-    def obstruct(self, pairs: npt.NDArray[np.int64], losses_db: npt.NDArray[np.float64]) -> None:
-        """Set the pairs of stations [n, 2] with something solid between them, and the loss of each, if that is known.
+    def obstruct(
+        self,
+        pairs: npt.NDArray[np.int64],
+        losses_db: npt.NDArray[np.float64],
+        ground_m: npt.NDArray[np.float64] | float = 0.0,
+    ) -> None:
+        """Set the pairs of stations [n, 2] with something solid between them, and the loss of each, if that is known;
+        and the height of the ground below each station.
 
         It takes effect at the next `place`.
         """
-        self._placement.obstruct(pairs, losses_db)
+        self._placement.obstruct(pairs, losses_db, ground_m)
 
     def place(self, at: npt.NDArray[np.float64], velocity: npt.NDArray[np.float64], t_ns: int) -> None:
         """Take over positions [m] and velocities [m/s] of an instant, one row per station; frames in flight are carried

@@ -299,7 +299,11 @@ class Medium(Actor):
         if len(losses_db) not in (0, len(pairs) // 2):
             self._counters.refused["obstructions"] += 1
             return
-        self._kernel.obstruct(pairs.reshape(-1, 2) - 1, losses_db)
+        ground_m = np.frombuffer(obstructions.ground_m, np.float32).astype(np.float64)
+        if len(ground_m) not in (0, self._count) or not (np.abs(ground_m) <= FARTHEST_M).all():
+            self._counters.refused["obstructions"] += 1
+            return
+        self._kernel.obstruct(pairs.reshape(-1, 2) - 1, losses_db, ground_m if len(ground_m) else 0.0)
 
     def _place(self, poses: Poses) -> None:
         ids = np.frombuffer(poses.ids, np.uint16).astype(np.int64)

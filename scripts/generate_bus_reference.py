@@ -51,8 +51,9 @@ NAMED: Final[dict[type[Any], Names]] = {
         "world/pose", "t_ns count", f"`count` x uint16: ids, ascending; `count` x 6 float64: {_VECTOR} {_MOVES}",
     ),
     m.Obstructions: Names(
-        "world/obstruction", "t_ns count",
-        "`count` x uint16: pairs of node ids, smaller first; then nothing, or `count` / 2 x uint16: losses [1/10 dB]",
+        "world/obstruction", "t_ns grounds count",
+        "`grounds` x float32: the height of the ground below nodes 1, 2, ... [m]; `count` x uint16: pairs of node ids, "
+        "smaller first; then nothing, or `count` / 2 x uint16: losses [1/10 dB]",
     ),
     m.Setpoint: Names("world/<id>/setpoint", f"t_ns {_VECTOR} speed_m_s kind {_MOVES}"),
     m.Gps: Names("world/<id>/sensor/gps", f"t_ns {_VECTOR} {_MOVES}"),

@@ -196,7 +196,7 @@ class Channel(Protocol):
     """
 
     def loss_db(self, distance_m: Reals, from_m: Reals, to_m: Reals) -> Reals:
-        """The loss of each link [n] between its ends [n, 3]."""
+        """The loss of each link [n] between its ends [n, 3], whose heights are those above ground."""
         ...
 
     def reach_m(self, budget_db: float) -> float:
@@ -247,13 +247,17 @@ class LinkTable:
         radio: Radio,
         *,
         spare: int,
+        ground_m: Reals | float = 0.0,
         shadowing: Shadowing | None = None,
         blocked: Blocked | None = None,
         gains: Mapping[int, float] = {},
     ) -> None:
-        """`gains`: the gains in dBi of antennas that are not isotropic, by station."""
+        """`ground_m`: the height of the ground below each station. `gains`: the gains in dBi of antennas that are not
+        isotropic, by station.
+        """
         found, distance = pairs_in_reach(at, radio, gains)
-        power_dbm = received_dbm(distance, at[found[:, 0]], at[found[:, 1]], radio)
+        above = np.column_stack([at[:, :2], at[:, 2] - ground_m])
+        power_dbm = received_dbm(distance, above[found[:, 0]], above[found[:, 1]], radio)
         for station, gain_dbi in gains.items() if radio.channel != "range" else ():
             power_dbm = power_dbm + gain_dbi * (found == station).any(axis=1)
         if shadowing is not None:

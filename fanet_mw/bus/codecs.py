@@ -54,7 +54,7 @@ _RX = struct.Struct("<Hqf")
 _STATUS = struct.Struct("<IBqB")
 _SETPOINT = struct.Struct("<q4dB3d")
 _POSES = struct.Struct("<qI")
-_OBSTRUCTIONS = struct.Struct("<qI")
+_OBSTRUCTIONS = struct.Struct("<qHI")
 _CLOCK = struct.Struct("<qdBqQIq")
 _PACE = struct.Struct("<d")
 _INSTANT = struct.Struct("<q")
@@ -110,18 +110,21 @@ def _decode_poses(body: bytes) -> Poses:
 
 
 def _encode_obstructions(m: Obstructions) -> bytes:
-    return _OBSTRUCTIONS.pack(m.t_ns, len(m.pairs)) + m.pairs.tobytes() + m.losses_ddb.tobytes()
+    head = _OBSTRUCTIONS.pack(m.t_ns, len(m.ground_m), len(m.pairs))
+    return head + m.ground_m.tobytes() + m.pairs.tobytes() + m.losses_ddb.tobytes()
 
 
 def _decode_obstructions(body: bytes) -> Obstructions:
-    t_ns, count = _OBSTRUCTIONS.unpack_from(body)
-    pairs, losses = array("H"), array("H")
-    split = _OBSTRUCTIONS.size + 2 * count
+    t_ns, grounds, count = _OBSTRUCTIONS.unpack_from(body)
+    ground, pairs, losses = array("f"), array("H"), array("H")
+    start = _OBSTRUCTIONS.size + 4 * grounds
+    split = start + 2 * count
     if len(body) not in (split, split + count) or count % 2:
         raise ValueError("length")
-    pairs.frombytes(body[_OBSTRUCTIONS.size : split])
+    ground.frombytes(body[_OBSTRUCTIONS.size : start])
+    pairs.frombytes(body[start:split])
     losses.frombytes(body[split:])
-    return Obstructions(t_ns, pairs, losses)
+    return Obstructions(t_ns, pairs, losses, ground)
 
 
 def _encode_setpoint(m: Setpoint) -> bytes:

@@ -79,13 +79,15 @@ class Poses(NamedTuple):
 
 
 class Obstructions(NamedTuple):
-    """World -> medium: all pairs of nodes whose link something solid weakens at one instant."""
+    """World -> medium: all pairs of nodes whose link something solid weakens at one instant, and the ground below."""
 
     t_ns: int
     pairs: array[int]
     """`array('H')`, two node ids per pair, the smaller first, ascending."""
     losses_ddb: array[int] = array("H")
     """`array('H')`, the loss of each pair [1/10 dB]; empty: that of the scenario (`radio.obstruction_loss_db`)."""
+    ground_m: array[float] = array("f")
+    """`array('f')`, the height of the ground below each node, in order of id; empty: 0."""
 
 
 class SetpointKind(IntEnum):

@@ -189,6 +189,7 @@ _BY_HAND: Final[tuple[Message, ...]] = (
     ClockEpoch(1_735_689_600 * S, 1.0, ClockState.RUNNING, 5 * S, 77),
     Obstructions(S, array("H", [1, 2, 3, 4])),
     Obstructions(S, array("H", [1, 2, 3, 4]), array("H", [60, 352])),
+    Obstructions(S, array("H", [1, 2]), array("H", [60]), array("f", [0.0, 41.5])),
     Degrade("link", NodeId(1), NodeId(2), both=True, loss_db=10.0, loss_share=0.5, for_ns=S),
     Jam("jam", Enu(1.0, 2.0, 3.0), 100.0, -60.0, for_ns=S),
     Cut("cut", NodeId(3), for_ns=S, sends=True),

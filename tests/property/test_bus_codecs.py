@@ -78,9 +78,12 @@ messages: st.SearchStrategy[Message] = st.one_of(
     st.builds(TxStatus, u32, st.sampled_from(TxOutcome), instants, st.integers(0, 255)),
     poses(),
     st.builds(
-        lambda t_ns, pairs: Obstructions(t_ns, array("H", [node for pair in pairs for node in pair])),
+        lambda t_ns, pairs, ground: Obstructions(
+            t_ns, array("H", [node for pair in pairs for node in pair]), array("H", []), array("f", ground)
+        ),
         instants,
         st.lists(st.tuples(nodes, nodes), max_size=5),
+        st.lists(singles, max_size=5),
     ),
     st.builds(Setpoint, instants, vectors, doubles, st.sampled_from(SetpointKind), vectors),
     st.builds(Camera, instants, st.lists(st.builds(Person, *[finite] * 3), max_size=4).map(tuple)),

@@ -30,6 +30,7 @@ class Sight:
 
     def obstructions(self, at: Rows, now_ns: int) -> Obstructions:
         """The pairs among nodes at `at` [nodes, 3] with something between them."""
+        ground = array("f", self._solids.ground_m(at).tolist() if self._solids.hilly else ())
         found, _ = pairs_in_reach(at, self._radio, self._gains)
         found = found[found[:, 0] < found[:, 1]]
         top_m = self._solids.top_m + (FRESNEL_M if self._knife_edges else 0.0)
@@ -41,4 +42,4 @@ class Sight:
             found, losses = found[tenths > 0], array("H", tenths[tenths > 0].tolist())
         elif len(found):
             found = found[self._solids.blocked(at[found[:, 0]], at[found[:, 1]])]
-        return Obstructions(now_ns, array("H", (found + 1).ravel().tolist()), losses)
+        return Obstructions(now_ns, array("H", (found + 1).ravel().tolist()), losses, ground)

@@ -8,10 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from emulator.faults import Faults
+from emulator.kernel.state import LINK_POWER
+from emulator.kernel_interface import KernelInterface
 from fanet_mw.bus.messages import Obstructions
 from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import config
 from sim.world.environment.diffraction import knife_edge_db, loss_db
+from sim.world.environment.layout import positions
 from sim.world.environment.obstacles import obstacles
 from sim.world.environment.solids import Solids
 from sim.world.world import WorldActor
@@ -108,4 +112,33 @@ def test_the_world_tells_the_loss_and_the_medium_takes_it_off(make_scenario: Any
     (told,) = [message for topic, message in world.outbox if topic == Topics("test").obstruction]
     assert isinstance(told, Obstructions)
     assert (told.pairs.tolist(), told.losses_ddb.tolist()) == ([1, 2], [232])
+    world.stop(0)
+
+
+@pytest.mark.parametrize("channel", ["two_ray", "air_to_ground", "uma_av"])
+def test_a_hill_does_not_raise_antennas_above_the_ground_they_stand_on(make_scenario: Any, channel: str) -> None:
+    """Two antennas 2 m above a plateau, 1 km apart, lose what they lose on the plain; so the world says how high the
+    ground is.
+    """
+    scenario = make_scenario(**{"nodes.count": 2, "radio.channel": channel, "radio.interference_floor_dbm": -170.0,
+                                "radio.sensitivity_dbm": -90.0})  # fmt: skip
+
+    def power_mw(hill_m: float) -> float:
+        kernel = KernelInterface(scenario, stations=2, faults=Faults(scenario.radio, stations=2, planned=()))
+        none = np.zeros((0, 2), np.int64), np.zeros(0)
+        kernel.obstruct(*none, np.full(2, hill_m))
+        kernel.place(np.array([[0.0, 0, hill_m + 2], [1000, 0, hill_m + 2]]), np.zeros((2, 3)), 0)
+        return float(kernel.arrays.lp[LINK_POWER, 0])
+
+    assert power_mw(60.0) == pytest.approx(power_mw(0.0)) != 0
+
+    hilly = make_scenario(**{"nodes.count": 3, "radio.channel": channel, "world.terrain_m": 30.0,
+                             "nodes.altitude_m": 60.0, "world.area_m": 800.0})  # fmt: skip
+    world = WorldActor(hilly, "test")
+    world.start(0)
+    (told,) = [message for topic, message in world.outbox if topic == Topics("test").obstruction]
+    at = np.array(positions(hilly))
+    assert isinstance(told, Obstructions)
+    assert told.ground_m.tolist() == pytest.approx(Solids(obstacles(hilly, at)).ground_m(at).tolist(), abs=1e-4)
+    assert max(told.ground_m) > 1
     world.stop(0)

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from kit import slow
 
 PROGRAM = """
 import multiprocessing, sys, time
@@ -37,8 +38,9 @@ def ends(tmp_path: Path, call: str, kind: str, what: str) -> None:
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "end of program\n", "")
 
 
-@pytest.mark.parametrize("what", ["daemon", "pool"])
-@pytest.mark.parametrize("kind", ["spawn", "forkserver"])
+@pytest.mark.parametrize(
+    ("kind", "what"), [("spawn", "daemon"), ("forkserver", "pool"), *slow(("spawn", "pool"), ("forkserver", "daemon"))]
+)
 def test_a_program_whose_own_processes_live_ends_although_we_were_looked_up(
     tmp_path: Path, kind: str, what: str
 ) -> None:

@@ -3,6 +3,7 @@
 from typing import Any
 
 import pytest
+from kit import slow
 
 from sim.planner.answer import judge
 from sim.results.files import finish
@@ -55,7 +56,7 @@ def test_a_dense_swarm_needs_few_relays_and_they_win_the_turns_they_need() -> No
     assert summary["frames"]["closes"]
 
 
-@pytest.mark.parametrize("rule", [pytest.param("heads", marks=pytest.mark.slow), "cds", "mpr"])
+@pytest.mark.parametrize("rule", ["mpr", *slow("heads", "cds")])
 def test_chosen_relays_reach_nearly_all_of_a_dense_swarm_by_half_the_frames(rule: str) -> None:
     heads = ["clusters.count=5"] if rule == "heads" else []
     few = summary_of(f"clusters.relay={rule}", "traffic.interval_s=0.5", "duration_s=17", *DENSE, *heads)

@@ -21,8 +21,9 @@ def run(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize(
     ("package", "kind"),
     [
-        ("agents", "package"), ("sim", "folder"), ("emulator", "module"),
+        ("agents", "package"), ("emulator", "module"),
         *slow(
+            ("sim", "folder"),
             ("agents", "folder"), ("agents", "module"), ("sim", "package"), ("sim", "module"), ("emulator", "package"),
             ("emulator", "folder"),
         ),

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 
 import pytest
+from kit import slow
 
 from fanet_mw.orders import Order, OrderKind
 from fanet_mw.scenario import Scenario
@@ -33,7 +34,7 @@ def track(records: Sequence[Record], node: int) -> dict[int, Posed]:
     return {r.t_ns // S: r for r in records if isinstance(r, Posed) and r.node == node}
 
 
-@pytest.mark.parametrize(("order", "mode"), [("recall", "recall"), ("end", "done")])
+@pytest.mark.parametrize(("order", "mode"), [("recall", "recall"), *slow(("end", "done"))])
 def test_all_fly_home_and_land_when_they_are_recalled(
     make_scenario: Callable[..., Scenario], order: str, mode: str
 ) -> None:

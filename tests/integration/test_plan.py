@@ -6,6 +6,7 @@ import sys
 from typing import Any
 
 import pytest
+from kit import slow
 
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.units import NodeId
@@ -81,7 +82,7 @@ def test_where_gps_errs_the_plan_has_the_greatest_bound_of_all_its_draws() -> No
     assert f"at most {plan['classes'][0]['bound_ms'] / 1000:.3f} s in 95 % of flights" in text
 
 
-@pytest.mark.parametrize("channel", ["range", "log_distance"])
+@pytest.mark.parametrize("channel", ["range", *slow("log_distance")])
 def test_floods_that_miss_nodes_with_reported_positions_are_a_problem(channel: str) -> None:
     """In the middle of the line two nodes are 2 m too far from each other, and another node is a way around; GPS
     errs by 1.5 m.
@@ -190,7 +191,7 @@ def test_a_deadline_that_cannot_be_met_is_no_plan() -> None:
     assert "takes up to 518.4 ms, the deadline is 300 ms" in text
 
 
-@pytest.mark.parametrize("relay", ["scheduled", "all"])
+@pytest.mark.parametrize("relay", ["scheduled", *slow("all")])
 def test_a_swarm_in_parts_is_told_with_who_is_out_of_reach(relay: str) -> None:
     here, there = [[200 * i, 0, 50] for i in range(5)], [[200 * i, 2000, 50] for i in range(3)]
     layout = ["nodes.count=8", "traffic.sources=7", 'nodes.layout="explicit"', f"nodes.positions_m={here + there}"]

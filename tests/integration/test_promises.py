@@ -3,6 +3,7 @@
 from typing import Any
 
 import pytest
+from kit import slow
 
 from sim.results.files import finish
 from sim.run.virtual import simulate
@@ -43,7 +44,7 @@ def test_no_bound_is_stated_where_lost_packets_are_repaired_later() -> None:
     assert summary["pdr"] == 1.0
 
 
-@pytest.mark.parametrize("handover_ms", [0, 20])
+@pytest.mark.parametrize("handover_ms", [20, *slow(0)])
 def test_bounds_hold_the_lead_and_the_handover(handover_ms: int) -> None:
     bound = summary_of("radio.lead_ms=30", f"radio.handover_ms={handover_ms}")["bound"]
     assert bound["violations"] == 0

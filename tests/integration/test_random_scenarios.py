@@ -11,7 +11,7 @@ import scenario_draws
 import tomli_w
 from hypothesis import example, given
 from hypothesis import strategies as st
-from kit import examples
+from kit import examples, slow
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario, config
@@ -22,7 +22,9 @@ from sim.run.virtual import simulate
 from sim.scenarios import catalog
 
 
-@pytest.mark.parametrize("seed", [0, 2, 5, 7])  # 1 takes ten times as long as another; the long run has a thousand
+@pytest.mark.parametrize(
+    "seed", [0, 5, *slow(2, 7)]
+)  # 1 takes ten times as long as another; the long run has a thousand
 def test_a_random_valid_scenario_ends_wakes_within_bounds_and_its_ledger_closes(seed: int) -> None:
     assert scenario_draws.check(seed, limit_s=60) == ""
 
@@ -83,8 +85,13 @@ def test_a_saturated_source_whose_radio_refuses_everything_does_not_offer_withou
     assert summary["generated"] < 7_000
 
 
-@pytest.mark.parametrize("destination", ["all", "1"])
-@pytest.mark.parametrize("protocol", ["direct", "clustered", "flooding", "aodv", "geographic"])
+@pytest.mark.parametrize(
+    ("protocol", "destination"),
+    [
+        ("direct", "1"), ("clustered", "all"), ("flooding", "all"), ("aodv", "1"), ("geographic", "1"),
+        *slow(("direct", "all"), ("clustered", "1"), ("flooding", "1"), ("aodv", "all"), ("geographic", "all")),
+    ],
+)  # fmt: skip
 def test_a_saturated_source_offers_packets_until_the_end(protocol: str, destination: str) -> None:
     end_s = 6 if protocol == "clustered" else 3  # its first turn is at 3 s
     keys = (f"routing.protocol={protocol}", f"traffic.destination={destination}", f"duration_s={end_s}")
@@ -162,7 +169,7 @@ def test_every_numeric_key_takes_a_number_out_of_all_proportion_or_names_itself_
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *slow(1, 2, 3)])
 def test_a_large_swarm_in_which_heads_come_and_go_all_the_time_keeps_going(seed: int) -> None:
     """Above 56 nodes a schedule has several parts; a head that was replaced may come back between two of them."""
     pick = random.Random(seed)

@@ -5,6 +5,7 @@ from functools import lru_cache
 from typing import Any
 
 import pytest
+from kit import slow
 
 from fanet_mw.scenario import config
 from fanet_mw.trace import BoundExcludes, BoundStated
@@ -32,7 +33,7 @@ def formation(speed_m_s: float) -> Mapping[str, Any]:
     return flown(mobility={"model": "formation", "speed_m_s": speed_m_s})
 
 
-@pytest.mark.parametrize("speed_m_s", [0.0, 10.0, 20.0])
+@pytest.mark.parametrize("speed_m_s", [0.0, 20.0, *slow(10.0)])
 def test_a_formation_keeps_its_bound_at_any_speed(speed_m_s: float) -> None:
     summary = formation(speed_m_s)
     assert summary["pdr"] == 1.0
@@ -71,7 +72,7 @@ def test_bulk_within_what_the_air_carries_reaches_everybody() -> None:
     assert summary["air"]["pdr"] > 0.98, "bulk slots keep apart who could collide"
 
 
-@pytest.mark.parametrize("loss", [0.1, 0.3])
+@pytest.mark.parametrize("loss", [0.3, *slow(0.1)])
 def test_who_missed_a_packet_gets_it_from_a_neighbor(loss: float) -> None:
     summary = flown(faults=[{"kind": "degrade", "at_s": 1, "loss_share": loss}])
     assert summary["pdr"] >= 0.999

@@ -65,6 +65,8 @@ def parts(name: str) -> Iterator[tuple[str, str]]:
     for kind, (count, code) in sorted(kinds.items()):
         yield kind, f"{count} {code:08x}"
     yield "reports", digest(outcome.reports)
+    yield "links", digest([tuple(row) for row in outcome.links.rows()])
+    yield "taps", digest([(t_ns, len(data), data[7:10].hex()) for t_ns, data in outcome.taps])  # which messages when
     for key, value in finish(outcome, out=None).items():
         if key not in _MACHINE:
             yield f"summary.{key}", digest(value)

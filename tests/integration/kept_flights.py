@@ -67,7 +67,9 @@ def parts(name: str) -> Iterator[tuple[str, str]]:
     yield "reports", digest(outcome.reports)
     yield "links", digest([tuple(row) for row in outcome.links.rows()])
     yield "taps", digest([(t_ns, len(data), data[7:10].hex()) for t_ns, data in outcome.taps])  # which messages when
-    for key, value in finish(outcome, out=None).items():
+    summary = finish(outcome, out=None)
+    yield "ledgers close", str(summary["frames"]["closes"] and summary["copies"]["closes"])
+    for key, value in summary.items():
         if key not in _MACHINE:
             yield f"summary.{key}", digest(value)
 

@@ -65,7 +65,7 @@ class Courier(Application):
             self.lost.append(status)
 
 
-_ALIKE = ("cds", "heads", "gossip", "counter")
+_ALIKE = ("cds", "heads", "gossip", "counter", "mpr")
 """The first two choose relays as `mpr` does, by what neighbors say of theirs; the others contend as `all` does."""
 
 

@@ -3,6 +3,7 @@
 from collections import Counter
 
 import pytest
+from kit import slow
 
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import BoundStated, Delivered, Dropped, Generated, LikelyStated
@@ -28,7 +29,7 @@ def test_links_are_measured_where_frames_fade_unless_places_are_wanted() -> None
     assert scenario('clusters.links="measured"').measures_links
 
 
-@pytest.mark.parametrize("loss", ['radio.fading="rician"', "radio.shadowing_db=4"])
+@pytest.mark.parametrize("loss", ['radio.fading="rician"', *slow("radio.shadowing_db=4")])
 def test_each_packet_over_lossy_links_arrives_within_what_was_stated_for_it(loss: str) -> None:
     outcome = simulate(scenario('radio.channel="log_distance"', loss, STIRRED))
     born = {(r.node, r.seq): r.t_ns for r in outcome.records if isinstance(r, Generated)}

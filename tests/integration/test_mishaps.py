@@ -97,5 +97,6 @@ def test_a_receiver_that_is_wrong_leads_astray_and_one_that_is_silent_says_nothi
         assert east_m(plain, 34) != east_m(wrong, 34)
 
 
+@pytest.mark.slow
 def test_it_is_the_same_run_again(stopped: Outcome) -> None:
     assert list(flown(*STOPS).records) == list(stopped.records)

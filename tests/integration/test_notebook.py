@@ -20,6 +20,7 @@ def shortened(folder: Path) -> nbformat.NotebookNode:
     return notebook
 
 
+@pytest.mark.slow
 def test_the_cells_of_the_example_notebook_compare_two_relays_and_draw_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from kit import slow
 
 from sim.results.files import finish
 from sim.run.virtual import simulate
@@ -27,7 +28,7 @@ def fanet(
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("closing", [">&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize("closing", [">&-", *slow("<&- >&- 2>&-")])
 def test_a_result_is_whole_when_standard_streams_are_closed(tmp_path: Path, closing: str) -> None:
     """The first file that is opened would otherwise be the standard output."""
     done = fanet("simulate", *SHORT, "--out", str(tmp_path / "out"), closing=closing)
@@ -42,7 +43,10 @@ def test_a_result_is_whole_when_standard_streams_are_closed(tmp_path: Path, clos
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
-@pytest.mark.parametrize("arguments", [("scenarios",), ("plan", "quick", "--json"), ("simulate", *SHORT, "--json")])
+@pytest.mark.parametrize(
+    "arguments",
+    [("scenarios",), ("simulate", *SHORT, "--json"), pytest.param(("plan", "quick", "--json"), marks=pytest.mark.slow)],
+)
 def test_a_full_disk_under_the_standard_output_is_one_sentence(arguments: tuple[str, ...]) -> None:
     done = fanet(*arguments, closing="> /dev/full")
     said = f"fanet: standard output: cannot be written: {os.strerror(errno.ENOSPC)}\n"

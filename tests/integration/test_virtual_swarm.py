@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
+from kept_flights import FLIGHTS
 
 from fanet_mw import wire
 from fanet_mw.scenario import Scenario
@@ -30,8 +31,15 @@ def quick() -> Outcome:
     return simulate(catalog.find("quick"))
 
 
+_KEPT = {settings[0] for settings in FLIGHTS.values()}
+"""The scenarios of which `test_kept_flights.py` flies variants and closes the ledgers."""
+
+
 @pytest.mark.parametrize("duration_s", [2.5, pytest.param(8, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("name", [entry.name for entry in catalog.shipped()])
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(entry.name, marks=pytest.mark.slow if entry.name in _KEPT else ()) for entry in catalog.shipped()],
+)
 def test_the_ledger_closes_and_copies_add_up_in_every_shipped_scenario(name: str, duration_s: float) -> None:
     summary = summary_of(catalog.find(name, [f"duration_s={duration_s}", "warmup_s=0", "drain_s=0.5"]))
     frames, copies = summary["frames"], summary["copies"]

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kit import slow
 
 from fanet_mw.errors import ConfigError
 from sim.cli.app import app
@@ -325,7 +326,7 @@ def test_a_page_needs_nothing_else_and_has_every_verdict(nine, tmp_path) -> None
         write([folder / "sweeps"], folder)
 
 
-@pytest.mark.parametrize("scenario", ["quick", "clusters"])
+@pytest.mark.parametrize("scenario", ["clusters", *slow("quick")])
 def test_a_run_has_a_page_with_its_delays_links_and_mission(scenario: str, tmp_path: Path) -> None:
     keys = ["nodes.count=9", "world.engine=kinematic", "duration_s=8", "warmup_s=5", "drain_s=1", "traffic.sources=all"]
     keys += ["clusters.count=8"] if scenario == "clusters" else []

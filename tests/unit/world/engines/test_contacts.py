@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from kit import slow
 
 from sim.world.engines.contacts import approaches
 from sim.world.engines.contract import Engine
@@ -28,7 +29,7 @@ def test_the_reach_of_a_vehicle_is_that_of_its_blades() -> None:
     assert CRAZYFLIE.reach_m == pytest.approx(0.043 + 0.023, abs=0.001)
 
 
-@pytest.mark.parametrize("count", [2, 30, 450])
+@pytest.mark.parametrize("count", [2, 30, *slow(450)])
 def test_approaches_are_those_that_a_fine_scan_finds(count: int) -> None:
     random = np.random.default_rng(count)
     before = random.uniform(-20, 20, (count, 3))

@@ -221,7 +221,7 @@ def turn_lines(found: Turns, now_ns: int) -> Text:
     superframe, place_ns = divmod(now_ns - found.start_ns, period_ns)
     owners = sorted({span.node for span in found.own})
     now = found.owners(now_ns)
-    text = Text(f"superframe {superframe} of {period_ns / MS:g} ms, {place_ns / MS:.1f} ms into it; ")
+    text = Text(f"{found.period_called} {superframe} of {period_ns / MS:g} ms, {place_ns / MS:.1f} ms into it; ")
     free = found.window_called if found.in_window(now_ns) else "nobody's"
     text.append(f"now: {found.called} of {', '.join(map(str, now))}\n\n" if now else f"now: {free}\n\n", "bold")
     if found.window[1]:

@@ -31,6 +31,7 @@ class Turns(NamedTuple):
     window: tuple[int, int] = (0, 0)
     """What is left beside the spans, for contention or bulk: start and length."""
     window_called: str = "all contend"
+    period_called: str = "superframe"
 
     def in_window(self, t_ns: int) -> bool:
         """True within the window."""
@@ -49,7 +50,7 @@ def turns(scenario: Scenario, reports: Mapping[int, Mapping[str, Any]]) -> Turns
         timing = RoundTiming.of(scenario)
         own = [Span(node, (node - 1) * timing.turn_ns, timing.turn_ns) for node in scenario.node_ids]
         window = (timing.nodes * timing.turn_ns, timing.slots * timing.slot_ns)
-        return Turns(0, timing.period_ns, own, "turn", window, "bulk slots")
+        return Turns(0, timing.period_ns, own, "turn", window, "bulk slots", "round")
     turned = {node: report["turns"] for node, report in reports.items() if report.get("turns")}
     if turned:
         newest = max(turned.values(), key=lambda frame: float(frame["start_ms"]))

@@ -23,6 +23,8 @@ from sim.results.mission import OverflownCells
 from sim.results.run_folder import RunFolder
 
 _MOST_PIECES: Final = 5
+_RAYLEIGH_95: Final = math.sqrt(-2 * math.log(0.05))
+"""Of a place that errs alike in two directions, 95 of 100 are within so many standard deviations."""
 _M2_PER_HA: Final = 10_000.0
 
 
@@ -140,7 +142,9 @@ def without_doubles(known: Sequence[Find]) -> tuple[list[Find], int]:
 
 def found_rows(run: RunRecords, known: Sequence[Find]) -> Rows:
     """The table of finds."""
-    origin = Geodetic(*run.scenario.world.origin_deg, 0.0)
+    sensors, world = run.scenario.sensors, run.scenario.world
+    origin = Geodetic(*world.origin_deg, 0.0)
+    gps_m = math.hypot(sensors.gps_common_m, sensors.gps_bias_m, world.gps_sigma_m)
     rows = []
     for one in known:
         who = "person without a phone" if is_person(one.survivor) else f"survivor {one.survivor}"
@@ -153,7 +157,7 @@ def found_rows(run: RunRecords, known: Sequence[Find]) -> Rows:
             if 1 <= one.survivor <= len(run.survivors):
                 truth = run.survivors[one.survivor - 1]
                 off = f"{math.hypot(truth.east - east, truth.north - north):.0f} m"
-        rows.append([who, place, on_earth, _how_sure(one), _seconds(one.heard_ns),
+        rows.append([who, place, on_earth, _how_sure(one, gps_m), _seconds(one.heard_ns),
                      _seconds(one.said_ns), f"UAV {one.node}", off])  # fmt: skip
     headings = (
         "who",
@@ -168,14 +172,15 @@ def found_rows(run: RunRecords, known: Sequence[Find]) -> Rows:
     return Rows(headings, rows)
 
 
-def _how_sure(one: Find) -> str:
+def _how_sure(one: Find, gps_m: float) -> str:
+    """What UAVs told each other of a place counts from where they are: the error of their own places comes on top."""
     words = {
         "confirmed": "confirmed at close range", "heard": "phone heard, no place yet",
         "taken back": "confirmation taken back", "estimated": "by phone alone",
     }  # fmt: skip
     said = words.get(one.said, one.said)
     if one.sigma_m is not None:
-        return f"{said}, within {max(1.0, 2 * one.sigma_m):.0f} m (95 %)"
+        return f"{said}, within {max(1.0, _RAYLEIGH_95 * math.hypot(one.sigma_m, gps_m)):.0f} m (95 %)"
     return f"{said}, roughly" if one.said == "estimated" else said
 
 

@@ -26,7 +26,11 @@ pre { padding: .7rem; overflow-x: auto; } .wide { overflow-x: auto; } .short { w
 .wide td:not([class]) { min-width: 10rem; }
 .agrees { color: #00543d; font-weight: 600; }
 .partly { color: #7a4b00; font-weight: 600; } .differs { color: #9c2a00; font-weight: 600; }
-@media (max-width: 40rem) { body { margin: 1rem auto; padding: 0 .8rem; } th, td { padding: .25rem .45rem; } }
+@media (max-width: 40rem) { body { margin: 1rem auto; padding: 0 .8rem; } th, td { padding: .25rem .45rem; }
+  .cards thead { display: none; } .cards tr { display: block; padding: .5rem 0; border-bottom: 1px solid #bbb; }
+  .cards td, .cards td:not([class]) { display: flex; min-width: 0; padding: .1rem .3rem; border: 0; }
+  .cards td::before { content: attr(data-column); flex: 0 0 9rem; color: #555; }
+  .cards td.short { white-space: normal; } .cards td:first-child { font-weight: 600; } }
 """
 
 
@@ -82,6 +86,8 @@ _INSIDE: Final = re.compile(r"[\\`*_\[\]|~@]|(?<=\])\(|:(?=//)|(?<=www)\.", re.I
 """The characters inside a line to which Markdown gives a meaning, among them those that make addresses links."""
 _SHORT: Final = 21
 """A cell of at most so many characters, as a pair of coordinates, is not broken into lines."""
+_MOST_COLUMNS: Final = 4
+"""A row of a wider table is a card on a phone: a line for each column."""
 _VERDICTS: Final = ("agrees", "partly", "differs")
 
 
@@ -109,16 +115,21 @@ def _html(block: Block) -> str:
             drawn = f'<img alt="{said}" src="data:image/png;base64,{image}">'
             return f"<figure>{drawn}<figcaption>{said}</figcaption></figure>"
         case Rows(head, rows):
+            cards = len(head) > _MOST_COLUMNS
+            columns = head if cards else [""] * len(head)
             first = "".join(f"<th>{html.escape(cell)}</th>" for cell in head)
-            rest = "".join(f"<tr>{''.join(_cell(cell) for cell in row)}</tr>\n" for row in rows)
-            return f'<div class="wide"><table><thead><tr>{first}</tr></thead>\n<tbody>{rest}</tbody></table></div>'
+            rest = "".join(f"<tr>{''.join(map(_cell, row, columns))}</tr>\n" for row in rows)
+            table = f"<thead><tr>{first}</tr></thead>\n<tbody>{rest}</tbody>"
+            return f'<div class="wide"><table{" class=cards" if cards else ""}>{table}</table></div>'
 
 
-def _cell(text: str) -> str:
+def _cell(text: str, column: str) -> str:
+    """A cell; with the name of its column where a narrow screen shows that beside it."""
     kind = f' class="{text}"' if text in _VERDICTS else ' class="short"' if len(text) <= _SHORT else ""
     lines = html.escape(text).split("\n")
     inside = lines[0] if len(lines) == 1 else "".join(f"<div>{line}</div>" for line in lines)
-    return f"<td{kind}>{inside}</td>"
+    named = f' data-column="{html.escape(column)}"' if column else ""
+    return f"<td{kind}{named}>{inside}</td>"
 
 
 def as_markdown(title: str, blocks: Iterable[Block], folder: Path) -> str:

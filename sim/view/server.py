@@ -23,6 +23,10 @@ _PHONE: Final = (
     "}</style>"
 )
 """On a phone viser has a sheet of fixed width in a corner; this lets it take the lower part of the screen."""
+EYE: Final = (-0.2, -2.0, 1.5)
+"""The place of the first camera, in units of half the side of the area."""
+GOAL: Final = (0.04, -0.1, 0.0)
+"""What it looks at, in the same units."""
 _SKY: Final = np.full((2, 2, 3), (236, 240, 245), np.uint8)
 
 
@@ -70,7 +74,7 @@ def sight(scene: Scene) -> Sight:
     """From the south on the whole area."""
     uavs = [uav.position for uav in scene.state.uavs.values()]
     reach = max([scene.around.half_m, *(abs(value) for at in uavs for value in at[:2])])
-    eye, goal = (np.array(at, np.float32) * reach for at in ((-0.2, -2.0, 1.5), (0.04, -0.1, 0.0)))
+    eye, goal = (np.array(at, np.float32) * reach for at in (EYE, GOAL))
     return Sight(eye, goal, reach)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from sim.cli.app import app
+from sim.view.server import EYE, GOAL
 
 CHROMIUM = shutil.which("chromium-headless-shell") or shutil.which("chromium") or shutil.which("google-chrome")
 pytestmark = [
@@ -90,8 +91,8 @@ def share(page: Any) -> float | None:
 
 def on_screen(page: Any, at: np.ndarray, half_m: float) -> tuple[float, float]:
     """Where a place is drawn, by the first camera of the view (`look_over`)."""
-    eye = np.array([-0.3, -1.75, 1.35]) * half_m
-    ahead = np.array([0.05, -0.12, 0.0]) * half_m - eye
+    eye = np.array(EYE) * half_m
+    ahead = np.array(GOAL) * half_m - eye
     ahead /= np.linalg.norm(ahead)
     right = np.cross(ahead, [0, 0, 1])
     right /= np.linalg.norm(right)
@@ -138,6 +139,44 @@ def test_cut_in_the_page_lets_deliveries_fall_in_the_panel(page: Any, start: Cal
     wait_for(lambda: (share(page) or 100) < 85)
     page.get_by_role("tab", name="Events").click()
     wait_for(lambda: "radio fault cut" in page.inner_text("body"))
+
+
+SMALL = ("nodes.count=9", "world.area_m=400", "mission.survivors=2", "duration_s=900", "time_scale=0.5")
+
+
+def test_every_action_says_and_does_what_it_is_called(page: Any, start: Callable[..., str]) -> None:
+    """Each button of the panel, on a search of nine UAVs."""
+
+    def says(*texts: str) -> None:
+        for text in texts:
+            wait_for(lambda text=text: re.search(text, page.inner_text("body")) is not None)  # type: ignore[misc]
+
+    def press(button: str, *texts: str) -> None:
+        page.get_by_role("button", name=button, exact=True).click()
+        says(*texts)
+
+    page.goto(start("launch", "rescue", "--view", "--set", *SMALL))
+    page.get_by_text("delivered lately").first.wait_for(timeout=PATIENCE_MS)
+    page.get_by_role("tab", name="UAV").click()
+    page.locator("input[value='none']").first.click()
+    page.get_by_role("option", name="5", exact=True).first.click()
+    says(r"UAV 5\s+role|UAV 5\s+mode")
+    page.mouse.click(*on_screen(page, np.array([100.0, -100.0, 0.0]), half_m=200.0))
+    for folder in ("send it", "its link to another"):
+        page.get_by_text(folder, exact=True).click()
+    press("send it to the mark", r"UAV 5 sent to \d+ m E")
+    press("call it home", "UAV 5 sent home")
+    press("release it", "UAV 5 released")
+    press("degrade the link", "link 5 to 1 cut")
+    press("cut its radio", "UAV 5: radio off")
+    page.get_by_role("tab", name="Act").click()
+    press("jam at the mark, or about the UAV", "jammed 150 m about")
+    press("end all faults", "all faults end")
+    press("let that UAV crash", r"UAV \d crashes")
+    press("pause", "the clock stands", ", paused")
+    press("run", "clock at 0.5")
+    page.get_by_role("tab", name="Events").click()
+    says("crash", "jam", "cut", "degrade")
 
 
 def test_one_file_plays_without_a_network(page: Any, folder: Path, tmp_path: Path) -> None:

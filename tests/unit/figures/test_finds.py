@@ -10,6 +10,7 @@ from fanet_mw.trace import Approaching, Confirmed, Detected, PlacedInside, Posed
 from fanet_mw.units import S
 from fanet_mw.wire.survivors import Found, Standing, person_id
 from sim.report import finds
+from sim.report.html import Rows, as_html
 from sim.report.run_records import RunRecords
 from sim.results.files import finish
 from sim.results.mission import OverflownCells
@@ -75,9 +76,9 @@ def test_how_sure_is_what_uavs_told_each_other(make_scenario: MakeScenario, tmp_
     known = finds.with_estimates(finds.finds(run), finds.told(folder_of(run, taps, tmp_path)))
     rows = {row[0]: row for row in finds.found_rows(run, known).rows}
     assert rows["survivor 3"][1] == "95 W, 5 N"
-    assert rows["survivor 3"][3] == "by phone alone, within 20 m (95 %)"
+    assert rows["survivor 3"][3] == "by phone alone, within 25 m (95 %)"
     assert rows["survivor 3"][5:] == ["13 s", "UAV 2", "7 m"]
-    assert rows["survivor 1"][3] == "confirmed at close range, within 4 m (95 %)"
+    assert rows["survivor 1"][3] == "confirmed at close range, within 7 m (95 %)"
     assert rows["survivor 1"][7] == "5 m"
     assert rows["survivor 4"][1:4] == ["-", "-", "phone heard, no place yet"]
     lat, lon = map(float, rows["survivor 3"][2].split(", "))
@@ -124,3 +125,13 @@ def test_what_is_not_searched_is_told_by_piece(make_scenario: MakeScenario) -> N
     assert all(piece.north <= north.south for piece in pieces[1:])
     rows = finds.unsearched_rows(share, pieces)
     assert rows.rows[0][0] == f"{north.area_m2 / 1e4:.1f} ha"
+
+
+def test_a_wide_table_is_cards_on_a_phone_with_the_name_of_each_column() -> None:
+    names = ("who", "where", "how sure", "when", "by")
+    page = as_html(
+        "A page", [Rows(names, [["survivor 1", "3 E", "close", "9 s", "UAV 2"]]), Rows(("a", "b"), [["1", "2"]])]
+    )
+    assert page.count("<table class=cards>") == 1
+    assert all(f'data-column="{name}"' in page for name in names)
+    assert page.count("data-column=") == len(names)

@@ -17,7 +17,9 @@ from mavsdk import ComponentType, Configuration, Mavsdk
 from mavsdk.plugins.action_server.action_server import ActionServer, AllowableFlightModes, FlightMode
 from mavsdk.plugins.mavlink_direct_server.mavlink_direct_server import MavlinkDirectServer
 from mavsdk.plugins.telemetry_server.telemetry_server import (
+    AngularVelocityBody,
     Battery,
+    EulerAngle,
     FixType,
     GpsInfo,
     Heading,
@@ -29,9 +31,12 @@ from mavsdk.plugins.telemetry_server.telemetry_server import (
     VtolState,
 )
 
+from fanet_mw.hosts.timebase import THIS_MACHINE
+
 LAT, LON, GROUND_M = 37.5665, 126.978, 40.0
 PER_DEG = 111_319.5
 TICK_S = 0.1
+YAW_DEG = 57.3
 
 
 def say(text: str) -> None:
@@ -133,7 +138,12 @@ def main(url: str, system: int, east_m: float) -> None:
         telemetry.publish_position(
             Position(lat, lon, GROUND_M + model.up, model.up), VelocityNed(north, east, -up), Heading(0.0)
         )
+        telemetry.publish_attitude(
+            EulerAngle(math.degrees(east / 50), math.degrees(-north / 50), YAW_DEG, 0),
+            AngularVelocityBody(0.0, 0.0, 0.0),
+        )
         if ticks % 5 == 0:
+            telemetry.publish_unix_epoch_time(THIS_MACHINE.unix_ns() // 1000)
             state = LandedState.ON_GROUND if model.up < 0.1 else LandedState.IN_AIR
             telemetry.publish_extended_sys_state(VtolState.UNDEFINED, state)
             telemetry.publish_raw_gps(

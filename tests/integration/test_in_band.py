@@ -273,6 +273,7 @@ FAULTS = {
 slow = pytest.mark.slow
 
 
+@pytest.mark.timeout(1200)
 @pytest.mark.parametrize("faults", [*FAULTS])
 @pytest.mark.parametrize(
     ("protocol", "count"),

@@ -3,6 +3,7 @@
 With FANET_TRANSCRIPTS=1 what they say is written to docs/how-to/transcripts/.
 """
 
+import asyncio
 import importlib.util
 import os
 import pty
@@ -16,8 +17,16 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+
+from fanet_mw.autopilot.link import AutopilotLink
+from fanet_mw.autopilot.serving import Autopilot
+from fanet_mw.bus.messages import Battery, FlightState, Gps
+from fanet_mw.flavors import Flavor
+from fanet_mw.gateway.connections import Address
+from fanet_mw.mavlink import ORIGIN
 
 HERE = Path(__file__).resolve().parent
 TRANSCRIPTS = HERE.parent.parent / "docs" / "how-to" / "transcripts"
@@ -152,6 +161,35 @@ def test_mavsdk_flies_a_uav_two_hops_away_over_the_air(tmp_path: Path) -> None:
     said = "".join(line for line in flown.stdout.splitlines(keepends=True) if "[0m" not in line)
     assert flown.returncode == 0, said + flown.stderr + swarm.log.read_text()
     keep("mavsdk-in-band", said)
+
+
+@pytest.mark.skipif(importlib.util.find_spec("mavsdk") is None, reason="MAVSDK is not installed")
+def test_what_mavsdk_tells_as_a_flight_controller_is_what_a_computer_beside_it_measures(tmp_path: Path) -> None:
+    async def heard() -> set[type]:
+        kinds: dict[type, Any] = {}
+        link = AutopilotLink(flavor=Flavor.PX4, origin=ORIGIN)
+        address = Address("udpin", "127.0.0.1", free_port(socket.SOCK_DGRAM))
+        said: list[str] = []
+        beside = Autopilot("UAV 1", link, address, now_ns=time.monotonic_ns, tell=said.append)
+        await beside.connection.open()
+        words = (str(HERE / "mavsdk_autopilot.py"), f"udpout://127.0.0.1:{address.port}", "1")
+        with (tmp_path / "autopilot.log").open("wb") as file:
+            flying = await asyncio.create_subprocess_exec(sys.executable, *words, stdout=file, stderr=file)
+        end_s = time.monotonic() + PATIENCE_S
+        while time.monotonic() < end_s and not (len(kinds) == 3 and kinds[FlightState].unix_ns):
+            kinds |= {type(reading): reading for reading in beside.tick()}
+            await asyncio.sleep(0.05)
+        flying.kill()
+        await flying.wait()
+        beside.connection.close()
+        state = kinds[FlightState]
+        assert (state.roll_rad, state.yaw_rad) == pytest.approx((0.0, 1.0), abs=1e-3)
+        assert state.satellites == 12
+        assert abs(link.counts["clock_behind_gps_ms"]) < 2_000
+        assert not any("clock differs" in line for line in said)
+        return {*kinds}
+
+    assert asyncio.run(heard()) == {Gps, Battery, FlightState}
 
 
 @pytest.mark.slow

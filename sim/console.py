@@ -9,7 +9,7 @@ from rich.console import Console as RichConsole
 CLOSED: Final = 128 + 13
 """The exit code that a shell shows for a process that SIGPIPE ended."""
 
-
+_NARROWEST: Final = 20
 _UNWRAPPED: Final = 10_000
 """The width where no terminal limits it: nothing is this long."""
 
@@ -22,8 +22,12 @@ class Console(RichConsole):
 
     def __init__(self, *, wraps: bool = False, **options: Any) -> None:  # noqa: ANN401  (they are those of rich)
         """`wraps`: lines are wrapped in a pipe, too."""
+        stated = os.environ.get("COLUMNS", "")
+        if not (stated.isdecimal() and int(stated) >= _NARROWEST):  # some programs export 0, in which nothing fits
+            options["_environ"] = {name: value for name, value in os.environ.items() if name != "COLUMNS"}
+            stated = ""
         super().__init__(markup=False, **options)
-        if not (wraps or self.is_terminal or "COLUMNS" in os.environ):
+        if not (wraps or self.is_terminal or stated):
             self.width = _UNWRAPPED
 
     def print(self, *objects: Any, **options: Any) -> None:  # noqa: ANN401  (they are those of rich)

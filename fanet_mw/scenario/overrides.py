@@ -41,7 +41,8 @@ def _entry(entries: list[Any], part: str, override: str) -> Any:  # noqa: ANN401
 def one_value(text: str) -> object:
     """The value of some TOML text; text that is no TOML is a string, so that names need no quotes."""
     try:
-        return tomllib.loads(f"value = {text}")["value"]
+        tree = tomllib.loads(f"value = {text}")
+        return tree["value"] if len(tree) == 1 else text
     except (
         ValueError,
         RecursionError,

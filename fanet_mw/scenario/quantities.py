@@ -5,6 +5,7 @@ A unit of another dimension is refused, and so is a unit for a key that has none
 """
 
 import re
+import unicodedata
 from collections.abc import Mapping
 from decimal import Decimal
 from typing import Final
@@ -44,7 +45,7 @@ _SUFFIXES: Final[Mapping[str, tuple[str, Mapping[str, str]]]] = {
 }
 """The unit for each ending of a key's name, the longest ending first, and the factors of units of
 the same dimension."""
-_QUANTITY: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([a-zA-Zµ°][a-zA-Zµ°/²0-9]*)")
+_QUANTITY: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([a-zA-Z\u03bc°][a-zA-Z\u03bc°/0-9]*)")
 
 
 _NO_UNIT: Final = frozenset({"nakagami_m"})
@@ -62,10 +63,10 @@ def in_unit_of(key: str, text: str) -> float | None:
 
     Raises ValueError with the accepted units if the unit is another one.
     """
-    match = _QUANTITY.fullmatch(text.strip())
+    match = _QUANTITY.fullmatch(unicodedata.normalize("NFKC", text).replace("\u2212", "-").strip())
     if match is None:
         return None
-    number, unit = match[1], match[2].replace("µ", "u")
+    number, unit = match[1], match[2].replace("\u03bc", "u")
     found = _entry(key)
     if found is None:
         raise ValueError(f"{unit!r} is not understood: the key has no unit")

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from fanet_mw.scenario import Scenario
     from sim.observation.observer import Observer
+    from sim.recording.mcap_recording import McapRecording
     from sim.results.outcome import Outcome
     from sim.run.collecting.running_tally import Progress
 
@@ -86,7 +87,8 @@ def simulate(
             spool_folder=output.out,
             observer=_together(watcher, recording),
         )
-    return _finish(outcome, output)
+    code = _finish(outcome, output)
+    return code if recording is None or recording.failure is None else 1
 
 
 def launch(
@@ -212,7 +214,7 @@ def plan(
 
 
 @contextmanager
-def _recording(scenario: "Scenario", path: Path | None, *, epoch_unix_ns: int) -> "Iterator[Observer | None]":
+def _recording(scenario: "Scenario", path: Path | None, *, epoch_unix_ns: int) -> "Iterator[McapRecording | None]":
     """A recording in a file, if one is wanted."""
     if path is None:
         yield None

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from fanet_mw.bus.messages import Poses
-from fanet_mw.errors import BusError
+from fanet_mw.errors import BusError, ConfigError
 from fanet_mw.trace import Posed, Record
 from fanet_mw.units import S
 from sim.observation.bus_feed import BusFeed, Paced
@@ -45,6 +45,8 @@ def record(
                 on_progress(feed.now_ns() / S)
                 paced.wait()
         heard += feed.drain(recording)
+    if recording.failure is not None:
+        raise ConfigError(f"{path}: ends early: {recording.failure}")
     return heard
 
 
@@ -75,7 +77,9 @@ def write_mcap(outcome: Outcome, path: Path) -> int:
             for item in items:
                 if isinstance(item, bytes):
                     recording.take_tap(item[5], t_ns, item)
-        return recording.count
+    if recording.failure is not None:
+        raise ConfigError(f"{path}: ends early: {recording.failure}")
+    return recording.count
 
 
 def _timeline(outcome: Outcome) -> Iterator[tuple[int, int, Any]]:

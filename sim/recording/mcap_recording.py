@@ -16,8 +16,10 @@
 Instants are unix time: that of swarm instant 0 plus swarm time.
 """
 
+import contextlib
 import json
 import math
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -118,6 +120,8 @@ class McapRecording:
         self._second = -1
         self.count = 0
         """Messages that were written."""
+        self.failure: str | None = None
+        """Why the file ends early; the swarm flies on."""
         self._events = 0
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -137,8 +141,18 @@ class McapRecording:
 
     def close(self) -> None:
         """Write the index; without it readers must search the file."""
-        self._writer.finish()
-        self._file.close()
+        if self.failure is None:
+            try:
+                self._writer.finish()
+                self._file.close()
+            except OSError as error:
+                self._give_up(error)
+
+    def _give_up(self, error: OSError) -> None:
+        with contextlib.suppress(OSError):
+            self._file.close()
+        self.failure = error.strerror or str(error)
+        sys.stderr.write(f"{self.path}: the recording ends here: {self.failure}\n")
 
     # --- what is observed -----------------------------------------------------------------------------------------
 
@@ -288,9 +302,14 @@ class McapRecording:
         return Timestamp(seconds=seconds, nanos=nanos)
 
     def _put(self, topic: str, message: Any, t_ns: int) -> None:  # noqa: ANN401  (protobuf's types are made at run time)
+        if self.failure is not None:
+            return
         unix_ns = self.epoch_unix_ns + t_ns
         self.count += 1
-        self._writer.write_message(topic, message, log_time=unix_ns, publish_time=unix_ns)
+        try:
+            self._writer.write_message(topic, message, log_time=unix_ns, publish_time=unix_ns)
+        except OSError as error:
+            self._give_up(error)
 
 
 def _world(

@@ -317,6 +317,18 @@ def test_a_recording_that_cannot_be_written_is_said_before_the_run(tmp_path: Pat
         app(["simulate", "quick", "--record", str(tmp_path / path)], result_action="return_value", exit_on_error=False)
 
 
+def test_a_recording_that_ends_early_costs_no_result(tmp_path: Path) -> None:
+    """The file may have 8 KiB: the recording says why it ends there, and the summary is printed."""
+    flown = "simulate quick --json --record x.mcap --set duration_s=5 warmup_s=2 drain_s=1 nodes.count=4"
+    done = subprocess.run(
+        ["bash", "-c", f"ulimit -f 8; exec {sys.executable} -m fanet_mw {flown}"],
+        cwd=tmp_path, capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert json.loads(done.stdout)["valid"]
+    assert done.stderr.splitlines()[-1] == "x.mcap: the recording ends here: File too large"
+    assert done.returncode == 1
+
+
 def test_info_names_kinds_and_topics(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for path, words in ((folder, ("delivered", "valid", "posed")), (folder / "run.mcap", ("/tf", "foxglove.Log"))):
         assert app(["log", "info", str(path)], result_action="return_value") == 0

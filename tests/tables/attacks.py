@@ -69,6 +69,7 @@ def replays() -> Rows:
                 continue
             planned = sum((a.scenario, a.kind, a.spoofed) == (scenario, kind, spoofed) for a in matrix)
             least = min(of, key=lambda verdict: verdict.share)
+            without = [verdict.apart_without_us for verdict in of if verdict.apart_without_us is not None]
             refused: Counter[str] = Counter()
             for verdict in of:
                 refused.update(verdict.refused)
@@ -76,7 +77,7 @@ def replays() -> Rows:
                 scenario, kind.name.lower(), "of whom it repeats" if spoofed else "its own", f"{len(of)} of {planned}",
                 f"{sum(verdict.sent for verdict in of):,}", f"{least.share:.4f}",
                 "-" if least.noise_share is None else f"{least.noise_share:.4f}",
-                f"{max(verdict.apart_us for verdict in of):.0f}", f"{max(v.apart_without_us for v in of):.0f}",
+                f"{max(verdict.apart_us for verdict in of):.0f}", f"{max(without):.0f}" if without else "-",
                 str(sum(max(0, verdict.beyond) for verdict in of)),
                 ", ".join(f"{count:,} {why}" for why, count in sorted(refused.items()) if why in _REFUSED),
             ])  # fmt: skip

@@ -24,6 +24,11 @@ def test_overrides_take_toml_values_and_plain_words() -> None:
     assert made.traffic.sources == (1, 2)
 
 
+def test_an_override_sets_one_key_only() -> None:
+    with pytest.raises(ConfigError, match=r"nodes\.count = '3\\nseed=2'"):
+        scenario("nodes.count=3\nseed=2")
+
+
 def test_an_entry_of_an_array_is_changed_by_its_number() -> None:
     text = '[[faults]]\nkind = "cut"\nnode = 2\nat_s = 3\n'
     assert scenario("faults.0.node=4", text=text).faults[0].node == 4  # type: ignore[union-attr]

@@ -29,6 +29,10 @@ def scenario(*overrides: str, text: str = "") -> Scenario:
         ("tx_power_dbm", "-3 dBm", -3.0),
         ("payload_bytes", "1 kB", 1000.0),
         ("turn_slack_us", "50 µs", 50.0),
+        ("turn_slack_us", "50 \u03bcs", 50.0),
+        ("duration_s", "2\u00a0min", 120.0),
+        ("tx_power_dbm", "\u22123 dBm", -3.0),
+        ("acceleration_m_s2", "2 m/s\u00b2", 2.0),
     ],
 )
 def test_a_unit_of_the_keys_dimension_is_understood(key: str, text: str, value: float) -> None:

@@ -82,7 +82,7 @@ def pytest_collection_finish() -> None:
     os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_scenario() -> MakeScenario:
     """Build a scenario from dotted keys: `make_scenario(**{"nodes.count": 3})`. Small and quiet by default."""
 

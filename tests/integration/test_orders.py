@@ -60,14 +60,20 @@ def test_one_that_is_recalled_and_released_before_it_is_home_takes_part_again(
     assert all(mode not in ("recall", "land") for node in (1, 2, 4, 5, 6, 7) for mode, _ in modes(records, node))
 
 
-def test_one_stays_over_a_place_and_the_nearest_that_can_be_spared_is_sent(
-    make_scenario: Callable[..., Scenario],
-) -> None:
-    records = flown(make_scenario, {"at_s": AT_S, "order": "stay", "place_m": (80.0, -90.0)})
-    chosen = next(r.other for r in records if isinstance(r, Ordered))
-    over = [one for t_s, one in track(records, chosen).items() if t_s > AT_S + 30]
-    assert max(math.hypot(one.east_m - 80, one.north_m + 90) for one in over) < 12
-    assert [mode for mode, _ in modes(records, chosen)][-1] == "errand"
+STAY_M = (80.0, -90.0)
+
+
+@pytest.fixture(scope="module")
+def one_stays(make_scenario: Callable[..., Scenario]) -> Sequence[Record]:
+    """The flight in which somebody is to stay over a place, and all others search on."""
+    return flown(make_scenario, {"at_s": AT_S, "order": "stay", "place_m": STAY_M})
+
+
+def test_one_stays_over_a_place_and_the_nearest_that_can_be_spared_is_sent(one_stays: Sequence[Record]) -> None:
+    chosen = next(r.other for r in one_stays if isinstance(r, Ordered))
+    over = [one for t_s, one in track(one_stays, chosen).items() if t_s > AT_S + 30]
+    assert max(math.hypot(one.east_m - STAY_M[0], one.north_m - STAY_M[1]) for one in over) < 12
+    assert [mode for mode, _ in modes(one_stays, chosen)][-1] == "errand"
 
 
 def test_one_searches_around_a_place_up_to_the_radius(make_scenario: Callable[..., Scenario]) -> None:
@@ -82,13 +88,15 @@ def test_one_searches_around_a_place_up_to_the_radius(make_scenario: Callable[..
     assert max(math.hypot(one.east_m, one.north_m) for one in around) < 95
 
 
-def test_all_keep_out_of_an_area_that_is_closed_while_they_fly(make_scenario: Callable[..., Scenario]) -> None:
+def test_all_keep_out_of_an_area_that_is_closed_while_they_fly(
+    make_scenario: Callable[..., Scenario], one_stays: Sequence[Record]
+) -> None:
     def inside(records: Sequence[Record]) -> set[int]:
         return {
             r.node for r in records if isinstance(r, Posed) and r.t_ns > 45 * S and math.hypot(r.east_m, r.north_m) < 28
         }
 
-    assert inside(flown(make_scenario)), "they fly there otherwise"
+    assert inside(one_stays), "they fly there otherwise"
     order = {"at_s": 25, "order": "no_fly", "place_m": (0.0, 0.0), "radius_m": 30.0}
     assert not inside(flown(make_scenario, order))
 

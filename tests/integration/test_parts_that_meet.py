@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 import pytest
+from kit import slow
 
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Confirmed, KnownOnGround
@@ -19,7 +20,7 @@ KEYS = {
 WHOLE_S = 50
 
 
-@pytest.mark.parametrize("protocol", ["clustered", "rounds"])
+@pytest.mark.parametrize("protocol", ["rounds", *slow("clustered")])
 def test_what_was_found_is_known_on_the_other_side_soon_after_the_air_is_whole(
     make_scenario: Callable[..., Scenario], protocol: str
 ) -> None:

@@ -81,6 +81,18 @@ class Hills(NamedTuple):
         low, high = np.minimum(u, v), np.maximum(u, v)
         return np.asarray(self.heights[i, j] * (1 - high) + self.heights[i + 1, j + 1] * low + beside * (high - low))
 
+    def normals(self, places: Rows) -> Rows:
+        """The upward unit normal of the triangle at each place [n, 2 or 3]."""
+        last = self.heights.shape[0] - 1
+        column, row = places[:, 0] / self.cell_m + last / 2, places[:, 1] / self.cell_m + last / 2
+        i, j = (np.clip(part.astype(np.int64), 0, last - 1) for part in (row, column))
+        below = row - i <= column - j
+        h, southwest, northeast = self.heights, self.heights[i, j], self.heights[i + 1, j + 1]
+        east = np.where(below, h[i, j + 1] - southwest, northeast - h[i + 1, j])
+        north = np.where(below, northeast - h[i, j + 1], h[i + 1, j] - southwest)
+        upright = np.stack([-east / self.cell_m, -north / self.cell_m, np.ones(len(places))], axis=1)
+        return np.asarray(upright / np.linalg.norm(upright, axis=1)[:, None])
+
     @property
     def steepest(self) -> float:
         """The greatest slope of any triangle is at most this."""

@@ -18,6 +18,16 @@ RAYS: Final = 1000
 """Rays that are cast over hills at once; more would take much memory."""
 _SHORT_M: Final = 0.01
 """A body stops this far before a wall or the ground."""
+_ROUND: Final = np.array([[0.0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0.7, -0.7, 0], [-0.7, 0.7, 0]])
+"""Places around one, on whose hillsides that nearest to it may lie."""
+_DOWN: Final = np.array(
+    [
+        [math.sin(tilt) * math.cos(turn), math.sin(tilt) * math.sin(turn), -math.cos(tilt)]
+        for tilt in (0.25, 0.5, 0.75, 1.0, 1.25, 1.5)
+        for turn in (math.pi * share / 8 for share in range(16))
+    ]
+)
+"""Directions downwards, for edges."""
 _ROUNDS: Final = 40
 """Rounds of the search for the place at which a path is nearest to a box; each leaves two thirds of the path."""
 
@@ -72,12 +82,12 @@ class Solids:
 
     def least_gap_m(self, before: Rows, after: Rows, *, within_m: float) -> Values:
         """The least gap on the straight path of each body; that at its end where no path can lead nearer than
-        `within_m`.
+        `within_m`. Over a slope it is at most `within_m` where the path leads so near to it in any direction.
         """
         gap = self.gap_m(after)
         path = after - before
         length = np.linalg.norm(path, axis=1)
-        near = np.flatnonzero(gap - length * math.hypot(1.0, self._steepest) <= within_m)
+        near = np.flatnonzero(gap <= (length + within_m) * math.hypot(1.0, self._steepest))
         if not len(near):
             return gap
         start, way = before[near], path[near]
@@ -85,6 +95,10 @@ class Solids:
         if self._hills is not None:
             _, above = self.above_hills(start, way, np.ones(len(near)))
             least = np.minimum(least, above.min(axis=1))
+            beside = np.flatnonzero(least > within_m)
+            if len(beside):
+                touch = self._hill_within(start[beside], way[beside], within_m)
+                least[beside[touch]] = within_m
         if len(self._middle):
             least = np.minimum(least, self._boxes_least_m(start, way, within_m=within_m))
         gap[near] = least
@@ -189,6 +203,20 @@ class Solids:
             low, high = np.where(farther, low + third, low), np.where(farther, high, high - third)
         np.minimum.at(least, first, gap((low + high) / 2))
         return least
+
+    def _hill_within(self, start: Rows, way: Rows, radius_m: float) -> Flags:
+        """Which paths lead so near to a hillside: where the nearest of its places lies along its normal, or towards an
+        edge, some point at this distance from the path is below the ground.
+        """
+        assert self._hills is not None, "asked only where there are hills"
+        normals = [self._hills.normals(place + off) for place in (start, start + way) for off in _ROUND * radius_m]
+        towards = np.concatenate(
+            [-np.stack(normals, axis=1), np.broadcast_to(_DOWN, (len(start), *_DOWN.shape))], axis=1
+        )
+        low = (start[:, None] + radius_m * towards).reshape(-1, 3)
+        along = np.repeat(way, towards.shape[1], axis=0)
+        _, above = self.above_hills(low, along, np.ones(len(low)))
+        return np.asarray((above.min(axis=1) <= 0).reshape(len(start), -1).any(axis=1))
 
     def _local(self, at: Rows) -> Values:
         """Each place in the axes of each box [n, boxes, 3]."""

@@ -10,7 +10,7 @@ moves many wavelengths in between; Matolak and Sun (IEEE Trans. Veh. Technol. 66
 over suburbs in the L band, and a phone lies on the ground. The loss through a collapsed building was measured from 50
 MHz to 1.8 GHz by Holloway et al. (IEEE Antennas and Propagation Magazine 56(3), 2014: some 20 to 80 dB). It grows with
 the frequency, by 10 to 100 dB for each metre of reinforced concrete (Oestges, EMTS 2013). Not modeled: the phone's own
-interval of probe requests.
+interval of probe requests, and hills or walls in the way.
 """
 
 import math

@@ -58,7 +58,7 @@ from fanet_mw.orders import OrderKind
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.world import FASTEST_AIR_M_S
-from fanet_mw.units import Enu, NodeId, S
+from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire.bids import Bids, encode_bids
 from fanet_mw.wire.roll import Roll
 from fanet_mw.wire.search_messages import Told
@@ -72,6 +72,8 @@ _MOST_DECADES: Final = 12.0
 _OFFSET_DB: Final = 1.0
 """The standard deviation that is assumed for the difference between one phone's power and the mean of all phones."""
 _REVIEW_NS: Final = 1 * S
+_ROLL_NS: Final = 400 * MS
+"""The interval at which it is found who is lost."""
 _LEAST_RECOGNIZED: Final = 0.1
 """The least share of the people in an image that a camera must recognize from the height of the search."""
 _LOOKED_NS: Final = 10 * S
@@ -166,6 +168,7 @@ class Searcher:
         self._outbox = outbox
         self._limits = limits
         self._next_review_ns: int | None = None
+        self._next_roll_ns = 0
 
     # --- time -----------------------------------------------------------------------------------------------------
 
@@ -218,6 +221,9 @@ class Searcher:
 
     def fix(self, position: Enu, velocity: Enu, *, now_ns: int) -> None:
         """A position and a velocity from the receiver: the UAV chooses its next velocity."""
+        if now_ns >= self._next_roll_ns:
+            self._next_roll_ns = now_ns + _ROLL_NS
+            self._plans.close_ranks(now_ns)
         self._flight.fix(position, velocity, self._bidding.survivor, now_ns=now_ns)
 
     def on_battery(self, charge: float, *, now_ns: int) -> None:
@@ -299,7 +305,7 @@ class Searcher:
             self._announcing.on_post(now_ns)
             return
         self._neighbors.on_hello(origin, motion)
-        if self._plans.on_hello(origin, motion.position, now_ns=now_ns):
+        if self._plans.on_hello(origin, motion, now_ns=now_ns):
             self._announcing.on_returned(now_ns)
 
     def _on_heard(self, now_ns: int) -> None:

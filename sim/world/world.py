@@ -149,7 +149,7 @@ class WorldActor(Actor):
         self._flies = np.ones(len(self._ids), bool)
         """The UAVs that have not crashed."""
         self._falling: set[int] = set()
-        """The UAVs that fall by a fault, and whose radio works until they hit something."""
+        """The UAVs that fall by a fault, and whose sensors and radio work until they hit something."""
         if flight is not None and scenario.world.crash == "falls":
             self._find_wrecks(solids)
         self._ticks = Ticks()
@@ -322,4 +322,6 @@ class WorldActor(Actor):
             for node, (east, north, up) in zip(self._ids, at.tolist(), strict=True):
                 if self._flies[node - 1]:
                     self.records.append(Posed(now_ns, node, round(east, 2), round(north, 2), round(up, 2)))
-        self.outbox.extend(self._suite.readings(self._truth(now_ns), self._flies, before_ns=before_ns))
+        sense = self._flies.copy()
+        sense[[node - 1 for node in self._falling]] = True
+        self.outbox.extend(self._suite.readings(self._truth(now_ns), sense, before_ns=before_ns))

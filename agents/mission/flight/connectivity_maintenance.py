@@ -17,6 +17,8 @@ _TETHER: Final = 0.95
 """The greatest distance of two UAVs that must stay connected, as a share of the radio's reach."""
 _TETHER_S: Final = 4.0
 """A UAV may use up the rest of that distance in this time at the earliest."""
+_CLOSING_S: Final = 2.0
+"""The same while ranks are closed over somebody who is lost, and every second counts."""
 
 
 _EARLY_TIES: Final = 2
@@ -55,7 +57,7 @@ class ConnectivityMaintenance:
             ]
         else:
             ties = self._nearest_motions(now_ns)
-        planes = []
+        planes, closes = [], pattern is not None and bool(pattern.vacant)
         for motion in ties:
             if motion is None:
                 continue
@@ -63,7 +65,7 @@ class ConnectivityMaintenance:
                 motion.offset_from(self._own_motion.position, now_ns),
                 (motion.velocity.east, motion.velocity.north),
                 tether_m=self._tether_m,
-                within_s=_TETHER_S,
+                within_s=_CLOSING_S if closes else _TETHER_S,
             )
             if plane is not None:
                 planes.append(plane)

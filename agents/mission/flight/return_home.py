@@ -34,7 +34,7 @@ _SINKS_M_S: Final = 0.7
 """Who is lower and does not sink at this speed is still on its way up, or stands."""
 _LOW_M: Final = 25.0
 """Who is lower by this stands at home, or has nothing to do there."""
-_TURN_S: Final = 11.0
+_TURN_S: Final = 14.0
 """The time between two landings beside each other."""
 _LAND_M_S: Final = 1.5
 """The speed of the landing."""

@@ -11,13 +11,16 @@ from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.formation_planner import STATUS_S, FormationPlanner
 from agents.mission.search_formation.pattern import Pattern
 from agents.mission.search_formation.roll_call import RollCall
+from fanet_mw.motion import Motion
 from fanet_mw.trace import Planned
-from fanet_mw.units import US, Enu, NodeId, S
+from fanet_mw.units import US, NodeId, S
 from fanet_mw.wire.roll import Roll
 from fanet_mw.wire.search_plan import Search, SearchStatus
 
 _FIRST_STATUS_S: Final = 2
 """A UAV sends its first status at a random instant within this time after its start."""
+_FALLS_M_S: Final = 6.0
+"""Nobody sinks this fast on purpose."""
 
 
 class PlanExchange:
@@ -59,11 +62,14 @@ class PlanExchange:
             self.say_status(percent, now_ns)
         if self._planner.review(self._pattern, now_ns=now_ns):
             self._adopt(now_ns)
+        plans, self._planner.to_tell = self._planner.to_tell, []
+        self._outbox.packets += [OutgoingPacket(plan.encode_frame(self._node)) for plan in plans]
+
+    def close_ranks(self, now_ns: int) -> None:
+        """Find who is lost, and fly on without them."""
         if self._place.plan is not None:
             self._roll_call.review(self._place.plan, since_ns=self._adopted_ns, now_ns=now_ns)
             self._place.close_ranks({*self._roll_call.lost, *self._planner.leavers, *self._planner.absent})
-        plans, self._planner.to_tell = self._planner.to_tell, []
-        self._outbox.packets += [OutgoingPacket(plan.encode_frame(self._node)) for plan in plans]
 
     def say_status(self, percent: int, now_ns: int) -> None:
         """Send this UAV's status: its position, its plan, and the percentage of its battery that it may still spend."""
@@ -96,12 +102,12 @@ class PlanExchange:
 
     # --- received messages ----------------------------------------------------------------------------------------
 
-    def on_hello(self, node: int, position: Enu, *, now_ns: int) -> bool:
-        """A neighbor's hello states its position; returns True if it was lost."""
-        self._planner.on_neighbor(node, position, now_ns=now_ns)
-        returned = node in self._roll_call.lost
-        self._roll_call.on_hello(node, now_ns=now_ns)
-        return returned
+    def on_hello(self, node: int, motion: Motion, *, now_ns: int) -> bool:
+        """A neighbor's hello states how it flies; returns True if it was lost."""
+        self._planner.on_neighbor(node, motion.position, now_ns=now_ns)
+        returned, falls = node in self._roll_call.lost, motion.velocity.up <= -_FALLS_M_S
+        self._roll_call.on_hello(node, now_ns=now_ns, falls=falls)
+        return returned and not falls
 
     def on_roll(self, roll: Roll, *, now_ns: int) -> None:
         """A neighbor tells who was heard when."""

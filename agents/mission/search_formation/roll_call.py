@@ -3,6 +3,7 @@
     heard     the latest instant at which anybody is known to have heard a UAV; each hello tells them all on
     lost      said by a UAV that has heard it itself until lately, when nobody is known to have heard it for some time;
               it is told on with the instant at which the UAV was last heard, and a later one takes it back
+    falls     a UAV whose hello says that it falls is lost at once
     away      a UAV that this one never heard itself is lost only after much longer, because news take a second a hop:
               then it is cut off with a part of the swarm
 
@@ -40,10 +41,10 @@ class RollCall:
         self.lost: dict[int, int] = {}
         """The UAVs that are lost, each with the instant at which this UAV has learned it."""
 
-    def on_hello(self, node: int, *, now_ns: int) -> None:
-        """A neighbor was heard."""
+    def on_hello(self, node: int, *, now_ns: int, falls: bool = False) -> None:
+        """A neighbor was heard; `falls`: its hello says that it falls from the sky."""
         self._neighbor_ns[node] = now_ns
-        self._take(node, now_ns // ROLL_NS, lost=False, now_ns=now_ns)
+        self._take(node, now_ns // ROLL_NS, lost=falls, now_ns=now_ns)
 
     def on_roll(self, roll: Roll, plan: Search | None, *, now_ns: int) -> None:
         """A neighbor tells on what it knows; of another plan than the own one it is not understood."""
@@ -65,7 +66,7 @@ class RollCall:
             self.lost.setdefault(node, now_ns)
 
     def review(self, plan: Search, *, since_ns: int, now_ns: int) -> None:
-        """Find who is lost, to be called about once a second; `since_ns`: the instant at which this UAV began to follow
+        """Find who is lost, to be called twice a second; `since_ns`: the instant at which this UAV began to follow
         the plan, before which nobody need have been heard.
         """
         for node in plan.nodes:

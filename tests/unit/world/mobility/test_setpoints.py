@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from fanet_mw.bus.messages import Gps, Message, Poses, Setpoint, SetpointKind
-from fanet_mw.bus.radio_control import Cut
+from fanet_mw.bus.radio_control import Cut, Mishap, MishapKind
 from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Collided, FlightModeChanged
-from fanet_mw.units import Enu, S
+from fanet_mw.units import Enu, NodeId, S
 from sim.world.flight_recorder import SwarmFlight
 from sim.world.world import WorldActor
 
@@ -130,6 +130,20 @@ def test_who_lands_stays_over_its_place_although_its_estimate_of_its_velocity_dr
     off_m = [float(np.linalg.norm((flying.at(node) - was)[:2])) for node, was in enumerate(before, start=1)]
     assert max(flying.at(node)[2] for node in range(1, 11)) < 0.5
     assert max(off_m) < 1.5
+
+
+def test_who_falls_by_a_fault_senses_it_until_it_hits_the_ground(make_scenario: MakeScenario) -> None:
+    flying = Flying(make_scenario, **{"nodes.altitude_m": 60, "world.crash": "falls", "mission.survivors": 1})
+    flying.fly(1.0)
+    crash = Mishap("motors", NodeId(1), MishapKind.CRASH, STILL, 0)
+    flying.world.receive(NAMES.radio_control, crash, flying.now_ns)
+    flying.fly(2.0)
+    fixes = [said for topic, said in flying.said if topic == NAMES.sensor(1, "gps") and isinstance(said, Gps)]
+    assert fixes[-1].t_ns > 2 * S
+    assert fixes[-1].velocity.up < -8.0
+    flying.said.clear()
+    flying.fly(10.0).said.clear()
+    assert not [topic for topic, _ in flying.fly(2.0).said if topic == NAMES.sensor(1, "gps")]
 
 
 def test_who_is_told_to_land_while_it_takes_off_lands_and_takes_off_again(make_scenario: MakeScenario) -> None:

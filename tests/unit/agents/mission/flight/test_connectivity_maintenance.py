@@ -37,3 +37,16 @@ def test_who_is_on_the_way_to_its_place_stays_within_reach_of_the_two_nearest() 
         board.neighbors.on_hello(other, Motion(Enu(east, 0.0, 65.0), Enu(0, 0, 0), now_ns))
     assert sorted(plane.east for plane in tied.planes(now_ns)) == [-1.0, 1.0]
     assert not board.place.is_taken_up(now_ns)
+
+
+def test_who_closes_ranks_over_a_lost_uav_may_use_up_its_reach_in_half_the_time() -> None:
+    now_ns = TAKEN_UP_NS + 20 * S
+    board = Board(LINE, lane_of(LINE, now_ns))
+    for other in range(1, COUNT + 1):
+        if other != LINE:
+            board.neighbors.on_hello(other, Motion(lane_of(other, now_ns), Enu(0, 0, 0), now_ns))
+    tied = ConnectivityMaintenance(board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M)
+    before = {(plane.east, plane.north): plane.least for plane in tied.planes(now_ns)}
+    board.place.close_ranks({FOLLOWER})
+    after = {(plane.east, plane.north): plane.least for plane in tied.planes(now_ns)}
+    assert after == {way: 2 * least for way, least in before.items()}

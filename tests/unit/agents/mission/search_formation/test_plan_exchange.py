@@ -51,7 +51,7 @@ def test_the_others_close_ranks_while_it_is_absent() -> None:
     for absent, vacant in ((True, {PLAN.nodes.index(out)}), (False, set())):
         status = SearchStatus(NOW_NS // 1000 + (not absent), Enu(0, 0, 65), out, 1, 80, absent)
         exchange.plans.on_status(status, now_ns=NOW_NS)
-        exchange.plans.review(80, NOW_NS)
+        exchange.plans.close_ranks(NOW_NS)
         assert exchange.place.pattern is not None
         assert exchange.place.pattern.vacant == vacant
 
@@ -59,6 +59,6 @@ def test_the_others_close_ranks_while_it_is_absent() -> None:
 def test_who_is_absent_keeps_its_own_place_in_its_plan() -> None:
     exchange = Exchange(LINE)
     exchange.plans.be_absent(80, NOW_NS, goes=True)
-    exchange.plans.review(80, NOW_NS)
+    exchange.plans.close_ranks(NOW_NS)
     assert exchange.place.pattern is not None
     assert exchange.place.pattern.vacant == frozenset()

@@ -132,3 +132,16 @@ def test_a_roll_of_no_plan_is_refused() -> None:
             Roll.decode_frame(bytes(HEADER_BYTES) + wrong.encode_frame(3))
     with pytest.raises(LocalProtocolError):
         Roll(1, 1, 1, (0,) * 80, frozenset()).encode_frame(3)
+
+
+def test_who_says_that_it_falls_is_lost_at_once_and_who_is_heard_again_in_flight_is_not() -> None:
+    plan = ring_plan()
+    call, told = (RollCall(NodeId(node), hello_interval_s=1.0) for node in (1, 45))
+    call.on_hello(2, now_ns=10 * S)
+    assert not call.lost
+    call.on_hello(2, now_ns=11 * S, falls=True)
+    assert set(call.lost) == {2}
+    told.on_roll(call.roll(plan, now_ns=11 * S), plan, now_ns=12 * S)
+    assert set(told.lost) == {2}, "who is out of reach learns it from hellos"
+    call.on_hello(2, now_ns=14 * S)
+    assert not call.lost

@@ -158,3 +158,15 @@ def test_a_better_estimate_turns_a_uav_only_when_it_is_far_off() -> None:
     assert uav.out.course is None
     uav.rule.reported(report(4, 5, 600, rssi_dbm=-40.0), position=HERE, now_ns=3 * S)
     assert uav.out.course is not None
+
+
+def test_uavs_that_turn_towards_one_survivor_hold_at_places_apart() -> None:
+    places = []
+    for node in range(1, 46):
+        out = Outbox()
+        rule = PaperRule(scenario(), NodeId(node), out)
+        for reporter in (1, 2, 3):
+            rule.reported(report(4, reporter, 100, 10.0 * reporter), position=HERE, now_ns=S)
+        assert out.course is not None
+        places.append(out.course.position)
+    assert min(a.minus(b).norm() for i, a in enumerate(places) for b in places[:i]) > 1.6

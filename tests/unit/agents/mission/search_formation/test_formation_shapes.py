@@ -52,6 +52,14 @@ anyone = st.builds(
 ).filter(lambda made: made is not None)  # fmt: skip
 
 
+@given(anyone)
+def test_who_is_tied_to_a_place_has_that_place_tied_to_its_own(pattern: Pattern) -> None:
+    ties = {place: set(pattern.shape.tethers(place)) for place in range(pattern.dimensions.fixed)}
+    assert {(here, there) for here in ties for there in ties[here]} == {
+        (here, there) for there in ties for here in ties[there]
+    }
+
+
 @given(anyone, st.floats(0, 2000))
 def test_nobody_jumps_and_whoever_sweeps_flies_no_faster_than_a_way_back(pattern: Pattern, swept_s: float) -> None:
     for place in range(pattern.places):

@@ -45,7 +45,7 @@ from sim.scenarios import catalog
 CLOCKS: Final = ("clock.sync=beacons", "clock.offset_ms=5", "clock.drift_ppm=20")
 SCENARIOS: Final[Mapping[str, tuple[str, ...]]] = {
     "clusters": ("nodes.count=15", "clusters.count=14", "clusters.turn_slack_us=400", "warmup_s=26"),
-    "rescue": ("warmup_s=20",),
+    "rescue": ("warmup_s=24",),
 }
 NODES: Final = {"clusters": 15, "rescue": 45}
 PLACES: Final = {"clusters": {"corner": 15, "middle": 8}, "rescue": {"corner": 45, "middle": 23}}

@@ -1,7 +1,8 @@
 """What looking at a swarm costs it: its lateness without and with onlookers, in turns, and what each of them takes.
 
     python tests/benchmarks/onlookers.py [SECONDS] [TURNS] [--only view gateway inspect] [--of SCENARIO]
-                                      the demo of 45 UAVs, SECONDS each (40), TURNS times (3): nobody, view, doors
+                                      the demo of 45 UAVs, SECONDS each (40), TURNS times (3): nobody, view, doors;
+                                      `--only flood`: a ground station that says 4,000 commands a second
     python tests/benchmarks/onlookers.py virtual [SECONDS]     200 UAVs in virtual time: CPU per frame, bytes a second
 
 view     `fanet view` at 10 Hz, and a browser: a websocket client in this process that takes all that comes
@@ -22,6 +23,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -70,12 +72,12 @@ def browse(taker: Taker) -> None:
             time.sleep(STEP_S)
 
 
-def stand_on_ground(taker: Taker) -> None:
-    """Be a ground station: say a heartbeat each second, and hear all UAVs."""
+def stand_on_ground(taker: Taker, *, floods: bool = False) -> None:
+    """Be a ground station: say a heartbeat each second, and hear all UAVs. `floods`: and say commands without end."""
     voice = common.MAVLink(None, srcSystem=255, srcComponent=190)
     said_s = 0.0
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
-        sock.settimeout(STEP_S)
+        sock.settimeout(0.001 if floods else STEP_S)
         while not taker.ends:
             if time.monotonic() >= said_s + 1:
                 said_s = time.monotonic()
@@ -83,8 +85,15 @@ def stand_on_ground(taker: Taker) -> None:
                 voice.seq = (voice.seq + 1) % 256
                 with contextlib.suppress(OSError):
                     sock.sendto(beat, (HOST, GROUND))
+            for number in range(40 if floods else 0):
+                order = common.MAVLink_command_long_message(1 + number, 1, 400, 0, 1, voice.seq, 0, 0, 0, 0, 0)
+                with contextlib.suppress(OSError):
+                    sock.sendto(order.pack(voice), (HOST, GROUND))
+                voice.seq = (voice.seq + 1) % 256
             with contextlib.suppress(OSError):
                 taker.bytes += len(sock.recv(65_536))
+            if floods:
+                time.sleep(0.01)
 
 
 @contextlib.contextmanager
@@ -93,6 +102,7 @@ def onlooker(name: str, swarm: str) -> Iterator[tuple[int, Taker]]:
     words = {
         "view": ["view", swarm, "--port", str(PORT), "--until-gone"],
         "gateway": ["gateway", swarm, "--mavlink", f"udpin:{HOST}:{GROUND}"],
+        "flood": ["gateway", swarm, "--mavlink", f"udpin:{HOST}:{GROUND}"],
         "inspect": ["inspect", swarm],
     }[name]
     master, terminal = pty.openpty()
@@ -108,7 +118,7 @@ def onlooker(name: str, swarm: str) -> Iterator[tuple[int, Taker]]:
                 taker.bytes += len(chunk)
 
     screen = Taker(read)
-    taker = {"view": browse, "gateway": stand_on_ground}.get(name)
+    taker = {"view": browse, "gateway": stand_on_ground, "flood": partial(stand_on_ground, floods=True)}.get(name)
     takes = screen if taker is None else Taker(taker)
     try:
         yield process.pid, takes
@@ -220,7 +230,9 @@ def main() -> None:
     flags = argparse.ArgumentParser(description="What it costs a swarm to be looked at.")
     flags.add_argument("seconds", nargs="?", default="40", help="seconds of a flight, or `virtual`")
     flags.add_argument("turns", nargs="?", type=float, default=3)
-    flags.add_argument("--only", nargs="+", choices=("view", "gateway", "inspect"), help="these instead, each alone")
+    flags.add_argument(
+        "--only", nargs="+", choices=("view", "gateway", "inspect", "flood"), help="these instead, each alone"
+    )
     flags.add_argument("--of", default="demo", help="a scenario instead of the demo")
     given = flags.parse_args()
     if given.seconds == "virtual":

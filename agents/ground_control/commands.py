@@ -16,7 +16,7 @@ _ACCEPTED: Final = common.MAV_RESULT_ACCEPTED
 _DENIED: Final = common.MAV_RESULT_DENIED
 _LATER: Final = common.MAV_RESULT_TEMPORARILY_REJECTED
 _UNSUPPORTED: Final = common.MAV_RESULT_UNSUPPORTED
-_MOST_US: Final = 3600 * 1_000_000
+_MOST_US: Final = 1800 * 1_000_000  # MESSAGE_INTERVAL tells them in 31 bits
 _NONE: Final = 0x7FFF_FFFF
 """A latitude or longitude that is not given (INT32_MAX)."""
 _CHANGE_MODE: Final = 1

@@ -8,12 +8,13 @@ from typing import Final
 
 from fanet_mw.autopilot.link import AutopilotLink, Reading
 from fanet_mw.bus import codecs
-from fanet_mw.bus.messages import Battery, FlightState, Gps, Poses, Setpoint
+from fanet_mw.bus.messages import Battery, FlightState, Gps, Poses, Setpoint, TraceBatch
 from fanet_mw.bus.topics import Topics, node_of
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.gateway.connections import Address, Connection
 from fanet_mw.hosts.bus import HostBus, OnSample
 from fanet_mw.hosts.timebase import THIS_MACHINE
+from fanet_mw.trace import Posed
 from fanet_mw.units import MS, STILL, Enu, NodeId, S
 
 _TICK_S: Final = 0.05
@@ -144,7 +145,7 @@ async def serve_world(
 
     loop = asyncio.get_running_loop()
     bus.subscribe(names.all_setpoints, on_setpoint)
-    ticks = 0
+    ticks, recorded_s = 0, 0
     while True:
         for node, autopilot in autopilots.items():
             for reading in autopilot.tick():
@@ -154,6 +155,12 @@ async def serve_world(
             known |= {node: (place, STILL) for node, place in standing.items()}
             states = array("d", [part for _, (at, moves) in sorted(known.items()) for part in (*at, *moves)])
             bus.put(names.pose, codecs.encode([Poses(now_ns(), array("H", sorted(known)), states)]))
+            if now_ns() // S > recorded_s:
+                recorded_s = now_ns() // S
+                posed = tuple(
+                    Posed(now_ns(), node, *(round(part, 2) for part in at)) for node, (at, _) in known.items()
+                )
+                bus.put(names.trace("world"), codecs.encode([TraceBatch(posed)]), reliable=True)
             for node, place in standing.items():
                 bus.put(names.sensor(node, "gps"), codecs.encode([Gps(now_ns(), place, STILL)]))
         ticks += 1

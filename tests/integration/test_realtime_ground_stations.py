@@ -27,6 +27,8 @@ from fanet_mw.bus.messages import Battery, FlightState, Gps
 from fanet_mw.flavors import Flavor
 from fanet_mw.gateway.connections import Address
 from fanet_mw.mavlink import ORIGIN
+from fanet_mw.results import records
+from fanet_mw.trace import Posed
 
 HERE = Path(__file__).resolve().parent
 TRANSCRIPTS = HERE.parent.parent / "docs" / "how-to" / "transcripts"
@@ -205,7 +207,9 @@ def test_mavsdk_on_both_sides_and_the_swarm_in_band_between_them(tmp_path: Path)
             flying.append(subprocess.Popen([*command, str(number + 1), str(east_m)], stdout=file, stderr=file))
     text = LINE.replace('engine = "kinematic"\n', "").replace("time_scale = 2.0", "time_scale = 1.0")
     try:
-        swarm = Field(tmp_path, text, "--no-world", "--autopilots", f"udpin:127.0.0.1:{first}+")
+        swarm = Field(
+            tmp_path, text, "--no-world", "--autopilots", f"udpin:127.0.0.1:{first}+", "--out", str(tmp_path / "run")
+        )
         try:
             command = [sys.executable, str(HERE / "mavsdk_pilot.py"), f"udpin://127.0.0.1:{swarm.udp}", "3", "2"]
             flown = subprocess.run(command, capture_output=True, text=True, check=False, timeout=200)
@@ -219,6 +223,7 @@ def test_mavsdk_on_both_sides_and_the_swarm_in_band_between_them(tmp_path: Path)
     autopilot = "".join(line for line in logs[1].read_text().splitlines(keepends=True) if "[0m" not in line)
     assert flown.returncode == 0, said + flown.stderr + swarm.log.read_text() + autopilot
     assert "armed True" in autopilot
+    assert max(one.up_m for one in records(tmp_path / "run", Posed) if one.node == 2) > 10
     assert "mode OFFBOARD" in autopilot
     assert autopilot.rstrip().endswith("landed")
     keep("closed-loop", f"The ground station:\n\n{said}\nThe flight controller, two hops away:\n\n{autopilot}")

@@ -515,6 +515,14 @@ def test_messages_are_sent_when_asked_for_and_as_often_as_asked() -> None:
     assert bench.streams.interval_ns(30) == 0
 
 
+@pytest.mark.parametrize("interval_us", [1.8e9, 2.2e9, 3.6e9])
+def test_an_interval_that_no_answer_could_tell_is_denied(interval_us: float) -> None:
+    bench = Bench()
+    assert bench.command(511, 30, interval_us) == (ACCEPTED if interval_us < 2**31 else DENIED)
+    answers = bench.say(common.MAVLink_command_long_message(1, 1, 510, 0, 30, 0, 0, 0, 0, 0, 0))
+    assert [answer.get_type() for answer in answers] == ["MESSAGE_INTERVAL", "COMMAND_ACK"]
+
+
 def test_answers_and_telemetry_are_numbered_without_a_gap() -> None:
     bench = Bench()
     bench.airborne()

@@ -128,6 +128,7 @@ class Uav(Actor):
         heard = (topics.radio_rx(node), topics.sensors(node), topics.operator(node), *ordered)
         super().__init__(f"agent-{node}", heard)
         self.slack_ns = min(scenario.radio.handover_ns, scenario.radio.lead_ns // 2)  # the rest is for the bus
+        self.patient = (topics.sensors(node),)
         self._topics = _OutTopics(topics.radio_tx(node), topics.setpoint(node), topics.mavlink(node))
         self._prompt_ns = scenario.radio.handover_ns + scenario.radio.lead_ns
         """The greatest delay of a reception after the end of its frame: a relay must still be

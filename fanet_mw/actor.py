@@ -14,7 +14,7 @@ lists by lists of its own before `start`; the actor only appends to them, and on
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from fanet_mw.bus.messages import Message
@@ -29,6 +29,8 @@ class Actor(ABC):
     slack_ns = 0
     """How much later than `next_wake_ns()` a host may wake the actor, so that several wake-ups become one. A process is
     woken less often; in virtual time, where a wake-up costs nothing, the host does not make use of it."""
+    patient: Collection[str] = ()
+    """The topics whose messages may wait for a wake-up that is due within the slack."""
     hears_out = False
     """True for an actor that accounts for what others send. In real time it then still receives, before `stop`, the
     messages that were on their way when the run ended."""

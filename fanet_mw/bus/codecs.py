@@ -314,6 +314,7 @@ HEADS: Final[dict[type[Any], tuple[struct.Struct, ...]]] = {
 CODES: Final = {kind: code for code, (kind, _, _) in _CODECS.items()}
 _CODE_OF: Final = {kind: (code, encode) for code, (kind, encode, _) in _CODECS.items()}
 _ITEM: Final = struct.Struct("<BI")
+_new: Final = tuple.__new__  # for what is made once per message
 MAX_ITEMS: Final = 16_384
 """The greatest number of messages in one put: several times what the busiest medium sends at once."""
 
@@ -345,25 +346,26 @@ def codes_of(*kinds: type[Any]) -> frozenset[int]:
 def items(data: bytes) -> list[Item]:
     """The messages of one put, not decoded; raises MalformedFrameError if they are cut off, or more than MAX_ITEMS."""
     found: list[Item] = []
-    at = 0
-    while at < len(data):
-        if at + _ITEM.size > len(data) or len(found) == MAX_ITEMS:
+    at, size = 0, len(data)
+    while at < size:
+        start = at + _ITEM.size
+        if start > size or len(found) == MAX_ITEMS:
             raise MalformedFrameError(f"bus message malformed at byte {at}: cut off, or the {MAX_ITEMS + 1}th of a put")
         code, length = _ITEM.unpack_from(data, at)
-        start = at + _ITEM.size
         at = start + length
-        if at > len(data):
+        if at > size:
             raise MalformedFrameError(f"bus message malformed at byte {start}: length beyond the end")
-        found.append(Item(code, start, at))
+        found.append(_new(Item, (code, start, at)))
     return found
 
 
 def decode_item(data: bytes, item: Item) -> Message:
     """One message of a put; raises MalformedFrameError for bytes that `encode` could not have made."""
+    code, start, end = item
     try:
-        return _CODECS[item.code][2](data[item.start : item.end])
+        return _CODECS[code][2](data[start:end])
     except (struct.error, ValueError, KeyError, OverflowError, RecursionError) as error:
-        raise MalformedFrameError(f"bus message malformed at byte {item.start}: {error}") from error
+        raise MalformedFrameError(f"bus message malformed at byte {start}: {error}") from error
 
 
 def decode(data: bytes) -> list[Message]:

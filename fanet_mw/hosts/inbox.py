@@ -116,7 +116,7 @@ class Inbox:
             put = self._open
             if put is not None:
                 left_bytes -= self._hand_over_one(put, receive)
-        return self._open is not None or bool(self._waiting)
+        return self.waiting
 
     def _hand_over_one(self, put: _Put, receive: Callable[[str, Message], object]) -> int:
         """Pass on the next message of the open put, and close the put after its last one; returns
@@ -138,13 +138,12 @@ class Inbox:
 
     def _opened(self, topic: str, payload: bytes, usage: _Usage) -> _Put | None:
         """Open a put: its messages are located but not decoded. None if it is malformed, or not meant for an actor."""
-        put = _Put(topic, payload, usage, deque())
         try:
-            put.items.extend(codecs.items(payload))
+            items = codecs.items(payload)
         except MalformedFrameError:
-            self._close(put, malformed=True)
-            return None
-        if any(item.code in _FOR_COLLECTORS for item in put.items):
+            items = None
+        put = _Put(topic, payload, usage, deque(items or ()))
+        if items is None or not _FOR_COLLECTORS.isdisjoint([item.code for item in items]):
             self._close(put, malformed=True)
             return None
         return put
@@ -159,6 +158,11 @@ class Inbox:
         put.usage.puts_gone += 1
         put.usage.bytes_gone += len(put.payload)
         self._all.bytes_gone += len(put.payload)
+
+    @property
+    def waiting(self) -> bool:
+        """True if there is something to hand over."""
+        return self._open is not None or bool(self._waiting)
 
     @property
     def overflowed(self) -> int:

@@ -3,8 +3,8 @@
     Zenoh's thread -> inbox -> wake-ups of the loop drain it -> actor -> outbox, one put per topic and wake-up
 
 The host never wakes an actor early. An actor with slack is woken together with the next message that comes after the
-instant it asked for, at the latest when its slack is over: each wake-up of a process costs far more than what the actor
-does in it. The host measures and reports how late beyond that it wakes the actor, and for how long it could do nothing
+instant it asked for, at the latest when its slack is over, and what need not be handled at once waits for a wake-up
+that is due within the slack: each wake-up of a process costs far more than what the actor does in it. The host measures and reports how late beyond that it wakes the actor, and for how long it could do nothing
 at all; the lateness of frames is counted by the medium. A wake-up that is requested for an instant in the past
 counts as late from the request on; how far past the instant was is reported separately. An actor that raises ends its
 host, and with it the process.
@@ -215,9 +215,17 @@ class RealtimeHost:
     def _from_thread(self, topic: str, payload: bytes) -> None:
         """Called on Zenoh's thread: many samples cause one wake-up of the loop."""
         self._inbox.offer(topic, payload)
-        if not self._drain_asked and not self._loop.is_closed():
-            self._drain_asked = True
-            self._loop.call_soon_threadsafe(self._drain)
+        if self._drain_asked or self._loop.is_closed() or (topic in self._actor.patient and self._wakes_soon()):
+            return
+        self._drain_asked = True
+        self._loop.call_soon_threadsafe(self._drain)
+
+    def _wakes_soon(self) -> bool:
+        """True if the actor will be woken within its slack, and takes what has come then."""
+        wake_up = self._wake_up
+        if not self._running or wake_up is None:
+            return False
+        return 0 < wake_up.due_ns - self.now_ns() <= self._actor.slack_ns
 
     def _drain(self) -> None:
         self._drain_asked = False
@@ -234,14 +242,11 @@ class RealtimeHost:
                 self._failure.set_exception(error)
 
     def _take_inbox(self) -> None:
-        more = self._inbox.deliver(self._receive)
+        self._inbox.deliver(self._receive)
         if self._wake_up is not None and self._wake_up.asked_ns <= self.now_ns():
             self._wake_actor()
         else:
             self._publish_and_arm()
-        if more and not self._drain_asked:  # timers, the clock and reports may run before the rest
-            self._drain_asked = True
-            self._loop.call_soon(self._drain)
 
     def _receive(self, topic: str, message: Message) -> None:
         self._call_ns = self.now_ns()
@@ -278,7 +283,11 @@ class RealtimeHost:
             self._wake_up = wake_up._replace(timer=timer)
 
     def _wake(self) -> None:
-        self._guard(self._wake_actor)
+        self._guard(self._wake_with_inbox)
+
+    def _wake_with_inbox(self) -> None:
+        self._inbox.deliver(self._receive)
+        self._wake_actor()
 
     def _wake_actor(self) -> None:
         wake_up, now_ns = self._wake_up, self.now_ns()
@@ -309,6 +318,9 @@ class RealtimeHost:
             actor.records.clear()
         if rearm:
             self._arm()
+            if self._inbox.waiting and not self._drain_asked:  # timers, the clock and reports may run before
+                self._drain_asked = True
+                self._loop.call_soon(self._drain)
 
     def _publish_records(self) -> None:
         if self._records:

@@ -42,6 +42,8 @@ _LATEST: Final = 64
 _UNKNOWN: Final = (-1, b"", 0)
 """Stands for the length, the inner frames and the hash of a packet that was not looked at lately; no frame has this
 length."""
+_LONG: Final = 400
+"""A packet of this length has so many inner frames that to pass over them at once pays."""
 _REMEMBERED: Final = 512
 """The number of packets whose hash a reader remembers: as many as plain flooding by 44 nodes carries in one second."""
 
@@ -104,6 +106,8 @@ class Reader:
         """The length, the inner frames and the hash of packets that were looked at lately, by what no hop changes in
         their headers. A packet is looked at once for each node that relays it, and to compare its bytes takes a third
         of the time that hashing them takes."""
+        self._cut_out: dict[bytes, bytes] = {}
+        """The inner frames of long packets that were lately cut out of frames with several, likewise."""
 
     def look(self, frame: bytes) -> Looked:
         """Go on to another frame."""
@@ -120,7 +124,12 @@ class Reader:
         The flag that says that more packets follow is ignored in each.
         """
         if looked.parts is None:
-            looked.parts = [self._packet(part, fields_of(part)) for part in unbundle(looked.frame)]
+            looked.parts = [self._packet(part, fields_of(part)) for part in unbundle(looked.frame, self._cut_out)]
+            for part in looked.parts:
+                if len(part.frame) >= _LONG and part.frame[END_TO_END] not in self._cut_out:
+                    if len(self._cut_out) >= _REMEMBERED:
+                        self._cut_out.clear()
+                    self._cut_out[part.frame[END_TO_END]] = part.frame[HEADER_BYTES:]
         return looked.parts
 
     def _packet(self, frame: bytes, fields: Fields) -> Looked:

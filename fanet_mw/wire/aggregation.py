@@ -5,10 +5,14 @@ protocol's access (in `fanet_mw/routing/clustered/`: `slots/slot_access.py`, `ti
 order of the queue.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import Final
 
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.wire.frame import ROUTE_ID, end_of_frame, with_more
+from fanet_mw.wire.frame import END_TO_END, ROUTE_ID, end_of_frame, with_more
+
+_NOTHING: Final[Mapping[bytes, bytes]] = MappingProxyType({})
 
 
 def aggregated(packets: Iterable[tuple[int, bytes]], *, most_bytes: int) -> Iterator[tuple[int, bytes, int]]:
@@ -35,13 +39,20 @@ def bundle(packets: Sequence[bytes]) -> bytes:
     return b"".join((*(with_more(packet) for packet in packets[:-1]), packets[-1]))
 
 
-def unbundle(frame: bytes) -> list[bytes]:
-    """The packets in a radio frame, each as if it had come alone except for its flag; raises MalformedFrameError."""
+def unbundle(frame: bytes, known: Mapping[bytes, bytes] = _NOTHING) -> list[bytes]:
+    """The packets in a radio frame, each as if it had come alone except for its flag; raises MalformedFrameError.
+
+    `known`: the inner frames of packets that were cut out before, by what no hop changes in their headers; these are
+    passed over at once.
+    """
     starts, at, size = list[int](), 0, len(frame)
     while at < size:
         end = end_of_frame(frame, at)
         if frame[at + 7 : at + 10] == ROUTE_ID:
             starts.append(at)
+            inner = known.get(frame[at + END_TO_END.start : at + END_TO_END.stop])
+            if inner is not None and frame.startswith(inner, end):
+                end += len(inner)
         at = end
     if not starts or starts[0]:
         raise MalformedFrameError("a bundle that does not begin with a routing header")

@@ -48,7 +48,7 @@ class OneWay:
 
     def send(self, packet: Packet, *, near: int, from_ns: int, now_ns: int, tried: int = 0) -> bool:
         """Hand a packet to a neighbor that is nearer to its destination, among `near`; False if there is none."""
-        nearer = self._topology.nearer(NodeId(packet.header.destination), now_ns) & near & ~tried
+        nearer = self._topology.nearer(NodeId(packet.header.destination)) & near & ~tried
         if not nearer:
             return False
         hop = max(nodes_of(nearer), key=lambda node: self._heard_ns.get(node, 0))

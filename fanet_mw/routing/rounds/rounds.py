@@ -313,7 +313,7 @@ class RoundFlooding(RoutingProtocol):
 
     def _take_bulk(self, packet: Packet, *, src: int | None, from_ns: int, now_ns: int) -> None:
         """A bulk packet may be sent from an instant on."""
-        if src is not None and not self._topology.dominates(now_ns):
+        if src is not None and not self._topology.dominates():
             from_ns += _SPARE_HOPS * self._law.hop_ns
         evicted = self._spreading.take(packet, src=src, now_ns=now_ns, bulk_from_ns=from_ns)
         if evicted is not None:
@@ -329,13 +329,13 @@ class RoundFlooding(RoutingProtocol):
     def _seek_slot(self, from_ns: int, now_ns: int) -> None:
         """Find the first own bulk slot at or after an instant."""
         self._slot_from_ns = from_ns
-        rivals = self._topology.rivals(self._neighbors(now_ns), now_ns)
+        rivals = self._topology.rivals(self._neighbors(now_ns))
         self._slot_ns = self._slots.next_ns(self._slot_from_ns, often=self._often, rivals=rivals)
         self._slot_by = self._near, self._topology.changes, self._often
 
     def _use_slot(self, slot_ns: int, now_ns: int) -> None:
         """Announce the frame of a bulk slot, if it is still this node's own, and seek the next one."""
-        rivals = self._topology.rivals(self._neighbors(now_ns), now_ns)
+        rivals = self._topology.rivals(self._neighbors(now_ns))
         changed = self._slot_by != (self._near, self._topology.changes, self._often)
         lost = changed and self._slots.next_ns(slot_ns, often=self._often, rivals=rivals) != slot_ns
         if slot_ns < now_ns or lost:
@@ -448,7 +448,7 @@ class RoundFlooding(RoutingProtocol):
         self._now_ns = now_ns
         if now_ns >= self._topology.next_epoch_ns():
             waiting = self._spreading.ready_bulk()
-            self._often = self._topology.dominates(now_ns) or waiting >= (1 if self._often else _MUCH_BULK)
+            self._often = self._topology.dominates() or waiting >= (1 if self._often else _MUCH_BULK)
             self._topology.state(self._neighbors(now_ns), often=self._often, now_ns=now_ns)
         self._repair_due(now_ns)
         if self._slot_ns is not None and self._slot_ns - self._lead_ns <= now_ns:

@@ -25,6 +25,10 @@ def nodes_of(bits: int) -> list[NodeId]:
     return nodes
 
 
+def _seldom(rival: tuple[NodeId, bool]) -> bool:
+    return not rival[1]
+
+
 class _Stated(NamedTuple):
     epoch: int
     heard: int
@@ -64,7 +68,7 @@ class Topology:
         self.changes = 0
         """How often links, or who takes part in bulk slots often, have changed."""
         self._arranged_for = -1
-        """The epoch for which the rings were computed; -1: they must be computed anew."""
+        """The state of the links for which the rings were computed."""
 
     # --- what is stated -------------------------------------------------------------------------------------------
 
@@ -74,7 +78,9 @@ class Topology:
 
     def state(self, heard: int, *, often: bool, now_ns: int) -> None:
         """An epoch has begun in which this node hears these neighbors, and takes part in bulk slots often or not."""
-        self._own_epoch = now_ns // self._epoch_ns
+        self._own_epoch = epoch = now_ns // self._epoch_ns
+        for node in [n for n, one in self._stated.items() if one.epoch < epoch - self._lifetime]:
+            self._forget(node)
         self._arrange(now_ns)
         known = self._stated.get(self._node)
         if (
@@ -102,7 +108,6 @@ class Topology:
         changed = stated.heard if known is None else stated.heard ^ known.heard
         self.changes += changed != 0 or known is None or known.often != stated.often
         if changed or known is None:
-            self._arranged_for = -1
             self._relink(node, stated.heard, changed)
 
     def _relink(self, node: NodeId, heard: int, changed: int) -> None:
@@ -139,13 +144,10 @@ class Topology:
     # --- what follows from it -------------------------------------------------------------------------------------
 
     def _arrange(self, now_ns: int) -> None:
-        """Compute the rings anew if something has changed, or nodes are gone."""
-        epoch = now_ns // self._epoch_ns
-        if self._arranged_for == epoch:
+        """Compute the rings anew if something has changed."""
+        if self._arranged_for == self.changes:
             return
-        for node in [n for n, one in self._stated.items() if one.epoch < epoch - self._lifetime]:
-            self._forget(node)
-        self._arranged_for = epoch
+        self._arranged_for = self.changes
         ring = reached = 1 << (self._node - 1)
         self._rings = []
         while ring:
@@ -160,11 +162,10 @@ class Topology:
         self._arrange(now_ns)
         return {node: hops for hops, ring in enumerate(self._rings) for node in nodes_of(ring)}
 
-    def nearer(self, destination: NodeId, now_ns: int) -> int:
+    def nearer(self, destination: NodeId) -> int:
         """The nodes with links to this one from which a node is fewer hops away than from here; none if no way is
         known.
         """
-        self._arrange(now_ns)
         if self._nearer_for != self.changes:
             self._nearer_for, self._nearer = self.changes, {}
         found = self._nearer.get(destination)
@@ -197,20 +198,19 @@ class Topology:
         """True while this node has links, and there are nodes of which it has not heard, or has not heard for long."""
         return len(self._stated) < self._count and self.links[self._node] != 0
 
-    def rivals(self, near: int, now_ns: int) -> list[tuple[NodeId, bool]]:
+    def rivals(self, near: int) -> list[tuple[NodeId, bool]]:
         """The nodes within two hops, if this node hears `near`, and whether each takes part in bulk slots often."""
-        self._arrange(now_ns)
         if self._rivals_for != (near, self.changes):
             self._rivals_for = near, self.changes
             reached = near | self._around(near)
             stated = self._stated
             others = nodes_of(reached & ~(1 << (self._node - 1)))
-            self._rivals = [(node, node not in stated or stated[node].often) for node in others]
+            found = [(node, node not in stated or stated[node].often) for node in others]
+            self._rivals = sorted(found, key=_seldom)  # those that take part in each slot decide soonest
         return self._rivals
 
-    def dominates(self, now_ns: int) -> bool:
+    def dominates(self) -> bool:
         """True if this node is one of the connected dominating set whose transmissions reach all nodes."""
-        self._arrange(now_ns)
         if self._dominates_for != self.changes:
             self._dominates_for = self.changes
             near = [self._node, *nodes_of(self.links[self._node])]

@@ -120,6 +120,35 @@ def test_messages_of_one_sender_arrive_whole_and_in_order(run: Run) -> None:
     assert listener.heard == [f"{wake}.{part}".encode() for wake in wakes for part in range(3)]
 
 
+class Patient(Watched):
+    """Can wait for messages until it is woken anyway."""
+
+    slack_ns = 100 * MS
+    patient = (NAMES.mavlink(1),)
+
+
+@pytest.mark.parametrize("wakes", [[], [150 * MS, 290 * MS, 430 * MS]], ids=["never woken", "woken"])
+def test_a_patient_actor_hears_all_in_order_at_most_its_slack_late(run: Run, wakes: list[int]) -> None:
+    patient, speaker = Patient("patient", (NAMES.mavlink("*"),)), Speaker("speaker")
+    patient.wakes_ns = list(wakes)
+    speaker.wakes_ns = [200 * MS, 220 * MS, 320 * MS]
+    run([patient, speaker])
+    assert patient.heard == [f"{said}.{part}".encode() for said in (2, 3, 4) for part in range(3)]
+    heard_ns = [at_ns for name, at_ns in patient.calls if name == "receive"][::3]
+    for said_ns, at_ns in zip([200 * MS, 220 * MS, 320 * MS], heard_ns, strict=True):
+        assert at_ns <= said_ns + Patient.slack_ns + 100 * MS, "the rest is for a busy machine"
+
+
+def test_what_a_patient_actor_hears_costs_no_wake_up_of_its_process_when_one_is_due() -> None:
+    patient, speaker = Patient("patient", (NAMES.mavlink("*"),)), Speaker("speaker")
+    patient.wakes_ns = [290 * MS]
+    speaker.wakes_ns = [310 * MS]
+    realtime([patient, speaker])
+    at = {name: at_ns for name, at_ns in patient.calls}
+    assert at["receive"] >= 390 * MS
+    assert at["wake"] - at["receive"] < 50 * MS
+
+
 def test_an_actor_hears_only_what_it_subscribed_to(run: Run) -> None:
     deaf, speaker = Watched("deaf", (NAMES.mavlink(2), NAMES.pose)), Speaker("speaker")
     speaker.wakes_ns = [200 * MS]

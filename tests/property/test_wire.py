@@ -362,6 +362,24 @@ def test_a_bundle_is_taken_apart_into_what_it_was_made_of(parts: list[tuple[Head
     assert more == [True] * (len(packets) - 1) + [False]
 
 
+@given(
+    st.lists(st.tuples(headers, st.sampled_from([17, 60, 300])), min_size=1, max_size=5),
+    st.lists(st.tuples(headers, st.sampled_from([0, 17, 60, 300])), max_size=3),
+    st.integers(0, 3),
+)
+def test_what_is_known_of_packets_changes_nothing_about_how_a_bundle_is_taken_apart(
+    parts: list[tuple[Header, int]], others: list[tuple[Header, int]], longer: int
+) -> None:
+    packets = [header._replace(flags=header.flags & 3).encode() + wire.filler(size) for header, size in parts]
+    known = {packet[wire.END_TO_END]: packet[wire.HEADER_BYTES :] for packet in packets[longer:]}
+    for (header, _), (_, size) in zip(parts, others, strict=False):  # another packet of that name was seen
+        known[header.encode()[wire.END_TO_END]] = wire.filler(size)
+    frame = wire.bundle(packets)
+    assert wire.unbundle(frame, known) == wire.unbundle(frame)
+    with pytest.raises(MalformedFrameError):
+        wire.unbundle(frame[:-1], known)
+
+
 @given(st.one_of(st.binary(max_size=120), st.binary(max_size=90).map(lambda tail: HEADER + tail)))
 def test_garbage_for_a_bundle_is_one_error(data: bytes) -> None:
     with suppress(MalformedFrameError):

@@ -124,6 +124,8 @@ class RoundFlooding(RoutingProtocol):
         """The instant until which none of them can become silent."""
         self._turn_ns = 0
         """The next own turn that may still be filled."""
+        self._turn_asked = False
+        """Whether something waited for it when it could still be announced in time."""
         self._stated = 0
         self._now_ns = 0
 
@@ -217,9 +219,19 @@ class RoundFlooding(RoutingProtocol):
             self._port.transmit_together([packet], flags=FLAG_FLOOD, at_ns=(self._timing.between_turns_ns(start_ns),))
 
     def _reach_turn(self, now_ns: int) -> None:
-        """Something waits: the next turn that can still be announced in time is the one to fill."""
-        if self._turn_ns < now_ns + self._lead_ns:
+        """Something waits: the next turn that can still be announced in time is the one to fill.
+
+        A turn for which the node has asked to be woken stays, because a process is woken up to half a lead late.
+        """
+        asked = self._turn_asked and now_ns <= self._turn_ns - self._lead_ns // 2
+        if self._turn_ns < now_ns + self._lead_ns and not asked:
             self._turn_ns = self._timing.turn_start_ns(self._port.node, from_ns=now_ns + self._lead_ns)
+        self._turn_asked = True
+
+    @property
+    def _needs_turn(self) -> bool:
+        """True if something waits for an own turn."""
+        return bool(self._spreading.has_urgent or self._hello is not None or self._held or self._topology.has_news)
 
     def _fill(self, turn_ns: int, now_ns: int) -> None:
         """Announce the frame of a turn: urgent packets, what neighbors are told, then the hello, as they fit."""
@@ -418,7 +430,9 @@ class RoundFlooding(RoutingProtocol):
         turn_ns = self._timing.turn_start_ns(self._port.node, from_ns=start_ns)
         if not wants_status:
             self._hello = packet
-            self._turn_ns = max(self._turn_ns, turn_ns)
+            if not self._turn_asked:
+                self._turn_ns = max(self._turn_ns, turn_ns)
+                self._turn_asked = True
             return -1
         self._turn_ns = max(self._turn_ns, self._timing.turn_start_ns(self._port.node, from_ns=turn_ns + 1))
         request = self._port.transmit(packet.frame, BROADCAST, turn_ns, wants_status=True)
@@ -435,7 +449,7 @@ class RoundFlooding(RoutingProtocol):
 
     def next_wake_ns(self) -> int | None:
         first_ns = self._topology.next_epoch_ns()
-        if self._spreading.has_urgent or self._hello is not None or self._held or self._topology.has_news:
+        if self._needs_turn:
             first_ns = min(first_ns, self._turn_ns - self._lead_ns)
         if self._slot_ns is not None and self._slot_ns - self._lead_ns < first_ns:
             first_ns = self._slot_ns - self._lead_ns
@@ -458,6 +472,7 @@ class RoundFlooding(RoutingProtocol):
             return
         if turn_ns + self._timing.turn_ns // 2 >= now_ns:
             self._fill(turn_ns, now_ns)
+        self._turn_asked = self._needs_turn
         self._turn_ns = self._timing.turn_start_ns(self._port.node, from_ns=max(turn_ns + 1, now_ns + self._lead_ns))
 
     def _repair_due(self, now_ns: int) -> None:

@@ -112,3 +112,14 @@ def test_a_warning_goes_at_once_and_in_the_turn(make_node: MakeNode) -> None:
     assert [each.start_ns - born_ns < timing.slot_ns for each in node.requests] == [True]
     turns = [each.start_ns for each in run(node, born_ns + timing.period_ns, from_ns=born_ns)]
     assert timing.turn_start_ns(OURS, from_ns=born_ns) in turns
+
+
+def test_what_comes_before_a_late_wake_up_does_not_cost_the_turn_that_was_asked_for(make_node: MakeNode) -> None:
+    """A process is woken up to its slack late, together with the next message (`Actor.slack_ns`)."""
+    node = make_node(**{"radio.lead_ms": 100})
+    run(node, 1 * S)
+    hear(node, 7, src=NEAR, at_ns=1 * S, priority=PRIORITY_REPORT)
+    turn_ns = RoundTiming.of(node.scenario).turn_start_ns(OURS, from_ns=1 * S + 100 * MS)
+    run(node, turn_ns - 100 * MS)
+    hear(node, 8, src=NEAR, at_ns=turn_ns - 90 * MS, priority=PRIORITY_REPORT)
+    assert turn_ns in [each.start_ns for each in run(node, turn_ns - 80 * MS, from_ns=turn_ns - 90 * MS)]

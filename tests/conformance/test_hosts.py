@@ -144,7 +144,7 @@ def test_what_a_patient_actor_hears_costs_no_wake_up_of_its_process_when_one_is_
     patient.wakes_ns = [290 * MS]
     speaker.wakes_ns = [310 * MS]
     realtime([patient, speaker])
-    at = {name: at_ns for name, at_ns in patient.calls}
+    at = dict(patient.calls)
     assert at["receive"] >= 390 * MS
     assert at["wake"] - at["receive"] < 50 * MS
 

@@ -2,9 +2,9 @@
 
     python tests/fuzz/origins.py 200 --seed 1 --set routing.protocol=rounds
 
-Drawn are grids of 9 to 45 UAVs in which every node hears others, and the phases of their packets, which stay the same for
-the whole run: what collides once could collide each second. A line per origin below .99; the exit status is 1 if there is
-one.
+Drawn are grids of 9 to 45 UAVs in which every node hears others, and the phases of their packets, which stay the same
+for the whole run: what collides once could collide each second. A line per origin below .99; the exit status is 1 if
+there is one.
 """
 
 import argparse

@@ -35,6 +35,7 @@ from fanet_mw.bus.messages import (
     TraceBatch,
     TxRequest,
     Voice,
+    WindEstimate,
 )
 from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Mishap, MishapKind, Partition, Restore
 from fanet_mw.bus.topics import Topics
@@ -208,6 +209,7 @@ _BY_HAND: Final[tuple[Message, ...]] = (
     Altimeter(S, 50.0, 49.0),
     Inertial(S, Enu(1.0, 2.0, 3.0)),
     Battery(S, 15.0, 20.0, 0.5),
+    WindEstimate(S, Enu(3.0, -1.0, 0.1)),
     FlightState(S, 0.1, -0.2, 3.0, 14, 0.8, 1_800_000_000 * S),
 )
 

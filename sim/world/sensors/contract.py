@@ -8,7 +8,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from functools import cache
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,9 @@ from fanet_mw.bus.messages import Message
 from fanet_mw.rng import stream_seed
 from fanet_mw.units import S
 from sim.world.arrays import Rows, Values
+
+_LONGEST_NS: Final = 1 << 62
+"""No run is as long; longer periods do not fit 64 bits."""
 
 
 class Truth(NamedTuple):
@@ -45,7 +48,7 @@ class Sensor(ABC):
 
     def due(self, count: int, *, now_ns: int, before_ns: int) -> list[int]:
         """The rows that have an instant in (before, now]."""
-        period_ns = self.period_ns
+        period_ns = min(self.period_ns, _LONGEST_NS)
         if not self.spread:
             return list(range(count)) if now_ns // period_ns > before_ns // period_ns else []
         phases_ns = _phases_ns(count, period_ns)

@@ -7,6 +7,8 @@ from typing import Any
 import pytest
 from kit import slow
 
+from agents.uav import Uav
+from fanet_mw.bus.messages import Message
 from fanet_mw.scenario import config
 from fanet_mw.trace import BoundExcludes, BoundStated
 from fanet_mw.units import S
@@ -144,3 +146,31 @@ def test_bulk_for_one_goes_another_way_when_a_relay_falls_silent() -> None:
 def test_bulk_for_one_of_whom_nothing_is_known_yet_is_flooded() -> None:
     summary = to_one(traffic={**ONE, "sources": [15]}, warmup_s=0.1, duration_s=5)
     assert summary["pdr"] == 1.0
+
+
+class WokenLate(Uav):
+    """A UAV that is woken as late as its process may be, or together with a message that comes first."""
+
+    def receive(self, topic: str, message: Message, now_ns: int) -> bool:
+        asked_ns = super().next_wake_ns()
+        super().receive(topic, message, now_ns)
+        if asked_ns is not None and asked_ns <= now_ns:
+            self.wake(now_ns)
+        return False
+
+    def next_wake_ns(self) -> int | None:
+        asked_ns = super().next_wake_ns()
+        return None if asked_ns is None else asked_ns + self.slack_ns
+
+
+def test_a_late_wake_up_of_a_process_costs_no_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    often = {
+        "traffic": {"interval_s": 0.25, "payload_bytes": 64},
+        "radio": {"lead_ms": 100, "handover_ms": 30},
+        "rounds": {"bulk_share": 0},
+    }
+    exact = flown(**often)
+    monkeypatch.setattr("sim.run.virtual.make_uav", WokenLate)
+    late = flown(**often)
+    assert late["delay_ms"]["mean"] <= exact["delay_ms"]["mean"] + 30
+    assert late["bound"]["stated_share"] == late["bound"]["within_share"] == 1.0

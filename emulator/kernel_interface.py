@@ -104,11 +104,7 @@ class KernelInterface:
         losses_db: npt.NDArray[np.float64],
         ground_m: npt.NDArray[np.float64] | float = 0.0,
     ) -> None:
-        """Set the pairs of stations [n, 2] with something solid between them, and the loss of each, if that is known;
-        and the height of the ground below each station.
-
-        It takes effect at the next `place`.
-        """
+        """Tell what stands between stations, and on what ground they do (`Placement.obstruct`)."""
         self._placement.obstruct(pairs, losses_db, ground_m)
 
     def place(self, at: npt.NDArray[np.float64], velocity: npt.NDArray[np.float64], t_ns: int) -> None:

@@ -265,7 +265,7 @@ class Receiver:
                 continue
             # what is known goes along; a message of which pieces are still coming waits for them
             ready = {
-                number: each for number, each in owed.items() if each.due_ns <= now_ns or self._is_over(origin, number)
+                number: each for number, each in owed.items() if each.due_ns <= now_ns or (origin, number) in self._done
             }
             for number in ready:
                 del owed[number]
@@ -277,9 +277,6 @@ class Receiver:
             (each.due_ns for owed in self._receipts.values() for each in owed.values()), default=None
         )
         return found
-
-    def _is_over(self, origin: NodeId, number: int) -> bool:
-        return (origin, number) in self._done
 
     def _latest(self, origin: NodeId, receipt: Receipt) -> Receipt:
         """The receipt as it must be sent now, because the message may have been handed over since it was made."""

@@ -6,7 +6,7 @@ networks", MobiCom 2001). A node that has little to send takes part in a few of 
 do not know of each other yet, carrier sensing and repetitions remain.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 from fanet_mw.routing.rounds.round_timing import RoundTiming
@@ -25,19 +25,6 @@ def _bid(node: int, slot: int) -> int:
     return mixed ^ mixed >> 15
 
 
-def _is_beaten(own: int, slot: int, rivals: Iterable[tuple[int, bool]]) -> bool:
-    """True if another node bids more for a slot than this one."""
-    of_slot = slot * 0x85EBCA77
-    for node, takes_part in rivals:
-        mixed = (node * 0x9E3779B1 + of_slot) & 0xFFFFFFFF  # `_bid` without the call: ten thousands a second are made
-        mixed = (mixed ^ mixed >> 15) * 0x2C1B3C6D & 0xFFFFFFFF
-        mixed = (mixed ^ mixed >> 12) * 0x297A2D39 & 0xFFFFFFFF
-        theirs = mixed ^ mixed >> 15
-        if theirs >= own and (takes_part or not theirs % _SELDOM):
-            return True
-    return False
-
-
 class BulkSlots:
     """The bulk slots of one node."""
 
@@ -54,6 +41,10 @@ class BulkSlots:
             own = _bid(self._node, slot)
             if own % _SELDOM and not often:
                 continue
-            if not _is_beaten(own, slot, rivals):
+            for node, takes_part in rivals:
+                theirs = _bid(node, slot)
+                if theirs >= own and (takes_part or not theirs % _SELDOM):
+                    break
+            else:
                 return self._timing.slot_start_ns(slot)
         return self._timing.slot_start_ns(first + _MOST_SEARCHED)

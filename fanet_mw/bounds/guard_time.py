@@ -1,7 +1,7 @@
 """The guard time of a slot: set by the scenario, or computed from clock error, propagation and frame length.
 
 It is for slots with contention. Between the turns of a timetable the guard is called slack, as it is part of each turn
-(`turn_slack_ns`, `least_slack_ns` in `fanet_mw/routing/clustered/tdma/turn_timing.py`).
+(`fanet_mw/timesync/turn_slack.py`).
 
 The guard time is the silent end of a slot. It is kept where slots are laid out: no frame starts in it (`Superframe` in
 `fanet_mw/routing/clustered/tdma/slot_timing.py`).

@@ -51,6 +51,7 @@ from sim.planner import (
 from sim.planner.claimed_turns import ClaimedPlan
 from sim.planner.expected_links import expected_links
 from sim.planner.plan_text import item
+from sim.planner.problems_and_notes import clocks_apart
 from sim.planner.reception_probability import chance_of
 from sim.world.environment.layout import positions
 
@@ -152,6 +153,7 @@ def _judge_rounds(
     problems = list[str]()
     if longest > timing.turn_bytes:
         problems.append(f"urgent packets of {longest} B are longer than rounds.turn_bytes = {timing.turn_bytes}")
+    problems += clocks_apart(scenario, slack="rounds.turn_slack_us")
     if any(len(hops_to) < len(at) for hops_to in ways):
         problems.append("the nodes are not all connected at their starting positions")
     if offered > carried:

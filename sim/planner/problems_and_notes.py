@@ -2,14 +2,17 @@
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
+from math import ceil
+from operator import attrgetter
 from typing import Final
 
 from fanet_mw import wire
 from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.graph.topology import Adjacency, levels
-from fanet_mw.routing.clustered.tdma.turn_timing import least_slack_ns, turn_slack_ns
+from fanet_mw.routing.clustered.tdma.turn_timing import turn_slack_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.timesync.ftsp import MOST_STATED_NS
+from fanet_mw.timesync.turn_slack import least_slack_ns
 from fanet_mw.units import MS, US, NodeId, S
 from sim.planner.demand import ClassPlan, TrafficClass
 from sim.planner.head_slot import ClusterPlan
@@ -29,6 +32,7 @@ _PASSED_ON_HELLOS: Final = 3
 swarms of 2 to 45 nodes, 1 to 13 hops wide, took at least two intervals less; lines take longest, because a node then
 has only one neighbor to believe. A line with a window too short for its hellos took two intervals more.
 """
+_MOST_SLACK_US: Final = 1_000_000
 _LIFETIMES: Final = {wire.PRIORITY_SAFETY: "safety_lifetime_s", wire.PRIORITY_REPORT: "report_lifetime_s"}
 
 
@@ -93,18 +97,22 @@ def problems(
             yield problem
 
 
-def clocks_apart(scenario: Scenario) -> Iterator[str]:
-    """Sentences about clocks that nothing brings together: they differ by more than the slack of a turn and are not
-    synchronized, or by more than nodes accept.
+def clocks_apart(scenario: Scenario, *, slack: str = "clusters.turn_slack_us") -> Iterator[str]:
+    """Sentences about clocks that nothing brings together: they differ by more than the slack of a turn, which is that
+    of the key `slack`, and are not synchronized, or by more than nodes accept.
     """
     yield from refused_time(scenario)
-    clock, slack_ns = scenario.clock, turn_slack_ns(scenario)
+    clock, slack_us = scenario.clock, attrgetter(slack)(scenario)
     needed_ns = unsynchronized_slack_ns(scenario)
-    if needed_ns > slack_ns:
-        most_us = (needed_ns - least_slack_ns(0)) / 2 / US
+    if needed_ns > slack_us * US:
+        most_us, needed_us = (needed_ns - least_slack_ns(0)) / 2 / US, ceil(needed_ns / US)
+        off = f"{most_us:g} us" if most_us < _MOST_SLACK_US else f"{most_us / 1e6:g} s"
+        short = (
+            f"has to be at least {needed_us}" if needed_us <= _MOST_SLACK_US else "cannot be so much (at most 1000000)"
+        )
         yield (
-            f"clocks may be {most_us:g} us off by the end, and clusters.turn_slack_us = {slack_ns / US:g} has to be at "
-            f'least {needed_ns / US:g}: with clock.sync = "{clock.sync}" nothing brings them together '
+            f"clocks may be {off} off by the end, and {slack} = {slack_us:g} {short}: "
+            f'with clock.sync = "{clock.sync}" nothing brings them together '
             f"(clock.offset_ms = {clock.offset_ms:g}, clock.drift_ppm = {clock.drift_ppm:g})"
         )
 

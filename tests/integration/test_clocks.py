@@ -13,7 +13,7 @@ from fanet_mw.bounds import Bounded
 from fanet_mw.bounds.guard_time import slot_guard_ns
 from fanet_mw.bus.messages import Reception
 from fanet_mw.bus.topics import Topics
-from fanet_mw.routing.clustered.tdma.turn_timing import clocks_fit
+from fanet_mw.timesync.turn_slack import clocks_fit
 from fanet_mw.trace import Delivered, Generated
 from fanet_mw.units import MS, US, Enu, NodeId
 from sim.planner import plan
@@ -170,10 +170,10 @@ def test_a_guard_of_its_own_making_follows_the_worst_clock(make_scenario: MakeSc
 
 
 def test_the_slack_of_a_turn_holds_two_clock_errors_and_the_flight(make_scenario: MakeScenario) -> None:
-    scenario = make_scenario(**{"clusters.turn_slack_us": 200})
-    assert clocks_fit(scenario, clock_error_ns=90 * US)
-    assert not clocks_fit(scenario, clock_error_ns=91 * US)
-    assert clocks_fit(make_scenario(**{"clusters.turn_slack_us": 0}), clock_error_ns=0)
+    clock = make_scenario().clock
+    assert clocks_fit(clock, slack_ns=200 * US, clock_error_ns=90 * US)
+    assert not clocks_fit(clock, slack_ns=200 * US, clock_error_ns=91 * US)
+    assert clocks_fit(clock, slack_ns=0, clock_error_ns=0)
 
 
 def test_no_bound_is_stated_while_the_slack_does_not_hold_the_clocks() -> None:

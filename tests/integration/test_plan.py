@@ -223,6 +223,8 @@ def test_the_search_meets_its_deadline_and_every_delivery_of_the_swarm_does() ->
         (("convoy",), 0, "FEASIBLE  convoy"),
         (("rescue",), 0, "a round of"),
         (("rescue", "--deadline", "0.5"), 1, "not within the deadline of 500 ms"),
+        (("rescue", "--set", "clock.offset_ms=0.1"), 1, "rounds.turn_slack_us = 50 has to be at"),
+        (("rescue", "--set", "clock.sync=gps", "clock.offset_ms=20000"), 1, "accepts no time that differs by more"),
         (("flooding",), 2, 'only "clustered" and "rounds" can be planned'),
         (("clusters", "--deadline", "-1"), 2, "must be > 0"),
     ],

@@ -112,6 +112,27 @@ def test_bounds_are_whole_again_a_second_after_the_air_is() -> None:
     assert not whole & excludes
 
 
+@pytest.mark.parametrize(
+    ("clock", "slack_us"),
+    [({"offset_ms": 12_000}, 50), ({"offset_ms": 0.1}, 200), ({"sync": "gps", "offset_ms": 50}, 20)],
+)
+def test_no_bound_is_stated_while_clocks_may_be_further_apart_than_the_slack_of_turns(
+    clock: Mapping[str, Any], slack_us: float
+) -> None:
+    """Of clocks 12 s apart, all that was stated excluded those whose statements about links seemed too old."""
+    timing = {"turn_slack_us": slack_us, "bulk_share": 0}
+    summary = flown(clock={**clock, "drift_ppm": 1}, rounds=timing)
+    assert summary["pdr"] == 1.0
+    assert not summary["bound"]
+
+
+def test_clocks_that_fit_the_slack_of_turns_leave_all_bounds_as_they_were() -> None:
+    timing = {"turn_slack_us": 300, "bulk_share": 0}
+    summary = flown(clock={"offset_ms": 0.1, "drift_ppm": 1}, rounds=timing)
+    bound = summary["bound"]
+    assert bound["stated_share"] == bound["within_share"] == 1.0
+
+
 ONE: dict[str, Any] = {"priority": "bulk", "payload_bytes": 1024, "destination": 1, "interval_s": 0.5}
 
 

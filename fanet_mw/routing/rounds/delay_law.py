@@ -8,10 +8,10 @@ the turn, and is handed over. `h` is the greatest distance that the node knows t
 that changes meanwhile. All urgent packets that are under way together, `B` bytes, delay each other once: every node
 serves them at the same rate, `room` bytes of a frame per round, so what waited for one node's turn does not wait
 again for the next one's (tandem of equal servers; Le Boudec and Thiran, Network Calculus, 1.4.3).
-Assumed: no frame is lost, so over any channel but `range` no bound is stated. None is stated either while more was
-heard than the turns of that time carry, or of late more than three quarters of what they carry, or while a node has
-been out of reach for less than the silence by which it is known to be gone; nodes gone for longer are not among those
-to which a bound applies.
+Assumed: no frame is lost, so over any channel but `range` no bound is stated. None is stated either while clocks may be
+further apart than the slack of turns holds, while more was heard than the turns of that time carry, or of late more
+than three quarters of what they carry, or while a node has been out of reach for less than the silence by which it is
+known to be gone; nodes gone for longer are not among those to which a bound applies.
 """
 
 from collections import deque
@@ -21,7 +21,8 @@ from typing import Final
 from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.routing.rounds.topology import Topology
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import NodeId, S, seconds_to_ns
+from fanet_mw.timesync.turn_slack import clocks_fit
+from fanet_mw.units import US, NodeId, S, seconds_to_ns
 from fanet_mw.wire import HEADER_BYTES
 from fanet_mw.wire.rounds import HEARD_BYTES
 
@@ -39,6 +40,7 @@ class DelayLaw:
 
     def __init__(self, timing: RoundTiming, scenario: Scenario) -> None:
         self._timing = timing
+        self._clock, self._slack_ns = scenario.clock, round(scenario.rounds.turn_slack_us * US)
         self._loses_frames = scenario.radio.channel != "range" or scenario.radio.fading != "none"
         self.kept_bytes = min(HEADER_BYTES + HEARD_BYTES, timing.turn_bytes // 2)
         """The part of a turn that is kept for news of links, which urgent packets must not crowd out."""
@@ -59,8 +61,12 @@ class DelayLaw:
         """An urgent packet came, own or another node's."""
         self._recent.append((now_ns, size))
 
-    def bound_ns(self, topology: Topology, *, now_ns: int) -> int | None:
-        """The bound for a packet that is handed over now; None if none can be stated."""
+    def bound_ns(self, topology: Topology, *, clock_error_ns: int, now_ns: int) -> int | None:
+        """The bound for a packet that is handed over now, if all clocks are within `clock_error_ns`; None if none can
+        be stated.
+        """
+        if not clocks_fit(self._clock, slack_ns=self._slack_ns, clock_error_ns=clock_error_ns):
+            return None
         while self._recent and self._recent[0][0] < now_ns - _LATELY * self._burst_ns:
             self._recent.popleft()
         sizes = [size for at_ns, size in self._recent if at_ns >= now_ns - self._burst_ns]

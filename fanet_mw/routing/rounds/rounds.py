@@ -173,7 +173,7 @@ class RoundFlooding(RoutingProtocol):
 
     def _state_bound(self, packet: Packet, now_ns: int) -> None:
         """State by when all nodes have an own packet, if that is known."""
-        bound_ns = self._law.bound_ns(self._topology, now_ns=now_ns)
+        bound_ns = self._law.bound_ns(self._topology, clock_error_ns=self._port.clock_error_ns, now_ns=now_ns)
         header = packet.header
         if bound_ns is not None and bound_ns <= self._port.scenario.routing.lifetime_ns(header.priority):
             self._stated += 1
@@ -492,7 +492,7 @@ class RoundFlooding(RoutingProtocol):
     # --- what is known --------------------------------------------------------------------------------------------
 
     def bound_ns(self) -> int | None:
-        return self._law.bound_ns(self._topology, now_ns=self._now_ns)
+        return self._law.bound_ns(self._topology, clock_error_ns=self._port.clock_error_ns, now_ns=self._now_ns)
 
     def bounds(self, priority: int) -> bool:
         return priority < PRIORITY_BULK or not self._timing.slots

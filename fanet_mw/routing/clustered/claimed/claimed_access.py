@@ -27,7 +27,8 @@ from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTi
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import NO_HEAD, Gradient
 from fanet_mw.routing.clustered.forwarding.uplink import Uplink
-from fanet_mw.routing.clustered.tdma.turn_timing import clocks_fit
+from fanet_mw.routing.clustered.tdma.turn_timing import turn_slack_ns
+from fanet_mw.timesync.turn_slack import clocks_fit
 from fanet_mw.units import MS, US, seconds_to_ns
 from fanet_mw.wire import Kind
 from fanet_mw.wire.hello.beacon import Beacon
@@ -151,7 +152,8 @@ class ClaimedAccess:
         """
         turns, claimed = self._claiming.own.turns, self._claiming.own.claimed()
         scenario = self._port.scenario
-        if not claimed or not clocks_fit(scenario, clock_error_ns=self._port.clock_error_ns):
+        slack_ns, error_ns = turn_slack_ns(scenario), self._port.clock_error_ns
+        if not claimed or not clocks_fit(scenario.clock, slack_ns=slack_ns, clock_error_ns=error_ns):
             return None
         starts = tuple(turns.start_ns(turn, superframe_start_ns=0) for turn in claimed)
         ahead_ns = self._lead_ns + scenario.radio.handover_ns

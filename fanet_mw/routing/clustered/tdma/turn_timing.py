@@ -20,11 +20,8 @@ from typing import Final, NamedTuple
 from fanet_mw.airtime import longest_access_ns
 from fanet_mw.bounds import timetable_flood
 from fanet_mw.scenario import Scenario
-from fanet_mw.timesync.ftsp import MOST_STATED_NS
 from fanet_mw.units import MS, US
 
-_FLIGHT_NS: Final = 20 * US
-"""The propagation delay over 6 km; this part of the slack is not available for clock errors."""
 TAIL_NS: Final = 5 * MS
 """In this last part of the contention window no frame becomes due, so that contending frames are over when the turns
 begin."""
@@ -132,22 +129,3 @@ def receipt_ns(scenario: Scenario) -> int:
     process, and one lead, because the process may wake up to one lead late.
     """
     return scenario.radio.handover_ns + scenario.radio.lead_ns
-
-
-def clocks_fit(scenario: Scenario, *, clock_error_ns: int) -> bool:
-    """True if turns of different nodes do not overlap while each clock is within this error of swarm time.
-
-    If the scenario models clocks, an error of 0 means that the node does not know any error yet, so the answer is
-    False. If nodes get the time by beacons, it is also False for the largest error that a beacon can state, because the
-    true one may be larger.
-    """
-    if not clock_error_ns:
-        return not scenario.clock.modelled
-    if scenario.clock.sync == "beacons" and clock_error_ns >= MOST_STATED_NS:
-        return False
-    return least_slack_ns(clock_error_ns) <= turn_slack_ns(scenario)
-
-
-def least_slack_ns(clock_error_ns: int) -> int:
-    """The slack that keeps turns of different nodes apart if each clock is within this error of swarm time."""
-    return 2 * clock_error_ns + _FLIGHT_NS

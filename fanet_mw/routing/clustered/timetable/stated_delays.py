@@ -19,13 +19,14 @@ from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.roles.leader import HEARD_NS
 from fanet_mw.routing.clustered.roles.leader_election import Lease
-from fanet_mw.routing.clustered.tdma.turn_timing import clocks_fit, receipt_ns
+from fanet_mw.routing.clustered.tdma.turn_timing import receipt_ns, turn_slack_ns
 from fanet_mw.routing.clustered.timetable.admission import Admission, least_interval_ns
 from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE, likely_delay_ns
 from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.own_bound import RootTurns
 from fanet_mw.routing.clustered.timetable.root_release import RootRelease
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
+from fanet_mw.timesync.turn_slack import clocks_fit
 from fanet_mw.trace import BoundExcludes, BoundStated, LikelyStated
 from fanet_mw.units import MS, US, NodeId, seconds_to_ns
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY
@@ -269,7 +270,8 @@ class StatedDelays:
 
     def _in_step(self) -> bool:
         """True if the slack of turns is enough for the known errors of the swarm's clocks."""
-        return clocks_fit(self._port.scenario, clock_error_ns=self._port.clock_error_ns)
+        scenario = self._port.scenario
+        return clocks_fit(scenario.clock, slack_ns=turn_slack_ns(scenario), clock_error_ns=self._port.clock_error_ns)
 
     def report(self) -> Mapping[str, object]:
         """The state and the counters, as JSON values."""

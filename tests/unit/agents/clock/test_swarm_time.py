@@ -7,8 +7,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from agents.clock.swarm_time import GpsTime, oscillator, swarm_time
-from fanet_mw.routing.clustered.tdma.turn_timing import clocks_fit
+from fanet_mw.routing.clustered.tdma.turn_timing import turn_slack_ns
 from fanet_mw.scenario import Clock, Scenario
+from fanet_mw.timesync.turn_slack import clocks_fit
 from fanet_mw.units import MS, US, NodeId, S
 from sim.planner.problems_and_notes import clocks_apart
 from sim.scenarios import catalog
@@ -79,5 +80,5 @@ def test_without_a_common_time_nodes_believe_in_their_turns_exactly_when_the_pla
     keys = [f"clock.offset_ms={offset_us / 1000}", f"clock.drift_ppm={drift_ppm}", "duration_s=60"]
     scenario = catalog.find("clusters", [*keys, f"clusters.turn_slack_us={needed_us + more_ns / 1000}"])
     known_ns = swarm_time(scenario, NodeId(1)).worst_ns(at_s * S)
-    assert clocks_fit(scenario, clock_error_ns=known_ns) == (more_ns >= 0)
+    assert clocks_fit(scenario.clock, slack_ns=turn_slack_ns(scenario), clock_error_ns=known_ns) == (more_ns >= 0)
     assert (not list(clocks_apart(scenario))) == (more_ns >= 0)

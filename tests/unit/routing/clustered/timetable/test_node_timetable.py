@@ -4,12 +4,13 @@ from collections.abc import Callable
 
 import pytest
 
-from fanet_mw.routing.clustered.tdma.turn_timing import Turns, clocks_fit, turn_ns
+from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_ns, turn_slack_ns
 from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
 from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.routing.clustered.timetable.turn_size import largest_frame, links, superframe
 from fanet_mw.scenario import Scenario
+from fanet_mw.timesync.turn_slack import clocks_fit
 from fanet_mw.units import MS, US, NodeId
 
 MakeScenario = Callable[..., Scenario]
@@ -27,7 +28,7 @@ def test_the_slack_of_a_turn_holds_two_clocks_that_are_wrong_and_the_flight(
 ) -> None:
     """100 us: 20 us of flight, and one clock early by 40 us while another is as late."""
     scenario = make_scenario(**KEYS, **{"clusters.turn_slack_us": 100})
-    assert clocks_fit(scenario, clock_error_ns=error_us * US) == fits
+    assert clocks_fit(scenario.clock, slack_ns=turn_slack_ns(scenario), clock_error_ns=error_us * US) == fits
 
 
 @pytest.mark.parametrize(
@@ -38,7 +39,7 @@ def test_an_error_that_hellos_cut_may_be_any_and_fits_no_slack(
 ) -> None:
     """Hellos state 20 ms of every error that is greater, too; of clocks left alone the bound itself is known."""
     scenario = make_scenario(**KEYS, **{"clock.sync": sync, "clock.offset_ms": 20, "clusters.turn_slack_us": 60_000})
-    assert clocks_fit(scenario, clock_error_ns=error_us * US) == fits
+    assert clocks_fit(scenario.clock, slack_ns=turn_slack_ns(scenario), clock_error_ns=error_us * US) == fits
 
 
 def test_interference_reaches_twice_as_far_as_reception_where_it_is_a_matter_of_power(

@@ -1,0 +1,29 @@
+"""The slack of turns: how far clocks may be apart so that the turns of different nodes do not overlap."""
+
+from typing import Final
+
+from fanet_mw.scenario import Clock
+from fanet_mw.timesync.ftsp import MOST_STATED_NS
+from fanet_mw.units import US
+
+_FLIGHT_NS: Final = 20 * US
+"""The propagation delay over 6 km; this part of the slack is not available for clock errors."""
+
+
+def clocks_fit(clock: Clock, *, slack_ns: int, clock_error_ns: int) -> bool:
+    """True if turns of different nodes do not overlap while each clock is within this error of swarm time.
+
+    If the scenario models clocks, an error of 0 means that the node does not know any error yet, so the answer is
+    False. If nodes get the time by beacons, it is also False for the largest error that a beacon can state, because the
+    true one may be larger.
+    """
+    if not clock_error_ns:
+        return not clock.modelled
+    if clock.sync == "beacons" and clock_error_ns >= MOST_STATED_NS:
+        return False
+    return least_slack_ns(clock_error_ns) <= slack_ns
+
+
+def least_slack_ns(clock_error_ns: int) -> int:
+    """The slack that keeps turns of different nodes apart if each clock is within this error of swarm time."""
+    return 2 * clock_error_ns + _FLIGHT_NS

@@ -13,7 +13,8 @@ class Rounds(Section):
     turn_bytes: Annotated[int, Field(ge=100, le=16_384)] = 600
     """The size of frame that a turn holds."""
     turn_slack_us: Annotated[float, Field(ge=0, le=1e6)] = 50.0
-    """By how much a turn is longer than its frame, for errors of clocks and for propagation."""
+    """By how much a turn is longer than its frame. A bound is stated while it holds twice the bound of a clock's error,
+    and some 20 us for propagation and detection."""
     bulk_share: Annotated[float, Field(ge=0, le=0.95)] = 0.7
     """Share of a round whose slots are for bulk (0 to 0.95); 0: bulk goes in turns, too."""
     least_period_ms: Milliseconds = 0.0

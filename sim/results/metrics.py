@@ -85,6 +85,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "clock": clock,
         "admission": _admission(outcome),
         "mission": mission(outcome.scenario, outcome.records),
+        "no_fly_entries": outcome.reports.get("world", {}).get("no_fly_entries", 0),
         "separation": separation(outcome),
         "processes": {
             "ready_s": round(outcome.ready_s, 3),

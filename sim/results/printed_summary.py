@@ -51,6 +51,10 @@ def _rows(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     mission = summary["mission"]
     if mission["survivors"]:
         yield from _mission_rows(mission)
+    elif mission["collisions"]:
+        yield "collisions", str(mission["collisions"])
+    if summary["no_fly_entries"]:
+        yield "no-fly areas", f"entered {summary['no_fly_entries']} times"
     yield from _separation_rows(summary["separation"])
     yield "trace", summary["trace_sha256"][:16]
 

@@ -81,6 +81,13 @@ _SMALL: Final = (
     "world.area_m=1000", "mission.survivors=8", "duration_s=150",
 )  # fmt: skip
 """`rescue` over a sixth of its area."""
+COUNTRY_IN_SMALL: Final[Mapping[str, Case]] = {
+    "`rescue`": Case("rescue", _SMALL, _TWENTY),
+    "`hills`": Case("hills", _SMALL, _TWENTY),
+    "`night`, without GPS within 240 m from 30 to 110 s": Case(
+        "night", (*_SMALL, "sensors.gps_outages=[[0,0,240,30,110]]"), _TWENTY
+    ),
+}
 SHAPES: Final[Mapping[str, Case]] = {
     **{f"`{shape}`, 20 UAVs": Case("rescue", (*_SMALL, f"mission.search={shape}"), (1, 2))
        for shape in ("lines", "spiral", "sectors")},
@@ -257,6 +264,12 @@ def country(kept: Kept | None = None) -> Rows:
     """The whole rescue over a plain, over hills, and with an outage of GPS."""
     kept = all_flown(COUNTRY, kept)
     return [PLACES_HEAD, *(places_row(name, flown(case, kept)) for name, case in COUNTRY.items())]
+
+
+def country_in_small(kept: Kept | None = None) -> Rows:
+    """The same three over a square kilometre, with 20 UAVs."""
+    kept = all_flown(COUNTRY_IN_SMALL, kept)
+    return [PLACES_HEAD, *(places_row(name, flown(case, kept)) for name, case in COUNTRY_IN_SMALL.items())]
 
 
 SHAPES_HEAD: Final = [

@@ -93,6 +93,9 @@ TABLES: Final[Mapping[str, Table]] = {
     "formation-flight": Table("explanation/formation-flight.md", formation_flight.measured, Tolerance(relative=0.05)),
     "places": Table("results/missions.md", missions.places, Tolerance(absolute=0.05, relative=0.02)),
     "country": Table("results/missions.md", missions.country, Tolerance(absolute=0.05, relative=0.02)),
+    "country-in-small": Table(
+        "results/missions.md", missions.country_in_small, Tolerance(absolute=0.05, relative=0.02)
+    ),
     "from-the-ground": Table("results/missions.md", missions.from_the_ground, Tolerance(absolute=0.05, relative=0.02)),
     "shapes": Table("results/missions.md", missions.shapes, Tolerance(absolute=1, relative=0.05)),
     "engines": Table(

@@ -1,18 +1,21 @@
 """The parts of a summary that are about the mission, admission and delays, on traces written by hand."""
 
+import io
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from fanet_mw.errors import DropReason
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Approaching, Arrived, DeadlineLost, DeadlineMet, Detected, Dropped, Record
+from fanet_mw.trace import Approaching, Arrived, Collided, DeadlineLost, DeadlineMet, Detected, Dropped, Record
 from fanet_mw.units import MS, S
 from sim.results.delays import summed_up
 from sim.results.metrics import summarize
 from sim.results.outcome import Outcome
+from sim.results.printed_summary import show
 from sim.world.environment.survivors import place
 
 MakeScenario = Callable[..., Scenario]
@@ -54,3 +57,16 @@ def test_what_was_refused_and_who_has_no_deadline_is_counted(make_scenario: Make
         Dropped(6 * S, 2, DropReason.EXPIRED, 2, 2),
     )["admission"]
     assert admission == {"deadline_ms": 500, "refused": 1, "lost": 1, "met": 2, "nodes_without": 1}
+
+
+def test_contacts_and_entries_into_no_fly_areas_are_printed_without_survivors_too(make_scenario: MakeScenario) -> None:
+    outcome = Outcome(
+        make_scenario(**{"nodes.count": 4}), "virtual", 1.0, [Collided(1 * S, 1, 2), Collided(2 * S, 3, 0)],
+        {"world": {"no_fly_entries": 7}},
+    )  # fmt: skip
+    summary = summarize(outcome, trace_sha256="")
+    assert summary["no_fly_entries"] == 7
+    show(summary, console := Console(width=200, record=True, file=io.StringIO()))
+    printed = console.export_text()
+    assert "collisions    2" in printed
+    assert "entered 7 times" in printed

@@ -65,6 +65,7 @@ def degraded(scenario: Scenario, loss: float) -> Scenario:
 
 
 _TWENTY: Final = tuple(range(1, 21))
+_TEN: Final = _TWENTY[:10]
 PLACES: Final[Mapping[str, Case]] = {
     "`town`": Case("town", (), _TWENTY),
 }
@@ -82,10 +83,10 @@ _SMALL: Final = (
 )  # fmt: skip
 """`rescue` over a sixth of its area."""
 COUNTRY_IN_SMALL: Final[Mapping[str, Case]] = {
-    "`rescue`": Case("rescue", _SMALL, _TWENTY),
-    "`hills`": Case("hills", _SMALL, _TWENTY),
+    "`rescue`": Case("rescue", _SMALL, _TEN),
+    "`hills`": Case("hills", _SMALL, _TEN),
     "`night`, without GPS within 240 m from 30 to 110 s": Case(
-        "night", (*_SMALL, "sensors.gps_outages=[[0,0,240,30,110]]"), _TWENTY
+        "night", (*_SMALL, "sensors.gps_outages=[[0,0,240,30,110]]"), _TEN
     ),
 }
 SHAPES: Final[Mapping[str, Case]] = {

@@ -16,6 +16,7 @@ from tests.tables import (
     installations,
     mission,
     missions,
+    models,
     motion,
     paper_rescue,
     plans,
@@ -93,9 +94,6 @@ TABLES: Final[Mapping[str, Table]] = {
     "formation-flight": Table("explanation/formation-flight.md", formation_flight.measured, Tolerance(relative=0.05)),
     "places": Table("results/missions.md", missions.places, Tolerance(absolute=0.05, relative=0.02)),
     "country": Table("results/missions.md", missions.country, Tolerance(absolute=0.05, relative=0.02)),
-    "country-in-small": Table(
-        "results/missions.md", missions.country_in_small, Tolerance(absolute=0.05, relative=0.02)
-    ),
     "from-the-ground": Table("results/missions.md", missions.from_the_ground, Tolerance(absolute=0.05, relative=0.02)),
     "shapes": Table("results/missions.md", missions.shapes, Tolerance(absolute=1, relative=0.05)),
     "engines": Table(
@@ -114,6 +112,7 @@ TABLES: Final[Mapping[str, Table]] = {
     ),
     "sensor-errors": Table("reference/sensors.md", sensors.errors, Tolerance(absolute=0.1, relative=0.05)),
     "sensor-heights": Table("reference/sensors.md", sensors.heights, Tolerance(absolute=0.1)),
+    "models": Table("results/models.md", models.measured, Tolerance(absolute=0.05, relative=0.05)),
     "attacks": Table(
         "results/attacks.md", attacks.over_the_air, Tolerance(absolute=0.02, relative=0.2), attacks.MACHINE
     ),

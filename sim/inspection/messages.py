@@ -2,7 +2,6 @@
 
 import json
 from collections import deque
-from collections.abc import Iterator
 from typing import Any, Final, NamedTuple
 
 from fanet_mw import wire
@@ -82,6 +81,7 @@ class Messages:
         self.streams: dict[Key, Stream] = {}
         self.count = 0
         self.malformed = 0
+        self._order: list[Key] = []
 
     def take(self, node: int, where: str, t_ns: int, data: bytes) -> None:
         """Some whole frames of a node."""
@@ -96,13 +96,17 @@ class Messages:
         except MalformedFrameError:
             self.malformed += 1
 
-    def found(self, words: str = "") -> Iterator[tuple[Key, Stream]]:
+    def found(self, words: str = "") -> list[Key]:
         """Those whose node, way and name have all of these words, in order."""
+        if len(self._order) != len(self.streams):
+            self._order = sorted(self.streams)
         wanted = words.lower().split()
-        for key in sorted(self.streams):
-            text = f"{key.node} {key.where} {name_of(key.message_id).lower()}"
-            if all(word in text.split() or word in text.split()[-1] for word in wanted):
-                yield key, self.streams[key]
+        return [key for key in self._order if _fits(key, wanted)] if wanted else self._order
+
+
+def _fits(key: Key, wanted: list[str]) -> bool:
+    *exact, name = str(key.node), key.where, name_of(key.message_id).lower()
+    return all(word in exact or word in name for word in wanted)
 
 
 def name_of(message_id: int) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from fanet_mw.trace import BoundStated, Delivered, Dropped, Generated, LetOut, Record
-from fanet_mw.units import MS
+from fanet_mw.units import MS, S
 
 MOST: Final = 5_000
 """The packets that are remembered; the oldest is forgotten."""
@@ -32,7 +32,7 @@ class Way:
         """The way as text, hop by hop."""
         said = [f"packet {self.seq} of node {self.origin}"]
         if self.born_ns is not None:
-            said[0] += f": {self.app}, {self.size} bytes, handed over at {self.born_ns / MS:.3f} ms"
+            said[0] += f": {self.app}, {self.size} bytes, handed over at {self.born_ns / S:.3f} s"
             if self.let_out_ns is not None:
                 said.append(f"  first frame announced {(self.let_out_ns - self.born_ns) / MS:.3f} ms later")
         if self.bound_ns is not None:
@@ -44,7 +44,7 @@ class Way:
             nodes = ", ".join(f"{node} ({delay_ns / MS:.1f} ms)" for delay_ns, node in sorted(came)[:8])
             more = f" and {len(came) - 8} more" if len(came) > 8 else ""
             said.append(f"  hop {hop}: {nodes}{more}")
-        said += [f"  ended in node {node} at {t_ns / MS:.1f} ms: {reason}" for t_ns, node, reason in self.dropped[:12]]
+        said += [f"  ended in node {node} at {t_ns / S:.3f} s: {reason}" for t_ns, node, reason in self.dropped[:12]]
         if len(self.dropped) > 12:
             said.append(f"  and {len(self.dropped) - 12} more ends")
         if not self.delivered and not self.dropped:

@@ -10,19 +10,31 @@ from rich.text import Text
 from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, VerticalScroll
-from textual.widgets import DataTable, Footer, Input, Static, TabbedContent, TabPane
+from textual.widgets import Footer, Input, Static, TabbedContent, TabPane
 
 from fanet_mw.units import MS, S
-from sim.inspection.inspection import Inspection
+from sim.inspection.inspection import Inspection, LinkLine
 from sim.inspection.messages import Key, fields_of, name_of
 from sim.inspection.packets import Way
+from sim.inspection.rows import Column, Rows
 from sim.observation.turns import Turns
 
 _TABS: Final = {"messages": "#streams", "packets": "#ways", "turns": None, "links": "#pairs"}
 """The tabs, each with the table that has the focus there."""
 _REFRESH_S: Final = 0.5
-_MOST_ROWS: Final = 400
 _WIDTH: Final = 100
+_STREAM_COLUMNS: Final = (
+    Column("node", 4, number=True), Column("way", 4), Column("message", 27), Column("Hz", 7, number=True),
+    Column("B/s", 7, number=True), Column("count", 8, number=True), Column("age s", 6, number=True),
+)  # fmt: skip
+_WAY_COLUMNS: Final = (
+    Column("packet", 12), Column("application", 14), Column("bytes", 6, number=True),
+    Column("born s", 9, number=True), Column("nodes", 5, number=True), Column("ended", 24),
+)  # fmt: skip
+_LINK_COLUMNS: Final = (
+    Column("from", 4, number=True), Column("to", 4, number=True), Column("received", 16),
+    Column("RSSI dBm", 8, number=True), Column("lost", 60),
+)  # fmt: skip
 Pump = Callable[[Inspection], str]
 """Takes in what has come, and says what of it was skipped."""
 
@@ -33,8 +45,8 @@ class Inspector(App[None]):
     CSS = """
     #filter { height: 3; }
     TabbedContent { height: 1fr; }
-    #detail { width: 62; border-left: solid $panel; padding: 0 1; }
-    DataTable { height: 1fr; }
+    #detail, #ways-detail { border-left: solid $panel; padding: 0 1; }
+    #detail { width: 62; }
     #status { height: 1; background: $panel; padding: 0 1; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -55,30 +67,26 @@ class Inspector(App[None]):
         self._inspection, self._pump, self._live = inspection, pump, live
         self.frozen = False
         self._skipped = ""
-        self._key: Key | None = None
-        self._way: tuple[int, int] | None = None
+        self._said: dict[str, Text | str] = {}
 
     def compose(self) -> ComposeResult:
         yield Input(placeholder="filter: node, tap or air, part of a message's name", id="filter")
         with TabbedContent(initial="messages"):
             with TabPane("Messages", id="messages"), Horizontal():
-                yield DataTable[Text | str](id="streams", cursor_type="row", zebra_stripes=True)
+                yield Rows[Key](*_STREAM_COLUMNS, id="streams")
                 yield VerticalScroll(Static(id="fields"), id="detail")
             with TabPane("Packets", id="packets"), Horizontal():
-                yield DataTable[Text | str](id="ways", cursor_type="row", zebra_stripes=True)
-                yield VerticalScroll(Static(id="way"))
+                yield Rows[tuple[int, int]](*_WAY_COLUMNS, id="ways")
+                yield VerticalScroll(Static(id="way"), id="ways-detail")
             with TabPane("Turns", id="turns"):
                 yield VerticalScroll(Static(id="superframe"))
             with TabPane("Links", id="links"):
-                yield DataTable[Text | str](id="pairs", zebra_stripes=True)
+                yield Rows[tuple[int, int]](*_LINK_COLUMNS, id="pairs")
         yield Static(id="status")
         yield Footer()
 
     def on_mount(self) -> None:
-        self.query_one("#streams", DataTable).add_columns("node", "way", "message", "Hz", "B/s", "count", "age s")
-        self.query_one("#ways", DataTable).add_columns("packet", "application", "bytes", "born s", "nodes", "ended")
-        self.query_one("#pairs", DataTable).add_columns("from", "to", "received", "RSSI dBm", "lost")
-        self.query_one("#streams", DataTable).focus()
+        self.query_one("#streams", Rows).focus()
         self.refresh_all()
         self.set_interval(_REFRESH_S, self.refresh_all)
 
@@ -95,7 +103,7 @@ class Inspector(App[None]):
     def action_table(self) -> None:
         table = _TABS[self.query_one(TabbedContent).active]
         if table is not None:
-            self.query_one(table, DataTable).focus()
+            self.query_one(table, Rows).focus()
         else:
             self.set_focus(None)
 
@@ -108,18 +116,8 @@ class Inspector(App[None]):
     def on_input_changed(self, _event: Input.Changed) -> None:
         self.refresh_all()
 
-    def on_data_table_row_highlighted(self, event: DataTable.RowHighlighted) -> None:
-        key = event.row_key.value if event.row_key is not None else None
-        if key is None:
-            return
-        if event.data_table.id == "streams":
-            node, where, message_id = key.split("/")
-            self._key = Key(int(node), where, int(message_id))
-            self._show_fields()
-        elif event.data_table.id == "ways":
-            origin, seq = key.split("/")
-            self._way = int(origin), int(seq)
-            self._show_way()
+    def on_rows_chosen(self, _event: Rows.Chosen) -> None:
+        self._show_detail()
 
     # --- what is shown --------------------------------------------------------------------------------------------
 
@@ -145,72 +143,87 @@ class Inspector(App[None]):
             self._skipped or "nothing skipped",
             *(["FROZEN"] if self.frozen else []),
         ]  # fmt: skip
-        self.query_one("#status", Static).update("  |  ".join(parts))
+        self._say("status", "  |  ".join(parts))
+
+    def _say(self, where: str, what: Text | str) -> None:
+        """Change a text; the screen is laid out anew only if the text has another number of lines."""
+        before = self._said.get(where, "")
+        if what != before:
+            self._said[where] = what
+            lines = [str(text).count("\n") for text in (before, what)]
+            self.query_one(f"#{where}", Static).update(what, layout=lines[0] != lines[1])
 
     def _show_streams(self) -> None:
-        words, now_ns = self.query_one("#filter", Input).value, self._inspection.now_ns
-        rows = []
-        for key, stream in self._inspection.messages.found(words):
+        seen, words = self._inspection.messages, self.query_one("#filter", Input).value
+        now_ns = self._inspection.now_ns
+
+        def cells(key: Key) -> list[str]:
+            stream = seen.streams[key]
             hz, size = stream.rates(now_ns) if self._live else stream.mean_rates(now_ns)
-            age_s = f"{max(0, now_ns - stream.last_ns) / S:.1f}"
-            cells = [
-                str(key.node),
-                key.where,
-                name_of(key.message_id),
-                f"{hz:.2f}",
-                f"{size:.0f}",
-                str(stream.count),
-                age_s,
-            ]
-            rows.append((f"{key.node}/{key.where}/{key.message_id}", cells))
-        _fill(self.query_one("#streams", DataTable), rows)
+            return [
+                str(key.node), key.where, name_of(key.message_id), f"{hz:.2f}", f"{size:.0f}", str(stream.count),
+                f"{max(0, now_ns - stream.last_ns) / S:.1f}",
+            ]  # fmt: skip
+
+        self.query_one("#streams", Rows).show(seen.found(words), cells)
         self._show_fields()
 
+    def _show_detail(self) -> None:
+        self._show_fields()
+        self._show_way()
+
     def _show_fields(self) -> None:
-        stream = None if self._key is None else self._inspection.messages.streams.get(self._key)
-        if stream is None or self._key is None:
+        key = self.query_one("#streams", Rows).chosen
+        if key is None:
             return
-        text = Text(f"{name_of(self._key.message_id)} of node {self._key.node}, {len(stream.frame)} bytes\n\n", "bold")
-        for field in fields_of(stream.frame):
+        frame = self._inspection.messages.streams[key].frame
+        text = Text(f"{name_of(key.message_id)} of node {key.node}, {len(frame)} bytes\n\n", "bold")
+        for field in fields_of(frame):
             text.append(f"{field.name:<24.24} ", "cyan").append(field.value)
             text.append(f" {field.unit}" if field.unit else "", "dim")
             text.append(f"  {field.meaning}" if field.meaning else "", "green").append("\n")
-        self.query_one("#fields", Static).update(text)
+        self._say("fields", text)
 
     def _show_ways(self) -> None:
-        words = self.query_one("#filter", Input).value.split()
-        ways = [way for way in reversed(self._inspection.packets.ways.values()) if _fits(way, words)]
-        rows = [
-            (f"{way.origin}/{way.seq}", [
+        words, ways = self.query_one("#filter", Input).value.split(), self._inspection.packets.ways
+        found = [(way.origin, way.seq) for way in reversed(ways.values()) if _fits(way, words)]
+
+        def cells(key: tuple[int, int]) -> list[str]:
+            way = ways[key]
+            return [
                 f"{way.origin}:{way.seq}", way.app, str(way.size),
                 "-" if way.born_ns is None else f"{way.born_ns / S:.3f}", str(len(way.delivered)),
-                ", ".join(sorted({reason for _, _, reason in way.dropped}))[:24],
-            ])
-            for way in ways[:_MOST_ROWS]
-        ]  # fmt: skip
-        _fill(self.query_one("#ways", DataTable), rows)
+                ", ".join(sorted({reason for _, _, reason in way.dropped})),
+            ]  # fmt: skip
+
+        self.query_one("#ways", Rows).show(found, cells)
         self._show_way()
 
     def _show_way(self) -> None:
-        way = None if self._way is None else self._inspection.packets.ways.get(self._way)
-        if way is not None:
-            self.query_one("#way", Static).update("\n".join(way.lines()))
+        key = self.query_one("#ways", Rows).chosen
+        if key is not None and (way := self._inspection.packets.ways.get(key)) is not None:
+            self._say("way", "\n".join(way.lines()))
 
     def _show_turns(self) -> None:
         found = self._inspection.turns()
-        self.query_one("#superframe", Static).update(
+        self._say(
+            "superframe",
             "nobody owns slots or turns: all contend for the channel" if found is None
-            else turn_lines(found, self._inspection.now_ns)
+            else turn_lines(found, self._inspection.now_ns),
         )  # fmt: skip
 
     def _show_links(self) -> None:
-        rows = []
-        for line in self._inspection.links[:_MOST_ROWS]:
-            lost = ", ".join(f"{reason} {count}" for reason, count in line.lost.items() if count)
-            rssi = "-" if line.rssi_dbm is None else f"{line.rssi_dbm:.1f}"
-            cells = [str(line.src), str(line.dst), f"{line.received} of {line.copies}", rssi, lost]
-            rows.append((f"{line.src}/{line.dst}", cells))
-        _fill(self.query_one("#pairs", DataTable), rows)
+        lines: dict[tuple[int, int], LinkLine] = {(line.src, line.dst): line for line in self._inspection.links}
+
+        def cells(key: tuple[int, int]) -> list[str]:
+            line = lines[key]
+            return [
+                str(line.src), str(line.dst), f"{line.received} of {line.copies}",
+                "-" if line.rssi_dbm is None else f"{line.rssi_dbm:.1f}",
+                ", ".join(f"{reason} {count}" for reason, count in line.lost.items() if count),
+            ]  # fmt: skip
+
+        self.query_one("#pairs", Rows).show([*lines], cells)
 
 
 def turn_lines(found: Turns, now_ns: int) -> Text:
@@ -242,20 +255,3 @@ def turn_lines(found: Turns, now_ns: int) -> Text:
 def _fits(way: Way, words: list[str]) -> bool:
     text = f"{way.origin} {way.origin}:{way.seq} {way.app} " + " ".join(reason for _, _, reason in way.dropped)
     return all(word in text.split() for word in words)
-
-
-def _fill(table: DataTable[Text | str], rows: list[tuple[str, list[str]]]) -> None:
-    """Show these rows; the cursor stays on its row, and rows that are there already are only changed."""
-    wanted = [key for key, _ in rows]
-    if [key.value for key in table.rows] == wanted:
-        for key, cells in rows:
-            for column, cell in zip(table.columns, cells, strict=True):
-                table.update_cell(key, column, cell)
-        return
-    at = table.cursor_row
-    chosen = [*table.rows][at].value if 0 <= at < len(table.rows) else None
-    table.clear()
-    for key, cells in rows:
-        table.add_row(*cells, key=key)
-    if chosen in wanted:
-        table.move_cursor(row=wanted.index(chosen))

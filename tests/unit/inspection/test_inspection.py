@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
-from textual.widgets import DataTable, Input, Static, TabbedContent
+from textual.widgets import Input, Static, TabbedContent
 
 from fanet_mw.flavors import Mode
 from fanet_mw.mavlink import Encoder
@@ -18,6 +18,7 @@ from fanet_mw.units import MS, Enu, NodeId, S
 from sim.inspection.inspection import Inspection, of_folder
 from sim.inspection.messages import Messages, fields_of, name_of
 from sim.inspection.packets import Packets
+from sim.inspection.rows import Rows
 from sim.inspection.screen import Inspector, turn_lines
 from sim.inspection.topics import bandwidth, plain, rate
 from sim.observation.turns import Span, Turns
@@ -42,7 +43,7 @@ def test_rates_and_bytes_are_those_of_the_last_seconds() -> None:
         seen.take(3, "tap", tenth * 100 * MS, heartbeat(3))
         if tenth % 5 == 0:
             seen.take(3, "air", tenth * 100 * MS, heartbeat(3) * 2)
-    by_way = {key.where: stream for key, stream in seen.found()}
+    by_way = {key.where: seen.streams[key] for key in seen.found()}
     assert by_way["tap"].rates(10 * S) == (10.0, 210.0)
     assert by_way["air"].rates(10 * S) == (4.0, 84.0)
     assert by_way["tap"].rates(30 * S) == (0.0, 0.0)
@@ -54,9 +55,9 @@ def test_a_filter_needs_all_its_words() -> None:
     encoder = Encoder(NodeId(1), component=1)
     for node in (1, 12):
         seen.take(node, "tap", S, heartbeat(node) + encoder.attitude((0.1, 0.2, 0.3), now_ns=S))  # type: ignore[arg-type]
-    assert [(key.node, name_of(key.message_id)) for key, _ in seen.found("1 heart")] == [(1, "HEARTBEAT")]
-    assert [key.node for key, _ in seen.found("attitude")] == [1, 12]
-    assert not [*seen.found("13")]
+    assert [(key.node, name_of(key.message_id)) for key in seen.found("1 heart")] == [(1, "HEARTBEAT")]
+    assert [key.node for key in seen.found("attitude")] == [1, 12]
+    assert not seen.found("13")
 
 
 def test_a_message_is_shown_with_units_and_the_names_of_its_values() -> None:
@@ -97,11 +98,11 @@ def test_a_packet_is_followed_from_hop_to_hop_to_its_ends() -> None:
         Delivered(S, 1, 4, 8, MS, 1),
     ])  # fmt: skip
     assert packets.ways[4, 7].lines() == [
-        "packet 7 of node 4: traffic, 300 bytes, handed over at 1000.000 ms",
+        "packet 7 of node 4: traffic, 300 bytes, handed over at 1.000 s",
         "  first frame announced 5.000 ms later",
         "  hop 1: 2 (8.0 ms)",
         "  hop 2: 9 (20.0 ms)",
-        "  ended in node 5 at 1021.0 ms: hop_limit",
+        "  ended in node 5 at 1.021 s: hop_limit",
     ]
 
 
@@ -142,24 +143,24 @@ async def test_the_screens_show_a_recording(folder: Path) -> None:
     app = Inspector(inspection, title="a run", pump=lambda _: "nothing skipped", live=False)
     async with app.run_test(size=(150, 40)) as pilot:
         await pilot.pause()
-        streams = app.query_one("#streams", DataTable)
-        assert streams.row_count == len(inspection.messages.streams) > 20
+        streams = app.query_one("#streams", Rows)
+        assert streams.count == len(inspection.messages.streams) > 20
         app.query_one("#filter", Input).value = "2 heartbeat"
         await pilot.pause()
         app.refresh_all()
-        assert [str(cell) for cell in streams.get_row_at(0)[:3]] == ["2", "tap", "HEARTBEAT"]
-        assert streams.row_count == 1
+        assert streams.row(0)[:3] == ["2", "tap", "HEARTBEAT"]
+        assert streams.count == 1
         app.query_one("#filter", Input).value = ""
         await pilot.press("escape", "2")
         await pilot.pause()
         assert app.query_one(TabbedContent).active == "packets"
-        assert app.query_one("#ways", DataTable).row_count > 3
+        assert app.query_one("#ways", Rows).count > 3
         await pilot.press("down")
         await pilot.pause()
         assert "packet" in str(app.query_one("#way", Static).render())
         await pilot.press("4")
         await pilot.pause()
-        assert app.query_one("#pairs", DataTable).row_count == len(inspection.links) > 3
+        assert app.query_one("#pairs", Rows).count == len(inspection.links) > 3
         assert "messages" in str(app.query_one("#status", Static).render())
 
 

@@ -5,13 +5,13 @@ some areas there are no fixes.
     velocity   truth + noise of each fix
 
 Most of the budget of errors is common to receivers that are near each other: orbits and clocks of the satellites,
-ionosphere and troposphere; reflections and noise are each receiver's own (Parkinson and Spilker, GPS: Theory and
-Applications, 1996, vol. 1, ch. 11: 4.9 m of 5.3 m). The defaults add up to 2.1 m along each horizontal axis, the 2.5
-m CEP of a u-blox NEO-M8 (data sheet, as its 0.05 m/s). Correlation times: 1800 s for the ionosphere (Rankin, IEEE
-PLANS, 1994), and 300 s for a receiver's own errors, within the 10 to 900 s of multipath (bounds used in ION's
-NAVIGATION, after Joerger and Pervan, 2020). The vertical error is twice as great (GPS SPS Performance Standard, 5th
-ed., 2020: 13 m and 8 m at 95 %). The delay is the 0.11 s that PX4 assumes (EKF2_GPS_DELAY). Not modeled: reflections
-that depend on walls, and satellites that set.
+ionosphere and troposphere; reflections and noise are each receiver's own (NAVSTAR GPS User Equipment Introduction,
+1996, table 3-1, C/A code at 95 %: 15.2 m of 15.7 m are common). The defaults add up to 2.1 m along each horizontal
+axis, the 2.5 m CEP of a u-blox NEO-M8 (data sheet, as its 0.05 m/s). Correlation times: 1800 s in common, the middle of
+the 900 to 2700 s of the troposphere, and 300 s for a receiver's own errors, within the 10 to 900 s of multipath (bounds
+used in ION's NAVIGATION, after Joerger and Pervan, 2020); for the ionosphere no published time was found. The vertical
+error is twice as great (GPS SPS Performance Standard, 5th ed., 2020: 13 m and 8 m at 95 %). The delay is the 0.11 s
+that PX4 assumes (EKF2_GPS_DELAY). Not modeled: reflections that depend on walls, and satellites that set.
 """
 
 from collections.abc import Iterator, Sequence

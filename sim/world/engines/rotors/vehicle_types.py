@@ -70,10 +70,11 @@ class Vehicle(NamedTuple):
 
 
 IRIS: Final = Vehicle(
-    # Mass, inertia, rotors and motors: RotorS (ETH Zurich), rotors_description/urdf/iris.xacro, from which PX4's is.
-    # Propellers of 10 inches; 3 cells of 5.1 Ah: 3D Robotics, Iris+ specification (16 to 22 min of flight at 1.28 kg).
-    # Frame: its width and height there, 0.47 m x 0.11 m, with a drag coefficient of 0.5 (assumed). Efficiency of motors
-    # and controllers: 0.85 (assumed). k_z is not published and taken as 0.
+    # Mass, inertia, arms and motors: RotorS (ETH Zurich), rotors_description/urdf/iris.xacro. PX4's model began as this
+    # one and has other motors since (5.84e-6, up to 1100 rad/s). Propellers of 10 inches (RotorS draws 0.1 m); 3 cells
+    # of 5.1 Ah: 3D Robotics, Iris+ specification (16 to 22 min of flight at 1.28 kg). Frame: its width and height
+    # there, 0.47 m x 0.11 m, with a drag coefficient of 0.5 (assumed). Efficiency of motors and controllers: 0.85
+    # (assumed). k_z is not published and taken as 0.
     name="iris", mass_kg=1.5, inertia_kg_m2=(0.0347563, 0.0458929, 0.0977),
     rotors_m=((0.13, -0.22), (-0.13, 0.20), (0.13, 0.22), (-0.13, -0.20)), spins=(-1, -1, 1, 1),
     rotor_radius_m=0.127, thrust_n_s2=8.54858e-6, torque_m=0.016, inflow_n_s2_m=0.0, rotor_drag_n_s2_m=8.06428e-5,
@@ -82,10 +83,10 @@ IRIS: Final = Vehicle(
 )  # fmt: skip
 CRAZYFLIE: Final = Vehicle(
     # Mass, inertia, rotors, motor lag: RotorPy (University of Pennsylvania), vehicles/crazyflie_params.py; torque over
-    # thrust: Forster, "System Identification of the Crazyflie 2.0 Nano Quadrocopter", ETH, 2015. Battery and time
-    # of flight (0.24 Ah, 7 min): Bitcraze, Crazyflie 2.0. The efficiency of the brushed motors is what gives that time.
-    # Frame: 12 cm2 of board, battery and motors (Bitcraze, assumed outline) with 1.17, the drag coefficient of a flat
-    # plate (Hoerner, Fluid-Dynamic Drag, 1965).
+    # thrust, 0.034 there: Forster, "System Identification of the Crazyflie 2.0 Nano Quadrocopter", ETH, 2015. Battery
+    # and time of flight (0.24 Ah, 7 min): Bitcraze, Crazyflie 2.0. The efficiency of the brushed motors is what gives
+    # that time. Frame: 12 cm2 of board, battery and motors (Bitcraze, assumed outline) with 1.17, the drag coefficient
+    # of a flat plate (Hoerner, Fluid-Dynamic Drag, 1965).
     name="crazyflie", mass_kg=0.030, inertia_kg_m2=(1.43e-5, 1.43e-5, 2.89e-5),
     rotors_m=((0.0304, 0.0304), (0.0304, -0.0304), (-0.0304, -0.0304), (-0.0304, 0.0304)), spins=(1, -1, 1, -1),
     rotor_radius_m=0.0231, thrust_n_s2=2.3e-8, torque_m=0.00596, inflow_n_s2_m=7.553e-7, rotor_drag_n_s2_m=1.02506e-6,

@@ -26,7 +26,7 @@ from emulator.channel.propagation import received_dbm  # noqa: E402
 from emulator.kernel import state  # noqa: E402
 from emulator.kernel.fading_gain import gain  # noqa: E402
 from emulator.kernel.state import Reals  # noqa: E402
-from fanet_mw.bus.messages import Altimeter, Camera, Inertial, Radar  # noqa: E402
+from fanet_mw.bus.messages import Altimeter, Camera, Inertial, Radar, WindEstimate  # noqa: E402
 from fanet_mw.scenario import Radio, Scenario, config  # noqa: E402
 from fanet_mw.units import S  # noqa: E402
 from sim.figures.colors import BLUE, GRAY, GREEN, RED  # noqa: E402
@@ -37,14 +37,16 @@ from sim.world.environment.obstacles import obstacles  # noqa: E402
 from sim.world.environment.solids import Solids  # noqa: E402
 from sim.world.environment.survivors import Survivors  # noqa: E402
 from sim.world.sensors.altimeter import AltimeterSensor  # noqa: E402
-from sim.world.sensors.camera import CameraSensor  # noqa: E402
+from sim.world.sensors.camera import CameraSensor, recognized_share  # noqa: E402
 from sim.world.sensors.contract import Truth  # noqa: E402
 from sim.world.sensors.gps import GpsReceiver  # noqa: E402
 from sim.world.sensors.inertial import InertialSensor  # noqa: E402
 from sim.world.sensors.phone import REFERENCE_LOSS_DB, PhoneSensor  # noqa: E402
 from sim.world.sensors.position_estimate import PositionEstimate  # noqa: E402
-from sim.world.sensors.radar import RadarSensor  # noqa: E402
+from sim.world.sensors.radar import RadarSensor, detected_share  # noqa: E402
 from sim.world.sensors.voice import VoiceSensor, level_db  # noqa: E402
+from sim.world.sensors.wind import WindSensor  # noqa: E402
+from sim.world.world import make_engine  # noqa: E402
 
 REFERENCE, EXPLANATION = ROOT / "docs" / "reference", ROOT / "docs" / "explanation"
 PLAIN = Solids(None)
@@ -68,7 +70,7 @@ def _gps(axes: Axes) -> None:
     turn = np.linspace(0, 2 * math.pi, 100)
     axes.plot(2.5 * np.cos(turn), 2.5 * np.sin(turn), color=GRAY, linestyle=":", label="2.5 m (CEP)")
     axes.set(title="GPS at rest, 30 min", xlabel="east, off [m]", ylabel="north, off [m]", aspect="equal")
-    axes.legend(loc="best", fontsize="small")
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize="small")
 
 
 def _height(axes: Axes) -> None:
@@ -180,6 +182,52 @@ def _inertial(axes: Axes) -> None:
     axes.legend(loc="best", fontsize="small")
 
 
+def _wind(axes: Axes) -> None:
+    """The mean of the air at a UAV, as it is and as it is told, in gusts."""
+    scenario = _scenario("world.engine=rotors", "world.wind_m_s=[5,0]", "world.gusts_m_s=6", "sensors.wind_hz=1")
+    engine = make_engine(scenario)
+    engine.reset(np.tile([0.0, 0, 50], (3, 1)) + np.arange(3)[:, None] * [60.0, 0, 0])
+    sensor, still = WindSensor(scenario, engine), np.zeros((3, 3))
+    told, air = [], []
+    for second in range(300):
+        for _ in range(20):
+            engine.advance(0.05, still)
+        truth = Truth(second * S, engine.positions(), engine.velocities())
+        ((_, reading),) = sensor.read(truth, [0])
+        assert isinstance(reading, WindEstimate)
+        told.append(reading.velocity.east)
+        air.append(engine.air_m_s()[0, 0])
+    axes.plot(air, color=GRAY, linewidth=1.2, linestyle=":", label="air")
+    axes.plot(told, color=BLUE, linewidth=0.8, label="estimate")
+    axes.set(title="Wind to the east, in gusts", xlabel="time [s]", ylabel="velocity [m/s]")
+    axes.legend(loc="best", fontsize="small")
+
+
+def _shares(axes: Axes) -> None:
+    """How often a radar detects a UAV and a camera recognizes a person, and what their laws say."""
+    far = np.arange(20.0, 131.0, 10.0)
+    scenario = _scenario("sensors.radar_hz=5", "sensors.camera_hz=1")
+    radar, camera = RadarSensor(scenario, PLAIN), CameraSensor(scenario, Survivors(scenario), PLAIN)
+    met, seen = [], []
+    for range_m in far:
+        at = np.array([[0.0, 0, range_m], [range_m, 0, range_m], [0, 5000, 50]])
+        scans = [[*radar.read(Truth(step * S // 5, at, at * 0), [0])] for step in range(400)]
+        met.append(np.mean([any(abs(echo.range_m - range_m) < 5 for _, told in scan if isinstance(told, Radar)
+                                for echo in told.echoes) for scan in scans]))  # fmt: skip
+        seen.append(np.mean([bool([*camera.read(Truth(step * S, at, at * 0), [0])]) for step in range(400)]))
+    config_ = scenario.sensors
+    snr = 10 ** ((config_.radar_snr_db + 10 * math.log10(config_.radar_uav_m2) - 40 * np.log10(far / 100)) / 10)
+    for name, shares, law, color in (
+        ("radar, a UAV at this distance", met, detected_share(snr, false_alarm=config_.radar_false_alarm), BLUE),
+        ("camera, a person so far below", seen,
+         recognized_share(camera.pixels(far), cycles_for_half=config_.camera_cycles), RED),
+    ):  # fmt: skip
+        axes.plot(far, shares, ".", color=color, label=name)
+        axes.plot(far, law, color=color, linestyle=":")
+    axes.set(title="Share of scans and images", xlabel="distance [m]", ylabel="detected", ylim=(-0.02, 1.3))
+    axes.legend(loc="upper right", fontsize="small")
+
+
 def radio(**keys: object) -> Radio:
     return config.build({"clusters": {"count": 1}, "radio": keys}).radio
 
@@ -194,12 +242,14 @@ def loss_db(channel: str, distance_m: Reals | float, height_m: Reals | float) ->
 
 
 def panels(title: str, draw: Callable[[Axes, str], None]) -> Figure:
-    figure = Figure(figsize=(11, 6.4), layout="constrained")
-    for axes, channel in zip(figure.subplots(2, 3, sharey=True).flat, CHANNELS, strict=True):
+    figure = Figure(figsize=(11, 6.8), layout="constrained")
+    grid = figure.subplots(2, 3, sharey=True)
+    for axes, channel in zip(grid.flat, CHANNELS, strict=True):
         draw(axes, channel)
         axes.set_title(f"{channel}, other node at {ANTENNA_M.get(channel, 2.0):g} m", fontsize=9)
         axes.grid(alpha=0.3)
         axes.set_ylabel("loss [dB]")
+    figure.legend(*grid.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=9)
     figure.suptitle(title, fontsize=10)
     return figure
 
@@ -208,7 +258,6 @@ def over_distance(axes: Axes, channel: str) -> None:
     along = np.geomspace(10, 10_000, 300)
     for height_m in (2.0, 10.0, 30.0, 100.0):
         axes.semilogx(along, loss_db(channel, along, height_m), label=f"{height_m:g} m up")
-    axes.legend(fontsize=7)
     axes.set_xlabel("distance along the ground [m]")
 
 
@@ -216,7 +265,6 @@ def over_height(axes: Axes, channel: str) -> None:
     up = np.linspace(1, 150, 600)
     for along_m in (50.0, 200.0, 1000.0):
         axes.plot(up, loss_db(channel, along_m, up), label=f"{along_m:g} m away")
-    axes.legend(fontsize=7)
     axes.set_xlabel("height [m]")
 
 
@@ -235,7 +283,7 @@ def correlation() -> Figure:
     random = np.random.Generator(np.random.PCG64(1))
     for both, color in ((False, "tab:blue"), (True, "tab:orange")):
         drawn = []
-        for seed in range(40):
+        for seed in range(60):
             at, velocity = random.uniform(0, 5000, (60, 3)), np.zeros((60, 3))
             velocity[::2, 0], velocity[1::2, 1] = 1.0, float(both)
             waves = fading.Waves(keys, seed=seed).of(at, velocity, 0)
@@ -277,8 +325,8 @@ def edge() -> Figure:
 def main() -> None:
     """All pictures."""
     with applied():
-        figure, grid = canvas(2, 4, width=4.0, height=3.4)
-        drawn = (_gps, _height, _phone, _voice, _camera, _radar, _inertial, _outage)
+        figure, grid = canvas(2, 5, width=4.0, height=3.4)
+        drawn = (_gps, _height, _phone, _voice, _camera, _shares, _radar, _inertial, _wind, _outage)
         for draw, axes in zip(drawn, grid, strict=True):
             draw(axes)
         figure.savefig(REFERENCE / "sensors.png", dpi=90, metadata={"Software": None})

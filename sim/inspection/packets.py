@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Final
 
-from fanet_mw.trace import BoundStated, Delivered, Dropped, Generated, LetOut, Record
+from fanet_mw.trace import BoundExcludes, BoundStated, Delivered, Dropped, Generated, LetOut, Record
 from fanet_mw.units import MS, S
 
 MOST: Final = 5_000
@@ -23,6 +23,8 @@ class Way:
     size: int = 0
     let_out_ns: int | None = None
     bound_ns: int | None = None
+    excluded: list[int] = field(default_factory=list)
+    """The nodes for which the bound does not hold."""
     delivered: list[tuple[int, int, int]] = field(default_factory=list)
     """(hops, delay [ns], node), as it came."""
     dropped: list[tuple[int, int, str]] = field(default_factory=list)
@@ -36,7 +38,8 @@ class Way:
             if self.let_out_ns is not None:
                 said.append(f"  first frame announced {(self.let_out_ns - self.born_ns) / MS:.3f} ms later")
         if self.bound_ns is not None:
-            said.append(f"  stated to arrive within {self.bound_ns / MS:.3f} ms")
+            but = f", but not at {', '.join(map(str, sorted(self.excluded)))}, gone" if self.excluded else ""
+            said.append(f"  stated to arrive within {self.bound_ns / MS:.3f} ms{but}")
         hops: dict[int, list[tuple[int, int]]] = {}
         for hop, delay_ns, node in self.delivered:
             hops.setdefault(hop, []).append((delay_ns, node))
@@ -70,6 +73,8 @@ class Packets:
                     self._way(node, seq).let_out_ns = t_ns
                 case BoundStated(_, node, seq, bound_ns):
                     self._way(node, seq).bound_ns = bound_ns
+                case BoundExcludes(_, node, seq, other):
+                    self._way(node, seq).excluded.append(other)
                 case Delivered(_, node, origin, seq, delay_ns, hops):
                     self._way(origin, seq).delivered.append((hops, delay_ns, node))
                 case Dropped(t_ns, node, reason, origin, seq):

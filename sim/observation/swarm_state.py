@@ -27,6 +27,7 @@ from fanet_mw.graph.topology import components
 from fanet_mw.mavlink import common, decode
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import (
+    BoundExcludes,
     BoundStated,
     Delivered,
     Dropped,
@@ -120,7 +121,13 @@ class PacketNow:
     app: str = ""
     targets: int = 0
     bound_ns: int = 0
+    excluded: set[int] = field(default_factory=set)
+    """The nodes for which the bound does not hold, because the origin takes them to be gone."""
     got: dict[int, Copy] = field(default_factory=dict)
+
+    def bounded_delays_ns(self) -> list[int]:
+        """The delays of the copies for which the bound holds."""
+        return [copy.delay_ns for node, copy in self.got.items() if node not in self.excluded]
 
 
 class Estimate(NamedTuple):
@@ -206,6 +213,8 @@ class SwarmState:
                     self._generated(record)
                 case BoundStated():
                     self._packet(record.node, record.seq, record.t_ns).bound_ns = record.bound_ns
+                case BoundExcludes():
+                    self._packet(record.node, record.seq, record.t_ns).excluded.add(record.other)
                 case Posed():
                     if not self._by_poses:
                         self._posed(record)
@@ -336,7 +345,7 @@ class SwarmState:
         had = sum(min(one.targets, len(one.got)) for _, one in packets)
         delays = sorted(copy.delay_ns for _, one in packets for copy in one.got.values())
         bounded = self.bounded()
-        kept = sorted(copy.delay_ns for one in bounded for copy in one.got.values())
+        kept = sorted(delay_ns for one in bounded for delay_ns in one.bounded_delays_ns())
         air, late = self.emulator.get("air", {}), self.emulator.get("late", {})
         (since_ns, before_ns), (until_ns, after_ns) = (self._air[0], self._air[-1]) if self._air else ((0, 0), (0, 0))
         return {
@@ -400,8 +409,8 @@ class SwarmState:
             if one.born_ns < self.t_ns - _REMEMBERED_NS:
                 del self.packets[name]
                 if one.bound_ns:
-                    in_time = sum(copy.delay_ns <= one.bound_ns for copy in one.got.values())
-                    self.broken += max(0, one.targets - in_time)
+                    in_time = sum(delay_ns <= one.bound_ns for delay_ns in one.bounded_delays_ns())
+                    self.broken += max(0, one.targets - len(one.excluded) - in_time)
 
     def _packet(self, origin: int, seq: int, born_ns: int) -> PacketNow:
         found = self.packets.get((origin, seq))

@@ -16,6 +16,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.foreign_file import json_of, open_regular
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import (
+    BoundExcludes,
     BoundStated,
     Collided,
     Confirmed,
@@ -203,13 +204,17 @@ def _notable(records: Sequence[Record]) -> Iterator[Event]:
 def _broken(records: Sequence[Record]) -> Iterator[Event]:
     """The first deliveries that came later than the bound of their packet."""
     bounds: dict[tuple[int, int], int] = {}
+    excluded: set[tuple[int, int, int]] = set()
     count = 0
     for record in records:
         if isinstance(record, BoundStated):
             bounds[record.node, record.seq] = record.bound_ns
+        elif isinstance(record, BoundExcludes):
+            excluded.add((record.node, record.seq, record.other))
         elif isinstance(record, Delivered) and count < _MOST_BROKEN:
             bound_ns = bounds.get((record.origin, record.seq))
-            if bound_ns is not None and record.delay_ns > bound_ns:
+            meant = (record.origin, record.seq, record.node) not in excluded
+            if bound_ns is not None and meant and record.delay_ns > bound_ns:
                 count += 1
                 late_ms = (record.delay_ns - bound_ns) / MS
                 text = f"broken bound: packet {record.seq} of UAV {record.origin}, {late_ms:.0f} ms late"

@@ -13,7 +13,7 @@ from textual.widgets import Input, Static, TabbedContent
 
 from fanet_mw.flavors import Mode
 from fanet_mw.mavlink import Encoder
-from fanet_mw.trace import Delivered, Dropped, Generated, LetOut
+from fanet_mw.trace import BoundExcludes, BoundStated, Delivered, Dropped, Generated, LetOut
 from fanet_mw.units import MS, Enu, NodeId, S
 from sim.inspection.inspection import Inspection, of_folder
 from sim.inspection.messages import Messages, fields_of, name_of
@@ -104,6 +104,12 @@ def test_a_packet_is_followed_from_hop_to_hop_to_its_ends() -> None:
         "  hop 2: 9 (20.0 ms)",
         "  ended in node 5 at 1.021 s: hop_limit",
     ]
+
+
+def test_for_whom_a_bound_does_not_hold_stands_beside_it() -> None:
+    packets = Packets()
+    packets.take([BoundStated(S, 4, 7, 50 * MS), BoundExcludes(S, 4, 7, 9), BoundExcludes(S, 4, 7, 2)])
+    assert packets.ways[4, 7].lines()[1] == "  stated to arrive within 50.000 ms, but not at 2, 9, gone"
 
 
 def test_the_oldest_packets_are_forgotten_and_counted() -> None:

@@ -118,16 +118,24 @@ def test_6_11_a_source_that_is_told_searches_again_and_finds_another_way(bench: 
     assert [sent.node for sent in found.data(last, 1)] == [1, 6, 4]
 
 
-def test_6_11_ii_data_without_a_route_is_dropped_and_its_sender_told(bench: MakeBench) -> None:
+@pytest.mark.parametrize("known", [True, False])
+def test_6_11_ii_data_without_a_route_is_dropped_and_its_sender_told_the_newest_number(
+    bench: MakeBench, known: bool
+) -> None:
     found = bench(3)
     found.send(1, 3)
     found.advance(2 * S)
-    stale = found.protocol(2)._table
-    stale.invalidate(stale.active(3, now_ns=found.now_ns), now_ns=found.now_ns)
+    table = found.protocol(2)._table
+    stale = table.active(3, now_ns=found.now_ns)
+    assert stale is not None
+    table.invalidate(stale, now_ns=found.now_ns)
+    number = stale.seq + 1 if known else 0
+    if not known:
+        del table._routes[3]
     found.send(1, 3)
     found.advance(100 * MS)
     assert found.nodes[2].dropped["no_route"] == 1
-    assert [(dst, [u.destination for u in error.unreachable]) for dst, error in errors(found, 2)] == [(1, [3])]
+    assert errors(found, 2) == [(1, RouteError((Unreachable(3, number),)))]
     assert active(found, 1, 3) is None
 
 

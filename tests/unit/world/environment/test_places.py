@@ -23,7 +23,7 @@ from sim.world.engines.rotors.rigid_body import Rotors
 from sim.world.engines.rotors.vehicle_types import IRIS
 from sim.world.environment import footprints, heightmap
 from sim.world.environment.layout import positions
-from sim.world.environment.obstacles import obstacles
+from sim.world.environment.obstacles import Box, Obstacles, obstacles
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors, place
 from sim.world.incidents.incidents import NoFlyEntries
@@ -49,6 +49,15 @@ def test_survivors_in_buildings_are_within_walls(make_scenario: MakeScenario) ->
     assert all(homes)
     assert len({home[0] for home in homes}) > 3
     assert place(scenario) == place(scenario)
+
+
+def test_the_surface_below_is_the_highest_roof_of_those_that_cover_the_place() -> None:
+    quarter = math.pi / 4
+    solids = Solids(Obstacles(None, (Box(0, 0, 40, 10, 12), Box(0, 0, 10, 10, 30), Box(100, 0, 40, 4, 8, quarter))))
+    at = [[0, 0, 50], [15, 0, 50], [15, 0, 3], [15, 6, 50], [100 + 12, 12, 50], [100 + 12, -12, 50]]
+    assert solids.surface_m(np.array(at, dtype=float)).tolist() == pytest.approx([30, 12, 12, 0, 8, 0])
+    assert solids.any
+    assert not Solids(Obstacles(None, ())).any
 
 
 def test_survivors_stand_on_the_hills_and_a_share_of_them_is_buried(make_scenario: MakeScenario) -> None:

@@ -120,6 +120,18 @@ def test_the_outermost_lane_of_a_spiral_flies_at_the_speed_of_the_sweep_and_no_l
     assert min(fastest) > 0.6 * SPEED_M_S
 
 
+@pytest.mark.parametrize("count", [2, 5, 20, 45])
+def test_a_sweep_of_a_spiral_lasts_until_an_arm_is_where_the_next_one_began(count: int) -> None:
+    shape = formed(ShapeName.SPIRAL, count, 1000).shape
+    arms = shape.rows()
+    outermost = arms[0].places[-1]
+    track = [shape.at(outermost, shape.sweep_s * step / 1000) for step in range(1001)]
+    way_m = sum(there.minus(here).norm() for here, there in itertools.pairwise(track))
+    assert 0.95 * SPEED_M_S * shape.sweep_s < way_m < 1.001 * SPEED_M_S * shape.sweep_s
+    if len(arms) > 1:
+        assert track[-1].minus(shape.at(arms[1].places[-1], 0.0)).norm() < 0.01
+
+
 def test_a_spiral_of_few_has_seen_the_middle_first() -> None:
     pattern = formed(ShapeName.SPIRAL, 2, 1000)
     eighth_s = pattern.shape.sweep_s / 8

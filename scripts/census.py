@@ -24,7 +24,9 @@ SMALL_LINES: Final = 60
 WORDS: Final = 10
 SENTENCES: Final = 4
 ATTRIBUTES: Final = 15
-WRITTEN: Final = re.compile(r"<!-- (?:[a-z]+: )?([\w-]+):? (?:generated )?by scripts/.*?<!-- end of \1 -->", re.DOTALL)
+WRITTEN: Final = re.compile(
+    r"<!-- (?:[a-z]+: )?([\w-]+):? (?:generated )?by (?:python tests|scripts)/.*?<!-- end of \1 -->", re.DOTALL
+)
 """A part of a page that a command of ours writes between its marks."""
 
 

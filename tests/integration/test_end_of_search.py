@@ -21,7 +21,13 @@ KEYS = {
 def test_after_the_last_sweep_all_land_where_they_started_and_wait_one_sweep_for_who_is_still_sought(
     make_scenario: Callable[..., Scenario], sweeps: int, camera_hz: float, passes: int | None
 ) -> None:
-    keys = {**KEYS, "mission.sweeps": sweeps, "sensors.camera_hz": camera_hz, "sensors.camera_fov_deg": 90.0}
+    keys = {
+        **KEYS,
+        "duration_s": 130 if passes else 70,
+        "mission.sweeps": sweeps,
+        "sensors.camera_hz": camera_hz,
+        "sensors.camera_fov_deg": 90.0,
+    }
     records = simulate(make_scenario(**keys)).records
     modes = [r for r in records if isinstance(r, MissionModeChanged)]
     began_s = min(r.t_ns for r in modes if r.mode == "search") / S

@@ -21,9 +21,9 @@ def run(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize(
     ("package", "kind"),
     [
-        ("agents", "package"), ("emulator", "module"),
+        ("emulator", "module"),
         *slow(
-            ("sim", "folder"),
+            ("agents", "package"), ("sim", "folder"),
             ("agents", "folder"), ("agents", "module"), ("sim", "package"), ("sim", "module"), ("emulator", "package"),
             ("emulator", "folder"),
         ),

@@ -39,7 +39,7 @@ def ends(tmp_path: Path, call: str, kind: str, what: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "what"), [("spawn", "daemon"), ("forkserver", "pool"), *slow(("spawn", "pool"), ("forkserver", "daemon"))]
+    ("kind", "what"), [("forkserver", "pool"), *slow(("spawn", "daemon"), ("spawn", "pool"), ("forkserver", "daemon"))]
 )
 def test_a_program_whose_own_processes_live_ends_although_we_were_looked_up(
     tmp_path: Path, kind: str, what: str

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import pytest
+from kit import slow
 
 from fanet_mw import wire
 from fanet_mw.application import Application, Data, Fate, Received, Status
@@ -122,12 +123,12 @@ WITH_REPORTS = ["mission.survivors=1", "mission.report_bytes=900", "traffic.payl
 @pytest.mark.parametrize(
     "settings",
     [
-        ["clusters.relay=scheduled"],
+        *slow(["clusters.relay=scheduled"]),
         ["clusters.relay=scheduled", *WITH_REPORTS],
         ["clusters.relay=scheduled", *WITH_REPORTS, "mission.report_priority=bulk"],
         ["clusters.relay=scheduled", "routing.aggregate=true"],
         ["clusters.relay=scheduled", "clusters.links=measured"],
-        ["clusters.relay=claimed"],
+        *slow(["clusters.relay=claimed"]),
         ["clusters.relay=claimed", *WITH_REPORTS],
         ["clusters.relay=claimed", "routing.aggregate=true"],
         ["clusters.relay=all"],

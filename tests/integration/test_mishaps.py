@@ -4,6 +4,7 @@ import json
 from collections.abc import Mapping
 
 import pytest
+from kit import slow
 
 from fanet_mw.scenario import config
 from fanet_mw.trace import Delivered, FlightModeChanged, Generated, MissionModeChanged, Posed, RadioFault
@@ -79,7 +80,7 @@ def test_a_program_that_ends_says_nothing_and_takes_part_again_when_it_is_starte
     assert summary["copies"]["closes"]
 
 
-@pytest.mark.parametrize("offset_m", [[30, 0, 0], None])
+@pytest.mark.parametrize("offset_m", [[30, 0, 0], *slow(None)])
 def test_a_receiver_that_is_wrong_leads_astray_and_one_that_is_silent_says_nothing(
     plain: Outcome, offset_m: list[int] | None
 ) -> None:

@@ -180,4 +180,8 @@ def test_the_way_of_a_packet_is_as_the_architecture_says() -> None:
 
 
 if __name__ == "__main__":
-    print("\n".join(rows({kind: trace() for kind, trace in WAYS.items()})))
+    page = ROOT / "ARCHITECTURE.md"
+    before, after = (part := page.read_text().partition("<!-- end of way -->"))[0], "".join(part[1:])
+    head = "| packet | direction | files |\n|---|---|---|\n"
+    table = "".join(f"{row}\n" for row in rows({kind: trace() for kind, trace in WAYS.items()}))
+    page.write_text(before[: before.index(head) + len(head)] + table + after)

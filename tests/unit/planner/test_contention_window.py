@@ -1,6 +1,7 @@
 """Hellos and the window in which they contend."""
 
 import pytest
+from kit import slow
 
 from fanet_mw.graph.topology import within_range
 from fanet_mw.units import MS, Enu, NodeId
@@ -63,7 +64,7 @@ def test_hellos_that_no_turn_holds_contend_always() -> None:
     assert claimed_hellos_ns(short, crowd) == 2 * claimed_hellos_ns(long, crowd)
 
 
-@pytest.mark.parametrize(("contention_ms", "fits"), [(10, True), (6, False)])
+@pytest.mark.parametrize(("contention_ms", "fits"), [*slow((10, True)), (6, False)])
 def test_claimed_slots_lose_packets_where_the_plan_says_that_the_hellos_do_not_fit(
     contention_ms: float, *, fits: bool
 ) -> None:

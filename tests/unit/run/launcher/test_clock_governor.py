@@ -173,7 +173,7 @@ FREE = 3.0
 """What the machine gets done without the load: it runs the swarm in a third of its time."""
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=20)
 @given(st.floats(0.3, 0.95), st.integers(0, 40), st.sampled_from([alone, beside_others]))
 def test_under_a_load_the_pace_settles_near_what_it_allows_and_returns_within_30_s(
     capacity: float, from_s: int, taken: Taken
@@ -193,7 +193,7 @@ def test_under_a_load_the_pace_settles_near_what_it_allows_and_returns_within_30
     assert len(machine.history) == falls_before, "and there it stays"
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=20)
 @given(st.lists(st.tuples(st.floats(10.5, 30), st.floats(0.02, 0.145)), max_size=12), st.floats(2.0, 4.0))
 def test_pauses_of_which_the_lead_covers_most_pass(pauses: list[tuple[float, float]], capacity: float) -> None:
     """Pauses of: the seconds since the one before, and its length."""

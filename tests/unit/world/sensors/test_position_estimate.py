@@ -28,7 +28,7 @@ def flying(make_scenario: MakeScenario, seed: int = 1, **keys: Any) -> Flying:
 
 def misses_m(make_scenario: MakeScenario, **keys: Any) -> np.ndarray:
     """By how much UAVs miss the places to which they were sent [runs, 3]; one UAV of each run."""
-    return np.array([flying(make_scenario, seed, **keys).fly(60).at(1) - [100, 20, 40] for seed in range(12)])
+    return np.array([flying(make_scenario, seed, **keys).fly(30).at(1) - [100, 20, 40] for seed in range(12)])
 
 
 def test_a_uav_flies_to_where_its_gps_says_that_the_place_is(make_scenario: MakeScenario) -> None:
@@ -92,7 +92,7 @@ def test_dead_reckoning_drifts_as_integrals_of_gauss_markov_processes_do(
 def test_a_return_and_the_geofence_go_by_the_estimate(make_scenario: MakeScenario) -> None:
     keys = {"sensors.gps_common_m": 40.0, "mobility.geofence": "return", "mobility.return_height_m": 30.0}
     off = []
-    for seed in range(6):
+    for seed in range(4):
         made = flying(make_scenario, seed, **keys).fly(20)
         made.ask(1, SetpointKind.RETURN)
         off.append(made.fly(80).at(1) - [-50, 0, 0])

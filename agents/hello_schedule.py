@@ -40,10 +40,12 @@ class HelloSchedule:
         """The instant at which the last hello of each other node was received."""
 
     def start(self, now_ns: int) -> None:
-        """Choose the instant of the first hello, at random within the first interval."""
+        """Choose the instant of the first hello: at random within the first interval, or as the protocol says."""
         if self._interval_ns:
-            first_ns = now_ns + self._lead_ns + int(self._random() * self._interval_ns)
-            self._next_ns = self._node.hello_due_ns(first_ns)
+            earliest_ns = now_ns + self._lead_ns
+            self._next_ns = self._node.first_hello_ns(
+                earliest_ns, earliest_ns + int(self._random() * self._interval_ns)
+            )
 
     def due_ns(self) -> int | None:
         """The instant at which the next hello must be announced to the radio."""

@@ -9,11 +9,11 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from agents.applications.conflict_monitor import ConflictMonitor
-from agents.positioning.received_motion import motion_in
 from fanet_mw import mavlink, wire
 from fanet_mw.application import Application, AppPort, Course, Received
 from fanet_mw.bus.messages import Gps
 from fanet_mw.motion import Motion
+from fanet_mw.node.received_motion import motion_in
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Warned
 from fanet_mw.units import NodeId

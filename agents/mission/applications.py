@@ -14,7 +14,6 @@ from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.mission.outbox import Outbox
 from agents.mission.paper_rule import PaperRule
 from agents.mission.searcher import Searcher, phone_model
-from agents.positioning.received_motion import motion_in
 from fanet_mw.application import Application, AppPort, Received
 from fanet_mw.bus.messages import (
     Altimeter,
@@ -30,6 +29,7 @@ from fanet_mw.bus.messages import (
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.mavlink import Geodetic
 from fanet_mw.node.reader import decoded
+from fanet_mw.node.received_motion import motion_in
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId
 from fanet_mw.wire import BIDS, COVERED, FOUND, ORDER, ROLL, SEARCH, STATUS, SURVIVOR

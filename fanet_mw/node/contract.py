@@ -118,6 +118,12 @@ class RoutingProtocol(ABC):
         """Transmit a hello of this node; returns the sequence number of the transmit request."""
         return self._port.transmit(packet.frame, BROADCAST, start_ns=start_ns, wants_status=wants_status)
 
+    def first_hello_ns(self, earliest_ns: int, start_ns: int) -> int:
+        """The instant for which the node's first hello is to be made: at or after `start_ns`, which is at random within
+        the first interval, or sooner if hellos cannot collide.
+        """
+        return self.hello_due_ns(start_ns)
+
     def hello_due_ns(self, start_ns: int) -> int:
         """The instant, at or after `start_ns`, for which the node's next hello is to be made."""
         return start_ns

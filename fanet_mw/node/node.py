@@ -210,6 +210,10 @@ class Node:
         request = self._protocol.send_hello(packet, start_ns=start_ns, wants_status=time is not None, now_ns=now_ns)
         return AnnouncedHello(request, packet.header.seq)
 
+    def first_hello_ns(self, earliest_ns: int, start_ns: int) -> int:
+        """The instant for which the first hello is to be made; `RoutingProtocol.first_hello_ns`."""
+        return self._protocol.first_hello_ns(earliest_ns, start_ns)
+
     def hello_due_ns(self, start_ns: int) -> int:
         """The instant, at or after `start_ns`, for which the next hello is to be made."""
         return self._protocol.hello_due_ns(start_ns)

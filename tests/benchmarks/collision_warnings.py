@@ -17,7 +17,7 @@ CASES: tuple[tuple[str, ...], ...] = (
     ("mission.collision_horizon_s=0",),
     (),
     ("traffic.interval_s=1",),
-    ("clusters.relay=counter",),
+    ("routing.protocol=clustered", "clusters.relay=counter", "clusters.repair_s=10"),
 )
 
 

@@ -133,6 +133,18 @@ def test_clocks_that_fit_the_slack_of_turns_leave_all_bounds_as_they_were() -> N
     assert bound["stated_share"] == bound["within_share"] == 1.0
 
 
+def test_bounds_do_not_count_on_those_who_fly_away() -> None:
+    """UAVs that mix at 20 m/s on 700 m leave each other's range all the time, and often the swarm."""
+    mixing = {"model": "random_waypoint", "speed_m_s": 20.0}
+    summary = flown(
+        seed=3, duration_s=30, nodes={"layout": "disc", "spacing_m": 100, "telemetry_hz": 1}, world={"area_m": 700},
+        mobility=mixing, rounds={"bulk_share": 0},
+    )  # fmt: skip
+    bound = summary["bound"]
+    assert bound["stated_share"] > 0.8
+    assert bound["violations"] == 0
+
+
 ONE: dict[str, Any] = {"priority": "bulk", "payload_bytes": 1024, "destination": 1, "interval_s": 0.5}
 
 
@@ -153,7 +165,7 @@ def test_bulk_for_one_finds_its_way_in_a_swarm_that_mixes(speed_m_s: float) -> N
     mixing = {"model": "random_waypoint", "speed_m_s": speed_m_s}
     lives = {"duration_s": 30, "drain_s": 7, "routing": {"lifetime_s": 6}}
     summary = to_one(traffic=ONE, mobility=mixing, world={"area_m": 500}, **lives)
-    assert summary["reachable"]["traffic"]["pdr"] == 1.0
+    assert summary["reachable"]["traffic"]["pdr"] >= 0.99
     assert summary["frames"]["closes"]
 
 

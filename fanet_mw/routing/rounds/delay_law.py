@@ -8,13 +8,13 @@ the turn, and is handed over. `h` is the greatest distance that the node knows t
 that changes meanwhile. All urgent packets that are under way together, `B` bytes, delay each other once: every node
 serves them at the same rate, `room` bytes of a frame per round, so what waited for one node's turn does not wait
 again for the next one's (tandem of equal servers; Le Boudec and Thiran, Network Calculus, 1.4.3).
-Assumed: no frame is lost, so over any channel but `range` no bound is stated. None is stated either while clocks may be
-further apart than the slack of turns holds, while more was heard than the turns of that time carry, or of late more
-than three quarters of what they carry, or while a node has been out of reach for less than the silence by which it is
-known to be gone; nodes gone for longer are not among those to which a bound applies.
+Assumed: no frame is lost, so over any channel but `range` no bound is stated. None is stated either while clocks may
+be further apart than the slack of turns holds, while more waits for turns, everywhere alike, than three quarters of
+`rounds.burst_bytes`, or while no way has been found yet to a node that may only just have started. A bound does not
+apply to nodes without a way, and counts on links that will last only (`lasting_links.py`). What waits follows from what
+was heard, because all nodes hear the same packets and serve them at the same rate (a leaky bucket).
 """
 
-from collections import deque
 from collections.abc import Sequence
 from typing import Final
 
@@ -30,8 +30,6 @@ MARGIN_HOPS: Final = 2
 MOST_HOPS: Final = 32
 """The hops for which a statement about links lives at least."""
 _SILENT_HELLOS: Final = 1.6
-_LATELY: Final = 4
-"""What came within so many times that in which a burst is served came lately."""
 _MOST_USED: Final = 0.75
 
 
@@ -54,12 +52,30 @@ class DelayLaw:
         self.silent_ns = round(_SILENT_HELLOS * hello_ns) + self.hop_ns
         """A neighbor that was not heard for so long is none."""
         self.epoch_ns = max(hello_ns // 4, 1)
-        self._recent: deque[tuple[int, int]] = deque()
-        """(instant, size) of the urgent packets that came lately."""
+        self._waiting_bytes = 0.0
+        self._greatest = 0
+        """The size of the greatest of the packets that wait."""
+        self._counted_ns = 0
+        """The instant for which that is known."""
 
     def count(self, size: int, *, now_ns: int) -> None:
         """An urgent packet came, own or another node's."""
-        self._recent.append((now_ns, size))
+        self._serve(now_ns)
+        self._waiting_bytes += size
+        self._greatest = max(self._greatest, size)
+
+    def _serve(self, now_ns: int) -> None:
+        """Each round has carried a turn's worth of what waited."""
+        served = self._sure_bytes * (now_ns - self._counted_ns) / self._timing.period_ns
+        self._waiting_bytes -= served
+        self._counted_ns = now_ns
+        if self._waiting_bytes <= 0:
+            self._waiting_bytes, self._greatest = 0.0, 0
+
+    @property
+    def _sure_bytes(self) -> int:
+        """What a turn carries at least of packets that wait: none is divided, so its end may be empty."""
+        return max(1, self._room - self._greatest + 1)
 
     def bound_ns(self, topology: Topology, *, clock_error_ns: int, now_ns: int) -> int | None:
         """The bound for a packet that is handed over now, if all clocks are within `clock_error_ns`; None if none can
@@ -67,27 +83,18 @@ class DelayLaw:
         """
         if not clocks_fit(self._clock, slack_ns=self._slack_ns, clock_error_ns=clock_error_ns):
             return None
-        while self._recent and self._recent[0][0] < now_ns - _LATELY * self._burst_ns:
-            self._recent.popleft()
-        sizes = [size for at_ns, size in self._recent if at_ns >= now_ns - self._burst_ns]
-        if self._turns_for(sizes) > self._burst_turns:
-            return None
-        if self._turns_for([size for _, size in self._recent]) > _MOST_USED * _LATELY * self._burst_turns:
+        self._serve(now_ns)
+        if self._waiting_bytes > _MOST_USED * self._burst_turns * self._sure_bytes:
             return None
         if self.absent(topology, now_ns=now_ns) is None:
             return None
         hops = topology.hops(now_ns)
         return self.over_ns(max(hops.values())) if len(hops) > 1 else None
 
-    def _turns_for(self, sizes: Sequence[int]) -> int:
-        """The turns that packets need at most: none is divided, so the end of each turn may be empty."""
-        sure = self._room - max(sizes, default=0) + 1
-        return min(len(sizes), -(-sum(sizes) // sure)) if sure > 0 else len(sizes)
-
     def over_ns(self, hops: int) -> int | None:
         """The bound over so many hops; None if the channel loses frames."""
         return None if self._loses_frames else (hops + MARGIN_HOPS) * self.hop_ns + self._burst_ns
 
     def absent(self, topology: Topology, *, now_ns: int) -> Sequence[NodeId] | None:
-        """The nodes to which a bound does not apply, because they are gone; None while some may just have gone."""
+        """The nodes to which a bound does not apply, because no way leads to them; None while one may yet be found."""
         return topology.absent(now_ns, doubt_ns=self.silent_ns)

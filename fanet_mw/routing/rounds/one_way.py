@@ -48,7 +48,9 @@ class OneWay:
 
     def send(self, packet: Packet, *, near: int, from_ns: int, now_ns: int, tried: int = 0) -> bool:
         """Hand a packet to a neighbor that is nearer to its destination, among `near`; False if there is none."""
-        nearer = self._topology.nearer(NodeId(packet.header.destination)) & near & ~tried
+        destination = NodeId(packet.header.destination)
+        itself = 1 << (destination - 1)
+        nearer = (itself if near & itself else self._topology.nearer(destination)) & near & ~tried
         if not nearer:
             return False
         hop = max(nodes_of(nearer), key=lambda node: self._heard_ns.get(node, 0))

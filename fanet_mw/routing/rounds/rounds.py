@@ -17,14 +17,18 @@ from typing import ClassVar, Final
 
 from fanet_mw.bus.messages import Reception, TxStatus
 from fanet_mw.errors import DropReason
+from fanet_mw.geodesy import Geodetic
+from fanet_mw.motion import Motion
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.duplicates import key_of, key_of_packet, origin_and_seq
 from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.packet import Packet
 from fanet_mw.node.reader import decoded
+from fanet_mw.node.received_motion import motion_in
 from fanet_mw.routing.packet_repair import FLOOD_OVER_NS, Repair
 from fanet_mw.routing.rounds.bulk_slots import BulkSlots
 from fanet_mw.routing.rounds.delay_law import MOST_HOPS, DelayLaw
+from fanet_mw.routing.rounds.lasting_links import LastingLinks
 from fanet_mw.routing.rounds.one_way import OneWay
 from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.routing.rounds.spreading import Spreading
@@ -56,6 +60,8 @@ _MOST_ROUNDS: Final = 8
 """The rounds that a node lets pass at most before it repeats bulk once more."""
 _FLOOD_HOPS: Final = 4
 """A node that comes near has got elsewhere what is older than so many hops."""
+_LASTING_HOPS: Final = 8
+"""A link counts if it lasts until its end would be noticed, and a packet has gone so many hops after that."""
 _MUCH_BULK: Final = 4
 """A node with so many bulk packets takes part in all bulk slots until they are sent."""
 _SPREAD_SLOTS: Final = 1.0
@@ -84,6 +90,12 @@ class RoundFlooding(RoutingProtocol):
             epoch_ns=self._law.epoch_ns,
             lifetime_ns=self._law.silent_ns + MOST_HOPS * self._law.hop_ns,
         )
+        self._place = Geodetic(*scenario.world.origin_deg, 0.0)
+        self._lasting = None
+        if radio.channel == "range":
+            self._lasting = LastingLinks(
+                range_m=radio.range_m, horizon_ns=self._law.silent_ns + _LASTING_HOPS * self._law.hop_ns
+            )
         self._spreading = Spreading(
             capacity=scenario.routing.queue_frames, repeats=rounds.repeats, patience_ns=self._law.hop_ns,
             links=self._topology.links,
@@ -109,6 +121,8 @@ class RoundFlooding(RoutingProtocol):
         """The instant from which that slot was sought."""
         self._slot_by: tuple[int, int, bool] | None = None
         """The neighbors, the state of the topology, and the part in slots, by which it was found."""
+        self._gone = 0
+        """The neighbors that have left, though they were heard lately."""
         self._clock_hellos: set[int] = set()
         """The requests of hellos of which the clock wants to know when they ended."""
         self._held: dict[HeldPacket, None] = {}
@@ -240,7 +254,7 @@ class RoundFlooding(RoutingProtocol):
         if hello is not None and self._hello_waits >= _PATIENT_TURNS:
             room -= self._add_hello(together)
         kept = self._law.kept_bytes if self._topology.has_news else 0
-        for packet in self._spreading.wanted(self._neighbors(now_ns), start_ns=turn_ns):
+        for packet in self._spreading.wanted(self._neighbors(now_ns), gone=self._gone, start_ns=turn_ns):
             if self._expired(packet, turn_ns):
                 continue
             size = len(packet.frame)
@@ -359,7 +373,7 @@ class RoundFlooding(RoutingProtocol):
                 room -= len(urgent.frame)
                 together.append(urgent)
         neighbors = self._neighbors(now_ns)
-        while (packet := self._spreading.next_bulk(neighbors, start_ns=slot_ns)) is not None:
+        while (packet := self._spreading.next_bulk(neighbors, gone=self._gone, start_ns=slot_ns)) is not None:
             if self._expired(packet, slot_ns):
                 continue
             if len(packet.frame) > room:
@@ -413,7 +427,19 @@ class RoundFlooding(RoutingProtocol):
             self._near_until_ns = min(near.values(), default=now_ns) + self._law.silent_ns
         return self._near
 
+    def _stayers(self, now_ns: int) -> int:
+        """The neighbors with which this node has links that will last."""
+        near = self._neighbors(now_ns)
+        if self._lasting is None:
+            return near
+        own = Motion(self._port.position, self._port.velocity, now_ns)
+        self._gone = self._lasting.gone(near, own)
+        return self._lasting.among(near, own)
+
     # --- hellos ---------------------------------------------------------------------------------------------------
+
+    def first_hello_ns(self, earliest_ns: int, start_ns: int) -> int:
+        return self.hello_due_ns(earliest_ns)
 
     def hello_due_ns(self, start_ns: int) -> int:
         return self._timing.turn_start_ns(self._port.node, from_ns=start_ns) - _BEFORE_TURN_NS
@@ -441,6 +467,10 @@ class RoundFlooding(RoutingProtocol):
 
     def on_hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         self._hears(reception.src, now_ns)
+        if self._lasting is not None:
+            told = motion_in(packet.frame, own=self._port.node, now_ns=now_ns, place=self._place)
+            if told is not None:
+                self._lasting.hear(*told)
         digest = decoded(packet.frame, Digest.decode_frames) if self._repair else None
         if self._repair and digest:
             self._repair.on_digest(digest, now_ns=now_ns)
@@ -463,7 +493,7 @@ class RoundFlooding(RoutingProtocol):
         if now_ns >= self._topology.next_epoch_ns():
             waiting = self._spreading.ready_bulk()
             self._often = self._topology.dominates() or waiting >= (1 if self._often else _MUCH_BULK)
-            self._topology.state(self._neighbors(now_ns), often=self._often, now_ns=now_ns)
+            self._topology.state(self._stayers(now_ns), often=self._often, now_ns=now_ns)
         self._repair_due(now_ns)
         if self._slot_ns is not None and self._slot_ns - self._lead_ns <= now_ns:
             self._use_slot(self._slot_ns, now_ns)

@@ -215,8 +215,10 @@ class Spreading:
 
     # --- what is sent ---------------------------------------------------------------------------------------------
 
-    def wanted(self, neighbors: int, *, start_ns: int) -> list[Packet]:
-        """The urgent packets for the turn at `start_ns`, in order; those that nobody lacks are forgotten."""
+    def wanted(self, neighbors: int, *, start_ns: int, gone: int = 0) -> list[Packet]:
+        """The urgent packets for the turn at `start_ns`, in order; those that nobody lacks are forgotten. For neighbors
+        that are `gone` nothing is sent again.
+        """
         patient_ns = start_ns - self._patience_ns
         done = []
         for key, entry in self._urgent.items():
@@ -224,6 +226,8 @@ class Spreading:
                 continue
             if entry.sent > self._repeats or not neighbors & ~entry.having:
                 done.append((key, entry))
+            elif not neighbors & ~gone & ~entry.having:
+                continue
             elif entry.sent_ns <= patient_ns and entry.copy_ns <= patient_ns:
                 self._waiting.add(key)
         for key, entry in done:
@@ -266,8 +270,10 @@ class Spreading:
         self._remove(key)
         return fresh
 
-    def next_bulk(self, neighbors: int, *, start_ns: int) -> Packet | None:
-        """The bulk packet for a frame that starts at `start_ns`, what is new first; what nobody lacks is forgotten."""
+    def next_bulk(self, neighbors: int, *, start_ns: int, gone: int = 0) -> Packet | None:
+        """The bulk packet for a frame that starts at `start_ns`, what is new first; what nobody lacks is forgotten. For
+        neighbors that are `gone` nothing is sent again.
+        """
         while self._due and self._due[0][0] <= start_ns:
             from_ns, key = heappop(self._due)
             entry = self._bulk.get(key)
@@ -282,6 +288,8 @@ class Spreading:
                 self._settle(key, entry)
                 continue
             next_ns = self._not_before_ns(entry, neighbors, start_ns)
+            if entry.sent and not neighbors & ~gone & ~entry.having:
+                next_ns = start_ns + self._patience_ns
             if next_ns <= start_ns:
                 return entry.packet
             self._look(entry, key, next_ns)

@@ -58,6 +58,8 @@ class Topology:
         """The state of the links for which this node decided whether it is in the dominating set."""
         self._unreached_ns: dict[NodeId, int] = {}
         """The instant since which each node without a way is known to have none."""
+        self._known = 0
+        """The nodes to which there has been a way."""
         self._rivals: list[tuple[NodeId, bool]] = []
         self._rivals_for: tuple[int, int] | None = None
         """The neighbors, and the state of what is known, for which the rivals were found."""
@@ -83,6 +85,8 @@ class Topology:
             self._forget(node)
         self._arrange(now_ns)
         known = self._stated.get(self._node)
+        if known is None and not heard:
+            return  # nobody would learn anything
         if (
             known is None
             or (known.heard, known.often) != (heard, often)
@@ -156,6 +160,7 @@ class Topology:
             reached |= ring
         since, away = self._unreached_ns, nodes_of(~reached & (1 << self._count) - 1)
         self._unreached_ns = {node: since.get(node, now_ns) for node in away}
+        self._known |= reached
 
     def hops(self, now_ns: int) -> Mapping[NodeId, int]:
         """The hops to each node to which a way is known, this node included."""
@@ -195,8 +200,8 @@ class Topology:
 
     @property
     def is_partial(self) -> bool:
-        """True while this node has links, and there are nodes of which it has not heard, or has not heard for long."""
-        return len(self._stated) < self._count and self.links[self._node] != 0
+        """True while this node has links, and there are nodes to which it knows no way."""
+        return bool(self._unreached_ns) and self.links[self._node] != 0
 
     def rivals(self, near: int) -> list[tuple[NodeId, bool]]:
         """The nodes within two hops, if this node hears `near`, and whether each takes part in bulk slots often."""
@@ -218,10 +223,11 @@ class Topology:
         return self._dominates
 
     def absent(self, now_ns: int, *, doubt_ns: int) -> Sequence[NodeId] | None:
-        """The nodes to which there has been no way for longer than `doubt_ns`; None while there is a node to which
-        there is none for less.
+        """The nodes to which there is no way any more, or has been none for longer than `doubt_ns`; None while there is
+        a node to which none has been found yet.
         """
         self._arrange(now_ns)
-        if any(since_ns > now_ns - doubt_ns for since_ns in self._unreached_ns.values()):
+        unreached = self._unreached_ns
+        if any(since > now_ns - doubt_ns and not self._known >> (node - 1) & 1 for node, since in unreached.items()):
             return None
-        return tuple(self._unreached_ns)
+        return tuple(unreached)

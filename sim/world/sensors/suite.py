@@ -91,7 +91,7 @@ def uses_fixes(scenario: Scenario) -> bool:
     """True if any application uses position fixes."""
     moves = scenario.mobility.model != "static"
     protocol = scenario.routing.protocol
-    by_places = protocol == "geographic" or (protocol == "clustered" and moves) or protocol not in PROTOCOLS
+    by_places = protocol == "geographic" or (protocol in ("clustered", "rounds") and moves) or protocol not in PROTOCOLS
     return (
         scenario.nodes.telemetry_hz > 0
         or scenario.clock.sync == "gps"

@@ -2,9 +2,9 @@
 
 import pytest
 
-from agents.positioning.received_motion import motion_in
 from fanet_mw.mavlink import ORIGIN, Encoder
 from fanet_mw.motion import Motion
+from fanet_mw.node.received_motion import motion_in
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
 from fanet_mw.wire import PRIORITY_CONTROL, Header, Kind
 

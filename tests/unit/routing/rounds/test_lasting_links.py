@@ -1,0 +1,49 @@
+"""Which links last: by where both nodes are, and how they fly."""
+
+import pytest
+
+from fanet_mw.motion import Motion
+from fanet_mw.routing.rounds.lasting_links import LastingLinks
+from fanet_mw.units import STILL, Enu, NodeId, S
+
+OTHER = NodeId(3)
+BIT = 1 << (OTHER - 1)
+OWN = Motion(Enu(0.0, 0.0, 50.0), Enu(10.0, 0.0, 0.0), 0)
+
+
+@pytest.mark.parametrize(
+    ("at_m", "speed_m_s", "lasts"),
+    [
+        (240.0, 10.0, True),  # flies along, however near the edge
+        (-200.0, 10.0, True),
+        (100.0, -10.0, True),  # comes, passes, and is near after that
+        (-150.0, -10.0, False),  # 150 m behind, both fly away from each other: 250 m after 5 s
+        (240.0, 9.0, True),  # comes nearer
+        (240.0, 20.0, False),
+        (260.0, 10.0, False),  # out of range already
+    ],
+)
+def test_a_link_lasts_if_both_are_in_range_for_the_horizon(at_m: float, speed_m_s: float, lasts: bool) -> None:
+    links = LastingLinks(range_m=250.0, horizon_ns=6 * S)
+    links.hear(OTHER, Motion(Enu(at_m, 0.0, 50.0), Enu(speed_m_s, 0.0, 0.0), 0))
+    assert links.among(BIT | 1, OWN) == (BIT if lasts else 0) | 1
+
+
+def test_a_link_that_was_given_up_counts_again_only_with_a_margin() -> None:
+    links = LastingLinks(range_m=250.0, horizon_ns=6 * S)
+    leaving = Motion(Enu(200.0, 0.0, 50.0), Enu(20.0, 0.0, 0.0), 0)
+    links.hear(OTHER, leaving)
+    assert not links.among(BIT, OWN)
+    links.hear(OTHER, leaving._replace(velocity=Enu(17.0, 0.0, 0.0)))
+    assert not links.among(BIT, OWN), "it lasts for 6 s now, but not for 9"
+    links.hear(OTHER, leaving._replace(velocity=Enu(12.0, 0.0, 0.0)))
+    assert links.among(BIT, OWN)
+
+
+def test_who_should_be_out_of_range_by_now_is_gone() -> None:
+    links = LastingLinks(range_m=250.0, horizon_ns=6 * S)
+    links.hear(OTHER, Motion(Enu(200.0, 0.0, 50.0), Enu(20.0, 0.0, 0.0), 0))
+    still = OWN._replace(velocity=STILL)
+    assert not links.gone(BIT, still._replace(at_ns=2 * S))
+    assert links.gone(BIT, still._replace(at_ns=3 * S)) == BIT
+    assert not links.gone(1, still._replace(at_ns=3 * S))

@@ -102,6 +102,9 @@ def files(photos: Photographer, folder: Path, at_s: float, *, name: str) -> None
     def look(page: Any, _ending: str) -> None:  # noqa: ANN401
         page.wait_for_timeout(9000)
         without_warning(page)
+        if name == "html":
+            page.locator("button").first.click()  # pause, and let the drawing catch up
+            page.wait_for_timeout(9000)
 
     photos.take(f"file-{name}", path.resolve().as_uri() + ending, look)
 

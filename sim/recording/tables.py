@@ -89,7 +89,7 @@ def _deliveries(outcome: Outcome, _: Path | None) -> Iterator[Row]:
             had.add((one.node, one.origin, one.seq))
         yield (
             one.t_ns / S, one.node, one.origin, one.seq, app, one.delay_ns / MS, one.hops, one.handover_ns / MS,
-            _bound_ms(packet), counts,
+            None if packet is not None and one.node in packet.excluded else _bound_ms(packet), counts,
         )  # fmt: skip
 
 

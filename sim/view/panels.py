@@ -238,7 +238,7 @@ class Panels:
             scene.size_m = float(size.value)
 
         size.on_update(self.later(resize))
-        gui.add_html(_box(_legend(by_cluster=scene.clustered, links_known=not scene.by_range)))
+        gui.add_html(_box(legend(by_cluster=scene.clustered, links_known=not scene.by_range)))
 
     def _follow(self, wanted: bool) -> None:
         self._follows = wanted
@@ -439,7 +439,7 @@ def _dot(color: str) -> str:
     return f"<span style='color:{color}'>&#9679;</span>"
 
 
-def _legend(*, by_cluster: bool, links_known: bool) -> str:
+def legend(*, by_cluster: bool, links_known: bool) -> str:
     """What the colors mean."""
     bars = ((colors.BLUE, "90 % received"), (colors.ORANGE, "half"), (colors.RED, "less"))
     links = ", ".join(f"<nobr><span style='color:{color}'>&#9644;</span> {said}</nobr>" for color, said in bars)

@@ -1,5 +1,6 @@
 """`fanet replay`: a finished run in the same scene, with time to go through, or as one file that needs no network."""
 
+import html
 import time
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
@@ -7,11 +8,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, S
 from fanet_mw.whole_file import replace_file
 from sim.observation.bus_feed import Paced
 from sim.observation.timeline import Timeline
-from sim.view.panels import Panels
+from sim.view.panels import Panels, legend
 from sim.view.scene import Scene
 from sim.view.server import HOST, Sight, close_server, look_over, open_server, sight
 
@@ -121,6 +123,18 @@ def _step_back(seen: Sight) -> str:
     return f"if (innerWidth < innerHeight && !location.search) location.search = '?initialCameraPosition={eye}'"
 
 
+def _caption(scenario: Scenario, scene: Scene) -> str:
+    """What a file says beside its scene: whose run it is, how fast it plays, and what the colors mean."""
+    said = legend(by_cluster=scene.clustered, links_known=not scene.by_range)
+    return (
+        "<details open style='position: fixed; top: 8px; left: 8px; max-width: min(27em, 90vw); padding: 6px 10px; "
+        "background: #fffd; border-radius: 6px; font: 13px/1.45 sans-serif; z-index: 1'><summary>"
+        f"<b>{html.escape(scenario.name)}</b>, seed {scenario.seed}, {len(scenario.node_ids)} nodes; "
+        f"plays {FILE_SPEED:g} swarm seconds a second</summary>{said}</details>"
+        "<script>if (innerWidth < 700) document.querySelector('details').open = false</script>"
+    )
+
+
 def write_html(folder: Path, path: Path, *, tell: Callable[[str], None]) -> None:
     """Write the scene of a run as one file that plays without a network; raises ConfigError."""
     timeline = Timeline(folder)
@@ -139,7 +153,8 @@ def write_html(folder: Path, path: Path, *, tell: Callable[[str], None]) -> None
             server.flush()
             serializer.insert_sleep(step_ns / S / FILE_SPEED)
         page = serializer.as_html().replace("<head>", f"<head><script>{_step_back(sight(scene))}</script>", 1)
-        replace_file(path, page.encode())
+        caption = _caption(timeline.scenario, scene)
+        replace_file(path, page.replace('<div id="root"></div>', f'<div id="root"></div>{caption}', 1).encode())
     except OSError as error:
         raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
     finally:

@@ -8,6 +8,7 @@ from fanet_mw.trace import BoundExcludes, BoundStated, Delivered
 from fanet_mw.units import S
 from sim.observation.swarm_state import SwarmState
 from sim.observation.timeline import Timeline
+from sim.recording.tables import table
 from sim.results.files import finish
 from sim.results.result import Result
 from sim.run.virtual import simulate
@@ -57,6 +58,8 @@ def test_what_a_view_counts_as_broken_is_what_the_result_counts(tmp_path: Path) 
     told = [event.t_ns for event in Timeline(tmp_path / "run").events if "broken bound" in event.text]
     assert told == [one.t_ns for one in broken]
     assert len(came_late) > len(broken), "what waited for UAV 6 came to it late, as its bounds say"
+    late = [row for row in table("deliveries", outcome).to_pylist() if row["delay_ms"] > (row["bound_ms"] or math.inf)]
+    assert [(row["origin"], row["seq"], row["node"]) for row in late] == [(b.origin, b.seq, b.node) for b in broken]
     born_s = [(one.t_ns - one.delay_ns) / S for one in broken]
     assert min(born_s) > 8.9, "while the air is as it was, all bounds hold"
     assert max(born_s) < 9 + 1.6 + 0.2, "after 1.6 hellos and a hop it is known"

@@ -3,6 +3,7 @@
 Whatever could not be looked at in time is counted in the last line.
 """
 
+import contextlib
 from collections.abc import Callable, Sequence
 from typing import ClassVar, Final
 
@@ -10,6 +11,7 @@ from rich.text import Text
 from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, VerticalScroll
+from textual.css.query import NoMatches
 from textual.widgets import Footer, Input, Static, TabbedContent, TabPane
 
 from fanet_mw.units import MS, S
@@ -88,7 +90,7 @@ class Inspector(App[None]):
     def on_mount(self) -> None:
         self.query_one("#streams", Rows).focus()
         self.refresh_all()
-        self.set_interval(_REFRESH_S, self.refresh_all)
+        self.set_interval(_REFRESH_S, self.tick)
 
     # --- what keys and clicks do ----------------------------------------------------------------------------------
 
@@ -133,6 +135,11 @@ class Inspector(App[None]):
         }  # fmt: skip
         shown[self.query_one(TabbedContent).active]()
         self._show_status()
+
+    def tick(self) -> None:
+        """What the timer does; its last tick may come while the widgets go."""
+        with contextlib.suppress(NoMatches):
+            self.refresh_all()
 
     def _show_status(self) -> None:
         seen = self._inspection

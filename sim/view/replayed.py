@@ -119,7 +119,7 @@ def serve(folder: Path, *, port: int | None, start_s: float, ended: Sequence[int
 
 def _step_back(seen: Sight) -> str:
     """A script for narrow screens: the page is opened again with a camera that is farther away."""
-    eye = ",".join(f"{value:.0f}" for value in seen.eye_for(0.5))
+    eye = ",".join(f"{value:.0f}" for value in seen.eye_for(0.4))
     return f"if (innerWidth < innerHeight && !location.search) location.search = '?initialCameraPosition={eye}'"
 
 
@@ -127,7 +127,7 @@ def _caption(scenario: Scenario, scene: Scene) -> str:
     """What a file says beside its scene: whose run it is, how fast it plays, and what the colors mean."""
     said = legend(by_cluster=scene.clustered, links_known=not scene.by_range)
     return (
-        "<details open style='position: fixed; top: 8px; left: 8px; max-width: min(27em, 90vw); padding: 6px 10px; "
+        "<details open style='position: fixed; top: 8px; left: 8px; max-width: min(31em, 90vw); padding: 6px 10px; "
         "background: #fffd; border-radius: 6px; font: 13px/1.45 sans-serif; z-index: 1'><summary>"
         f"<b>{html.escape(scenario.name)}</b>, seed {scenario.seed}, {len(scenario.node_ids)} nodes; "
         f"plays {FILE_SPEED:g} swarm seconds a second</summary>{said}</details>"

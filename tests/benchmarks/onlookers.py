@@ -163,10 +163,10 @@ def flight(seconds: float, who: tuple[str, ...], *, of: str) -> dict[str, Any]:
                     used[name].append((time.monotonic(), now, takes.bytes))
         assert process.stdout is not None, "it is a pipe"
         summary = json.loads(process.stdout.read())
-    late = summary["lateness"]
+    late, bound = summary["lateness"], summary["bound"] or {"violations": 0, "never": 0}
     row: dict[str, Any] = {
         "with": "+".join(who) or "nobody", "late_percent": round(100 * late["share"], 3), "late_p99_ms": late["p99_ms"],
-        "late_max_ms": late["max_ms"], "pdr": summary["pdr"],
+        "late_max_ms": late["max_ms"], "pdr": summary["pdr"], "bounds_broken": bound["violations"] + bound["never"],
         "least_pace": min([1.0, *(step["time_scale"] for step in summary["paces"])]),
         "valid": summary["valid"], "load": round(os.getloadavg()[0], 1),
     }  # fmt: skip
@@ -216,7 +216,7 @@ def virtual(seconds: float) -> dict[str, Any]:
 
 def medians(rows: list[dict[str, Any]]) -> str:
     """A table of the medians of what was measured, a line per company."""
-    columns = ["late_percent", "late_p99_ms", "late_max_ms", "pdr", "least_pace", "load"]
+    columns = ["late_percent", "late_p99_ms", "late_max_ms", "pdr", "bounds_broken", "least_pace", "load"]
     columns += sorted({name for row in rows for name in row if name.endswith(("_core_percent", "_kB_per_s"))})
     lines = [f"| with | flights | {' | '.join(columns)} |", f"|{'---|' * (len(columns) + 2)}"]
     for company in dict.fromkeys(row["with"] for row in rows):

@@ -184,6 +184,14 @@ async def test_a_frozen_screen_takes_nothing_in(folder: Path) -> None:
         assert len(pumps) > count
 
 
+async def test_a_tick_of_the_timer_after_the_widgets_have_gone_is_none(folder: Path) -> None:
+    app = Inspector(of_folder(RunFolder(folder)), title="x", pump=lambda _: "", live=False)
+    async with app.run_test() as pilot:
+        await pilot.pause()
+        await app.query("Screen > *").remove()
+        app.tick()
+
+
 def test_sigterm_ends_it_at_once(folder: Path) -> None:
     ours, terminal = pty.openpty()
     command = [sys.executable, "-m", "fanet_mw", "inspect", str(folder)]

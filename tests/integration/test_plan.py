@@ -47,7 +47,7 @@ def without_capacity(*settings: str) -> ScenarioPlan:
 )
 def test_the_bound_that_is_planned_is_the_one_that_the_nodes_compute_in_flight(settings: tuple[str, ...]) -> None:
     scenario = catalog.find(
-        "clusters", ["duration_s=15", "warmup_s=12", "world.gps_sigma_m=0", "sensors.gps_bias_m=0", *settings]
+        "clusters", ["duration_s=20", "warmup_s=12", "world.gps_sigma_m=0", "sensors.gps_bias_m=0", *settings]
     )
     _, plan, feasible = judge(scenario, deadline_s=None, search=False)
     assert feasible
@@ -89,7 +89,8 @@ def test_floods_that_miss_nodes_with_reported_positions_are_a_problem(channel: s
     """
     places = [[0, 0, 50], [200, 0, 50], [452, 0, 50], [650, 0, 50], [326, 150, 50]]
     settings = (f"nodes.positions_m={places}", "nodes.layout=explicit", "nodes.count=5", "clusters.count=4",
-                "traffic.sources=4", f"radio.channel={channel}", "clusters.links=places")  # fmt: skip
+                "traffic.sources=4", f"radio.channel={channel}", "clusters.links=places",
+                "clusters.link_m=250")  # fmt: skip
     _, plan, feasible = planned(*settings, "world.gps_sigma_m=1.5")
     assert not feasible
     assert "floods that miss others" in plan["problems"][0]

@@ -59,8 +59,7 @@ def test_new_timetables_break_no_promise() -> None:
     bound = summary_of(*keys)["bound"]
     assert bound["deliveries"] > 1000
     assert bound["stated_share"] > 0.5
-    assert bound["violations"] == bound["never"], "nothing that comes is late"
-    assert 0 < bound["never"] < bound["deliveries"] / 20, "nodes out of reach, who are promised what they do not get"
+    assert bound["violations"] == 0
 
 
 def test_reports_that_are_sent_as_bulk_and_longer_than_the_traffic_are_carried() -> None:

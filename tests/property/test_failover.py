@@ -229,7 +229,7 @@ class AnySwarm(RuleBasedStateMachine):
 
     @initialize(started=st.sets(nodes, min_size=2), relay=st.sampled_from(["all", "counter", "scheduled"]))
     def begin(self, started: set[int], relay: str) -> None:
-        self.swarm = Swarm(scenario(relay=relay, assess_ms=50), line())
+        self.swarm = Swarm(scenario(relay=relay, assess_ms=50, resume=False), line())
         for node in sorted(started):
             self.swarm.start(node)
 

@@ -54,6 +54,7 @@ from fanet_mw.routing.clustered.slots.slot_access import SlotAccess
 from fanet_mw.routing.clustered.slots.slot_release import SlotRelease
 from fanet_mw.routing.clustered.timetable.admission import Admission
 from fanet_mw.routing.clustered.timetable.call_release import CallRelease
+from fanet_mw.routing.clustered.timetable.followers import Followers
 from fanet_mw.routing.clustered.timetable.reserved_room import reserved
 from fanet_mw.routing.clustered.timetable.resumed_floods import ResumedFloods
 from fanet_mw.routing.clustered.timetable.root_release import RootRelease
@@ -225,18 +226,27 @@ def _by_timetable(ground: _Ground) -> Clustered:
     lead_ns = scenario.radio.lead_ns
     roots = RootRelease(port.node, ground.queue(), reserved=reserved(scenario), lead_ns=lead_ns)
     calls = CallRelease(TxQueue(capacity=scenario.routing.queue_frames), lead_ns=lead_ns)
-    delays = StatedDelays(port, timetables=timetables, roots=roots, lease=parts.lease, admission=_admission(port))
+    followers = Followers(port.node)
+    delays = StatedDelays(
+        port, timetables=timetables, roots=roots, lease=parts.lease, admission=_admission(port), followers=followers
+    )
     resumed = None if ground.missing is None else ResumedFloods(port, timetables, ground.floods)
     access = TurnAccess(
         port, timetables=timetables, roots=roots, calls=calls, slots=_slots(ground, parts.membership), delays=delays,
-        floods=ground.floods, contention=ground.contention, resumed=resumed,
+        floods=ground.floods, contention=ground.contention, resumed=resumed, followers=followers,
     )  # fmt: skip
     timetabling = FromPlaces(
-        port, lease=parts.lease, membership=parts.membership, refresh=parts.refresh, delays=delays, access=access
+        port,
+        lease=parts.lease,
+        membership=parts.membership,
+        refresh=parts.refresh,
+        delays=delays,
+        access=access,
+        followers=followers,
     )
     contending = ContendingRelaying(port, RelayAll(), ground.contention)
     relaying = ScheduledRelaying(
-        port, timetables, contending, resumed=resumed, repair=ground.repair, missing=ground.missing
+        port, timetables, contending, resumed=resumed, repair=ground.repair, missing=ground.missing, followers=followers
     )
     heard = HeardLoads(interval_s=scenario.traffic.interval_s) if scenario.hears_load else None
     whole = Parts(

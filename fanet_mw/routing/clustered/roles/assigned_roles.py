@@ -238,7 +238,9 @@ class AssignedRoles:
 
     def before_hello(self, now_ns: int) -> None:
         parts, leader = self.parts, self._leader
-        if leader is None:
+        if leader is None and self._timetabling.must_show(now_ns):
+            self._join(now_ns)
+        elif leader is None:
             parts.joining.update_if_outdated(listed=parts.membership.nodes_listed, now_ns=now_ns)
         elif parts.links is not None and parts.links.outdated(now_ns=now_ns):
             leader.on_links(self._port.node, parts.links.tell(now_ns=now_ns))

@@ -37,6 +37,9 @@ class Timetabling(Protocol):
     def on_links(self, packet: Packet, *, now_ns: int) -> None:
         """A packet of links was received that belongs to a schedule; raises MalformedFrameError."""
 
+    def must_show(self, now_ns: int) -> bool:
+        """True if a flood of this node in its turn is to show the others that it keeps the timetable."""
+
     def notice_ns(self, now_ns: int) -> int:
         """How long ahead the leader must announce another schedule."""
 
@@ -60,6 +63,9 @@ class NoTimetable:
 
     def on_links(self, packet: Packet, *, now_ns: int) -> None:
         """Nothing is done: links are of no use without a timetable."""
+
+    def must_show(self, now_ns: int) -> bool:
+        return False
 
     def notice_ns(self, now_ns: int) -> int:
         return 0

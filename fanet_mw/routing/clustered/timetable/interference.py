@@ -33,8 +33,14 @@ class InterferenceByDistance:
         self._parts: dict[int, tuple[int, int]] = {}
         at = [place for _, place in positions]
         self.hears = [_within(at, row, geometry.link_m) for row in range(len(at))]
-        reach = max(geometry.interference_m, geometry.link_m)
-        self.disturbs = self.hears if reach == geometry.link_m else [_within(at, row, reach) for row in range(len(at))]
+        sure = [_within(at, row, geometry.link_m - geometry.margin_m) for row in range(len(at))]
+        parts = ([reach(links, row)[0] for row in range(len(at))] for links in (sure, self.hears))
+        self.sure = not geometry.margin_m or next(parts) == next(parts)
+        """True if the links that are farther than errors of positions from the end of the range connect as many."""
+        if self.sure:
+            self.hears = sure
+        disturbed_m = max(geometry.interference_m, geometry.link_m)
+        self.disturbs = [_within(at, row, disturbed_m) for row in range(len(at))]
 
     def part(self, root: int) -> tuple[int, int]:
         """The rows that a flood from this row can reach, itself included, and the number of hops to the farthest."""

@@ -5,18 +5,25 @@
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple, Self
+from typing import Final, NamedTuple, Self
 
+from fanet_mw.routing.clustered.roles.leader_election import Authority
+from fanet_mw.routing.clustered.roles.membership import Version
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.delivery_odds import Odds
 from fanet_mw.routing.clustered.timetable.fitted_timetable import NO_LOADS, FittedTimetable
 from fanet_mw.routing.clustered.timetable.timetable import Timetable
 from fanet_mw.units import NodeId
 
+UNANNOUNCED: Final = Version(Authority(0, NodeId(0)), 0)
+"""Of no leader: a timetable that is computed before take-off."""
+
 
 class NodeTimetable(NamedTuple):
     """A timetable that is in force from an instant on, as one node needs it."""
 
+    version: Version
+    """The schedule from which it was made."""
     valid_ns: int
     turns: Turns
     table: Timetable
@@ -37,7 +44,7 @@ class NodeTimetable(NamedTuple):
     loads: Mapping[NodeId, int] = NO_LOADS
 
     @classmethod
-    def of(cls, node: NodeId, valid_ns: int, found: FittedTimetable) -> Self:
+    def of(cls, node: NodeId, valid_ns: int, found: FittedTimetable, *, version: Version = UNANNOUNCED) -> Self:
         turns, table = found.turns, found.table
         sends: dict[tuple[NodeId, int], list[int]] = {}
         for turn in sorted(table.turns):
@@ -45,6 +52,7 @@ class NodeTimetable(NamedTuple):
                 sends.setdefault((turn.root, turn.instance), []).append(turn.offset)
         own = [offsets for (root, _), offsets in sends.items() if root == node]
         return cls(
+            version=version,
             valid_ns=valid_ns,
             turns=turns,
             table=table,

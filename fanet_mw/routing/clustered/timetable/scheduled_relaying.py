@@ -18,6 +18,7 @@ from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.clustered.contract import Relaying
 from fanet_mw.routing.clustered.tdma.turn_timing import turn_slack_ns
+from fanet_mw.routing.clustered.timetable.followers import Followers
 from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.resumed_floods import ResumedFloods
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
@@ -42,6 +43,7 @@ class ScheduledRelaying:
         resumed: ResumedFloods | None,
         repair: Repair | None,
         missing: MissingPackets | None,
+        followers: Followers,
     ) -> None:
         self._port = port
         self._timetables = timetables
@@ -49,6 +51,7 @@ class ScheduledRelaying:
         self._resumed = resumed
         self._repair = repair
         self._missing = missing
+        self._followers = followers
         self._slack_ns = turn_slack_ns(port.scenario)
         self._missed = 0
         """The number of packets that arrived only after the node's turn to relay them had begun."""
@@ -114,6 +117,8 @@ class ScheduledRelaying:
         the sender, and the reception ended at `end_ns`.
         """
         offset, root, instance = heard
+        if packet.header.origin == root:
+            self._followers.hear(timetable.version, root)
         own = timetable.mine.get((root, instance), ())
         if not own:
             return ()

@@ -21,6 +21,7 @@ from fanet_mw.routing.clustered.roles.leader import HEARD_NS
 from fanet_mw.routing.clustered.roles.leader_election import Lease
 from fanet_mw.routing.clustered.tdma.turn_timing import receipt_ns, turn_slack_ns
 from fanet_mw.routing.clustered.timetable.admission import Admission, least_interval_ns
+from fanet_mw.routing.clustered.timetable.followers import Followers
 from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE, likely_delay_ns
 from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.own_bound import RootTurns
@@ -49,12 +50,14 @@ class StatedDelays:
         roots: RootRelease,
         lease: Lease,
         admission: Admission | None,
+        followers: Followers,
     ) -> None:
         self._port = port
         self._timetables = timetables
         self._roots = roots
         self._lease = lease
         self._admission = admission
+        self._followers = followers
         self._lead_ns = port.scenario.radio.lead_ns
         self._interval_ns = seconds_to_ns(port.scenario.traffic.interval_s)
         self._bounds_ns: list[tuple[NodeTimetable, Mapping[int, int]]] = []
@@ -100,6 +103,8 @@ class StatedDelays:
         if timetable.table.uncovered[self._port.node]:
             return None
         if self._ends_early(timetable):
+            return None
+        if not timetable.table.sure and self._port.scenario.mobility.model != "static":
             return None
         return self._own_of(self._port.node, timetable)
 
@@ -185,10 +190,15 @@ class StatedDelays:
             born_ns = packet.header.origin_us * US
             due_ns = born_ns + bound_ns
             expires_ns = born_ns + self._port.scenario.routing.lifetime_ns(packet.header.priority)
-            if had_ns <= min(due_ns, known_ns, expires_ns):
+            in_force = [
+                one for one in self._timetables.in_order[self._timetables.superseded(now_ns) :] if one.valid_ns < had_ns
+            ]
+            kept = all(self._followers.have(one.version, one.table.spans) for one in in_force)
+            if kept and had_ns <= min(due_ns, known_ns, expires_ns):
                 self._port.record(BoundStated(now_ns, self._port.node, packet.header.seq, bound_ns))
                 for other in range(1, self._port.scenario.node_count + 1):
-                    if other not in newest.table.spans:  # it has not joined, or is gone: no turn reaches it for sure
+                    # one that has not joined, or is gone: no turn reaches it for sure
+                    if any(other not in one.table.spans for one in in_force):
                         excluded = NodeId(other)
                         self._port.record(BoundExcludes(now_ns, self._port.node, packet.header.seq, excluded))
                 self._promised[packet.header.seq] = through_ns, due_ns - receipt_ns(self._port.scenario)
@@ -228,12 +238,15 @@ class StatedDelays:
             self._port.record(lost)
 
     def bound_ns(self) -> int | None:
-        """The bound of the node's bulk packets by the newest timetable, from application to application; None if there
-        is none.
+        """The bound of the node's bulk packets, from application to application, by the newest timetable that all are
+        known to keep; None if there is none.
         """
-        if not self._bounds_ns or self._lease.leads or not self._in_step():
+        if self._lease.leads or not self._in_step():
             return None
-        return self._bounds_ns[-1][1].get(PRIORITY_BULK)
+        for timetable, bounds_ns in reversed(self._bounds_ns):
+            if self._followers.have(timetable.version, timetable.table.spans):
+                return bounds_ns.get(PRIORITY_BULK)
+        return None
 
     def least_interval_ns(self, deadline_ns: int) -> int | None:
         """The least interval between packets of the node that meets a deadline; None if none does, or if there is no

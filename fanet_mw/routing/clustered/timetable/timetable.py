@@ -58,6 +58,8 @@ class Timetable(NamedTuple):
     packet that one lacks."""
     hops: Mapping[NodeId, int] = MappingProxyType({})
     """For each root, the number of hops to the farthest node, if each relay passes on the first copy that it hears."""
+    sure: bool = True
+    """False if it uses links that errors of positions may have made."""
 
     def roots(self) -> list[Turn]:
         """The turns in which roots transmit new packets; repetitions are not among them."""
@@ -103,7 +105,8 @@ def timetable(
     turns = _repeated(block, Counter(roots), geometry.turns, blocks, whole)
     uncovered = _uncovered(swarm.nodes, ordered, floods)
     hops = _hops(swarm.nodes, swarm.hears, ordered, floods)
-    return Timetable(turns, _spans(turns), uncovered, len({turn.offset % whole for turn in turns}), hops=hops)
+    used = len({turn.offset % whole for turn in turns})
+    return Timetable(turns, _spans(turns), uncovered, used, hops=hops, sure=swarm.sure)
 
 
 @lru_cache(maxsize=16)

@@ -20,6 +20,7 @@ from fanet_mw.routing.clustered.roles.leader_election import Authority, Lease
 from fanet_mw.routing.clustered.roles.membership import Membership, Version
 from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
 from fanet_mw.routing.clustered.timetable.fitted_timetable import NO_LOADS, FittedTimetable
+from fanet_mw.routing.clustered.timetable.followers import Followers
 from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
@@ -49,6 +50,7 @@ class FromPlaces:
         refresh: ScheduleRefresh,
         delays: StatedDelays,
         access: TurnAccess,
+        followers: Followers,
     ) -> None:
         self._port = port
         self._lease = lease
@@ -56,6 +58,7 @@ class FromPlaces:
         self._refresh = refresh
         self._delays = delays
         self._access = access
+        self._followers = followers
         self._schedules: dict[int, tuple[Schedule, PartDetails]] = {}
         self._measured: dict[int, Links] = {}
         """The links of this version of the schedule, by part."""
@@ -83,6 +86,9 @@ class FromPlaces:
             Links(self._port.node, links, part.term, leader.epoch, index, len(frames)).encode_frames()
             for index, links in enumerate(frames)
         ]
+
+    def must_show(self, now_ns: int) -> bool:
+        return self._access.must_show(now_ns)
 
     def notice_ns(self, now_ns: int) -> int:
         return self._delays.notice_ns(now_ns)
@@ -172,7 +178,11 @@ class FromPlaces:
         head_of = {node: heads[cluster] for node, cluster in sorted(cluster_of.items())}
         found = self._fit(schedule, at, head_of, measured, loads or NO_LOADS)
         # None if not even one packet of each head fits; `fanet plan` tells the user
-        timetable = None if found is None else NodeTimetable.of(self._port.node, schedule.start_us * US, found)
+        timetable = None
+        if found is not None:
+            version = Version(Authority(schedule.term, NodeId(schedule.leader)), schedule.epoch)
+            timetable = NodeTimetable.of(self._port.node, schedule.start_us * US, found, version=version)
+            self._followers.follow(version)
         self._access.follow(timetable, now_ns=now_ns)
 
     def _fit(

@@ -17,17 +17,21 @@ from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTi
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.slots.slot_access import SlotAccess
 from fanet_mw.routing.clustered.timetable.call_release import CallRelease
+from fanet_mw.routing.clustered.timetable.followers import Followers
 from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.resumed_floods import ResumedFloods
 from fanet_mw.routing.clustered.timetable.root_release import RootRelease, TurnsInForce
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
 from fanet_mw.routing.clustered.timetable.turn_size import most_packet_bytes
-from fanet_mw.units import US, earliest, seconds_to_ns
+from fanet_mw.units import US, S, earliest, seconds_to_ns
 from fanet_mw.wire import Kind
 
 _MOST_ANSWERS: Final = 2
 """The greatest number of missed packets that wait for calls; any further ones contend."""
+
+_SHOWN_NS: Final = 1 * S
+"""Packets of applications show soonest that a node keeps a timetable; if none comes in this time, a join does."""
 
 
 class TurnAccess:
@@ -45,6 +49,7 @@ class TurnAccess:
         floods: Floods,
         contention: ContentionTiming,
         resumed: ResumedFloods | None,
+        followers: Followers,
     ) -> None:
         self._port = port
         self._timetables = timetables
@@ -55,7 +60,10 @@ class TurnAccess:
         self._floods = floods
         self._contention = contention
         self._resumed = resumed
+        self._followers = followers
         self._lead_ns = port.scenario.radio.lead_ns
+        self._has_shown: NodeTimetable | None = None
+        """The timetable in whose turns the node has last begun a flood."""
         self._lifetime_ns = seconds_to_ns(port.scenario.routing.lifetime_s)
 
     def start(self, now_ns: int) -> None:
@@ -118,6 +126,15 @@ class TurnAccess:
 
     def renew_slot(self) -> None:
         self._slots.renew_slot()
+
+    def must_show(self, now_ns: int) -> bool:
+        """True if the others cannot know that this node keeps the timetable, because it has begun no flood by it for a
+        second, and nothing waits for its turns.
+        """
+        timetable = self._timetables.at(now_ns)
+        if timetable is None or timetable is self._has_shown or timetable.odds is not None:
+            return False
+        return bool(timetable.roots) and now_ns > timetable.valid_ns + _SHOWN_NS and not len(self._roots)
 
     # --- letting out ----------------------------------------------------------------------------------------------
 
@@ -218,6 +235,7 @@ class TurnAccess:
         for packets, start_ns in self._roots.due(now_ns=now_ns):
             kept = self._kept(packets, through_ns=self._through_ns(start_ns), now_ns=now_ns)
             if kept:
+                self._has_shown = self._timetables.at(start_ns)
                 self._floods.begin(kept, start_ns=start_ns, again_ns=self._repetitions(start_ns))
         if len(self._roots) and not self._roots.has_turn(now_ns=now_ns):
             for packet in self._stranded(now_ns):  # that was the node's last turn: the next timetable gives it none

@@ -17,6 +17,8 @@ from fanet_mw.wire.schedule import CAPACITY
 
 _AVERAGED: Final = 0.02
 """The greatest error of a reported position along each axis, as a share of the radio range; it is a little less."""
+_UNSURE: Final = 0.05
+"""The share of the range at whose end a link may not be there, because positions have errors."""
 _ROUNDING_M: Final = 1.5
 _SCHEDULE_BYTES: Final = SCHEDULE.layout.size + OVERHEAD
 _PLACES_BYTES: Final = PLACES.layout.size + OVERHEAD
@@ -71,6 +73,7 @@ def links(scenario: Scenario, turns: Turns) -> Geometry:
         link_m=clusters.link_m or radio.range_m,
         interference_m=clusters.interference_m
         or (_disturbed_m(scenario) if radio.channel == "range" else 2 * radio.range_m),
+        margin_m=0.0 if clusters.link_m else _UNSURE * radio.range_m,
         turns=turns.per_superframe,
         hop_turns=1 + -(-wait_ns // turns.turn_ns),
     )

@@ -17,7 +17,7 @@ from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.delivery_odds import Odds
 from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
-from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
+from fanet_mw.routing.clustered.timetable.node_timetable import UNANNOUNCED, NodeTimetable
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.scenario import Scenario
@@ -64,6 +64,10 @@ def node(make_scenario: MakeScenario) -> Node:
     made = Node(US, make_scenario(**keys), make_protocol, position=Enu(0.0, 0.0, 50.0))
     made.start(0)
     access_of(made)._timetables.in_order = [planned(FLOODS)]
+    access_of(made)._has_shown = access_of(made)._timetables.newest
+    followers = access_of(made)._delays._followers
+    followers.follow(UNANNOUNCED)
+    followers.hear(UNANNOUNCED, ROOT)
     return made
 
 

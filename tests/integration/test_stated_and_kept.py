@@ -1,0 +1,51 @@
+"""Bounds by timetables that were stated and not kept, as a fuzz found them: each is kept, or not stated."""
+
+from typing import Any
+
+import pytest
+
+from fanet_mw.scenario import config
+from sim.results.files import finish
+from sim.run.virtual import simulate
+
+BASE: dict[str, Any] = {
+    "name": "drawn", "duration_s": 26, "warmup_s": 8, "drain_s": 8,
+    "routing": {"protocol": "clustered", "lifetime_s": 8},
+    "clusters": {"relay": "scheduled", "guard_ms": 1},
+    "radio": {"channel": "range", "range_m": 250, "standard": "g", "rate_mbps": 6},
+}  # fmt: skip
+
+
+def bound_of(**tables: dict[str, Any]) -> dict[str, Any]:
+    seed = tables.pop("seed", 1)
+    tree = {key: {**value, **tables.pop(key, {})} if isinstance(value, dict) else value for key, value in BASE.items()}
+    found: dict[str, Any] = finish(simulate(config.build({**tree, **tables, "seed": seed})), out=None)["bound"]
+    return found
+
+
+def test_a_timetable_does_not_count_on_a_link_that_errors_of_positions_made() -> None:
+    """Four in a line, 125.58 m apart: the second next is 251.2 m away, and by its GPS sometimes within the range."""
+    bound = bound_of(
+        seed=237700, nodes={"count": 4, "layout": "grid", "columns": 4, "spacing_m": 125.57797, "telemetry_hz": 0},
+        traffic={"payload_bytes": 65, "interval_s": 2.6956061237, "sources": 3, "arrivals": "poisson"},
+        radio={"cw_min": 15, "lead_ms": 43, "handover_ms": 43 / 3},
+        clusters={"count": 3, "flooding_period_s": 1.166106141476719},
+        mobility={"model": "formation", "speed_m_s": 5.229136},
+    )  # fmt: skip
+    assert bound["violations"] == 0
+    assert bound["stated_share"] == 1.0
+
+
+@pytest.mark.parametrize(("count", "columns", "spacing_m", "seed"), [(9, 4, 227.04, 886227), (13, 6, 189.3, 185840)])
+def test_nobody_promises_while_the_timetable_has_not_reached_everybody(
+    count: int, columns: int, spacing_m: float, seed: int
+) -> None:
+    bound = bound_of(
+        seed=seed, nodes={"count": count, "layout": "grid", "columns": columns, "spacing_m": spacing_m},
+        traffic={"payload_bytes": 300, "interval_s": 1.4, "sources": count - 1, "arrivals": "poisson"},
+        radio={"standard": "b", "rate_mbps": 5.5, "cw_min": 7, "lead_ms": 0},
+        clusters={"count": count - 1, "flooding_period_s": 0.6},
+        mobility={"model": "formation", "speed_m_s": 10.0},
+    )  # fmt: skip
+    assert bound["violations"] == 0
+    assert bound["stated_share"] > 0.3

@@ -217,5 +217,6 @@ def _broken(records: Sequence[Record]) -> Iterator[Event]:
             if bound_ns is not None and meant and record.delay_ns > bound_ns:
                 count += 1
                 late_ms = (record.delay_ns - bound_ns) / MS
-                text = f"broken bound: packet {record.seq} of UAV {record.origin}, {late_ms:.0f} ms late"
+                name = f"packet {record.seq} of UAV {record.origin}"
+                text = f"broken bound: {name}, {late_ms:.0f} ms late at UAV {record.node}"
                 yield Event(record.t_ns, record.node, text)

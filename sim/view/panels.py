@@ -262,7 +262,7 @@ class Panels:
         pace = "" if math.isclose(state.time_scale, 1.0) else f" at {state.time_scale:.3g} of real time"
         if state.time_scale <= PAUSED:
             pace = ", paused"
-        now = f"<b style='font-size:17px'>{t_ns // (100 * MS) / 10:.1f} s</b>"
+        now = f"<b style='font-size:17px'>{t_ns / S:.1f} s</b>"
         lines = [f"{now} of {state.scenario.duration_s:g} s{pace}"]
         lines += [f"<span style='color:#b04a00'>{html.escape(text)}</span>" for text in (note, self._said) if text]
         self._write("_clock", _box("<br>".join(lines)))

@@ -3,6 +3,7 @@
 import html
 import time
 from bisect import bisect_left, bisect_right
+from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -41,7 +42,7 @@ class _Player:
             )
             self._group = gui.add_button_group("event", ("play", "earlier", "later"))
             self._speed = gui.add_dropdown("speed", _SPEEDS, initial_value="1")
-            names = [f"{e.t_ns / S:.1f} s  {e.text}" for e in timeline.events[:_MOST_LISTED]]
+            names = told_apart([f"{e.t_ns / S:.1f} s  {e.text}" for e in timeline.events[:_MOST_LISTED]])
             self._list = gui.add_dropdown("jump to", ["choose an event", *names])
         later = panels.later
         self._slider.on_update(later(lambda: self.jump(round(self._slider.value * S))))
@@ -85,6 +86,16 @@ class _Player:
     def _see(self, t_ns: int) -> None:
         self.jump(t_ns)
         self._slider.value = round(self.t_ns / S, 1)
+
+
+def told_apart(names: Sequence[str]) -> list[str]:
+    """Names with a number behind each that was there before: of two alike, viser's page stays blank."""
+    seen: Counter[str] = Counter()
+    found = []
+    for name in names:
+        seen[name] += 1
+        found.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
+    return found
 
 
 def serve(folder: Path, *, port: int | None, start_s: float, ended: Sequence[int], tell: Callable[[str], None]) -> None:

@@ -33,7 +33,7 @@ from sim.run.virtual import Observed, simulate
 from sim.scenarios import catalog
 from sim.view.actions import Actions
 from sim.view.panels import Panels
-from sim.view.replayed import write_html
+from sim.view.replayed import told_apart, write_html
 from sim.view.scene import CLUSTER_COLORS, Scene
 from sim.view.server import open_server
 from sim.view.shapes import linear, rgb
@@ -433,3 +433,9 @@ def test_a_head_that_is_cut_in_a_view_costs_deliveries_and_the_clock_obeys() -> 
     assert after[-1] < 0.85, "56 of 72 copies are left when one of nine is silent"
     assert any("radio fault cut" in text and "begins" in text for text in watcher.events)
     assert any("radio fault cut" in text and "ends" in text for text in watcher.events)
+
+
+def test_events_that_are_alike_are_told_apart() -> None:
+    assert told_apart(["1.0 s  a", "1.0 s  b", "1.0 s  a", "1.0 s  a"]) == [
+        "1.0 s  a", "1.0 s  b", "1.0 s  a (2)", "1.0 s  a (3)",
+    ]  # fmt: skip

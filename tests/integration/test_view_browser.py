@@ -1,5 +1,6 @@
 """The pages in a browser, where there is a headless Chromium: what is clicked is selected, moved and cut."""
 
+import hashlib
 import json
 import math
 import re
@@ -14,7 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fanet_mw.units import S
 from sim.cli.app import app
+from sim.scenarios.catalog import text_of
 from sim.view.server import EYE, GOAL
 
 CHROMIUM = shutil.which("chromium-headless-shell") or shutil.which("chromium") or shutil.which("google-chrome")
@@ -191,3 +194,42 @@ def test_one_file_plays_without_a_network(page: Any, folder: Path, tmp_path: Pat
         return len(pictures) >= 2
 
     wait_for(plays, seconds=180)
+
+
+def test_a_find_a_lost_head_and_a_broken_bound_are_jumped_to(
+    page: Any, start: Callable[..., str], tmp_path: Path
+) -> None:
+    folder, scenario = tmp_path / "run", tmp_path / "falls.toml"
+    small = ("nodes.count=9", "world.area_m=400", "mission.survivors=2", "duration_s=60", "routing.protocol=clustered")
+    text = text_of("rescue")
+    scenario.write_text(f'{text}\n[[faults]]\nkind = "crash"\nnode = 1\nat_s = 20\n')
+    words = ["simulate", str(scenario), "--set", *small, "--out", str(folder), "--json"]
+    assert app(words, result_action="return_value") == 0
+    trace = folder / "trace.jsonl"
+    told = [json.loads(line) for line in trace.open()]
+    _, t_ns, _, origin, seq, delay_ns, *_ = next(one for one in told if one[0] == "delivered" and one[1] > 30 * S)
+    with trace.open("a") as file:  # a bound that was not kept
+        file.write(json.dumps(["bound_stated", t_ns - delay_ns, origin, seq, delay_ns - 1]) + "\n")
+    summary = json.loads((folder / "summary.json").read_text())
+    data = trace.read_bytes()
+    summary["files"]["trace.jsonl"] = {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+    (folder / "summary.json").write_text(json.dumps(summary))
+    found_s = next(one[1] / S for one in told if one[0] == "confirmed")
+    head_s = next(one[1] / S for one in told if one[0] == "role_changed" and one[3] == "head" and one[1] > 20 * S)
+
+    page.goto(start("replay", str(folder), "--start", "1"))
+    page.get_by_text("delivered lately").first.wait_for(timeout=PATIENCE_MS)
+    page.get_by_role("button", name="play").click()  # pause
+    page.get_by_role("tab", name="Events").click()
+    chosen = "choose an event"
+    for at_s, what in ((found_s, "confirms"), (head_s, "becomes head"), (t_ns / S, "broken bound")):
+        name = re.compile(rf"^{at_s:.1f} s .*{what}")
+        page.locator(f"input[value='{chosen}']").first.click()
+        page.get_by_role("option", name=name).first.click()
+        wait_for(lambda at_s=at_s: f"{at_s:.1f} s of 60 s" in page.inner_text("body"))  # type: ignore[misc]
+        chosen = page.locator("input[value*=' s  ']").first.input_value()
+        assert name.search(chosen)
+    page.get_by_role("button", name="earlier", exact=True).click()
+    wait_for(lambda: f"{t_ns / S:.1f} s of 60 s" not in page.inner_text("body"))
+    page.get_by_role("button", name="later", exact=True).click()
+    wait_for(lambda: f"{t_ns / S:.1f} s of 60 s" in page.inner_text("body"))

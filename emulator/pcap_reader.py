@@ -42,6 +42,8 @@ class AirFrame(NamedTuple):
     """1: first transmission; None for receptions and ACKs."""
     rssi_dbm: int | None
     """Of a reception, if the channel knows powers."""
+    payload: bytes = b""
+    """Of a transmission: the frame of the swarm."""
 
 
 def frames_of(path: Path, *, epoch_unix_ns: int) -> Iterator[AirFrame]:
@@ -76,7 +78,8 @@ def _frame(data: bytes, t_ns: int) -> AirFrame:
         return AirFrame(t_ns, "ack", None, dst, None, 0, None, None)
     size = len(mac) - _BEFORE_FRAME - _FCS_BYTES
     if present & _HAS_POWER:
-        return AirFrame(t_ns, "sent", _node(mac[10:16]), dst, None, size, last + 1, None)
+        payload = mac[_BEFORE_FRAME : _BEFORE_FRAME + size]
+        return AirFrame(t_ns, "sent", _node(mac[10:16]), dst, None, size, last + 1, None, payload)
     rssi_dbm = int.from_bytes(data[_TAP.size : _TAP.size + 1], "little", signed=True)
     return AirFrame(
         t_ns, "received", _node(mac[10:16]), dst, last, size, None, rssi_dbm if present & _HAS_SIGNAL else None

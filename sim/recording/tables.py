@@ -135,7 +135,7 @@ def _links(outcome: Outcome, _: Path | None) -> Iterator[Row]:
 def _frames(outcome: Outcome, folder: Path | None) -> Iterator[Row]:
     for path in captures(folder / CAPTURE) if folder is not None else ():
         for one in frames_of(path, epoch_unix_ns=outcome.epoch_unix_ns):
-            yield one.t_ns / S, *one[1:]
+            yield one.t_ns / S, *one[1:-1]
 
 
 TABLES: Final[Mapping[str, Table]] = {

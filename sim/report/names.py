@@ -7,7 +7,7 @@ REPLAY: Final = "replay.html"
 PAGES: Final = ("report.html", "report.md", REPLAY)
 PICTURES: Final = "pictures"
 """The folder of a run's pictures, beside the page."""
-KINDS: Final = ("delays", "delivery", "links", "slots", "mission", "waits", "tracks")
+KINDS: Final = ("delays", "delivery", "links", "slots", "air", "mission", "waits", "tracks")
 """What the pictures of a run show; each is a file `SCENARIO-SEED-KIND` in both formats."""
 FORMATS: Final = (".png", ".svg")
 

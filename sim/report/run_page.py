@@ -7,9 +7,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from emulator.pcap_file import NAME as CAPTURE
+from emulator.pcap_file import captures
 from fanet_mw.whole_file import require_folder
 from sim.figures.style import applied, save
-from sim.report import finds, mission_pictures, run_pictures, run_rows, slot_pictures
+from sim.report import air_pictures, finds, mission_pictures, run_pictures, run_rows, slot_pictures
 from sim.report.html import Block, Commands, Heading, Picture, Quoted, Text
 from sim.report.names import KINDS, PICTURES
 from sim.report.run_records import SHOWN, RunRecords
@@ -37,13 +39,17 @@ def blocks_of_run(folder: Path, out: Path) -> list[Block]:
     ]
     if run.searches:
         blocks += [Heading("Mission", 3), run_rows.mission(summary, confirms=run.scenario.mission.search != "none")]
-    for kind, draw in zip(KINDS, _drawings(run, links, reports), strict=True):
+    captured = captures(folder / CAPTURE)
+    air = air_pictures.air_of(run, captured, epoch_unix_ns=summary.get("epoch_unix_ns", 0))
+    for kind, draw in zip(KINDS, _drawings(run, links, reports, air), strict=True):
         with applied():
             drawn = draw()
             if drawn is not None:
                 blocks.append(Heading(_TITLES[kind], 3))
                 save(drawn.figure, pictures, f"{name}-{kind}")
                 blocks.append(Picture(pictures / f"{name}-{kind}.png", drawn.caption))
+                if kind == "air" and air is not None:
+                    blocks += [air_pictures.rows(air), Text(air_pictures.against_dominating_set(run, air))]
     if summary["mode"] == "realtime":
         blocks += [Heading("Lateness", 3), run_rows.lateness(summary)]
     return [*blocks, Commands([f"fanet simulate {folder / 'scenario.toml'}"])]
@@ -54,6 +60,7 @@ _TITLES = {
     "delivery": "Delivery",
     "links": "Links",
     "slots": "Slots and turns",
+    "air": "The air",
     "mission": "Mission over time",
     "waits": "From heard to confirmed",
     "tracks": "Tracks",
@@ -61,7 +68,7 @@ _TITLES = {
 
 
 def _drawings(
-    run: RunRecords, links: Sequence[Any], reports: dict[int, Any]
+    run: RunRecords, links: Sequence[Any], reports: dict[int, Any], air: air_pictures.Air | None
 ) -> Sequence[Callable[[], run_pictures.RunPicture | None]]:
     """What draws each kind of picture, in the order of `KINDS`; a mission's pictures only if the run has one."""
     return (
@@ -69,6 +76,7 @@ def _drawings(
         partial(run_pictures.delivery, run),
         partial(run_pictures.links, run, links),
         partial(slot_pictures.slots, run, reports),
+        _nothing if air is None else partial(air_pictures.picture, run, air),
         *(
             partial(draw, run) if run.searches else _nothing
             for draw in (mission_pictures.progress, mission_pictures.waits, mission_pictures.tracks)

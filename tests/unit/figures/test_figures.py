@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from kit import slow
 
+from emulator.pcap_file import PcapFile
 from fanet_mw.errors import ConfigError
 from sim.cli.app import app
 from sim.figures.all_figures import FIGURES, chosen
@@ -24,7 +25,7 @@ from sim.figures.statistics import DISTANCE, SHARE, interval, quantile_975
 from sim.figures.style import beside, canvas, legend_above, reaches, spaced
 from sim.report.page import write
 from sim.results.files import finish
-from sim.run.virtual import simulate
+from sim.run.virtual import EPOCH_UNIX_NS, simulate
 from sim.scenarios import catalog
 from sim.sweep import spec
 from sim.sweep.one_run import carry_out
@@ -330,11 +331,16 @@ def test_a_page_needs_nothing_else_and_has_every_verdict(nine, tmp_path) -> None
 def test_a_run_has_a_page_with_its_delays_links_and_mission(scenario: str, tmp_path: Path) -> None:
     keys = ["nodes.count=9", "world.engine=kinematic", "duration_s=8", "warmup_s=5", "drain_s=1", "traffic.sources=all"]
     keys += ["clusters.count=8"] if scenario == "clusters" else []
-    finish(simulate(catalog.find(scenario, keys)), out=tmp_path)
+    chosen = catalog.find(scenario, keys)
+    with PcapFile(tmp_path / "air.pcap", chosen.radio) as file:
+        file.pcap.epoch_unix_ns = EPOCH_UNIX_NS
+        finish(simulate(chosen, capture=file.pcap), out=tmp_path)
     html, markdown = (path.read_text() for path in write([tmp_path], tmp_path))
     pictures = {path.stem.removeprefix(f"{scenario}-1-") for path in (tmp_path / "pictures").glob("*.png")}
     of_mission = {"mission", "tracks"} if scenario == "quick" else set()
-    assert pictures == {"delays", "delivery", "links", "slots"} | of_mission
+    assert pictures == {"delays", "delivery", "links", "slots", "air"} | of_mission
+    assert "| relayed |" in markdown
+    assert "A greedy connected dominating set of the links has" in markdown
     for words in ("Mission", "survivors confirmed", "area covered"):
         assert (words in markdown) == (scenario == "quick"), "a run without a mission has no section about one"
     kept = re.search(r"Of (\d+) packets of (heads|nodes with turns), (\d+) were let out", markdown)

@@ -1,0 +1,212 @@
+"""What went over the air, from a run's capture: who sent when and why, and what each cause took of the air.
+
+Of a frame with several packets the first cause counts that it holds, in the order of `Cause`. A packet that its node
+has sent before is sent again, whatever for: because a neighbor lacked it, or its flood was resumed.
+"""
+
+import math
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from enum import StrEnum
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from emulator.channel.propagation import heard_m
+from emulator.pcap_reader import AirFrame, frames_of
+from fanet_mw import airtime
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Posed
+from fanet_mw.units import MS, S
+from fanet_mw.wire import Header, Kind, decode_header
+from fanet_mw.wire.aggregation import unbundle
+from sim.figures.colors import BLUE, GRAY, GREEN, ORANGE, PINK, RED
+from sim.figures.style import canvas, legend_above
+from sim.report.html import Rows
+from sim.report.run_pictures import RunPicture
+from sim.report.run_records import RunRecords
+from sim.report.run_rows import number, percent
+
+_STEPS: Final = 60
+"""The number of steps of the shares over time."""
+_FRAMES_SHOWN: Final = 400
+"""About so many frames are drawn one by one."""
+_INSTANTS: Final = 12
+"""The number of instants for which a dominating set is sought."""
+_MAC_BYTES: Final = 24 + 36 + 4
+"""What stands around a frame of the swarm: the headers of 802.11, LLC, IP and UDP, and the FCS."""
+
+
+class Cause(StrEnum):
+    """Why a frame was sent."""
+
+    OWN = "own packets"
+    RELAYED = "relayed"
+    AGAIN = "sent again"
+    CONTROL = "control"
+    HELLO = "hellos"
+    ACK = "ACKs"
+
+
+_COLORS: Final = {
+    Cause.OWN: BLUE, Cause.RELAYED: GREEN, Cause.AGAIN: RED, Cause.CONTROL: ORANGE, Cause.HELLO: PINK, Cause.ACK: GRAY,
+}  # fmt: skip
+
+
+class AirTime(NamedTuple):
+    """One transmission."""
+
+    start_ns: int
+    node: int
+    length_ns: int
+    cause: Cause
+
+
+class Air:
+    """The transmissions of one run."""
+
+    def __init__(self, scenario: Scenario, frames: Iterable[AirFrame]) -> None:
+        self.sent: list[AirTime] = []
+        self.times: Counter[tuple[int, int]] = Counter()
+        """How often each packet of an application was sent, by all nodes together."""
+        self._known: set[tuple[int, int, int]] = set()
+        radio = scenario.radio
+        for frame in frames:
+            if frame.what == "sent" and frame.src is not None:
+                length_ns = airtime.airtime_ns(frame.frame_bytes + _MAC_BYTES, radio, rate_mbps=radio.rate_mbps)
+                self.sent.append(AirTime(frame.t_ns, frame.src, length_ns, self._cause(frame)))
+            elif frame.what == "ack":
+                length_ns = airtime.airtime_ns(airtime.ACK_BYTES, radio, rate_mbps=radio.ack_rate_mbps)
+                self.sent.append(AirTime(frame.t_ns, 0, length_ns, Cause.ACK))
+
+    def _cause(self, frame: AirFrame) -> Cause:
+        assert frame.src is not None
+        causes = {self._cause_of(header, frame.src, frame.attempt or 1) for header in _headers(frame.payload)}
+        return next((cause for cause in Cause if cause in causes), Cause.CONTROL)
+
+    def _cause_of(self, header: Header, sender: int, attempt: int) -> Cause:
+        if header.kind != Kind.DATA:
+            return Cause.HELLO if header.kind == Kind.HELLO else Cause.CONTROL
+        self.times[header.origin, header.seq] += 1
+        name = sender, header.origin, header.seq
+        if name in self._known or attempt > 1:
+            return Cause.AGAIN
+        self._known.add(name)
+        return Cause.OWN if header.origin == sender else Cause.RELAYED
+
+
+def _headers(payload: bytes) -> Iterator[Header]:
+    try:
+        for packet in unbundle(payload):
+            yield decode_header(packet)
+    except MalformedFrameError:
+        return  # somebody else's frame
+
+
+def air_of(run: RunRecords, captures: Sequence[Path], *, epoch_unix_ns: int) -> Air | None:
+    """What the captures of a run hold; None without one. Raises ConfigError."""
+    if not captures:
+        return None
+    return Air(run.scenario, (one for path in captures for one in frames_of(path, epoch_unix_ns=epoch_unix_ns)))
+
+
+def picture(run: RunRecords, air: Air) -> RunPicture | None:
+    """Some frames one by one, and the shares of the air over the whole run."""
+    if not air.sent:
+        return None
+    figure, (by_node, shares) = canvas(2, width=5.2, height=4.0)
+    begin_ns, end_ns = run.scenario.traffic_window_ns
+    start_ns = (begin_ns + end_ns) // 2
+    shown = [one for one in air.sent if one.start_ns >= start_ns and one.cause is not Cause.ACK][:_FRAMES_SHOWN]
+    until_ns = max((one.start_ns + one.length_ns for one in shown), default=start_ns + 1)
+    least_ms = (until_ns - start_ns) / MS / 400
+    for cause in Cause:
+        frames = [one for one in shown if one.cause is cause]
+        if frames:
+            by_node.barh(
+                [one.node for one in frames], [max(one.length_ns / MS, least_ms) for one in frames], height=0.9,
+                left=[(one.start_ns - start_ns) / MS for one in frames], color=_COLORS[cause], linewidth=0,
+            )  # fmt: skip
+    by_node.set_xlim(0, (until_ns - start_ns) / MS)
+    by_node.set_xlabel(f"time after {start_ns / S:.3g} s [ms]")
+    by_node.set_ylabel("sender (node id)")
+    last_ns = max(one.start_ns for one in air.sent) + 1
+    step_ns = -(-last_ns // _STEPS)
+    taken: Mapping[Cause, list[float]] = defaultdict(lambda: [0.0] * _STEPS)
+    for one in air.sent:
+        taken[one.cause][one.start_ns // step_ns] += one.length_ns / step_ns
+    used = [cause for cause in Cause if cause in taken]
+    shares.stackplot(
+        [(step + 0.5) * step_ns / S for step in range(_STEPS)], [taken[cause] for cause in used],
+        labels=list(used), colors=[_COLORS[cause] for cause in used],
+    )  # fmt: skip
+    shares.set_xlim(0, last_ns / S)
+    shares.set_ylim(bottom=0)
+    shares.set_xlabel("time [s]")
+    shares.set_ylabel("airtime of all senders [s per s]")
+    legend_above(figure, shares)
+    return RunPicture(
+        figure,
+        f"Left: {len(shown)} frames from the middle of the run, by sender and cause; none is drawn shorter than "
+        f"{least_ms:.2g} ms. Right: the airtime that each cause took over the whole run; senders far apart may send at "
+        "the same time, so the sum may be more than 1.",
+    )
+
+
+def rows(air: Air) -> Rows:
+    """What each cause took of the air."""
+    whole_ns = sum(one.length_ns for one in air.sent) or 1
+    found = list[list[str]]()
+    for cause in Cause:
+        frames = [one for one in air.sent if one.cause is cause]
+        if frames:
+            took_ns = sum(one.length_ns for one in frames)
+            found.append([cause, f"{len(frames)}", percent(len(frames) / len(air.sent)), percent(took_ns / whole_ns)])
+    return Rows(["cause", "frames", "of all frames", "of all airtime"], found)
+
+
+def against_dominating_set(run: RunRecords, air: Air) -> str:
+    """How often each packet to everyone was sent, beside the size of a connected dominating set of the links then."""
+    sent = [air.times[name] for name in run.sent if air.times[name] and run.scenario.traffic.destination == "all"]
+    least = [size for size in map(len, _dominating_sets(run)) if size]
+    if not sent or not least:
+        return ""
+    mean, needed = sum(sent) / len(sent), sum(least) / len(least)
+    return (
+        f"Each packet to everyone was sent {number(mean)} times. A greedy connected dominating set of the links has "
+        f"{number(needed)} nodes (mean of {len(least)} instants): {mean / needed:.2f} times as many transmissions."
+    )
+
+
+def _dominating_sets(run: RunRecords) -> Iterator[set[int]]:
+    """The sets at instants over the traffic's time."""
+    reach_m = heard_m(run.scenario.radio)
+    begin_ns, end_ns = run.scenario.traffic_window_ns
+    for step in range(_INSTANTS):
+        at_ns = begin_ns + (end_ns - begin_ns) * step // _INSTANTS
+        moved = {node: _at(track, at_ns)[2:] for node, track in run.tracks.items()}
+        places: Mapping[int, tuple[float, ...]] = moved or run.places().at
+        yield greedy_dominating_set(
+            {a: {b for b, there in places.items() if b != a and math.dist(here, there) <= reach_m}
+             for a, here in places.items()}
+        )  # fmt: skip
+
+
+def _at(track: Sequence[Posed], at_ns: int) -> Posed:
+    return next((one for one in reversed(track) if one.t_ns <= at_ns), track[0])
+
+
+def greedy_dominating_set(links: Mapping[int, set[int]]) -> set[int]:
+    """A small connected set from which every node of the greatest part is reached: the node that reaches most of the
+    others first, then always the one next to the set that reaches most (Guha and Khuller, 1998, algorithm I).
+    """
+    if not links:
+        return set()
+    chosen = {max(links, key=lambda node: (len(links[node]), -node))}
+    covered = chosen | links[next(iter(chosen))]
+    while True:
+        best = max(covered - chosen, key=lambda node: (len(links[node] - covered), -node), default=None)
+        if best is None or not links[best] - covered:
+            return chosen
+        chosen.add(best)
+        covered |= links[best]

@@ -329,7 +329,14 @@ def test_a_page_needs_nothing_else_and_has_every_verdict(nine, tmp_path) -> None
 
 @pytest.mark.parametrize("scenario", ["clusters", *slow("quick")])
 def test_a_run_has_a_page_with_its_delays_links_and_mission(scenario: str, tmp_path: Path) -> None:
-    keys = ["nodes.count=9", "world.engine=kinematic", "duration_s=11", "warmup_s=5", "drain_s=1", "traffic.sources=all"]
+    keys = [
+        "nodes.count=9",
+        "world.engine=kinematic",
+        "duration_s=11",
+        "warmup_s=5",
+        "drain_s=1",
+        "traffic.sources=all",
+    ]
     keys += ["clusters.count=8"] if scenario == "clusters" else []
     chosen = catalog.find(scenario, keys)
     with PcapFile(tmp_path / "air.pcap", chosen.radio) as file:

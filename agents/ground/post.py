@@ -47,13 +47,11 @@ class KnownUavs:
         self._plan: Search | None = None
 
     def on_status(self, status: SearchStatus) -> None:
-        """A UAV states where it is."""
         before = self._statuses.get(status.node)
         if before is None or status.t_us > before.t_us:
             self._statuses[status.node] = status
 
     def on_plan(self, plan: Search) -> None:
-        """A plan was received."""
         if self._plan is None or newer(plan.revision, self._plan.revision, bits=_REVISION_BITS):
             self._plan = plan
 

@@ -232,7 +232,6 @@ class Searcher:
             self._leave(now_ns)
 
     def on_wind(self, velocity: Enu) -> None:
-        """An estimate of the wind."""
         self._return_home.on_wind(velocity)
 
     def _leave(self, now_ns: int) -> None:

@@ -64,7 +64,6 @@ class LinkStats(NamedTuple):
     """`array('q')`: one per link."""
 
     def rows(self) -> Iterator[LinkRow]:
-        """The links, one by one."""
         for i, rssi_sum_mdbm in enumerate(self.rssi_sums_mdbm):
             received, *lost = self.counts[i * COUNTS : (i + 1) * COUNTS]
             yield LinkRow(NodeId(self.ends[2 * i]), NodeId(self.ends[2 * i + 1]), received, tuple(lost), rssi_sum_mdbm)

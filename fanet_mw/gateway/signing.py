@@ -59,7 +59,6 @@ class Signing:
         self._sent = max(self._sent, self._now)
 
     def signed(self, frame: bytes) -> bytes:
-        """A frame, signed."""
         shape = layout(int.from_bytes(frame[7:10], "little"))
         if frame[2] or shape is None:
             return frame

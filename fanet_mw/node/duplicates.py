@@ -53,7 +53,6 @@ def origin_and_seq(key: int) -> tuple[int, int]:
 
 
 def key_of_packet(packet: Packet) -> int:
-    """The key of a packet."""
     return key_of(packet.header.origin, packet.header.seq)
 
 

@@ -133,7 +133,6 @@ class Reader:
         return looked.parts
 
     def _packet(self, frame: bytes, fields: Fields) -> Looked:
-        """Look at the bytes of one packet."""
         name = frame[END_TO_END]
         size, inner, packet_hash = self._hashes.get(name, _UNKNOWN)
         # packets that differ only in their inner frames are told apart by them: no copy is taken for another packet

@@ -204,7 +204,6 @@ class Scenario(Section):
 
     @property
     def uav_ids(self) -> range:
-        """The nodes that are UAVs."""
         return range(1, self.nodes.count + 1)
 
     @property

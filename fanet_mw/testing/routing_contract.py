@@ -71,7 +71,6 @@ class RoutingContract:
         )  # fmt: skip
 
     def run(self, destination: Destination, *, moving: bool) -> ContractRun:
-        """One run, cached."""
         return _run(json.dumps(self.scenario(destination, moving=moving).model_dump(mode="json")))
 
     # --- over the real medium -------------------------------------------------------------------------------------

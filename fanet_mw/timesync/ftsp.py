@@ -192,7 +192,6 @@ class TimeSync:
     # --- sending --------------------------------------------------------------------------------------------------
 
     def start(self, local_ns: int) -> None:
-        """The node has started."""
         self._news_ns = local_ns
         self._wait(local_ns)
         if self._own.leads:

@@ -34,7 +34,6 @@ class Loads(NamedTuple):
     members: tuple[int, ...]
 
     def encode_frames(self, node: int) -> bytes:
-        """One message."""
         unused = (0,) * (CAPACITY - len(self.members))
         return encode_inner(LOADS, LOADS.layout.pack(*self.members, *unused, len(self.members), VERSION), node=node)
 

@@ -87,12 +87,10 @@ class Statement:
 
 
 def above(what: str, values: Values, threshold: float, unit: str = "", *, possible: Possible = ANY) -> Statement:
-    """The statement that a quantity is above a threshold."""
     return Statement(what, _listed(values), "above", threshold, unit, possible)
 
 
 def below(what: str, values: Values, threshold: float, unit: str = "", *, possible: Possible = ANY) -> Statement:
-    """The statement that a quantity is below a threshold."""
     return Statement(what, _listed(values), "below", threshold, unit, possible)
 
 

@@ -34,7 +34,6 @@ class Turns(NamedTuple):
     period_called: str = "superframe"
 
     def in_window(self, t_ns: int) -> bool:
-        """True within the window."""
         start_ns, length_ns = self.window
         return (t_ns - self.start_ns - start_ns) % self.period_ns < length_ns
 

@@ -12,7 +12,6 @@ _LONG_MS: Final = 10_000
 
 
 def network(summary: Mapping[str, Any]) -> Rows:
-    """What the network did."""
     return Rows(("quantity", "value"), list(_network(summary)))
 
 

@@ -221,7 +221,6 @@ class _DeliveryCount:
 
 
 def first_class_of(outcome: Outcome) -> AppPackets:
-    """The first class of traffic."""
     return packets_of(outcome)[next(iter(outcome.scenario.traffic_classes))]
 
 

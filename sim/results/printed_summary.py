@@ -9,7 +9,6 @@ from rich.text import Text
 
 
 def show(summary: Mapping[str, Any], console: Console) -> None:
-    """Print a summary."""
     mode = "virtual time" if summary["mode"] == "virtual" else "real processes"
     mode += clock_sentence(summary)
     pace = summary["simulated_s"] / summary["wall_s"] if summary["wall_s"] else 0.0

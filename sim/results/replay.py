@@ -132,7 +132,6 @@ class Replay:
         return states
 
     def found(self, t_s: float) -> Mapping[int, SurvivorState]:
-        """The states of all survivors at an instant."""
         return {
             survivor: next(state for state in reversed(states) if state.t_ns <= max(0, round(t_s * S)))
             for survivor, states in self.finds.items()

@@ -27,7 +27,6 @@ _CLUSTERED: Final = frozenset({"clustered"})
 
 
 def notes(scenario: Scenario) -> list[str]:
-    """One sentence for each."""
     kinds = (_after_the_end, _without_effect, _still_waves, _beyond_the_vehicle, _odd_band, _guessed)
     return [note for kind in kinds for note in kind(scenario)]
 

@@ -57,7 +57,6 @@ class CameraView:
         )
 
     def sighting_evidence(self, height_m: float) -> float:
-        """The evidence of one sighting from this height."""
         image_m2 = max(1.0, 4 * height_m * height_m * self._tan_east * self._tan_north)
         false = self._false_per_image * min(1.0, _PLACE_M2 / image_m2)
         return math.log(max(1e-3, min(_MOST, self.recognized(height_m))) / max(_LEAST_FALSE, min(0.5, false)))

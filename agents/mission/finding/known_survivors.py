@@ -187,7 +187,6 @@ class KnownSurvivors:
         return self.by_id[found.survivor].is_refuted(found)
 
     def confirmed_places(self) -> dict[int, Estimate]:
-        """The places of the confirmed survivors."""
         return {
             survivor: estimate_of(known.confirmed)
             for survivor, known in sorted(self.by_id.items())
@@ -211,7 +210,6 @@ class KnownSurvivors:
         return [survivor for survivor in self.unconfirmed() if self.by_id[survivor].inside is None]
 
     def is_confirmed(self, survivor: int) -> bool:
-        """True if the survivor has a confirmation that holds."""
         known = self.by_id.get(survivor)
         return known is not None and known.confirmed is not None
 

@@ -48,7 +48,6 @@ class Endurance:
         self._readings: deque[_Reading] = deque()
 
     def on_wind(self, velocity: Enu) -> None:
-        """An estimate of the wind."""
         self._wind = velocity
 
     def read(self, charge: float, *, now_ns: int, velocity: Enu = STILL) -> None:

@@ -96,7 +96,6 @@ class ReturnHome:
         return True
 
     def on_wind(self, velocity: Enu) -> None:
-        """An estimate of the wind."""
         self._endurance.on_wind(velocity)
 
     def stands_on_pad(self) -> None:

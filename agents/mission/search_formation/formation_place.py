@@ -51,7 +51,6 @@ class FormationPlace:
         """The instant at which it leaves that position."""
 
     def adopt(self, plan: Search, now_ns: int) -> None:
-        """Follow a plan from now on."""
         first = self.place is None
         self.plan, self.pattern = plan, pattern_of(plan, reach_m=self._reach_m)
         self.place = plan.nodes.index(self._node) if self._node in plan.nodes else None

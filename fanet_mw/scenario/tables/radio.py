@@ -23,8 +23,6 @@ DSSS_BANDWIDTH_HZ: Final = 22e6
 OFDM_BANDWIDTH_HZ: Final = 20e6
 _THERMAL_DBM_PER_HZ: Final = -174.0
 NS3_SENSITIVITY_DBM: Final = -82.0
-NS3_PREAMBLE_SNR_DB: Final = 4.0
-"""ns-3.44, ThresholdPreambleDetectionModel: the same for all rates."""
 LEAST_SNR_DB: Final = {
     "nist": {
         1.0: -6.65, 2.0: -2.5, 5.5: 0.35, 11.0: 3.35,

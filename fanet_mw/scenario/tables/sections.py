@@ -65,7 +65,6 @@ def _has_truth(value: object) -> bool:
 
 
 def _types(annotation: object) -> set[object]:
-    """All types in an annotation."""
     if get_origin(annotation) is Literal:
         return {type(choice) for choice in get_args(annotation)}
     found: set[object] = {annotation} if isinstance(annotation, type) or annotation is Any else set()

@@ -212,7 +212,6 @@ class Collector:
             return {name: self._why_no_report.get(name, "no report was heard") for name in missing}
 
     def links(self) -> LinkTotals:
-        """The statistics of all links."""
         with self._lock:
             return self._links
 

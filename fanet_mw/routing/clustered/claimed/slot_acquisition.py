@@ -194,7 +194,6 @@ def longest_superframe(turns: Turns) -> int:
 
 
 def geometry(scenario: Scenario) -> Turns:
-    """The geometry of periods and turns."""
     period_ns = scenario.claimed_period_ns
     contention_ns = round(scenario.clusters.contention_ms * MS)
     turn = turn_ns(scenario, payload_bytes=scenario.claimed_turn_bytes)

@@ -88,7 +88,6 @@ class HeardLoads:
         return max(1, min(MOST_LOAD, math.ceil(load - 1e-6)))
 
     def loads(self, nodes: Iterable[NodeId], *, now_ns: int) -> dict[NodeId, int]:
-        """The load of each of these nodes."""
         return {node: self.load(node, now_ns=now_ns) for node in nodes}
 
     def worth_a_change(

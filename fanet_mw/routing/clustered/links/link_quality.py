@@ -47,7 +47,6 @@ class LinkQuality:
         return 1.0 if self.has_estimate(now_ns=now_ns) else 1 / FAST
 
     def start(self, now_ns: int) -> None:
-        """The node has started."""
         self._start_ns = now_ns
 
     def on_hello(self, neighbor: NodeId, *, rssi_dbm: float, now_ns: int) -> None:

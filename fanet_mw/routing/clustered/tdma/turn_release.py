@@ -45,7 +45,6 @@ class TurnRelease(ABC):
         return self._push(packet, packet.header.priority, now_ns)
 
     def _push(self, packet: Packet, rank: int, now_ns: int) -> Packet | None:
-        """Queue a packet at a rank."""
         evicted = self._queue.push(packet, rank=rank)
         if self._next is None:
             self._arm(now_ns)

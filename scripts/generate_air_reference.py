@@ -4,7 +4,7 @@ import re
 import struct
 import sys
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -51,6 +51,17 @@ def described(spec: wire.Spec, entry: ET.Element) -> str:
     return "\n".join(text) + "\n"
 
 
+def listed(entries: Mapping[str, ET.Element]) -> str:
+    """Every message with its length on the air and the first sentence about it."""
+    text = ["| id | message | bytes on the air | what |", "|---|---|---|---|"]
+    for spec in sorted(wire.SPECS, key=lambda spec: spec.msgid):
+        name, most = fanet.mavlink_map[spec.msgid].msgname, spec.layout.size + wire.OVERHEAD
+        least = "17-" if name in ("FANET_CHUNK", "FANET_ROUTING") else ""
+        first = re.split(r"(?<=\w)[.;] ", f"{entries[name].findtext('description')} ")[0]
+        text.append(f"| {spec.msgid} | `{name}` | {least}{most} | {first} |")
+    return "\n".join(text) + "\n"
+
+
 def main(arguments: Sequence[str], *, folder: Path = ROOT / "docs" / "reference") -> int:
     """Write the tables, or with --check say which page is not what would be written."""
     if arguments not in ([], ["--check"]):
@@ -63,6 +74,7 @@ def main(arguments: Sequence[str], *, folder: Path = ROOT / "docs" / "reference"
     tables = {
         name: described(spec, entries[name]) for spec in wire.SPECS for name in [fanet.mavlink_map[spec.msgid].msgname]
     }
+    tables["every_message"] = listed(entries)
     found, wrong = [], []
     for page in (folder / name for name in PAGES):
         text = page.read_text(encoding="utf-8")

@@ -37,9 +37,18 @@ _NOT_FAST = (
     "unit/world/",
     "unit/sweep/",
     "unit/run/",
+    "unit/inspection/",
+    "unit/planner/",
+    "unit/results/test_run_folder.py",
+    "unit/results/test_results.py",
+    "unit/emulator/test_fading.py",
+    "unit/emulator/test_losses_and_levels.py",
     "property/test_ground.py",
+    "property/test_planner.py",
 )
-"""Folders below `tests/` of what `--fast` tries, and what it leaves out of them: processes, pictures, flights."""
+"""Folders below `tests/` of what `--fast` tries, and what it leaves out of them: processes, pictures, flights, samples
+that have to be large.
+"""
 
 _REALTIME = (
     "test_realtime", "test_host_realtime", "test_hosts", "test_radios", "test_real_radio", "test_time_scale",

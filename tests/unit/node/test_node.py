@@ -108,6 +108,14 @@ def test_a_delay_ends_when_the_application_has_the_packet(node: Node) -> None:
     assert delivered(node) == [Delivered(8 * MS, OURS, THEIRS, 7, 7 * MS, 1, 3 * MS)]
 
 
+def test_a_hello_that_is_old_when_it_is_heard_is_no_news_and_is_counted(node: Node) -> None:
+    oldest_ns = node._header_check.oldest_hello_ns
+    for seq, at_ns in ((1, oldest_ns), (2, oldest_ns + 1)):
+        hear(node, frame(kind=Kind.HELLO, seq=seq, hop_limit=1, flags=0), at_ns=at_ns)
+    assert [packet.header.seq for packet in node.hellos] == [1]
+    assert node.report()["dropped"] == {DropReason.EXPIRED: 1}
+
+
 @pytest.mark.parametrize(("priority", "lifetime_ns"), [(PRIORITY_BULK, 5 * S), (PRIORITY_REPORT, 2 * S)])
 def test_a_packet_ends_at_the_lifetime_of_its_class(node: Node, priority: int, lifetime_ns: int) -> None:
     hear(node, frame(priority=priority, seq=1), at_ns=lifetime_ns)

@@ -60,6 +60,23 @@ def test_the_surface_below_is_the_highest_roof_of_those_that_cover_the_place() -
     assert not Solids(Obstacles(None, ())).any
 
 
+@pytest.mark.parametrize("east_m", [-20, 0, 100, 200, 220])
+def test_buildings_beside_the_whole_of_a_path_are_near_it_and_others_are_not(east_m: float) -> None:
+    boxes = (
+        Box(east_m, 30, 10, 10, 12),
+        Box(east_m, -42, 10, 10, 12),
+        Box(290, 0, 10, 10, 12),
+        Box(-90, 0, 10, 10, 12),
+    )
+    rows, corners, roofs = Solids(Obstacles(None, boxes)).corners_near(
+        np.array([[0.0, 0, 20]]), np.array([[200.0, 0, 150]]), margin_m=30.0
+    )
+    assert (rows.tolist(), roofs.tolist()) == ([0], [12])
+    assert sorted(map(tuple, corners[0].tolist())) == [
+        (east_m + side, 30 + along) for side in (-5, 5) for along in (-5, 5)
+    ]
+
+
 def test_survivors_stand_on_the_hills_and_a_share_of_them_is_buried(make_scenario: MakeScenario) -> None:
     scenario = make_scenario(
         **{"mission.survivors": 20, "mission.buried": 0.3, "world.terrain_m": 40, "nodes.altitude_m": 90}

@@ -1,0 +1,16 @@
+"""What share of the time distances leave a way open, by which results of any protocol are bounded."""
+
+import pytest
+from kit import MakeScenario
+
+from sim.results.connectivity import connectivity
+
+
+@pytest.mark.parametrize(("spacing_m", "share"), [(240, 1.0), (260, 0.0)])
+@pytest.mark.parametrize("window_s", [0.4, 5])
+def test_at_rest_a_row_is_connected_always_or_never_however_short_the_window(
+    make_scenario: MakeScenario, spacing_m: float, share: float, window_s: float
+) -> None:
+    keys = {"nodes.count": 3, "nodes.spacing_m": spacing_m, "nodes.layout": "line", "radio.range_m": 250}
+    window = {"warmup_s": 1.1, "drain_s": 1, "duration_s": 2.1 + window_s}
+    assert connectivity(make_scenario(**keys, **window)) == share

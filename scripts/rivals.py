@@ -12,39 +12,11 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
-from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Delivered
-from fanet_mw.units import S
+from sim.results.connectivity import connectivity
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
-from sim.world.arrays import Rows
-from sim.world.environment.layout import positions
-from sim.world.mobility.guidance import Guidance
-
-
-def reached(at: Rows, range_m: float) -> int:
-    """How many nodes have a path to the first."""
-    linked = np.linalg.norm(at[:, None] - at[None], axis=2) <= range_m
-    known = np.zeros(len(at), dtype=bool)
-    known[0] = True
-    while True:
-        wider = linked[known].any(axis=0)
-        if (wider == known).all():
-            return int(known.sum()) - 1
-        known = wider
-
-
-def connectivity(scenario: Scenario) -> float:
-    """`conn` of one run."""
-    guidance = Guidance(np.array(positions(scenario), dtype=np.float64), scenario)
-    first_ns, end_ns = scenario.traffic_window_ns
-    seconds = range(first_ns // S, end_ns // S)
-    found = [reached(guidance.track(float(t_s)).places, scenario.radio.range_m) for t_s in seconds]
-    return sum(found) / (len(found) * (scenario.nodes.count - 1))
-
 
 COLUMNS = ("protocol", "m/s", "PDR (sd)", "conn", "hops", "delay ms mean / p50 / p95", "sent", "wall s", "closes")
 """`hops`: of delivered packets; `sent`: frames per packet generated; `wall`: of a run; `closes`: every frame's end."""

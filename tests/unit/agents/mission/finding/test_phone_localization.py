@@ -2,10 +2,11 @@
 
 import math
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, PhoneFilter, PhoneModel
+from agents.mission.finding.phone_localization import CELL_M, REFERENCE_LOSS_DB, PhoneFilter, PhoneModel
 from agents.mission.finding.sightings import ground_place
 from fanet_mw.units import Enu
 
@@ -40,6 +41,17 @@ def test_one_that_passes_straight_leaves_the_side_open_and_silence_elsewhere_set
     settled = phone.estimate()
     assert settled is not None
     assert settled.east_m > 40
+
+
+def test_no_place_is_known_better_than_within_a_cell() -> None:
+    truth, phone = Enu(60, 0, 0), PhoneFilter(MODEL)
+    for node in range(1, 226):
+        at = Enu(60 + CELL_M * (node % 15 - 7), CELL_M * (node // 15 - 7), 10)
+        phone.on_rssi(node, at, rssi_dbm(truth, at))
+    place = phone.estimate()
+    assert place is not None
+    assert (place.east_m, place.north_m) == pytest.approx((60, 0), abs=0.1)
+    assert (place.east_variance_m2, place.north_variance_m2) == pytest.approx((CELL_M**2 / 12,) * 2, rel=0.01)
 
 
 def test_the_same_place_counts_once_for_a_node() -> None:

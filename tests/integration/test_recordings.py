@@ -357,7 +357,7 @@ def test_the_programs_of_the_page_run(
     for program in programs:
         exec(program, names)
     said = capsys.readouterr().out
-    assert len(programs) == 4
+    assert len(programs) == 3
     assert "received_share" in said
     assert "1.0 " in said
 

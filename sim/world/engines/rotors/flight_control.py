@@ -69,7 +69,7 @@ class FlightControl:
         self._integral[2] += grown[2]
         most = gravity * self._tan_tilt
         np.clip(self._integral, -most, most, out=self._integral)
-        return np.asarray(mass * np.stack([acceleration[0] * scale, acceleration[1] * scale, lift]))
+        return np.asarray(mass * np.array([acceleration[0] * scale, acceleration[1] * scale, lift]))
 
     def rotor_thrusts(self, force: Values, attitude: Values, rates: Values) -> Values:
         """The wanted thrust of each rotor [4, UAVs], for a force at an attitude (quaternion w, x, y, z)."""
@@ -81,7 +81,7 @@ class FlightControl:
         torque = self._inertia * self._rate_gain * (target - rates) + cross(rates, self._inertia * rates)
         # Thrust along the body's own axis lifts less while it leans elsewhere than wanted.
         along = np.maximum((body_up(attitude) * force).sum(axis=0), 0.3 * size)
-        return np.asarray(self._mixer @ np.vstack([along, torque]))
+        return np.asarray(self._mixer @ np.concatenate([along[None], torque]))
 
 
 def still_drag_m_s2(vehicle: Vehicle, velocity: Values) -> Values:
@@ -95,26 +95,26 @@ def allocation(vehicle: Vehicle) -> Values:
     """Thrust and torques about x, y, z of the body, by the thrust of each rotor [4, 4]."""
     x = np.array([rotor[0] for rotor in vehicle.rotors_m])
     y = np.array([rotor[1] for rotor in vehicle.rotors_m])
-    return np.stack([np.ones(4), y, -x, vehicle.torque_m * np.array(vehicle.spins, dtype=np.float64)])
+    return np.array([np.ones(4), y, -x, vehicle.torque_m * np.array(vehicle.spins, dtype=np.float64)])
 
 
 def level_attitude(up: Values) -> Values:
     """The attitude whose body axis z is `up` (unit vectors), reached from level by the shortest rotation."""
     w = np.sqrt(np.maximum((1 + up[2]) / 2, 1e-9))
-    return np.stack([w, -up[1] / (2 * w), up[0] / (2 * w), np.zeros_like(w)])
+    return np.array([w, -up[1] / (2 * w), up[0] / (2 * w), np.zeros_like(w)])
 
 
 def body_up(q: Values) -> Values:
     """The body's axis z, in east, north, up."""
     w, x, y, z = q
-    return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
+    return np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
 
 
 def times(a: Values, b: Values) -> Values:
     """Hamilton's product of quaternions."""
     aw, ax, ay, az = a
     bw, bx, by, bz = b
-    return np.stack(
+    return np.array(
         [
             aw * bw - ax * bx - ay * by - az * bz,
             aw * bx + ax * bw + ay * bz - az * by,
@@ -125,8 +125,8 @@ def times(a: Values, b: Values) -> Values:
 
 
 def conjugate(q: Values) -> Values:
-    return np.stack([q[0], -q[1], -q[2], -q[3]])
+    return np.array([q[0], -q[1], -q[2], -q[3]])
 
 
 def cross(a: Values, b: Values) -> Values:
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

@@ -97,7 +97,7 @@ class Rotors(Engine):
         drag = self._drag_n(across, self._speed.sum(axis=0), airflow)
         acceleration = (up * total - drag) / vehicle.mass_kg
         acceleration[2] -= GRAVITY_M_S2
-        turning = (np.stack(torque) - cross(self._rates, self._inertia * self._rates)) / self._inertia
+        turning = (np.array(torque) - cross(self._rates, self._inertia * self._rates)) / self._inertia
         turning[:, self._dead] = -_TUMBLE_PER_S * self._rates[:, self._dead]
         before = self._at.copy()
         self._velocity = self._velocity + acceleration * _DT_S
@@ -135,7 +135,7 @@ class Rotors(Engine):
         np.minimum(self._speed, vehicle.max_rad_s, out=self._speed)
 
     def _turn_bodies(self) -> None:
-        half = np.vstack([np.zeros_like(self._rates[:1]), 0.5 * _DT_S * self._rates])
+        half = np.concatenate([np.zeros_like(self._rates[:1]), 0.5 * _DT_S * self._rates])
         attitude = self._attitude + times(self._attitude, half)
         self._attitude = attitude / np.sqrt((attitude**2).sum(axis=0))
 

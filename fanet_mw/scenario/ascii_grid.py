@@ -71,6 +71,8 @@ def parse(data: bytes) -> AsciiGrid:
         if len(words) != 2:
             raise ValueError(f"line {at + 1}: {line.strip()[:60]!r} must be a key and one number")
         value = number(words[1], line=at + 1)
+        if key != "nodata" and not math.isfinite(value):
+            raise ValueError(f"line {at + 1}: {words[0]} = {words[1]} must be a finite number")
         if key in _SIDES and THOUSANDS.fullmatch(words[1]):
             raise ValueError(f"line {at + 1}: {words[1]} may be thousands or a decimal comma; write {words[0]} without")
         if found.setdefault(key, value) != value and not math.isnan(value):
@@ -90,9 +92,11 @@ def parse(data: bytes) -> AsciiGrid:
 def number(text: str, *, line: int) -> float:
     """A number, with a decimal point or comma."""
     try:
-        return float(text.replace(",", ".", 1))
+        if "_" not in text:  # which Python would pass over
+            return float(text.replace(",", ".", 1))
     except ValueError:
-        raise ValueError(f"line {line}: {text[:40]!r} is no number") from None
+        pass
+    raise ValueError(f"line {line}: {text[:40]!r} is no number")
 
 
 def _text(data: bytes) -> str:

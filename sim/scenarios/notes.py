@@ -108,11 +108,15 @@ def _changed(section: Section) -> Iterator[tuple[str, FieldInfo]]:
 
 def _guessed(scenario: Scenario) -> Iterator[str]:
     world = scenario.world
-    if not world.buildings_geojson:
+    if not (world.buildings_geojson or world.heightmap):
         return
-    from sim.world.environment.obstacles import town_of  # it brings numpy
+    from sim.world.environment.obstacles import heightmap_of, town_of  # they bring numpy
 
     try:
+        if world.heightmap and (odd := heightmap_of(world).odd_low):
+            yield f"world.heightmap: {odd}"
+        if not world.buildings_geojson:
+            return
         town = town_of(world)
     except ConfigError:
         return  # whoever builds the world says what is wrong with the file

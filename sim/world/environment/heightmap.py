@@ -31,6 +31,9 @@ _MOST_CELLS: Final = 64_000_000
 _LOWEST_M: Final = -500.0
 _HIGHEST_M: Final = 9000.0
 """Land lies between the shore of the Dead Sea, -430 m, and Mount Everest, 8849 m."""
+_ODD_M: Final = 50.0
+_ODD_SHARE: Final = 0.1
+"""Cells that are so much lower than all others, and no greater share of them, are told."""
 _THOUSANDS_M: Final = re.compile(r"[1-9],\d{3}")
 """A height with a comma that may be one of thousands; no land is higher."""
 _TIFF: Final = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
@@ -50,6 +53,8 @@ class Heightmap(NamedTuple):
     """Latitude and longitude of the file's middle, if the file says where on earth it lies."""
     name_of: Callable[[int, int], str] = lambda row, column: f"row {row + 1} from the south, column {column + 1}"
     """How a cell is called in the file, by its row and column."""
+    odd_low: str = ""
+    """What is odd about the lowest cells of the area, if they may be voids."""
 
     @property
     def cell_m(self) -> float:
@@ -232,7 +237,22 @@ def _without_voids(found: Heightmap, path: Path, area_m: float) -> Heightmap:
             "fill them, for example by gdal_fillnodata.py, or put the area where there are none"
         )
     lowest = part.metres[used] if found.middle_deg else found.metres[~void]
-    return part._replace(metres=np.where(void_here, np.nan, part.metres - lowest.min()))
+    return part._replace(
+        metres=np.where(void_here, np.nan, part.metres - lowest.min()), odd_low=_odd_low(part.metres[used])
+    )
+
+
+def _odd_low(heights: Values) -> str:
+    """A few cells of one height, far below all others: a void, perhaps, that nobody has declared."""
+    low = heights.min()
+    others = heights[heights > low]
+    count = heights.size - others.size
+    if not others.size or others.min() - low < _ODD_M or count > _ODD_SHARE * heights.size:
+        return ""
+    return (
+        f"{low:g} m at {count} of {heights.size} cells of the area, and at least {others.min():g} m at all others: "
+        "a void that the file does not declare?"
+    )
 
 
 def _under(found: Heightmap, area_m: float) -> tuple[Heightmap, tuple[int, int]]:
@@ -272,6 +292,8 @@ def _numbers(grid: ascii_grid.AsciiGrid) -> Rows:
         text = text.replace(",", "." if is_decimal else " ")
     words = re.sub(r"-?1\.#\w+", "nan", text).split() if "#" in text else text.split()
     try:
+        if "_" in text:  # which numpy would pass over, as Python does
+            raise ValueError("a height with an underscore is no number")
         heights = np.array(words, dtype=np.float64)
     except ValueError:
         for at, line in enumerate(grid.lines):

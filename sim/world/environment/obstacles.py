@@ -175,6 +175,18 @@ def town_of(world: World) -> footprints.Town:
     )
 
 
+def heightmap_of(world: World) -> heightmap.Heightmap:
+    """The heights of the scenario's file."""
+    return heightmap.read(
+        Path(world.heightmap),
+        white_m=world.heightmap_white_m,
+        pixel_m=world.heightmap_pixel_m,
+        origin_deg=world.origin_deg,
+        area_m=world.area_m,
+        digest=world.heightmap_sha256,
+    )
+
+
 def _of_file(world: World, hills: Hills | None, starts: Rows) -> Iterator[Box]:
     """The buildings of the scenario's GeoJSON file whose middle lies in the area."""
     town = town_of(world)
@@ -198,14 +210,7 @@ def _hills_of_file(scenario: Scenario) -> Hills:
     The grid is nowhere lower than the file: where it is coarser, ridges and towers keep their highest point.
     """
     world = scenario.world
-    found = heightmap.read(
-        Path(world.heightmap),
-        white_m=world.heightmap_white_m,
-        pixel_m=world.heightmap_pixel_m,
-        origin_deg=world.origin_deg,
-        area_m=world.area_m,
-        digest=world.heightmap_sha256,
-    )
+    found = heightmap_of(world)
     cells = max(8, min(_FILE_CELLS, math.ceil(world.area_m / found.cell_m - 1e-6)))
     axis = np.linspace(-world.area_m / 2, world.area_m / 2, cells + 1)
     heights = found.sample(*np.meshgrid(axis, axis))

@@ -2,12 +2,14 @@
 change.
 """
 
+import contextlib
 import json
 import math
 import struct
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import numpy as np
@@ -18,6 +20,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.mavlink import Geodetic, to_geodetic
 from fanet_mw.scenario import Scenario, World, config
 from fanet_mw.units import Enu
+from sim.scenarios.notes import notes
 from sim.world.environment import footprints, heightmap
 from sim.world.environment.obstacles import Obstacles, terrain
 from sim.world.environment.solids import Solids
@@ -94,6 +97,19 @@ def test_a_void_that_the_header_does_not_declare_is_refused_with_its_place(tmp_p
         ground(path, (0, 0))
 
 
+@pytest.mark.parametrize(("low", "count", "is_odd"), [(-99, 1, True), (150, 12, True), (170, 1, False), (0, 61, False)])
+def test_a_few_cells_far_below_all_others_are_told(tmp_path: Path, low: int, count: int, is_odd: bool) -> None:
+    """A void that nobody declares may be a height on earth."""
+    rows: list[list[object]] = [[200.0] * 11 for _ in range(11)]
+    for at in range(count):
+        rows[at // 11][at % 11] = low
+    path = tmp_path / "hill.asc"
+    path.write_text(grid(CORNER, rows))
+    said = notes(config.build({"world": {"heightmap": str(path), "area_m": 100}}))
+    told = f"world.heightmap: {low} m at {count} of 121 cells of the area, and at least 200 m at all others: a void"
+    assert [note.startswith(told) for note in said] == [True] * is_odd
+
+
 @pytest.mark.parametrize(
     ("declared", "written"),
     [
@@ -120,6 +136,8 @@ def test_a_declared_void_is_recognized_in_other_digits_and_counts_for_nothing_ou
     ("data", "why"),
     [
         (grid(CORNER, hill()).replace("205.0", "2o5", 1), r"line 6: '2o5' is no number"),
+        (grid(CORNER, hill()).replace("205.0", "2_05", 1), r"line 6: '2_05' is no number"),
+        (grid(CORNER, hill()).replace("r 5411000", "r 1e999"), r"yllcorner = 1e999 must be a finite number"),
         (grid(CORNER, hill()).replace(" 205.0", "", 1), r"120 heights, not 11 x 11; line 6 has 10"),
         (grid(CORNER, hill()).replace("cellsize 10", "cellsize ten"), r"line 5: 'ten' is no number"),
         (grid(CORNER, hill()).replace("ncols 11", "columns 11"), r"line 1: 'columns 11' is no line of the header"),
@@ -232,6 +250,47 @@ def test_a_geotiff_of_any_reference_system_lies_where_it_belongs(tmp_path: Path,
     assert np.subtract(found, found[0]) == pytest.approx(wanted, abs=0.1)
     with pytest.raises(ConfigError, match=r"does not cover .*; the middle of the file is \[48\.85"):
         ground(path, (0, 0))
+
+
+def tiff(path: Path, rows: Any, crs: str = "EPSG:32631", **keys: Any) -> Path:
+    """Cells of 10 m about Paris, in all bands alike."""
+    rasterio = pytest.importorskip("rasterio")
+    (x,), (y,) = pytest.importorskip("rasterio.warp").transform("EPSG:4326", crs, [PARIS.lon_deg], [PARIS.lat_deg])
+    side = len(rows)
+    place = rasterio.Affine(10, 0, x - 5 * side, 0, -10, y + 5 * side)
+    shape = {"width": side, "height": side, "dtype": rows.dtype, "count": 1}
+    with rasterio.open(path, "w", "GTiff", crs=crs, transform=place, **{**shape, **keys}) as file:
+        for band in file.indexes:
+            file.write(rows, band)
+    return path
+
+
+def test_a_geotiff_whose_reference_system_has_heights_in_feet_is_read_in_metres(tmp_path: Path) -> None:
+    rows = np.add.outer(np.zeros(21), 2.0 * np.arange(21))
+    for crs, unit_m in (("EPSG:32631+6360", 1200 / 3937), ("EPSG:32631+5773", 1.0)):  # NAVD 88 in feet, EGM96 in metres
+        west, east = ground(tiff(tmp_path / "hill.tif", rows, crs), (-50, 0), (50, 0), origin_deg=PARIS[:2])
+        assert east - west == pytest.approx(20 * unit_m, abs=0.1)
+
+
+def test_a_geotiff_of_colors_is_no_map_of_heights(tmp_path: Path) -> None:
+    path = tiff(tmp_path / "photo.tif", np.full((21, 21), 90, "uint8"), count=3, photometric="rgb")
+    with pytest.raises(ConfigError, match="its first band holds red of uint8, and no heights"):
+        ground(path, (0, 0), origin_deg=PARIS[:2])
+
+
+def test_a_broken_geotiff_is_refused_in_one_sentence_whatever_gdal_raises(tmp_path: Path) -> None:
+    """Some errors of GDAL pass through rasterio as they are, and its warnings are not for users."""
+    path = tiff(tmp_path / "hill.tif", np.zeros((21, 21), "float32"))
+    data, random, read = path.read_bytes(), Random("tiff"), 0
+    for _ in range(100):
+        changed = bytearray(data)
+        for _ in range(random.randrange(1, 6)):
+            changed[random.randrange(600)] = random.randrange(256)
+        path.write_bytes(changed)
+        with contextlib.suppress(ConfigError):
+            ground(path, (0, 0), origin_deg=PARIS[:2])
+            read += 1
+    assert 10 < read < 90
 
 
 def test_a_geotiff_without_the_extra_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -89,6 +89,8 @@ def _tree(data: bytes) -> Any:  # noqa: ANN401  (JSON)
         if not lines or not all(line.startswith("{") and line.endswith("}") for line in lines):
             raise
         return {"type": "FeatureCollection", "features": [json.loads(line) for line in lines]}
+    except ValueError as error:  # of Python, whose advice is not for users
+        raise ValueError(str(error).partition(";")[0]) from error
     if isinstance(tree, dict) and "elements" in tree:
         raise ValueError("it is the JSON of Overpass; export it as GeoJSON")
     if not isinstance(tree, dict) or "type" not in tree:

@@ -26,6 +26,8 @@ from sim.world.environment.given_file import content
 LEVEL_M: Final = 3.0
 _FOOT_M: Final = 0.3048
 _INCH_M: Final = 0.0254
+_INCHES_A_FOOT: Final = 12
+_LONGEST_TAG: Final = 60
 _LEAST_SIDE_M: Final = 0.1
 _HIGHEST_M: Final = 2000.0
 _LEAST_FILLED: Final = 0.85
@@ -73,7 +75,7 @@ class Town(NamedTuple):
     untold: int
     """The number of buildings within the area of which no tag states a height."""
     broken: tuple[str, ...]
-    """The outlines of the file that enclose nothing."""
+    """The outlines of the file that enclose nothing, as far as they lie within the area."""
 
 
 @lru_cache(maxsize=8)
@@ -95,18 +97,22 @@ def read(path: Path, *, origin_deg: tuple[float, float], height_m: float, area_m
     origin = Geodetic(*origin_deg, 0.0)
     boxes: list[Footprint] = []
     guessed: list[str] = []
+    broken = [*found.broken]
     untold = 0
     for outline in found.buildings:
         ring = _plane(outline.ring, origin)
         whole = _rectangle(ring, 0.0)
         if max(abs(whole.east), abs(whole.north)) > area_m / 2:
             continue
+        if min(whole.width, whole.depth) <= _LEAST_SIDE_M:
+            broken.append(f"{outline.name}: its corners lie on a line")
+            continue
         height, why = height_of(outline.tags, height_m)
         boxes += _parts(ring, whole, height)
         if why:
             guessed.append(f"{outline.name}: {why}")
         untold += not any(_said(outline.tags, key) for key, _ in _KEYS)
-    return Town(tuple(boxes), len(found.buildings), tuple(guessed), untold, tuple(found.broken))
+    return Town(tuple(boxes), len(found.buildings), tuple(guessed), untold, tuple(broken))
 
 
 def height_of(tags: Mapping[str, Any], default_m: float) -> tuple[float, str]:
@@ -119,9 +125,9 @@ def height_of(tags: Mapping[str, Any], default_m: float) -> tuple[float, str]:
         values = _values(said, in_levels=unit_m != 1.0)
         height = max((value for value in values if value is not None), default=0.0) * unit_m
         if 0 < height <= _HIGHEST_M:
-            passed += [f"{key} = {said}"] if len(values) > 1 else []
+            passed += [f"{key} = {said[:_LONGEST_TAG]}"] if len(values) > 1 else []
             return height, f"{', '.join(passed)}: taken as {height:g} m" if passed else ""
-        passed.append(f"{key} = {said}")
+        passed.append(f"{key} = {said[:_LONGEST_TAG]}")
     return default_m, f"{', '.join(passed)}: taken as {default_m:g} m" if passed else ""
 
 
@@ -140,7 +146,7 @@ def _values(text: str, *, in_levels: bool) -> list[float | None]:
         word = _SUPPOSED.sub("", part.strip())
         if match := (_LEVELS if in_levels else _METRES).fullmatch(word):
             found.append(_float(match[1]))
-        elif not in_levels and (match := _FEET.fullmatch(word)):
+        elif not in_levels and (match := _FEET.fullmatch(word)) and _float(match[2] or "0") < _INCHES_A_FOOT:
             found.append(_float(match[1]) * _FOOT_M + _float(match[2] or "0") * _INCH_M)
         else:
             found.append(None)

@@ -326,6 +326,8 @@ def town(path: Path, origin: Geodetic = PARIS) -> footprints.Town:
         ({"height": "40 ft"}, 12.192, False),
         ({"height": "40'"}, 12.192, False),
         ({"height": "5'6\""}, 1.6764, False),
+        ({"height": "1'234"}, 19.0, True),
+        ({"height": "9" * 5000, "levels": 2}, 6.0, True),
         ({"height": "12,5"}, 12.5, False),
         ({"height": "12.5m"}, 12.5, False),
         ({"height": "12 metres"}, 12.0, False),
@@ -365,12 +367,14 @@ def test_a_height_is_what_its_tag_says_or_is_guessed_and_named(
     found = town(geojson(tmp_path / "a.geojson", (square, {"@id": "way/42", **tags})))
     assert [box.height for box in found.boxes] == pytest.approx([height_m])
     assert [text.partition(":")[0] for text in found.guessed] == (["way/42"] if guessed else [])
+    assert all(len(text) < 200 for text in found.guessed)
 
 
 def test_outlines_that_enclose_nothing_are_passed_over_and_named_and_parks_are_no_buildings(tmp_path: Path) -> None:
     path = geojson(
         tmp_path / "a.geojson",
         ([(0, 0), (10, 0), (10, 10)], {"height": 5}),
+        ([(0, 0), (30, 10), (60, 20)], {"height": 5}),
         ([(0, 0), (90, 0), (90, 90)], {"leisure": "park"}),
         ([(0, 0), (90, 0), (90, 90)], {"building": "no"}),
     )
@@ -382,8 +386,9 @@ def test_outlines_that_enclose_nothing_are_passed_over_and_named_and_parks_are_n
     tree["features"] += [{"type": "Feature", "properties": {}, "geometry": None}, None]
     path.write_text(json.dumps(tree))
     found = town(path)
-    assert (len(found.boxes), len(found.broken), found.buildings) == (1, 6, 1)
+    assert (len(found.boxes), len(found.broken), found.buildings) == (1, 7, 2)
     assert found.broken[0].startswith("7: ")
+    assert found.broken[-1].endswith("its corners lie on a line")
 
 
 def test_one_feature_a_line_is_read_as_a_collection(tmp_path: Path) -> None:
@@ -485,6 +490,7 @@ def test_the_smallest_rectangle_may_lie_along_a_side_of_the_hull_alone(tmp_path:
         ('{"type": "Polygon", "coordinates": [[[448000, 5411000], [448010, 5411000], [448010, 5411010]]]}', "ogr2ogr"),
         ('{"type": "FeatureCollection"}', "features are no list"),
         ('\ufeff<?xml version="1.0"?><osm/>', "it is XML or HTML: export it"),
+        (f'{{"type": {"1" * 5000}}}', r"4300 digits\) .* has 5000 digits$"),
         ("PK\x03\x04", "it is a ZIP archive: unpack it"),
         ('{"type": "Polygon", "crs": {"properties": {"name": "EPSG:3857"}}}', "its crs is EPSG:3857; convert the file"),
         ("SQLite format 3\0", "a GeoPackage or another SQLite database"),

@@ -259,10 +259,8 @@ def test_a_ground_station_that_floods_cannot_starve_the_swarm(capsys: pytest.Cap
     assert flooded[3]["operator_too_many"] > 20_000
     assert flooded[0] > quiet[0] - 0.005
     assert flooded[1] < 3 * S
-    late = [pair.delay_ns / pair.bound_ns for pair in flooded[2] if pair.delay_ns > pair.bound_ns]
-    # The law of delay does not count that commands overtake the operator's presence, a report, at each hop.
-    assert len(late) < 0.05 * len(flooded[2])
-    assert max(late, default=0.0) < 1.05
+    assert len(flooded[2]) > 400
+    assert all(pair.delay_ns <= pair.bound_ns for pair in flooded[2])
 
 
 FAULTS = {

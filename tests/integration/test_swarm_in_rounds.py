@@ -207,3 +207,19 @@ def test_a_late_wake_up_of_a_process_costs_no_turn(monkeypatch: pytest.MonkeyPat
     late = flown(**often)
     assert late["delay_ms"]["mean"] <= exact["delay_ms"]["mean"] + 30
     assert late["bound"]["stated_share"] == late["bound"]["within_share"] == 1.0
+
+
+def test_bounds_of_reports_hold_though_warnings_overtake_them_at_each_hop() -> None:
+    """Two nodes of a line of 12 warn so often that they use most of the turns: 302 bounds were broken."""
+    bound = flown(
+        duration_s=10, warmup_s=3,
+        nodes={"count": 12, "layout": "explicit", "positions_m": [[180.0 * n, 0.0, 60.0] for n in range(12)]},
+        rounds={"turn_bytes": 600, "bulk_share": 0.3},
+        radio={"lead_ms": 80},
+        traffic={"payload_bytes": 64, "interval_s": 0.5, "arrivals": "poisson", "sources": 12},
+        further_traffic=[
+            {"name": "warnings", "interval_s": 0.01, "payload_bytes": 100, "sources": [3, 8], "priority": "safety"}
+        ],
+    )["bound"]  # fmt: skip
+    assert bound["violations"] == 0
+    assert bound["classes"]["traffic"]["deliveries"] > 30

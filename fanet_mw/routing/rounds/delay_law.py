@@ -1,13 +1,14 @@
 """The delay bound of packets in turns: rounds x hops, with what surrounds each hop.
 
     hop = period + turn + lead + handover
-    D   = (h + margin) * hop + ceil(B / room) * period
+    D   = ((h + margin) * hop + ceil(B / room) * period) / (1 - urgent)
 
 A packet that was heard is announced one lead before the next own turn, at most one period later; its frame ends within
 the turn, and is handed over. `h` is the greatest distance that the node knows to another; `margin` is for a topology
 that changes meanwhile. All urgent packets that are under way together, `B` bytes, delay each other once: every node
 serves them at the same rate, `room` bytes of a frame per round, so what waited for one node's turn does not wait
-again for the next one's (tandem of equal servers; Le Boudec and Thiran, Network Calculus, 1.4.3).
+again for the next one's (tandem of equal servers; Le Boudec and Thiran, Network Calculus, 1.4.3). More urgent packets
+that come later overtake it on its way: `urgent` is the share of `room` that was theirs lately.
 Assumed: no frame is lost, so over any channel but `range` no bound is stated. None is stated either while clocks may
 be further apart than the slack of turns holds, while more waits for turns, everywhere alike, than three quarters of
 `rounds.burst_bytes`, or while no way has been found yet to a node that may only just have started. A bound does not
@@ -15,6 +16,7 @@ apply to nodes without a way, and counts on links that will last only (`lasting_
 was heard, because all nodes hear the same packets and serve them at the same rate (a leaky bucket).
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Final
 
@@ -31,6 +33,8 @@ MOST_HOPS: Final = 32
 """The hops for which a statement about links lives at least."""
 _SILENT_HELLOS: Final = 1.6
 _MOST_USED: Final = 0.75
+_MOST_URGENT: Final = 0.5
+"""No bound is stated while more urgent packets use a greater share of turns."""
 
 
 class DelayLaw:
@@ -57,9 +61,16 @@ class DelayLaw:
         """The size of the greatest of the packets that wait."""
         self._counted_ns = 0
         """The instant for which that is known."""
+        self._window_ns = max(self._burst_ns, timing.period_ns)
+        self._window = 0
+        self._came: Counter[int] = Counter()
+        self._came_before: Counter[int] = Counter()
+        """The bytes of each priority that came in the present window and in the one before."""
 
-    def count(self, size: int, *, now_ns: int) -> None:
-        """An urgent packet came, own or another node's."""
+    def count(self, size: int, *, priority: int, now_ns: int) -> None:
+        """A packet for turns came, own or another node's."""
+        self._turn_window(now_ns)
+        self._came[priority] += size
         self._serve(now_ns)
         self._waiting_bytes += size
         self._greatest = max(self._greatest, size)
@@ -77,7 +88,23 @@ class DelayLaw:
         """What a turn carries at least of packets that wait: none is divided, so its end may be empty."""
         return max(1, self._room - self._greatest + 1)
 
-    def bound_ns(self, topology: Topology, *, clock_error_ns: int, now_ns: int) -> int | None:
+    def _turn_window(self, now_ns: int) -> None:
+        window = now_ns // self._window_ns
+        if window != self._window:
+            self._came_before = self._came if window == self._window + 1 else Counter()
+            self._came, self._window = Counter(), window
+
+    def _urgent_share(self, priority: int, now_ns: int) -> float:
+        """The share of turns that packets more urgent than `priority` have used lately."""
+        self._turn_window(now_ns)
+        passed = now_ns % self._window_ns / self._window_ns
+        before, came = (
+            sum(size for other, size in counted.items() if other < priority)
+            for counted in (self._came_before, self._came)
+        )
+        return max(before, (1 - passed) * before + came) / (self._room * self._window_ns / self._timing.period_ns)
+
+    def bound_ns(self, topology: Topology, *, priority: int, clock_error_ns: int, now_ns: int) -> int | None:
         """The bound for a packet that is handed over now, if all clocks are within `clock_error_ns`; None if none can
         be stated.
         """
@@ -88,11 +115,14 @@ class DelayLaw:
             return None
         if self.absent(topology, now_ns=now_ns) is None:
             return None
-        hops = topology.hops(now_ns)
-        return self.over_ns(max(hops.values())) if len(hops) > 1 else None
+        hops, urgent = topology.hops(now_ns), self._urgent_share(priority, now_ns)
+        if len(hops) == 1 or urgent > _MOST_URGENT:
+            return None
+        alone_ns = self.over_ns(max(hops.values()))
+        return None if alone_ns is None else round(alone_ns / (1 - urgent))
 
     def over_ns(self, hops: int) -> int | None:
-        """The bound over so many hops; None if the channel loses frames."""
+        """The bound over so many hops if nothing more urgent comes; None if the channel loses frames."""
         return None if self._loses_frames else (hops + MARGIN_HOPS) * self.hop_ns + self._burst_ns
 
     def absent(self, topology: Topology, *, now_ns: int) -> Sequence[NodeId] | None:

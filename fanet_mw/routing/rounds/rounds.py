@@ -35,7 +35,7 @@ from fanet_mw.routing.rounds.spreading import Spreading
 from fanet_mw.routing.rounds.topology import Topology
 from fanet_mw.trace import BoundExcludes, BoundStated
 from fanet_mw.units import BROADCAST, US, NodeId, seconds_to_ns
-from fanet_mw.wire import FLAG_FLOOD, HEADER_BYTES, PRIORITY_BULK, PRIORITY_SAFETY, Kind
+from fanet_mw.wire import FLAG_FLOOD, HEADER_BYTES, PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY, Kind
 from fanet_mw.wire.hello.digest import MESSAGE_BYTES, Digest, capacity
 from fanet_mw.wire.rounds import (
     CAPACITY,
@@ -187,8 +187,11 @@ class RoundFlooding(RoutingProtocol):
 
     def _state_bound(self, packet: Packet, now_ns: int) -> None:
         """State by when all nodes have an own packet, if that is known."""
-        bound_ns = self._law.bound_ns(self._topology, clock_error_ns=self._port.clock_error_ns, now_ns=now_ns)
         header = packet.header
+        bound_ns = self._law.bound_ns(
+            self._topology,
+            priority=header.priority, clock_error_ns=self._port.clock_error_ns, now_ns=now_ns,
+        )  # fmt: skip
         if bound_ns is not None and bound_ns <= self._port.scenario.routing.lifetime_ns(header.priority):
             self._stated += 1
             stated = header.origin_us * US, self._port.node, header.seq
@@ -215,7 +218,7 @@ class RoundFlooding(RoutingProtocol):
 
     def _take(self, packet: Packet, *, src: int | None, now_ns: int, once: bool = False) -> None:
         """A packet is to go in the node's next turn."""
-        self._law.count(len(packet.frame), now_ns=now_ns)
+        self._law.count(len(packet.frame), priority=packet.header.priority, now_ns=now_ns)
         evicted = self._spreading.take(packet, src=src, now_ns=now_ns, once=once)
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
@@ -522,7 +525,11 @@ class RoundFlooding(RoutingProtocol):
     # --- what is known --------------------------------------------------------------------------------------------
 
     def bound_ns(self) -> int | None:
-        return self._law.bound_ns(self._topology, clock_error_ns=self._port.clock_error_ns, now_ns=self._now_ns)
+        return self._law.bound_ns(
+            self._topology,
+            priority=PRIORITY_REPORT if self._timing.slots else PRIORITY_BULK,
+            clock_error_ns=self._port.clock_error_ns, now_ns=self._now_ns,
+        )  # fmt: skip
 
     def bounds(self, priority: int) -> bool:
         return priority < PRIORITY_BULK or not self._timing.slots

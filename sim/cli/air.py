@@ -221,6 +221,9 @@ def _do(control: Control, where: SwarmFlags) -> int:
         kind, what = type(control).__name__.lower(), why.removeprefix("fault_").replace("_", " ")
         if isinstance(control, Degrade) and control.src == control.dst:
             raise ConfigError(f"{kind} {control.src} {control.dst}: a link has two different ends")
+        if what == "unknown node":
+            named = " ".join(map(str, nodes_of(control)))
+            raise ConfigError(f"{kind} {named}: the id of a node must be within [1, {MAX_NODES}]")
         bound = f"node ids from 1 to {MAX_NODES}" if nodes_of(control) else "see `fanet air --help`"
         raise ConfigError(f"{kind} {control.label}: {what} out of bounds ({bound})")
     console = Console(highlight=False)

@@ -2,6 +2,7 @@
 verdict on each claim.
 """
 
+import shlex
 from collections import Counter
 from pathlib import Path
 from typing import Annotated
@@ -108,7 +109,10 @@ def figures(
     if missing:
         console.print(f"not drawn, because {kept} has no table of it: {', '.join(missing)}", highlight=False)
         code = 1
-    console.print(f"figures, data and verdicts in {out}; fanet report {out} makes a page of them", highlight=False)
+    console.print(
+        f"figures, data and verdicts in {out}; fanet report {shlex.quote(str(out))} makes a page of them",
+        highlight=False,
+    )
     return code
 
 

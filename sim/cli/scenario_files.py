@@ -1,6 +1,7 @@
 """`fanet scenarios`, `init`, `show`, `check`, `schema`: scenario files for people and for their editors."""
 
 import json
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -86,8 +87,9 @@ def init(
     if schema:
         _write(file.parent / SCHEMA_NAME, _schema_text())
     console = Console(stderr=True)
+    word = shlex.quote(str(file))
     console.print(
-        f"written to {file}; next: fanet check {file}, fanet simulate {file}", highlight=False, soft_wrap=True
+        f"written to {file}; next: fanet check {word}, fanet simulate {word}", highlight=False, soft_wrap=True
     )
     return 0
 

@@ -179,6 +179,9 @@ _COLUMNS: Final = ("claim", "findings", "verdict", "why")
 
 def write(folders: Sequence[Path], out: Path) -> list[Path]:
     """Write report.html and report.md of these folders; returns their paths."""
+    for folder in folders:
+        if folder.exists() and not folder.is_dir():
+            raise ConfigError(f"{folder}: a file, and no folder of figures (fanet figures) or of a run (--out)")
     try:
         out.mkdir(parents=True, exist_ok=True)
         title, blocks = _blocks(folders, out)

@@ -2,6 +2,7 @@
 the mission achieved.
 """
 
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -52,7 +53,7 @@ def blocks_of_run(folder: Path, out: Path) -> list[Block]:
                     blocks += [air_pictures.rows(air), Text(air_pictures.against_dominating_set(run, air))]
     if summary["mode"] == "realtime":
         blocks += [Heading("Lateness", 3), run_rows.lateness(summary)]
-    return [*blocks, Commands([f"fanet simulate {folder / 'scenario.toml'}"])]
+    return [*blocks, Commands([f"fanet simulate {shlex.quote(str(folder / 'scenario.toml'))}"])]
 
 
 _TITLES = {

@@ -32,9 +32,12 @@ def notes(scenario: Scenario) -> list[str]:
 
 
 def _after_the_end(scenario: Scenario) -> Iterator[str]:
-    for index, fault in enumerate(scenario.faults):
-        if fault.at_s >= scenario.duration_s:
-            yield f"faults.{index}.at_s = {fault.at_s:g}: after the end, duration_s = {scenario.duration_s:g}"
+    instants = {f"faults.{index}.at_s": fault.at_s for index, fault in enumerate(scenario.faults)}
+    instants |= {f"orders.{index}.at_s": order.at_s for index, order in enumerate(scenario.orders)}
+    instants |= {f"clock.jumps.{index}.1": at_s for index, (_, at_s, _) in enumerate(scenario.clock.jumps)}
+    for key, at_s in instants.items():
+        if at_s >= scenario.duration_s:
+            yield f"{key} = {at_s:g}: after the end, duration_s = {scenario.duration_s:g}"
     begins_s, ends_s = (instant / S for instant in scenario.traffic_window_ns)
     for name, traffic in scenario.traffic_classes.items():
         start_s = begins_s if traffic.start_s is None else traffic.start_s

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -17,6 +18,14 @@ from sim.scenarios import catalog
 
 def fanet(*words: str) -> int:
     return int(app(words, result_action="return_value"))
+
+
+def test_what_init_recommends_can_be_typed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "Über mine's.toml"
+    fanet("init", str(file), "--short")
+    said = capsys.readouterr().err
+    for command in said.partition("next: ")[2].split(", "):
+        assert shlex.split(command)[2:] == [str(file)]
 
 
 def test_from_init_over_check_to_show(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -26,7 +26,8 @@ def test_a_name_of_a_swarm_that_would_be_another_topic_is_refused(name: str) -> 
 
 def test_a_link_from_a_node_to_itself_is_refused_in_words() -> None:
     assert refusal("air", "degrade", "3", "3", "--loss-db", "3") == "degrade 3 3: a link has two different ends"
-    assert refusal("air", "cut", "0") == "cut node-0: unknown node out of bounds (node ids from 1 to 65534)"
+    assert refusal("air", "cut", "-1") == "cut -1: the id of a node must be within [1, 65534]"
+    assert refusal("air", "degrade", "3", "0") == "degrade 3 0: the id of a node must be within [1, 65534]"
 
 
 def test_an_instant_beyond_the_end_of_a_run_is_refused(tmp_path: Path) -> None:

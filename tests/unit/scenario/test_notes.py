@@ -41,6 +41,7 @@ CUTS = [{"kind": "cut", "node": 1, "at_s": 5}, {"kind": "cut", "node": 1, "at_s"
             {"faults": [{"kind": "cut", "node": 1, "at_s": 5}, {"kind": "cut", "node": 1, "at_s": 4}]},
             ["faults.0.at_s = 5"],
         ),
+        ({"clock": {"jumps": [[1, 4.9, 1], [2, 50, 300]]}}, ["clock.jumps.1.1 = 50"]),
         ({"traffic": {"start_s": 4}}, ["traffic: start_s = 4, after the last packet, duration_s - drain_s = 4"]),
         (
             {"traffic": {"arrivals": "trace", "packets": [[1, 99], [4, 99], [9, 99]]}},
@@ -51,6 +52,12 @@ CUTS = [{"kind": "cut", "node": 1, "at_s": 5}, {"kind": "cut", "node": 1, "at_s"
 def test_what_comes_after_the_end_is_noted(changes: dict[str, object], said: list[str]) -> None:
     found = notes(config.build({**SHORT, **changes}))
     assert [text.partition(": after the end")[0] for text in found] == said
+
+
+def test_an_order_after_the_end_is_noted() -> None:
+    orders = 'orders=[{order="end", at_s=70}, {order="end", at_s=9}]'
+    found = notes(catalog.find("rescue", ["duration_s=40", "ground.at_m=[0, 0]", orders]))
+    assert found == ["orders.0.at_s = 70: after the end, duration_s = 40"]
 
 
 @pytest.mark.parametrize(

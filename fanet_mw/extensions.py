@@ -16,7 +16,6 @@ import hashlib
 import inspect
 import json
 import sys
-import sysconfig
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from importlib import import_module
@@ -40,7 +39,8 @@ GROUPS: Final[Mapping[str, str]] = {
 """The keys of a scenario that may name a part of another package, and the group of entry points for each."""
 _OURS: Final = ("fanet_mw", "agents", "emulator", "sim")
 _SUFFIXES: Final = frozenset(Path(f"_{suffix}").suffix for suffix in (*SOURCE_SUFFIXES, *EXTENSION_SUFFIXES))
-_INSTALLED: Final = frozenset(Path(sysconfig.get_path(name)) for name in ("purelib", "platlib"))
+_INSTALLED: Final = ("site-packages", "dist-packages")
+"""Folders of packages that were installed: of this environment, of another on its path, of the user, of Debian."""
 _DIGITS: Final = 16
 _METHODS: Final[Mapping[str, Sequence[str]]] = {
     "routing.protocol": ("start", "originate", "receive", "wake", "next_wake_ns", "report"),
@@ -103,7 +103,7 @@ def _sources(module: str) -> Iterator[tuple[str, Path]]:
             yield name, path
             for other in _imported(path) - known:
                 known.add(other)
-                if not any(_INSTALLED & {*file.parents} for _, file in _files(other)):
+                if not any(folder in file.parts for _, file in _files(other) for folder in _INSTALLED):
                     waiting.append(other)
 
 

@@ -93,6 +93,25 @@ def test_clusters_may_be_made_by_another_package(installed: Installed, monkeypat
     assert summary["pdr"] > 0.9
 
 
+@pytest.mark.parametrize("place", ["venv/lib/python3/site-packages", "usr/lib/python3/dist-packages"])
+def test_a_part_is_its_sources_and_those_beside_it_without_libraries_of_any_environment(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str
+) -> None:
+    (tmp_path / "part_of_one.py").write_text("import helper_of_one, library_of_one\n")
+    libraries = tmp_path / place
+    libraries.mkdir(parents=True)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.syspath_prepend(libraries)
+
+    def found(helper: str, library: str) -> str:
+        (tmp_path / "helper_of_one.py").write_text(helper)
+        (libraries / "library_of_one.py").write_text(library)
+        extensions.digest.cache_clear()
+        return extensions.digest("part_of_one")
+
+    assert found("N = 1", "N = 1") == found("N = 1", "N = 2") != found("N = 2", "N = 2")
+
+
 def test_a_scenario_with_options_is_a_key_of_a_cache_and_goes_to_other_processes_whole() -> None:
     options = Options({"fanout": 3})
 

@@ -65,7 +65,8 @@ class Timeline:
         post = self.scenario.post
         self._post = None if post is None else (post, positions(self.scenario)[-1])
         self._records = [one for one in records if not isinstance(one, Posed)]
-        epoch_ns = found.summary.get("epoch_unix_ns", 0)
+        self.epoch_unix_ns: int = found.summary.get("epoch_unix_ns", 0)
+        epoch_ns = self.epoch_unix_ns
         self._taps = [(t_us * US - epoch_ns, frame) for t_us, frame in found.telemetry()]
         self._links, self._told = _recorded(folder, epoch_ns, found.scenario)
         self.has_links = bool(self._links)

@@ -1,106 +1,41 @@
-"""What went over the air, from a run's capture: who sent when and why, and what each cause took of the air.
-
-Of a frame with several packets the first cause counts that it holds, in the order of `Cause`. A packet that its node
-has sent before is sent again, whatever for: because a neighbor lacked it, or its flood was resumed.
-"""
+"""What went over the air, from a run's capture: who sent when and why, and what each cause took of the air."""
 
 import math
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from enum import StrEnum
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 from emulator.channel.propagation import heard_m
 from emulator.pcap_reader import AirFrame, frames_of
-from fanet_mw import airtime
-from fanet_mw.errors import MalformedFrameError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Posed
 from fanet_mw.units import MS, S
-from fanet_mw.wire import Header, Kind, decode_header
-from fanet_mw.wire.aggregation import unbundle
-from sim.figures.colors import BLUE, GRAY, GREEN, ORANGE, PINK, RED
+from sim.figures import colors
 from sim.figures.style import canvas, legend_above
+from sim.observation.air_causes import AirCauses, Cause, transmissions
 from sim.report.html import Rows
 from sim.report.run_pictures import RunPicture
 from sim.report.run_records import RunRecords
 from sim.report.run_rows import number, percent
 
+_COLORS: Final = dict(zip(Cause, colors.SIX, strict=True))
 _STEPS: Final = 60
 """The number of steps of the shares over time."""
 _FRAMES_SHOWN: Final = 400
 """About so many frames are drawn one by one."""
 _INSTANTS: Final = 12
 """The number of instants for which a dominating set is sought."""
-_MAC_BYTES: Final = 24 + 36 + 4
-"""What stands around a frame of the swarm: the headers of 802.11, LLC, IP and UDP, and the FCS."""
-
-
-class Cause(StrEnum):
-    """Why a frame was sent."""
-
-    OWN = "own packets"
-    RELAYED = "relayed"
-    AGAIN = "sent again"
-    CONTROL = "control"
-    HELLO = "hellos"
-    ACK = "ACKs"
-
-
-_COLORS: Final = {
-    Cause.OWN: BLUE, Cause.RELAYED: GREEN, Cause.AGAIN: RED, Cause.CONTROL: ORANGE, Cause.HELLO: PINK, Cause.ACK: GRAY,
-}  # fmt: skip
-
-
-class AirTime(NamedTuple):
-    """One transmission."""
-
-    start_ns: int
-    node: int
-    length_ns: int
-    cause: Cause
 
 
 class Air:
     """The transmissions of one run."""
 
     def __init__(self, scenario: Scenario, frames: Iterable[AirFrame]) -> None:
-        self.sent: list[AirTime] = []
-        self.times: Counter[tuple[int, int]] = Counter()
+        causes = AirCauses(scenario)
+        self.sent = list(transmissions(causes, frames))
+        self.times = causes.times
         """How often each packet of an application was sent, by all nodes together."""
-        self._known: set[tuple[int, int, int]] = set()
-        radio = scenario.radio
-        for frame in frames:
-            if frame.what == "sent" and frame.src is not None:
-                length_ns = airtime.airtime_ns(frame.frame_bytes + _MAC_BYTES, radio, rate_mbps=radio.rate_mbps)
-                self.sent.append(AirTime(frame.t_ns, frame.src, length_ns, self._cause(frame)))
-            elif frame.what == "ack":
-                length_ns = airtime.airtime_ns(airtime.ACK_BYTES, radio, rate_mbps=radio.ack_rate_mbps)
-                self.sent.append(AirTime(frame.t_ns, 0, length_ns, Cause.ACK))
-
-    def _cause(self, frame: AirFrame) -> Cause:
-        assert frame.src is not None
-        causes = {self._cause_of(header, frame.src, frame.attempt or 1) for header in _headers(frame.payload)}
-        return next((cause for cause in Cause if cause in causes), Cause.CONTROL)
-
-    def _cause_of(self, header: Header, sender: int, attempt: int) -> Cause:
-        if header.kind != Kind.DATA:
-            return Cause.HELLO if header.kind == Kind.HELLO else Cause.CONTROL
-        self.times[header.origin, header.seq] += 1
-        name = sender, header.origin, header.seq
-        if name in self._known or attempt > 1:
-            return Cause.AGAIN
-        self._known.add(name)
-        return Cause.OWN if header.origin == sender else Cause.RELAYED
-
-
-def _headers(payload: bytes) -> Iterator[Header]:
-    try:
-        for packet in unbundle(payload):
-            yield decode_header(packet)
-    except MalformedFrameError:
-        return  # somebody else's frame
 
 
 def air_of(run: RunRecords, captures: Sequence[Path], *, epoch_unix_ns: int) -> Air | None:

@@ -7,6 +7,7 @@ from fanet_mw.errors import BusError
 from sim.observation.bus_feed import BusFeed, Paced
 from sim.observation.swarm_state import SwarmState
 from sim.view.actions import Actions
+from sim.view.air import LiveAir
 from sim.view.panels import Panels
 from sim.view.scene import Scene
 from sim.view.server import HOST, close_server, look_over, open_server
@@ -25,7 +26,7 @@ def view(
         scene = Scene(server, state, on_select=lambda node: panels.jobs.put(lambda: panels.select(node)))
         look_over(server, scene)
         actions = Actions(feed)
-        panels = Panels(server, scene, actions=actions)
+        panels = Panels(server, scene, actions=actions, air=LiveAir(feed))
         mark_clicks(server, scene, panels)
         tell(f"http://{HOST}:{server.get_port()} shows swarm {feed.names.swarm}")
         feed.listen()

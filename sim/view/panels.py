@@ -21,6 +21,7 @@ from sim.figures import colors
 from sim.observation.swarm_state import LATELY_NS, SwarmState, UavNow
 from sim.recording.drawing import FALLEN_COLOR, HOMEWARD_COLOR, MODE_COLORS, STATUS_COLORS
 from sim.view.actions import PAUSED, Actions
+from sim.view.air import AirSource, air_text, drawn_ns
 from sim.view.scene import HOP_COLORS, Scene
 
 _MOST_POINTS: Final = 300
@@ -35,12 +36,15 @@ Job = Callable[[], None]
 class Panels:
     """The panel of one server."""
 
-    def __init__(self, server: viser.ViserServer, scene: Scene, *, actions: Actions | None) -> None:
-        """Without `actions` there is nothing to do, because the swarm flew some time ago."""
+    def __init__(
+        self, server: viser.ViserServer, scene: Scene, *, actions: Actions | None, air: AirSource | None = None
+    ) -> None:
+        """Without `actions` there is nothing to do, because the swarm flew some time ago; `air`: who sends when."""
         self.jobs: queue.SimpleQueue[Job] = queue.SimpleQueue()
         self._server, self._scene, self.state = server, scene, scene.state
-        self._actions = actions
+        self._actions, self._air, self._watches_air = actions, air, False
         self._second = self._image_ns = -1
+        self._t_ns = 0
         self._history: dict[str, list[tuple[float, ...]]] = {}
         self._follows = False
         self._said = ""
@@ -67,6 +71,11 @@ class Panels:
         if actions is not None:
             with tabs.add_tab("Act"):
                 self._add_actions(actions)
+        if air is not None:
+            with tabs.add_tab("Air"):
+                watch = gui.add_checkbox("watch the air", initial_value=False)
+                self._frames = gui.add_html(_box("Who sends when, and why."))
+                watch.on_update(self.later(lambda: self._watch_air(watch.value)))
         with tabs.add_tab("Events"):
             self._events = gui.add_html("")
         with tabs.add_tab("Show"):
@@ -87,6 +96,7 @@ class Panels:
 
     def refresh(self, t_ns: int, *, note: str = "", all_of_it: bool = False) -> None:
         """Write the figures of an instant; those that need no hurry once a second."""
+        self._t_ns = t_ns
         self._write_clock(t_ns, note)
         if self._follows and self._scene.selected in self.state.uavs:
             self._look_at_selected()
@@ -98,6 +108,7 @@ class Panels:
         self._write("_events", self._event_list())
         self._write("_spread", self._spread_text(t_ns))
         self._write("_uav", self._uav_text())
+        self._write_air()
         self._plot(t_ns, metrics)
 
     def show_image(self, image: CameraImage | None) -> None:
@@ -250,6 +261,24 @@ class Panels:
             if float(np.abs(moved).max()) > 0.1:
                 client.camera.position = client.camera.position + moved
                 client.camera.look_at = at
+
+    def _watch_air(self, wanted: bool) -> None:
+        self._watches_air = wanted
+        if self._air is None:
+            return
+        if wanted:
+            self._write_air()  # time may stand
+        else:
+            self._air.rest()
+
+    def _write_air(self) -> None:
+        if self._air is None or not self._watches_air:
+            return
+        state = self.state
+        length_ns = drawn_ns(0 if state.turns is None else state.turns.period_ns)
+        nodes = state.scenario.node_ids
+        text = air_text(self._air, nodes, self._t_ns, length_ns=length_ns, selected=self._scene.selected)
+        self._write("_frames", _box(text))
 
     def _write(self, name: str, text: str) -> None:
         """Write text into a part of the panel, if it has changed."""

@@ -14,6 +14,7 @@ from fanet_mw.units import MS, S
 from fanet_mw.whole_file import replace_file
 from sim.observation.bus_feed import Paced
 from sim.observation.timeline import Timeline
+from sim.view.air import CapturedAir
 from sim.view.panels import Panels, legend
 from sim.view.scene import Scene
 from sim.view.server import HOST, Sight, close_server, look_over, open_server, sight
@@ -109,7 +110,8 @@ def serve(folder: Path, *, port: int | None, start_s: float, ended: Sequence[int
         scene = Scene(server, state, on_select=lambda node: panels.jobs.put(lambda: panels.select(node)))
         scene.by_range = not timeline.has_links
         look_over(server, scene)
-        panels = Panels(server, scene, actions=None)
+        air = CapturedAir(folder, timeline.scenario, epoch_unix_ns=timeline.epoch_unix_ns)
+        panels = Panels(server, scene, actions=None, air=air)
         player = _Player(server, timeline, panels, start_ns=start_ns)
         tell(f"http://{HOST}:{server.get_port()} replays {folder}")
         paced, then_s, drawn_ns = Paced(_RATE_HZ), time.monotonic(), -1

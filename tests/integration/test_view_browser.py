@@ -56,7 +56,7 @@ def page(browser: Any) -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("browsed") / "run"
-    assert app(["simulate", "quick", "--out", str(out), "--json"], result_action="return_value") == 0
+    assert app(["simulate", "quick", "--out", str(out), "--pcap", "--json"], result_action="return_value") == 0
     return out
 
 
@@ -127,6 +127,10 @@ def test_a_uav_that_is_clicked_is_shown_and_the_slider_moves_time(
     page.get_by_role("tab", name="UAV").click()
     wait_for(lambda: re.search(r"UAV 9\s", page.inner_text("body")) is not None)
     assert "neighbors" in page.inner_text("body")
+    page.get_by_role("tab", name="Air").click()
+    page.get_by_label("watch the air").first.click()  # while time stands
+    wait_for(lambda: re.search(r"own packets\s+\d+\s+[\d.]+ %", page.inner_text("body")) is not None)
+    page.get_by_role("tab", name="UAV").click()
     time_box.fill("15")
     time_box.press("Enter")
     wait_for(lambda: "15.0 s of 20 s" in page.inner_text("body"))

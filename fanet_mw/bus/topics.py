@@ -54,6 +54,8 @@ class Topics:
         self.all_alive = f"{self._base}/alive/**"
         self.scenario = f"{self._base}/scenario"
         """The topic of queries for the scenario; the keeper of the clock answers with the scenario as JSON."""
+        self.standing = f"{self._base}/standing"
+        """The topic of queries for how things stand; whoever collects answers with the trace records that say it."""
 
     def radio_tx(self, node: int | str) -> str:
         return f"{self._base}/radio/{node}/tx"

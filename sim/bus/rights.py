@@ -84,7 +84,7 @@ def rights(scenario: Scenario, names: Topics) -> dict[str, Rights]:
                 names.clock,
                 names.images,
             ),
-            queries=(names.clock, names.scenario),
+            queries=(names.clock, names.scenario, names.standing),
             watches=(f"{ROOT}/*/alive/**",),
         ),
         GATEWAY: Rights(

@@ -27,7 +27,7 @@ _HEADINGS: Final = (
 def watch(feed: BusFeed, *, ended: Sequence[int], screens: int | None, console: Console) -> None:
     """Show the swarm until it is over, until somebody ends it, or for so many seconds of it."""
     state, paced, second, shown = SwarmState(feed.scenario), Paced(_RATE_HZ), -1, 0
-    feed.listen()
+    feed.listen(catches_up=True)
     with Live(console=console, auto_refresh=False) as live, contextlib.suppress(KeyboardInterrupt):
         while not ended and not feed.over and (screens is None or shown < screens):
             feed.pump(state)

@@ -23,14 +23,18 @@ from fanet_mw.errors import ConfigError, FanetError, MalformedFrameError
 from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.hosts.clock import SwarmClock
 from fanet_mw.scenario import Scenario, config
+from fanet_mw.trace import Record
 from sim.bus.air_control import OPERATOR, find_swarm
 from sim.observation.observer import Observer
 from sim.observation.turns import MOST_SPANS
 from sim.records.bus_checks import BusChecks
+from sim.records.standing import KINDS
 
 _MOST_PUTS: Final = 50_000
 _ANSWER_S: Final = 3.0
 _ASK_CLOCK_S: Final = 1.0
+_STANDING_S: Final = 1.0
+"""How long it is waited for the answer how things stand; where nobody collects, none comes."""
 
 
 class _Put(NamedTuple):
@@ -72,6 +76,10 @@ class BusFeed:
         self.images: dict[int, CameraImage] = {}
         """The last image of each UAV's camera, where the scenario has images rendered."""
         self._checks = BusChecks(self.scenario)
+        self._stands: bytes | None = None
+        self._waits_until_s = 0.0
+        self._before: set[Record] = set()
+        """The records of that answer, until what was put meanwhile has been told."""
         self._puts: deque[_Put] = deque(maxlen=_MOST_PUTS)
         self._clocks: deque[bytes] = deque(maxlen=16)
         self._asked_s = 0.0
@@ -82,8 +90,8 @@ class BusFeed:
     def __exit__(self, *_: object) -> None:
         self.bus.close()
 
-    def listen(self) -> None:
-        """Begin to hear."""
+    def listen(self, *, catches_up: bool = False) -> None:
+        """Begin to hear; `catches_up`: first of all be told how things stand, by whoever collects, if anybody does."""
         for expression in (
             self.names.pose, self.names.all_traces, self.names.all_reports, self.names.radio_links,
             self.names.mavlink("*"),
@@ -91,6 +99,9 @@ class BusFeed:
             self.bus.subscribe(expression, self._keep)
         if self.scenario.sensors.image_hz:
             self.bus.subscribe(self.names.images, self._keep)
+        if catches_up:
+            self._waits_until_s = time.monotonic() + _STANDING_S
+            self.bus.ask(self.names.standing, self._stand)
         self._ask_clock()
 
     def pump(self, observer: Observer) -> int:
@@ -110,6 +121,11 @@ class BusFeed:
 
     def drain(self, observer: Observer) -> int:
         """Tell an observer what has come, whether the router is there or not; returns the number of puts."""
+        if self._waits_until_s:
+            if self._stands is None and time.monotonic() < self._waits_until_s:
+                return 0  # what is put meanwhile comes after it
+            self._waits_until_s = 0.0
+            self._catch_up(observer)
         count = 0
         while self._puts:
             put = self._puts.popleft()
@@ -143,7 +159,7 @@ class BusFeed:
             case TraceBatch() if name in self._checks.node_of:
                 good = [record for record in message.records if self._checks.record(name, record) is None]
                 self.refused += len(message.records) - len(good)
-                observer.take_records(good)
+                observer.take_records(record for record in good if record not in self._before)
             case Report() if name in self._checks.node_of and message.name == name:
                 content, why = self._checks.report(name, message.json)
                 if why is None and makes_sense(content):
@@ -158,6 +174,24 @@ class BusFeed:
                 observer.take_tap(node_of_tap(topic), message.t_ns, message.data)
             case _:
                 self.refused += 1
+
+    def _stand(self, _: str, payload: bytes) -> None:
+        self._stands = payload
+
+    def _catch_up(self, observer: Observer) -> None:
+        """Tell what was collected before this observer came."""
+        try:
+            batches = codecs.decode(self._stands) if self._stands else []
+        except MalformedFrameError:
+            batches = []
+        self._before = {
+            record
+            for batch in batches
+            if isinstance(batch, TraceBatch)
+            for record in batch.records
+            if isinstance(record, KINDS) and self._checks.named(record) is None
+        }
+        observer.take_records(sorted(self._before, key=lambda record: record.t_ns))
 
     def _known(self, poses: Poses) -> bool:
         return all(1 <= node <= self.scenario.node_count for node in poses.ids) and all(

@@ -26,6 +26,7 @@ TAKEN_NS: Final = 5 * S
 """Shares are those of so long a time."""
 _PICTURE_NS: Final = S
 """The longest time that is drawn."""
+_LEAST_NS: Final = 150 * MS
 _UNKNOWN_NS: Final = 500 * MS
 """What is drawn where nobody owns turns."""
 _REMEMBERED: Final = 100_000
@@ -107,8 +108,9 @@ class CapturedAir:
 
 
 def drawn_ns(period_ns: int) -> int:
-    """How long a time is drawn: a round or superframe, if it is no longer than can be seen."""
-    return min(period_ns, _PICTURE_NS) if period_ns else _UNKNOWN_NS
+    """How long a time is drawn: whole rounds or superframes, if they are no longer than can be seen."""
+    rounds = -(-_LEAST_NS // period_ns) if period_ns else 0
+    return min(rounds * period_ns, _PICTURE_NS) if rounds else _UNKNOWN_NS
 
 
 def air_text(source: AirSource, nodes: Sequence[int], t_ns: int, *, length_ns: int, selected: int = 0) -> str:

@@ -29,7 +29,7 @@ def view(
         panels = Panels(server, scene, actions=actions, air=LiveAir(feed))
         mark_clicks(server, scene, panels)
         tell(f"http://{HOST}:{server.get_port()} shows swarm {feed.names.swarm}")
-        feed.listen()
+        feed.listen(catches_up=True)
         paced = Paced(RATE_HZ)
         while not ended:
             note = ""

@@ -370,6 +370,7 @@ class Watcher:
         self.shares: list[tuple[float, float]] = []
         self.paces: list[float] = []
         self.events: list[str] = []
+        self.late = self.then = ""
         self.failure: BaseException | None = None
         self._where = endpoint, swarm
         self.thread = threading.Thread(target=self._run)
@@ -404,10 +405,29 @@ class Watcher:
                 actions.pace(0.5)
             if once("run", 13):
                 actions.pace(1.0)
+            if once("late", 20):
+                self.then = stands(state)
+                self.late = stands(self._come_late())
             if once("restore", 24):
                 actions.restore()
             time.sleep(0.1)
         self.events = [event.text for event in state.latest_events(200)]
+
+    def _come_late(self) -> SwarmState:
+        with BusFeed(*self._where) as feed:
+            state = SwarmState(feed.scenario)
+            feed.listen(catches_up=True)
+            end_s = time.monotonic() + 5
+            while stands(state) != self.then and time.monotonic() < end_s:
+                feed.pump(state)
+                time.sleep(0.1)
+        return state
+
+
+def stands(state: SwarmState) -> str:
+    """What an observer can know only from whoever was there before."""
+    uavs = [(node, uav.role, uav.cluster, uav.head) for node, uav in sorted(state.uavs.items())]
+    return f"{uavs}, faults {sorted(state.faults)}"
 
 
 @pytest.mark.realtime
@@ -431,6 +451,9 @@ def test_a_head_that_is_cut_in_a_view_costs_deliveries_and_the_clock_obeys() -> 
     after = [share for t_s, share in watcher.shares if 22 < t_s < 24]
     assert before[-1] > 0.9
     assert after[-1] < 0.85, "56 of 72 copies are left when one of nine is silent"
+    assert watcher.late == watcher.then
+    assert "head" in watcher.late
+    assert "node-" in watcher.late, "the fault"
     assert any("radio fault cut" in text and "begins" in text for text in watcher.events)
     assert any("radio fault cut" in text and "ends" in text for text in watcher.events)
 

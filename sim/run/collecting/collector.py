@@ -25,6 +25,7 @@ from fanet_mw.trace import Record
 from fanet_mw.units import S
 from sim.records.bus_checks import BusChecks
 from sim.records.spool import Spool
+from sim.records.standing import Standing
 from sim.records.stored_records import RecordSpools
 from sim.results.links import LinkTotals
 from sim.results.outcome import Outcome
@@ -72,6 +73,7 @@ class Collector:
         self._allowance = Allowance(burst=BURST_BYTES, per_s=BYTES_PER_S)
         self._records = RecordSpools(folder)
         self.tally = RunningTally(scenario)
+        self._standing = Standing()
         self._taps = Spool(folder)
         self._reports: dict[str, dict[str, Any]] = {}
         self._links = LinkTotals()
@@ -85,6 +87,11 @@ class Collector:
             (names.radio_links, "links", self._take_links),
         ):
             subscribe(expression, self._hearer(what, take))
+
+    def standing(self) -> bytes:
+        """The answer to an observer who asks how things stand."""
+        with self._lock:
+            return codecs.encode([TraceBatch(tuple(self._standing.records()))])
 
     # --- receiving, on threads of the bus -------------------------------------------------------------------------
 
@@ -131,6 +138,7 @@ class Collector:
                 self._refused[f"trace: {why}"] += 1
         self._keep(good)
         self.tally.take(good)
+        self._standing.take(good)
         return None
 
     def _keep(self, records: Iterable[Record]) -> None:

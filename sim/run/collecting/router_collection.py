@@ -20,6 +20,7 @@ class Collection:
         self._out = out
         self._began_s = time.monotonic()
         self._collector = Collector(scenario, bus.subscribe, names, now_ns=time.monotonic_ns, folder=out)
+        bus.answer(names.standing, self._collector.standing)
         self.summary: dict[str, Any] = {}
 
     def __enter__(self) -> Self:

@@ -93,6 +93,7 @@ class SwarmRun:
         self._leads = leads
         self._tell = tell
         self._collector = Collector(scenario, bus.subscribe, names, now_ns=time.monotonic_ns, folder=spool_folder)
+        bus.answer(names.standing, self._collector.standing)
         self._recorder = FlightRecorder(scenario, bus.subscribe, names) if respawn else None
         self._keeper = ClockKeeper(
             bus, names, time_scale=scenario.time_scale, expected=expected_names(scenario), scenario=scenario

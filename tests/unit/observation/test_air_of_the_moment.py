@@ -15,7 +15,7 @@ from fanet_mw.units import BROADCAST, MS, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Header, Kind, filler
 from sim.cli.app import app
 from sim.observation.air_causes import AirCauses, Cause
-from sim.view.air import CapturedAir, LiveAir, air_text
+from sim.view.air import CapturedAir, LiveAir, air_text, drawn_ns
 
 
 def put(sender: int, origin: int, seq: int, at_ns: int, *, kind: Kind = Kind.DATA) -> tuple[str, bytes]:
@@ -92,3 +92,8 @@ def test_a_capture_shows_the_air_of_any_instant_and_its_absence_is_said(tmp_path
     assert "frames/s" in air_text(air, timeline.scenario.node_ids, 6 * S, length_ns=S)
     nowhere = CapturedAir(tmp_path, timeline.scenario, epoch_unix_ns=0)
     assert "--pcap" in air_text(nowhere, [1], 4 * S, length_ns=S)
+
+
+@pytest.mark.parametrize(("period_ms", "drawn_ms"), [(28, 168), (146, 292), (800, 800), (5000, 1000), (0, 500)])
+def test_some_whole_rounds_are_drawn(period_ms: int, drawn_ms: int) -> None:
+    assert drawn_ns(period_ms * MS) == drawn_ms * MS

@@ -11,5 +11,3 @@ DARK: Final = "#222222"
 GRAY: Final = "#777777"
 SHADE: Final = "#f3cf86"
 """The color of areas behind marks."""
-SIX: Final = (BLUE, GREEN, RED, ORANGE, PINK, GRAY)
-"""Of kinds that are told apart, in their order."""

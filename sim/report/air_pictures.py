@@ -11,7 +11,7 @@ from emulator.pcap_reader import AirFrame, frames_of
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Posed
 from fanet_mw.units import MS, S
-from sim.figures import colors
+from sim.figures.colors import BLUE, GRAY, GREEN, ORANGE, PINK, RED
 from sim.figures.style import canvas, legend_above
 from sim.observation.air_causes import AirCauses, Cause, transmissions
 from sim.report.html import Rows
@@ -19,7 +19,7 @@ from sim.report.run_pictures import RunPicture
 from sim.report.run_records import RunRecords
 from sim.report.run_rows import number, percent
 
-_COLORS: Final = dict(zip(Cause, colors.SIX, strict=True))
+_COLORS: Final = dict(zip(Cause, (BLUE, GREEN, RED, ORANGE, PINK, GRAY), strict=True))
 _STEPS: Final = 60
 """The number of steps of the shares over time."""
 _FRAMES_SHOWN: Final = 400

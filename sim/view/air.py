@@ -16,12 +16,12 @@ from emulator.pcap_reader import frames_of
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, S
-from sim.figures import colors
+from sim.figures.colors import BLUE, GRAY, GREEN, ORANGE, PINK, RED
 from sim.observation.air_causes import AirCauses, AirTime, Cause, transmissions
 from sim.observation.bus_feed import BusFeed
 from sim.observation.live_frames import LiveFrames
 
-_COLORS: Final = dict(zip(Cause, colors.SIX, strict=True))
+_COLORS: Final = dict(zip(Cause, (BLUE, GREEN, RED, ORANGE, PINK, GRAY), strict=True))
 TAKEN_NS: Final = 5 * S
 """Shares are those of so long a time."""
 _PICTURE_NS: Final = S

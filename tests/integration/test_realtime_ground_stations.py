@@ -5,6 +5,7 @@ With FANET_TRANSCRIPTS=1 what they say is written to docs/how-to/transcripts/.
 
 import asyncio
 import importlib.util
+import itertools
 import os
 import pty
 import re
@@ -35,7 +36,7 @@ TRANSCRIPTS = HERE.parent.parent / "docs" / "how-to" / "transcripts"
 MAVPROXY = shutil.which("mavproxy.py", path=str(Path(sys.executable).parent))
 PATIENCE_S = 90
 FIELD = """
-duration_s = 900
+duration_s = 3600
 time_scale = 4.0
 [nodes]
 count = 3
@@ -72,20 +73,28 @@ def free_port(kind: int = socket.SOCK_STREAM) -> int:
         return int(probe.getsockname()[1])
 
 
+_NUMBERS = itertools.count(1)
+
+
 class Field:
     """A swarm that stands on the ground, with its doors."""
 
     def __init__(self, folder: Path, text: str = FIELD, *more: str) -> None:
         self.udp, self.tcp = free_port(socket.SOCK_DGRAM), free_port()
-        self.name = f"field-{os.getpid()}"
+        self.name = f"field-{os.getpid()}-{next(_NUMBERS)}"
         scenario = folder / "field.toml"
         scenario.write_text(text, encoding="utf-8")
         self.log = folder / "launch.log"
         self._processes: list[subprocess.Popen[bytes]] = []
-        self._start("launch", str(scenario), "--swarm", self.name, "--mavlink", f"udpout:127.0.0.1:{self.udp}", *more)
-        self.await_("processes up")
-        self._start("gateway", self.name, "--mavlink", f"tcpin:127.0.0.1:{self.tcp}", "--flavor", "ardupilot")
-        self.await_(f" on tcpin:127.0.0.1:{self.tcp}")
+        words = [str(scenario), "--swarm", self.name, "--mavlink", f"udpout:127.0.0.1:{self.udp}", *more]
+        try:
+            self._start("launch", *words)
+            self.await_("processes up")
+            self._start("gateway", self.name, "--mavlink", f"tcpin:127.0.0.1:{self.tcp}", "--flavor", "ardupilot")
+            self.await_(f" on tcpin:127.0.0.1:{self.tcp}")
+        except BaseException:
+            self.end()
+            raise
 
     def _start(self, *words: str) -> None:
         with self.log.open("ab") as file:

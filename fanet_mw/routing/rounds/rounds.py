@@ -113,6 +113,9 @@ class RoundFlooding(RoutingProtocol):
         self._one_way = OneWay(port, timing, self._topology, self._heard_ns)
         self._blind_ns = self._lead_ns + radio.handover_ns
         """The time that passes from the decision to send until others know of it, airtime and waiting left out."""
+        self._flood_ns = _FLOOD_HOPS * (self._law.hop_ns + self._blind_ns)
+        self._young_ns = self._flood_ns + 2 * scenario.clock.apart_ns(scenario.duration_ns)
+        """A packet that is older proves nothing about who is near: a station far away may have repeated it."""
         self._often = False
         """Whether this node takes part in all bulk slots, as it has stated."""
         self._slot_ns: int | None = None
@@ -159,8 +162,13 @@ class RoundFlooding(RoutingProtocol):
 
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         src, header = reception.src, packet.header
-        self._hears(src, now_ns)
+        young = now_ns - header.origin_us * US <= self._young_ns
+        if young:
+            self._hears(src, now_ns)
         if header.kind == Kind.ROUND:
+            if not young:
+                self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+                return
             self._on_round(packet, src, now_ns)
             return
         if header.kind == _DATA:
@@ -178,7 +186,8 @@ class RoundFlooding(RoutingProtocol):
             self._take_bulk(packet, src=src, from_ns=now_ns + self._lead_ns, now_ns=now_ns)
 
     def on_copy(self, key: int, src: NodeId, *, now_ns: int) -> None:
-        self._hears(src, now_ns)
+        if self._spreading.made_ns(key) >= now_ns - self._young_ns:
+            self._hears(src, now_ns)
         if self._repair is not None and key in self._repair.pending:
             self._repair.on_copy(key, now_ns=now_ns)
         if self._spreading.on_copy(key, src, neighbors=self._near, now_ns=now_ns):
@@ -414,7 +423,7 @@ class RoundFlooding(RoutingProtocol):
         self._heard_ns[src] = now_ns
         if not self._near >> (src - 1) & 1:
             self._near |= 1 << (src - 1)
-            old_ns = now_ns - _FLOOD_HOPS * (self._law.hop_ns + self._blind_ns)
+            old_ns = now_ns - self._flood_ns
             if self._topology.reaches(src, now_ns):
                 self._spreading.assume(src, until_ns=old_ns)
             for key in self._spreading.recent(old_ns):

@@ -13,12 +13,14 @@ round must have passed in which nobody else sent it, so that mostly one node rep
 stands for node i + 1.
 """
 
+import math
 from collections.abc import Iterable, Sequence
 from heapq import heappop, heappush
 from typing import Final
 
 from fanet_mw.node.duplicates import key_of
 from fanet_mw.node.packet import Packet
+from fanet_mw.units import US
 
 _MOST_EARLY: Final = 1024
 _MOST_DONE: Final = 1024
@@ -206,6 +208,11 @@ class Spreading:
         for entry in self._entries.values():
             if entry.taken_ns <= until_ns and entry.again:
                 entry.having |= 1 << (node - 1)
+
+    def made_ns(self, key: int) -> float:
+        """The instant at which a packet was made; long ago if this node does not remember it."""
+        entry = self._entries.get(key) or self._done.get(key)
+        return -math.inf if entry is None else entry.packet.header.origin_us * US
 
     def recent(self, from_ns: int) -> list[int]:
         """The keys of the packets that this node got after an instant."""

@@ -63,6 +63,10 @@ class Clock(Section):
         """The greatest error of an unsynchronized clock at the end of a run."""
         return self.offset_ns + math.ceil(self.drift_ppm * duration_ns / 1_000_000)
 
+    def apart_ns(self, duration_ns: int) -> int:
+        """The greatest error of a clock that counts: that of the whole run if nothing synchronizes clocks."""
+        return self.unsynchronized_error_ns(duration_ns) if self.modelled and self.sync == "none" else 0
+
     @property
     def stamp_ns(self) -> int:
         """Resolution of a time stamp, at least 1 ns."""

@@ -40,9 +40,18 @@ def make_node(make_scenario: MakeScenario) -> MakeNode:
 
 
 def hear(
-    node: Node, seq: int, *, src: NodeId, at_ns: int, kind: Kind = Kind.DATA, priority: int = PRIORITY_BULK
+    node: Node,
+    seq: int,
+    *,
+    src: NodeId,
+    at_ns: int,
+    kind: Kind = Kind.DATA,
+    priority: int = PRIORITY_BULK,
+    origin: NodeId | None = None,
+    made_ns: int | None = None,
 ) -> None:
-    header = Header(at_ns // 1000, seq, src, BROADCAST, src, kind, 8, 0, priority, FLAG_FLOOD)
+    made_us, hops = (at_ns if made_ns is None else made_ns) // 1000, 0 if origin is None else 2
+    header = Header(made_us, seq, origin or src, BROADCAST, src, kind, 8, hops, priority, FLAG_FLOOD)
     node.hear(Reception(header.encode() + filler(40), src, at_ns, -60.0), at_ns)
 
 
@@ -100,6 +109,27 @@ def test_who_comes_near_is_told_of_recent_bulk(make_node: MakeNode) -> None:
     assert not held_in(run(node, 1130 * MS)), "once is enough"
     hear(node, 1, src=NEW, at_ns=1130 * MS, kind=Kind.ROUND, priority=PRIORITY_CONTROL)
     assert HeldPacket(7, NEAR) in held_in(run(node, 1200 * MS, from_ns=1130 * MS))
+
+
+@pytest.mark.parametrize(
+    "kind", [Kind.ROUND, Kind.DATA, "a copy"], ids=["what a node tells", "a first packet", "a copy"]
+)
+def test_who_is_heard_by_frames_that_somebody_repeats_long_after_is_not_near(
+    make_node: MakeNode, kind: Kind | str
+) -> None:
+    """A station in the middle repeated frames of others 10 s later: 3 % of the packets were lost."""
+    node = make_node()
+    run(node, 1 * S)
+    hear(node, 6, src=NEAR, at_ns=1 * S)
+    run(node, 11 * S, from_ns=1 * S)
+    hear(node, 7, src=NEAR, at_ns=11 * S)
+    assert HeldPacket(7, NEAR) in held_in(run(node, 11_080 * MS, from_ns=11 * S))
+    assert not held_in(run(node, 11_130 * MS)), "once is enough"
+    if isinstance(kind, Kind):
+        hear(node, 1, src=NEW, at_ns=11_130 * MS, kind=kind, made_ns=2 * S)
+    else:
+        hear(node, 6, src=NEW, at_ns=11_130 * MS, origin=NEAR, made_ns=1 * S)
+    assert HeldPacket(7, NEAR) not in held_in(run(node, 11_200 * MS, from_ns=11_130 * MS))
 
 
 def test_a_warning_goes_at_once_and_in_the_turn(make_node: MakeNode) -> None:

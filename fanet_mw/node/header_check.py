@@ -5,7 +5,7 @@ any effect.
     origin                              not this node, unless it knows the packet as its own
     hops                                0 only at the origin; hops made and hop limit are at most 255 together
     kind                                nobody relays a hello
-    instant of generation               not in the future
+    instant of generation               not in the future; unless most neighbors say so: then the own clock is behind
     sequence number                     not greater than a node had time to reach since swarm instant 0
 
 Frames that cannot be decoded (`reader.py`) are counted as `malformed` by the node (`node.py`). A packet that was
@@ -37,6 +37,9 @@ _AHEAD_NS: Final = 100 * MS
 _BURST: Final = 100_000
 """A sequence number may be greater by this than one packet per `RESTART_STEP_NS` would reach: it is ten seconds of the
 densest traffic."""
+_LATEST: Final = 8
+"""The transmitters that decide whether the own clock is behind: those that were heard last."""
+_SEVERAL: Final = 2
 _STEP_US: Final = RESTART_STEP_NS // US
 _NUMBER: Final = CONTROL - 1
 """The bits of a sequence number that count the packets of its kind."""
@@ -60,6 +63,9 @@ class HeaderCheck:
         self._youngest_ns = -_AHEAD_NS - apart_ns
         """The least age of a packet. It is negative, because clocks differ: a packet from further in the future is a
         lie."""
+        self._may_jump = clock.modelled
+        self._ahead: dict[NodeId, bool] = {}
+        """Whether each of the latest transmitters has sent a packet from the future, the latest last."""
         hello_ns = seconds_to_ns(scenario.routing.hello_interval_s)
         self.oldest_hello_ns: Final = scenario.mac_lifetime_ns + hello_ns + _AHEAD_NS + apart_ns
         """The greatest age of a hello, which waits in the queue of the radio and no longer than for the next one."""
@@ -81,8 +87,18 @@ class HeaderCheck:
             prev_hop != src
             or (origin != prev_hop and (hops == 0 or kind == _HELLO))
             or hops + hop_limit > MOST_HOPS
-            or age_ns < self._youngest_ns
             or (number > _BURST and number - _BURST > origin_us // _STEP_US)  # mostly no division
         ):
             return DropReason.FORGED
-        return None
+        early = age_ns < self._youngest_ns
+        if self._may_jump:
+            self._ahead.pop(src, None)
+            self._ahead[src] = early
+            if len(self._ahead) > _LATEST:
+                del self._ahead[next(iter(self._ahead))]
+        return DropReason.FORGED if early and not self._is_behind() else None
+
+    def _is_behind(self) -> bool:
+        """True if the own clock must have jumped back: of the latest transmitters most are ahead of it."""
+        early = sum(self._ahead.values())
+        return early >= _SEVERAL and 2 * early > len(self._ahead)

@@ -110,5 +110,5 @@ def test_without_a_counter_nothing_comes_late_and_the_swarm_is_together_again_or
             assert max(values) - min(values) < 100 * US, t_ns
     heard = Counter((record.origin, record.seq) for record in outcome.records if isinstance(record, Delivered))
     for record in outcome.records:
-        if isinstance(record, Generated) and (AT_S + 5) * S <= record.t_ns < 58 * S and not left_out:
+        if isinstance(record, Generated) and (AT_S + 6) * S <= record.t_ns < 58 * S and not left_out:
             assert heard[record.node, record.seq] == 14, "everything arrives again"

@@ -88,3 +88,28 @@ def test_a_number_is_one_that_the_time_so_far_has_room_for(plausible: HeaderChec
     most = NOW_US // 100 + 100_000
     assert judged(plausible, FIRST._replace(seq=apart + most)) is None
     assert judged(plausible, FIRST._replace(seq=apart + most + 1)) is DropReason.FORGED
+
+
+def test_a_node_whose_clock_has_jumped_back_believes_most_of_its_neighbors_and_no_single_one(
+    make_scenario: MakeScenario,
+) -> None:
+    """A clock without a counter jumped back by 3.7 s: its node refused all packets of others for 4 s."""
+    keys = {"nodes.count": 9, "clock.offset_ms": 5}
+    plausible = HeaderCheck(OURS, make_scenario(**keys), handed_on=HANDED_ON.__contains__)
+
+    def of(node: int, ahead_s: float) -> DropReason | None:
+        told = FIRST._replace(origin=node, prev_hop=node, origin_us=NOW_US + round(ahead_s * 1e6))
+        return judged(plausible, told, src=NodeId(node))
+
+    assert [of(node, 0) for node in (3, 4, 5)] == [None] * 3
+    assert [of(6, 3.7) for _ in range(9)] == [DropReason.FORGED] * 9, "one station is nobody's clock"
+    assert [of(node, 3.7) for node in (6, 7)] == [DropReason.FORGED] * 2, "nor are two beside three others"
+    assert [of(node, 3.7) for node in (7, 3, 4)] == [DropReason.FORGED, None, None]
+    assert [of(node, 0) for node in (3, 4, 5)] == [None] * 3, "it has the time again"
+    assert of(7, 3.7) is DropReason.FORGED
+
+
+def test_exact_clocks_do_not_jump(plausible: HeaderCheck) -> None:
+    early = FIRST._replace(origin_us=NOW_US + 3_700_000)
+    for node in (3, 4, 5):
+        assert judged(plausible, early._replace(origin=node, prev_hop=node), src=NodeId(node)) is DropReason.FORGED

@@ -250,7 +250,7 @@ def _simulated(scenario: "Scenario", *, quiet: bool) -> "Iterator[tuple[Callable
     if _err.is_terminal and not quiet:
         tally = RunningTally(scenario)
         with _progress(scenario, quiet=quiet) as tell:
-            yield lambda s: tell(s, f"{scenario.name}: {figures(s, tally).figures()}"), TallyObserver(tally)
+            yield lambda s: tell(s, f"{scenario.name}: {figures(s, tally).in_words()}"), TallyObserver(tally)
         return
 
     def say(seconds: float) -> None:
@@ -281,7 +281,7 @@ def _watched(scenario: "Scenario", *, quiet: bool) -> Iterator[Callable[["Progre
     """A progress bar for a person who is watching, and else a line every ten seconds, both on standard error."""
     if _err.is_terminal:
         with _progress(scenario, quiet=quiet) as tell:
-            yield lambda progress: tell(progress.swarm_s, f"{scenario.name}: {progress.figures()}")
+            yield lambda progress: tell(progress.swarm_s, f"{scenario.name}: {progress.in_words()}")
         return
     said_s = monotonic()
 

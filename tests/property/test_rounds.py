@@ -81,7 +81,7 @@ def test_of_nodes_within_two_hops_one_owns_a_bulk_slot(timing: RoundTiming, from
     often = {node: data.draw(st.booleans()) for node in nodes}
     owned = [
         BulkSlots(node, timing).next_ns(
-            from_ns, often=often[node], rivals=[(other, often[other]) for other in nodes if other != node]
+            from_ns, in_each_slot=often[node], rivals=[(other, often[other]) for other in nodes if other != node]
         )
         for node in nodes
     ]
@@ -94,7 +94,7 @@ def test_a_node_with_little_to_send_owns_few_slots_and_leaves_the_others_alone()
     def owned(rivals: list[tuple[int, bool]], *, often: bool = True) -> set[int]:
         found, at_ns = set[int](), 0
         slots = BulkSlots(1, timing)
-        while (at_ns := slots.next_ns(at_ns, often=often, rivals=rivals)) < 100 * timing.period_ns:
+        while (at_ns := slots.next_ns(at_ns, in_each_slot=often, rivals=rivals)) < 100 * timing.period_ns:
             found.add(at_ns)
             at_ns += 1
         return found

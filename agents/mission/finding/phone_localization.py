@@ -258,7 +258,7 @@ class PhoneFilter:
             return math.inf
         return self._best - self._totals[j * _WIDTH + i]
 
-    def likely_cells(self, most: float) -> Iterator[tuple[float, float, float]]:
+    def likely_cells(self, most_deficit: float) -> Iterator[tuple[float, float, float]]:
         """East and north of each cell whose `deficit` is at most this, and the deficit; none before the phone was
         received.
         """
@@ -268,7 +268,7 @@ class PhoneFilter:
         west, south = self._middle.east - _HALF_CELLS * CELL_M, self._middle.north - _HALF_CELLS * CELL_M
         possible = _inside(self._middle, self._model.half_m + CELL_M / 2)
         for cell, (total, inside) in enumerate(zip(self._totals, possible, strict=False)):
-            if inside and self._best - total <= most:
+            if inside and self._best - total <= most_deficit:
                 yield west + cell % _WIDTH * CELL_M, south + cell // _WIDTH * CELL_M, self._best - total
 
     def near(self, place: Enu, *, within_m: float) -> bool:

@@ -185,7 +185,7 @@ class FormationPlace:
             for ahead_s in (within_s, within_s + 5.0)
         )
 
-    def beyond_reach_m(self, east_m: float, north_m: float, now_ns: int) -> float:
+    def beyond_reception_m(self, east_m: float, north_m: float, now_ns: int) -> float:
         """How far a position is from where this UAV's team receives it at an instant of the sweep; without a plan, from
         where this UAV waits for one.
         """

@@ -51,4 +51,4 @@ class Absence:
         if begins_ns is not None and now_ns < begins_ns:
             return self.late_s(place, now_ns, after_s=after_s) <= self._most_s
         at_ns = now_ns + round((after_s + self._most_s) * S)
-        return self._formation.beyond_reach_m(place.east_m, place.north_m, at_ns) <= self._most_s * self._speed_m_s
+        return self._formation.beyond_reception_m(place.east_m, place.north_m, at_ns) <= self._most_s * self._speed_m_s

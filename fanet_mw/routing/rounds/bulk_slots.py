@@ -32,14 +32,14 @@ class BulkSlots:
         self._node = node
         self._timing = timing
 
-    def next_ns(self, from_ns: int, *, often: bool, rivals: Sequence[tuple[int, bool]]) -> int:
+    def next_ns(self, from_ns: int, *, in_each_slot: bool, rivals: Sequence[tuple[int, bool]]) -> int:
         """The start of the first own slot at or after an instant; `rivals`: the other nodes within two hops, and
         whether each takes part in all slots. The others take part where the last bits of their bids are 0.
         """
         first = self._timing.slot_from(from_ns)
         for slot in range(first, first + _MOST_SEARCHED):
             own = _bid(self._node, slot)
-            if own % _SELDOM and not often:
+            if own % _SELDOM and not in_each_slot:
                 continue
             for node, takes_part in rivals:
                 theirs = _bid(node, slot)

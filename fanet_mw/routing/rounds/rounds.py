@@ -368,14 +368,14 @@ class RoundFlooding(RoutingProtocol):
         """Find the first own bulk slot at or after an instant."""
         self._slot_from_ns = from_ns
         rivals = self._topology.rivals(self._neighbors(now_ns))
-        self._slot_ns = self._slots.next_ns(self._slot_from_ns, often=self._often, rivals=rivals)
+        self._slot_ns = self._slots.next_ns(self._slot_from_ns, in_each_slot=self._often, rivals=rivals)
         self._slot_by = self._near, self._topology.changes, self._often
 
     def _use_slot(self, slot_ns: int, now_ns: int) -> None:
         """Announce the frame of a bulk slot, if it is still this node's own, and seek the next one."""
         rivals = self._topology.rivals(self._neighbors(now_ns))
         changed = self._slot_by != (self._near, self._topology.changes, self._often)
-        lost = changed and self._slots.next_ns(slot_ns, often=self._often, rivals=rivals) != slot_ns
+        lost = changed and self._slots.next_ns(slot_ns, in_each_slot=self._often, rivals=rivals) != slot_ns
         if slot_ns < now_ns or lost:
             self._seek_slot(max(slot_ns, now_ns + self._lead_ns), now_ns)
             return

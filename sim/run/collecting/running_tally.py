@@ -41,7 +41,7 @@ class Progress(NamedTuple):
     survivors: int
     """Of the scenario; 0: nobody is searched for."""
 
-    def figures(self) -> str:
+    def in_words(self) -> str:
         """All but the time, in words."""
         parts = [f"clock {self.time_scale:.3g}" if self.late is not None else f"{self.time_scale:.3g} x real time"]
         if self.delivered is not None:
@@ -55,7 +55,7 @@ class Progress(NamedTuple):
         return ", ".join(parts)
 
     def sentence(self) -> str:
-        return f"{self.swarm_s:.0f} of {self.duration_s:g} s: {self.figures()}"
+        return f"{self.swarm_s:.0f} of {self.duration_s:g} s: {self.in_words()}"
 
 
 class RunningTally:

@@ -104,7 +104,7 @@ class Ring:
     def _half_m(self, swept_s: float) -> float:
         formation = self._formation
         slower = formation._replace(speed_m_s=formation.speed_m_s * _SLOWER)
-        return min(self._most_m, swept_m(slower, swept_s, back=1.0))
+        return min(self._most_m, swept_m(slower, swept_s, faster_back=1.0))
 
 
 def fitted(count: int, demands: Demands) -> Dimensions | None:

@@ -231,7 +231,7 @@ class AssignedRoles:
         """Flood one part of the leader's schedule, and follow it as all other nodes do."""
         inner = part.encode_frame(self._port.node) + self._timetabling.addition(part, leader)
         self._on_schedule(self._access.flood_control(Kind.SCHEDULE, inner, now_ns=now_ns), now_ns=now_ns)
-        for links in self._timetabling.links_after(part, leader) if self._leader is not None else ():
+        for links in self._timetabling.links_to_send_after(part, leader) if self._leader is not None else ():
             self._timetabling.on_links(self._access.flood_control(Kind.LINKS, links, now_ns=now_ns), now_ns=now_ns)
 
     # --- hellos ---------------------------------------------------------------------------------------------------

@@ -25,7 +25,7 @@ class Timetabling(Protocol):
     def addition(self, part: Schedule, leader: Leader) -> bytes:
         """The inner frames that the leader adds to a part of the schedule."""
 
-    def links_after(self, part: Schedule, leader: Leader) -> list[bytes]:
+    def links_to_send_after(self, part: Schedule, leader: Leader) -> list[bytes]:
         """The inner frames of the packets with links that follow a part of the schedule."""
 
     def read(self, packet: Packet, schedule: Schedule) -> PartDetails | None:
@@ -52,7 +52,7 @@ class NoTimetable:
     def addition(self, part: Schedule, leader: Leader) -> bytes:
         return b""
 
-    def links_after(self, part: Schedule, leader: Leader) -> list[bytes]:
+    def links_to_send_after(self, part: Schedule, leader: Leader) -> list[bytes]:
         return []
 
     def read(self, packet: Packet, schedule: Schedule) -> PartDetails | None:

@@ -287,7 +287,7 @@ class StatedDelays:
         return clocks_fit(scenario.clock, slack_ns=turn_slack_ns(scenario), clock_error_ns=self._port.clock_error_ns)
 
     def report(self) -> Mapping[str, object]:
-        """The state and the counters, as JSON values."""
+        """The likely delay, and the bounds that this node states, as JSON values."""
         bound_ns, likely_ns = self.bound_ns(), self.likely_ns()
         bounds_ns = self._bounds_ns[-1][1] if self._bounds_ns else {}
         return {

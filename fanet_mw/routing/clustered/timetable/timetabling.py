@@ -78,7 +78,7 @@ class FromPlaces:
             return frames
         return frames + Loads(tuple(leader.load(member.node) for member in part.members)).encode_frames(self._port.node)
 
-    def links_after(self, part: Schedule, leader: Leader) -> list[bytes]:
+    def links_to_send_after(self, part: Schedule, leader: Leader) -> list[bytes]:
         if not leader.links or not part.members or part.part + 1 < part.parts:
             return []
         frames = frames_of(leader.links)

@@ -71,12 +71,17 @@ def test_a_folder_for_temporary_files_with_too_long_a_name_is_one_sentence(tmp_p
     assert f"TMPDIR = {long}" in done.stderr
 
 
-def test_without_docstrings_a_run_is_the_same_and_help_says_what_is_missing() -> None:
+def test_without_docstrings_help_says_what_is_missing() -> None:
+    assert "python -OO has removed" in fanet("simulate", "--help", flags=("-OO",)).stderr
+
+
+@pytest.mark.slow
+def test_without_docstrings_a_run_is_the_same() -> None:
+    """All sources are compiled anew for it."""
     done = fanet("simulate", *SHORT, "--json", flags=("-OO",))
     assert done.returncode == 0
     scenario = catalog.find("quick", ["nodes.count=3", "clusters.count=1", "duration_s=13"])
     assert json.loads(done.stdout)["trace_sha256"] == finish(simulate(scenario), out=None)["trace_sha256"]
-    assert "python -OO has removed" in fanet("simulate", "--help", flags=("-OO",)).stderr
     assert fanet("simulate", "--help", flags=("-O",)).stderr == ""
 
 

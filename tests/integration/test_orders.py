@@ -13,7 +13,7 @@ from fanet_mw.units import S
 from sim.run.virtual import Observed, simulate
 
 KEYS = {
-    "nodes.count": 7, "nodes.spacing_m": 40, "nodes.altitude_m": 40, "duration_s": 100, "warmup_s": 1, "drain_s": 1,
+    "nodes.count": 7, "nodes.spacing_m": 40, "nodes.altitude_m": 40, "duration_s": 80, "warmup_s": 1, "drain_s": 1,
     "mission.survivors": 1, "mission.search": "lines", "mobility.model": "onboard", "mobility.speed_m_s": 7.5,
     "world.area_m": 240, "radio.range_m": 250, "traffic.arrivals": "none", "nodes.telemetry_hz": 0,
     "ground.at_m": (0.0, -150.0),
@@ -38,7 +38,7 @@ def track(records: Sequence[Record], node: int) -> dict[int, Posed]:
 def test_all_fly_home_and_land_when_they_are_recalled(
     make_scenario: Callable[..., Scenario], order: str, mode: str
 ) -> None:
-    records = flown(make_scenario, {"at_s": AT_S, "order": order})
+    records = flown(make_scenario, {"at_s": AT_S, "order": order}, duration_s=100)
     for node in range(1, 8):
         of_node = dict(modes(records, node))
         assert of_node[mode] == pytest.approx(AT_S, abs=2.0)

@@ -40,8 +40,8 @@ def without_capacity(*settings: str) -> ScenarioPlan:
     "settings",
     [
         (),
-        ("clusters.count=8",),
-        ("radio.lead_ms=10", "clusters.flooding_period_s=1"),
+        pytest.param(("clusters.count=8",), marks=pytest.mark.slow),
+        pytest.param(("radio.lead_ms=10", "clusters.flooding_period_s=1"), marks=pytest.mark.slow),
         ("clusters.method=wca", "nodes.count=21", "clusters.count=20", "traffic.sources=20", "nodes.spacing_m=75"),
     ],
 )

@@ -8,6 +8,7 @@ import pybullet
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from kit import slow
 
 from agents.mission.navigation.onboard_map import OnboardMap
 from fanet_mw.scenario import Scenario
@@ -78,7 +79,7 @@ def engine_of(name: str, solid: Obstacles) -> Engine:
 
 
 @pytest.mark.parametrize("name", ["kinematic", "rotors", "pybullet"])
-@pytest.mark.parametrize("terrain_m", [15, 40])
+@pytest.mark.parametrize("terrain_m", [40, *slow(15)])
 def test_uavs_land_on_hills_and_beyond_them_and_their_motors_stop(name: str, terrain_m: float) -> None:
     keys = [f"world.terrain_m={terrain_m}", "world.area_m=400", "world.terrain_scale_m=120", "nodes.count=9",
             "nodes.on_ground=true", "nodes.spacing_m=190", 'mobility.model="onboard"']  # fmt: skip

@@ -4,9 +4,9 @@
 
 By default 40 draws of clustered floods, each with a counter and without.
 
-With a counter (`clock.counter`) no bound may be broken. Within 15 s all nodes are within 100 us again, or the one that
-cannot be is counted as without time; what was stated before others could know, without a counter, and was not kept is
-counted, and must be over by then.
+With a counter (`clock.counter`, the default) no bound that is stated after the jump may be broken. Within 15 s all
+nodes are within 100 us again, or the one that cannot be is counted as without time. Without a counter nobody can know
+of the jump before some hellos were heard: bounds stated until then are counted, and those stated later must be kept.
 """
 
 import math
@@ -32,6 +32,9 @@ PROTOCOLS: Final = {
     ),
 }  # fmt: skip
 REUNITED_S: Final = 15
+UNKNOWN_S: Final = 4
+"""A node that has no counter gives up its time 1.5 hello intervals after the jump, and its alarm goes from hello to
+hello through the swarm."""
 NODES: Final = 15
 
 
@@ -65,8 +68,9 @@ class Seen(NamedTuple):
 
     def kept(self, jump: Jump) -> bool:
         together = self.reunited_s is not None and self.reunited_s <= REUNITED_S
-        broken = self.late or self.never
-        return together and self.last_broken_s <= REUNITED_S and not (jump.counter and (broken or self.jumps != 1))
+        if jump.counter:
+            return together and self.jumps == 1 and not (self.late or self.never)
+        return together and self.last_broken_s <= UNKNOWN_S
 
 
 def drawn(seed: int, *, counter: bool, protocol: str = "clustered") -> Jump:

@@ -50,10 +50,11 @@ class CameraView:
         return recognized_share(pixels, cycles_for_half=self._cycles)
 
     def shows(self, place: Enu, here: Enu) -> bool:
-        """True if a place on the ground is well inside the image; `here.up` is the height above ground."""
+        """True if a place on the ground is well inside the image; both heights are above the ground below the UAV."""
+        down_m = here.up - place.up
         return (
-            abs(place.east - here.east) <= _INSIDE * here.up * self._tan_east
-            and abs(place.north - here.north) <= _INSIDE * here.up * self._tan_north
+            abs(place.east - here.east) <= _INSIDE * down_m * self._tan_east
+            and abs(place.north - here.north) <= _INSIDE * down_m * self._tan_north
         )
 
     def sighting_evidence(self, height_m: float) -> float:

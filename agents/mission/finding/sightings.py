@@ -1,7 +1,7 @@
 """The people whom a UAV's camera shows and whose voices its microphones make out, as places on the ground."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from agents.mission.finding.camera_view import CameraView
@@ -22,6 +22,11 @@ _ANGLE_RAD: Final = 0.03
 """The standard deviation of the direction in which a camera shows a person, errors of the UAV's attitude included."""
 _LEAST_DEPRESSION_RAD: Final = 0.05
 """A direction that is less steep than this is not taken to hit the ground."""
+_RAY_STEP_M: Final = 10.0
+_RAY_STEPS: Final = 100
+"""Directions are followed in such steps until they are below the ground, so far at most."""
+_HALVINGS: Final = 8
+"""The last step is halved so often, to 4 cm."""
 _CALL_EVIDENCE: Final = 9.0
 """The evidence of a call: an array hardly takes anything else for one."""
 _SETTLED_NS: Final = S // 5
@@ -103,7 +108,7 @@ class Sightings:
         directions = [(*direction, _ANGLE_RAD) for direction in people]
         shown = self._sighted("camera", directions, math.inf, evidence=evidence, now_ns=now_ns)
         self._identities.on_images(
-            1, lambda place: self._view.shows(place, here), evidence=self._view.empty_evidence(here.up), but=shown
+            1, lambda place: self._shows(place, here), evidence=self._view.empty_evidence(here.up), but=shown
         )
 
     def voice(self, calls: Sequence[tuple[float, float, float]], *, now_ns: int) -> None:
@@ -139,7 +144,12 @@ class Sightings:
             self._imaged_ns += round(count * period_ns)
             here = self._own_motion.over_ground(now_ns)
             evidence = self._view.empty_evidence(here.up)
-            self._identities.on_images(count, lambda place: self._view.shows(place, here), evidence=evidence)
+            self._identities.on_images(count, lambda place: self._shows(place, here), evidence=evidence)
+
+    def _shows(self, place: Enu, here: Enu) -> bool:
+        """True if a place is in the image taken at `here`, whose height is the one above ground."""
+        rise_m = self._own_motion.rise_m
+        return self._view.shows(place if rise_m is None else place._replace(up=rise_m(place.east, place.north)), here)
 
     def _sighted(
         self,
@@ -155,7 +165,9 @@ class Sightings:
         """
         here, sightings = self._own_motion.over_ground(now_ns), []
         for bearing_rad, elevation_rad, sigma_rad in directions:
-            looked = ground_place(here, bearing_rad=bearing_rad, elevation_rad=elevation_rad)
+            looked = ground_place(
+                here, bearing_rad=bearing_rad, elevation_rad=elevation_rad, rise_m=self._own_motion.rise_m
+            )
             if looked is None or looked[2] > farthest_m:
                 continue
             sigma_m = max(1.0, sigma_rad * looked[2] * looked[2] / max(1.0, here.up))
@@ -169,17 +181,35 @@ class Sightings:
         return shown
 
 
-def ground_place(at: Enu, *, bearing_rad: float, elevation_rad: float) -> tuple[float, float, float] | None:
-    """East and north of the place where a direction from `at` meets the ground, and the slant range to that place.
+def ground_place(
+    at: Enu,
+    *,
+    bearing_rad: float,
+    elevation_rad: float,
+    rise_m: Callable[[float, float], float] | None = None,
+) -> tuple[float, float, float] | None:
+    """East and north of the place where a direction from `at` first meets the ground, and the slant range to it.
 
-    `at.up` is the height above the ground, which is taken to be level. None for directions above the horizon, and for
-    those so little below it (`_LEAST_DEPRESSION_RAD`) that a small error of the direction would move the place by far.
+    `at.up` is the height above the ground; `rise_m` tells by how much the ground is higher at a place than below `at`,
+    without it the ground is level. None for directions above the horizon, and for those so little below it
+    (`_LEAST_DEPRESSION_RAD`) that a small error of the direction would move the place by far.
     """
     if elevation_rad >= -_LEAST_DEPRESSION_RAD:
         return None
-    along_m = at.up / math.tan(-elevation_rad)
-    return (
-        at.east + along_m * math.sin(bearing_rad),
-        at.north + along_m * math.cos(bearing_rad),
-        math.hypot(along_m, at.up),
-    )
+    east, north, falls = math.sin(bearing_rad), math.cos(bearing_rad), math.tan(-elevation_rad)
+    along_m, down_m = at.up / falls, at.up
+    if rise_m is not None:
+
+        def ground_below_m(along_m: float) -> float:
+            return at.up - rise_m(at.east + along_m * east, at.north + along_m * north)
+
+        far_m = next((m for k in range(1, _RAY_STEPS) if (m := k * _RAY_STEP_M) * falls >= ground_below_m(m)), None)
+        if far_m is None:
+            return None
+        along_m = far_m - _RAY_STEP_M
+        for halving in range(1, _HALVINGS + 1):
+            further_m = along_m + _RAY_STEP_M / 2**halving
+            if further_m * falls < ground_below_m(further_m):
+                along_m = further_m
+        down_m = ground_below_m(along_m)
+    return at.east + along_m * east, at.north + along_m * north, math.hypot(along_m, down_m)

@@ -59,6 +59,8 @@ class VelocityChoice:
         speed = math.hypot(*wanted)
         if speed > self._most_m_s:
             wanted = wanted[0] * self._most_m_s / speed, wanted[1] * self._most_m_s / speed
+        share = self._terrain.speed_share(goal.up, Enu(*wanted, 0.0), now_ns)
+        wanted = share * wanted[0], share * wanted[1]
         planes = obstacles.planes(here, now_ns)
         planes += [plane for constraint in self._hard for plane in constraint.planes(now_ns)]
         hard = len(planes)

@@ -10,7 +10,7 @@ everything else.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
 from agents.mission.navigation.half_planes import HalfPlane
@@ -137,6 +137,11 @@ class KnownObstacles:
 
     # --- queries --------------------------------------------------------------------------------------------------
 
+    @property
+    def has_hills(self) -> bool:
+        """True if the map has the heights of the ground."""
+        return bool(self._map.heights_m)
+
     def ground_m(self, place: Enu) -> float:
         """The height of the ground at a place, by the map."""
         return self._map.ground_m(place.east, place.north) if self._map.heights_m else 0.0
@@ -155,18 +160,12 @@ class KnownObstacles:
         ]
         return max((roof for roof in ahead if roof + OVER_M <= at.up), default=-math.inf) + OVER_M
 
-    def rise_m(self, at: Enu, velocity: Enu) -> float:
-        """By how much the ground rises within the next seconds of the flight; 0 if it does not."""
+    def rises_m(self, at: Enu, velocity: Enu, after_s: Iterable[float]) -> list[float]:
+        """By how much the ground is higher after each of these times of a flight; empty without a map of the ground."""
         if not self._map.heights_m:
-            return 0.0
+            return []
         here = self.ground_m(at)
-        return max(
-            0.0,
-            *(
-                self._map.ground_m(at.east + s * velocity.east, at.north + s * velocity.north) - here
-                for s in (2.0, 4.0, 6.0)
-            ),
-        )
+        return [self._map.ground_m(at.east + s * velocity.east, at.north + s * velocity.north) - here for s in after_s]
 
     def movers(self, now_ns: int) -> list[Mover]:
         """The flying bodies that the radar has recently seen, without neighbors whose hellos are received."""

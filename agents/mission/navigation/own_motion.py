@@ -18,6 +18,8 @@ class OwnMotion:
     def __init__(self, position: Enu, obstacles: KnownObstacles) -> None:
         self.position = position
         self._obstacles = obstacles
+        self.rise_m = self._rise_m if obstacles.has_hills else None
+        """By how much the ground at a place (east, north) is higher than below this UAV; None over level ground."""
         self.velocity = STILL
         self._fix_ns: int | None = None
         self._above_ground: tuple[float, int] | None = None
@@ -48,3 +50,6 @@ class OwnMotion:
         if ranged and self._above_ground is not None and self._obstacles.roof_m(self.position) is None:
             return self._above_ground[0]
         return self.position.up - self._obstacles.ground_m(self.position)
+
+    def _rise_m(self, east_m: float, north_m: float) -> float:
+        return self._obstacles.ground_m(Enu(east_m, north_m, 0.0)) - self._obstacles.ground_m(self.position)

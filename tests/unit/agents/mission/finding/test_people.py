@@ -154,3 +154,5 @@ def test_an_image_is_as_wide_as_the_field_of_view_and_not_as_high(make_scenario:
     assert view.shows(Enu(55, 30, 0), Enu(0, 0, UP_M))
     assert not view.shows(Enu(62, 0, 0), Enu(0, 0, UP_M))
     assert not view.shows(Enu(0, 35, 0), Enu(0, 0, UP_M)), "images are wider than high"
+    assert not view.shows(Enu(55, 0, 20), Enu(0, 0, UP_M)), "uphill an image ends earlier"
+    assert view.shows(Enu(62, 0, -20), Enu(0, 0, UP_M))

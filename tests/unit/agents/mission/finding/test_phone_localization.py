@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from agents.mission.finding.phone_localization import CELL_M, REFERENCE_LOSS_DB, PhoneFilter, PhoneModel
@@ -95,3 +95,26 @@ def test_a_camera_looks_at_the_ground_where_its_angles_lead(
     looked = ground_place(Enu(east, north, up), bearing_rad=bearing, elevation_rad=elevation)
     assert looked is not None
     assert math.hypot(looked[0] - east - along, looked[1] - north - across) < 1e-6 * (1 + abs(east) + abs(north))
+
+
+@given(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(20, 100), st.floats(-60, 60), st.floats(-60, 60))
+def test_on_a_slope_a_camera_looks_at_the_slope(
+    eastward: float, northward: float, up: float, along: float, across: float
+) -> None:
+    def rise_m(east_m: float, north_m: float) -> float:
+        return eastward * east_m + northward * north_m
+
+    down = up - rise_m(along, across)
+    assume(down > 0.2 * math.hypot(along, across))
+    bearing, elevation = math.atan2(along, across), -math.atan2(down, math.hypot(along, across))
+    looked = ground_place(Enu(0, 0, up), bearing_rad=bearing, elevation_rad=elevation, rise_m=rise_m)
+    assert looked is not None
+    assert math.hypot(looked[0] - along, looked[1] - across) < 0.1
+    assert looked[2] == pytest.approx(math.hypot(along, across, down), abs=0.1)
+
+
+def test_a_direction_that_meets_no_ground_shows_nobody() -> None:
+    def falls_m(east_m: float, north_m: float) -> float:
+        return -2.0 * abs(east_m)
+
+    assert ground_place(Enu(0, 0, 65), bearing_rad=math.pi / 2, elevation_rad=-0.8, rise_m=falls_m) is None

@@ -173,10 +173,11 @@ def test_a_single_echo_is_soon_forgotten_and_a_repeated_one_is_kept() -> None:
     assert len(obstacles.planes(at, 15 * S)) == 1
 
 
-def test_a_hill_ahead_is_climbed_before_it_is_reached() -> None:
+def test_the_ground_ahead_is_that_of_the_map() -> None:
     rows = tuple(tuple(30.0 if column >= 3 else 0.0 for column in range(5)) for _ in range(5))
     obstacles = KnownObstacles(OnboardMap((), rows, 50.0))
     at = Enu(-25.0, 0.0, 60.0)
     assert obstacles.ground_m(Enu(25.0, 0.0, 0.0)) == pytest.approx(15.0)
-    assert obstacles.rise_m(at, Enu(10.0, 0.0, 0.0)) == pytest.approx(21.0)
-    assert obstacles.rise_m(at, Enu(-10.0, 0.0, 0.0)) == 0.0
+    assert obstacles.rises_m(at, Enu(10.0, 0.0, 0.0), (2, 6)) == [0.0, pytest.approx(21.0)]
+    assert obstacles.rises_m(at, Enu(-10.0, 0.0, 0.0), (2, 6)) == [0.0, 0.0]
+    assert KnownObstacles(NO_MAP).rises_m(at, Enu(10.0, 0.0, 0.0), (2, 6)) == []

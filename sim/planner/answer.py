@@ -140,7 +140,7 @@ def _judge_rounds(
     near = within_range(at, range_m=scenario.radio.range_m, reaches=scenario.reaches)
     ways = [levels(near, node) for node in at]
     hops = max(max(hops_to.values()) for hops_to in ways)
-    bound_ns = law.over_ns(hops)
+    bound_ns = None if law.loses_frames else law.over_ns(hops)
     urgent = {
         name: each for name, each in scenario.traffic_classes.items() if each.priority != "bulk" or not timing.slots
     }

@@ -9,11 +9,12 @@ that changes meanwhile. All urgent packets that are under way together, `B` byte
 serves them at the same rate, `room` bytes of a frame per round, so what waited for one node's turn does not wait
 again for the next one's (tandem of equal servers; Le Boudec and Thiran, Network Calculus, 1.4.3). More urgent packets
 that come later overtake it on its way: `urgent` is the share of `room` that was theirs lately.
-Assumed: no frame is lost, so over any channel but `range` no bound is stated. None is stated either while clocks may
-be further apart than the slack of turns holds, while more waits for turns, everywhere alike, than three quarters of
-`rounds.burst_bytes`, or while no way has been found yet to a node that may only just have started. A bound does not
-apply to nodes without a way, and counts on links that will last only (`lasting_links.py`). What waits follows from what
-was heard, because all nodes hear the same packets and serve them at the same rate (a leaky bucket).
+Assumed: no frame is lost; over any channel but `range` a likely delay is stated instead (`likely_delay.py`). None is
+stated while clocks may be further apart than the slack of turns holds, while more waits for turns, everywhere alike,
+than three quarters of `rounds.burst_bytes`, or while no way has been found yet to a node that may only just have
+started. A bound does not apply to nodes without a way, and counts on links that will last only (`lasting_links.py`).
+What waits follows from what was heard, because all nodes hear the same packets and serve them at the same rate (a leaky
+bucket).
 """
 
 from collections import Counter
@@ -43,7 +44,7 @@ class DelayLaw:
     def __init__(self, timing: RoundTiming, scenario: Scenario) -> None:
         self._timing = timing
         self._clock, self._slack_ns = scenario.clock, round(scenario.rounds.turn_slack_us * US)
-        self._loses_frames = scenario.radio.channel != "range" or scenario.radio.fading != "none"
+        self.loses_frames = scenario.radio.channel != "range" or scenario.radio.fading != "none"
         self.kept_bytes = min(HEADER_BYTES + HEARD_BYTES, timing.turn_bytes // 2)
         """The part of a turn that is kept for news of links, which urgent packets must not crowd out."""
         self._room = timing.turn_bytes - self.kept_bytes
@@ -106,7 +107,7 @@ class DelayLaw:
 
     def bound_ns(self, topology: Topology, *, priority: int, clock_error_ns: int, now_ns: int) -> int | None:
         """The bound for a packet that is handed over now, if all clocks are within `clock_error_ns`; None if none can
-        be stated.
+        be stated. Over a channel that loses frames it holds only for packets of which no frame is lost.
         """
         if not clocks_fit(self._clock, slack_ns=self._slack_ns, clock_error_ns=clock_error_ns):
             return None
@@ -118,12 +119,15 @@ class DelayLaw:
         hops, urgent = topology.hops(now_ns), self._urgent_share(priority, now_ns)
         if len(hops) == 1 or urgent > _MOST_URGENT:
             return None
-        alone_ns = self.over_ns(max(hops.values()))
-        return None if alone_ns is None else round(alone_ns / (1 - urgent))
+        return round(self.over_ns(max(hops.values())) / (1 - urgent))
 
-    def over_ns(self, hops: int) -> int | None:
-        """The bound over so many hops if nothing more urgent comes; None if the channel loses frames."""
-        return None if self._loses_frames else (hops + MARGIN_HOPS) * self.hop_ns + self._burst_ns
+    def over_ns(self, hops: int) -> int:
+        """The bound over so many hops if nothing more urgent comes and no frame is lost."""
+        return self.way_ns(hops) + self._burst_ns
+
+    def way_ns(self, hops: int) -> int:
+        """The same if nothing else waits."""
+        return (hops + MARGIN_HOPS) * self.hop_ns
 
     def absent(self, topology: Topology, *, now_ns: int) -> Sequence[NodeId] | None:
         """The nodes to which a bound does not apply, because no way leads to them; None while one may yet be found."""

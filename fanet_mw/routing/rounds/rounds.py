@@ -29,11 +29,12 @@ from fanet_mw.routing.packet_repair import FLOOD_OVER_NS, Repair
 from fanet_mw.routing.rounds.bulk_slots import BulkSlots
 from fanet_mw.routing.rounds.delay_law import MOST_HOPS, DelayLaw
 from fanet_mw.routing.rounds.lasting_links import LastingLinks
+from fanet_mw.routing.rounds.likely_delay import LIKELY_SHARE, LikelyDelay
 from fanet_mw.routing.rounds.one_way import OneWay
 from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.routing.rounds.spreading import Spreading
 from fanet_mw.routing.rounds.topology import Topology
-from fanet_mw.trace import BoundExcludes, BoundStated
+from fanet_mw.trace import BoundExcludes, BoundStated, LikelyStated
 from fanet_mw.units import BROADCAST, US, NodeId, seconds_to_ns
 from fanet_mw.wire import FLAG_FLOOD, HEADER_BYTES, PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY, Kind
 from fanet_mw.wire.hello.digest import MESSAGE_BYTES, Digest, capacity
@@ -84,6 +85,7 @@ class RoundFlooding(RoutingProtocol):
         self._timing = timing = RoundTiming.of(scenario)
         self._lead_ns = radio.lead_ns
         self._law = DelayLaw(timing, scenario)
+        self._likely = LikelyDelay() if self._law.loses_frames else None
         self._topology = Topology(
             port.node,
             count=scenario.node_count,
@@ -98,7 +100,7 @@ class RoundFlooding(RoutingProtocol):
             )
         self._spreading = Spreading(
             capacity=scenario.routing.queue_frames, repeats=rounds.repeats, patience_ns=self._law.hop_ns,
-            links=self._topology.links,
+            links=self._topology.links, lossy=self._law.loses_frames,
         )  # fmt: skip
         self._repair = None
         if rounds.repair_s:
@@ -173,6 +175,8 @@ class RoundFlooding(RoutingProtocol):
             return
         if header.kind == _DATA:
             self._hold(packet, now_ns)
+            if self._likely is not None and self._in_turns(packet):
+                self._compare(self._likely, packet, now_ns)
         if header.destination == self._port.node:
             return
         if is_used_up(header):
@@ -197,16 +201,31 @@ class RoundFlooding(RoutingProtocol):
     def _state_bound(self, packet: Packet, now_ns: int) -> None:
         """State by when all nodes have an own packet, if that is known."""
         header = packet.header
-        bound_ns = self._law.bound_ns(
+        law_ns = self._law.bound_ns(
             self._topology,
             priority=header.priority, clock_error_ns=self._port.clock_error_ns, now_ns=now_ns,
         )  # fmt: skip
-        if bound_ns is not None and bound_ns <= self._port.scenario.routing.lifetime_ns(header.priority):
+        if law_ns is None:
+            return
+        lifetime_ns = self._port.scenario.routing.lifetime_ns(header.priority)
+        absent = self._law.absent(self._topology, now_ns=now_ns) or ()
+        stated = header.origin_us * US, self._port.node, header.seq
+        if self._likely is not None:
+            likely_ns = self._likely.over_ns(self._law.way_ns(max(self._topology.hops(now_ns).values())))
+            if likely_ns is not None and likely_ns <= lifetime_ns and not absent:
+                self._port.record(LikelyStated(*stated, likely_ns, LIKELY_SHARE))
+        elif law_ns <= lifetime_ns:
             self._stated += 1
-            stated = header.origin_us * US, self._port.node, header.seq
-            self._port.record(BoundStated(*stated, bound_ns))
-            for other in self._law.absent(self._topology, now_ns=now_ns) or ():
+            self._port.record(BoundStated(*stated, law_ns))
+            for other in absent:
                 self._port.record(BoundExcludes(*stated, other))
+
+    def _compare(self, likely: LikelyDelay, packet: Packet, now_ns: int) -> None:
+        """How long a packet of another node took shows how long the own ones may take."""
+        hops = self._topology.hops_to(NodeId(packet.header.origin), now_ns)
+        if hops is not None:
+            delay_ns = now_ns + self._port.scenario.radio.handover_ns - packet.header.origin_us * US
+            likely.hear(delay_ns, way_ns=self._law.way_ns(hops))
 
     def _in_turns(self, packet: Packet) -> bool:
         """True for a packet that travels in turns; bulk does only where no window is left to it."""
@@ -534,6 +553,8 @@ class RoundFlooding(RoutingProtocol):
     # --- what is known --------------------------------------------------------------------------------------------
 
     def bound_ns(self) -> int | None:
+        if self._likely is not None:
+            return None
         return self._law.bound_ns(
             self._topology,
             priority=PRIORITY_REPORT if self._timing.slots else PRIORITY_BULK,

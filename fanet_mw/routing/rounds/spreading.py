@@ -6,11 +6,12 @@
                    -> a round later -> a neighbor is not known to have it: sent (again)
 
 A neighbor is known to have a packet when it was heard to send it (passive acknowledgment, RFC 4728, 3.4.2), or to say
-that it holds it (FANET_HELD). Urgent packets are sent by every node, so hearing them is enough. Bulk is sent only where
-a neighbor is out of reach of all that were heard to send it (scalable broadcast; Peng and Lu, MobiHoc 2000), so every
-node tells in its turns which bulk it has received. Before a packet is repeated a whole
-round must have passed in which nobody else sent it, so that mostly one node repeats. Sets of nodes are integers: bit i
-stands for node i + 1.
+that it holds it (FANET_HELD). Urgent packets are sent by every node, so hearing them is enough. Where frames are lost
+at random it is enough, too, that two were heard that have links to the neighbor; what is missing is sent again at
+growing intervals, and neighbors that are seldom heard are left to others. Bulk is sent only where a neighbor is out of
+reach of all that were heard to send it (scalable broadcast; Peng and Lu, MobiHoc 2000), so every node tells in turns
+which bulk it has received. Before a packet is repeated a whole round must have passed in which nobody else sent it, so
+that mostly one node repeats. Sets of nodes are integers: bit i stands for node i + 1.
 """
 
 import math
@@ -20,10 +21,18 @@ from typing import Final
 
 from fanet_mw.node.duplicates import key_of
 from fanet_mw.node.packet import Packet
+from fanet_mw.routing.rounds.topology import nodes_of
 from fanet_mw.units import US
 
 _MOST_EARLY: Final = 1024
 _MOST_DONE: Final = 1024
+_MOST_PATIENCE: Final = 64
+"""The longest interval between repetitions, in those of a channel that loses none at random."""
+_REMEMBERED: Final = 32
+"""The number of packets, about, over which the share that a neighbor was heard to send is averaged."""
+_WEAK_SHARE: Final = 0.5
+_OTHER_LINKS: Final = 2
+"""A neighbor that is heard of fewer packets than that share is left to others, if it has so many links."""
 _WAY_ROUND: Final = 2
 """The hops that a flood may need to reach a neighbor by relays that this node does not hear."""
 
@@ -39,7 +48,10 @@ class _Spread:
         "copy_ns",
         "from_ns",
         "having",
+        "in_reach",
+        "in_reach_twice",
         "left",
+        "measured",
         "packet",
         "rank",
         "reached",
@@ -64,10 +76,20 @@ class _Spread:
         """The neighbors that were heard to send it."""
         self.reached = 0
         """Bulk: the nodes in reach of those that were heard to send it."""
+        self.in_reach = 0
+        self.in_reach_twice = 0
+        """Urgent: the nodes with links to one, and to two, of those that were heard to send it."""
+        self.measured = False
+        """Urgent: true once it was noted which neighbors were heard to send it."""
         self.left = False
         """Bulk: true once it was left to others, because nobody lacked it."""
         self.from_ns = from_ns
         """Bulk: the instant before which it need not be looked at."""
+
+    def reach(self, nodes: int) -> None:
+        """One more node was heard to send it, which has links to these."""
+        self.in_reach_twice |= self.in_reach & nodes
+        self.in_reach |= nodes
 
     def dispensable(self) -> tuple[int, bool, int]:
         """Of two packets the greater one is missed less: it is less urgent, or was sent before, or is the older one of
@@ -85,10 +107,13 @@ class _Spread:
 class Spreading:
     """The packets that one node passes on."""
 
-    def __init__(self, *, capacity: int, repeats: int, patience_ns: int, links: Sequence[int]) -> None:
+    def __init__(
+        self, *, capacity: int, repeats: int, patience_ns: int, links: Sequence[int], lossy: bool = False
+    ) -> None:
         """`capacity`: the most packets that are kept.
         `patience_ns`: the time after which a neighbor that has received a packet was heard to say so.
         `links`: the nodes with which each node has links, by its id; they change.
+        `lossy`: the channel loses frames at random, so that not to hear a neighbor shows little.
         """
         self._capacity = capacity
         self._repeats = repeats
@@ -112,6 +137,11 @@ class Spreading:
         self._early: dict[int, int] = {}
         """The neighbors that say to hold packets which this node does not have, the latest last."""
         self.repeated = 0
+        self._lossy = lossy
+        self._share = [1.0] * len(links)
+        """The share of urgent packets that each neighbor was lately heard to send."""
+        self._weak = 0
+        """The neighbors that are heard so seldom that others are left to serve them."""
 
     def __contains__(self, key: object) -> bool:
         return key in self._entries
@@ -146,6 +176,8 @@ class Spreading:
             packet, (packet.header.priority, self._order), src, bulk_from_ns or 0, now_ns
         )
         entry.having |= self._early.pop(key, 0)
+        if src is not None:
+            entry.reach(self._links[src])
         entry.sent = self._repeats if once else 0
         if bulk_from_ns is None:
             self._urgent[key] = self._hasty[key] = entry
@@ -182,6 +214,8 @@ class Spreading:
             entry.copy_ns = now_ns  # who lacks it may have heard that copy
         self._reach(entry, src)
         again = bool(entry.senders & own)
+        if not again:
+            entry.reach(self._links[src])
         entry.senders |= own
         entry.having |= own
         return again
@@ -227,21 +261,37 @@ class Spreading:
         that are `gone` nothing is sent again.
         """
         patient_ns = start_ns - self._patience_ns
+        served = neighbors & ~self._weak
         done = []
         for key, entry in self._urgent.items():
+            if self._lossy and not entry.measured and entry.sent and entry.sent_ns <= patient_ns - self._patience_ns:
+                entry.measured = True
+                self._measure(neighbors, entry.senders)
             if key in self._waiting:
                 continue
-            if entry.sent > self._repeats or not neighbors & ~entry.having:
+            if entry.sent > self._repeats or not served & ~entry.having:
                 done.append((key, entry))
-            elif not neighbors & ~gone & ~entry.having:
+            elif not served & ~gone & ~entry.having & ~(entry.in_reach_twice if self._lossy else 0):
                 continue
-            elif entry.sent_ns <= patient_ns and entry.copy_ns <= patient_ns:
+            elif entry.sent_ns <= start_ns - self._patient_ns(entry) and entry.copy_ns <= patient_ns:
                 self._waiting.add(key)
         for key, entry in done:
             self._settle(key, entry)
         chosen = [self._entries[key] for key in self._waiting]
         chosen.sort(key=lambda entry: (entry.rank[0], entry.again, entry.rank))
         return [entry.packet for entry in chosen]
+
+    def _patient_ns(self, entry: _Spread) -> int:
+        """The time after which an urgent packet is sent again; ever longer where frames are lost at random."""
+        return self._patience_ns * (min(1 << max(0, entry.sent - 1), _MOST_PATIENCE) if self._lossy else 1)
+
+    def _measure(self, neighbors: int, senders: int) -> None:
+        """All neighbors have sent a packet by now, and were heard or not."""
+        for node in nodes_of(neighbors):
+            own = 1 << (node - 1)
+            self._share[node] += (bool(senders & own) - self._share[node]) / _REMEMBERED
+            weak = self._share[node] < _WEAK_SHARE and self._links[node].bit_count() >= _OTHER_LINKS
+            self._weak = self._weak | own if weak else self._weak & ~own
 
     def sent(self, packet: Packet, *, start_ns: int) -> int:
         """The packet is transmitted at `start_ns`; returns how often it has been."""

@@ -167,6 +167,12 @@ class Topology:
         self._arrange(now_ns)
         return {node: hops for hops, ring in enumerate(self._rings) for node in nodes_of(ring)}
 
+    def hops_to(self, node: NodeId, now_ns: int) -> int | None:
+        """The hops to one node; None if no way is known."""
+        self._arrange(now_ns)
+        own = 1 << node >> 1
+        return next((hops for hops, ring in enumerate(self._rings) if ring & own), None)
+
     def nearer(self, destination: NodeId) -> int:
         """The nodes with links to this one from which a node is fewer hops away than from here; none if no way is
         known.

@@ -1,6 +1,6 @@
 """What one node passes on, as timelines: urgent packets in turns, bulk where a neighbor is not known to have it."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from fanet_mw import wire
 from fanet_mw.node.duplicates import key_of_packet
@@ -26,10 +26,9 @@ def packet(seq: int, *, priority: int = wire.PRIORITY_REPORT) -> Packet:
     return Packet(header, header.encode())
 
 
-def spreading(*, repeats: int = 3) -> Spreading:
-    return Spreading(
-        capacity=8, repeats=repeats, patience_ns=ROUND, links=[nodes(NEAR.get(node, ())) for node in range(9)]
-    )
+def spreading(*, repeats: int = 3, lossy: bool = False, near: Mapping[int, Iterable[int]] = NEAR) -> Spreading:
+    links = [nodes(near.get(node, ())) for node in range(9)]
+    return Spreading(capacity=8, repeats=repeats, patience_ns=ROUND, links=links, lossy=lossy)
 
 
 def sent_in_turn(made: Spreading, turn: int, *, neighbors: tuple[int, ...] = (2, 3)) -> list[int]:
@@ -192,3 +191,31 @@ def test_new_urgent_packets_go_before_those_that_are_sent_again() -> None:
     assert sent_in_turn(made, 1) == [1]
     made.take(packet(2), src=None, now_ns=ROUND)
     assert sent_in_turn(made, 3) == [2, 1]
+
+
+def test_where_frames_are_lost_a_packet_is_sent_again_at_growing_intervals() -> None:
+    made = spreading(lossy=True, near={3: (1,)})
+    made.take(packet(1), src=2, now_ns=0)
+    assert [turn for turn in range(1, 16) if sent_in_turn(made, turn)] == [1, 2, 4, 8]
+
+
+def test_where_frames_are_lost_it_is_enough_that_two_are_heard_that_reach_a_neighbor() -> None:
+    for others, again in (((2,), True), ((2, 4), False)):
+        made = spreading(lossy=True, near={2: (1, 3), 4: (1, 3), 3: (1, 2, 4)})
+        made.take(packet(1), src=others[0], now_ns=0)
+        sent_in_turn(made, 1, neighbors=(2, 3, 4))
+        for other in others[1:]:
+            made.on_copy(key_of_packet(packet(1)), other, neighbors=nodes((2, 3, 4)), now_ns=ROUND + 10)
+        assert any(sent_in_turn(made, turn, neighbors=(2, 3, 4)) for turn in range(2, 6)) is again
+
+
+def test_a_neighbor_that_is_seldom_heard_is_left_to_those_that_hear_it() -> None:
+    for near, again in (({3: (1,)}, True), ({3: (1, 5)}, False)):
+        made = spreading(lossy=True, near=near)
+        for seq in range(1, 60):
+            made.take(packet(seq), src=2, now_ns=0)
+            for turn in range(10 * seq, 10 * seq + 9):
+                found = sent_in_turn(made, turn)
+        made.take(packet(60), src=2, now_ns=0)
+        found = [sent_in_turn(made, turn) for turn in range(600, 604)]
+        assert (len([one for one in found if 60 in one]) > 1) is again

@@ -140,11 +140,13 @@ def launch(
     """
     import asyncio
 
+    from fanet_mw.bus.topics import Topics
     from sim.results.files import begun
     from sim.run.launcher.leads import fitted
     from sim.run.launcher.swarm import launch as run
 
     chosen = choice.realtime_scenario(scenario) if no_world else choice.scenario(scenario)
+    name = Topics(swarm or chosen.name).swarm
     output.prepare()
     doors.doors()
     chosen, leads = (chosen, None) if no_world else fitted(chosen, _say)  # another's world has the scenario as it is
@@ -166,7 +168,7 @@ def launch(
         outcome = asyncio.run(
             run(
                 chosen,
-                swarm=swarm or chosen.name,
+                swarm=name,
                 listen=listen,
                 connect=connect,
                 respawn=respawn,

@@ -24,6 +24,11 @@ def test_a_name_of_a_swarm_that_would_be_another_topic_is_refused(name: str) -> 
         Topics(name)
 
 
+def test_launch_refuses_it_before_it_says_anything_else(capsys: pytest.CaptureFixture[str]) -> None:
+    assert refusal("launch", "flooding", "--swarm", "a/b c").startswith("the name of a swarm, 'a/b c', is part of")
+    assert capsys.readouterr() == ("", "")
+
+
 def test_a_link_from_a_node_to_itself_is_refused_in_words() -> None:
     assert refusal("air", "degrade", "3", "3", "--loss-db", "3") == "degrade 3 3: a link has two different ends"
     assert refusal("air", "cut", "-1") == "cut -1: the id of a node must be within [1, 65534]"

@@ -85,16 +85,18 @@ def urgent() -> Rows:
         ),
     }  # fmt: skip
     rows = [[
-        "setting", "delivered", "of reachable", "bound stated", "within it", "broken", "p50 [ms]", "p95 [ms]",
-        "worst [ms]",
+        "setting", "delivered", "of reachable", "bound stated", "within it", "broken", "likely stated", "within that",
+        "p50 [ms]", "p95 [ms]", "worst [ms]",
     ]]  # fmt: skip
     for name, keys in settings.items():
         found = summarized("clusters", *_URGENT, *keys)
-        delay, bound = found["delay_ms"], found["bound"]
+        delay, bound, likely = found["delay_ms"], found["bound"], found["likely"]
         broken = bound.get("violations") or 0
         rows.append([
             name, _share(found["pdr"]), _share(found["reachable"]["traffic"]["pdr"]), _share(bound.get("stated_share")),
-            _share(bound.get("within_share")), str(broken), *(_ms(delay[key]) for key in ("p50", "p95", "max")),
+            _share(bound.get("within_share")), str(broken),
+            _share(likely.get("stated_share")), _share(likely.get("within_share")),
+            *(_ms(delay[key]) for key in ("p50", "p95", "max")),
         ])  # fmt: skip
     return rows
 

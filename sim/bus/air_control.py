@@ -40,7 +40,9 @@ def find_swarm(bus: Bus) -> str:
     if came.wait(_DISCOVER_S):
         time.sleep(0.1)  # other emulators may answer too
     names = sorted(set(found))
-    if len(names) != 1:
+    if not names:
+        raise FanetError("no emulator of a swarm runs on this router; one that was just started needs some seconds")
+    if len(names) > 1:
         raise FanetError(f"{len(names)} swarms with an emulator on this router ({', '.join(names)}): say --swarm NAME")
     return names[0]
 

@@ -90,7 +90,7 @@ async def test_what_the_emulator_refuses_is_said_and_counted(control: Control, m
 async def test_without_a_swarm_or_with_two_the_command_asks_for_the_name() -> None:
     endpoint = free_endpoint()
     with Bus.serve(endpoint) as bus:
-        with pytest.raises(FanetError, match="0 swarms with an emulator"):
+        with pytest.raises(FanetError, match="no emulator of a swarm runs on this router"):
             await asyncio.to_thread(air_control.change, endpoint, None, Restore(""))
         for swarm in ("one", "two"):
             bus.announce(Topics(swarm).alive("emulator"))

@@ -9,7 +9,7 @@ that changes meanwhile. All urgent packets that are under way together, `B` byte
 serves them at the same rate, `room` bytes of a frame per round, so what waited for one node's turn does not wait
 again for the next one's (tandem of equal servers; Le Boudec and Thiran, Network Calculus, 1.4.3). More urgent packets
 that come later overtake it on its way: `urgent` is the share of `room` that was theirs lately.
-Assumed: no frame is lost; over any channel but `range` a likely delay is stated instead (`likely_delay.py`). None is
+Assumed: no frame is lost; over any channel but `range` a likely delay is stated instead (`LikelyDelay`). None is
 stated while clocks may be further apart than the slack of turns holds, while more waits for turns, everywhere alike,
 than three quarters of `rounds.burst_bytes`, or while no way has been found yet to a node that may only just have
 started. A bound does not apply to nodes without a way, and counts on links that will last only (`lasting_links.py`).
@@ -36,6 +36,17 @@ _SILENT_HELLOS: Final = 1.6
 _MOST_USED: Final = 0.75
 _MOST_URGENT: Final = 0.5
 """No bound is stated while more urgent packets use a greater share of turns."""
+LIKELY_SHARE: Final = 0.99
+_KEPT: Final = 0.997
+"""The share of received packets whose ratio is not exceeded; the rest of what may be missing never arrives."""
+_FEWEST: Final = 300
+"""So many packets are received before a delay is stated."""
+_MOST: Final = 800
+"""When so many are counted, each counts half from then on."""
+_STEPS: Final = 8
+"""The steps into which a ratio of 1 is divided."""
+_GREATEST: Final = 16
+"""Greater ratios count as this one, and no delay is stated by it."""
 
 
 class DelayLaw:
@@ -132,3 +143,35 @@ class DelayLaw:
     def absent(self, topology: Topology, *, now_ns: int) -> Sequence[NodeId] | None:
         """The nodes to which a bound does not apply, because no way leads to them; None while one may yet be found."""
         return topology.absent(now_ns, doubt_ns=self.silent_ns)
+
+
+class LikelyDelay:
+    """The delay within which most copies of one node's packets arrive where links lose frames, by how long packets of
+    others took:
+
+        ratio   the delay of a packet that was received, over the hops to its origin, two added, in rounds
+        D       the same hops to the farthest node, in rounds, x the ratio that few packets have exceeded lately
+
+    Links are as lossy one way as the other, so packets take as long to the others as from them.
+    """
+
+    def __init__(self) -> None:
+        self._counts = [0.0] * (_STEPS * _GREATEST)
+
+    def hear(self, delay_ns: int, *, way_ns: int) -> None:
+        """A packet took so long over a way that takes `way_ns` if nothing is lost and nothing waits."""
+        step = max(0, delay_ns) * _STEPS // way_ns
+        self._counts[min(step, len(self._counts) - 1)] += 1
+        if sum(self._counts) > _MOST:
+            self._counts = [count / 2 for count in self._counts]
+
+    def over_ns(self, way_ns: int) -> int | None:
+        """The delay that is likely over such a way; None if too little is known."""
+        rest = total = sum(self._counts)
+        if total < _FEWEST:
+            return None
+        for step, count in enumerate(self._counts[:-1]):
+            rest -= count
+            if rest <= (1 - _KEPT) * total:
+                return way_ns * (step + 1) // _STEPS
+        return None

@@ -27,9 +27,8 @@ from fanet_mw.node.reader import decoded
 from fanet_mw.node.received_motion import motion_in
 from fanet_mw.routing.packet_repair import FLOOD_OVER_NS, Repair
 from fanet_mw.routing.rounds.bulk_slots import BulkSlots
-from fanet_mw.routing.rounds.delay_law import MOST_HOPS, DelayLaw
+from fanet_mw.routing.rounds.delay_law import LIKELY_SHARE, MOST_HOPS, DelayLaw, LikelyDelay
 from fanet_mw.routing.rounds.lasting_links import LastingLinks
-from fanet_mw.routing.rounds.likely_delay import LIKELY_SHARE, LikelyDelay
 from fanet_mw.routing.rounds.one_way import OneWay
 from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.routing.rounds.spreading import Spreading

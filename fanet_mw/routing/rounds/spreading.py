@@ -78,7 +78,7 @@ class _Spread:
         """Bulk: the nodes in reach of those that were heard to send it."""
         self.in_reach = 0
         self.in_reach_twice = 0
-        """Urgent: the nodes with links to one, and to two, of those that were heard to send it."""
+        """Where frames are lost: the nodes with links to one, and to two, of those that were heard to send it."""
         self.measured = False
         """Urgent: true once it was noted which neighbors were heard to send it."""
         self.left = False
@@ -176,7 +176,7 @@ class Spreading:
             packet, (packet.header.priority, self._order), src, bulk_from_ns or 0, now_ns
         )
         entry.having |= self._early.pop(key, 0)
-        if src is not None:
+        if src is not None and self._lossy:
             entry.reach(self._links[src])
         entry.sent = self._repeats if once else 0
         if bulk_from_ns is None:
@@ -214,7 +214,7 @@ class Spreading:
             entry.copy_ns = now_ns  # who lacks it may have heard that copy
         self._reach(entry, src)
         again = bool(entry.senders & own)
-        if not again:
+        if not again and self._lossy:
             entry.reach(self._links[src])
         entry.senders |= own
         entry.having |= own
@@ -271,7 +271,7 @@ class Spreading:
                 continue
             if entry.sent > self._repeats or not served & ~entry.having:
                 done.append((key, entry))
-            elif not served & ~gone & ~entry.having & ~(entry.in_reach_twice if self._lossy else 0):
+            elif not served & ~gone & ~entry.having & ~entry.in_reach_twice:
                 continue
             elif entry.sent_ns <= start_ns - self._patient_ns(entry) and entry.copy_ns <= patient_ns:
                 self._waiting.add(key)

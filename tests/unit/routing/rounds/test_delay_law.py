@@ -1,6 +1,6 @@
 """Likely delays in rounds: what packets of others took, over their hops, shows what the own ones will take."""
 
-from fanet_mw.routing.rounds.likely_delay import LikelyDelay
+from fanet_mw.routing.rounds.delay_law import LikelyDelay
 
 WAY_NS = 100
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""Draws the table of docs/results/motion.md, five methods in motion, as docs/results/pictures/motion.png."""
+"""Draws the table of docs/results/motion.md, four methods in motion, as docs/results/pictures/motion.png."""
 
 import sys
 from pathlib import Path

@@ -370,7 +370,7 @@ MAVLINK_MSG_ID_FANET_TIME = 53005
 MAVLINK_MSG_ID_FANET_JOIN = 53006
 MAVLINK_MSG_ID_FANET_DIGEST = 53007
 MAVLINK_MSG_ID_FANET_PLACES = 53008
-MAVLINK_MSG_ID_FANET_CLAIMS = 53009
+MAVLINK_MSG_ID_FANET_NEIGHBORS = 53009
 MAVLINK_MSG_ID_FANET_ROUTING = 53010
 MAVLINK_MSG_ID_FANET_LINKS = 53011
 MAVLINK_MSG_ID_FANET_MESSAGE = 53012
@@ -817,55 +817,47 @@ class MAVLink_fanet_places_message(MAVLink_message):
 setattr(MAVLink_fanet_places_message, "name", mavlink_msg_deprecated_name_property())
 
 
-class MAVLink_fanet_claims_message(MAVLink_message):
+class MAVLink_fanet_neighbors_message(MAVLink_message):
     """
-    Part of a hello: the neighbors that the sender hears, and the
-    slots that it and they claim. More neighbors than fit come in
-    several messages.
+    Part of a hello: the neighbors that the sender hears. More than
+    fit come in several messages.
     """
 
-    id = MAVLINK_MSG_ID_FANET_CLAIMS
-    msgname = "FANET_CLAIMS"
-    fieldnames = ["node", "nodes", "slots", "lengths", "crowds", "facts", "slot", "length", "crowd", "lots", "count", "version"]
-    ordered_fieldnames = ["node", "nodes", "slots", "lengths", "crowds", "facts", "slot", "length", "crowd", "lots", "count", "version"]
-    fieldtypes = ["uint16_t", "uint16_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t"]
+    id = MAVLINK_MSG_ID_FANET_NEIGHBORS
+    msgname = "FANET_NEIGHBORS"
+    fieldnames = ["node", "nodes", "facts", "count", "version"]
+    ordered_fieldnames = ["node", "nodes", "facts", "count", "version"]
+    fieldtypes = ["uint16_t", "uint16_t", "uint8_t", "uint8_t", "uint8_t"]
     fielddisplays_by_name: Dict[str, str] = {}
     fieldenums_by_name: Dict[str, str] = {}
     fieldunits_by_name: Dict[str, str] = {}
-    native_format = bytearray(b"<HHBBBBBBBBBB")
-    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]
-    lengths = [1, 16, 16, 16, 16, 16, 1, 1, 1, 1, 1, 1]
-    array_lengths = [0, 16, 16, 16, 16, 16, 0, 0, 0, 0, 0, 0]
-    crc_extra = 249
-    unpacker = struct.Struct("<H16H16B16B16B16BBBBBBB")
+    native_format = bytearray(b"<HHBBB")
+    orders = [0, 1, 2, 3, 4]
+    lengths = [1, 16, 16, 1, 1]
+    array_lengths = [0, 16, 16, 0, 0]
+    crc_extra = 112
+    unpacker = struct.Struct("<H16H16BBB")
     instance_field = None
     instance_offset = -1
 
-    def __init__(self, node: int, nodes: Sequence[int], slots: Sequence[int], lengths: Sequence[int], crowds: Sequence[int], facts: Sequence[int], slot: int, length: int, crowd: int, lots: int, count: int, version: int):
-        MAVLink_message.__init__(self, MAVLink_fanet_claims_message.id, MAVLink_fanet_claims_message.msgname)
-        self._fieldnames = MAVLink_fanet_claims_message.fieldnames
-        self._instance_field = MAVLink_fanet_claims_message.instance_field
-        self._instance_offset = MAVLink_fanet_claims_message.instance_offset
+    def __init__(self, node: int, nodes: Sequence[int], facts: Sequence[int], count: int, version: int):
+        MAVLink_message.__init__(self, MAVLink_fanet_neighbors_message.id, MAVLink_fanet_neighbors_message.msgname)
+        self._fieldnames = MAVLink_fanet_neighbors_message.fieldnames
+        self._instance_field = MAVLink_fanet_neighbors_message.instance_field
+        self._instance_offset = MAVLink_fanet_neighbors_message.instance_offset
         self.node = node
         self.nodes = nodes
-        self.slots = slots
-        self.lengths = lengths
-        self.crowds = crowds
         self.facts = facts
-        self.slot = slot
-        self.length = length
-        self.crowd = crowd
-        self.lots = lots
         self.count = count
         self.version = version
 
     def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
-        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.node, self.nodes[0], self.nodes[1], self.nodes[2], self.nodes[3], self.nodes[4], self.nodes[5], self.nodes[6], self.nodes[7], self.nodes[8], self.nodes[9], self.nodes[10], self.nodes[11], self.nodes[12], self.nodes[13], self.nodes[14], self.nodes[15], self.slots[0], self.slots[1], self.slots[2], self.slots[3], self.slots[4], self.slots[5], self.slots[6], self.slots[7], self.slots[8], self.slots[9], self.slots[10], self.slots[11], self.slots[12], self.slots[13], self.slots[14], self.slots[15], self.lengths[0], self.lengths[1], self.lengths[2], self.lengths[3], self.lengths[4], self.lengths[5], self.lengths[6], self.lengths[7], self.lengths[8], self.lengths[9], self.lengths[10], self.lengths[11], self.lengths[12], self.lengths[13], self.lengths[14], self.lengths[15], self.crowds[0], self.crowds[1], self.crowds[2], self.crowds[3], self.crowds[4], self.crowds[5], self.crowds[6], self.crowds[7], self.crowds[8], self.crowds[9], self.crowds[10], self.crowds[11], self.crowds[12], self.crowds[13], self.crowds[14], self.crowds[15], self.facts[0], self.facts[1], self.facts[2], self.facts[3], self.facts[4], self.facts[5], self.facts[6], self.facts[7], self.facts[8], self.facts[9], self.facts[10], self.facts[11], self.facts[12], self.facts[13], self.facts[14], self.facts[15], self.slot, self.length, self.crowd, self.lots, self.count, self.version), force_mavlink1=force_mavlink1)
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.node, self.nodes[0], self.nodes[1], self.nodes[2], self.nodes[3], self.nodes[4], self.nodes[5], self.nodes[6], self.nodes[7], self.nodes[8], self.nodes[9], self.nodes[10], self.nodes[11], self.nodes[12], self.nodes[13], self.nodes[14], self.nodes[15], self.facts[0], self.facts[1], self.facts[2], self.facts[3], self.facts[4], self.facts[5], self.facts[6], self.facts[7], self.facts[8], self.facts[9], self.facts[10], self.facts[11], self.facts[12], self.facts[13], self.facts[14], self.facts[15], self.count, self.version), force_mavlink1=force_mavlink1)
 
 
 # Define name on the class for backwards compatibility (it is now msgname).
 # Done with setattr to hide the class variable from mypy.
-setattr(MAVLink_fanet_claims_message, "name", mavlink_msg_deprecated_name_property())
+setattr(MAVLink_fanet_neighbors_message, "name", mavlink_msg_deprecated_name_property())
 
 
 class MAVLink_fanet_routing_message(MAVLink_message):
@@ -1563,7 +1555,7 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_FANET_JOIN: MAVLink_fanet_join_message,
     MAVLINK_MSG_ID_FANET_DIGEST: MAVLink_fanet_digest_message,
     MAVLINK_MSG_ID_FANET_PLACES: MAVLink_fanet_places_message,
-    MAVLINK_MSG_ID_FANET_CLAIMS: MAVLink_fanet_claims_message,
+    MAVLINK_MSG_ID_FANET_NEIGHBORS: MAVLink_fanet_neighbors_message,
     MAVLINK_MSG_ID_FANET_ROUTING: MAVLink_fanet_routing_message,
     MAVLINK_MSG_ID_FANET_LINKS: MAVLink_fanet_links_message,
     MAVLINK_MSG_ID_FANET_MESSAGE: MAVLink_fanet_message_message,
@@ -2311,49 +2303,33 @@ class MAVLink(object):
         """
         self.send(self.fanet_places_encode(east, north, up, leader_east, leader_north, leader_up, first, count, version), force_mavlink1=force_mavlink1)
 
-    def fanet_claims_encode(self, node: int, nodes: Sequence[int], slots: Sequence[int], lengths: Sequence[int], crowds: Sequence[int], facts: Sequence[int], slot: int, length: int, crowd: int, lots: int, count: int, version: int) -> MAVLink_fanet_claims_message:
+    def fanet_neighbors_encode(self, node: int, nodes: Sequence[int], facts: Sequence[int], count: int, version: int) -> MAVLink_fanet_neighbors_message:
         """
-        Part of a hello: the neighbors that the sender hears, and the slots
-        that it and they claim. More neighbors than fit come in
-        several messages.
+        Part of a hello: the neighbors that the sender hears. More than fit
+        come in several messages.
 
         node                      : The sender. (type:uint16_t)
         nodes                     : Neighbors, ascending. (type:uint16_t)
-        slots                     : The slot each claims; 255: none. (type:uint8_t)
-        lengths                   : Slots in the superframe of that claim; 0: the neighbor knows no length. (type:uint8_t)
-        crowds                    : Nodes within two hops of each, itself included. (type:uint8_t)
-        facts                     : Bits 0-1: lots in turns that no node claims. Bit 2: it hears the sender. Bit 3: the sender wants it to relay. (type:uint8_t)
-        slot                      : The slot the sender claims; 255: none. (type:uint8_t)
-        length                    : Slots in the superframe of that claim. (type:uint8_t)
-        crowd                     : Nodes within two hops of the sender, itself included. (type:uint8_t)
-        lots                      : Lots of the sender, 0 to 3. (type:uint8_t)
+        facts                     : Bit 0: it hears the sender. Bit 1: the sender wants it to relay. (type:uint8_t)
         count                     : How many entries of this message are used. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """
-        return MAVLink_fanet_claims_message(node, nodes, slots, lengths, crowds, facts, slot, length, crowd, lots, count, version)
+        return MAVLink_fanet_neighbors_message(node, nodes, facts, count, version)
 
-    def fanet_claims_send(self, node: int, nodes: Sequence[int], slots: Sequence[int], lengths: Sequence[int], crowds: Sequence[int], facts: Sequence[int], slot: int, length: int, crowd: int, lots: int, count: int, version: int, force_mavlink1: bool = False) -> None:
+    def fanet_neighbors_send(self, node: int, nodes: Sequence[int], facts: Sequence[int], count: int, version: int, force_mavlink1: bool = False) -> None:
         """
-        Part of a hello: the neighbors that the sender hears, and the slots
-        that it and they claim. More neighbors than fit come in
-        several messages.
+        Part of a hello: the neighbors that the sender hears. More than fit
+        come in several messages.
 
         node                      : The sender. (type:uint16_t)
         nodes                     : Neighbors, ascending. (type:uint16_t)
-        slots                     : The slot each claims; 255: none. (type:uint8_t)
-        lengths                   : Slots in the superframe of that claim; 0: the neighbor knows no length. (type:uint8_t)
-        crowds                    : Nodes within two hops of each, itself included. (type:uint8_t)
-        facts                     : Bits 0-1: lots in turns that no node claims. Bit 2: it hears the sender. Bit 3: the sender wants it to relay. (type:uint8_t)
-        slot                      : The slot the sender claims; 255: none. (type:uint8_t)
-        length                    : Slots in the superframe of that claim. (type:uint8_t)
-        crowd                     : Nodes within two hops of the sender, itself included. (type:uint8_t)
-        lots                      : Lots of the sender, 0 to 3. (type:uint8_t)
+        facts                     : Bit 0: it hears the sender. Bit 1: the sender wants it to relay. (type:uint8_t)
         count                     : How many entries of this message are used. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """
-        self.send(self.fanet_claims_encode(node, nodes, slots, lengths, crowds, facts, slot, length, crowd, lots, count, version), force_mavlink1=force_mavlink1)
+        self.send(self.fanet_neighbors_encode(node, nodes, facts, count, version), force_mavlink1=force_mavlink1)
 
     def fanet_routing_encode(self, length: int, type: int, part: int, parts: int, data: Sequence[int]) -> MAVLink_fanet_routing_message:
         """

@@ -9,18 +9,17 @@ from __future__ import annotations  # `Scenario` imports this module: to it, the
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
-from fanet_mw.airtime import longest_access_ns
 from fanet_mw.bus.radio_control import EVERY, Degrade, Mishap, MishapKind, Partition, Restore, nodes_of
 from fanet_mw.orders import wrong
 from fanet_mw.scenario.tables.world import NO_AID_S
-from fanet_mw.units import MAX_NODES, MS, US
+from fanet_mw.units import MAX_NODES, MS
 
 if TYPE_CHECKING:
     from fanet_mw.scenario import Scenario, Traffic
 
 MESSAGE_BYTES: Final = {
     "FANET_ROUTE": 36, "positions": 61, "COLLISION": 31, "FANET_BEACON": 33, "FANET_SCHEDULE": 266,
-    "FANET_SURVIVOR": 43, "FANET_DIGEST": 255, "FANET_PLACES": 189, "FANET_CLAIMS": 116, "FANET_LINKS": 240,
+    "FANET_SURVIVOR": 43, "FANET_DIGEST": 255, "FANET_PLACES": 189, "FANET_NEIGHBORS": 64, "FANET_LINKS": 240,
     "FANET_LOADS": 126,
 }  # fmt: skip
 """The lengths of messages on the air, their MAVLink frame included (docs/reference/air-format.md); `positions` are
@@ -43,7 +42,7 @@ _LINKS: Final = 36
 """The number of links in one FANET_LINKS message."""
 _MOST_LINKS_MESSAGES: Final = 4
 """The number of FANET_LINKS messages in one frame."""
-_TELLS_NEIGHBORS: Final = ("heads", "cds", "mpr", "claimed")
+_TELLS_NEIGHBORS: Final = ("heads", "cds", "mpr")
 """The relay rules with which a hello states which nodes its sender hears."""
 _MOST_IN_ROUNDS: Final = 488
 """The nodes about which one FANET_HEARD can tell (64 bytes, of which 3 for node and epoch)."""
@@ -108,7 +107,6 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
                 f"clusters.guard_ms = {clusters.guard_ms:g} must be < the slot, flooding_period_s / count = "
                 f"{clusters.slot_ns / MS:g} ms"
             )
-        found += _no_claimed_turns(scenario)
     return found
 
 
@@ -136,21 +134,6 @@ def _too_frequent_readings(scenario: Scenario) -> Iterator[str]:
     scan_s, tick_s = scenario.mission.scan_interval_s, scenario.world.tick_ms / 1000
     if scenario.mission.survivors and scan_s < tick_s * (1 - 1e-9):
         yield f"mission.scan_interval_s = {scan_s:g} must be >= world.tick_ms, {tick_s:g} s"
-
-
-def _no_claimed_turns(scenario: Scenario) -> Iterator[str]:
-    """Periods of claimed turns in which no turn is left beside the contention window."""
-    clusters, radio, hello_s = scenario.clusters, scenario.radio, scenario.routing.hello_interval_s
-    if clusters.relay != "claimed" or not hello_s:
-        return
-    turn_ns = longest_access_ns(scenario.claimed_turn_bytes, radio) + round(clusters.turn_slack_us * US)
-    most_ms = (scenario.claimed_period_ns - turn_ns) // US * US / MS
-    if clusters.contention_ms > most_ms:
-        yield (
-            f"clusters.contention_ms = {clusters.contention_ms:g} must be <= {most_ms:g}, the period less one turn of "
-            f"{turn_ns / MS:g} ms: the period is the lesser of clusters.flooding_period_s = "
-            f"{clusters.flooding_period_s:g} and routing.hello_interval_s / 2 = {hello_s / 2:g}"
-        )
 
 
 def _impossible_rounds(scenario: Scenario) -> Iterator[str]:
@@ -210,9 +193,9 @@ def _too_small_frames(scenario: Scenario) -> Iterator[str]:
         if clustered:
             hello += size["FANET_BEACON"]
             hello += size["FANET_DIGEST"] if scenario.repair_ns else 0
-            hello += size["FANET_CLAIMS"] if relay in _TELLS_NEIGHBORS else 0
+            hello += size["FANET_NEIGHBORS"] if relay in _TELLS_NEIGHBORS else 0
         least["hellos"] = hello
-    if clustered and relay != "claimed":
+    if clustered:
         places = _SCHEDULE_PLACES * size["FANET_PLACES"] if relay == "scheduled" else 0
         loads = size["FANET_LOADS"] if scenario.hears_load else 0
         least["schedules"] = size["FANET_SCHEDULE"] + places + loads
@@ -250,8 +233,8 @@ def _impossible_formation(scenario: Scenario) -> Iterator[str]:
         yield f'{wanted} mobility.model = "onboard", not {scenario.mobility.model!r}'
     if mission.search != "none":
         yield f'{wanted} mission.search = "none", not {mission.search!r}'
-    if scenario.routing.protocol != "clustered" or scenario.clusters.relay == "claimed":
-        yield f'{wanted} routing.protocol = "clustered", and a clusters.relay that makes clusters'
+    if scenario.routing.protocol != "clustered":
+        yield f'{wanted} routing.protocol = "clustered", which makes clusters'
     if scenario.clusters.count > _MOST_CLUSTERS_ABREAST:
         yield f"{wanted} clusters.count = {scenario.clusters.count} <= {_MOST_CLUSTERS_ABREAST}"
 

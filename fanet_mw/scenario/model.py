@@ -35,8 +35,6 @@ _REPAIR_S: Final = 10.0
 """The time for which packets are repaired that floods over measured links have not delivered."""
 _LIFETIME_MS: Final = 500.0
 _FOREVER_MS: Final = 1e6
-_LEAST_TURN_BYTES: Final = 256
-"""The size of frame for which a claimed turn has room at least."""
 
 
 class Scenario(Section):
@@ -121,18 +119,6 @@ class Scenario(Section):
     def hears_load(self) -> bool:
         """True if timetables are made for the load that is heard (`clusters.load`)."""
         return self.clusters.load == "heard" and self.clusters.relay == "scheduled"
-
-    @property
-    def claimed_period_ns(self) -> int:
-        """The period of claimed turns, so short that each hello interval has a contention window."""
-        return min(self.clusters.period_ns, seconds_to_ns(self.routing.hello_interval_s) // 2)
-
-    @property
-    def claimed_turn_bytes(self) -> int:
-        """The largest frame that a claimed turn holds: no packet of traffic or of the mission is longer."""
-        longest = max(traffic.longest_bytes for traffic in self.traffic_classes.values())
-        least = max(longest, self.mission.report_bytes if self.mission.survivors else 0, _LEAST_TURN_BYTES)
-        return max(least, self.radio.max_frame_bytes) if self.routing.aggregate else least
 
     @property
     def longest_bulk_bytes(self) -> int:

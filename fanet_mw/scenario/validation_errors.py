@@ -15,6 +15,11 @@ from fanet_mw.scenario.tables.sections import NO_TRUTH
 _MOST_UNKNOWN: Final = 8
 """More unknown keys than this are named together, by the first ones."""
 _LONGEST_VALUE: Final = 80
+_REMOVED: Final = {
+    "clusters.relay = 'claimed'": 'removed; take routing.protocol = "rounds" for turns without a leader',
+    "clusters.slots": 'removed with clusters.relay = "claimed"; take routing.protocol = "rounds"',
+}
+"""Keys and values that older scenarios may have, and what to take instead."""
 
 
 def sentences(error: ValidationError) -> list[str]:
@@ -35,7 +40,7 @@ def sentence(item: dict[str, Any]) -> str:
     """One mistake as `key = value: bound`."""
     path, key = _path(item), _key(item)
     if item["type"] == "extra_forbidden":
-        return f"{key}: unknown key{_suggestion(path)}"
+        return f"{key}: {_REMOVED.get(key) or f'unknown key{_suggestion(path)}'}"
     message = str(item["msg"]).removeprefix("Value error, ")
     if item["type"] == NO_TRUTH:
         return f"{key}.{message}" if item["loc"] else message
@@ -43,7 +48,8 @@ def sentence(item: dict[str, Any]) -> str:
         return message
     value = repr(item["input"])
     shown = value if len(value) <= _LONGEST_VALUE else f"{value[:_LONGEST_VALUE]}..."
-    return f"{key} = {shown}: {message[0].lower()}{message[1:]}"
+    said = f"{key} = {shown}"
+    return f"{said}: {_REMOVED.get(said) or message[0].lower() + message[1:]}"
 
 
 def _path(item: dict[str, Any]) -> list[str]:

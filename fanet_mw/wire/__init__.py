@@ -3,7 +3,7 @@
 The header (`frame.py`) and several packets in one frame (`aggregation.py`) are re-exported here. Each inner message has
 a module of its own:
 
-    `hello/`                            the parts of a hello: beacon, digest, claims, time beacon
+    `hello/`                            the parts of a hello: beacon, digest, neighbors, time beacon
     `join.py`, `links.py`               a node asks for a place in a cluster, and reports the quality of its links
     `schedule.py`, `places.py`, `loads.py`    the leader's division into clusters; positions and loads for a timetable
     `rounds.py`                         who hears whom, and packets that are held, in turns of rounds
@@ -19,7 +19,6 @@ from fanet_mw.wire.frame import (
     BEACON,
     BIDS,
     CHUNK,
-    CLAIMS,
     COMPONENT,
     COVERED,
     DIGEST,
@@ -40,6 +39,7 @@ from fanet_mw.wire.frame import (
     MESSAGE,
     MOST_HOPS,
     NAME,
+    NEIGHBORS,
     NO_FIELDS,
     ORDER,
     OVERHEAD,
@@ -89,7 +89,7 @@ __all__ = [
     "BEACON",
     "BIDS",
     "CHUNK",
-    "CLAIMS",
+    "NEIGHBORS",
     "COMPONENT",
     "DIGEST",
     "END_TO_END",

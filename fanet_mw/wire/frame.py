@@ -356,7 +356,7 @@ TIME: Final = Spec(53005, 172, struct.Struct("<QIIIIHHHBBB"))
 JOIN: Final = Spec(53006, 221, struct.Struct("<ffffffHHB"))
 DIGEST: Final = Spec(53007, 37, struct.Struct("<24I24I24HBBB"))
 PLACES: Final = Spec(53008, 1, struct.Struct("<28h28h28hhhhBBB"))
-CLAIMS: Final = Spec(53009, 249, struct.Struct("<H16H16B16B16B16BBBBBBB"))
+NEIGHBORS: Final = Spec(53009, 112, struct.Struct("<H16H16BBB"))
 ROUTING: Final = Spec(53010, 255, struct.Struct("<BBBB240B"))
 LINKS: Final = Spec(53011, 92, struct.Struct("<IHH36H36H36B36bBBBB"))
 MESSAGE: Final = Spec(53012, 170, struct.Struct("<QIIIIHHHBBBB"))
@@ -373,7 +373,7 @@ COVERED: Final = Spec(53024, 57, struct.Struct("<128BB"))
 ROLL: Final = Spec(53025, 30, struct.Struct("<IHH79BB"))
 ORDER: Final = Spec(53026, 213, struct.Struct("<QfffHHHBB"))
 SPECS: Final = (
-    ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES, CLAIMS, ROUTING, LINKS,
+    ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES, NEIGHBORS, ROUTING, LINKS,
     MESSAGE, RECEIPT, TARGETS, LOADS, HEARD, HELD, SEARCH, STATUS, BIDS, FOUND,
     COVERED, ROLL, ORDER,
 )  # fmt: skip

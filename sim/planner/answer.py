@@ -48,7 +48,6 @@ from sim.planner import (
     plan_lossy,
     with_capacity,
 )
-from sim.planner.claimed_turns import ClaimedPlan
 from sim.planner.expected_links import expected_links
 from sim.planner.plan_text import item
 from sim.planner.problems_and_notes import clocks_apart
@@ -328,7 +327,6 @@ def _json(found: ScenarioPlan) -> dict[str, Any]:
             "together": superframe.together,
             "least_interval_s": None if superframe.least_interval_ns is None else superframe.least_interval_ns / S,
         },
-        "claims": None if found.claims is None else _claims_json(found.claims),
         "slots": [
             {
                 "head": c.head,
@@ -350,31 +348,6 @@ def _json(found: ScenarioPlan) -> dict[str, Any]:
         "problems": list(found.problems),
         "notes": list(found.notes),
     }  # fmt: skip
-
-
-def _claims_json(claims: ClaimedPlan) -> dict[str, Any]:
-    return {
-        "period_ms": claims.turns.period_ns / MS,
-        "contention_ms": claims.turns.contention_ns / MS,
-        "turn_ms": claims.turns.turn_ns / MS,
-        "turns": claims.turns.per_superframe,
-        "hops": claims.hops,
-        "hop_ms": None if claims.hop_ns is None else claims.hop_ns / MS,
-        "lone_ms": None if claims.lone_ns is None else claims.lone_ns / MS,
-        "least_interval_s": None if claims.least_interval_ns is None else claims.least_interval_ns / S,
-        "nodes": [
-            {
-                "node": node.node,
-                "relays": node.relays,
-                "superframe": node.superframe,
-                "claimed": node.claimed,
-                "by_lot": round(node.won, 3),
-                "needed": round(node.load, 3),
-                "used": round(node.utilization, 6) if node.claimed else None,
-            }
-            for node in claims.nodes
-        ],
-    }
 
 
 def _class_json(c: ClassPlan, deadline_ns: int | None) -> dict[str, Any]:

@@ -2,8 +2,7 @@
 
 The search varies the number of clusters and the flooding period. With a timetable it also varies the backoff that a
 turn must allow for (`radio.cw_min`), makes every node a head, and at last combines everything that makes turns short.
-If relays contend, it tries a timetable. With claimed slots it varies the backoff and the number of slots, puts small
-packets together, or tries a timetable. Its last resort is less application traffic.
+If relays contend, it tries a timetable. Its last resort is less application traffic.
 """
 
 import math
@@ -30,7 +29,6 @@ _PERIODS: Final = (0.1, 0.2, 0.4, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0, 5.0, 10.0)
 """Periods to try, as multiples of the scenario's own period."""
 _TURN_PERIODS_S: Final = (0.1, 0.2, 0.25, 0.3, 0.4, 0.5, 0.7, 1.0, 2.0, 5.0)
 _TIGHT_PERIOD_S: Final = 4.0
-_SLOTS: Final = (0, 6, 8, 10, 12, 14, 16, 20, 24, 32, 48, 64)
 WINDOWS: Final = (31, 15, 7, 3, 1)
 _SLOWER: Final = (1.1, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 20.0, 50.0, 100.0)
 
@@ -87,7 +85,7 @@ def hopeless(site: Site, sources: Sequence[NodeId] | None) -> bool:
 
 
 def _changes(site: Site, delivers_m: float | None) -> Iterator[Variant]:
-    options = {"scheduled": _turn_options, "claimed": _claim_options}.get(site.scenario.clusters.relay, _slot_options)
+    options = _turn_options if site.timetable else _slot_options
     for settings in options(site, delivers_m):
         variant = vary(site.scenario, settings)
         if variant is not None:
@@ -161,16 +159,6 @@ def _tightest(scenario: Scenario) -> Iterator[Variant]:
     variant = vary(scenario, settings)
     if variant is not None:
         yield variant
-
-
-def _claim_options(site: Site, delivers_m: float | None) -> Iterator[dict[str, Value]]:
-    scenario = site.scenario
-    windows = dict.fromkeys((scenario.radio.cw_min, *(w for w in WINDOWS if w < scenario.radio.cw_min)))
-    together = dict.fromkeys((scenario.routing.aggregate, True))
-    numbers = dict.fromkeys((scenario.clusters.slots, *_SLOTS))
-    for window, slots, aggregate, clocks in product(windows, numbers, together, _clock_options(scenario)):
-        yield {"radio.cw_min": window, "clusters.slots": slots, "routing.aggregate": aggregate, **clocks}
-    yield from ({"clusters.relay": "scheduled", **turned} for turned in _turn_options(site, delivers_m))
 
 
 def _slot_options(site: Site, _: float | None) -> Iterator[dict[str, Value]]:

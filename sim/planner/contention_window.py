@@ -3,9 +3,6 @@
 Everything except floods of data contends there: hellos, and packets of members if only heads have turns. Two frames
 destroy each other at a common neighbor, so those of all nodes within two hops are added up, each with DIFS and a mean
 backoff. This is an estimate.
-
-With claimed slots a hello names all neighbors of its sender, and half of the hellos go in turns, if these are long
-enough. Until nodes hold slots all hellos go in the window; those that are lost then are repeated, and not counted here.
 """
 
 import math
@@ -16,8 +13,7 @@ from typing import Final
 from fanet_mw.graph.topology import Adjacency, two_hop
 from fanet_mw.routing.clustered.tdma.turn_timing import TAIL_NS
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import MS, NodeId, S, seconds_to_ns
-from fanet_mw.wire.hello.claims import CAPACITY, MESSAGE_BYTES
+from fanet_mw.units import MS, NodeId, seconds_to_ns
 from sim.planner.demand import TrafficClass
 from sim.planner.flood_cost import contended_ns
 
@@ -48,35 +44,9 @@ def hellos_ns(scenario: Scenario, adjacency: Adjacency) -> int:
     return crowd * scenario.clusters.period_ns * contended_ns(scenario.radio, _HELLO_BYTES) // every_ns
 
 
-def claimed_hellos_ns(scenario: Scenario, adjacency: Adjacency) -> int:
-    """The airtime of the hellos in the window of one period of claimed slots, where they need the most."""
-    every_ns = seconds_to_ns(scenario.routing.hello_interval_s)
-    if not every_ns or not adjacency:
-        return 0
-    sizes = {node: _HELLO_BYTES + MESSAGE_BYTES * max(1, -(-len(near) // CAPACITY)) for node, near in adjacency.items()}
-    contending = {  # halves of hellos
-        node: contended_ns(scenario.radio, size) * (1 if size <= scenario.claimed_turn_bytes else 2)
-        for node, size in sizes.items()
-    }
-    most = max(contending[node] + sum(contending[n] for n in near) for node, near in two_hop(adjacency).items())
-    return most * scenario.claimed_period_ns // (2 * every_ns)
-
-
 def least_ms(needed_ns: int) -> int:
     """The length of the shortest contention window, in whole milliseconds, that has room for these hellos."""
     return math.ceil(max(needed_ns / MOST, needed_ns / _BACKLOG + TAIL_NS) / MS)
-
-
-def too_short_for_claims(scenario: Scenario, adjacency: Adjacency) -> Iterator[str]:
-    """A sentence about a window that is too short for the hellos of claimed slots; nothing if it is long enough."""
-    needed_ns, window_ns = claimed_hellos_ns(scenario, adjacency), round(scenario.clusters.contention_ms * MS)
-    if needed_ns > room_ns(window_ns):
-        every_s, period_s = scenario.routing.hello_interval_s, scenario.claimed_period_ns / S
-        yield (
-            f"the hellos that contend take {needed_ns / MS:.1f} ms of each period of {period_s:g} s where nodes are "
-            f"densest: clusters.contention_ms = {window_ns / MS:g} has to be at least {least_ms(needed_ns)}, "
-            f"or routing.hello_interval_s = {every_s:g} greater; claims of the same turn are noticed late or never"
-        )
 
 
 def too_short(scenario: Scenario, adjacency: Adjacency, uplinks_ns: Mapping[NodeId, int] = _NONE) -> Iterator[str]:

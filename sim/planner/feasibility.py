@@ -113,7 +113,6 @@ def evaluate(
         uplink_ns=uplink_ns,
         paper=_paper(judged.clusters, scenario),
         superframe=judged.superframe,
-        claims=None,
         cut_off=judged.cut_off,
         goodput=goodput(site, classes),
         deadline_ns=deadline_ns,

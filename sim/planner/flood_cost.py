@@ -55,7 +55,7 @@ def relay_share(scenario: Scenario, adjacency: Adjacency) -> float:
     """The share of the nodes that relays a flood: all, or about `gossip_degree` or `counter` nodes of each
     neighborhood.
 
-    With the rules `heads`, `cds`, `mpr` and `claimed` fewer nodes relay; since it is not estimated how many, all are
+    With the rules `heads`, `cds` and `mpr` fewer nodes relay; since it is not estimated how many, all are
     counted. With `counter` at most twice the threshold of each neighborhood relays, because nodes out of range of each
     other do not receive each other's copies.
     """

@@ -1,8 +1,7 @@
 """Plans one scenario with given positions: its traffic classes first, then whether they are feasible.
 
 plan -> demand.py                  the traffic classes
--> feasibility.py             if heads have slots, or turns of a timetable
--> claimed_feasibility.py     if nodes claim slots
+-> feasibility.py             in slots of heads, or in turns of a timetable
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,7 +12,6 @@ from fanet_mw.graph.topology import Adjacency
 from fanet_mw.routing.clustered.timetable.turn_allocation import least_interval_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId
-from sim.planner.claimed_feasibility import evaluate_claims
 from sim.planner.demand import demands
 from sim.planner.feasibility import evaluate, heads_of
 from sim.planner.scenario_plan import ScenarioPlan
@@ -101,8 +99,6 @@ def judge(
     classes = demands(site.scenario, sources)
     if isinstance(classes, Refused):
         return classes
-    if site.scenario.clusters.relay == "claimed":
-        return evaluate_claims(site, classes, deadline_ns=deadline_ns)
     found = evaluate(site, classes, deadline_ns=deadline_ns, quick=quick)
     if not site.timetable or quick or not found.feasible:
         return found

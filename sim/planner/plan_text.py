@@ -8,7 +8,6 @@ from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE
 from fanet_mw.units import MS, S
 from sim.planner.cheapest_change import ScenarioChange
-from sim.planner.claimed_turns import ClaimedPlan
 from sim.planner.demand import ClassPlan
 from sim.planner.flood_loss import Loss
 from sim.planner.head_slot import ClusterPlan
@@ -120,20 +119,15 @@ def _lines(found: ScenarioPlan) -> Iterator[str]:
     yield f"{'FEASIBLE' if found.feasible else 'NOT FEASIBLE'}  {found.scenario.name}: {_shape(found)}"
     yield from (item("problem", problem) for problem in found.problems)
     yield from (item("class" if index == 0 else "", _class(c, found)) for index, c in enumerate(found.classes))
-    if found.claims is not None:
-        yield from _claims(found.claims)
-    elif isinstance(found.access, Bounded):
+    if isinstance(found.access, Bounded):
         yield item("to the head", "every source is one" if not found.access.delay_ns else _bound_text(found.access))
     if found.superframe is not None:
         yield from _superframe(found.superframe)
     yield from _capacity(found)
     bottleneck = found.bottleneck
     if bottleneck is not None and bottleneck.usable_ns:
-        whose = "the slot of head" if found.claims is None else "the turns of node"
-        yield item("bottleneck", f"{whose} {bottleneck.head}, {100 * bottleneck.utilization:.0f} % used")
-    if found.claims is not None:
-        yield from _nodes(found.claims)
-    elif found.superframe is None or found.superframe.used:
+        yield item("bottleneck", f"the slot of head {bottleneck.head}, {100 * bottleneck.utilization:.0f} % used")
+    if found.superframe is None or found.superframe.used:
         yield from _details(found)
     yield from (item("note", note) for note in found.notes)
 
@@ -145,8 +139,6 @@ def _details(found: ScenarioPlan) -> Iterator[str]:
 
 def _shape(found: ScenarioPlan) -> str:
     scenario = found.scenario
-    if found.claims is not None:
-        return f"{scenario.node_count} nodes, floods in claimed slots"
     relays = (
         "collision-free floods" if found.superframe else f"floods relayed by contention ({scenario.clusters.relay})"
     )
@@ -166,32 +158,6 @@ def _superframe(superframe: TimetablePlan) -> Iterator[str]:
         share = 100 * superframe.used / turns.per_superframe
         floods = "packets" if superframe.together == 1 else f"frames of {superframe.together} packets"
         yield item("turns in use", f"{superframe.used} ({share:.0f} %) for {superframe.packets} {floods} a period")
-
-
-def _claims(claims: ClaimedPlan) -> Iterator[str]:
-    turns, nodes = claims.turns, claims.nodes
-    yield item(
-        "period",
-        f"{turns.period_ns / MS:g} ms: {turns.contention_ns / MS:g} ms of contention + {turns.per_superframe} turns of "
-        f"{turns.turn_ns / MS:.3f} ms",
-    )
-    lengths = sorted({node.superframe for node in nodes if node.slot is not None})
-    if lengths:
-        said = f"{lengths[0]}" if len(lengths) == 1 else f"{lengths[0]} to {lengths[-1]}"
-        yield item("superframes", f"{said} slots; {sum(node.relays for node in nodes)} of {len(nodes)} nodes relay")
-
-
-def _nodes(claims: ClaimedPlan) -> Iterator[str]:
-    yield "\n    node  relays  superframe  claimed  by lot  needed  used %"
-    fullest = sorted(claims.nodes, key=lambda node: (-node.utilization, node.node))
-    for node in fullest[:_SHOWN]:
-        yield (
-            f"    {node.node:4}  {'yes' if node.relays else 'no':>6}  {node.superframe:10}  {node.claimed:7}  "
-            f"{node.won:6.1f}  {node.load:6.1f}  {100 * node.utilization:6.0f}"
-        )
-    if len(fullest) > _SHOWN:
-        yield f"    and {len(fullest) - _SHOWN} nodes with no fuller turns"
-    yield ""
 
 
 def _capacity(found: ScenarioPlan) -> Iterator[str]:
@@ -223,8 +189,6 @@ def _class(c: ClassPlan, found: ScenarioPlan) -> str:
         )
     if isinstance(c.bound, Bounded) and not found.proven:
         line += ", an estimate"
-    if found.claims is not None and found.claims.lone_ns is not None and not found.cut_off:
-        line += f"; at most {found.claims.lone_ns / S:.3f} s without queues"
     if found.deadline_ns is not None:
         verdict = "met" if c.meets(found.deadline_ns) else "NOT met"
         line += f"; deadline {found.deadline_ns / S:g} s {verdict}"

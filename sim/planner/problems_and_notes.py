@@ -22,10 +22,6 @@ _JOINED_HELLOS: Final = 4
 """The time in which all nodes of a swarm have joined, and have heard the first schedule: so many seconds, or so many
 hello intervals if that is longer.
 """
-_CLAIMED_HELLOS: Final = 8
-"""The time in which the nodes of a swarm hold their slots, in hello intervals: with a packet a second from each of 3 to
-30 nodes, 22 swarms delivered 0.99 of all copies after at most 7.
-"""
 _LISTENED_HELLOS: Final = 4
 _PASSED_ON_HELLOS: Final = 3
 """The time in which clocks agree by time beacons, in hello intervals: at the leader, and for each hop from it. 15 of 16
@@ -148,7 +144,7 @@ def left_out(scenario: Scenario, adjacency: Adjacency) -> Iterator[str]:
     most_ns = (turn_slack_ns(scenario) - least_slack_ns(0)) // 2
     if scenario.clock.sync == "beacons":
         most_ns = min(most_ns, MOST_STATED_NS)
-    if scenario.clock.sync != "none" and scenario.clusters.relay in ("scheduled", "claimed"):
+    if scenario.clock.sync != "none" and scenario.clusters.relay == "scheduled":
         yield (
             f"in flight a bound is stated while clocks are known within {max(0, most_ns) / US:g} us "
             f"(clusters.turn_slack_us = {scenario.clusters.turn_slack_us:g}), and not before"
@@ -157,12 +153,6 @@ def left_out(scenario: Scenario, adjacency: Adjacency) -> Iterator[str]:
         bounded = scenario.clusters.relay == "scheduled" and not scenario.measures_links
         yield "repairs of lost packets come later than any bound here, and their load is not counted" + (
             ", and may reach into turns; nodes state no bound in flight" if bounded else ""
-        )
-    held_s = _CLAIMED_HELLOS * scenario.routing.hello_interval_s
-    if scenario.clusters.relay == "claimed" and scenario.warmup_s < held_s:
-        yield (
-            f"nodes hold their slots some {held_s:.0f} s after the start; floods before that contend, and many packets "
-            f"are lost (warmup_s = {scenario.warmup_s:g})"
         )
     joined_s = max(_JOINED_S, _JOINED_HELLOS * scenario.routing.hello_interval_s)
     ready_s = joined_s + 2 * scenario.clusters.flooding_period_s

@@ -5,7 +5,6 @@ from typing import NamedTuple
 from fanet_mw.bounds import Bounded, DelayBound
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, S
-from sim.planner.claimed_turns import ClaimedPlan
 from sim.planner.demand import ClassPlan
 from sim.planner.goodput_bound import Goodput
 from sim.planner.head_slot import ClusterPlan
@@ -24,8 +23,6 @@ class ScenarioPlan(NamedTuple):
     """The estimate of the paper's equations (1)-(4) for the cluster with the greatest load, for comparison only."""
     superframe: TimetablePlan | None
     """The timetable; None if relays are not scheduled."""
-    claims: ClaimedPlan | None
-    """The plan of claimed slots, if slots are claimed; `clusters` then has one entry for each node."""
     cut_off: tuple[NodeId, ...]
     """The nodes that floods from the leader's part of the swarm do not reach."""
     goodput: Goodput | None
@@ -63,14 +60,13 @@ class ScenarioPlan(NamedTuple):
         unknown.
 
         With a timetable whose capacity was computed, it is exact. If relays contend, it is the load that would fill the
-        fullest slot; with claimed slots, the load that fills the busiest node on average.
+        fullest slot.
         """
         application = next((c for c in self.classes if c.name == "application"), None)
         if application is None or not application.sources:
             return None
-        exact = self.superframe or self.claims
-        if exact is not None:
-            least_ns = exact.least_interval_ns
+        if self.superframe is not None:
+            least_ns = self.superframe.least_interval_ns
             return None if least_ns is None else application.sources * S / least_ns
         used = self.bottleneck.utilization if self.bottleneck else 0.0
         return application.sources * S / application.interval_ns / used if used else None

@@ -1,14 +1,12 @@
-"""The nodes of a scenario where they stand, and what follows from positions alone: links, floods, claimed slots."""
+"""The nodes of a scenario where they stand, and what follows from positions alone: links and floods."""
 
 from collections.abc import Mapping, Sequence
 
 from fanet_mw.bounds.guard_time import PLANNED_ERROR_NS, slot_guard_ns
 from fanet_mw.graph.topology import Adjacency, within_range
-from fanet_mw.routing.clustered.claimed.slot_acquisition import geometry
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId
 from fanet_mw.wire.places import rounded
-from sim.planner.claimed_turns import Claimants
 from sim.planner.flood_cost import FloodCost, flood_cost
 
 
@@ -38,7 +36,6 @@ class Site:
             else adjacency
         )
         self._floods: dict[tuple[NodeId, int], FloodCost] = {}
-        self._claimants: dict[object, Claimants] = {}
 
     def of(self, scenario: Scenario) -> "Site":
         """The same nodes with another scenario; the costs of floods are shared if the rules of
@@ -47,7 +44,6 @@ class Site:
         other = Site(scenario, self._exact, self.adjacency, self.reported)
         if scenario.clusters.relay == self.scenario.clusters.relay and scenario.radio == self.scenario.radio:
             other._floods = self._floods
-        other._claimants = self._claimants
         return other
 
     def as_reported(self) -> list["Site"]:
@@ -71,14 +67,6 @@ class Site:
             for positions in self.reported
         ]
         return len(set().union(*found)) - len(found[0].intersection(*found)) if found else 0
-
-    def claimants(self) -> Claimants:
-        """The slots and relays of claimed slots, which follow from the positions and the geometry of turns."""
-        scenario = self.scenario
-        key = geometry(scenario), scenario.clusters.slots, scenario.radio
-        if key not in self._claimants:
-            self._claimants[key] = Claimants(scenario, self.adjacency)
-        return self._claimants[key]
 
     @property
     def timetable(self) -> bool:

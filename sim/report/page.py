@@ -95,7 +95,7 @@ _UNSAID: Final = Rows(
             "fanet-mw",
             "",
             "by figure, named in each legend: every node a head, relays that count copies, repair (8, 12, reports); "
-            "4 clusters likewise (mission); the timetable, every node a head (11, load, age); claimed slots (size)",
+            "4 clusters likewise (mission); the timetable, every node a head (11, load, age)",
             "each use has settings of its own",
         ),
         (

@@ -65,7 +65,7 @@ def slots(run: RunRecords, reports: Mapping[int, Mapping[str, Any]]) -> RunPictu
     if run.scenario.routing.protocol != "clustered":
         return None
     turns = {node: report["turns"] for node, report in reports.items() if report.get("turns")}
-    return _in_turns(run, turns, reports) if turns else _in_slots(run, reports)
+    return _in_turns(run, turns) if turns else _in_slots(run, reports)
 
 
 def _in_slots(run: RunRecords, reports: Mapping[int, Mapping[str, Any]]) -> RunPicture:
@@ -114,9 +114,7 @@ def _cluster_led_by(run: RunRecords, one: LetOut) -> int | None:
     return roles[index - 1].cluster if index and roles[index - 1].role == "head" else None
 
 
-def _in_turns(
-    run: RunRecords, turns: Mapping[int, Mapping[str, Any]], reports: Mapping[int, Mapping[str, Any]]
-) -> RunPicture:
+def _in_turns(run: RunRecords, turns: Mapping[int, Mapping[str, Any]]) -> RunPicture:
     newest = max(turns.values(), key=lambda frame: float(frame["start_ms"]))
     own = sorted((one for node, frame in turns.items() for one in spans_of(node, frame)), key=lambda one: one.start_ns)
     frame = _Frame(_ns(newest["start_ms"]), _ns(newest["period_ms"]), (0, _ns(newest.get("contention_ms", 0.0))), own)
@@ -131,8 +129,6 @@ def _in_turns(
         f"own, on the line of that node. Of {len(owned):,} packets of nodes with turns, {kept:,} were let out in a "
         "turn of the origin."
     )
-    if any(report.get("lots") for report in reports.values()):
-        said += " Turns that nobody claims go to nodes by lot; they are not shaded."
     return RunPicture(picture, said)
 
 

@@ -37,7 +37,7 @@ _BASES: Final = (
     ("crossing", ["duration_s=24", "traffic.interval_s=0.5"]),
 )
 _RULES: Final = {
-    "all": [], "gossip": [], "counter": [], "heads": [], "cds": [], "mpr": [], "scheduled": [], "claimed": [],
+    "all": [], "gossip": [], "counter": [], "heads": [], "cds": [], "mpr": [], "scheduled": [],
     "measured": ["clusters.relay=scheduled", "clusters.links=measured"],
 }  # fmt: skip
 """What the draws take turns in: the values of `clusters.relay`, and timetables from measured links."""
@@ -49,7 +49,6 @@ _CHOICES: Final = {
     "clusters.pacing": ("burst", "spread"),
     "clusters.guard_ms": ("auto", 1, 2),
     "clusters.reassign_s": (0, 2, 5),
-    "clusters.slots": (0, 0, 16),
     "clusters.turn_slack_us": (50, 400),
     "routing.aggregate": ("false", "true"),
     "routing.lifetime_s": (3, 30),

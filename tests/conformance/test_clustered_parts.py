@@ -18,8 +18,8 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, PRIORITY_BULK, Header, Kind, filler
 from fanet_mw.wire.hello.beacon import Beacon, Role
-from fanet_mw.wire.hello.claims import Claims, SlotStatus
 from fanet_mw.wire.hello.digest import Digest
+from fanet_mw.wire.hello.neighbors import NeighborList
 
 OURS, THEIRS = NodeId(2), NodeId(3)
 NOW_NS = 1 * S
@@ -65,7 +65,7 @@ def test_an_access_tells_everyone_a_control_packet_of_the_node_or_keeps_it(node:
 
 def test_a_hello_goes_no_sooner_than_it_is_due(node: Node) -> None:
     for due_ns in range(NOW_NS, NOW_NS + 300 * MS, 7 * MS):
-        assert protocol_of(node).parts.access.hello_start_ns(due_ns, size=200) >= due_ns
+        assert protocol_of(node).parts.access.hello_start_ns(due_ns) >= due_ns
 
 
 def test_an_answer_to_a_neighbor_goes_once_and_never_beyond_the_hop_limit(node: Node) -> None:
@@ -138,10 +138,10 @@ def test_what_hellos_say_of_two_hops_names_whom_the_node_hears(node: Node) -> No
             "hellos say nothing of neighbors"
         )
         return
-    assert two_hops.claims(NOW_NS).heard == ()
+    assert two_hops.neighbor_list(NOW_NS).heard == ()
     beacon = Beacon(THEIRS, 0, 0, 0, 0, 0, Role.ISOLATED, 255)
-    two_hops.on_claims(Claims(THEIRS, SlotStatus(), ()), beacon, now_ns=NOW_NS)
-    said = two_hops.claims(NOW_NS + MS)
+    two_hops.on_neighbor_list(NeighborList(THEIRS, ()), beacon, now_ns=NOW_NS)
+    said = two_hops.neighbor_list(NOW_NS + MS)
     assert (said.node, [other.node for other in said.heard]) == (OURS, [THEIRS])
 
 

@@ -76,11 +76,10 @@ SETTINGS: Final[dict[str, tuple[str, ...]]] = {
         "clusters.repair_s=5",
         "clusters.load=heard",
     ),
-    "claimed": ("clusters.relay=claimed", "clusters.repair_s=5"),
-    "cds": ("clusters.relay=cds", "mobility.model=crossing"),
+    "cds": ("clusters.relay=cds", "mobility.model=crossing", "clusters.repair_s=5"),
     "mpr": ("clusters.relay=mpr", "clusters.method=wca", "clusters.reassign_s=1", "clock.sync=beacons"),
 }
-"""Sixteen swarms: every routing protocol, and of `clustered` every way to relay, repair and keep time but one."""
+"""Swarms of every routing protocol, and of `clustered` every way to relay, repair and keep time but one."""
 SMALL: Final = (
     "nodes.count=9", "clusters.count=2", "nodes.spacing_m=120", "world.engine=kinematic", "mobility.model=static",
     "mission.survivors=3", "clusters.flooding_period_s=0.5", "traffic.interval_s=0.5", "traffic.payload_bytes=128",
@@ -89,7 +88,7 @@ SMALL: Final = (
 
 
 def scenario_of(name: str, *more: str) -> Any:
-    """One of the fifteen."""
+    """One of these swarms."""
     return catalog.find("quick", [*SMALL, *SETTINGS[name], *more])
 
 

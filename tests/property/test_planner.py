@@ -294,7 +294,6 @@ def test_a_slack_that_leaves_too_few_turns_is_named_with_the_most_that_fits() ->
     [
         (["clock.offset_ms=1"], "2020"),
         (["clock.drift_ppm=10"], "1220"),
-        (["clock.offset_ms=1", "clusters.relay=claimed"], "2020"),
     ],
 )
 def test_clocks_that_nothing_brings_together_need_twice_their_error_and_20_us(

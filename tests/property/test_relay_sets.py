@@ -6,13 +6,34 @@ from dominating_sets import guha_khuller, wu_li
 from hypothesis import given
 from hypothesis import strategies as st
 from kit import examples
-from test_slots_with_reuse import graphs
 
 from fanet_mw.errors import LocalProtocolError
 from fanet_mw.graph.connected_dominating_set import dominates
 from fanet_mw.graph.multipoint_relays import WILL_ALWAYS, WILL_NEVER, multipoint_relays
 from fanet_mw.graph.topology import components, levels, symmetric, two_hop, within_range
+from fanet_mw.rng import stream
 from fanet_mw.units import Enu, NodeId
+
+
+@st.composite
+def graphs(draw, most: int = 28):
+    """Random disks and random graphs, ids in random order."""
+    rng = stream(draw(st.integers(0, 10**6)), "graph")
+    nodes = [NodeId(n) for n in rng.sample(range(1, 300), draw(st.integers(1, most)))]
+    if draw(st.booleans()):
+        positions = {n: Enu(rng.uniform(0, 900), rng.uniform(0, 900), 0.0) for n in nodes}
+        return within_range(positions, range_m=250.0)
+    share = draw(st.sampled_from([0.05, 0.15, 0.4]))
+    return symmetric({a: [b for b in nodes[i + 1 :] if rng.random() < share] for i, a in enumerate(nodes)})
+
+
+@given(graphs())
+def test_components_cover_all_and_levels_are_hops(adjacency) -> None:
+    assert sorted(n for part in components(adjacency) for n in part) == sorted(adjacency)
+    for part in components(adjacency):
+        hops = levels(adjacency, part[0])
+        assert all(abs(hops[a] - hops[b]) <= 1 for a in part for b in adjacency[a])
+        assert all(h == 0 or any(hops[b] == h - 1 for b in adjacency[a]) for a, h in hops.items())
 
 
 def by_parity(adjacency):

@@ -12,7 +12,6 @@ from types import FrameType
 from typing import Any
 
 import pytest
-from claims_radio import GraphRadio
 
 from fanet_mw.bus.messages import Reception
 from fanet_mw.node.node import Node
@@ -138,22 +137,7 @@ def scheduled() -> dict[str, Way]:
     return {"handed over": over, "let out": out, "heard": heard}
 
 
-def claimed() -> dict[str, Way]:
-    """The second of five nodes in a row, which relays what the first lets out."""
-    tree = {"nodes": {"count": 9}, "clusters": {"relay": "claimed", "flooding_period_s": 0.5}, "radio": {"lead_ms": 0}}
-    radio = GraphRadio(config.build(tree))
-    for number in range(1, 6):
-        radio.join(number, *([number - 1] if number > 1 else []))
-    radio.run(20 * S)
-    node = radio.nodes[NodeId(2)]
-    over = way(lambda: send(node, radio.now_ns))
-    wake_ns = node.next_wake_ns()
-    assert wake_ns is not None
-    out = way(lambda: node.wake(wake_ns))
-    return {"handed over": over, "let out": out, "heard": way(lambda: hear(node, wake_ns + S, origin=1))}
-
-
-WAYS = {"flooded": flooded, "in rounds": in_rounds, "scheduled": scheduled, "claimed": claimed}
+WAYS = {"flooded": flooded, "in rounds": in_rounds, "scheduled": scheduled}
 
 
 def rows(ways: dict[str, dict[str, Way]]) -> Iterable[str]:

@@ -1,14 +1,13 @@
 """Measured tables of clusters, slots and relays: how lasting, how short and how few they are. Each costs minutes."""
 
 import statistics
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from typing import Any, Final
 from unittest import mock
 
 from fanet_mw.routing.clustered.roles.neighbor_failure_detector import NeighborFailureDetector
-from tests.benchmarks import head_changes, moving_swarm, relay_rules, relay_sets, slot_reuse
+from tests.benchmarks import head_changes, moving_swarm, relay_rules, relay_sets
 from tests.tables.markdown import Rows
 from tests.tables.summaries import summarized
 
@@ -28,7 +27,7 @@ _OF_RESCUE: Final = {
 _RESCUE_S: Final = 150
 _NO_REPORTS: Final = mock.patch.object(NeighborFailureDetector, "find_suspect", return_value=None)
 _TOGETHER: Final = (
-    ("claimed", 1.0), ("claimed", 0.2), ("claimed", 0.1), ("claimed", 0.05), ("all", 1.0), ("all", 0.2),
+    ("all", 1.0), ("all", 0.2),
 )  # fmt: skip
 
 
@@ -112,25 +111,6 @@ def settings_of_rescue() -> Rows:
     return rows
 
 
-def reused_slots() -> Rows:
-    """The lengths of superframes in which no two nodes within two hops share a slot."""
-    head = ["layout, UAVs", "without reuse", "Welsh-Powell", "DSATUR", "claims", "claims, 20 % of hellos lost"]
-    rows = [head]
-    for name, make in (("grid", slot_reuse.grid), ("uniform", lambda count: slot_reuse.uniform(count, seed=1))):
-        for count in _UAVS:
-            adjacency = make(count)
-            colored = [
-                f"{slot_reuse.length(color(adjacency), adjacency)}"
-                for color in (slot_reuse.welsh_powell, slot_reuse.dsatur)
-            ]
-            claims = [
-                f"{slots} ({superframes})"
-                for slots, superframes in (slot_reuse.claimed(adjacency, loss) for loss in (0.0, 0.2))
-            ]
-            rows.append([f"{name}, {count}", f"{count}", *colored, *claims])
-    return rows
-
-
 def few_relays() -> Rows:
     """Transmissions and sub-slots of one flood."""
     rows = [["swarm", "all relay", "Wu-Li", "Guha-Khuller", "shortest relays", "MPR"]]
@@ -155,9 +135,8 @@ def rules() -> Rows:
     for rule in relay_rules.RULES:
         cells: list[str] = []
         for swarm in swarms:
-            found = relay_rules.measured(rule, swarm, seconds=40)
-            cells += _cells_of_rule(found) if found else ["", "", ""]
-        rows.append([f"`{rule.split(',')[0]}`{rule.partition(',')[1]}{rule.partition(',')[2]}", *cells])
+            cells += _cells_of_rule(relay_rules.measured(rule, swarm, seconds=40))
+        rows.append([f"`{rule}`", *cells])
     return rows
 
 
@@ -165,20 +144,6 @@ def _cells_of_rule(found: Sequence[dict[str, Any]]) -> Iterator[str]:
     yield ", ".join(f"{run['pdr']:.4f}" for run in found)
     yield f"{statistics.mean(run['frames']['sent'] / run['generated'] for run in found):.1f}"
     yield " / ".join(f"{statistics.mean(run['delay_ms'][key] for run in found):.0f}" for key in ("mean", "p95", "max"))
-
-
-def superframes() -> Rows:
-    """The superframes of claimed slots in the running protocol."""
-    rows = [["layout, UAVs", "superframe: UAVs", "highest slot + 1", "last change of a claim [s]", "without a slot"]]
-    for layout in ("grid", "disc"):
-        for count in (45, 100, 200):
-            nodes = relay_rules.claiming(layout, count)
-            lengths = Counter(node["superframe"] for node in nodes)
-            slots = [node["slot"] for node in nodes if node["slot"] is not None]
-            last_s = max(node["claimed_ms"] or 0 for node in nodes) / 1000
-            told = "; ".join(f"{length}: {uavs}" for length, uavs in sorted(lengths.items(), reverse=True))
-            rows.append([f"{layout}, {count}", told, f"{max(slots) + 1}", f"{last_s:.1f}", f"{count - len(slots)}"])
-    return rows
 
 
 def together() -> Rows:

@@ -1,4 +1,4 @@
-"""Measured tables of packets in motion: five methods, urgent packets, deaths, one receiver, costs of rounds."""
+"""Measured tables of packets in motion: four methods, urgent packets, deaths, one receiver, costs of rounds."""
 
 import time
 from collections.abc import Mapping
@@ -17,7 +17,6 @@ _ROUNDS: Final = ("routing.protocol=rounds",)
 METHODS: Final[Mapping[str, tuple[str, ...]]] = {
     "plain flooding": ("routing.protocol=flooding", "routing.jitter_ms=20", "radio.cw_min=31"),
     "`all` (the paper's)": ("clusters.relay=all", *_CONTENDING),
-    "`claimed`": ("clusters.relay=claimed", "clusters.count=4", "radio.cw_min=31"),
     "`scheduled`": (),
     "`rounds`": _ROUNDS,
 }
@@ -43,7 +42,7 @@ def _share(value: float | None) -> str:
 
 
 def methods() -> Rows:
-    """Five methods side by side: 45 UAVs, 44 of them send 1,024 bytes a second to all, at 11 Mb/s."""
+    """Four methods side by side: 45 UAVs, 44 of them send 1,024 bytes a second to all, at 11 Mb/s."""
     rows = [[
         "motion", "method", "delivered", "of reachable", "bound stated", "within it", "p50 [ms]", "p95 [ms]",
         "worst [ms]", "air busy", "MB sent",

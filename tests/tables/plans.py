@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from tests.benchmarks import claimed_plans, plan_against_runs
+from tests.benchmarks import plan_against_runs
 from tests.tables.markdown import Rows
 from tests.tables.summaries import summarized
 
@@ -23,11 +23,6 @@ def contending() -> Rows:
             f"{found.pdr:.3f}",
         ])  # fmt: skip
     return rows
-
-
-def claimed() -> Rows:
-    """Plans with claimed slots."""
-    return [claimed_plans.HEAD, *claimed_plans.rows(25)]
 
 
 def wrong_places() -> Rows:

@@ -31,11 +31,6 @@ _LOADED: Final = {
     ),
     "scheduled, period 1 s, `cw_min` 1": ("clusters.flooding_period_s=1", "radio.cw_min=1"),
     "scheduled, 0.5 s, `cw_min` 7": ("clusters.flooding_period_s=0.5", "radio.cw_min=7"),
-    "claimed, 10 slots, `cw_min` 1": ("clusters.relay=claimed", "clusters.slots=10", "radio.cw_min=1"),
-    "claimed, 16 slots, `cw_min` 1": ("clusters.relay=claimed", "clusters.slots=16", "radio.cw_min=1"),
-    "claimed, 10 slots, `cw_min` 1, `routing.aggregate`": (
-        "clusters.relay=claimed", "clusters.slots=10", "radio.cw_min=1", "routing.aggregate=true",
-    ),
     "clustered, relays `all`, 44 clusters, 0.5 s": ("clusters.relay=all", "clusters.flooding_period_s=0.5"),
     "clustered, `counter` = 2, 44 clusters, 0.5 s": (
         "clusters.relay=counter", "clusters.counter=2", "clusters.flooding_period_s=0.5",

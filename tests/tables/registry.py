@@ -65,16 +65,13 @@ TABLES: Final[Mapping[str, Table]] = {
     "silent-neighbors": Table(
         "explanation/roles.md", clusters.silent_neighbors, Tolerance(absolute=0.02, relative=0.1)
     ),
-    "reused-slots": Table("explanation/clusters.md", clusters.reused_slots, Tolerance()),
     "few-relays": Table("explanation/clusters.md", clusters.few_relays, Tolerance(relative=0.01)),
     "rescue-settings": Table(
         "explanation/protocol.md", clusters.settings_of_rescue, Tolerance(absolute=0.02, relative=0.1)
     ),
-    "together": Table("explanation/claimed-slots.md", clusters.together, Tolerance(absolute=0.02, relative=0.1)),
-    "relay-rules": Table("explanation/claimed-slots.md", clusters.rules, Tolerance(absolute=0.02, relative=0.1)),
-    "superframes": Table("explanation/claimed-slots.md", clusters.superframes, Tolerance(absolute=1, relative=0.1)),
+    "together": Table("explanation/protocol.md", clusters.together, Tolerance(absolute=0.02, relative=0.1)),
+    "relay-rules": Table("explanation/protocol.md", clusters.rules, Tolerance(absolute=0.02, relative=0.1)),
     "plans-of-relays": Table("results/plans.md", plans.contending, Tolerance(absolute=0.02, relative=0.1)),
-    "plans-of-claims": Table("results/plans.md", plans.claimed, Tolerance(absolute=0.02, relative=0.1)),
     "wrong-places": Table("explanation/lossy-links.md", plans.wrong_places, Tolerance(absolute=0.02)),
     "goodput": Table("explanation/planning.md", protocol.goodput, Tolerance(absolute=0.02, relative=0.1)),
     "rivals": Table("results/rivals.md", protocol.rivals, Tolerance(absolute=0.02, relative=0.1)),

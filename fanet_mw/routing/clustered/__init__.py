@@ -10,5 +10,4 @@ hands them what happens at a node:
     links         what a node knows of links and loads
     tdma, slots   turns, slots of heads, and the queues that are emptied in them
     timetable     `clusters.relay = "scheduled"`: floods that never collide, with delay bounds
-    claimed       `clusters.relay = "claimed"`: slots without a leader
 """

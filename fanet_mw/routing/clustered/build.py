@@ -4,7 +4,6 @@ clusters.relay          roles      access            relaying
 all, gossip, counter    assigned   slots of heads    contending, by that rule
 heads, cds, mpr         assigned   slots of heads    contending, by nodes that hellos choose
 scheduled               assigned   timetable         by turn; contending until there is one
-claimed                 none       claimed turns     pipelined in those turns
 """
 
 from collections.abc import Callable, Mapping
@@ -14,11 +13,6 @@ from typing import Final, NamedTuple
 from fanet_mw.node.contract import Port
 from fanet_mw.node.neighbors import Neighbors, neighbor_lifetime_ns
 from fanet_mw.node.queue import TxQueue, sooner_us
-from fanet_mw.routing.clustered.claimed.claimed_access import ClaimedAccess
-from fanet_mw.routing.clustered.claimed.claimed_relaying import ClaimedRelaying
-from fanet_mw.routing.clustered.claimed.claimed_release import ClaimedRelease
-from fanet_mw.routing.clustered.claimed.own_turns import OwnTurns
-from fanet_mw.routing.clustered.claimed.slot_acquisition import SlotAcquisition, geometry
 from fanet_mw.routing.clustered.clustered import Clustered, Parts
 from fanet_mw.routing.clustered.contract import HearsCopies, ScheduledAccess
 from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTiming
@@ -46,7 +40,6 @@ from fanet_mw.routing.clustered.roles.leader_election import Lease
 from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import Membership
 from fanet_mw.routing.clustered.roles.neighbor_failure_detector import NeighborFailureDetector
-from fanet_mw.routing.clustered.roles.no_roles import NoRoles
 from fanet_mw.routing.clustered.roles.position_updates import PositionUpdates
 from fanet_mw.routing.clustered.roles.schedule_check import ScheduleCheck
 from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
@@ -320,30 +313,6 @@ def _roles(
     )
 
 
-# --- claimed slots ----------------------------------------------------------------------------------------------------
-
-
-def _by_claims(ground: _Ground) -> Clustered:
-    port, scenario = ground.port, ground.port.scenario
-    own = OwnTurns(geometry(scenario))
-    ground.contention.turns_at = lambda _: own.turns
-    claiming = SlotAcquisition(port, own)
-    frame_bytes = scenario.radio.max_frame_bytes if scenario.routing.aggregate else 0
-    access = ClaimedAccess(
-        port, claiming=claiming, turn_bytes=scenario.claimed_turn_bytes, gradient=ground.gradient, uplink=ground.uplink,
-        queue=ClaimedRelease(ground.queue(), own, lead_ns=scenario.radio.lead_ns, frame_bytes=frame_bytes),
-        floods=ground.floods, contention=ground.contention,
-    )  # fmt: skip
-    contending = ContendingRelaying(port, RelayAll(), ground.contention)
-    relaying = ClaimedRelaying(port, claiming, access, contending)
-    whole = Parts(
-        neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
-        floods=ground.floods, roles=NoRoles(port), access=access, relaying=relaying, contending=contending,
-        two_hops=access,
-    )  # fmt: skip
-    return _protocol(ground, whole)
-
-
 def _protocol(ground: _Ground, whole: Parts, *hear_copies: HearsCopies) -> Clustered:
     repaired = () if ground.repair is None else (ground.repair,)
     return Clustered(ground.port, whole, [*hear_copies, *repaired])
@@ -357,5 +326,4 @@ RELAYS: Final[Mapping[str, Callable[[_Ground], Clustered]]] = {
     "cds": _by_set,
     "mpr": _by_mpr,
     "scheduled": _by_timetable,
-    "claimed": _by_claims,
 }

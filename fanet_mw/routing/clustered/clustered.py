@@ -30,15 +30,13 @@ from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.missing_packets import MissingPackets
 from fanet_mw.routing.packet_repair import Repair
 from fanet_mw.units import BROADCAST, US, NodeId
-from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, HEADER_BYTES, Kind
+from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Kind
 from fanet_mw.wire.hello.beacon import Beacon
-from fanet_mw.wire.hello.claims import MESSAGE_BYTES, Claims
 from fanet_mw.wire.hello.digest import MESSAGE_BYTES as DIGEST_BYTES
 from fanet_mw.wire.hello.digest import Digest, capacity
+from fanet_mw.wire.hello.neighbors import MESSAGE_BYTES, NeighborList
 
 _DATA: Final = int(Kind.DATA)
-_POSITION_BYTES: Final = 61
-"""The length of HEARTBEAT and GLOBAL_POSITION_INT, which the applications put into each hello."""
 
 
 class Parts(NamedTuple):
@@ -79,8 +77,6 @@ class Clustered(RoutingProtocol):
         self._asks = tuple(part.next_wake_ns for part in timed if part is not None)
         """The methods by which the parts tell when they want to be woken; they are called after every reception."""
         self._lead_ns = port.scenario.radio.lead_ns
-        self._hello_bytes = 0
-        """The approximate length of the last hello."""
 
     def start(self, now_ns: int) -> None:
         for part in (self.parts.roles, self.parts.access, self.parts.relaying):
@@ -155,7 +151,7 @@ class Clustered(RoutingProtocol):
     # --- hellos ---------------------------------------------------------------------------------------------------
 
     def hello_start_ns(self, start_ns: int) -> int:
-        return self.parts.access.hello_start_ns(start_ns, size=self._hello_bytes)
+        return self.parts.access.hello_start_ns(start_ns)
 
     def hello_share(self, *, now_ns: int) -> float:
         return self.parts.roles.hello_share(now_ns)
@@ -165,18 +161,17 @@ class Clustered(RoutingProtocol):
         neighbors, in this order and as far as they fit into `room` bytes.
         """
         parts = self.parts
-        claims = None if parts.two_hops is None else parts.two_hops.claims(now_ns)
+        near = None if parts.two_hops is None else parts.two_hops.neighbor_list(now_ns)
         parts.gradient.advance(now_ns)
         route = parts.gradient.route(now_ns=now_ns)
         parts.roles.before_hello(now_ns)
         inner = parts.roles.beacon(route, now_ns=now_ns).encode_frame(self._port.node)
-        left = room - len(inner) - (0 if claims is None else MESSAGE_BYTES)
+        left = room - len(inner) - (0 if near is None else MESSAGE_BYTES)
         digest = None if parts.repair is None else self._digest(parts.repair, left, now_ns)
         if digest is not None:
             inner += digest.encode_frames(self._port.node)
-        if claims is not None:
-            inner += claims.encode_frames(room - len(inner))
-        self._hello_bytes = HEADER_BYTES + _POSITION_BYTES + len(inner)
+        if near is not None:
+            inner += near.encode_frames(room - len(inner))
         return inner
 
     def _digest(self, repair: Repair, room: int, now_ns: int) -> Digest | None:
@@ -205,11 +200,11 @@ class Clustered(RoutingProtocol):
         for held in parts.uplink.released(now_ns=now_ns):
             parts.access.forward(held, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
         if parts.two_hops is not None:
-            claims = decoded(packet.frame, Claims.decode_frames)
-            if claims is not None and any(heard.node > count for heard in claims.heard):
-                raise MalformedFrameError("claims of nodes that are not there")
-            if claims is not None and claims.node == reception.src:
-                parts.two_hops.on_claims(claims, beacon, now_ns=now_ns)
+            near = decoded(packet.frame, NeighborList.decode_frames)
+            if near is not None and any(heard.node > count for heard in near.heard):
+                raise MalformedFrameError("neighbors that are not there")
+            if near is not None and near.node == reception.src:
+                parts.two_hops.on_neighbor_list(near, beacon, now_ns=now_ns)
 
     # --- time -----------------------------------------------------------------------------------------------------
 

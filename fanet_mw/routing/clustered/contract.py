@@ -20,7 +20,7 @@ from fanet_mw.routing.clustered.forwarding.gradient import RouteToHead
 from fanet_mw.units import NodeId
 from fanet_mw.wire import Kind
 from fanet_mw.wire.hello.beacon import Beacon
-from fanet_mw.wire.hello.claims import Claims
+from fanet_mw.wire.hello.neighbors import NeighborList
 
 
 class Roles(Protocol):
@@ -104,8 +104,8 @@ class Access(Protocol):
     def answer(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         """Send a packet again that a neighbor has missed, which was to be announced at `due_ns`."""
 
-    def hello_start_ns(self, start_ns: int, *, size: int) -> int:
-        """The earliest instant at which a hello of about `size` bytes, due at `start_ns`, may be transmitted."""
+    def hello_start_ns(self, start_ns: int) -> int:
+        """The earliest instant at which a hello, due at `start_ns`, may be transmitted."""
 
     def next_wake_ns(self) -> int | None: ...
 
@@ -148,11 +148,11 @@ class Relaying(Protocol):
 class TwoHops(Protocol):
     """What a node learns and tells in hellos about the nodes within two hops."""
 
-    def claims(self, now_ns: int) -> Claims:
+    def neighbor_list(self, now_ns: int) -> NeighborList:
         """The statement for the node's next hello; it is asked for once per hello, before the hello is written."""
 
-    def on_claims(self, claims: Claims, beacon: Beacon, *, now_ns: int) -> None:
-        """A neighbor's hello was received with this statement about its neighbors and itself."""
+    def on_neighbor_list(self, said: NeighborList, beacon: Beacon, *, now_ns: int) -> None:
+        """A neighbor's hello was received with this statement about its neighbors."""
 
 
 class HearsCopies(Protocol):

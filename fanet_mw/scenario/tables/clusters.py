@@ -30,20 +30,17 @@ class Clusters(Section):
     """The shortest time between two packets that a head releases in its slot."""
     pacing: Literal["burst", "spread"] = "spread"
     """`burst` releases at `release_gap_ms`; `spread` divides the slot evenly among the queued packets."""
-    relay: Literal["all", "gossip", "counter", "heads", "cds", "mpr", "scheduled", "claimed"] = "all"
+    relay: Literal["all", "gossip", "counter", "heads", "cds", "mpr", "scheduled"] = "all"
     """Which nodes relay a flooded packet. `all`: all nodes; `gossip`: each with probability min(1, gossip_degree /
     neighbors); `counter`: each that has received fewer than `counter` copies after U(0, assess_ms); `heads`: cluster
     heads and the nodes that connect them; `cds`: a connected dominating set; `mpr`: multipoint relays; `scheduled`: the
-    nodes that a collision-free timetable names, each in a turn of its own; `claimed`: a connected dominating set, in
-    slots that the nodes agree on over the air."""
+    nodes that a collision-free timetable names, each in a turn of its own."""
     contention_ms: Milliseconds = 40.0
-    """`scheduled`, `claimed`: length of the contention window at the beginning of each period, for hellos, joins,
+    """`scheduled`: length of the contention window at the beginning of each period, for hellos, joins,
     unicasts and all else that has no turn."""
     turn_slack_us: Annotated[float, Field(ge=0, le=1e6)] = 50.0
-    """`scheduled`, `claimed`: by how much a turn is longer than its frame. It must hold twice the bound of a clock's
+    """`scheduled`: by how much a turn is longer than its frame. It must hold twice the bound of a clock's
     error, and some 20 us for propagation and detection."""
-    slots: Annotated[int, Field(ge=0, le=254)] = 0
-    """`claimed`: number of slots in a superframe; 0: as many as the neighborhood needs, a power of two."""
     links: Literal["auto", "places", "measured"] = "auto"
     """`scheduled`: the links for which the timetable is made. `places`: all pairs within `link_m`; `measured`: as
     hellos have shown, with frames repeated according to their loss; `auto`: `measured` with shadowing or fading, else

@@ -193,7 +193,7 @@ def test_packets_in_rounds_are_let_out_in_the_turn_of_their_origin_or_in_a_bulk_
     assert set(legend(drawing.figure)) == {"packets", "slots of bulk", "the owner's turn"}
 
 
-def test_claimed_turns_are_shaded_behind_the_contention_window_each_on_the_line_of_its_owner(
+def test_turns_are_shaded_behind_the_contention_window_each_on_the_line_of_its_owner(
     make_scenario: MakeScenario,
 ) -> None:
     """Turns of 50 ms behind a window of 100 ms in a period of 400 ms; the one with offset 7 passes its end."""
@@ -214,24 +214,6 @@ def test_claimed_turns_are_shaded_behind_the_contention_window_each_on_the_line_
     ]
     assert bars == [(50, 50, 2), (100, 50, 1), (250, 50, 1)]
     assert "Of 2 packets of nodes with turns, 1 were let out in a turn of the origin." in drawing.caption
-
-
-def test_turns_that_nodes_claim_are_those_in_which_they_let_packets_out(make_scenario: MakeScenario) -> None:
-    """Four nodes in reach of each other; nobody has more to send than its claim carries, so nobody draws lots."""
-    scenario = make_scenario(**{
-        "nodes.count": 4, "nodes.spacing_m": 50, "duration_s": 12, "warmup_s": 6, "drain_s": 1, "traffic.interval_s": 1,
-        "routing.protocol": "clustered", "clusters.relay": "claimed", "radio.lead_ms": 0,
-    })  # fmt: skip
-    outcome = simulate(scenario)
-    reports = {node: outcome.reports[f"agent-{node}"] for node in scenario.node_ids}
-    drawing = slot_pictures.slots(run_of(scenario, *outcome.records), reports)
-    assert drawing is not None
-    assert {len(report["turns"]["own"]) > 0 for report in reports.values()} == {True}
-    owned, kept = (
-        int(word) for word in re.findall(r"Of (\d+) packets of nodes with turns, (\d+) were", drawing.caption)[0]
-    )
-    assert owned == kept > 10
-    assert "lot" not in drawing.caption
 
 
 def test_reports_have_a_line_of_their_own_with_their_bounds_beside_the_load(make_scenario: MakeScenario) -> None:

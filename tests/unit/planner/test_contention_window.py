@@ -1,15 +1,10 @@
 """Hellos and the window in which they contend."""
 
 import pytest
-from kit import slow
 
 from fanet_mw.graph.topology import within_range
 from fanet_mw.units import MS, Enu, NodeId
-from fanet_mw.wire.hello.claims import MESSAGE_BYTES
-from sim.planner.answer import judge
-from sim.planner.contention_window import claimed_hellos_ns, hellos_ns, too_short, too_short_for_claims
-from sim.results.files import finish
-from sim.run.virtual import simulate
+from sim.planner.contention_window import hellos_ns, too_short
 from sim.scenarios import catalog
 from sim.world.environment.layout import positions
 
@@ -42,48 +37,3 @@ def test_hellos_that_fit_by_their_airtime_need_time_in_which_to_begin(contention
     said = list(too_short(scenario, LINE))
     assert (not said) == fits
     assert fits or "which has to be at least 6" in said[0]
-
-
-CLAIMED = ('clusters.relay="claimed"', "clusters.flooding_period_s=1", "routing.hello_interval_s=1")
-
-
-def test_half_of_the_hellos_of_claimed_slots_contend_with_all_claims_that_they_name() -> None:
-    """Two periods in a hello interval, five nodes: each has a quarter of a hello in each window."""
-    scenario = catalog.find("clusters", CLAIMED)
-    one_ns = (192 + (137 + MESSAGE_BYTES + 64) * 8 / 11 + 50 + 70) * 1000
-    assert claimed_hellos_ns(scenario, LINE) == pytest.approx(5 / 4 * one_ns, rel=0.01)
-    crowd = {NodeId(i): tuple(NodeId(j) for j in range(1, 19) if j != i) for i in range(1, 19)}
-    one_ns += MESSAGE_BYTES * 8 / 11 * 1000  # 17 neighbors take two messages
-    assert claimed_hellos_ns(scenario, crowd) == pytest.approx(18 / 4 * one_ns, rel=0.01)
-
-
-def test_hellos_that_no_turn_holds_contend_always() -> None:
-    crowd = {NodeId(i): tuple(NodeId(j) for j in range(1, 121) if j != i) for i in range(1, 121)}
-    short = catalog.find("clusters", [*CLAIMED, "traffic.payload_bytes=64"])
-    long = catalog.find("clusters", [*CLAIMED, "traffic.payload_bytes=2000"])
-    assert claimed_hellos_ns(short, crowd) == 2 * claimed_hellos_ns(long, crowd)
-
-
-@pytest.mark.parametrize(("contention_ms", "fits"), [*slow((10, True)), (6, False)])
-def test_claimed_slots_lose_packets_where_the_plan_says_that_the_hellos_do_not_fit(
-    contention_ms: float, *, fits: bool
-) -> None:
-    keys = (*CLAIMED, "nodes.spacing_m=100", "traffic.interval_s=20", f"clusters.contention_ms={contention_ms}")
-    scenario = catalog.find("clusters", [*keys, "duration_s=26", "warmup_s=14"])
-    _, plan, feasible = judge(scenario, change=False)
-    assert feasible == fits
-    assert fits or ("contention_ms = 6 has to be at least 10" in plan["problems"][0] and len(plan["problems"]) == 1)
-    assert (finish(simulate(scenario), out=None)["pdr"] == 1.0) == fits
-
-
-def test_the_least_window_that_is_named_is_long_enough() -> None:
-    places = {NodeId(i): Enu(10.0 * i, 0.0, 0.0) for i in range(1, 41)}
-    adjacency = within_range(places, range_m=250)
-    (said,) = too_short_for_claims(catalog.find("clusters", [*CLAIMED, "clusters.contention_ms=5"]), adjacency)
-    least = int(said.split("has to be at least ")[1].split(",")[0])
-    enough, less = (
-        list(too_short_for_claims(catalog.find("clusters", [*CLAIMED, f"clusters.contention_ms={ms}"]), adjacency))
-        for ms in (least, least - 1)
-    )
-    assert not enough
-    assert less

@@ -28,7 +28,7 @@ def run(*settings: str) -> dict[str, Any]:
     return finish(simulate(catalog.find("clusters", [*LINE, *TIMES, *settings])), out=None)
 
 
-@pytest.mark.parametrize("relay", ["scheduled", "claimed", "all"])
+@pytest.mark.parametrize("relay", ["scheduled", "all"])
 def test_as_many_hops_as_a_flood_needs_are_enough_and_one_less_is_not(relay: str) -> None:
     keys = (f'clusters.relay="{relay}"', "traffic.interval_s=5", "clusters.flooding_period_s=1")
     assert planned(*keys, "routing.hop_limit=5") == (True, "")

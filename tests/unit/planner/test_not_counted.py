@@ -40,9 +40,8 @@ def test_faults_are_named_with_the_instant_of_the_first() -> None:
     assert EVERYONE not in text
 
 
-@pytest.mark.parametrize("relay", ["all", "claimed"])
-def test_without_a_timetable_there_is_no_bound_to_speak_of(relay: str) -> None:
-    _, (said,) = planned(with_faults(CUT, settings=(f"clusters.relay={relay}", "traffic.interval_s=5")))
+def test_without_a_timetable_there_is_no_bound_to_speak_of() -> None:
+    _, (said,) = planned(with_faults(CUT, settings=("clusters.relay=all", "traffic.interval_s=5")))
     assert said.endswith("then packets may miss nodes")
 
 
@@ -85,7 +84,7 @@ def test_a_plan_that_is_not_feasible_does_not_say_that_all_packets_arrive() -> N
     assert EVERYONE not in text
 
 
-@pytest.mark.parametrize(("relay", "lines"), [("claimed", 1), ("all", 1), ("scheduled", 0)])
+@pytest.mark.parametrize(("relay", "lines"), [("all", 1), ("scheduled", 0)])
 def test_a_channel_with_noise_loses_frames_of_which_only_a_timetable_knows_the_probability(
     relay: str, lines: int
 ) -> None:

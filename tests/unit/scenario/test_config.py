@@ -10,7 +10,6 @@ from agents.applications.telemetry_streams import TelemetryStreams
 from fanet_mw import wire
 from fanet_mw.errors import ConfigError
 from fanet_mw.mavlink import Encoder
-from fanet_mw.routing.clustered.claimed.slot_acquisition import geometry
 from fanet_mw.scenario import Scenario, config, grid_columns
 from fanet_mw.scenario.cross_checks import MESSAGE_BYTES
 from fanet_mw.units import Enu, NodeId
@@ -102,10 +101,10 @@ def test_the_sizes_of_messages_that_a_scenario_is_checked_with_are_those_of_the_
     node = NodeId(5)
     positions = TelemetryStreams(node, position=Enu(1, 2, 3), telemetry_hz=0).beacon_frames(0)
     warning = Encoder(node).collision(NodeId(3), closest_s=1, altitude_m=1, horizontal_m=1)
-    specs = (wire.ROUTE, wire.BEACON, wire.SCHEDULE, wire.SURVIVOR, wire.DIGEST, wire.PLACES, wire.CLAIMS,
+    specs = (wire.ROUTE, wire.BEACON, wire.SCHEDULE, wire.SURVIVOR, wire.DIGEST, wire.PLACES, wire.NEIGHBORS,
              wire.LINKS, wire.LOADS)  # fmt: skip
     names = {53000: "ROUTE", 53001: "BEACON", 53002: "SCHEDULE", 53003: "SURVIVOR", 53007: "DIGEST", 53008: "PLACES",
-             53009: "CLAIMS", 53011: "LINKS", 53015: "LOADS"}  # fmt: skip
+             53009: "NEIGHBORS", 53011: "LINKS", 53015: "LOADS"}  # fmt: skip
     sizes = {f"FANET_{names[spec.msgid]}": wire.OVERHEAD + spec.layout.size for spec in specs}
     assert {**sizes, "positions": len(positions), "COLLISION": len(warning)} == MESSAGE_BYTES
 
@@ -132,34 +131,22 @@ def test_formation_flight_needs_clusters_and_uavs_that_fly_themselves() -> None:
         ("mobility.model=static", 'needs mobility.model = "onboard"'),
         ("mission.search=lines", 'needs mission.search = "none"'),
         ("routing.protocol=flooding", 'needs routing.protocol = "clustered"'),
-        ("clusters.relay=claimed", "a clusters.relay that makes clusters"),
         ("clusters.count=8", "needs clusters.count = 8 <= 7"),
     ):
         with pytest.raises(ConfigError, match=wanted):
             catalog.find("convoy", [override])
 
 
-CLAIMED = '[nodes]\ncount = 5\n[routing]\nprotocol = "clustered"\n[clusters]\ncount = 1\nrelay = "claimed"\n'
-
-
 @pytest.mark.parametrize(
-    ("keys", "bound"),
+    ("key", "instead"),
     [
-        ("contention_ms = 600\nflooding_period_s = 0.5\n", "contention_ms = 600 must be <= 49"),
-        ("flooding_period_s = 0.04\n", "contention_ms = 40 must be <= 3"),
-        ("contention_ms = 39.5\nflooding_period_s = 0.04\n", "contention_ms = 39.5 must be <= 3"),
+        ("clusters.relay=claimed", r"clusters\.relay = 'claimed': removed; take routing\.protocol = \"rounds\""),
+        ("clusters.slots=8", r"clusters\.slots: removed .* take routing\.protocol = \"rounds\""),
     ],
 )
-def test_a_contention_window_that_leaves_no_claimed_turn_is_refused(keys: str, bound: str) -> None:
-    assert bound in refusal(CLAIMED + keys)
-    config.parse(CLAIMED.replace("claimed", "all") + keys, source="a.toml", name="a")
-
-
-def test_a_contention_window_that_leaves_one_claimed_turn_is_accepted() -> None:
-    message = refusal(CLAIMED + "contention_ms = 600\nflooding_period_s = 0.5\n")
-    most = float(message.split("must be <= ")[1].split(",")[0])
-    found = config.parse(CLAIMED + f"contention_ms = {most}\nflooding_period_s = 0.5\n", source="a.toml", name="a")
-    assert geometry(found).per_superframe == 1
+def test_who_sets_what_was_removed_is_told_what_to_take_instead(key: str, instead: str) -> None:
+    with pytest.raises(ConfigError, match=instead):
+        catalog.find("clusters", [key])
 
 
 @pytest.mark.parametrize(

@@ -80,17 +80,6 @@ def test_a_timetable_has_room_for_the_first_class_only(tmp_path: Path) -> None:
     assert read(tmp_path, text.replace('priority = "report"', "")).further_traffic
 
 
-def test_claimed_turns_have_room_for_every_class_and_for_reports(tmp_path: Path) -> None:
-    claimed = 'protocol = "clustered"\nhello_interval_s = 0.5\n[clusters]\ncount = 1\nrelay = "claimed"'
-    text = TWO.replace('protocol = "flooding"', claimed).replace("interval_s = 1.0", "payload_bytes = 128")
-    longer = text.replace("payload_bytes = 512", "payload_bytes = 900")
-    assert read(tmp_path, text, "mission.survivors=1").claimed_turn_bytes == 512
-    assert read(tmp_path, text, "mission.survivors=1", "mission.report_bytes=700").claimed_turn_bytes == 700
-    assert read(tmp_path, text, "mission.report_bytes=700", "mission.survivors=0").claimed_turn_bytes == 512
-    summary: Any = fanet_mw.simulate(read(tmp_path, longer, "warmup_s=6", "duration_s=12")).summary
-    assert summary["classes"]["app_2"]["delivered"] == summary["classes"]["app_2"]["generated"] > 0
-
-
 def test_a_trace_is_read_from_a_file_beside_the_scenario(tmp_path: Path) -> None:
     (tmp_path / "load.csv").write_text("seconds,bytes\n0.5, 100\n\n1.25,200\n", encoding="utf-8")
     text = TWO + 'arrivals = "trace"\npackets_csv = "load.csv"\n'

@@ -41,7 +41,3 @@ class ContentionTiming:
         """A random instant from `from_ns` on, at which a frame is to be announced that then contends at once."""
         jitter_ns = 0 if self.most_jitter_ns is None else int(self._jitter() * self.most_jitter_ns)
         return self.not_before(from_ns + jitter_ns + self._lead_ns) - self._lead_ns
-
-    def by_chance(self, share: float) -> bool:
-        """True with the given probability."""
-        return self._window() < share

@@ -21,7 +21,7 @@ from fanet_mw.routing.clustered.roles.membership import Membership
 from fanet_mw.units import NodeId, seconds_to_ns
 from fanet_mw.wire import Kind
 from fanet_mw.wire.hello.beacon import Beacon, Role
-from fanet_mw.wire.hello.claims import Claims, SlotStatus
+from fanet_mw.wire.hello.neighbors import NeighborList
 
 _LEARN: Final = 4
 """The number of hello intervals after which two hops are known: one for the neighbors, one for theirs, and two may be
@@ -74,7 +74,7 @@ class DominatingSet:
         """Nothing depends on a neighbor's role."""
 
     def relays(self, sender: NodeId, *, now_ns: int) -> bool:
-        return self.near.dominates(own_rank=0.0, now_ns=now_ns)
+        return self.near.dominates(now_ns=now_ns)
 
 
 class HeadsFirst:
@@ -85,7 +85,7 @@ class HeadsFirst:
         self._is_head: dict[int, bool] = {}
         self.near = Neighborhood(node, lifetime_ns=lifetime_ns, rank=self._rank)
 
-    def _rank(self, node: NodeId, _: SlotStatus) -> float:
+    def _rank(self, node: NodeId) -> float:
         return float(self._is_head.get(node, False))
 
     def before_hello(self, now_ns: int) -> None:
@@ -98,7 +98,7 @@ class HeadsFirst:
             self.near.forget_rank()
 
     def relays(self, sender: NodeId, *, now_ns: int) -> bool:
-        return self._membership.is_head or self.near.dominates(own_rank=0.0, now_ns=now_ns)
+        return self._membership.is_head or self.near.dominates(now_ns=now_ns)
 
 
 class NeighborKnowledgeRelaying:
@@ -120,12 +120,12 @@ class NeighborKnowledgeRelaying:
             return ()
         return self._otherwise.on_flood(packet, reception, at_once=at_once, now_ns=now_ns)
 
-    def claims(self, now_ns: int) -> Claims:
+    def neighbor_list(self, now_ns: int) -> NeighborList:
         self._choice.before_hello(now_ns)
-        return Claims(self._node, SlotStatus(), self._choice.near.heard(now_ns=now_ns))
+        return NeighborList(self._node, self._choice.near.heard(now_ns=now_ns))
 
-    def on_claims(self, claims: Claims, beacon: Beacon, *, now_ns: int) -> None:
-        self._choice.near.on_claims(claims, now_ns=now_ns)
+    def on_neighbor_list(self, said: NeighborList, beacon: Beacon, *, now_ns: int) -> None:
+        self._choice.near.on_neighbor_list(said, now_ns=now_ns)
         self._choice.on_beacon(beacon)
 
     def report(self) -> Mapping[str, object]:

@@ -6,7 +6,7 @@
 
 `gossip` is after GOSSIP1 (Haas, Halpern, Li, ToN 14(3), 2006), `counter` after Ni et al. (MobiCom 1999, 3.2). `counter`
 adapts to the density: in a sparse swarm no node hears enough copies to stay silent, in a dense one most nodes do.
-Rules by which neighbors or a timetable decide are in `gateways_cds_mpr.py`, `claimed/claimed_relaying.py` and
+Rules by which neighbors or a timetable decide are in `gateways_cds_mpr.py` and
 `timetable/scheduled_relaying.py`.
 A copy that was heard before never gets here (`fanet_mw/node/duplicates.py`); the hop limit is checked by the callers.
 """

@@ -5,5 +5,5 @@ every node    `joining` asks the leader for a place, `position_updates` tell whe
 the leader    `leader` divides the nodes that the `roster` knows, and announces the schedule
 failures      `liveness`, `head_failure_detector`, `neighbor_failure_detector`, `leader_election`; `failover` finds
               what has happened, and the table in `states` says what a node does then
-all together  `assigned_roles`; `no_roles` takes its place in a swarm without a leader
+all together  `assigned_roles`
 """

@@ -71,7 +71,7 @@ class SlotAccess:
     def answer(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         self._floods.contend_again(packet, due_ns=due_ns, now_ns=now_ns)
 
-    def hello_start_ns(self, start_ns: int, *, size: int) -> int:
+    def hello_start_ns(self, start_ns: int) -> int:
         return start_ns
 
     # --- when the schedule changes the node's role ----------------------------------------------------------------

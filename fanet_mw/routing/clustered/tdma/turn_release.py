@@ -1,8 +1,7 @@
 """Releases the queued packets of a node in its turns: one frame in each turn, announced to the radio one lead ahead.
 
 The base class in this file has the queue and the next turn. A subclass knows which turns the node has:
-`timetable/root_release.py` by a timetable, `timetable/call_release.py` for frames to neighbors alone, and
-`claimed/claimed_release.py` by claims.
+`timetable/root_release.py` for its own floods, and `timetable/call_release.py` for frames to neighbors alone.
 """
 
 from abc import ABC, abstractmethod
@@ -34,9 +33,6 @@ class TurnRelease(ABC):
     def _turn(self, earliest_ns: int) -> OwnTurn | None:
         """The first turn of the node from an instant on."""
 
-    def _look_again(self, now_ns: int) -> None:  # noqa: B027  (most turns stay as they were)
-        """Plan the next turn anew, if turns may have changed since the last time."""
-
     def __len__(self) -> int:
         return len(self._queue)
 
@@ -67,7 +63,6 @@ class TurnRelease(ABC):
 
     def due(self, *, now_ns: int) -> list[tuple[list[Packet], int]]:
         """Take out the packets to announce now: for each frame its packets, and the instant of the frame."""
-        self._look_again(now_ns)
         released = []
         while self._next is not None and self._next.start_ns - self._lead_ns <= now_ns and len(self._queue):
             released.append((self._fill(self._next.frame_bytes), self._next.start_ns))

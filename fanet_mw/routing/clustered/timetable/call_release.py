@@ -2,7 +2,7 @@
 
 A timetable for lossy links gives each node *calls* (`redundant_scheduling.py`); other timetables have none. A call is a
 turn in which the node sends one frame that only its neighbors need, so no node relays it. Missed packets wait for a
-call in the queue of this file; a hello reserves the next call when it is due (`claim`).
+call in the queue of this file; a hello reserves the next call when it is due (`reserve`).
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ class CallRelease(TurnRelease):
         self._in_force = in_force
         self._arm(now_ns)
 
-    def claim(self, *, not_before_ns: int, now_ns: int) -> int | None:
+    def reserve(self, *, not_before_ns: int, now_ns: int) -> int | None:
         """Reserve the next call for a frame that is not queued, such as a hello; returns its start, None if the node
         has no call.
         """

@@ -206,12 +206,12 @@ class TurnAccess:
         elif not self._calls.holds(key):
             self._calls.push(packet, now_ns=now_ns)
 
-    def hello_start_ns(self, start_ns: int, *, size: int) -> int:
+    def hello_start_ns(self, start_ns: int) -> int:
         timetable = self._timetables.at(start_ns)
         if timetable is not None and timetable.calls:
-            claimed_ns = self._calls.claim(not_before_ns=start_ns, now_ns=start_ns - self._lead_ns)
-            if claimed_ns is not None:
-                return claimed_ns
+            called_ns = self._calls.reserve(not_before_ns=start_ns, now_ns=start_ns - self._lead_ns)
+            if called_ns is not None:
+                return called_ns
         return self._contention.not_before(start_ns)
 
     # --- time -----------------------------------------------------------------------------------------------------

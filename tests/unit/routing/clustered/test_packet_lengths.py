@@ -45,14 +45,6 @@ def test_in_a_timetable_reports_have_room_whether_they_are_urgent_or_not(make_sc
     assert lengths(make_scenario, "scheduled", 1200, **REPORTS) == (1200, 1200)
 
 
-def test_a_claimed_turn_has_room_for_what_the_scenario_sends(make_scenario: MakeScenario) -> None:
-    assert lengths(make_scenario, "claimed", 100) == (256, 256)
-    assert lengths(make_scenario, "claimed", 600, **REPORTS) == (900, 900)
-    assert lengths(make_scenario, "claimed", 600, **{"routing.aggregate": True}) == (2268, 2268)
-    short = {"radio.max_frame_bytes": 250}
-    assert lengths(make_scenario, "claimed", 100, **short) == (250, 250)
-
-
 @pytest.mark.parametrize("relay", ["all", "gossip", "counter", "heads", "cds", "mpr"])
 def test_who_contends_sends_frames_of_any_length(make_scenario: MakeScenario, relay: str) -> None:
     assert lengths(make_scenario, relay, 100) == (2268, 2268)

@@ -1,1 +1,0 @@
-"""TDMA slots that the nodes agree on among themselves, without a leader (`clusters.relay = "claimed"`)."""

@@ -1,12 +1,13 @@
 """Files that are whole: items that end with the last one that fits, or one content that replaces another."""
 
 import contextlib
+import errno
 import hashlib
 import os
 from collections.abc import Iterable, Iterator
 from itertools import accumulate
 from pathlib import Path
-from typing import Final
+from typing import BinaryIO, Final
 
 _BATCH_BYTES: Final = 1 << 18
 
@@ -49,23 +50,29 @@ def write_items(path: Path, items: Iterable[bytes], held: Written | None = None)
             held.add(data)
 
 
-def replace_file(path: Path, data: bytes) -> None:
-    """Put a file with this content in the place of a file, or of a link, of this name; raises OSError.
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[BinaryIO]:
+    """A new file, which takes the place of a file, or of a link, of this name if nothing is raised; raises OSError.
 
     The old one stays until the new one is whole, and nothing is ever written through a link.
     """
+    if path.exists() and not (path.is_file() or path.is_symlink()):
+        raise OSError(errno.EINVAL, "there is something that is no file")
     fresh = path.with_name(f".{path.name}.{os.getpid()}.new")
     try:
-        with contextlib.suppress(FileNotFoundError):
-            fresh.unlink()
-        with fresh.open("xb", buffering=0) as file:
-            written = 0
-            while written < len(data):
-                written += os.write(file.fileno(), data[written:])
+        fresh.unlink(missing_ok=True)
+        with fresh.open("xb") as file:
+            yield file
         fresh.replace(path)
-    except OSError:
+    except BaseException:
         fresh.unlink(missing_ok=True)
         raise
+
+
+def replace_file(path: Path, data: bytes) -> None:
+    """Put a file with this content in the place of a file, or of a link, of this name; raises OSError."""
+    with replacing(path) as file:
+        file.write(data)
 
 
 def require_folder(path: Path) -> None:

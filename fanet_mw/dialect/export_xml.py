@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.whole_file import replace_file
 
 NAME: Final = "fanet.xml"
 _INCLUDE: Final = re.compile(r"<include>\s*(\S+?)\s*</include>")
@@ -26,7 +27,7 @@ def write(folder: Path) -> Path:
     try:
         target.mkdir(parents=True, exist_ok=True)
         for name, text in _with_included(ours / NAME, theirs).items():
-            (target / name).write_text(text, encoding="utf-8")
+            replace_file(target / name, text.encode())
     except FileNotFoundError as error:
         raise ConfigError(f"{error.filename}: is missing: install pymavlink anew") from error
     except OSError as error:

@@ -32,6 +32,8 @@ _PREV_HOP: Final = 6
 """The index of the transmitter among the fields of a header (`wire.Fields`). A copy that another station transmits says
 nothing about who has the packet."""
 _NONE: Final[Sequence[Relay]] = ()
+_LEADERLESS: Final = {"state": "leaderless", "leader": 0, "term": 0, "epoch": 0}
+"""What a node reports of a leader unless its protocol has one, so that one program reads the reports of all."""
 _new: Final = tuple.__new__  # for what is made once per frame
 
 
@@ -359,6 +361,7 @@ class Node:
             "frames_sent": self.port.frames_sent,
             "receptions": self.receptions,
             "dropped": self._drops(),
+            **_LEADERLESS,
             **self._protocol.report(),
         }
 

@@ -7,6 +7,7 @@ nobody can make another certificate for the swarm; whoever needs one makes new k
 
 import base64
 import json
+import os
 import subprocess
 import tempfile
 from collections.abc import Iterable
@@ -18,6 +19,7 @@ from typing import Any, Final
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
+from fanet_mw.whole_file import replacing
 from sim.bus.rights import ROUTER, access_control, rights
 
 _NEW_KEY: Final = ("req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes")
@@ -102,6 +104,6 @@ class _CertificateAuthority:
 
 def _write_secret(path: Path, text: str) -> None:
     """Write a file that only its owner can read, even if a file of that name existed with other rights."""
-    path.unlink(missing_ok=True)
-    path.touch(mode=0o600)
-    path.write_text(text, encoding="utf-8")
+    with replacing(path) as file:
+        os.fchmod(file.fileno(), 0o600)
+        file.write(text.encode())

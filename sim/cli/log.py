@@ -117,6 +117,8 @@ def export(
         raise ConfigError(f"--to {to}: must be one of {', '.join(FORMATS)}")
     target, write = FORMATS[to]
     path = out or folder / target
+    if out is None and path.is_symlink():
+        raise ConfigError(f"{path}: is a link, which might lead anywhere; name a place by --out")
     if path.exists() and not force and (path.is_file() or any(path.glob(f"*.{to}"))):
         raise ConfigError(f"{path}: exists; choose another --out, or replace it with --force")
     console = Console(highlight=False, soft_wrap=True)

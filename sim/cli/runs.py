@@ -87,8 +87,8 @@ def simulate(
             spool_folder=output.out,
             observer=_together(watcher, recording),
         )
-    code = _finish(outcome, output)
-    return code if recording is None or recording.failure is None else 1
+    why = None if recording is None else recording.failure
+    return _finish(outcome, output, {} if why is None else {str(output.record): why})
 
 
 def launch(
@@ -302,8 +302,8 @@ def _say(text: str) -> None:
         _err.print(text, highlight=False, soft_wrap=True, markup=False)
 
 
-def _finish(outcome: "Outcome", output: OutputFlags) -> int:
-    """Write and show the result; returns 0 only if it may be used."""
+def _finish(outcome: "Outcome", output: OutputFlags, cut: dict[str, str] | None = None) -> int:
+    """Write and show the result, in which `cut` names what else ends early; returns 0 only if it may be used."""
     from json import dumps
 
     from sim.results import printed_summary
@@ -314,7 +314,7 @@ def _finish(outcome: "Outcome", output: OutputFlags) -> int:
         from sim.report.page import write
 
         page = partial(write, [output.out], output.out)
-    summary: dict[str, Any] = finish(outcome, out=output.out, page=page)
+    summary: dict[str, Any] = finish(outcome, out=output.out, page=page, cut=cut)
     if output.json:
         sys.stdout.write(dumps(summary, indent=2) + "\n")
     else:
@@ -323,6 +323,7 @@ def _finish(outcome: "Outcome", output: OutputFlags) -> int:
         if output.out is not None:
             console.print(f"written to {output.out}", highlight=False, soft_wrap=True)
     for name, why in summary["unwritten"].items():
-        _err.print(f"{name} in --out {output.out} ends early or is missing: {why}", highlight=False, soft_wrap=True,
-                   markup=False)  # fmt: skip
+        if name not in (cut or ()):  # those were named as they ended
+            _err.print(f"{name} in --out {output.out} ends early or is missing: {why}", highlight=False, soft_wrap=True,
+                       markup=False)  # fmt: skip
     return 0 if summary["valid"] else 1

@@ -176,7 +176,9 @@ def _schema_text() -> str:
 
 
 def _write(path: Path, text: str) -> None:
+    from fanet_mw.whole_file import replace_file
+
     try:
-        path.write_text(text, encoding="utf-8")
+        replace_file(path.resolve(), text.encode())
     except OSError as error:
         raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error

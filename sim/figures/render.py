@@ -7,6 +7,7 @@ from pathlib import Path
 from pyarrow import Table
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.whole_file import replace_file
 from sim.figures.finished_runs import Runs
 from sim.figures.paper_claims import Claim
 from sim.figures.recipe import Recipe
@@ -38,7 +39,7 @@ def render(recipe: Recipe, table: Table, folder: Path, *, variant: str = "quick"
             "runs_by_code": dict(sorted(Counter(row["code"] for row in runs.rows).items())),
             "claims": [claim.plain() for claim in claims],
         }
-        (folder / f"{recipe.name}.json").write_text(f"{json.dumps(about, indent=2)}\n", encoding="utf-8")
+        replace_file(folder / f"{recipe.name}.json", f"{json.dumps(about, indent=2)}\n".encode())
     except OSError as error:
         raise ConfigError(f"{folder}: cannot be written: {error.strerror}") from error
     except (KeyError, IndexError, TypeError, ArithmeticError) as error:  # a table that is not of this sweep

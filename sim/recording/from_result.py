@@ -13,6 +13,7 @@ from fanet_mw.bus.messages import Poses
 from fanet_mw.errors import BusError, ConfigError
 from fanet_mw.trace import Posed, Record
 from fanet_mw.units import S
+from fanet_mw.whole_file import replacing
 from sim.observation.bus_feed import BusFeed, Paced
 from sim.recording.mcap_recording import McapRecording
 from sim.results.outcome import Outcome
@@ -54,32 +55,42 @@ def write_mcap(outcome: Outcome, path: Path) -> int:
     """Write the recording; returns its number of messages. Links and airtime per second are not in a trace: a
     recording that is made during the run (`--record`) has them.
     """
-    with McapRecording(path, outcome.scenario, epoch_unix_ns=outcome.epoch_unix_ns) as recording:
-        velocities: dict[int, tuple[float, float, float]] = {}
-        last: dict[int, Posed] = {}
-        for t_ns, together in groupby(_timeline(outcome), key=lambda item: item[0]):
-            items = [item for _, _, item in together]
-            posed = {item.node: item for item in items if isinstance(item, Posed)}
-            for node, one in posed.items():
-                before = last.get(node)
-                span_s = (t_ns - before.t_ns) / S if before is not None else 0.0
-                still = before is None or span_s <= 0
-                velocities[node] = (
-                    (0.0, 0.0, 0.0) if still or before is None
-                    else tuple((b - a) / span_s for a, b in zip(before[2:], one[2:], strict=True))  # type: ignore[assignment]
-                )  # fmt: skip
-            last |= posed
-            if posed:
-                ids = sorted(posed)
-                states = [value for node in ids for value in (*posed[node][2:], *velocities[node])]
-                recording.take_poses(Poses(t_ns, array("H", ids), array("d", states)))
-            recording.take_records(item for item in items if not isinstance(item, Posed | bytes))
-            for item in items:
-                if isinstance(item, bytes):
-                    recording.take_tap(item[5], t_ns, item)
-    if recording.failure is not None:
-        raise ConfigError(f"{path}: ends early: {recording.failure}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with (
+            replacing(path) as file,
+            McapRecording(path, outcome.scenario, epoch_unix_ns=outcome.epoch_unix_ns, file=file) as recording,
+        ):
+            _retell(outcome, recording)
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
     return recording.count
+
+
+def _retell(outcome: Outcome, recording: McapRecording) -> None:
+    """Tell a recording all that a trace has, in the order of time."""
+    velocities: dict[int, tuple[float, float, float]] = {}
+    last: dict[int, Posed] = {}
+    for t_ns, together in groupby(_timeline(outcome), key=lambda item: item[0]):
+        items = [item for _, _, item in together]
+        posed = {item.node: item for item in items if isinstance(item, Posed)}
+        for node, one in posed.items():
+            before = last.get(node)
+            span_s = (t_ns - before.t_ns) / S if before is not None else 0.0
+            still = before is None or span_s <= 0
+            velocities[node] = (
+                (0.0, 0.0, 0.0) if still or before is None
+                else tuple((b - a) / span_s for a, b in zip(before[2:], one[2:], strict=True))  # type: ignore[assignment]
+            )  # fmt: skip
+        last |= posed
+        if posed:
+            ids = sorted(posed)
+            states = [value for node in ids for value in (*posed[node][2:], *velocities[node])]
+            recording.take_poses(Poses(t_ns, array("H", ids), array("d", states)))
+        recording.take_records(item for item in items if not isinstance(item, Posed | bytes))
+        for item in items:
+            if isinstance(item, bytes):
+                recording.take_tap(item[5], t_ns, item)
 
 
 def _timeline(outcome: Outcome) -> Iterator[tuple[int, int, Any]]:

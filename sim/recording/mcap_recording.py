@@ -108,8 +108,10 @@ _Metrics, _UavState, _Links, _Report = _messages()
 class McapRecording:
     """A recording that is being written; a context manager, which closes the file."""
 
-    def __init__(self, path: Path, scenario: Scenario, *, epoch_unix_ns: int) -> None:
-        """Raises ConfigError when the file cannot be written."""
+    def __init__(self, path: Path, scenario: Scenario, *, epoch_unix_ns: int, file: BinaryIO | None = None) -> None:
+        """Raises ConfigError when the file cannot be opened. With `file` that is written instead, and whatever hinders
+        it is raised.
+        """
         self.state = SwarmState(scenario)
         self.path = path
         self.epoch_unix_ns = epoch_unix_ns
@@ -123,9 +125,10 @@ class McapRecording:
         self.failure: str | None = None
         """Why the file ends early; the swarm flies on."""
         self._events = 0
+        self._gives_up = file is None
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._file: BinaryIO = path.open("wb")
+            self._file: BinaryIO = file or path.open("wb")
         except OSError as error:
             raise ConfigError(f"--record {path}: cannot be written: {error.strerror}") from error
         self._writer = Writer(self._file, chunk_size=_CHUNK_BYTES)
@@ -144,11 +147,14 @@ class McapRecording:
         if self.failure is None:
             try:
                 self._writer.finish()
-                self._file.close()
+                if self._gives_up:
+                    self._file.close()
             except OSError as error:
                 self._give_up(error)
 
     def _give_up(self, error: OSError) -> None:
+        if not self._gives_up:
+            raise error
         with contextlib.suppress(OSError):
             self._file.close()
         self.failure = error.strerror or str(error)

@@ -5,7 +5,7 @@ A table is a generator of rows, so a run of any length is written in portions. `
 
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, BinaryIO, Final, NamedTuple
 
 import pyarrow as pa
 
@@ -27,6 +27,7 @@ from fanet_mw.trace import (
     kind_of,
 )
 from fanet_mw.units import MS, S
+from fanet_mw.whole_file import replacing
 from sim.records.record_kinds import KINDS, records_of
 from sim.results.links import described
 from sim.results.outcome import Outcome
@@ -216,25 +217,26 @@ def write_parquet(outcome: Outcome, folder: Path | None, out: Path) -> dict[Path
     """Write each table that has rows as NAME.parquet into a folder; returns the number of rows of each."""
     import pyarrow.parquet as pq
 
-    return _write(outcome, folder, out, ".parquet", lambda path, schema: pq.ParquetWriter(path, schema))
+    return _write(outcome, folder, out, ".parquet", pq.ParquetWriter)
 
 
 def write_csv(outcome: Outcome, folder: Path | None, out: Path) -> dict[Path, int]:
     """Write each table that has rows as NAME.csv, with a header, into a folder; returns the number of rows of each."""
     import pyarrow.csv as csv
 
-    return _write(outcome, folder, out, ".csv", lambda path, schema: csv.CSVWriter(path, schema))
+    return _write(outcome, folder, out, ".csv", csv.CSVWriter)
 
 
 def _write(
-    outcome: Outcome, folder: Path | None, out: Path, suffix: str, opened: Callable[[Path, pa.Schema], Any]
+    outcome: Outcome, folder: Path | None, out: Path, suffix: str, opened: Callable[[BinaryIO, pa.Schema], Any]
 ) -> dict[Path, int]:
     found: dict[Path, int] = {}
+    path = out
     try:
         out.mkdir(parents=True, exist_ok=True)
         for name, described_table in TABLES.items():
             path, count = out / f"{name}{suffix}", 0
-            with opened(path, described_table.schema) as writer:
+            with replacing(path) as file, opened(file, described_table.schema) as writer:
                 for batch in batches(name, outcome, folder):
                     writer.write_batch(batch)
                     count += batch.num_rows
@@ -243,5 +245,5 @@ def _write(
             else:
                 found[path] = count
     except OSError as error:
-        raise ConfigError(f"{error.filename or out}: cannot be written: {error.strerror or error}") from error
+        raise ConfigError(f"{path}: cannot be written: {error.strerror or error}") from error
     return found

@@ -14,6 +14,7 @@ from fanet_mw.mavlink import Geodetic, to_geodetic
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Confirmed, PlacedInside, Posed
 from fanet_mw.units import Enu, S
+from fanet_mw.whole_file import replacing
 from sim.records.record_kinds import records_of
 from sim.results.outcome import Outcome
 
@@ -126,6 +127,7 @@ def _text(parent: Xml.Element, name: str, text: str) -> None:
 def _write(root: Xml.Element, path: Path) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        Xml.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+        with replacing(path) as file:
+            Xml.ElementTree(root).write(file, encoding="utf-8", xml_declaration=True)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error

@@ -11,7 +11,7 @@ import contextlib
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -82,8 +82,15 @@ def begun(out: Path | None) -> Iterator[None]:
         raise
 
 
-def finish(outcome: Outcome, *, out: Path | None, page: Callable[[], object] | None = None) -> dict[str, Any]:
-    """Summarize a run and, if a folder is given, write its files, and then what `page` makes of them.
+def finish(
+    outcome: Outcome,
+    *,
+    out: Path | None,
+    page: Callable[[], object] | None = None,
+    cut: Mapping[str, str] | None = None,
+) -> dict[str, Any]:
+    """Summarize a run and, if a folder is given, write its files, and then what `page` makes of them. `cut` names what
+    was written during the run and ends early, and why.
 
     Raises ConfigError if the folder cannot be used at all. The trace is written even if summarizing raises.
     """
@@ -100,9 +107,11 @@ def finish(outcome: Outcome, *, out: Path | None, page: Callable[[], object] | N
     finally:
         if out is not None:
             _write(outcome, out, files, unwritten)
-    cut = outcome.reports.get("emulator", {}).get("capture_failed")
-    if cut is not None:
-        unwritten[CAPTURE] = cut
+    unwritten |= cut or {}
+    capture = outcome.reports.get("emulator", {}).get("capture_failed")
+    if capture is not None:
+        unwritten[CAPTURE] = capture
+    _say_cut(summary)
     if out is not None:
         _write_summary(summary, out, page)
     return summary

@@ -119,6 +119,16 @@ def test_each_carries_packets_of_the_length_that_it_states(protocol: str) -> Non
     of_protocol().test_a_packet_of_the_greatest_stated_length_leaves_its_node()
 
 
+@pytest.mark.parametrize("protocol", sorted(PROTOCOLS))
+def test_every_node_says_whom_it_follows(protocol: str) -> None:
+    """0 and `leaderless` where the protocol has no leader, so that one program reads the reports of all."""
+    outcome, _ = run(protocol, 1)
+    said = [report for report in outcome.reports.values() if report.get("kind") == "agent"]
+    led = protocol == "clustered"
+    assert all((report["state"] != "leaderless") == (report["leader"] > 0) == led for report in said)
+    assert all(report["term"] == 0 and (report["epoch"] > 0) == led for report in said)
+
+
 def transmissions(scenario: Scenario) -> Counter[tuple[int, int, int]]:
     """How often each node announced each data packet."""
     sent: Counter[tuple[int, int, int]] = Counter()

@@ -3,7 +3,8 @@
     python tests/fuzz/foreign.py INPUTS [FIRST SEED]        10,000 inputs take some ten minutes
 
 Each input is the seed of everything drawn for it. What is read ends as a value or as a ConfigError that `fanet` prints
-in few short lines, within 20 s, and nothing outside of the folder is made, changed or removed.
+in few short lines, within 20 s of this processor's time (whatever else it does meanwhile), and nothing outside of the
+folder is made, changed or removed.
 """
 
 import contextlib
@@ -222,17 +223,21 @@ KINDS: Final[tuple[Callable[[Corpus, Path, Random], None], ...]] = (scenario, op
 
 @contextlib.contextmanager
 def in_time() -> Iterator[None]:
-    """Raises TimeoutError after the longest time that an input may take."""
+    """Raises TimeoutError after the longest processor time that an input may take, or ten times that of waiting."""
 
     def late(_number: int, _frame: FrameType | None) -> None:
         raise TimeoutError
 
     before = signal.signal(signal.SIGALRM, late)
-    signal.setitimer(signal.ITIMER_REAL, LONGEST_S, 1)  # again and again: a callback of the collector swallows one
+    busy = signal.signal(signal.SIGPROF, late)
+    signal.setitimer(signal.ITIMER_PROF, LONGEST_S, 1)  # again and again: a callback of the collector swallows one
+    signal.setitimer(signal.ITIMER_REAL, 10 * LONGEST_S, 1)  # who waits for ever is not busy
     try:
         yield
     finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
         signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGPROF, busy)
         signal.signal(signal.SIGALRM, before)
 
 

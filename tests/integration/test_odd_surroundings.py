@@ -53,6 +53,15 @@ def test_a_full_disk_under_the_standard_output_is_one_sentence(arguments: tuple[
     assert (done.returncode, done.stderr) == (2, said)
 
 
+def test_a_file_that_does_not_fit_is_not_left_behind_cut(tmp_path: Path) -> None:
+    done = subprocess.run(
+        ["bash", "-c", f"ulimit -f 1; exec {sys.executable} -m fanet_mw init mine.toml"], cwd=tmp_path,
+        capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert done.stderr == "fanet: mine.toml: cannot be written: File too large\n"
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_brackets_in_names_are_no_markup(tmp_path: Path) -> None:
     out = tmp_path / "x[/b]"
     done = fanet("simulate", *SHORT, "--out", str(out))

@@ -3,6 +3,7 @@
 import contextlib
 import json
 import re
+import shutil
 import subprocess
 import sys
 import time
@@ -288,6 +289,40 @@ def test_a_gpx_per_uav_and_a_kml_have_the_tracks_on_earth(folder: Path, tmp_path
     assert up == posed[7].up_m
 
 
+@pytest.mark.parametrize("to", ["parquet", "csv", "mcap", "gpx", "kml"])
+def test_an_export_that_does_not_fit_leaves_no_file_that_is_cut(folder: Path, tmp_path: Path, to: str) -> None:
+    """A table that ends early looks like one that is whole; files may have 1 KiB here."""
+    done = subprocess.run(
+        ["bash", "-c", f"ulimit -f 1; exec {sys.executable} -m fanet_mw log export {folder} --to {to} --out out"],
+        cwd=tmp_path, capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (2, "")
+    assert re.fullmatch(r"fanet: out(/[a-z]+(-1)?\.[a-z]+)?: cannot be written: File too large\n", done.stderr)
+    assert [path for path in tmp_path.rglob("*") if path.is_file() and path.stat().st_size == 1024] == []
+
+
+@pytest.mark.parametrize(
+    ("to", "link", "target"),
+    [
+        ("csv", "tables", "outside"), ("gpx", "tracks", "outside"), ("kml", "tracks.kml", "outside/x"),
+        ("mcap", "recording.mcap", "outside/x"), ("parquet", "tables/drops.parquet", "../../outside/x"),
+    ],
+)  # fmt: skip
+def test_an_export_never_follows_a_link_that_lies_in_the_folder(
+    folder: Path, tmp_path: Path, to: str, link: str, target: str
+) -> None:
+    """The folder may be somebody else's, and the link may lead anywhere."""
+    run, outside = Path(shutil.copytree(folder, tmp_path / "run")), tmp_path / "outside"
+    shutil.rmtree(run / "tables")
+    outside.mkdir()
+    (outside / "x").write_text("untouched")
+    (run / link).parent.mkdir(exist_ok=True)
+    (run / link).symlink_to(tmp_path / target if "/" not in link else target)
+    with contextlib.suppress(ConfigError):
+        app(["log", "export", str(run), "--to", to, "--force"], result_action="return_value", exit_on_error=False)
+    assert {path.name: path.read_text() for path in outside.iterdir()} == {"x": "untouched"}
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -318,13 +353,15 @@ def test_a_recording_that_cannot_be_written_is_said_before_the_run(tmp_path: Pat
 
 
 def test_a_recording_that_ends_early_costs_no_result(tmp_path: Path) -> None:
-    """The file may have 8 KiB: the recording says why it ends there, and the summary is printed."""
+    """The file may have 8 KiB: the recording says why it ends there, and the summary names it."""
     flown = "simulate quick --json --record x.mcap --set duration_s=5 warmup_s=2 drain_s=1 nodes.count=4"
     done = subprocess.run(
         ["bash", "-c", f"ulimit -f 8; exec {sys.executable} -m fanet_mw {flown}"],
         cwd=tmp_path, capture_output=True, text=True, timeout=120,
     )  # fmt: skip
-    assert json.loads(done.stdout)["valid"]
+    said = json.loads(done.stdout)
+    assert (said["valid"], said["unwritten"]) == (False, {"x.mcap": "File too large"})
+    assert said["pdr"] > 0.9
     assert done.stderr.splitlines()[-1] == "x.mcap: the recording ends here: File too large"
     assert done.returncode == 1
 

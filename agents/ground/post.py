@@ -20,7 +20,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.serial_number import newer
 from fanet_mw.trace import KnownOnGround
 from fanet_mw.units import US, S, seconds_to_ns
-from fanet_mw.wire import BIDS, COVERED, FOUND, ORDER, PRIORITY_SAFETY, ROLL, SEARCH, STATUS, SURVIVOR
+from fanet_mw.wire import BIDS, FOUND, ORDER, PRIORITY_SAFETY, ROLL, SEARCH, STATUS, SURVIVOR
 from fanet_mw.wire.search_messages import told_in
 from fanet_mw.wire.search_plan import Search, SearchStatus
 from fanet_mw.wire.survivors import Found, Standing
@@ -74,7 +74,7 @@ class Post(Application):
 
     name: Final = "report"
     listens = (
-        SURVIVOR.msgid, SEARCH.msgid, STATUS.msgid, BIDS.msgid, FOUND.msgid, COVERED.msgid, ROLL.msgid, ORDER.msgid,
+        SURVIVOR.msgid, SEARCH.msgid, STATUS.msgid, BIDS.msgid, FOUND.msgid, ROLL.msgid, ORDER.msgid,
     )  # fmt: skip
 
     def __init__(self, scenario: Scenario) -> None:

@@ -32,7 +32,7 @@ from fanet_mw.node.reader import decoded
 from fanet_mw.node.received_motion import motion_in
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId
-from fanet_mw.wire import BIDS, COVERED, FOUND, ORDER, ROLL, SEARCH, STATUS, SURVIVOR
+from fanet_mw.wire import BIDS, FOUND, ORDER, ROLL, SEARCH, STATUS, SURVIVOR
 from fanet_mw.wire.search_messages import Told, told_in
 from fanet_mw.wire.search_plan import Search, SearchStatus
 from fanet_mw.wire.survivors import Found, Standing, Survivor
@@ -79,7 +79,7 @@ class PlannedSearch(Application):
 
     name: Final = "report"
     listens = (
-        SURVIVOR.msgid, SEARCH.msgid, STATUS.msgid, BIDS.msgid, FOUND.msgid, COVERED.msgid, ROLL.msgid, ORDER.msgid,
+        SURVIVOR.msgid, SEARCH.msgid, STATUS.msgid, BIDS.msgid, FOUND.msgid, ROLL.msgid, ORDER.msgid,
     )  # fmt: skip
 
     def __init__(

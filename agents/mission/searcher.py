@@ -18,7 +18,6 @@ from typing import Final, assert_never
 
 from agents.mission.finding.announcing import Announcing
 from agents.mission.finding.camera_view import CameraView
-from agents.mission.finding.coverage_map import CoverageMap
 from agents.mission.finding.in_building import place_in_building
 from agents.mission.finding.known_survivors import KnownSurvivors
 from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, PhoneModel
@@ -43,7 +42,6 @@ from agents.mission.orders import KnownOrders, record_of
 from agents.mission.outbox import Outbox
 from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.formation_planner import FormationPlanner
-from agents.mission.search_formation.missed_cells import MissedCells
 from agents.mission.search_formation.pattern import Pattern, fastest, fitted
 from agents.mission.search_formation.plan_exchange import PlanExchange
 from agents.mission.search_formation.roll_call import RollCall
@@ -63,7 +61,6 @@ from fanet_mw.wire.bids import Bids, encode_bids
 from fanet_mw.wire.roll import Roll
 from fanet_mw.wire.search_messages import Told
 from fanet_mw.wire.search_plan import MOST_PLACES, Search, SearchStatus
-from fanet_mw.wire.searched_cells import Covered
 from fanet_mw.wire.survivors import Found, Standing, Survivor, is_person
 from fanet_mw.wire.told_order import ToldOrder
 
@@ -118,8 +115,7 @@ class Searcher:
             node, planner, roll_call, place, own_motion, outbox,
             pattern=formation(scenario, nodes.count), random=self._random,
         )  # fmt: skip
-        coverage = coverage_map(scenario)
-        self._reception = PhoneReception(scenario, node, survivors, own_motion, outbox, coverage, neighbors)
+        self._reception = PhoneReception(scenario, node, survivors, own_motion, outbox, neighbors)
         self._sightings = Sightings(scenario, node, survivors, own_motion, outbox)
         self._announcing = Announcing(node, survivors, outbox)
         self._map = onboard_map
@@ -145,7 +141,6 @@ class Searcher:
             hard=[ReciprocalAvoidance(own_motion, self._radar.avoided, obstacles)],
             soft=[ConnectivityMaintenance(own_motion, neighbors, place, self._bidding, reach_m=reach_m)],
         )
-        missed_cells = None if coverage is None else MissedCells(coverage, place)
         heard = scenario.sensors.voice_hz > 0
         listening = VoiceDescent(scenario, node, own_motion, neighbors, speed_m_s=speed_m_s) if heard else None
         self._orders = orders = KnownOrders(node)
@@ -154,7 +149,7 @@ class Searcher:
             orders, own_motion,
             height_m=nodes.altitude_m, speed_m_s=scenario.mobility.speed_m_s, look_m=min(_view_m(scenario)),
         )  # fmt: skip
-        goal = Goal(survivors, own_motion, place, approach, missed_cells, listening, errand, absence=absence)
+        goal = Goal(survivors, own_motion, place, approach, listening, errand, absence=absence)
         take_off = TakeOff(
             node, position,
             own_motion=own_motion, neighbors=neighbors, outbox=outbox, height_m=nodes.altitude_m,
@@ -330,8 +325,6 @@ class Searcher:
                 self._bidding.merge(message.bids, now_ns=now_ns)
             case Found():
                 self._on_found(message, now_ns, flooded=flooded)
-            case Covered():
-                self._reception.on_covered(message)
             case Roll():
                 self._plans.on_roll(message, now_ns=now_ns)
             case ToldOrder():
@@ -386,14 +379,12 @@ class Searcher:
     # --- sent messages --------------------------------------------------------------------------------------------
 
     def hello_frames(self, now_ns: int) -> bytes:
-        """The inner frames for the next hello: the latest reports, the best bids, recent verdicts and orders, and the
-        map of searched cells.
-        """
+        """The inner frames for the next hello: the latest reports, the best bids, recent verdicts and orders."""
         frames = b"".join(report.encode_frame(self._node) for report in self._survivors.recent_reports(now_ns=now_ns))
         bids = self._bidding.bids_to_tell(now_ns=now_ns)
         if bids:
             frames += encode_bids(bids, node=self._node)
-        frames += self._announcing.hello_frames(now_ns) + self._reception.hello_frames(now_ns)
+        frames += self._announcing.hello_frames(now_ns)
         return frames + self._orders.hello_frames(now_ns) + self._plans.hello_frames(now_ns)
 
 
@@ -457,12 +448,6 @@ def unflyable(scenario: Scenario) -> Iterator[str]:
             f"{list(scenario.sensors.camera_pixels)} and camera_fov_deg = {scenario.sensors.camera_fov_deg:g} "
             f"recognizes {recognized:.1%} of the people in an image, which must be >= {_LEAST_RECOGNIZED:.0%}"
         )
-
-
-def coverage_map(scenario: Scenario) -> CoverageMap | None:
-    """An empty map of searched cells; None if the UAVs of this scenario share none."""
-    seen_m = _ground_range_m(scenario)
-    return CoverageMap(area_m=scenario.world.area_m, seen_m=seen_m) if scenario.mission.coverage_map else None
 
 
 def least_nodes(scenario: Scenario) -> int | None:

@@ -46,7 +46,6 @@ _LAST_UNIX_US: Final = 1 << 52
 """The year 2112."""
 _POSITION_MASK: Final = 0b110111111000
 _VELOCITY_MASK: Final = 0b110111000111
-_HOLD_M_S: Final = 5.0
 _MISSING: Final = (_UNKNOWN_U16, -1)
 
 

@@ -383,7 +383,6 @@ MAVLINK_MSG_ID_FANET_SEARCH = 53020
 MAVLINK_MSG_ID_FANET_STATUS = 53021
 MAVLINK_MSG_ID_FANET_BIDS = 53022
 MAVLINK_MSG_ID_FANET_FOUND = 53023
-MAVLINK_MSG_ID_FANET_COVERED = 53024
 MAVLINK_MSG_ID_FANET_ROLL = 53025
 MAVLINK_MSG_ID_FANET_ORDER = 53026
 
@@ -1415,47 +1414,6 @@ class MAVLink_fanet_found_message(MAVLink_message):
 setattr(MAVLink_fanet_found_message, "name", mavlink_msg_deprecated_name_property())
 
 
-class MAVLink_fanet_covered_message(MAVLink_message):
-    """
-    Which cells of the area have been searched, as far as the sender
-    knows: 32 x 32 cells over the square area, row by row from its
-    south-western corner, to the east within a row.
-    """
-
-    id = MAVLINK_MSG_ID_FANET_COVERED
-    msgname = "FANET_COVERED"
-    fieldnames = ["cells", "version"]
-    ordered_fieldnames = ["cells", "version"]
-    fieldtypes = ["uint8_t", "uint8_t"]
-    fielddisplays_by_name: Dict[str, str] = {}
-    fieldenums_by_name: Dict[str, str] = {}
-    fieldunits_by_name: Dict[str, str] = {}
-    native_format = bytearray(b"<BB")
-    orders = [0, 1]
-    lengths = [128, 1]
-    array_lengths = [128, 0]
-    crc_extra = 57
-    unpacker = struct.Struct("<128BB")
-    instance_field = None
-    instance_offset = -1
-
-    def __init__(self, cells: Sequence[int], version: int):
-        MAVLink_message.__init__(self, MAVLink_fanet_covered_message.id, MAVLink_fanet_covered_message.msgname)
-        self._fieldnames = MAVLink_fanet_covered_message.fieldnames
-        self._instance_field = MAVLink_fanet_covered_message.instance_field
-        self._instance_offset = MAVLink_fanet_covered_message.instance_offset
-        self.cells = cells
-        self.version = version
-
-    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
-        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.cells[0], self.cells[1], self.cells[2], self.cells[3], self.cells[4], self.cells[5], self.cells[6], self.cells[7], self.cells[8], self.cells[9], self.cells[10], self.cells[11], self.cells[12], self.cells[13], self.cells[14], self.cells[15], self.cells[16], self.cells[17], self.cells[18], self.cells[19], self.cells[20], self.cells[21], self.cells[22], self.cells[23], self.cells[24], self.cells[25], self.cells[26], self.cells[27], self.cells[28], self.cells[29], self.cells[30], self.cells[31], self.cells[32], self.cells[33], self.cells[34], self.cells[35], self.cells[36], self.cells[37], self.cells[38], self.cells[39], self.cells[40], self.cells[41], self.cells[42], self.cells[43], self.cells[44], self.cells[45], self.cells[46], self.cells[47], self.cells[48], self.cells[49], self.cells[50], self.cells[51], self.cells[52], self.cells[53], self.cells[54], self.cells[55], self.cells[56], self.cells[57], self.cells[58], self.cells[59], self.cells[60], self.cells[61], self.cells[62], self.cells[63], self.cells[64], self.cells[65], self.cells[66], self.cells[67], self.cells[68], self.cells[69], self.cells[70], self.cells[71], self.cells[72], self.cells[73], self.cells[74], self.cells[75], self.cells[76], self.cells[77], self.cells[78], self.cells[79], self.cells[80], self.cells[81], self.cells[82], self.cells[83], self.cells[84], self.cells[85], self.cells[86], self.cells[87], self.cells[88], self.cells[89], self.cells[90], self.cells[91], self.cells[92], self.cells[93], self.cells[94], self.cells[95], self.cells[96], self.cells[97], self.cells[98], self.cells[99], self.cells[100], self.cells[101], self.cells[102], self.cells[103], self.cells[104], self.cells[105], self.cells[106], self.cells[107], self.cells[108], self.cells[109], self.cells[110], self.cells[111], self.cells[112], self.cells[113], self.cells[114], self.cells[115], self.cells[116], self.cells[117], self.cells[118], self.cells[119], self.cells[120], self.cells[121], self.cells[122], self.cells[123], self.cells[124], self.cells[125], self.cells[126], self.cells[127], self.version), force_mavlink1=force_mavlink1)
-
-
-# Define name on the class for backwards compatibility (it is now msgname).
-# Done with setattr to hide the class variable from mypy.
-setattr(MAVLink_fanet_covered_message, "name", mavlink_msg_deprecated_name_property())
-
-
 class MAVLink_fanet_roll_message(MAVLink_message):
     """
     When each UAV of the plan was last heard by anybody, as far as the
@@ -1568,7 +1526,6 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_FANET_STATUS: MAVLink_fanet_status_message,
     MAVLINK_MSG_ID_FANET_BIDS: MAVLink_fanet_bids_message,
     MAVLINK_MSG_ID_FANET_FOUND: MAVLink_fanet_found_message,
-    MAVLINK_MSG_ID_FANET_COVERED: MAVLink_fanet_covered_message,
     MAVLINK_MSG_ID_FANET_ROLL: MAVLink_fanet_roll_message,
     MAVLINK_MSG_ID_FANET_ORDER: MAVLink_fanet_order_message,
 }
@@ -2744,30 +2701,6 @@ class MAVLink(object):
 
         """
         self.send(self.fanet_found_encode(t_us, survivor, east, north, east_variance, covariance, north_variance, node, confirmed, version), force_mavlink1=force_mavlink1)
-
-    def fanet_covered_encode(self, cells: Sequence[int], version: int) -> MAVLink_fanet_covered_message:
-        """
-        Which cells of the area have been searched, as far as the sender
-        knows: 32 x 32 cells over the square area, row by row from its
-        south-western corner, to the east within a row.
-
-        cells                     : A bit per cell, the lowest bit of the first byte first; 1: searched. (type:uint8_t)
-        version                   : 1. (type:uint8_t)
-
-        """
-        return MAVLink_fanet_covered_message(cells, version)
-
-    def fanet_covered_send(self, cells: Sequence[int], version: int, force_mavlink1: bool = False) -> None:
-        """
-        Which cells of the area have been searched, as far as the sender
-        knows: 32 x 32 cells over the square area, row by row from its
-        south-western corner, to the east within a row.
-
-        cells                     : A bit per cell, the lowest bit of the first byte first; 1: searched. (type:uint8_t)
-        version                   : 1. (type:uint8_t)
-
-        """
-        self.send(self.fanet_covered_encode(cells, version), force_mavlink1=force_mavlink1)
 
     def fanet_roll_encode(self, at_half_s: int, planner: int, revision: int, entries: Sequence[int], version: int) -> MAVLink_fanet_roll_message:
         """

@@ -17,6 +17,7 @@ _MOST_UNKNOWN: Final = 8
 _LONGEST_VALUE: Final = 80
 _REMOVED: Final = {
     "clusters.relay = 'claimed'": 'removed; take routing.protocol = "rounds" for turns without a leader',
+    "mission.coverage_map": "removed: as much was searched without it; free UAVs follow their place in the formation",
     "clusters.slots": 'removed with clusters.relay = "claimed"; take routing.protocol = "rounds"',
 }
 """Keys and values that older scenarios may have, and what to take instead."""

@@ -8,8 +8,7 @@ a module of its own:
     `schedule.py`, `places.py`, `loads.py`    the leader's division into clusters; positions and loads for a timetable
     `rounds.py`                         who hears whom, and packets that are held, in turns of rounds
     `application_message.py`            messages of applications: pieces, targets, receipts
-    `search_messages.py`                messages of a search: `search_plan.py`, `survivors.py`, `bids.py`,
-                                        `searched_cells.py`
+    `search_messages.py`                messages of a search: `search_plan.py`, `survivors.py`, `bids.py`
     `checks.py`                         what several decoders check
 """
 
@@ -20,7 +19,6 @@ from fanet_mw.wire.frame import (
     BIDS,
     CHUNK,
     COMPONENT,
-    COVERED,
     DIGEST,
     END_TO_END,
     FLAG_FLOOD,
@@ -96,7 +94,6 @@ __all__ = [
     "FLAG_FLOOD",
     "FLAG_MORE",
     "FLAG_TO_HEAD",
-    "COVERED",
     "FOUND",
     "HEARD",
     "HELD",

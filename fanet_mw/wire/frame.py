@@ -369,13 +369,12 @@ SEARCH: Final = Spec(53020, 44, struct.Struct("<QfffffHHH79HBBBBBB"))
 STATUS: Final = Spec(53021, 210, struct.Struct("<QfffHHBBB"))
 BIDS: Final = Spec(53022, 212, struct.Struct("<12H12H12H12HH12BBB"))
 FOUND: Final = Spec(53023, 195, struct.Struct("<QIfffffHBB"))
-COVERED: Final = Spec(53024, 57, struct.Struct("<128BB"))
 ROLL: Final = Spec(53025, 30, struct.Struct("<IHH79BB"))
 ORDER: Final = Spec(53026, 213, struct.Struct("<QfffHHHBB"))
 SPECS: Final = (
     ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES, NEIGHBORS, ROUTING, LINKS,
     MESSAGE, RECEIPT, TARGETS, LOADS, HEARD, HELD, SEARCH, STATUS, BIDS, FOUND,
-    COVERED, ROLL, ORDER,
+    ROLL, ORDER,
 )  # fmt: skip
 _OURS: Final = {spec.msgid: spec for spec in SPECS}
 

@@ -20,13 +20,6 @@ from fanet_mw.trace import (
 )
 from fanet_mw.wire.survivors import called
 
-TOLD: Final = (
-    Approaching, Arrived, Collided, Confirmed, Detected, FlightModeChanged, MissionModeChanged, PlacedInside,
-    ProcessEnded, RadioFault, Refuted, RoleChanged,
-)  # fmt: skip
-"""The kinds of records of which some are told."""
-
-
 _ABOUT_SURVIVORS: Final[Mapping[type[Any], str]] = {
     Detected: "hears the phone of {}",
     Approaching: "turns towards {}",

@@ -51,7 +51,6 @@ from fanet_mw.wire.application_message import DELIVERED, MISSING, Head, Receipt,
 from fanet_mw.wire.bids import Bid, encode_bids
 from fanet_mw.wire.roll import Roll
 from fanet_mw.wire.search_plan import Search, SearchStatus
-from fanet_mw.wire.searched_cells import Covered
 from fanet_mw.wire.survivors import Found, Standing
 from fanet_mw.wire.told_order import ToldOrder
 from sim.run.virtual import actors_of
@@ -175,7 +174,6 @@ def _not_recorded() -> list[bytes]:
         SearchStatus(7, Enu(1.0, 2.0, 3.0), 4, 1, 80).encode_frame(4),
         encode_bids([Bid(3, 4, 200, 7), Bid(5, 6, 0xFFFF, 8, 2)], node=4),
         Found(7, 3, 10.0, 20.0, node=4, standing=Standing.ESTIMATED, **covariance).encode_frame(4),
-        Covered(0x8001 << 1000 | 5).encode_frame(4),
         Roll(77, 3, 2, (0, 5, 127, 60), frozenset((1, 2))).encode_frame(4),
         ToldOrder(7, 9, 1, Order(OrderKind.SEARCH, 3, 10.0, 20.0, 50.0)).encode_frame(9),
         encode_piece(head, bytes(range(200)), node=3),

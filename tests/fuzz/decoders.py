@@ -46,7 +46,6 @@ from fanet_mw.wire.places import Places
 from fanet_mw.wire.roll import Roll
 from fanet_mw.wire.schedule import Schedule
 from fanet_mw.wire.search_plan import Search, SearchStatus
-from fanet_mw.wire.searched_cells import Covered
 from fanet_mw.wire.survivors import Found as FoundMessage
 from fanet_mw.wire.survivors import Survivor
 from fanet_mw.wire.told_order import ToldOrder
@@ -117,7 +116,6 @@ def _of_the_air(found: Corpus) -> Iterator[Decoder]:
         (Search, wire.SEARCH),
         (SearchStatus, wire.STATUS),
         (FoundMessage, wire.FOUND),
-        (Covered, wire.COVERED),
         (Roll, wire.ROLL),
         (ToldOrder, wire.ORDER),
     ):

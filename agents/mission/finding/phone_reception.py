@@ -7,7 +7,6 @@ neighbor that does not report a phone does not receive it where it flies, which 
 from collections.abc import Sequence
 from typing import Final
 
-from agents.mission.finding.coverage_map import CoverageMap
 from agents.mission.finding.known_survivors import KnownSurvivors
 from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.own_motion import OwnMotion
@@ -15,7 +14,6 @@ from agents.mission.outbox import Outbox, ReportFormat
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Detected
 from fanet_mw.units import US, NodeId, S, seconds_to_ns
-from fanet_mw.wire.searched_cells import Covered
 from fanet_mw.wire.survivors import Survivor
 
 MISSED_SCANS: Final = 1.5
@@ -40,10 +38,8 @@ class PhoneReception:
         survivors: KnownSurvivors,
         own_motion: OwnMotion,
         outbox: Outbox,
-        coverage: CoverageMap | None,
         neighbors: NeighborMotions,
     ) -> None:
-        """`coverage`: the map of searched cells, for UAVs that share one."""
         self._neighbors = neighbors
         self._others_ns = 0
         self._node = node
@@ -51,14 +47,11 @@ class PhoneReception:
         self._format = ReportFormat(scenario, node)
         self._silent_after_ns = MISSED_SCANS * scenario.mission.scan_interval_s * S
         self._report_every_ns = seconds_to_ns(scenario.mission.report_interval_s)
-        self._coverage = coverage
         self._scan_ns = 0
         self._reported_ns: dict[int, int] = {}
 
     def review(self, now_ns: int) -> None:
         """If there was no scan for a while, assume one without phones at the present place."""
-        if self._coverage is not None:
-            self._coverage.fly_over(self._own_motion.position)
         if now_ns - self._scan_ns > self._silent_after_ns:
             self.scan((), now_ns=now_ns)
         if now_ns - self._others_ns >= _OTHERS_NS:
@@ -98,13 +91,3 @@ class PhoneReception:
             if known.confirmed is None and (last_ns is None or now_ns - last_ns >= self._report_every_ns):
                 self._reported_ns[survivor] = now_ns
                 self._outbox.packets.append(self._format.packet(report))
-
-    def on_covered(self, covered: Covered) -> None:
-        """A neighbor has sent its map of searched cells."""
-        if self._coverage is not None:
-            self._coverage.merge(covered)
-
-    def hello_frames(self, now_ns: int) -> bytes:
-        """The inner frames with the map of searched cells for the next hello, if it is due."""
-        covered = None if self._coverage is None else self._coverage.news(now_ns)
-        return b"" if covered is None else covered.encode_frame(self._node)

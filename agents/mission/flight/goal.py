@@ -8,7 +8,6 @@ from agents.mission.finding.known_survivors import KnownSurvivors
 from agents.mission.flight.errand import Errand
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.search_formation.formation_place import FormationPlace, along
-from agents.mission.search_formation.missed_cells import MissedCells
 from agents.mission.tasking.absence import Absence
 from agents.mission.tasking.approach import VAGUE_M, Approach
 from agents.mission.tasking.bidding import FAR_M
@@ -28,20 +27,16 @@ class Goal:
         own_motion: OwnMotion,
         formation: FormationPlace,
         approach: Approach,
-        missed_cells: MissedCells | None,
         listening: VoiceDescent | None,
         errand: Errand | None = None,
         *,
         absence: Absence,
     ) -> None:
-        """`missed_cells`: the cells that the formation has left unsearched; None if UAVs do not share what
-        they have searched. `listening`: takes a UAV with microphones down; None for a UAV without.
-        `errand`: what the post on the ground orders.
-        """
+        """`listening`: takes a UAV with microphones down; None for a UAV without. `errand`: what the post orders."""
         self._errand, self._absence = errand, absence
         self._survivors, self._own_motion = survivors, own_motion
         self._formation, self._approach = formation, approach
-        self._missed_cells, self._listening = missed_cells, listening
+        self._listening = listening
 
     def at(self, task: int | None, now_ns: int) -> tuple[Enu, Enu]:
         """The place to fly to, and how it moves; `task` is the survivor that this UAV has won, if any."""
@@ -59,8 +54,7 @@ class Goal:
                 survivor = task if leaves else self._in_lane(lane, moves, now_ns)
         place = None if survivor is None else self._survivors.by_id[survivor].place()
         if survivor is None or place is None:
-            missed = self._missed_place(now_ns)
-            return (lane, moves) if missed is None else (Enu(*missed, lane.up), STILL)
+            return lane, moves
         east, north = self._approach.next_point(survivor, place, now_ns, responding=survivor == task)
         look = Enu(east, north, lane.up)
         if self._listening is not None:
@@ -71,15 +65,6 @@ class Goal:
             return look, STILL
         goal, feed = formation.bounded(look.east, look.north, lane, moves, now_ns)
         return goal._replace(up=look.up), feed
-
-    def _missed_place(self, now_ns: int) -> tuple[float, float] | None:
-        """The place of the nearest missed cells, if this UAV is a follower; None for all other UAVs, or if no cell is
-        missed.
-        """
-        formation = self._formation
-        if self._missed_cells is None or not formation.is_free(now_ns) or formation.place is None:
-            return None
-        return self._missed_cells.nearest(self._own_motion.position, now_ns)
 
     def _in_lane(self, lane: Enu, moves: Enu, now_ns: int) -> int | None:
         """The nearest survivor beside the UAV's lane, whom it examines in passing, without leaving the formation."""

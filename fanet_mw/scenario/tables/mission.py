@@ -68,9 +68,6 @@ class Mission(Section):
     route_m: tuple[tuple[Coordinate, Coordinate], ...] = ()
     """`formation`: east and north of the waypoints through which the leader flies at `mobility.speed_m_s`; empty: it
     stays where it is."""
-    coverage_map: bool = False
-    """`search`: whether UAVs send their neighbors every 4 s a map of the searched cells (143 B in a hello), so that
-    free UAVs search what a lost or responding UAV has left out."""
     avoid_by: tuple[Literal["hellos", "radar"], ...] = ("hellos", "radar")
     """`search`: by what UAVs detect others to avoid them: the positions in hellos, and their own radar."""
     reserve_charge: Annotated[float, Field(ge=0, le=1)] = 0.15

@@ -141,6 +141,7 @@ def test_formation_flight_needs_clusters_and_uavs_that_fly_themselves() -> None:
     ("key", "instead"),
     [
         ("clusters.relay=claimed", r"clusters\.relay = 'claimed': removed; take routing\.protocol = \"rounds\""),
+        ("mission.coverage_map=true", r"mission\.coverage_map: removed: as much was searched without it"),
         ("clusters.slots=8", r"clusters\.slots: removed .* take routing\.protocol = \"rounds\""),
     ],
 )

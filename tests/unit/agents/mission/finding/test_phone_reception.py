@@ -20,7 +20,7 @@ def heard_at_the_middle(*, reported: bool) -> float:
     """How far to the east a phone is placed that this UAV has received once, while others fly west of it."""
     survivors, neighbors = KnownSurvivors(MODEL), NeighborMotions()
     motion = OwnMotion(Enu(0, 0, UP_M), KnownObstacles(NO_MAP))
-    reception = PhoneReception(SCENARIO, NodeId(9), survivors, motion, Outbox(), None, neighbors)
+    reception = PhoneReception(SCENARIO, NodeId(9), survivors, motion, Outbox(), neighbors)
     reception.scan([(1, -88.0)], now_ns=0)
     for second in range(1, 13):
         for node, at in enumerate(WEST, start=1):

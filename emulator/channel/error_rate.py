@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from emulator.channel.ofdm_error_rate import SHORT_BYTES, TABLED_MBPS, bit_error, log_success
+from emulator.channel.ofdm_error_rate import SHORT_BYTES, bit_error, log_success
 from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
 from fanet_mw.airtime import is_ofdm
 from fanet_mw.scenario.tables.radio import DSSS_BANDWIDTH_HZ
@@ -34,7 +34,7 @@ def log_success_per_bit(rate_mbps: float, ofdm_errors: str = "nist", *, short: b
 
     `ofdm_errors` is `radio.ofdm_errors`; its tables differ for frames shorter than SHORT_BYTES.
     """
-    found = _log_success_per_bit(rate_mbps, tabled=ofdm_errors == "tables" and rate_mbps in TABLED_MBPS, short=short)
+    found = _log_success_per_bit(rate_mbps, tabled=ofdm_errors == "tables" and is_ofdm(rate_mbps), short=short)
     found.setflags(write=False)
     return found
 

@@ -94,10 +94,11 @@ def _network_rows(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         )
     missed = {name: part for name, part in summary["reachable"].items() if part["share"] is not None}
     if any(part["share"] < 1 for part in missed.values()):
-        yield (
-            "reachable",
-            ", ".join(f"{part['pdr']:.2%} of {part['share']:.1%} in reach ({name})" for name, part in missed.items()),
+        told = (
+            f"{part['pdr']:.2%} of {part['share']:.1%} in reach ({name})" if part["share"] else f"nobody ({name})"
+            for name, part in missed.items()
         )
+        yield "reachable", ", ".join(told)
     stated = summary["likely"]
     if stated:
         share = "-" if stated["within_share"] is None else f"{stated['within_share']:.2%}"

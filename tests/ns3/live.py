@@ -1,4 +1,4 @@
-"""ns-3.44 itself, run beside ours: `swarm.cc` in this folder, compiled against an installed ns-3.
+"""ns-3.44 itself, run beside ours: `swarm.cc` and `models.cc` in this folder, compiled against an installed ns-3.
 
 PREFIX is a folder with `include` and `lib64` of ns-3.44, such as `site-packages/ns3` of an environment in which `pip
 install ns3==3.44.post0` was run. It needs g++ too; neither is a dependency of ours.
@@ -10,15 +10,15 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Final
 
-_SOURCE: Final = Path(__file__).parent / "swarm.cc"
+_SOURCES: Final = Path(__file__).parent
 _MODULES: Final = ("core", "network", "internet", "mobility", "wifi", "propagation")
 
 
-def build(prefix: Path, folder: Path) -> Path:
+def build(prefix: Path, folder: Path, name: str = "swarm") -> Path:
     """The program, compiled into `folder`; raises CalledProcessError when that fails."""
-    program = folder / "swarm"
+    program = folder / name
     libraries = prefix / "lib64"
-    command = ["g++", "-O2", "-std=c++20", f"-I{prefix / 'include'}", str(_SOURCE), "-o", str(program)]
+    command = ["g++", "-O2", "-std=c++20", f"-I{prefix / 'include'}", str(_SOURCES / f"{name}.cc"), "-o", str(program)]
     command += [f"-L{libraries}", f"-Wl,-rpath,{libraries}", *(f"-lns3.44-{module}" for module in _MODULES)]
     subprocess.run(command, check=True)
     return program

@@ -1,9 +1,10 @@
 // Our scenarios `flooding`, `contention_broadcast`, `contention_unicast` and `hidden_terminal` in ns-3.44.
 //
-// 802.11b ad hoc at 11 Mb/s, UDP payload of 1024 bytes, addresses known from the start. Topologies: `grid`, 9 x 5 nodes
-// 200 m apart, where every node sends each new packet once more after U(0, jitter); `disc` of 100 m radius; `hidden`,
-// nodes at 0, 200, 400 m; `line`, nodes at `places`, each of which broadcasts what `sends` says and nothing else. Node 0
-// is the leader of the grid, the sink of unicast and the middle of `hidden`. Channel A: range 250 m; B: log-distance.
+// 802.11b or a ad hoc, addresses known from the start; by default 11 Mb/s and a UDP payload of 1024 bytes. Topologies:
+// `grid`, where every node sends each new packet once more after U(0, jitter); `disc` of 100 m radius; `chain`, all on a
+// line; `hidden`, three on a line, of which the ends send; `line`, nodes at `places`, each of which broadcasts what `sends`
+// says and nothing else. Node 0 is the leader of the grid, the sink of unicast and the middle of `hidden`. Channel A:
+// range 250 m; B: log-distance, with Jakes' fading if there is a `doppler`.
 // Prints one line of JSON: CPU seconds of Simulator::Run, frames sent, and shares; of a `line` when who began to transmit.
 //
 // Not part of the product; ns-3 links under its own licence.
@@ -28,13 +29,12 @@
 using namespace ns3;
 
 static const uint16_t PORT = 9000;
-static const uint32_t PAYLOAD = 1024;
 
 struct Settings
 {
-    std::string topology = "grid", channel = "A", cast = "broadcast", arrivals = "cbr", places, sends;
-    double interval = 1.0, duration = 100, jitter = 0.01;
-    uint32_t nodes = 45, sources = 44, run = 1;
+    std::string topology = "grid", channel = "A", cast = "broadcast", arrivals = "cbr", places, sends, standard = "b", rate = "11", errors;
+    double interval = 1.0, duration = 100, jitter = 0.01, spacing = 200, doppler = 0;
+    uint32_t nodes = 45, sources = 44, columns = 9, payload = 1024, run = 1;
 
     bool Unicast() const { return cast == "unicast"; }
 };
@@ -87,9 +87,9 @@ class Station : public Object
         ++g_counts.generated;
         uint64_t key = (uint64_t(m_id) << 32) | m_seq++;
         m_seen.insert(key);
-        uint8_t bytes[PAYLOAD] = {};
-        std::memcpy(bytes, &key, sizeof key);
-        Send(Create<Packet>(bytes, PAYLOAD));
+        std::vector<uint8_t> bytes(m_settings.payload);
+        std::memcpy(bytes.data(), &key, sizeof key);
+        Send(Create<Packet>(bytes.data(), bytes.size()));
         Simulator::Schedule(Seconds(Gap()), &Station::Generate, this);
     }
 
@@ -131,7 +131,7 @@ static std::string g_began;
 static void
 TransmissionBegins(uint32_t node, Ptr<const Packet> packet, double)
 {
-    g_counts.attempts += packet->GetSize() > PAYLOAD; // no ACK
+    g_counts.attempts += packet->GetSize() > 14; // no ACK
     std::ostringstream began;
     began << (g_began.empty() ? "[" : ", [") << node << ", " << Simulator::Now().GetNanoSeconds() << "]";
     g_began += began.str();
@@ -154,7 +154,7 @@ Parse(int argc, char** argv)
 {
     Settings s;
     CommandLine cmd;
-    cmd.AddValue("topology", "grid, disc, hidden or line", s.topology);
+    cmd.AddValue("topology", "grid, disc, chain, hidden or line", s.topology);
     cmd.AddValue("places", "of the nodes of the line [m], separated by commas", s.places);
     cmd.AddValue("sends", "on the line: node, instant [ns] and bytes of each broadcast, separated by commas", s.sends);
     cmd.AddValue("channel", "A or B", s.channel);
@@ -163,18 +163,23 @@ Parse(int argc, char** argv)
     cmd.AddValue("interval", "between packets of a source [s]", s.interval);
     cmd.AddValue("duration", "[s]; nothing is generated in the last second", s.duration);
     cmd.AddValue("jitter", "most that a relay waits [s]", s.jitter);
-    cmd.AddValue("nodes", "in the disc, with the sink", s.nodes);
+    cmd.AddValue("standard", "b or a", s.standard);
+    cmd.AddValue("rate", "of data [Mb/s]", s.rate);
+    cmd.AddValue("errors", "of OFDM: nist or tables; by default ns-3's own", s.errors);
+    cmd.AddValue("payload", "of UDP [bytes]", s.payload);
+    cmd.AddValue("spacing", "of the grid, the chain and hidden nodes [m]", s.spacing);
+    cmd.AddValue("columns", "of the grid", s.columns);
+    cmd.AddValue("doppler", "greatest of Jakes' fading [Hz]; 0: none", s.doppler);
+    cmd.AddValue("nodes", "with the sink", s.nodes);
     cmd.AddValue("sources", "nodes 1, 2, ... of the grid", s.sources);
     cmd.AddValue("run", "seed", s.run);
     cmd.Parse(argc, argv);
-    if (s.topology == "grid")
-        s.nodes = 45;
     if (s.topology == "hidden")
         s.nodes = 3;
     if (s.topology == "line")
         s.nodes = Numbers(s.places).size();
     if (s.arrivals == "saturated")
-        s.interval = 0.001;
+        s.interval = s.standard == "a" ? 0.0002 : 0.001;
     return s;
 }
 
@@ -183,14 +188,16 @@ Place(const NodeContainer& nodes, const Settings& s)
 {
     Ptr<ListPositionAllocator> places = CreateObject<ListPositionAllocator>();
     Ptr<UniformRandomVariable> uniform = CreateObject<UniformRandomVariable>();
-    const double middle_and_ends[] = {200, 0, 400};
+    const double middle_and_ends[] = {1, 0, 2};
     for (uint32_t i = 0; i < s.nodes; ++i)
     {
         double radius = 100 * std::sqrt(uniform->GetValue(0, 1)), angle = uniform->GetValue(0, 2 * M_PI);
         if (s.topology == "grid")
-            places->Add(Vector(200.0 * (i % 9), 200.0 * (i / 9), 0));
+            places->Add(Vector(s.spacing * (i % s.columns), s.spacing * (i / s.columns), 0));
+        else if (s.topology == "chain")
+            places->Add(Vector(s.spacing * i, 0, 0));
         else if (s.topology == "hidden")
-            places->Add(Vector(middle_and_ends[i], 0, 0));
+            places->Add(Vector(s.spacing * middle_and_ends[i], 0, 0));
         else if (s.topology == "line")
             places->Add(Vector(Numbers(s.places)[i], 0, 0));
         else
@@ -214,15 +221,24 @@ Radios(const NodeContainer& nodes, const Settings& s)
     {
         channel.AddPropagationLoss("ns3::LogDistancePropagationLossModel", "Exponent", DoubleValue(3),
                                    "ReferenceDistance", DoubleValue(1), "ReferenceLoss", DoubleValue(40.05));
+        if (s.doppler > 0)
+        {
+            Config::SetDefault("ns3::JakesProcess::DopplerFrequencyHz", DoubleValue(s.doppler));
+            channel.AddPropagationLoss("ns3::JakesPropagationLossModel");
+        }
         phy.Set("TxPowerStart", DoubleValue(30));
         phy.Set("TxPowerEnd", DoubleValue(30));
     }
     phy.SetChannel(channel.Create());
+    if (!s.errors.empty())
+        phy.SetErrorRateModel(s.errors == "nist" ? "ns3::NistErrorRateModel" : "ns3::TableBasedErrorRateModel");
     WifiMacHelper mac;
     mac.SetType("ns3::AdhocWifiMac");
     WifiHelper wifi;
-    wifi.SetStandard(WIFI_STANDARD_80211b);
-    StringValue rate("DsssRate11Mbps");
+    wifi.SetStandard(s.standard == "a" ? WIFI_STANDARD_80211a : WIFI_STANDARD_80211b);
+    std::string mode = (s.standard == "a" ? "OfdmRate" : "DsssRate") + s.rate + "Mbps";
+    std::replace(mode.begin(), mode.end(), '.', '_');
+    StringValue rate(mode);
     wifi.SetRemoteStationManager("ns3::ConstantRateWifiManager", "DataMode", rate, "ControlMode", rate,
                                  "NonUnicastMode", rate);
     NetDeviceContainer devices = wifi.Install(phy, mac, nodes);
@@ -254,7 +270,7 @@ main(int argc, char** argv)
     Ipv4InterfaceContainer interfaces = addresses.Assign(devices);
     NeighborCacheHelper().PopulateNeighborCache();
 
-    const bool all = s.topology == "disc" && !s.Unicast();
+    const bool all = (s.topology == "disc" || s.topology == "chain") && !s.Unicast();
     Ipv4Address destination = s.Unicast() ? interfaces.GetAddress(0) : Ipv4Address("255.255.255.255");
     std::vector<Ptr<Station>> stations;
     for (uint32_t i = 0; i < s.nodes; ++i)
@@ -282,7 +298,7 @@ main(int argc, char** argv)
     std::printf("{\"cpu_s\": %.3f, \"sent\": %lu, \"pdr\": %.6f, \"air.pdr\": %.6f, \"air.throughput_mbps\": %.6f, "
                 "\"air.attempt_failure\": %.6f, \"air.mean_retries\": %.6f}\n",
                 cpu_s, g_counts.sent, g_counts.delivered / (targets * g_counts.generated),
-                g_counts.received / (targets * g_counts.attempts), g_counts.received * 8e-6 * PAYLOAD / s.duration,
+                g_counts.received / (targets * g_counts.attempts), g_counts.received * 8e-6 * s.payload / s.duration,
                 double(g_counts.failed) / g_counts.attempts, (g_counts.failed - g_counts.given_up) / std::max(1.0, ended));
     stations.clear();
     Simulator::Destroy();

@@ -30,7 +30,7 @@ LEAST_SNR_DB: Final = {
     },
     "tables": {
         1.0: -6.65, 2.0: -2.5, 5.5: 0.35, 11.0: 3.35,
-        6.0: -1.65, 9.0: 5.05, 12.0: 1.35, 18.0: 3.85, 24.0: 6.65, 36.0: 9.8, 48.0: 13.65, 54.0: 15.05,
+        6.0: -1.65, 9.0: -0.3, 12.0: 1.35, 18.0: 3.85, 24.0: 6.65, 36.0: 9.8, 48.0: 13.65, 54.0: 15.05,
     },
 }  # fmt: skip
 """The SINR [dB] at which one of a hundred frames of 128 bytes arrives, by `ofdm_errors` and rate, by the emulator's

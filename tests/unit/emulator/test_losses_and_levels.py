@@ -209,7 +209,7 @@ def test_the_tables_of_ns3_need_less_than_the_bound_of_nist() -> None:
     assert half_db(54.0, "tables") == pytest.approx(17.5, abs=0.06)
     for rate_mbps in (6.0, 12.0, 18.0, 24.0, 36.0, 48.0, 54.0):
         assert 2.5 < half_db(rate_mbps, "nist") - half_db(rate_mbps, "tables") < 5.5
-    assert half_db(9.0, "tables") == half_db(9.0, "nist"), "there is no table for it"
+    assert half_db(6.0, "tables") < half_db(9.0, "tables") < half_db(12.0, "tables")
 
 
 def test_short_frames_have_the_table_of_short_frames(make_scenario: MakeScenario) -> None:

@@ -1,14 +1,17 @@
 """Deliveries are held against an ideal flood over the links as they were: traces by hand, reach 250 m."""
 
+import io
 from typing import Any
 
 import pytest
+from rich.console import Console
 
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import BoundStated, Delivered, Generated, Posed, RadioFault, Record
 from fanet_mw.units import MS, S
 from sim.results.metrics import summarize
 from sim.results.outcome import Outcome
+from sim.results.printed_summary import show
 
 NEAR, FAR = 200.0, 2000.0
 
@@ -51,6 +54,14 @@ def reachable(scenario: Scenario, *parts: list[Record]) -> dict[str, Any]:
 def test_who_is_never_in_reach_counts_against_nobody(scenario: Scenario) -> None:
     found = reachable(scenario, flight(99), packet(2, (2, 0.1)))
     assert (found["share"], found["pdr"]) == (0.5, 1.0)
+
+
+def test_a_run_in_which_nobody_was_ever_in_reach_is_printed(scenario: Scenario) -> None:
+    lonely = [each for t in range(11) for each in poses(t, 0.0, FAR, 2 * FAR)]
+    summary = summarize(Outcome(scenario, "virtual", 1.0, [*lonely, *packet(2)], {}), trace_sha256="")
+    assert summary["reachable"]["traffic"]["pdr"] is None
+    show(summary, console := Console(width=200, record=True, file=io.StringIO()))
+    assert "nobody (traffic)" in console.export_text()
 
 
 def test_who_was_in_reach_and_got_nothing_counts(scenario: Scenario) -> None:

@@ -1220,10 +1220,10 @@ class MAVLink_fanet_search_message(MAVLink_message):
     """
     The plan of a search: a formation, when it sweeps, and which node
     takes which place of it. Lines: two teams abreast begin beside the
-    middle of the area and part, a chain of relays lies between them.
-    Spiral: teams abreast turn about the middle, or a single one winds
-    outward. Sectors: each team sweeps its own. Ring: one team on a
-    square that grows. Followers fly behind.
+    middle of the area and part, or more in step, with chains of
+    relays between them. Spiral: teams abreast turn about the middle,
+    or a single one winds outward. Sectors: each team sweeps its own.
+    Ring: one team on a square that grows. Followers fly behind.
     """
 
     id = MAVLINK_MSG_ID_FANET_SEARCH
@@ -2542,10 +2542,11 @@ class MAVLink(object):
         """
         The plan of a search: a formation, when it sweeps, and which node
         takes which place of it. Lines: two teams abreast begin beside
-        the middle of the area and part, a chain of relays lies
-        between them. Spiral: teams abreast turn about the middle, or
-        a single one winds outward. Sectors: each team sweeps its own.
-        Ring: one team on a square that grows. Followers fly behind.
+        the middle of the area and part, or more in step, with chains
+        of relays between them. Spiral: teams abreast turn about the
+        middle, or a single one winds outward. Sectors: each team
+        sweeps its own. Ring: one team on a square that grows.
+        Followers fly behind.
 
         start_us                  : When everyone leaves for its place. [us] (type:uint64_t)
         half_width                : Lines: how far the outermost lanes are from the middle; others: half the width of the area. [m] (type:float)
@@ -2561,7 +2562,7 @@ class MAVLink(object):
         relays                    : Places of the chain. (type:uint8_t)
         followers                 : Places behind the teams. (type:uint8_t)
         shape                     : 0: lines, 1: spiral, 2: sectors, 3: ring, 4: circuit. (type:uint8_t)
-        teams                     : Lines abreast; 2 for lines. (type:uint8_t)
+        teams                     : Lines abreast; an even number for lines. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """
@@ -2571,10 +2572,11 @@ class MAVLink(object):
         """
         The plan of a search: a formation, when it sweeps, and which node
         takes which place of it. Lines: two teams abreast begin beside
-        the middle of the area and part, a chain of relays lies
-        between them. Spiral: teams abreast turn about the middle, or
-        a single one winds outward. Sectors: each team sweeps its own.
-        Ring: one team on a square that grows. Followers fly behind.
+        the middle of the area and part, or more in step, with chains
+        of relays between them. Spiral: teams abreast turn about the
+        middle, or a single one winds outward. Sectors: each team
+        sweeps its own. Ring: one team on a square that grows.
+        Followers fly behind.
 
         start_us                  : When everyone leaves for its place. [us] (type:uint64_t)
         half_width                : Lines: how far the outermost lanes are from the middle; others: half the width of the area. [m] (type:float)
@@ -2590,7 +2592,7 @@ class MAVLink(object):
         relays                    : Places of the chain. (type:uint8_t)
         followers                 : Places behind the teams. (type:uint8_t)
         shape                     : 0: lines, 1: spiral, 2: sectors, 3: ring, 4: circuit. (type:uint8_t)
-        teams                     : Lines abreast; 2 for lines. (type:uint8_t)
+        teams                     : Lines abreast; an even number for lines. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """

@@ -58,7 +58,7 @@ class Search(NamedTuple):
         """The plan of these fields; raises MalformedFrameError."""
         lanes, relays, followers, shape, teams, version = fields[-6:]
         places = teams * lanes + relays + followers
-        in_lines = shape == _LINES and teams == 2 and lanes >= 2
+        in_lines = shape == _LINES and teams >= 2 and teams % 2 == 0 and lanes >= 2
         other = _LINES < shape <= _LAST_SHAPE and teams >= 1 and lanes >= 1 and relays == 0
         refuse_unless(
             version == VERSION and (in_lines or other) and places <= MOST_PLACES,

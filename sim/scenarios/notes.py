@@ -15,6 +15,7 @@ from fanet_mw.scenario.tables.routing import PROTOCOLS
 from fanet_mw.scenario.tables.sections import Section
 from fanet_mw.scenario.tables.world import FASTEST_AIR_M_S
 from fanet_mw.units import S
+from fanet_mw.wire.search_plan import MOST_PLACES
 
 _NAMED: Final = 3
 """A note names at most this many things, and gives the number of the others."""
@@ -27,7 +28,7 @@ _CLUSTERED: Final = frozenset({"clustered"})
 
 
 def notes(scenario: Scenario) -> list[str]:
-    kinds = (_after_the_end, _without_effect, _still_waves, _beyond_the_vehicle, _odd_band, _guessed)
+    kinds = (_after_the_end, _without_effect, _without_place, _still_waves, _beyond_the_vehicle, _odd_band, _guessed)
     return [note for kind in kinds for note in kind(scenario)]
 
 
@@ -69,6 +70,15 @@ def _without_effect(scenario: Scenario) -> Iterator[str]:
                 value = getattr(section, other)
                 if other != key and wanted and wanted <= known and value in known and value not in wanted:
                     yield f"{table}.{key}: no effect with {table}.{other} = {value!r}"
+
+
+def _without_place(scenario: Scenario) -> Iterator[str]:
+    more = scenario.nodes.count - MOST_PLACES
+    if scenario.mission.search != "none" and more > 0:
+        yield (
+            f"nodes.count = {scenario.nodes.count}: the plan of a search has {MOST_PLACES} places; {more} of the UAVs "
+            "will get none, wait where they start, and fly to survivors only"
+        )
 
 
 def _still_waves(scenario: Scenario) -> Iterator[str]:

@@ -118,11 +118,9 @@ def fastest(count: int, demands: Demands) -> Pattern | None:
     found = [
         lines.fitted(count, demands),
         circuit.fitted(count, demands),
+        spiral.fitted(count, demands),
         *(sectors.fitted(count, teams, demands) for teams in range(1, count + 1)),
     ]
-    for some in range(1, count + 1):
-        arms = spiral.fitted(some, demands)
-        found.append(arms._replace(followers=arms.followers + count - some))
     patterns = [Pattern(made, reach_m=demands.reach_m) for made in found if made is not None]
     return min(patterns, key=lambda pattern: pattern.shape.sweep_s, default=None)
 

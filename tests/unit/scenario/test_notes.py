@@ -54,6 +54,13 @@ def test_what_comes_after_the_end_is_noted(changes: dict[str, object], said: lis
     assert [text.partition(": after the end")[0] for text in found] == said
 
 
+def test_uavs_for_whom_the_plan_has_no_place_are_noted() -> None:
+    few = ["world.area_m=1000", "nodes.spacing_m=50"]
+    assert notes(catalog.find("rescue", [*few, "nodes.count=79"])) == []
+    (said,) = notes(catalog.find("rescue", [*few, "nodes.count=82"]))
+    assert said.startswith("nodes.count = 82: the plan of a search has 79 places; 3 of the UAVs will get none")
+
+
 def test_an_order_after_the_end_is_noted() -> None:
     orders = 'orders=[{order="end", at_s=70}, {order="end", at_s=9}]'
     found = notes(catalog.find("rescue", ["duration_s=40", "ground.at_m=[0, 0]", orders]))

@@ -6,7 +6,7 @@
     relay      a place that only keeps two teams within radio reach of each other
     follower   a place behind a team that nothing depends on, so that its UAV may leave it
 
-    lines      two lines abreast part from the middle of the area; a chain of relays keeps the swarm connected
+    lines      two lines abreast part from the middle of the area, or more in step; chains of relays join them
     spiral     arms turn about the middle, or one arm winds outward from it; any number of UAVs will do
     sectors    one team sweeps each sector; more UAVs are free for survivors, but the swarm does not stay connected
     circuit    one team on a closed way over the whole area; any number of UAVs is used, and nobody need hear anybody
@@ -132,10 +132,11 @@ class Dimensions(NamedTuple):
     half_width_m: float
     """Lines: how far east and west of the middle the outermost lanes are. Other shapes: half the side of the area."""
     first_m: float
-    """Lines: the distance of each line from the middle when a sweep begins. Sectors: the distance of each team from the
-    side where its sweep begins. Spiral: the half-side of the innermost square."""
+    """Lines: the distance of the innermost lines from the middle when a sweep begins. Sectors: the distance of each
+    team from the side where its sweep begins. Spiral: the half-side of the innermost square."""
     last_m: float
-    """Lines and sectors: the same distance at the turn. Spiral: the half-side of the outermost square."""
+    """Lines and sectors: the same distance at the turn; the next lines began there. Spiral: the half-side of the
+    outermost square."""
     height_m: float
     speed_m_s: float
     shape: ShapeName = ShapeName.LINES
@@ -169,9 +170,11 @@ class Dimensions(NamedTuple):
 
     def follower(self, place: int) -> tuple[int, float]:
         """The team of a follower, and its position along that team, from 0 to 1; the followers of a team are evenly
-        distributed along it.
+        distributed along it, and few of them over many teams.
         """
         which = place - self.fixed
+        if self.followers <= self.teams > 2:
+            return (2 * which + 1) * self.teams // (2 * self.followers), 0.25 + 0.5 * (which % 2)
         team = which % self.teams
         of_team = (self.followers + self.teams - 1 - team) // self.teams
         return team, (which // self.teams + 0.5) / of_team

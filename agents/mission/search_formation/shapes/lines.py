@@ -6,8 +6,11 @@
                               |  chain          the relays of the chain spread as the lines part
             line 1   o--o--o--o--o--o--o
 
+With UAVs enough there are more lines, as many to the north as to the south: each sweeps its share of its half and ends
+where the next one began, and chains join neighboring ones unless these are within reach of each other anyway.
+
 The words place, lane, team, relay and follower are explained in `contract.py`; the teams of this formation are its
-lines.
+lines, from the northernmost to the southernmost.
 
 Between two turns each place of a line moves straight at constant speed. A relay does so, too, but changes its velocity
 once, when the lines have flown `_STRAIGHT_M`. The distance of two such places is therefore a convex function of time
@@ -44,15 +47,38 @@ _SIDE_M: Final = 65.0
 still shift to either side."""
 _LEAST_LANES: Final = 2
 """The least number of lanes of a line, which has one at each end."""
+_LEAST_APART_M: Final = 60.0
+"""The least distance of two lines on the same side of the middle."""
+_FREE: Final = 4
+"""More than two lines are flown only if they leave so many followers, who are free for survivors."""
 
 
 class Lines:
-    """The positions of the places of two lines, their chain and their followers."""
+    """The positions of the places of all lines, their chains and their followers."""
 
-    def __init__(self, formation: Dimensions, *, most_m: float = math.inf) -> None:
-        """`most_m`: how far from the middle the lines may be for the relays that are left."""
+    def __init__(self, formation: Dimensions, *, most_m: float = math.inf, gaps_m: tuple[float, ...] = ()) -> None:
+        """`most_m`: how far from the middle the innermost lines may be for the relays that are left; `gaps_m`: the
+        distances of neighboring lines, from north to south, that those relays can span.
+        """
         self._formation = formation
         self._most_m = most_m
+        self._half = half = formation.teams // 2
+        """The number of lines to the north of the middle, and to the south."""
+        self._apart_m = formation.last_m - formation.first_m
+        gaps_m = gaps_m or (self._apart_m,) * (formation.teams - 1)
+        northern, southern = gaps_m[: half - 1][::-1], gaps_m[half:]
+        self._outward_m = tuple(
+            math.fsum((northern if line < half else southern)[: half - 1 - line if line < half else line - half])
+            for line in range(formation.teams)
+        )
+        """How much farther from the middle each line is than the innermost one on its side."""
+        of_side = formation.relays // formation.teams
+        sizes = [of_side] * (formation.teams - 1)
+        sizes[half - 1] = formation.relays - (formation.teams - 2) * of_side
+        starts = [formation.teams * formation.lanes + sum(sizes[:chain]) for chain in range(formation.teams - 1)]
+        self._chains = tuple(
+            RowOfPlaces(start, size, RowKind.BETWEEN) for start, size in zip(starts, sizes, strict=True)
+        )
 
     @property
     def sweep_s(self) -> float:
@@ -64,52 +90,72 @@ class Lines:
 
     def at(self, place: float, swept_s: float) -> Enu:
         formation = self._formation
-        north, lanes = self._north_m(swept_s), formation.lanes
-        if place <= 2 * lanes - 1:
+        inner_m, lanes = self._inner_m(swept_s), formation.lanes
+        if place <= formation.teams * lanes - 1:
             line, lane = divmod(place, lanes)
-            return Enu(self._lane(lane), north if line == 0 else -north, formation.height_m)
+            return Enu(self._lane(lane), self._north_m(int(line), inner_m), formation.height_m)
         if place < formation.fixed:
-            share = 1 - 2 * (place - 2 * lanes + 1) / (formation.relays + 1)
-            east = -_BUNCHED_M * share * max(0.0, 1 - (north - formation.first_m) / _STRAIGHT_M)
-            return Enu(self._lane(lanes // 2) + east, share * north, formation.height_m + _CHAIN_HIGHER_M)
+            chain, row = next((c, row) for c, row in enumerate(self._chains) if place < row.first + row.size)
+            share = 1 - 2 * (place - row.first + 1) / (row.size + 1)
+            up_m, middle = formation.height_m + _CHAIN_HIGHER_M, self._lane(lanes // 2)
+            if chain != self._half - 1:
+                ends = self._north_m(chain, inner_m), self._north_m(chain + 1, inner_m)
+                return Enu(middle, (sum(ends) + share * (ends[0] - ends[1])) / 2, up_m)
+            east = -_BUNCHED_M * share * max(0.0, 1 - (inner_m - formation.first_m) / _STRAIGHT_M)
+            return Enu(middle + east, share * inner_m, up_m)
         line, share = formation.follower(round(place))
-        behind = max(north - FOLLOW_M, formation.first_m * 0.5)
+        outward_m = self._outward_m[line]
+        behind_m = FOLLOW_M if not outward_m else min(FOLLOW_M, self._apart_m / 2)
+        behind = max(inner_m + outward_m - behind_m, formation.first_m * 0.5)
         east = formation.half_width_m * (2 * share - 1)
-        return Enu(east, behind if line == 0 else -behind, formation.height_m + FOLLOWER_HIGHER_M)
+        return Enu(east, behind if line < self._half else -behind, formation.height_m + FOLLOWER_HIGHER_M)
 
     def tethers(self, place: int) -> tuple[int, ...]:
-        lanes, relays = self._formation.lanes, self._formation.relays
+        formation = self._formation
+        lanes = formation.lanes
         middle = lanes // 2
         found: list[int] = []
-        if place < 2 * lanes:
+        if place < formation.teams * lanes:
             line, lane = divmod(place, lanes)
             found += [place - 1] if lane > 0 else []
             found += [place + 1] if lane < lanes - 1 else []
             if lane == middle:
-                chain_end = 2 * lanes + (0 if line == 0 else relays - 1)
-                found.append(chain_end if relays else (lanes + middle if line == 0 else middle))
-        elif place < 2 * lanes + relays:
-            found.append(place - 1 if place > 2 * lanes else middle)
-            found.append(place + 1 if place < 2 * lanes + relays - 1 else lanes + middle)
+                found += [self._joined(line - 1)[-2]] if line > 0 else []
+                found += [self._joined(line)[1]] if line < formation.teams - 1 else []
+        elif place < formation.fixed:
+            joined = next(self._joined(c) for c, row in enumerate(self._chains) if place in row.places)
+            found += [joined[joined.index(place) - 1], joined[joined.index(place) + 1]]
         return tuple(found)
 
+    def _joined(self, chain: int) -> tuple[int, ...]:
+        """The places from the middle of a line to that of the next one to the south, over the chain between them."""
+        lanes = self._formation.lanes
+        middle = chain * lanes + lanes // 2
+        return (middle, *self._chains[chain].places, middle + lanes)
+
     def rows(self) -> tuple[RowOfPlaces, ...]:
-        lanes, relays = self._formation.lanes, self._formation.relays
-        two = tuple(RowOfPlaces(first, lanes, RowKind.SPAN) for first in (0, lanes))
-        return (*two, RowOfPlaces(2 * lanes, relays, RowKind.BETWEEN))
+        lanes = self._formation.lanes
+        lines = tuple(RowOfPlaces(line * lanes, lanes, RowKind.SPAN) for line in range(self._formation.teams))
+        return lines + self._chains
 
     def drawn_in(self, left: tuple[int, ...], hop_m: float) -> "Lines":
-        formation = self._formation
-        half_width_m = min(formation.half_width_m, max(1, min(left[:2]) - 1) * hop_m / 2)
-        return Lines(formation._replace(half_width_m=half_width_m), most_m=(left[2] + 1) * hop_m / 2)
+        formation, lines = self._formation, self._formation.teams
+        half_width_m = min(formation.half_width_m, max(1, min(left[:lines]) - 1) * hop_m / 2)
+        gaps_m = tuple(min(self._apart_m, (relays + 1) * hop_m) for relays in left[lines:])
+        most_m = (left[lines + self._half - 1] + 1) * hop_m / 2
+        return Lines(formation._replace(half_width_m=half_width_m), most_m=most_m, gaps_m=gaps_m)
 
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
         """The distance of a point from a line to the north or south; a line is taken to be as wide as the area."""
-        north = self._north_m(swept_s)
-        return abs(north_m - (north if team == 0 else -north))
+        return abs(north_m - self._north_m(team, self._inner_m(swept_s)))
 
-    def _north_m(self, swept_s: float) -> float:
+    def _inner_m(self, swept_s: float) -> float:
+        """How far from the middle the innermost lines are."""
         return min(self._most_m, swept_m(self._formation, swept_s))
+
+    def _north_m(self, line: int, inner_m: float) -> float:
+        out_m = inner_m + self._outward_m[line]
+        return out_m if line < self._half else -out_m
 
     def _lane(self, lane: float) -> float:
         """East of a lane [m]."""
@@ -117,15 +163,29 @@ class Lines:
 
 
 def fitted(count: int, demands: Demands) -> Dimensions | None:
-    """The lines with which this number of UAVs can sweep a square area in one piece; None if they are too few."""
+    """As many lines as this number of UAVs can sweep a square area with in one piece; None if they are too few for two.
+    More lines take less time.
+    """
     half = demands.area_m / 2
     edge, side = min(EDGE_M, half / 2), min(_SIDE_M, half / 2)
     half_width = half - side
     lanes = max(_LEAST_LANES, math.ceil(2 * half_width / demands.apart_m(demands.reach_m)) + 1)
-    last = half - edge
-    relays = max(0, math.ceil(2 * last / demands.hop_m) - 1)
-    followers = count - 2 * lanes - relays
-    if followers < 0:
-        return None
-    first = min(FIRST_M, last / 2)
-    return Dimensions(lanes, relays, followers, half_width, first, last, demands.height_m, demands.speed_m_s)
+    first = min(FIRST_M, (half - edge) / 2)
+    found: Dimensions | None = None
+    for of_half in range(1, count // (2 * lanes) + 1):
+        apart = (half - edge - first) / of_half
+        relays = _relays(2 * (first + apart), demands.hop_m) + 2 * (of_half - 1) * _relays(apart, demands.hop_m)
+        followers = count - 2 * of_half * lanes - relays
+        if followers < 0:
+            continue
+        if of_half == 1 or (apart >= _LEAST_APART_M and followers >= _FREE):
+            found = Dimensions(
+                lanes, relays, followers, half_width, first, first + apart, demands.height_m, demands.speed_m_s,
+                teams=2 * of_half,
+            )  # fmt: skip
+    return found
+
+
+def _relays(gap_m: float, hop_m: float) -> int:
+    """The number of relays that join two lines at this distance."""
+    return max(0, math.ceil(gap_m / hop_m) - 1)

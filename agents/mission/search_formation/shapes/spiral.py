@@ -152,8 +152,15 @@ def _on_square(turned: float) -> tuple[float, float]:
 
 def fitted(count: int, demands: Demands) -> Dimensions:
     """The spiral for a number of UAVs: as many full arms as there are UAVs for and as have room in the middle, or one
-    winding arm of all UAVs if they are too few for a full arm. UAVs that are left over become followers.
+    winding arm if they are too few for a full one, of as many UAVs as fly it in the shortest time. Those who are left
+    over become followers.
     """
+    found = (_of(some, demands) for some in range(1, count + 1))
+    made = min(found, key=lambda made: Spiral(made).sweep_s)
+    return made._replace(followers=count - made.fixed)
+
+
+def _of(count: int, demands: Demands) -> Dimensions:
     half = demands.area_m / 2
     apart_m = demands.apart_m(demands.reach_m / math.sqrt(2))
     needed = math.ceil(half / apart_m)
@@ -162,6 +169,6 @@ def fitted(count: int, demands: Demands) -> Dimensions:
     first_m = half / (2 * lanes * rounds)
     teams = max(1, min(count // needed, math.floor(8 * first_m / _ARMS_M)))
     return Dimensions(
-        lanes, 0, count - teams * lanes, half, first_m, first_m * (2 * lanes * rounds - 1), demands.height_m,
-        demands.speed_m_s, ShapeName.SPIRAL, teams,
+        lanes, 0, 0, half, first_m, first_m * (2 * lanes * rounds - 1), demands.height_m, demands.speed_m_s,
+        ShapeName.SPIRAL, teams,
     )  # fmt: skip

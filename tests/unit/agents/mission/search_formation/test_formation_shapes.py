@@ -167,6 +167,27 @@ def test_sectors_lie_in_rows_that_leave_none_over(teams: int, rows: int) -> None
     assert rows_of(teams) == rows
 
 
+@pytest.mark.parametrize(("count", "area_m"), [(32, 1000), (41, 1000), (76, 1000), (73, 2500)])
+def test_more_than_two_lines_move_as_one_piece_and_nobody_meets(count: int, area_m: float) -> None:
+    pattern = formed(ShapeName.LINES, count, area_m)
+    assert pattern.dimensions.teams > 2
+    for second in range(2 * round(pattern.shape.sweep_s) + 20):
+        places = [pattern.at(place, second) for place in range(pattern.places)]
+        assert pieces(places) == 1, second
+        assert min(a.minus(b).norm() for a, b in itertools.combinations(places, 2)) > 8.0, second
+
+
+@pytest.mark.parametrize("shape", [ShapeName.LINES, ShapeName.SPIRAL])
+def test_one_more_uav_is_never_slower(shape: ShapeName) -> None:
+    times = [made.shape.sweep_s for n in range(1, 90) if (made := fitted(n, demands(1000), shape=shape)) is not None]
+    assert all(after <= before + 1e-9 for before, after in itertools.pairwise(times))
+
+
+def test_twice_the_uavs_sweep_in_lines_in_half_the_time() -> None:
+    times = [formed(ShapeName.LINES, count, 1000).shape.sweep_s for count in (20, 40, 80)]
+    assert times == pytest.approx([61.2, 30.6, 10.2], abs=0.1)
+
+
 def test_a_ring_is_so_large_that_it_hangs_by_no_single_uav() -> None:
     pattern = formed(ShapeName.RING)
     for second in range(0, 2 * round(pattern.shape.sweep_s) + 20, 3):
@@ -207,6 +228,15 @@ def test_whoever_is_left_of_a_row_closes_ranks_and_keeps_the_order(
                 assert apart <= 0.96 * REACH_M or len(left) < 8, (place, other)
         for place in left:
             assert not set(closed.tethers(place, swept_s)) & vacant
+
+
+@pytest.mark.parametrize("lost", [[2], [61], [64], [68, 20], [3, 17, 36, 60, 65]])
+def test_more_than_two_lines_without_some_of_their_uavs_are_one_piece(lost: list[int]) -> None:
+    whole = formed(ShapeName.LINES, 73, 2500)
+    pattern = whole.closed(frozenset(lost))
+    left = [place for place in range(73) if place not in lost]
+    for second in range(45, 2 * round(whole.shape.sweep_s) + 20, 5):
+        assert pieces([pattern.at(place, second) for place in left]) == 1, second
 
 
 @pytest.mark.parametrize("shape", [ShapeName.LINES, ShapeName.RING])

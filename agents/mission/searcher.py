@@ -42,7 +42,7 @@ from agents.mission.orders import KnownOrders, record_of
 from agents.mission.outbox import Outbox
 from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.formation_planner import FormationPlanner
-from agents.mission.search_formation.pattern import Pattern, fastest, fitted
+from agents.mission.search_formation.pattern import Pattern, fastest, fitted, of_few
 from agents.mission.search_formation.plan_exchange import PlanExchange
 from agents.mission.search_formation.roll_call import RollCall
 from agents.mission.search_formation.shapes.contract import Demands, ShapeName
@@ -110,6 +110,7 @@ class Searcher:
         planner = FormationPlanner(
             node, roll_call, expected=nodes.count, deploy_speed_m_s=_DEPLOY * least_m_s,
             take_off_ns=take_off_ns(nodes.altitude_m) if nodes.on_ground else 0,
+            of_few=lambda count, now_ns: None if self._is_swept(now_ns) else _of_few(scenario, count),
         )  # fmt: skip
         self._plans = PlanExchange(
             node, planner, roll_call, place, own_motion, outbox,
@@ -241,10 +242,14 @@ class Searcher:
 
     def _is_over(self, now_ns: int) -> bool:
         """True once the area was swept often enough, and nobody is sought or it was swept once more."""
-        sweeps, place = self._limits.sweeps, self._place
-        if not sweeps or not place.is_swept(now_ns, times=sweeps):
+        if not self._is_swept(now_ns):
             return False
-        return not self._survivors.sought() or place.is_swept(now_ns, times=sweeps + 1)
+        return not self._survivors.sought() or self._place.is_swept(now_ns, times=self._limits.sweeps + 1)
+
+    def _is_swept(self, now_ns: int) -> bool:
+        """True once the area was swept often enough."""
+        sweeps = self._limits.sweeps
+        return bool(sweeps) and self._place.is_swept(now_ns, times=sweeps)
 
     def scan(self, heard: Sequence[tuple[int, float]], *, now_ns: int) -> None:
         """The receiver detects these phones with these powers [dBm], and no others."""
@@ -416,18 +421,28 @@ def _view_m(scenario: Scenario) -> tuple[float, float]:
 
 def formation(scenario: Scenario, count: int) -> Pattern | None:
     """The formation in which this number of UAVs searches the area of a scenario; None if they are too few."""
-    demands = Demands(
+    demands = demands_of(scenario)
+    search = scenario.mission.search
+    if search == "fastest":
+        return fastest(count, demands)
+    shape = ShapeName.LINES if search == "none" else ShapeName[search.upper()]
+    return fitted(count, demands, shape=shape, sectors_wanted=scenario.clusters.count)
+
+
+def _of_few(scenario: Scenario, count: int) -> Pattern:
+    """The formation in which so few UAVs search, when others have flown home."""
+    return of_few(count, demands_of(scenario), connected=scenario.mission.connection == "always")
+
+
+def demands_of(scenario: Scenario) -> Demands:
+    """The requirements of a scenario that a formation is fitted to."""
+    return Demands(
         area_m=scenario.world.area_m,
         seen_m=_ground_range_m(scenario),
         reach_m=scenario.radio.range_m,
         height_m=scenario.nodes.altitude_m,
         speed_m_s=scenario.mobility.speed_m_s,
     )
-    search = scenario.mission.search
-    if search == "fastest":
-        return fastest(count, demands)
-    shape = ShapeName.LINES if search == "none" else ShapeName[search.upper()]
-    return fitted(count, demands, shape=shape, sectors_wanted=scenario.clusters.count)
 
 
 def unflyable(scenario: Scenario) -> Iterator[str]:

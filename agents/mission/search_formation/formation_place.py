@@ -51,8 +51,9 @@ class FormationPlace:
         """The instant at which it leaves that position."""
 
     def adopt(self, plan: Search, now_ns: int) -> None:
-        first = self.place is None
-        self.plan, self.pattern = plan, pattern_of(plan, reach_m=self._reach_m)
+        made, before = pattern_of(plan, reach_m=self._reach_m), self.pattern
+        first = self.place is None or before is None or before.dimensions != made.dimensions
+        self.plan, self.pattern = plan, made
         self.place = plan.nodes.index(self._node) if self._node in plan.nodes else None
         if first:
             self.depart(now_ns)

@@ -7,7 +7,8 @@
                 seemed to be lost has its place still
     newcomers:  a node that has no place gets one that nobody has, or that of a node that was not received for _LOST_NS
     take-off:   the first plan of UAVs on the ground begins when they have had time to climb
-    leavers:    a node whose status says that its battery is only enough for the way home is replaced at once
+    leavers:    a node whose status says that its battery is only enough for the way home is replaced at once; once the
+                others cannot span the area any more, they get a plan of their own, and begin anew
     alone:      a node that has received nobody takes the place with its own number, and keeps it; others that are
                 alone then search other lanes
     restarts:   a node without a plan that hears of others' waits to be told it, even if it has the lowest id; of those
@@ -19,6 +20,7 @@ become followers, on whom nothing depends. The words place, team, relay and
 follower are explained in `shapes/contract.py`; how the area is split into lanes is in `shapes/`.
 """
 
+from collections.abc import Callable, Collection
 from typing import Final, NamedTuple
 
 from agents.mission.hungarian import assign
@@ -50,6 +52,8 @@ _ASKS_NS: Final = 60 * S
 """How long a node without a plan waits to be told that of the others before it makes one that replaces theirs."""
 _BUSY_M2: Final = 500.0**2
 """By how much longer a way, squared, a UAV may have that becomes a follower because it is out for a survivor."""
+_LEAVE_NS: Final = 6 * S
+"""Once a UAV has left, those who leave with it have said so within this time: all do at the end of a search."""
 _REVISION_BITS: Final = 16
 
 
@@ -70,15 +74,27 @@ class FormationPlanner:
     """The planning at one node. Any node can be the planner; all others only listen."""
 
     def __init__(
-        self, node: NodeId, roll_call: RollCall, *, expected: int, deploy_speed_m_s: float, take_off_ns: int = 0
+        self,
+        node: NodeId,
+        roll_call: RollCall,
+        *,
+        expected: int,
+        deploy_speed_m_s: float,
+        of_few: Callable[[int, int], Pattern | None],
+        take_off_ns: int = 0,
     ) -> None:
-        """`take_off_ns`: the time that UAVs need for their take-off, before which the first plan does not begin."""
+        """`of_few`: the formation for so many UAVs at an instant, when others have flown home; None if the search is
+        over. `take_off_ns`: the time that UAVs need
+        for their take-off, before which the first plan does not begin.
+        """
         self._node = node
         self._roll_call = roll_call
-        self._take_off_ns = take_off_ns
+        self._take_off_ns, self._of_few = take_off_ns, of_few
         self._expected = expected
         self._deploy_speed = deploy_speed_m_s
         self._members: dict[int, _HeardUav] = {}
+        self._left_ns: dict[int, int] = {}
+        """The instant at which each UAV first said that it flies home."""
         self._began_ns: int | None = None
         self.plan: Search | None = None
         self.to_tell: list[Search] = []
@@ -98,6 +114,10 @@ class FormationPlanner:
         before = self._members.get(status.node)
         if before is None or status.t_us * US >= before.heard_ns - S:
             stated_ns = min(now_ns, status.t_us * US)
+            if status.charge == 0:
+                self._left_ns.setdefault(status.node, now_ns)
+            else:
+                self._left_ns.pop(status.node, None)
             self._members[status.node] = _HeardUav(
                 status.position,
                 stated_ns,
@@ -202,9 +222,10 @@ class FormationPlanner:
             self._told_ns = now_ns
             self.to_tell.append(self.plan)
 
-    def _first(self, pattern: Pattern, now_ns: int) -> Search:
-        """The first plan of the search, for all UAVs that were received and stay."""
-        nodes = sorted(node for node, member in self._members.items() if not member.leaves)[: pattern.places]
+    def _first(self, pattern: Pattern, now_ns: int, *, but: Collection[int] = ()) -> Search:
+        """The first plan of a formation, for all UAVs that were received and stay, `but` these."""
+        staying = (node for node, member in self._members.items() if not member.leaves and node not in but)
+        nodes = sorted(staying)[: pattern.places]
         alone = len(nodes) == 1
         places = [(nodes[0] - 1) % pattern.places] if alone else list(range(pattern.places))
         goals = [pattern.at(place, 0.0) for place in places]
@@ -246,9 +267,25 @@ class FormationPlanner:
             if vacant and node not in holders and not member.leaves and now_ns - member.heard_ns <= _LOST_NS:
                 holders[min(vacant, key=lambda place: _distance2(pattern.at(place, 0.0), member.position))] = node
         _fill(holders, pattern)
+        anew = self._for_those_who_stay(pattern, holders, now_ns)
+        if anew is not None:
+            return anew._replace(revision=_next(plan.revision))
         if tuple(holders) == plan.nodes:
             return None
         return plan._replace(revision=_next(plan.revision), planner=self._node, nodes=tuple(holders))
+
+    def _for_those_who_stay(self, pattern: Pattern, holders: list[int], now_ns: int) -> Search | None:
+        """The plan of another formation, if so many have flown home that the others cannot span this one any more; None
+        while they can, while others may be about to leave as well, and if the search is over.
+        """
+        gone = self.leavers
+        if not gone or now_ns - max(self._left_ns[node] for node in gone) < _LEAVE_NS:
+            return None
+        if pattern.spans(frozenset(place for place in range(pattern.dimensions.fixed) if not holders[place])):
+            return None
+        lost = set(self._roll_call.lost) - {self._node}
+        few = self._of_few(len(self._members.keys() - gone - lost), now_ns)
+        return None if few is None or few.dimensions == pattern.dimensions else self._first(few, now_ns, but=lost)
 
     def _is_up_for_grabs(self, holder: int, now_ns: int) -> bool:
         """True for a place that nobody holds, or a UAV that has been lost for long."""

@@ -4,6 +4,7 @@ The words place, team, lane, relay and follower are explained in `shapes/contrac
 """
 
 from collections.abc import Callable, Mapping
+from itertools import pairwise
 from typing import Final, assert_never
 
 from agents.mission.search_formation.shapes import circuit, lines, ring, sectors, spiral
@@ -50,6 +51,20 @@ class Pattern:
     def closed(self, vacant: frozenset[int]) -> "Pattern":
         """The same formation without the UAVs of these places."""
         return Pattern(self.dimensions, reach_m=self._reach_m, vacant=vacant)
+
+    def spans(self, vacant: frozenset[int]) -> bool:
+        """True if the UAVs of the other places can sweep all that this formation sweeps."""
+        if self.dimensions.shape is ShapeName.CIRCUIT or not vacant:
+            return True
+        closed, whole, end_s = self.closed(vacant), _SHAPES[self.dimensions.shape](self.dimensions), self.shape.sweep_s
+        for row in whole.rows():
+            if any(closed.shape.at(end, end_s) != whole.at(end, end_s) for end in {row.places[0], row.places[-1]}):
+                return False
+            shared = row.shared(vacant)
+            flown = [whole.at(shared.get(place, place), end_s) for place in row.places if place not in vacant]
+            if not flown or any(a.minus(b).horizontal() > self._hop_m for a, b in pairwise(flown)):
+                return False
+        return True
 
     @property
     def places(self) -> int:
@@ -123,6 +138,17 @@ def fastest(count: int, demands: Demands) -> Pattern | None:
     ]
     patterns = [Pattern(made, reach_m=demands.reach_m) for made in found if made is not None]
     return min(patterns, key=lambda pattern: pattern.shape.sweep_s, default=None)
+
+
+def of_few(count: int, demands: Demands, *, connected: bool = True) -> Pattern:
+    """The formation of any shape in which so many UAVs sweep the area in the shortest time, in one piece all the time
+    if it has to be `connected`: lines, one line abreast, or a spiral.
+    """
+    count = min(count, MOST_PLACES)
+    found = [lines.fitted(count, demands), sectors.fitted(count, 1, demands), spiral.fitted(count, demands)]
+    found += [] if connected else [circuit.fitted(count, demands)]
+    patterns = [Pattern(made, reach_m=demands.reach_m) for made in found if made is not None]
+    return min(patterns, key=lambda pattern: pattern.shape.sweep_s)
 
 
 def fitted(

@@ -1,10 +1,10 @@
 """The place of a UAV in the formation: taking it up, staying near it."""
 
 import pytest
-from search_board import FOLLOWER, LINE, TAKEN_UP_NS, UP_M, Board
+from search_board import FOLLOWER, LINE, PLAN, TAKEN_UP_NS, UP_M, Board
 
 from agents.mission.finding.phone_localization import Estimate
-from fanet_mw.units import STILL, Enu, NodeId, S
+from fanet_mw.units import STILL, US, Enu, NodeId, S
 
 
 def test_who_has_no_plan_waits_where_it_is() -> None:
@@ -20,6 +20,17 @@ def test_a_place_is_taken_up_on_a_straight_way_that_begins_and_ends_with_the_pla
     half = board.place.lane(35 * S)[0]
     assert (half.east, half.north) == pytest.approx((end.east / 2, (end.north - 400) / 2))
     assert (board.place.is_taken_up(TAKEN_UP_NS - 1), board.place.is_taken_up(TAKEN_UP_NS)) == (False, True)
+
+
+def test_who_gets_a_place_in_another_formation_flies_there_from_where_it_is() -> None:
+    here = Enu(300, -900, UP_M)
+    board, now_ns = Board(LINE, here), TAKEN_UP_NS + 90 * S
+    later = PLAN._replace(revision=2, start_us=now_ns // US)
+    board.place.adopt(later, now_ns)
+    assert board.place.lane(now_ns)[0] != here, "the same formation goes on"
+    board.place.adopt(later._replace(revision=3, last_m=1000.0), now_ns)
+    assert board.place.lane(now_ns)[0] == here
+    assert not board.place.is_taken_up(now_ns)
 
 
 def test_a_uav_of_a_line_stays_near_its_lane_and_a_follower_goes_anywhere() -> None:

@@ -6,8 +6,8 @@ from collections.abc import Collection, Sequence
 
 import pytest
 
-from agents.mission.search_formation.formation_planner import FormationPlanner, plan_of
-from agents.mission.search_formation.pattern import Pattern, fitted
+from agents.mission.search_formation.formation_planner import FormationPlanner, pattern_of, plan_of
+from agents.mission.search_formation.pattern import Pattern, fitted, of_few
 from agents.mission.search_formation.roll_call import RollCall
 from agents.mission.search_formation.shapes.contract import Demands, ShapeName
 from fanet_mw.units import US, Enu, NodeId, S
@@ -70,7 +70,10 @@ def test_too_few_have_no_formation() -> None:
 def planner_of(node: int, *, expected: int, lost: Collection[int] = (), take_off_ns: int = 0) -> FormationPlanner:
     roll_call = RollCall(NodeId(node), hello_interval_s=1.0)
     roll_call.lost.update(dict.fromkeys(lost, 0))
-    return FormationPlanner(NodeId(node), roll_call, expected=expected, deploy_speed_m_s=9, take_off_ns=take_off_ns)
+    return FormationPlanner(
+        NodeId(node), roll_call, expected=expected, deploy_speed_m_s=9, take_off_ns=take_off_ns,
+        of_few=lambda count, now_ns: of_few(count, DEMANDS) if now_ns < 300 * S else None,
+    )  # fmt: skip
 
 
 def planner_with(nodes: int, *, node: int = 1, lost: Collection[int] = ()) -> FormationPlanner:
@@ -190,6 +193,45 @@ def test_who_flies_home_holds_no_place_any_more_from_when_it_says_so() -> None:
     assert leaver not in after.nodes
     assert sorted(node for node in after.nodes if node) == [node for node in range(1, 46) if node != leaver]
     assert after.nodes[3] in before.nodes[pattern.followers.start :]
+
+
+@pytest.mark.parametrize(("leavers", "whole"), [(3, True), (20, False)])
+def test_when_those_who_stay_cannot_span_the_area_they_fly_a_formation_that_they_can(leavers: int, whole: bool) -> None:
+    planner, pattern = planner_with(45), formation()
+    planner.review(pattern, now_ns=S)
+    planner.review(pattern, now_ns=2 * S)
+    before = planner.plan
+    assert before is not None
+    for node in range(46 - leavers, 46):
+        planner.status(SearchStatus(20_000_000, Enu(0, 0, 50), node, 1, 0), now_ns=20 * S)
+    assert planner.review(pattern, now_ns=20 * S)
+    assert planner.plan is not None
+    assert planner.plan.start_us == before.start_us, "others may be about to say that they leave as well"
+    planner.review(pattern, now_ns=21 * S)
+    assert planner.review(pattern, now_ns=32 * S) != whole
+    plan = planner.plan
+    assert plan is not None
+    assert (plan.start_us == before.start_us, plan.shape == before.shape) == (whole, whole)
+    assert plan.revision == before.revision + (1 if whole else 2)
+    assert sorted(node for node in plan.nodes if node) == list(range(1, 46 - leavers))
+    made = pattern_of(plan, reach_m=REACH_M)
+    places = [made.at(place, 0.0) for place in range(made.places)]
+    assert is_one(places)
+    assert max(place.east for place in places) > 1100
+    assert not planner.review(pattern, now_ns=90 * S), "it is not made anew while it can be flown"
+
+
+def test_nobody_begins_anew_when_the_search_is_over() -> None:
+    planner, pattern = planner_with(45), formation()
+    planner.review(pattern, now_ns=S)
+    before = planner.plan
+    assert before is not None
+    for node in range(1, 46):
+        planner.status(SearchStatus(300_000_000, Enu(0, 0, 50), node, 1, 0 if node > 9 else 99), now_ns=300 * S)
+    for second in (300, 301, 320):
+        planner.review(pattern, now_ns=second * S)
+        assert planner.plan is not None
+        assert planner.plan.start_us == before.start_us
 
 
 def test_a_planner_that_flies_home_leaves_planning_to_the_next() -> None:

@@ -22,7 +22,10 @@ class Exchange:
         self.out, self.motion = Outbox(), OwnMotion(lane_of(node, NOW_NS), OPEN)
         self.place = FormationPlace(node, self.motion, reach_m=REACH_M)
         roll_call = RollCall(node, hello_interval_s=1.0)
-        planner = FormationPlanner(node, roll_call, expected=COUNT, deploy_speed_m_s=9.0)
+        planner = FormationPlanner(
+            node, roll_call, expected=COUNT, deploy_speed_m_s=9.0,
+            of_few=lambda *_: None,
+        )  # fmt: skip
         self.plans = PlanExchange(
             node, planner, roll_call, self.place, self.motion, self.out, pattern=None, random=lambda: 0.5
         )

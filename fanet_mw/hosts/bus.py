@@ -182,7 +182,7 @@ class Bus:
             why = "no answer" if "onnect" in str(error) else _first_sentence(error)
             raise BusError(
                 f"no Zenoh router at {endpoint} ({why} within {patience_s:g} s); "
-                f"start one with `fanet router` or `fanet launch --listen {endpoint}`"
+                f"start one with `fanet router SCENARIO` or `fanet launch SCENARIO`, and --listen {endpoint}"
             ) from error
 
     def __enter__(self) -> Self:

@@ -20,6 +20,9 @@ _SIDES: Final = ("cellsize", "dx", "dy")
 THOUSANDS: Final = re.compile(r"[1-9]\d{0,2},\d{3}")
 """A comma that may be one of thousands."""
 COMMENTS: Final = ("#", "//", "!")
+VOIDS: Final = frozenset({"*", "-", "null", "nodata", "n/a", "na", "none", "void"})
+"""Words for a cell without a height; GRASS writes `*`, and databases `null`."""
+_CONVERT: Final = "other formats are converted by gdal_translate -of AAIGrid"
 _COARSEST_DEG: Final = 0.02
 """A grid with places in degrees has cells of at most this; cells of less than 2 cm there are none."""
 
@@ -55,7 +58,7 @@ class AsciiGrid(NamedTuple):
 
 def parse(data: bytes) -> AsciiGrid:
     """Read the header; raises ValueError with the line that is wrong."""
-    lines = _text(data).splitlines()
+    lines = _text(data).rstrip("\x1a").splitlines()  # the last character of files of DOS
     found: dict[str, float] = {}
     body = len(lines)
     for at, line in enumerate(lines):
@@ -64,13 +67,16 @@ def parse(data: bytes) -> AsciiGrid:
             continue
         key = _KEYS.get(words[0].lower())
         if key is None:
-            if words[0][0].isalpha() and words[0].lower() not in {"nan", "inf", "infinity"}:
-                raise ValueError(f"line {at + 1}: {line.strip()[:60]!r} is no line of the header of an ASCII grid")
+            if words[0][0].isalpha() and words[0].lower() not in {"nan", "inf", "infinity", *VOIDS}:
+                raise ValueError(
+                    f"line {at + 1}: {line.strip()[:60]!r} is no line of the header of an ASCII grid; {_CONVERT}"
+                )
             body = at
             break
         if len(words) != 2:
             raise ValueError(f"line {at + 1}: {line.strip()[:60]!r} must be a key and one number")
-        value = number(words[1], line=at + 1)
+        is_void = key == "nodata" and words[1].lower() in VOIDS
+        value = math.nan if is_void else number(words[1], line=at + 1)
         if key != "nodata" and not math.isfinite(value):
             raise ValueError(f"line {at + 1}: {words[0]} = {words[1]} must be a finite number")
         if key in _SIDES and THOUSANDS.fullmatch(words[1]):
@@ -106,13 +112,13 @@ def _text(data: bytes) -> str:
     except UnicodeDecodeError:
         text = decoded(data, otherwise="latin-1")
     if "\0" in text[:4096]:
-        raise ValueError("it is binary")
+        raise ValueError(f"it is binary; {_CONVERT}")
     return text
 
 
 def _count(found: dict[str, float], key: str) -> int:
     if key not in found:
-        raise ValueError(f"its header has no {key}")
+        raise ValueError(f"its header has no {key}; {_CONVERT}")
     value = found[key]
     if not (1 <= value <= 1e9 and value == int(value)):
         raise ValueError(f"{key} = {value:g} must be a whole number > 0")

@@ -75,7 +75,7 @@ def sweep(
     rerun_older
         Repeat runs that code other than the present one has finished, so that all rows are of one code.
     dry_run
-        Validate, count, estimate, and stop.
+        Validate, count, and stop.
     json
         Print what came out as JSON, on standard output.
 
@@ -99,7 +99,7 @@ def carry_out(
     dry_run: bool = False,
     json: bool = False,
 ) -> int:
-    """Plan a sweep, print how long it will take, and carry it out."""
+    """Plan a sweep, say how many runs it has, and carry it out."""
     from sim.sweep.provenance import code
     from sim.sweep.remaining_runs import RemainingRuns
     from sim.sweep.store import TABLE, Store

@@ -22,7 +22,9 @@ _NAMED: Final = 3
 
 
 _ONLY_WITH: Final = re.compile(r"`\w+`(?:(?:, | and |, and )`\w+`)*: ")
+_BUT: Final = re.compile(r"(?:all|every) (\w+?)s? but `(\w+)`", re.IGNORECASE)
 _WORDS: Final = re.compile(r"`(\w+)`")
+_OFF: Final = ("none", "", False, None)
 _BETWEEN_BANDS_MHZ: Final = 3700.0
 _CLUSTERED: Final = frozenset({"clustered"})
 
@@ -60,16 +62,40 @@ def _without_effect(scenario: Scenario) -> Iterator[str]:
             yield f"clusters.{', clusters.'.join(unused)}: no effect with routing.protocol = {protocol!r}"
     if protocol in PROTOCOLS and protocol != "rounds" and (unused := [key for key, _ in _changed(scenario.rounds)]):
         yield f"rounds.{', rounds.'.join(unused)}: no effect with routing.protocol = {protocol!r}"
-    for table in ("nodes", "routing", "radio", "mobility", "clock", "world", "traffic"):
+    for table in ("nodes", "routing", "clusters", "radio", "mobility", "clock", "world", "traffic", "mission"):
         section = getattr(scenario, table)
+        unused_by: dict[str, list[str]] = {}
         for key, field in _changed(section):
-            said = _ONLY_WITH.match(field.description or "")
-            wanted = set(_WORDS.findall(said[0])) if said else set()
-            for other, choice in type(section).model_fields.items():
-                known = {*get_args(choice.annotation), *(n for m in choice.metadata for n in getattr(m, "ours", ()))}
-                value = getattr(section, other)
-                if other != key and wanted and wanted <= known and value in known and value not in wanted:
-                    yield f"{table}.{key}: no effect with {table}.{other} = {value!r}"
+            for other in _prevented_by(section, key, field.description or ""):
+                if _is_given(section, key):
+                    unused_by.setdefault(other, []).append(f"{table}.{key}")
+        for other, keys in unused_by.items():
+            yield f"{', '.join(keys)}: no effect with {table}.{other} = {getattr(section, other)!r}"
+
+
+def _prevented_by(section: Section, key: str, documentation: str) -> Iterator[str]:
+    """The keys of the table whose values leave this one without an effect."""
+    fields = type(section).model_fields
+    said = _ONLY_WITH.match(documentation)
+    wanted = set(_WORDS.findall(said[0])) if said else set()
+    if wanted and wanted <= fields.keys() and all(getattr(section, other) in _OFF for other in wanted):
+        yield from sorted(wanted)
+    if (but := _BUT.search(documentation)) and getattr(section, but[1], None) == but[2]:
+        yield but[1]
+    for other, choice in fields.items():
+        known = {*get_args(choice.annotation), *(n for m in choice.metadata for n in getattr(m, "ours", ()))}
+        value = getattr(section, other)
+        if other != key and wanted and wanted <= known and value in known and value not in wanted:
+            yield other
+
+
+def _is_given(section: Section, key: str) -> bool:
+    """False for a value that follows from other keys of the table."""
+    others = {name: getattr(section, name) for name, _ in _changed(section) if name != key}
+    try:
+        return bool(getattr(type(section)(**others), key) != getattr(section, key))
+    except ValueError:  # without it the others are not allowed
+        return True
 
 
 def _without_place(scenario: Scenario) -> Iterator[str]:
@@ -133,11 +159,15 @@ def _guessed(scenario: Scenario) -> Iterator[str]:
         town = town_of(world)
     except ConfigError:
         return  # whoever builds the world says what is wrong with the file
-    for what, found in (("of heights that were guessed", town.guessed), ("outlines that enclose nothing", town.broken)):
+    for one, several, found in (
+        ("building of a height that was guessed", "buildings of heights that were guessed", town.guessed),
+        ("outline that encloses nothing", "outlines that enclose nothing", town.broken),
+    ):
         if found:
             others = f"; and {len(found) - _NAMED} others" if len(found) > _NAMED else ""
-            noun = "buildings " if found is town.guessed else ""
-            yield f"world.buildings_geojson: {len(found)} {noun}{what}: {'; '.join(found[:_NAMED])}{others}"
+            what = one if len(found) == 1 else several
+            yield f"world.buildings_geojson: {len(found)} {what}: {'; '.join(found[:_NAMED])}{others}"
     if town.untold:
         default_m = sum(world.building_height_m) / 2
-        yield f"world.buildings_geojson: {town.untold} buildings state no height: taken as {default_m:g} m"
+        what = "building states" if town.untold == 1 else "buildings state"
+        yield f"world.buildings_geojson: {town.untold} {what} no height: taken as {default_m:g} m"

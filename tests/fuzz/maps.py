@@ -15,7 +15,7 @@ CELL_M = 10.0
 AREA_M = 100.0
 PARIS = (48.8566, 2.3522)
 VOIDS = ("-9999", "-9999.0", "-32768", "-32767", "32767", "-3.4028234663852886e+38", "-3.402823e+38", "1e+30", "nan",
-         "NaN", "-99999", "1.#QNAN", "-1.#IND", "-2147483648")  # fmt: skip
+         "NaN", "-99999", "1.#QNAN", "-1.#IND", "-2147483648", "*", "NULL", "NoData")  # fmt: skip
 Write = Callable[[str], bytes]
 
 
@@ -75,7 +75,7 @@ def grid(random: Random) -> Sample:
         lines.insert(random.randrange(len(lines)), random.choice(("# made by hand", "// metres above the sea", "")))
     if comma and all(len(cell) == 5 and cell[1] == "." and cell[0] > "0" for row in cells for cell in row):
         meaning = None  # "1,234" may be thousands
-    text = "\n".join([*lines, *(between.join(row) for row in cells)]) + random.choice(("\n", "", "\n\n"))
+    text = "\n".join([*lines, *(between.join(row) for row in cells)]) + random.choice(("\n", "", "\n\n", "\n\x1a"))
     return Sample(written(random, text.replace(".", ",") if comma else text), meaning)
 
 

@@ -35,7 +35,8 @@ class Clock(Section):
     gps_sigma_ns: Annotated[float, Field(ge=0, le=1e9)] = 100.0
     """`gps`: standard deviation of the time of one fix; a receiver without a timing output has some 100 ns to 1 us."""
     limit_s: SomeTime = 5.0
-    """A swarm time that differs from the own clock by more than this is not accepted, whichever node states it."""
+    """`beacons` and `gps`: a swarm time that differs from the own clock by more than this is not accepted, whichever
+    node states it."""
 
     jumps: tuple[tuple[Id, SomeTime, Annotated[float, Field(ge=-60_000, le=60_000)]], ...] = ()
     """Clocks that jump, as a step of NTP lets them: node, instant [s] and by how much [ms], for example

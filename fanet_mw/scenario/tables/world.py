@@ -85,9 +85,9 @@ class World(Section):
     heightmap_sha256: Sha256 = ""
     """Beginning of the SHA-256 of that file, which is filled in when the scenario is read. Another file is refused."""
     heightmap_white_m: Annotated[float, Field(gt=0, le=9000)] = 100.0
-    """Height of a white pixel above a black one."""
+    """`heightmap`: height of a white pixel above a black one, in a picture."""
     heightmap_pixel_m: Annotated[float, Field(gt=0, le=1e5)] = 10.0
-    """Width of a pixel."""
+    """`heightmap`: width of a pixel, in a picture."""
     buildings_geojson: str = ""
     """A file with outlines of buildings (GeoJSON), in place of `buildings`. A path is relative to the scenario file's
     folder."""

@@ -231,9 +231,11 @@ def _without_voids(found: Heightmap, path: Path, area_m: float) -> Heightmap:
         column = int(missing[row].argmax())
         cell, value = found.name_of(first_row + row, first_column + column), part.metres[row, column]
         said = f"{value:g}" if np.isfinite(value) else "the value of a void"
+        count = int(missing.sum())
         raise ConfigError(
-            f"world.heightmap: {path}: {int(missing.sum())} cells within world.area_m = {area_m:g} have no data, or no "
-            f"height on earth, [{_LOWEST_M:g}, {_HIGHEST_M:g}] m: the first has {said} ({cell}); "
+            f"world.heightmap: {path}: {count} cell{'s' * (count > 1)} within world.area_m = {area_m:g} "
+            f"{'have' if count > 1 else 'has'} no data, or no height on earth, [{_LOWEST_M:g}, {_HIGHEST_M:g}] m: "
+            f"the first has {said} ({cell}); "
             "fill them, for example by gdal_fillnodata.py, or put the area where there are none"
         )
     lowest = part.metres[used] if found.middle_deg else found.metres[~void]
@@ -274,6 +276,13 @@ def _used(part: Heightmap, area_m: float) -> Flags:
     return np.asarray((np.abs(east) < half + a + b) & (np.abs(north) < half + c + d))
 
 
+def _floats(words: list[str]) -> Values:
+    try:
+        return np.array(words, dtype=np.float64)
+    except ValueError:  # some of them are words, perhaps
+        return np.array(["nan" if word.lower() in ascii_grid.VOIDS else word for word in words], dtype=np.float64)
+
+
 def _numbers(grid: ascii_grid.AsciiGrid) -> Rows:
     """The heights of an ASCII grid, the northernmost row first; raises ValueError with the line that is wrong."""
     count = grid.columns * grid.rows
@@ -294,11 +303,12 @@ def _numbers(grid: ascii_grid.AsciiGrid) -> Rows:
     try:
         if "_" in text:  # which numpy would pass over, as Python does
             raise ValueError("a height with an underscore is no number")
-        heights = np.array(words, dtype=np.float64)
+        heights = _floats(words)
     except ValueError:
         for at, line in enumerate(grid.lines):
             for word in line.replace(";", " ").split():
-                ascii_grid.number(word, line=grid.first_line + at)
+                if word.lower() not in ascii_grid.VOIDS:
+                    ascii_grid.number(word, line=grid.first_line + at)
         raise
     if len(heights) != count:
         widths = [len(line.split()) for line in text.split("\n")]

@@ -78,6 +78,16 @@ def test_an_order_after_the_end_is_noted() -> None:
         (["nodes.layout=line", "nodes.radius_m=5"], "nodes.radius_m: no effect with nodes.layout = 'line'"),
         (["routing.gossip_p=0.3"], "routing.gossip_p: no effect with routing.protocol = 'flooding'"),
         (["radio.exponent=4"], "radio.exponent: no effect with radio.channel = 'range'"),
+        (["radio.frequency_mhz=5200"], "radio.frequency_mhz: no effect with radio.channel = 'range'"),
+        (
+            ["radio.tx_power_dbm=20", "radio.noise_figure_db=5"],
+            "radio.tx_power_dbm, radio.noise_figure_db: no effect with radio.channel = 'range'",
+        ),
+        (["radio.capture_db=4"], "radio.capture_db: no effect with radio.capture = False"),
+        (["clock.limit_s=3"], "clock.limit_s: no effect with clock.sync = 'none'"),
+        (["mission.formation_m=30"], "mission.formation_m: no effect with mission.formation = 'none'"),
+        (["world.heightmap_white_m=50"], "world.heightmap_white_m: no effect with world.heightmap = ''"),
+        (["radio.channel=friis", "radio.frequency_mhz=2437", "radio.tx_power_dbm=20"], None),
         (["radio.channel=log_distance", "radio.exponent=4"], None),
         (["routing.protocol=gossip", "routing.gossip_p=0.3"], None),
     ],
@@ -101,7 +111,7 @@ def test_a_guessed_height_is_noted_before_the_run_and_in_its_summary(
     (tmp_path / "town.geojson").write_text(json.dumps(house))
     (tmp_path / "s.toml").write_text(TOWN)
     app(["check", str(tmp_path / "s.toml")], result_action="return_value")
-    said = "1 buildings of heights that were guessed: way/7: height = tall: taken as 19 m"
+    said = "1 building of a height that was guessed: way/7: height = tall: taken as 19 m"
     assert said in capsys.readouterr().err
     summary = finish(simulate(config.load(tmp_path / "s.toml")), out=None)
     assert summary["notes"] == [f"world.buildings_geojson: {said}"]

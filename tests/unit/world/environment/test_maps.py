@@ -93,7 +93,7 @@ def test_a_void_that_the_header_does_not_declare_is_refused_with_its_place(tmp_p
     rows[0][3] = void
     path = tmp_path / "hill.asc"
     path.write_text(grid(CORNER, rows))
-    with pytest.raises(ConfigError, match=r"1 cells within .* = 100 have no data.*\(line 6, column 4\); fill"):
+    with pytest.raises(ConfigError, match=r"1 cell within .* = 100 has no data.*\(line 6, column 4\); fill"):
         ground(path, (0, 0))
 
 
@@ -220,7 +220,7 @@ def test_a_tile_of_srtm_lies_where_its_name_says_and_its_voids_are_refused(tmp_p
     wanted = [1000 * (lat - 48) + 500 * (lon - 2) for lat, lon in (degrees(*each) for each in at)]
     found = ground(path, *at, area_m=5000, origin_deg=PARIS[:2])
     assert found[1] - found[0] == pytest.approx(wanted[1] - wanted[0], abs=1.5)
-    with pytest.raises(ConfigError, match="1 cells within"):
+    with pytest.raises(ConfigError, match="1 cell within"):
         ground(path, (0, 0), area_m=900, origin_deg=(49 - 100 / 1200, 2 + 100 / 1200))
     with pytest.raises(ConfigError, match=r"does not cover .*; the middle of the file is \[48\.50000, 2\.50000\]"):
         ground(path, (0, 0))

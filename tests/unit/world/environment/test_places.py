@@ -169,10 +169,13 @@ def test_a_path_is_taken_from_the_scenario_files_folder(tmp_path: Path) -> None:
         ("ncols 2\nnrows 2\ncellsize 10\n1 2 3\n", "3 heights, not 2 x 2"),
         (
             "ncols 2\nnrows 2\ncellsize 790\nNODATA_value -9\n1 2\n-9 3\n",
-            r"1 cells within .* = 800 have no data, or .*: the first has the value of a void \(line 6, column 1\)",
+            r"1 cell within .* = 800 has no data, or .*: the first has the value of a void \(line 6, column 1\)",
         ),
         ("ncols 2\nnrows 2\ncellsize 0\n1 2 3 4\n", "cell size > 0"),
-        ("ncols 2\nnrows 2\ncellsize 790\n1 2\n3 nan\n", "1 cells within .* have no data"),
+        ("ncols 2\nnrows 2\ncellsize 790\n1 2\n3 nan\n", "1 cell within .* has no data"),
+        ("ncols 2\nnrows 2\ncellsize 790\n1 2\n3 *\n", r"1 cell within .* no data.* \(line 5, column 2\)"),
+        ("ncols 2\nnrows 2\ncellsize 790\nNODATA_value null\nnull 2\n3 4\n", r"1 cell .* \(line 5, column 1\)"),
+        ("north: 5\nsouth: 1\n", "line 1: 'north: 5' is no line of the header .*gdal_translate -of AAIGrid"),
         ("ncols 2\nnrows 2\ncellsize 10\n1 2 3 4\n", r"covers 10 m to the east, which must be >= world.area_m = 800"),
     ],
 )

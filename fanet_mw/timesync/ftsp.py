@@ -132,6 +132,8 @@ class TimeSync:
         """The reference whose time this node has; None if it has none. After a restart it may be the node's own id
         without `is_reference`, because the swarm still has the time of this node."""
         self.is_reference = False
+        self._led_at: float | None = None
+        """The rate of swarm time over this node's clock that it gave as the reference before it lost the time."""
         self._round = 0
         self._news_ns = 0
         self._claim_ns = 0
@@ -237,7 +239,10 @@ class TimeSync:
 
     def _become_reference(self) -> None:
         """Become the reference: from now on swarm time is this node's line, without error."""
-        self._fit.replace(self.line._replace(stated_ns=0.0, offset_sd_ns=0.0, rate_sd=0.0, stated_rate=0.0))
+        rate = self.line.rate
+        if self.reference == self._own.node and self._led_at is not None:
+            rate = self._led_at  # it leads on, and a few pairs soon after each other tell no rate
+        self._fit.replace(self.line._replace(rate=rate, stated_ns=0.0, offset_sd_ns=0.0, rate_sd=0.0, stated_rate=0.0))
         self.reference, self.is_reference, self._rival = self._own.node, True, None
         self.counts["claimed"] += 1
 
@@ -360,6 +365,8 @@ class TimeSync:
     def _lose(self, local_ns: int) -> None:
         """Give up the time, and all that was noted by the clock before it jumped."""
         self.counts["lost"] += 1
+        if self.is_reference:
+            self._led_at = self.line.rate
         self.reference, self.is_reference, self._rival = None, False, None
         self._fit = ClockFit(self._own.oscillator)
         self._first = InitialSync(

@@ -123,6 +123,28 @@ def test_a_reference_that_restarts_learns_the_time_and_leads_on() -> None:
     assert network.worst_us() < 30
 
 
+def test_a_reference_whose_clock_has_jumped_goes_on_at_its_rate() -> None:
+    """Two statements that are 40 ms apart and 8 us wrong tell where swarm time is, but not how fast it goes: it goes as
+    fast as this clock, for the swarm follows it.
+    """
+    leader = follower(1, leads=True)
+    neighbors = (2, 3, 4)
+    ahead_ns = 0
+    for second in range(3, 30):
+        leader.pass_time(second * S - ahead_ns)
+        ahead_ns = 0 if second < 12 else 3 * S
+        for node in neighbors:
+            noise_ns = (4 - 2 * (node % 3)) * US
+            earlier_ns = (second - 1) * S + node * 20 * MS
+            beacon = said(earlier_ns + noise_ns, second - 1, node=node, hops=1, error_ns=8 * US)
+            hear(leader, node, second, second * S + node * 20 * MS - ahead_ns, beacon)
+    leader.pass_time(30 * S - ahead_ns)
+    assert leader.counts["lost"] == 1
+    assert leader.is_reference
+    assert leader.line.rate == 0
+    assert abs(leader.line.swarm_ns(40 * S - ahead_ns) - 40 * S) < 10 * US
+
+
 def test_a_reference_that_comes_back_with_a_time_and_rounds_of_its_own_is_followed_at_once() -> None:
     """It has led for 300 s; away from the others it starts again, by a clock that is 30 ms off, and counts from 0."""
     sync = follower()

@@ -5,6 +5,7 @@ import sys
 from typing import Any, Final, NoReturn
 
 from rich.console import Console as RichConsole
+from rich.text import Text
 
 CLOSED: Final = 128 + 13
 """The exit code that a shell shows for a process that SIGPIPE ended."""
@@ -38,9 +39,18 @@ class Console(RichConsole):
             super().print(*objects, **options)
         self.file.write("\n".join(line.rstrip() for line in captured.get().split("\n")))
 
+    def render_str(self, text: str, **options: Any) -> Text:  # noqa: ANN401
+        """What is printed may be somebody else's: what would move the cursor is escaped."""
+        return super().render_str(printable(text), **options)
+
     def on_broken_pipe(self) -> None:
         self.quiet = True
         raise
+
+
+def printable(text: str) -> str:
+    """A text in which what would move the cursor, but for ends of lines and tabs, is escaped."""
+    return text if text.isprintable() else "".join(c if c.isprintable() or c in "\n\t" else repr(c)[1:-1] for c in text)
 
 
 def open_closed_streams() -> None:

@@ -32,7 +32,7 @@ from sim.cli.air import app as air_app
 from sim.cli.command_groups import OPTIONS
 from sim.cli.memory import require_for
 from sim.cli.order import app as order_app
-from sim.console import Console, discard_output, nobody_reads, open_closed_streams
+from sim.console import Console, discard_output, nobody_reads, open_closed_streams, printable
 
 app = App(
     name="fanet",
@@ -102,7 +102,7 @@ def refused(why: str) -> int:
 
 def _printable(line: str) -> str:
     """A line that may hold what somebody else wrote: what would move the cursor is escaped, and the middle left out."""
-    shown = "".join(c if c.isprintable() else repr(c)[1:-1] for c in line)
+    shown = printable(line.replace("\t", "\\t"))
     return shown if len(shown) <= _LONGEST_LINE else f"{shown[: _LONGEST_LINE - 200]} ... {shown[-190:]}"
 
 

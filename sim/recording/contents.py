@@ -1,11 +1,13 @@
 """What the folder of a run, or a recording, holds, as lines and a table for people."""
 
+import struct
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.foreign_file import open_regular
 from fanet_mw.trace import Record, kind_of
 from fanet_mw.units import S
 from sim.results.run_folder import RunFolder
@@ -50,19 +52,20 @@ def of_recording(path: Path) -> Contents:
     from mcap.reader import make_reader
 
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             summary = make_reader(file).get_summary()
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
-    except (McapError, ValueError) as error:
-        raise ConfigError(f"{path}: is no MCAP file: {str(error)[:200]}") from error
+    except (McapError, ValueError, struct.error) as error:
+        raise ConfigError(f"{path}: is no MCAP file: {str(error)[:200] or 'it ends too soon'}") from error
     if summary is None or summary.statistics is None:
         raise ConfigError(f"{path}: was cut off before its index; `mcap recover` of Foxglove's command line mends it")
     held = summary.statistics
     span_s = (held.message_end_time - held.message_start_time) / S
     counts = held.channel_message_counts
+    schemas = {number: schema.name for number, schema in summary.schemas.items()}
     rows = [
-        (channel.topic, summary.schemas[channel.schema_id].name, f"{counts.get(channel.id, 0):,}")
+        (channel.topic, schemas.get(channel.schema_id, ""), f"{counts.get(channel.id, 0):,}")
         for channel in sorted(summary.channels.values(), key=lambda channel: channel.topic)
     ]
     lines = [

@@ -33,6 +33,8 @@ _SHORT: Final = 120
 R = TypeVar("R", bound=Record)
 Measured = Number | None
 Text = Annotated[str, Field(max_length=10_000)]
+_Node = Annotated[int, Field(ge=1, le=0xFFFF)]
+_Copies = Annotated[int, Field(ge=0, le=1 << 40)]
 
 
 class _ShownShape(BaseModel):
@@ -113,6 +115,10 @@ class _ShownSummary(_ShownPackets):
     nodes: Count
     mode: Literal["virtual", "realtime"]
     time_scale: Measured
+    simulated_s: Annotated[float, Field(ge=0, le=1e9)]
+    wall_s: Number = 0.0
+    epoch_unix_ns: Annotated[int, Field(ge=0, le=1 << 62)] = 0
+    aborted: Text | None = None
     slowed: list[Any]
     reports: _ShownPackets
     bound: _ShownBound | dict[str, None]
@@ -124,10 +130,12 @@ class _ShownSummary(_ShownPackets):
 
 
 class _ShownLink(_ShownShape):
-    src: Count
-    dst: Count
-    copies: Count
-    received: Count
+    src: _Node
+    dst: _Node
+    copies: _Copies
+    received: _Copies
+    lost: dict[str, _Copies] = {}
+    rssi_dbm: Annotated[float, Field(ge=-400, le=400)] | None = None
 
 
 class _ShownTurns(_ShownShape):

@@ -25,12 +25,17 @@ from typing import Any, Final, NamedTuple
 
 from fanet_mw.errors import ConfigError
 from sim.cli.app import refused
+from sim.recording import contents
+from sim.recording.from_result import write_mcap
+from sim.recording.tables import write_csv, write_parquet
+from sim.recording.tracks import write_gpx
 from sim.report import page, replay_page
 from sim.report.run_records import SHOWN, RunRecords
 from sim.results.files import finish
 from sim.results.replay import Replay
 from sim.results.run_folder import RunFolder
 from sim.results.run_table import read
+from sim.results.stored_result import load_result
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 from sim.sweep.one_run import Finished
@@ -187,9 +192,15 @@ def result(corpus: Corpus, folder: Path, random: Random) -> None:
         (run / random.choice(("report.md", "report.html", "replay.html", "replay.html"))).symlink_to("../foreign")
     if random.random() < 0.1:
         (run / "pictures").symlink_to("..")
-    match random.randrange(8):
+    match random.randrange(10):
         case 0:
             page.write([run], run)
+        case 4:
+            contents.of_folder(run)
+        case 5:
+            outcome = load_result(run).outcome
+            random.choice((write_csv, write_parquet))(outcome, run, run / "tables")
+            write_gpx(outcome, run / "tracks"), write_mcap(outcome, run / "recording.mcap")
         case 1 | 2 | 3:
             replay_page.write(Replay.read(run, *replay_page.REPLAYED), run / "replay.html")
         case _:

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -25,6 +26,7 @@ from foxglove_schemas_protobuf import (
 )
 from google.protobuf import descriptor_pb2, unknown_fields
 from mcap.reader import make_reader
+from mcap.writer import Writer
 from mcap_protobuf.decoder import DecoderFactory
 
 import fanet_mw
@@ -341,6 +343,26 @@ def test_what_cannot_be_exported_is_said(folder: Path, words: list[str], message
             result_action="return_value",
             exit_on_error=False,
         )
+
+
+def test_a_recording_of_another_program_is_shown_and_moves_no_cursor(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its channel has no schema, as MCAP allows, and its name would clear the screen."""
+    with (tmp_path / "other.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        channel = writer.register_channel(topic="/\x1b[2J[bold]", message_encoding="json", schema_id=0)
+        writer.add_message(channel, log_time=1, data=b"{}", publish_time=1)
+        writer.finish()
+    assert app(["log", "info", str(tmp_path / "other.mcap")], result_action="return_value") == 0
+    assert capsys.readouterr().out.splitlines()[-1].split() == ["/\\x1b[2J[bold]", "1"]
+
+
+def test_a_pipe_is_no_recording_and_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.mcap")
+    with pytest.raises(ConfigError, match="a pipe, not a regular file"):
+        app(["log", "info", str(tmp_path / "pipe.mcap")], result_action="return_value", exit_on_error=False)
 
 
 @pytest.mark.parametrize(

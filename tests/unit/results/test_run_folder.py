@@ -20,6 +20,7 @@ from sim.report import page, replay_page
 from sim.results.files import finish
 from sim.results.replay import Replay
 from sim.results.run_table import read
+from sim.results.stored_result import load_result
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 
@@ -113,6 +114,8 @@ def test_a_folder_of_ones_own_makes_a_page_a_replay_and_a_row(folder: Path) -> N
         ({"valid": False}, "contradicts invalid_because"),
         ({"invalid_because": ["a"]}, "contradicts invalid_because"),
         ({"unwritten": {"trace.jsonl": "full"}}, "contradicts"),
+        ({"simulated_s": "long"}, "simulated_s = 'long'"),
+        ({"epoch_unix_ns": -1}, "epoch_unix_ns = -1"),
         ({"pdr": math.nan}, "nan, which must be finite"),
         ({"pdr": 1.5}, "pdr = 1.5"),
         ({"pdr": "x" * 100_000}, "pdr = "),
@@ -147,6 +150,15 @@ def test_content_that_is_none_is_one_line(folder: Path, name: str, content: byte
         report(folder)  # nobody has reported
     else:
         refused(folder, by=report)
+
+
+@pytest.mark.parametrize(
+    "change", [{"src": 70_000}, {"dst": 0}, {"received": 2**53}, {"lost": "all"}, {"rssi_dbm": 1e300}], ids=str
+)
+def test_a_link_that_cannot_be_is_named(folder: Path, change: dict[str, Any]) -> None:
+    links = json.loads((folder / "links.json").read_text())
+    forge(folder, "links.json", json.dumps([{**links[0], **change}, *links[1:]]).encode())
+    assert f"links.json: 0.{next(iter(change))}" in refused(folder, by=lambda where: load_result(where).outcome)
 
 
 @pytest.mark.parametrize("by", [report, Replay.read])

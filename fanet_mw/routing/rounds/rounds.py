@@ -35,7 +35,7 @@ from fanet_mw.routing.rounds.spreading import Spreading
 from fanet_mw.routing.rounds.topology import Topology
 from fanet_mw.trace import BoundExcludes, BoundStated, LikelyStated
 from fanet_mw.units import BROADCAST, US, NodeId, seconds_to_ns
-from fanet_mw.wire import FLAG_FLOOD, HEADER_BYTES, PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY, Kind
+from fanet_mw.wire import FLAG_FLOOD, HEADER_BYTES, PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY, Content, Kind
 from fanet_mw.wire.hello.digest import MESSAGE_BYTES, Digest, capacity
 from fanet_mw.wire.rounds import (
     CAPACITY,
@@ -63,13 +63,18 @@ _FLOOD_HOPS: Final = 4
 _LASTING_HOPS: Final = 8
 """A link counts if it lasts until its end would be noticed, and a packet has gone so many hops after that."""
 _MUCH_BULK: Final = 4
-"""A node with so many bulk packets takes part in all bulk slots until they are sent."""
+"""A node that is to send so many bulk packets before others takes part in all bulk slots until they are sent."""
 _SPREAD_SLOTS: Final = 1.0
 """Neighbors that pass on the same warning start within so many slots."""
 _BEFORE_TURN_NS: Final = 1 * US
 """A hello is made just before the turn in which it goes is filled."""
 _PATIENT_TURNS: Final = 2
 """A hello that found no room in so many turns goes before urgent packets."""
+
+
+def _keys_held(content: Content) -> list[int]:
+    """The packets that a neighbor says to hold, by their keys."""
+    return [key_of(origin, seq) for seq, origin in decode_held(content)]
 
 
 class RoundFlooding(RoutingProtocol):
@@ -349,7 +354,7 @@ class RoundFlooding(RoutingProtocol):
         """A neighbor tells of links and of packets that it holds."""
         if packet.header.origin != src:
             return
-        self._spreading.on_held([key_of(origin, seq) for seq, origin in decoded(packet.frame, decode_held)], src)
+        self._spreading.on_held(decoded(packet.frame, _keys_held), src)
         self._topology.hear(decoded(packet.frame, decode_heard), now_ns=now_ns)
         if self._topology.has_news:
             self._reach_turn(now_ns)
@@ -369,9 +374,10 @@ class RoundFlooding(RoutingProtocol):
 
     def _take_bulk(self, packet: Packet, *, src: int | None, from_ns: int, now_ns: int) -> None:
         """A bulk packet may be sent from an instant on."""
-        if src is not None and not self._topology.dominates():
+        spare = src is not None and not self._topology.dominates()
+        if spare:
             from_ns += _SPARE_HOPS * self._law.hop_ns
-        evicted = self._spreading.take(packet, src=src, now_ns=now_ns, bulk_from_ns=from_ns)
+        evicted = self._spreading.take(packet, src=src, now_ns=now_ns, bulk_from_ns=from_ns, spare=spare)
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
         self._reach_slot(from_ns, now_ns)
@@ -521,7 +527,7 @@ class RoundFlooding(RoutingProtocol):
     def wake(self, now_ns: int) -> None:
         self._now_ns = now_ns
         if now_ns >= self._topology.next_epoch_ns():
-            waiting = self._spreading.ready_bulk()
+            waiting = self._spreading.due_bulk()  # repetitions, and what others send, must not take the relays' slots
             self._often = self._topology.dominates() or waiting >= (1 if self._often else _MUCH_BULK)
             self._topology.state(self._stayers(now_ns), often=self._often, now_ns=now_ns)
         self._repair_due(now_ns)

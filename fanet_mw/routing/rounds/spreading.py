@@ -19,9 +19,9 @@ from collections.abc import Iterable, Sequence
 from heapq import heappop, heappush
 from typing import Final
 
+from fanet_mw.graph.topology import nodes_of
 from fanet_mw.node.duplicates import key_of
 from fanet_mw.node.packet import Packet
-from fanet_mw.routing.rounds.topology import nodes_of
 from fanet_mw.units import US
 
 _MOST_EARLY: Final = 1024
@@ -58,6 +58,7 @@ class _Spread:
         "senders",
         "sent",
         "sent_ns",
+        "spare",
         "taken_ns",
     )
 
@@ -85,6 +86,8 @@ class _Spread:
         """Bulk: true once it was left to others, because nobody lacked it."""
         self.from_ns = from_ns
         """Bulk: the instant before which it need not be looked at."""
+        self.spare = False
+        """Bulk: true if others are to pass it on first."""
 
     def reach(self, nodes: int) -> None:
         """One more node was heard to send it, which has links to these."""
@@ -158,24 +161,32 @@ class Spreading:
         """The number of bulk packets that have not been sent yet."""
         return sum(1 for entry in self._bulk.values() if not entry.sent)
 
-    def ready_bulk(self) -> int:
-        """The number of bulk packets, about, that wait for a slot only."""
-        return len(self._ready)
+    def due_bulk(self) -> int:
+        """The number of bulk packets, about, that wait for a slot and that this node is to send before others."""
+        bulk = self._bulk
+        return sum(1 for again, _, key in self._ready if not again and key in bulk and not bulk[key].spare)
 
     # --- what is heard --------------------------------------------------------------------------------------------
 
     def take(
-        self, packet: Packet, *, src: int | None, now_ns: int, bulk_from_ns: int | None = None, once: bool = False
+        self,
+        packet: Packet,
+        *,
+        src: int | None,
+        now_ns: int,
+        bulk_from_ns: int | None = None,
+        spare: bool = False,
+        once: bool = False,
     ) -> Packet | None:
-        """A new packet, heard from the neighbor `src`; bulk may be sent from an instant on. What is sent `once` is not
-        repeated. Returns a packet that was evicted for it.
+        """A new packet, heard from the neighbor `src`; bulk may be sent from an instant on, `spare` bulk if others have
+        not passed it on by then. What is sent `once` is not repeated. Returns a packet that was evicted for it.
         """
         self._order += 1
         key = _key(packet)
         entry = self._entries[key] = _Spread(
             packet, (packet.header.priority, self._order), src, bulk_from_ns or 0, now_ns
         )
-        entry.having |= self._early.pop(key, 0)
+        entry.having |= self._early.pop(key, 0) | 1 << (packet.header.origin - 1)
         if src is not None and self._lossy:
             entry.reach(self._links[src])
         entry.sent = self._repeats if once else 0
@@ -184,6 +195,7 @@ class Spreading:
             self._waiting.add(key)
         else:
             self._bulk[key] = entry
+            entry.spare = spare
             heappush(self._due, (bulk_from_ns, key))
             self._reach(entry, src)
         if len(self._entries) <= self._capacity:
@@ -240,7 +252,7 @@ class Spreading:
     def assume(self, node: int, *, until_ns: int) -> None:
         """A node that was elsewhere in the swarm has come near: what is older than an instant it has got there."""
         for entry in self._entries.values():
-            if entry.taken_ns <= until_ns and entry.again:
+            if entry.taken_ns <= until_ns and (entry.again or entry.spare):
                 entry.having |= 1 << (node - 1)
 
     def made_ns(self, key: int) -> float:
@@ -344,8 +356,8 @@ class Spreading:
             if self._is_done(entry, neighbors):
                 self._settle(key, entry)
                 continue
-            next_ns = self._not_before_ns(entry, neighbors, start_ns)
-            if entry.sent and not neighbors & ~gone & ~entry.having:
+            next_ns = self._not_before_ns(entry, neighbors & ~gone, start_ns)
+            if entry.again and not neighbors & ~gone & ~entry.having:
                 next_ns = start_ns + self._patience_ns
             if next_ns <= start_ns:
                 return entry.packet
@@ -367,7 +379,7 @@ class Spreading:
         """The instant before which others may do what sending this packet would."""
         if entry.again:
             return entry.copy_ns + self._patience_ns  # somebody else is at it
-        if neighbors and not neighbors & ~entry.reached:
+        if neighbors and not neighbors & ~(entry.reached | entry.having):
             entry.left = True
             return start_ns + _WAY_ROUND * self._patience_ns
         return start_ns

@@ -8,21 +8,12 @@ per second in any case. A link counts if both its ends state it.
 from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
-from fanet_mw.graph.connected_dominating_set import dominates
+from fanet_mw.graph.greedy_dominating_set import greedy_dominating_set
+from fanet_mw.graph.topology import nodes_of
 from fanet_mw.units import NodeId, S
 from fanet_mw.wire.rounds import HeardNodes
 
 _MODULUS: Final = 256
-
-
-def nodes_of(bits: int) -> list[NodeId]:
-    """The nodes of a set, in order: bit i stands for node i + 1."""
-    nodes = []
-    while bits:
-        last = bits & -bits
-        nodes.append(NodeId(last.bit_length()))
-        bits ^= last
-    return nodes
 
 
 def _seldom(rival: tuple[NodeId, bool]) -> bool:
@@ -97,11 +88,14 @@ class Topology:
     def hear(self, told: Sequence[HeardNodes], *, now_ns: int) -> None:
         """A neighbor passes on what nodes have stated."""
         current = now_ns // self._epoch_ns
+        stated = self._stated
         for node, short, heard, often in told:
+            known = stated.get(NodeId(node))
+            if known is not None and known.epoch % _MODULUS == short:
+                continue
             behind = (current + 1 - short) % _MODULUS - 1  # one epoch ahead is possible, because clocks differ
             if node == self._node or node > self._count or behind > self._lifetime or heard >> self._count:
                 continue
-            known = self._stated.get(NodeId(node))
             if known is None or current - behind > known.epoch:
                 self._note(NodeId(node), _Stated(current - behind, heard, often))
 
@@ -224,8 +218,8 @@ class Topology:
         """True if this node is one of the connected dominating set whose transmissions reach all nodes."""
         if self._dominates_for != self.changes:
             self._dominates_for = self.changes
-            near = [self._node, *nodes_of(self.links[self._node])]
-            self._dominates = dominates(self._node, {n: tuple(nodes_of(self.links[n])) for n in near})
+            relays = greedy_dominating_set(self.links, self._node)
+            self._dominates = bool(relays >> (self._node - 1) & 1)
         return self._dominates
 
     def absent(self, now_ns: int, *, doubt_ns: int) -> Sequence[NodeId] | None:

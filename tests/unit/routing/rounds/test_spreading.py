@@ -132,6 +132,21 @@ def test_new_bulk_goes_before_what_is_sent_again() -> None:
     assert bulk_sent(made, 3 * ROUND) == [2, 1]
 
 
+def test_what_others_send_first_and_what_is_sent_again_asks_for_no_more_slots() -> None:
+    made = spreading()
+    made.take(bulk(1), src=None, now_ns=0, bulk_from_ns=0)
+    assert bulk_sent(made, 0) == [1]
+    made.take(bulk(2), src=None, now_ns=0, bulk_from_ns=0)
+    made.take(bulk(3), src=None, now_ns=0, bulk_from_ns=0)
+    made.take(bulk(4), src=3, now_ns=0, bulk_from_ns=0, spare=True)
+    first = made.next_bulk(nodes((2, 3)), start_ns=3 * ROUND)
+    assert first is not None
+    assert first.header.seq == 2
+    assert made.due_bulk() == 1, "3; others send 4 first, and 1 is sent again"
+    made.look_again(first, from_ns=3 * ROUND)
+    assert bulk_sent(made, 3 * ROUND) == [2, 3, 4, 1]
+
+
 def test_the_least_important_packet_is_evicted_when_too_many_are_kept() -> None:
     made = spreading()
     for seq in range(8):
@@ -167,6 +182,41 @@ def test_who_comes_near_has_got_elsewhere_what_is_old() -> None:
         made.on_held([key_of_packet(bulk(seq))], 2)
     made.assume(3, until_ns=ROUND)
     assert bulk_sent(made, 8 * ROUND) == [2]
+
+
+def test_the_origin_of_a_packet_is_known_to_have_it() -> None:
+    made = spreading()
+    made.take(bulk(1), src=2, now_ns=0, bulk_from_ns=0)
+    assert bulk_sent(made, 0, neighbors=(2, 7)) == []
+
+
+def test_a_neighbor_that_is_gone_is_sent_nothing_that_was_left_to_others() -> None:
+    made = spreading()
+    made.take(bulk(1), src=2, now_ns=0, bulk_from_ns=0)
+    assert bulk_sent(made, 0, neighbors=(2, 5)) == [], "2 reaches 5"
+    assert made.next_bulk(nodes((2, 5)), start_ns=3 * ROUND, gone=nodes((5,))) is None
+    assert bulk_sent(made, 6 * ROUND, neighbors=(2, 5)) == [1], "5 is back"
+
+
+def test_a_spare_node_sends_nothing_for_a_neighbor_that_is_gone() -> None:
+    made = spreading(near={})
+    made.take(bulk(1), src=2, now_ns=0, bulk_from_ns=2 * ROUND, spare=True)
+    assert made.next_bulk(nodes((2, 3)), start_ns=2 * ROUND, gone=nodes((3,))) is None
+    assert bulk_sent(made, 4 * ROUND) == [1], "3 is back"
+
+
+def test_a_spare_node_sends_nothing_if_its_neighbors_hold_it_or_are_reached() -> None:
+    made = spreading(near={2: (5,)})
+    made.take(bulk(1), src=2, now_ns=0, bulk_from_ns=2 * ROUND, spare=True)
+    made.on_held([key_of_packet(bulk(1))], 3)
+    assert bulk_sent(made, 2 * ROUND, neighbors=(2, 3, 5)) == []
+
+
+def test_a_spare_node_leaves_out_who_had_it_elsewhere() -> None:
+    made = spreading(near={})
+    made.take(bulk(1), src=2, now_ns=0, bulk_from_ns=2 * ROUND, spare=True)
+    made.assume(3, until_ns=ROUND)
+    assert bulk_sent(made, 2 * ROUND) == []
 
 
 def test_bulk_that_was_sent_is_evicted_before_bulk_that_was_not() -> None:

@@ -25,6 +25,7 @@ from fanet_mw.routing.clustered.clustering import (
     by_degree,
     by_id,
 )
+from fanet_mw.routing.clustered.clustering.bisection import among
 from fanet_mw.routing.clustered.clustering.head_election import Score
 from fanet_mw.scenario.tables.clusters import METHODS
 from fanet_mw.units import NodeId, S
@@ -102,7 +103,7 @@ def _distance(head: NodeId, members: Sequence[NodeId], adjacency: Adjacency) -> 
 
 
 def carried_on(present: Sequence[Cluster], swarm: Swarm, stand_ins: Mapping[NodeId, NodeId]) -> list[Cluster]:
-    """The present clusters, without the nodes that are gone and with the new ones."""
+    """The present clusters, without the nodes that are gone or cut off from their head, and with those that are new."""
     here = swarm.adjacency
     clusters = []
     for cluster in present:
@@ -110,14 +111,33 @@ def carried_on(present: Sequence[Cluster], swarm: Swarm, stand_ins: Mapping[Node
         if members:
             stand_in = stand_ins.get(cluster.head, cluster.head)
             head = next((node for node in (cluster.head, stand_in) if node in members), None)
-            clusters.append(Cluster(head or _nearest_to_all(members, here), tuple(members)))
-    placed = {node for cluster in clusters for node in cluster.members}
-    hops = [levels(here, cluster.head) for cluster in clusters]
-    for node in sorted(here):
-        if node not in placed and clusters:
-            best = min(range(len(clusters)), key=lambda k: (hops[k].get(node, len(here)), len(clusters[k].members), k))
-            clusters[best] = clusters[best]._replace(members=tuple(sorted((*clusters[best].members, node))))
-    return clusters
+            head = head or _nearest_to_all(members, here)
+            clusters.append(Cluster(head, tuple(sorted(levels(among(members, here), head)))))
+    return _with_the_others(clusters, here) if clusters else []
+
+
+def _with_the_others(clusters: list[Cluster], here: Adjacency) -> list[Cluster]:
+    """Each node that is in no cluster joins the one whose head is nearest over members, or over any nodes."""
+    members = [set(cluster.members) for cluster in clusters]
+    hops = [levels(among(cluster.members, here), cluster.head) for cluster in clusters]
+    left = sorted(set(here).difference(*members))
+    while left:
+        over_members = [
+            (min(hops[k][near] for near in here[node] if near in members[k]) + 1, len(members[k]), k, node)
+            for node in left
+            for k in range(len(clusters))
+            if members[k].intersection(here[node])
+        ]
+        if over_members:
+            far, _, k, node = min(over_members)
+        else:
+            everywhere = [levels(here, cluster.head) for cluster in clusters]
+            node = left[0]
+            far, _, k = min((everywhere[k].get(node, len(here)), len(members[k]), k) for k in range(len(clusters)))
+        members[k].add(node)
+        hops[k][node] = far
+        left.remove(node)
+    return [cluster._replace(members=tuple(sorted(m))) for cluster, m in zip(clusters, members, strict=True)]
 
 
 def _nearest_to_all(members: Sequence[NodeId], adjacency: Adjacency) -> NodeId:

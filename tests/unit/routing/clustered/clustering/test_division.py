@@ -40,6 +40,12 @@ def test_clusters_that_are_as_good_as_new_ones_stay_though_new_ones_would_be_oth
     assert Division("balanced", count=2, range_m=RANGE_M).renew(mixed, crowd, {}, now_ns=0) == mixed
 
 
+def test_a_member_that_is_cut_off_from_its_head_goes_to_the_cluster_that_it_hears() -> None:
+    apart = LINE | {4: 950.0, 5: 1150.0, 6: 1350.0, 7: 1550.0, 2: 500.0, 3: 700.0}
+    torn = [Cluster(NodeId(3), names(2, 3, 7)), Cluster(NodeId(5), names(4, 5, 6))]
+    assert [cluster.members for cluster in carried_on(torn, swarm_of(apart), {})] == [names(2, 3), names(4, 5, 6, 7)]
+
+
 def test_clusters_that_share_the_load_badly_are_made_anew() -> None:
     uneven = [Cluster(NodeId(3), names(2, 3, 4, 5)), Cluster(NodeId(6), names(6, 7))]
     clusters = Division("balanced", count=2, range_m=RANGE_M).renew(uneven, swarm_of(LINE), {}, now_ns=0)

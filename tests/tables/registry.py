@@ -47,6 +47,7 @@ class Table(NamedTuple):
 TABLES: Final[Mapping[str, Table]] = {
     "ns3": Table("results/against-ns3.md", emulator.against_ns3, Tolerance(absolute=0.005, relative=0.01)),
     "ns3-points": Table("results/against-ns3.md", emulator.points, Tolerance(absolute=0.005, relative=0.01)),
+    "ns3-held-out": Table("results/against-ns3.md", emulator.held_out, Tolerance(absolute=0.005, relative=0.01)),
     "ns3-fading": Table("results/against-ns3.md", fading_table, Tolerance(absolute=0.01, relative=0.01)),
     "closed-forms": Table("results/against-ns3.md", emulator.closed_forms, Tolerance(relative=0.01)),
     "error-rates": Table("explanation/channel.md", emulator.error_rates, Tolerance(absolute=0.05)),

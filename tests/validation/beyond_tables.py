@@ -103,23 +103,23 @@ def theirs_of(case: Case, program: Path) -> list[dict[str, Any]]:
     return [live.run(program, duration=case.seconds, run=seed, **case.theirs) for seed in _SEEDS]
 
 
-def beside(case: Case, theirs: Sequence[Mapping[str, Any]]) -> list[Compared]:
-    """Every figure of a case, ours beside what ns-3 said."""
-    ours, standard = [
+def beside(case: Case, theirs: Sequence[Mapping[str, Any]], *, standard: bool = True) -> list[Compared]:
+    """Every figure of a case, ours beside what ns-3 said; NaN for the standard's access if that is not asked for."""
+    ours, other = [
         [
             summary_of(case.scenario, (*case.ours, f"duration_s={case.seconds}", f"radio.access={access}"), seed)
-            for seed in _SEEDS
+            for seed in (_SEEDS if wanted else ())
         ]
-        for access in ("ns3", "standard")
+        for access, wanted in (("ns3", True), ("standard", standard))
     ]
     found = []
     for figure in case.figures:
         reference, sd = _mean_and_sd(said[figure] for said in theirs)
         mean, own_sd = _mean_and_sd(at(summary, figure) for summary in ours)
         both_sd = math.hypot(sd, own_sd) / math.sqrt(2)
-        relative = _RELATIVE.get(figure, 0.0)
-        metric = Metric(figure, reference, both_sd, len(_SEEDS), relative)
-        found.append(Compared(case.name, metric, len(_SEEDS), mean, _mean_and_sd(at(s, figure) for s in standard)[0]))
+        metric = Metric(figure, reference, both_sd, len(_SEEDS), _RELATIVE.get(figure, 0.0))
+        by_standard = statistics.fmean(at(summary, figure) for summary in other) if other else math.nan
+        found.append(Compared(case.name, metric, len(_SEEDS), mean, by_standard))
     return found
 
 

@@ -45,7 +45,9 @@ class GarbageOfRuns:
             yield
         finally:
             self._uncollected_s += self._cpu_s() - began_s
-            if was_on:
+            if was_on and gc.get_freeze_count():  # what the program has frozen stays so
+                gc.enable()
+            elif was_on:
                 gc.freeze()
                 gc.enable()
                 gc.unfreeze()  # all that is alive counts as old, so that the collector does not examine it at once

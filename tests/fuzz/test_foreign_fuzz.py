@@ -7,7 +7,7 @@ import pytest
 
 from fanet_mw.errors import ConfigError
 
-INPUTS = 140
+INPUTS = 90
 
 
 @pytest.fixture(scope="module")

@@ -3,6 +3,7 @@
 from typing import Any
 
 import pytest
+from kit import slow
 
 from sim.results.files import finish
 from sim.run.virtual import simulate
@@ -73,7 +74,7 @@ def test_more_than_fits_is_carried_as_far_as_it_fits_and_has_no_bound() -> None:
     assert summary["frames"]["closes"]
 
 
-@pytest.mark.parametrize("clusters", [4, 22])
+@pytest.mark.parametrize("clusters", [4, *slow(22)])
 def test_members_of_a_cluster_keep_a_bound_too(clusters: int) -> None:
     summary = summary_of(f"clusters.count={clusters}")
     assert summary["pdr"] >= 0.999

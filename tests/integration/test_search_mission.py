@@ -142,6 +142,7 @@ def test_a_shipped_flight_goes_as_it_does_when_the_worlds_truth_is_poisoned(name
     assert min(refused) > 100, "every UAV was told, and took in nothing"  # type: ignore[type-var]
 
 
+@pytest.mark.slow
 def test_three_uavs_confirm_by_a_spiral_what_lines_would_need_twelve_for() -> None:
     found = mission_of(simulate(find("rescue", [*KEYS, *FEW, "duration_s=160"])))
     assert found["coverage"] == found["connected"] == 1.0

@@ -95,7 +95,7 @@ def test_uavs_land_on_hills_and_beyond_them_and_their_motors_stop(name: str, ter
     assert landed.all(), "all of them have noticed that they stand on the ground"
 
 
-@pytest.mark.parametrize("name", ["kinematic", "rotors", "pybullet"])
+@pytest.mark.parametrize("name", ["kinematic", "rotors", *slow("pybullet")])
 def test_a_uav_that_lands_on_a_roof_stops_its_motors(name: str) -> None:
     solid = Obstacles(None, (Box(0, 0, 20, 20, 12, 0.3),))
     scenario = catalog.find("quick", ["nodes.count=3", 'mobility.model="onboard"'])

@@ -55,6 +55,20 @@ def test_a_program_that_has_switched_the_collector_off_finds_it_off() -> None:
         gc.enable()
 
 
+def test_what_a_program_has_frozen_is_still_frozen_after_a_run() -> None:
+    before = gc.get_freeze_count()
+    gc.freeze()
+    try:
+        frozen = gc.get_freeze_count()
+        with GarbageOfRuns().not_collected():
+            pass
+        assert gc.get_freeze_count() == frozen
+        assert gc.isenabled()
+    finally:
+        if not before:  # the tests have frozen what they hold themselves
+            gc.unfreeze()
+
+
 def test_the_uavs_of_an_ended_run_are_freed_before_a_later_one(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(virtual, "GARBAGE", GarbageOfRuns(every_s=0.0))
     seen: list[weakref.ref[Actor]] = []

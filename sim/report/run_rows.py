@@ -78,6 +78,8 @@ def _mission(found: Mapping[str, Any], *, confirms: bool) -> Iterator[tuple[str,
             yield "median error of the places confirmed", f"{found['confirmed_error_m']:g} m"
     if found["coverage"] is not None:
         yield "area covered", percent(found["coverage"])
+        if found.get("photographed") is not None:
+            yield "area shown by cameras", percent(found["photographed"])
         late = found["covered_95_s"]
         yield "time until 95 % of the area were covered", "not within the run" if late is None else f"{number(late)} s"
     if found["connected"] is not None:

@@ -2,6 +2,7 @@
 swarm.
 
     coverage    share of the area that came within the nominal range of the phone receiver of a UAV, cell by cell
+    photographed share of the area that was in an image of a UAV's camera, likewise
     connected   share of the time in which all searching UAVs were one connected component at the radio's reach; UAVs
                 that have crashed, fly home or stand there, or whose radio is off, do not count
     biconnected share of the time in which they would have remained so after the loss of any one of them
@@ -211,7 +212,7 @@ def _median(values: list[float]) -> float | None:
 
 def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
     """Coverage and coherence; None if the trace has no positions."""
-    covered = OverflownCells(scenario)
+    covered, photographed = OverflownCells(scenario), PhotographedCells(scenario)
     graphs: list[Coherence] = []
     with_post: list[bool] = []
     range_m, reaches = scenario.radio.range_m, max(scenario.reaches.values(), default=1.0)
@@ -229,11 +230,13 @@ def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
             np.fill_diagonal(apart, math.inf)
             nearest.append(apart.min(axis=0))
         covered.add(at.tolist())
+        photographed.add(at.tolist())
         if nearly_all_ns is None and covered.share >= _NEARLY_ALL:
             nearly_all_ns = t_ns
     return {
         "coverage": round(covered.share, 6) if graphs else None,
         "covered_95_s": None if nearly_all_ns is None else round(nearly_all_ns / S, 3),
+        "photographed": round(photographed.share, 6) if graphs and scenario.sensors.camera_hz else None,
         "connected": round(statistics.fmean(graph.connected for graph in graphs), 6) if graphs else None,
         "post_connected": round(statistics.fmean(with_post), 6) if with_post else None,
         "biconnected": round(statistics.fmean(graph.biconnected for graph in graphs), 6) if graphs else None,
@@ -299,13 +302,11 @@ def searching_instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows, F
         yield t_ns, np.array(rows), np.array(searching)
 
 
-class OverflownCells:
-    """The cells of the area that UAVs have flown over."""
+class _Cells:
+    """Cells of the area, none of them seen at first."""
 
     def __init__(self, scenario: Scenario) -> None:
-        mission, half = scenario.mission, scenario.world.area_m / 2
-        budget_db = mission.phone_power_dbm - mission.rubble_db - REFERENCE_LOSS_DB - mission.detection_dbm
-        self._range_m = 10 ** min(_MOST_DECADES, budget_db / (10 * mission.phone_exponent))
+        half = scenario.world.area_m / 2
         count = max(1, round(2 * half / _CELL_M))
         self._axis = (np.arange(count) + 0.5) * (2 * half / count) - half
         self._seen = np.zeros((count, count), bool)
@@ -316,8 +317,18 @@ class OverflownCells:
 
     @property
     def seen(self) -> Flags:
-        """The cells, row by row from south to north, each row from west to east; true of those flown over."""
+        """The cells, row by row from south to north, each row from west to east; true of those seen."""
         return self._seen.copy()
+
+
+class OverflownCells(_Cells):
+    """The cells of the area that UAVs have flown over."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        super().__init__(scenario)
+        mission = scenario.mission
+        budget_db = mission.phone_power_dbm - mission.rubble_db - REFERENCE_LOSS_DB - mission.detection_dbm
+        self._range_m = 10 ** min(_MOST_DECADES, budget_db / (10 * mission.phone_exponent))
 
     def add(self, at: Iterable[tuple[float, float, float]]) -> None:
         """UAVs were at these places."""
@@ -331,3 +342,22 @@ class OverflownCells:
                 within = (self._axis[near_n, None] - north) ** 2 + (self._axis[None, near_e] - east) ** 2 <= ground2
                 block = np.ix_(near_n, near_e)
                 self._seen[block] |= within
+
+
+class PhotographedCells(_Cells):
+    """The cells of the area that cameras have shown: the middle of a cell was in the image."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        super().__init__(scenario)
+        sensors = scenario.sensors
+        width, height = sensors.camera_pixels
+        self._tan_east = math.tan(math.radians(sensors.camera_fov_deg) / 2)
+        self._tan_north, self._most_up_m = self._tan_east * height / width, scenario.nodes.altitude_m
+
+    def add(self, at: Iterable[tuple[float, float, float]]) -> None:
+        """UAVs were at these places; over hills they are taken to be at the height of the search."""
+        for east, north, up in at:
+            above_m = min(up, self._most_up_m)
+            near_e = np.abs(self._axis - east) <= above_m * self._tan_east
+            near_n = np.abs(self._axis - north) <= above_m * self._tan_north
+            self._seen |= near_n[:, None] & near_e

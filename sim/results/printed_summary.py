@@ -185,9 +185,12 @@ def _mission_rows(mission: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if mission["mistaken"] or mission["reopened"]:
         yield "mistaken", f"{mission['mistaken']} taken for somebody else, {mission['reopened']} taken back"
     if mission["coverage"] is not None:
+        images = (
+            f" by phones, {mission['photographed']:.1%} by cameras" if mission.get("photographed") is not None else ""
+        )
         yield (
             "search",
-            f"{mission['coverage']:.1%} of the area covered, connected {mission['connected']:.1%} of the time",
+            f"{mission['coverage']:.1%} of the area covered{images}, connected {mission['connected']:.1%} of the time",
         )
     times = mission["time_to_approach_s"]
     if times:

@@ -68,6 +68,13 @@ def test_who_has_left_the_search_or_has_fallen_need_not_be_in_reach(
     assert measured([gone, back, *away])["connected"] == (1.0 if gone.mode == "fallen" else 0.0), "a wreck stays one"
 
 
+def test_what_cameras_have_shown_is_a_share_of_its_own() -> None:
+    assert measured(at(1, 0, 0, 0))["photographed"] is None
+    seen = {"sensors": {"camera_hz": 2.0, "camera_fov_deg": 90.0, "camera_pixels": (400, 200)}}
+    found = mission(Scenario(**KEYS, **seen), [*at(1, -200, 0, 200), *at(2, -150, 50, 1000)])
+    assert found["photographed"] == pytest.approx((3 * 100 + 2 * 50) * 50 / 500**2)
+
+
 def test_coverage_is_the_share_of_the_area_within_range_of_a_receiver() -> None:
     circle = math.pi * 137**2 / 500**2
     assert abs(measured(at(1, 0, 0, 0))["coverage"] - circle) < 0.02, "cells of 25 m"

@@ -88,7 +88,10 @@ class Pattern:
 
     def at(self, place: int, swept_s: float) -> Enu:
         """The position of a place after this time of sweeping; before 0, where the sweep begins."""
-        return self.shape.at(self._flown.get(place, place), swept_s)
+        flown = self._flown.get(place, place)
+        at = self.shape.at(flown, swept_s)
+        aside_m = self.shape.aside_m(flown, swept_s) if isinstance(self.shape, Lines) else 0.0
+        return at._replace(east=at.east + aside_m) if aside_m else at
 
     def tethers(self, place: int, swept_s: float) -> tuple[int, ...]:
         """The places that must stay within radio reach of this one to keep the swarm connected, past those that are
@@ -117,11 +120,14 @@ class Pattern:
         return rank % 2 == 1 and self.shape.may_leave(at, swept_s, reach_m=self._hop_m, left=self._left[0])
 
     def velocity(self, place: int, swept_s: float) -> Enu:
-        """The velocity of a place after this time of sweeping."""
+        """The velocity of a place after this time of sweeping, without that at which lines shift to their other lanes:
+        while they do, they wait, and whoever is behind stays there.
+        """
         if swept_s < 0:
             return STILL
         early = max(0.0, swept_s - _STEP_S)
-        a, b = self.at(place, early), self.at(place, early + _STEP_S)
+        flown = self._flown.get(place, place)
+        a, b = self.shape.at(flown, early), self.shape.at(flown, early + _STEP_S)
         return Enu((b.east - a.east) / _STEP_S, (b.north - a.north) / _STEP_S, (b.up - a.up) / _STEP_S)
 
 

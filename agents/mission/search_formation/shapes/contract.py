@@ -38,7 +38,7 @@ edge. In a very small area it is less."""
 FIRST_M: Final = 16.0
 """The distance of each line from the middle, or of a sector's team from the side where its sweep begins, at the
 beginning: far enough for two teams not to be in each other's way, and near enough to receive what lies behind them."""
-_TURN_S: Final = 10.0
+TURN_S: Final = 10.0
 """How long lines and sectors' teams wait at the edge of the area before they fly back, so that a UAV that has fallen
 behind gets there, too."""
 BACK: Final = 1.2
@@ -232,7 +232,7 @@ def swept_m(formation: Dimensions, swept_s: float, *, faster_back: float = BACK)
     if swept_s <= 0:
         return formation.first_m
     out_s = (formation.last_m - formation.first_m) / formation.speed_m_s
-    along_s = swept_s % (out_s + _TURN_S + out_s / faster_back)
+    along_s = swept_s % (out_s + TURN_S + out_s / faster_back)
     if along_s <= out_s:
         return formation.first_m + along_s * formation.speed_m_s
-    return formation.last_m - max(0.0, along_s - out_s - _TURN_S) * formation.speed_m_s * faster_back
+    return formation.last_m - max(0.0, along_s - out_s - TURN_S) * formation.speed_m_s * faster_back

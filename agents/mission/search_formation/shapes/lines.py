@@ -12,6 +12,8 @@ where the next one began, and chains join neighboring ones unless these are with
 The words place, lane, team, relay and follower are explained in `contract.py`; the teams of this formation are its
 lines, from the northernmost to the southernmost.
 
+On its way back each UAV flies between the lanes of its way out.
+
 Between two turns each place of a line moves straight at constant speed. A relay does so, too, but changes its velocity
 once, when the lines have flown `_STRAIGHT_M`. The distance of two such places is therefore a convex function of time
 from a turn to that instant, and from that instant to the next turn: a pair that is within radio reach at these three
@@ -23,10 +25,12 @@ import math
 from typing import Final
 
 from agents.mission.search_formation.shapes.contract import (
+    BACK,
     EDGE_M,
     FIRST_M,
     FOLLOW_M,
     FOLLOWER_HIGHER_M,
+    TURN_S,
     Demands,
     Dimensions,
     RowKind,
@@ -47,6 +51,8 @@ _SIDE_M: Final = 65.0
 still shift to either side."""
 _LEAST_LANES: Final = 2
 """The least number of lanes of a line, which has one at each end."""
+_SHIFT: Final = 1.15
+"""The greatest speed at which lines shift sideways at a turn, as a multiple of the speed of the sweep."""
 _LEAST_APART_M: Final = 60.0
 """The least distance of two lines on the same side of the middle."""
 _FREE: Final = 4
@@ -109,6 +115,19 @@ class Lines:
         behind = max(inner_m + outward_m - behind_m, formation.first_m * 0.5)
         east = formation.half_width_m * (2 * share - 1)
         return Enu(east, behind if line < self._half else -behind, formation.height_m + FOLLOWER_HIGHER_M)
+
+    def aside_m(self, place: float, swept_s: float) -> float:
+        """How far to the east of its lane a place is: all but the easternmost shift into the middle between lanes at
+        each turn at the edge, and back at the next one, so that what no camera shows on one sweep is shown on another.
+        """
+        formation = self._formation
+        turn, into_s = divmod(swept_s - self.sweep_s, self.sweep_s + TURN_S + self.sweep_s / BACK)
+        if turn < 0 or place >= formation.fixed:
+            return 0.0
+        shifted = min(1.0, into_s / TURN_S)
+        lane = place % formation.lanes if place <= formation.teams * formation.lanes - 1 else formation.lanes // 2
+        most_m = min(self.lane_m / 2, _SHIFT * TURN_S * formation.speed_m_s)
+        return most_m * min(1.0, formation.lanes - 1 - lane) * (1 - shifted if turn % 2 else shifted)
 
     def tethers(self, place: int) -> tuple[int, ...]:
         formation = self._formation

@@ -19,6 +19,8 @@ from fanet_mw.units import Enu
 from fanet_mw.wire import HEADER_BYTES
 from fanet_mw.wire.search_plan import MOST_PLACES, Search
 from sim.results.coherence import coherence
+from sim.results.mission import PhotographedCells
+from sim.scenarios import catalog
 
 REACH_M, SEEN_M, SPEED_M_S = 250.0, 131.0, 7.5
 
@@ -181,6 +183,18 @@ def test_more_than_two_lines_move_as_one_piece_and_nobody_meets(count: int, area
 def test_one_more_uav_is_never_slower(shape: ShapeName) -> None:
     times = [made.shape.sweep_s for n in range(1, 90) if (made := fitted(n, demands(1000), shape=shape)) is not None]
     assert all(after <= before + 1e-9 for before, after in itertools.pairwise(times))
+
+
+@pytest.mark.parametrize(("count", "area_m"), [(45, 2500), (20, 1000), (41, 1000)])
+def test_lines_show_on_their_way_back_what_no_camera_has_shown_on_their_way_out(count: int, area_m: float) -> None:
+    pattern = formed(ShapeName.LINES, count, area_m)
+    keys = [f"world.area_m={area_m}", f"nodes.count={count}", "nodes.spacing_m=50"]
+    cells, shown = PhotographedCells(catalog.find("rescue", keys)), []
+    for second in range(math.ceil(2 * pattern.shape.sweep_s) + 10):
+        cells.add(pattern.at(place, second) for place in range(pattern.dimensions.fixed))
+        shown.append(cells.share)
+    assert shown[math.ceil(pattern.shape.sweep_s)] < 0.85
+    assert shown[-1] > 0.98
 
 
 def test_twice_the_uavs_sweep_in_lines_in_half_the_time() -> None:

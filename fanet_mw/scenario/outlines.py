@@ -2,7 +2,7 @@
 
 Read are collections of features, single ones and one a line (RFC 8142), with tags as properties, in `tags`
 (osmtogeojson) or in `other_tags` (GDAL). A polygon is left out if it has less than three corners, or if its tags say
-that it is no building, such as a park.
+that it is no building, such as a park, or lies underground.
 """
 
 import contextlib
@@ -91,8 +91,13 @@ def _tree(data: bytes) -> Any:  # noqa: ANN401  (JSON)
         return {"type": "FeatureCollection", "features": [json.loads(line) for line in lines]}
     except ValueError as error:  # of Python, whose advice is not for users
         raise ValueError(str(error).partition(";")[0]) from error
+    if isinstance(tree, list) and all(isinstance(feature, dict) for feature in tree):
+        tree = {"type": "FeatureCollection", "features": tree}
     if isinstance(tree, dict) and "elements" in tree:
         raise ValueError("it is the JSON of Overpass; export it as GeoJSON")
+    if isinstance(tree, dict) and (tree.get("type") == "Topology" or "geometryType" in tree):
+        kind = "Esri's JSON" if "geometryType" in tree else "TopoJSON"
+        raise ValueError(f"it is {kind}; convert it: ogr2ogr -f GeoJSON -t_srs EPSG:4326 town.geojson in.json")
     if not isinstance(tree, dict) or "type" not in tree:
         raise ValueError("it is no object with a type")
     crs = tree.get("crs") or "WGS84"
@@ -165,6 +170,8 @@ def _tags(properties: object) -> Mapping[str, Any]:
 
 
 def _is_building(tags: Mapping[str, Any]) -> bool:
+    if str(tags.get("location")).lower() == "underground":
+        return False
     said = [tags[key] for key in _BUILDING if key in tags]
     if said:
         return any(str(value).lower() not in {"no", "false", "0"} for value in said)

@@ -134,7 +134,7 @@ def carry_out(
         took = time.monotonic() - began
         cpu_s = math.fsum(done.cpu_s for task in plan.todo if (done := store.get(task.key)) is not None)
         spent = f"in {took:.0f} s ({cpu_s:.0f} s of CPU)"
-        Console().print(f"{len(statuses)} rows in {out / TABLE}, {len(plan.todo)} of them new, {spent}",
+        Console().print(f"{_counted(len(statuses), 'row')} in {out / TABLE}, {len(plan.todo)} of them new, {spent}",
                         highlight=False, soft_wrap=True)  # fmt: skip
     if failed:
         _say_failures(table)
@@ -175,12 +175,17 @@ def _workers(jobs: int | None, scheduler: str | None, plan: "RemainingRuns", *, 
 
 def _announcement(name: str, wanted: "Sweep", plan: "RemainingRuns", workers: "Workers") -> str:
     settings = plan.total // max(1, len(wanted.seed_list()))
-    text = f"{name}: {plan.total} runs ({settings} settings x {len(wanted.seed_list())} seeds)"
+    seeds = _counted(len(wanted.seed_list()), "seed")
+    text = f"{name}: {_counted(plan.total, 'run')} ({_counted(settings, 'setting')} x {seeds})"
     if len(plan.todo) < plan.total:
         text += f", {plan.total - len(plan.todo)} finished before"
     if not plan.todo:
         return f"{text}; nothing to do"
     return f"{text}; {workers.workers} process{'' if workers.workers == 1 else 'es'}"
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def _warn_of_codes(codes: Mapping[str, int], what_follows: str) -> None:
@@ -217,7 +222,7 @@ def _say(text: str, *, style: str | None = None) -> None:
 
 def _say_failures(table: "Table") -> None:
     rows = [row for row in table.select(["status", "error", "command"]).to_pylist() if row["status"] == "failed"]
-    _say(f"{len(rows)} runs failed:", style="bold red")
+    _say(f"{_counted(len(rows), 'run')} failed:", style="bold red")
     for row in rows[:5]:
         _err.print(
             f"  {row['error'].splitlines()[0]}\n    {row['command']}", markup=False, highlight=False, soft_wrap=True

@@ -94,7 +94,9 @@ HEIGHTS: tuple[tuple[dict[str, object], float], ...] = (
     ({"height": True}, 19.0), ({"height": "NaN"}, 19.0), ({"height": "12 стор."}, 19.0), ({"height": "١٢"}, 12.0),
     ({"HEIGHT": 12}, 12.0), ({"height": "40\u2019"}, 12.192), ({"height": "12m50"}, 19.0), ({"height": "12 cm"}, 19.0),
     ({"height": "6 ft 6 in"}, 1.9812), ({"building:levels": "G+3"}, 19.0), ({"building:levels": "3;roof"}, 9.0),
-    ({"building:levels": "-1"}, 19.0), ({"height": "10,000"}, 19.0), ({"height": "nicht bekannt"}, 19.0),
+    ({"building:levels": "-1"}, 19.0), ({"building:levels": "1,2"}, 6.0), ({"building:levels": "2,5"}, 7.5),
+    ({"building_levels": "5"}, 15.0), ({"num_floors": 4, "height": None}, 12.0), ({"building:levels": "1, 2, 3"}, 9.0),
+    ({"height": "10,000"}, 19.0), ({"height": "nicht bekannt"}, 19.0),
 )  # fmt: skip
 """Tags of a building, and its height; 19 m is the default."""
 

@@ -2,9 +2,10 @@
 
 Each outline becomes upright boxes: the smallest rectangle around it or, if it is concave and fills less than
 `_LEAST_FILLED` of that, those of its parts. Its height is the property `height` [m], else `building:height` or
-`est_height`, else `building:levels` (or `levels`) times 3 m, else the middle of `world.building_height_m`; what cannot
-be read is passed over, and of several values the greatest counts. Longitude and latitude are converted to east and
-north of `world.origin_deg`. Other geometries are ignored. Not modeled: courtyards, and roofs that are not flat.
+`est_height`, else `building:levels` (`levels`, Overture's `num_floors`) times 3 m, else the middle of
+`world.building_height_m`; what cannot be read is passed over, and of several values the greatest counts. Longitude and
+latitude are converted to east and north of `world.origin_deg`. Other geometries are ignored. Not modeled: courtyards,
+and roofs that are not flat.
 """
 
 import json
@@ -37,7 +38,8 @@ _MOST_PARTS: Final = 16
 _MOST_CUTS: Final = 24
 """The number of cuts that are tried on a part, along each axis."""
 _KEYS: Final = (
-    ("height", 1.0), ("building:height", 1.0), ("est_height", 1.0), ("building:levels", LEVEL_M), ("levels", LEVEL_M)
+    ("height", 1.0), ("building:height", 1.0), ("est_height", 1.0), ("building:levels", LEVEL_M),
+    ("building_levels", LEVEL_M), ("levels", LEVEL_M), ("num_floors", LEVEL_M),
 )  # fmt: skip
 _NUMBER: Final = r"\+?(?:\d+(?:\.\d*|,(?!\d{3}(?!\d))\d*)?|[.,]\d+)"
 """A comma before three digits may be one of thousands, so that number is not read."""
@@ -50,6 +52,8 @@ _METRES: Final = re.compile(
 _LEVELS: Final = re.compile(rf"({_NUMBER})\s*(?:levels?|lvls?|floors?|fl|f|stor(?:e?ys?|ies))?")
 _ABOUT: Final = re.compile(r"^(?:~|≈|<|>|<=|>=|ca\.?|c\.|approx\.?|approximately|about|around|est\.?)\s*")
 _SUPPOSED: Final = re.compile(r"\s*(?:\(.*\)|\?|approx\.?|approximately|ca\.?|est\.?|estimated)$")
+_LEVELS_LISTED: Final = re.compile(r",(?!5$)")
+"""A comma between levels, of which only half ones are written with a decimal comma."""
 _SEVERAL: Final = re.compile(r"\s*(?:;|\||/|\u2013|\u2014|-|\bto\b|\bor\b)\s*")
 
 
@@ -76,6 +80,8 @@ class Town(NamedTuple):
     """The number of buildings within the area of which no tag states a height."""
     broken: tuple[str, ...]
     """The outlines of the file that enclose nothing, as far as they lie within the area."""
+    middle_deg: tuple[float, float]
+    """Latitude and longitude of the middle of the file."""
 
 
 @lru_cache(maxsize=8)
@@ -112,7 +118,7 @@ def read(path: Path, *, origin_deg: tuple[float, float], height_m: float, area_m
         if why:
             guessed.append(f"{outline.name}: {why}")
         untold += not any(_said(outline.tags, key) for key, _ in _KEYS)
-    return Town(tuple(boxes), len(found.buildings), tuple(guessed), untold, tuple(broken))
+    return Town(tuple(boxes), len(found.buildings), tuple(guessed), untold, tuple(broken), found.middle_deg)
 
 
 def height_of(tags: Mapping[str, Any], default_m: float) -> tuple[float, str]:
@@ -139,7 +145,8 @@ def _said(tags: Mapping[str, Any], key: str) -> str:
 def _values(text: str, *, in_levels: bool) -> list[float | None]:
     """The numbers that a tag states, in metres or levels; None for a part of it that states anything else."""
     found: list[float | None] = []
-    parts = _SEVERAL.split(_ABOUT.sub("", text.strip().lower()))
+    said = _ABOUT.sub("", text.strip().lower())
+    parts = _SEVERAL.split(_LEVELS_LISTED.sub(";", said) if in_levels else said)
     if not parts[0]:  # a minus, and no range
         return [None]
     for part in parts:

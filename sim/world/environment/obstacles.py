@@ -21,6 +21,7 @@ from fanet_mw.scenario import Scenario, World
 from sim.world.arrays import Rows, Values
 from sim.world.environment import footprints, heightmap
 
+_NEAR_DEG: Final = 1.0
 _CLEAR_M: Final = 5.0
 """The least distance between a random building and a UAV at its start."""
 _TRIES: Final = 200
@@ -191,9 +192,13 @@ def _of_file(world: World, hills: Hills | None, starts: Rows) -> Iterator[Box]:
     """The buildings of the scenario's GeoJSON file whose middle lies in the area."""
     town = town_of(world)
     if not town.boxes:
+        lat, lon = town.middle_deg
+        exchanged = math.hypot(lat - world.origin_deg[1], lon - world.origin_deg[0]) < _NEAR_DEG
         raise ConfigError(
             f"world.buildings_geojson: none of the {town.buildings} buildings of {world.buildings_geojson} lies within "
-            f"world.area_m = {world.area_m:g}; is world.origin_deg right?"
+            f"world.area_m = {world.area_m:g} about world.origin_deg = [{world.origin_deg[0]:g}, "
+            f"{world.origin_deg[1]:g}]; the middle of the file is [{lat:.5f}, {lon:.5f}]: "
+            f"{'are longitude and latitude exchanged in it?' if exchanged else 'is world.origin_deg right?'}"
         )
     for east, north, width, depth, yaw, height in town.boxes:
         box = Box(east, north, width, depth, height + (hills.height_m(east, north) if hills else 0.0), yaw)

@@ -410,6 +410,17 @@ def test_a_closed_line_of_a_building_is_its_outline_in_any_unicode(tmp_path: Pat
     assert [box.height for box in town(path, Geodetic(0.0, 0.0, 0.0)).boxes] == [8.0]
 
 
+def test_a_list_of_features_is_a_town_without_what_is_underground(tmp_path: Path) -> None:
+    ring = [[0.0, 0.0], [0.0001, 0.0], [0.0001, 0.0001], [0.0, 0.0001], [0.0, 0.0]]
+    features = [
+        {"type": "Feature", "properties": tags, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+        for tags in ({"building": "yes", "height": 8}, {"building": "parking", "location": "underground"})
+    ]
+    path = tmp_path / "a.geojson"
+    path.write_text(json.dumps(features))
+    assert [box.height for box in town(path, Geodetic(0.0, 0.0, 0.0)).boxes] == [8.0]
+
+
 def test_a_town_across_180_degrees_is_one_town(tmp_path: Path) -> None:
     taveuni = Geodetic(-16.8, 180.0, 0.0)
     square = [(0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0)]

@@ -309,7 +309,10 @@ def test_a_turned_building_hides_and_is_hit_where_it_stands(
     ("text", "named"),
     [
         ("{", "is no JSON"),
-        ("[]", "no GeoJSON of buildings"),
+        ("[]", "holds no Polygon"),
+        ("[1]", "no GeoJSON of buildings"),
+        ('{"type": "Topology", "arcs": []}', "it is TopoJSON; convert it"),
+        ('{"geometryType": "esriGeometryPolygon", "features": []}', "it is Esri's JSON; convert it"),
         ('{"type": "FeatureCollection", "features": []}', "holds no Polygon"),
         ('{"type": "Polygon", "coordinates": [[[0, 0], [1, 1]]]}', "four positions"),
         ('{"type": "Polygon", "coordinates": [[[200, 0], [1, 1], [1, 2], [0, 0]]]}', "longitude and latitude"),
@@ -327,6 +330,9 @@ def test_buildings_far_from_the_origin_and_on_a_start_are_refused(make_scenario:
     far = make_scenario(**{"world.buildings_geojson": path, "world.origin_deg": (10.0, 10.0)})
     with pytest.raises(ConfigError, match=r"is world\.origin_deg right"):
         obstacles(far, np.array(positions(far)))
+    exchanged = make_scenario(**{"world.buildings_geojson": path, "world.origin_deg": (PARIS[1], PARIS[0])})
+    with pytest.raises(ConfigError, match=r"the middle of the file is \[.*: are longitude and latitude exchanged"):
+        obstacles(exchanged, np.array(positions(exchanged)))
     there = make_scenario(**{"world.buildings_geojson": path, "nodes.count": 1})
     with pytest.raises(ConfigError, match="a node starts within the building"):
         obstacles(there, np.array(positions(there)))

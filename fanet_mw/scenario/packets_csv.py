@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Final
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.scenario.tables.sections import MOST_S
+from fanet_mw.scenario.tables.traffic import LEAST_BYTES, MOST_BYTES
 from fanet_mw.scenario.text_files import read_text
 
 _BETWEEN: Final = re.compile(r"\s*\"?sep=(.)\"?\s*", re.IGNORECASE)
@@ -34,7 +36,7 @@ def packets_of(path: Path, *, key: str) -> list[tuple[float, int]]:
     what = f"{key} = {path}"
     found: list[tuple[float, int]] = []
     may_be_heading = True
-    for number, line, cells in _lines(read_text(path, what=what), what):
+    for number, line, cells in _lines(read_text(path, what=what, latin=True), what):  # as Excel writes it
         if may_be_heading and not any(_LIKE_A_NUMBER.match(cell) for cell in cells):
             _require_units(cells, f"{what}, line {number}: {line!r}")
         else:
@@ -42,6 +44,16 @@ def packets_of(path: Path, *, key: str) -> list[tuple[float, int]]:
             if seconds is None or size is None or seconds < 0 or size != int(size):
                 raise ConfigError(
                     f"{what}, line {number}: {line!r} must be seconds,bytes: a number >= 0 and a whole one"
+                )
+            if seconds > MOST_S:
+                raise ConfigError(
+                    f"{what}, line {number}: {line!r}: seconds must be at most {MOST_S:g}; they count from start_s, "
+                    "and are no time of day"
+                )
+            if not LEAST_BYTES <= size <= MOST_BYTES:
+                raise ConfigError(
+                    f"{what}, line {number}: {line!r}: bytes must be within [{LEAST_BYTES}, {MOST_BYTES}]; they "
+                    "include the routing header"
                 )
             found.append((seconds, int(size)))
         may_be_heading = False

@@ -11,13 +11,16 @@ _MARKS: Final = (
     (b"\xfe\xff", "utf-16"),
 )  # fmt: skip
 _NO_TEXT: Final = (
-    (b"PK\x03\x04", "a ZIP archive: unpack it"), (b"\x1f\x8b", "compressed by gzip: unpack it"),
+    (b"PK\x03\x04", "a ZIP archive, as spreadsheets are: unpack it, or save it as text"),
+    (b"\x1f\x8b", "compressed by gzip: unpack it"),
     (b"7z\xbc\xaf\x27\x1c", "a 7z archive: unpack it"), (b"BZh", "compressed by bzip2: unpack it"),
     (b"SQLite format 3", "a GeoPackage or another SQLite database: export it, for example by ogr2ogr"),
     (b"\0\0\x27\x0a", "a shapefile: export it, for example by ogr2ogr"),
     (b"<", "XML or HTML: export it, OpenStreetMap's for example by osmtogeojson"),
 )  # fmt: skip
 """How files of other kinds begin, and what each is."""
+_CONTROLS: Final = frozenset(range(32)) - frozenset(b"\t\n\r\f\x1a")
+"""Bytes that no text holds."""
 
 
 def decoded(data: bytes, *, otherwise: str = "utf-8") -> str:
@@ -28,11 +31,14 @@ def decoded(data: bytes, *, otherwise: str = "utf-8") -> str:
     return data.decode(next((encoding for mark, encoding in _MARKS if data.startswith(mark)), otherwise))
 
 
-def read_text(path: Path, *, what: str) -> str:
-    """The text of a file; raises ConfigError, which calls it `what`."""
+def read_text(path: Path, *, what: str, latin: bool = False) -> str:
+    """The text of a file; raises ConfigError, which calls it `what`. `latin`: it may be in Latin-1."""
+    data = read_regular(path, what=what)
     try:
-        return decoded(read_regular(path, what=what))
+        return decoded(data)
     except UnicodeError as error:
+        if latin and not _CONTROLS.intersection(data):
+            return data.decode("latin-1")
         raise ConfigError(f"{what}: is no text in UTF-8: {error}") from error
     except ValueError as error:
         if isinstance(error, ConfigError):

@@ -1,6 +1,6 @@
 """The `[traffic]` table: the application load."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -13,6 +13,10 @@ from fanet_mw.scenario.tables.sections import (
 )
 from fanet_mw.units import MAX_NODES
 
+LEAST_BYTES: Final = 64
+MOST_BYTES: Final = 2304
+"""Bounds of a packet; an MSDU has no more (802.11-2020, 9.2.4.8.1)."""
+
 
 class Traffic(Section):
     """The application load: which nodes send how much, how often, and to whom. With several classes: one `[[traffic]]`
@@ -21,7 +25,7 @@ class Traffic(Section):
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{0,64}$")] = ""
     """Name of the traffic class in results; empty: `traffic` for the first class, then `traffic_2` and so on."""
-    payload_bytes: Annotated[int, Field(ge=64, le=2304)] = 1024
+    payload_bytes: Annotated[int, Field(ge=LEAST_BYTES, le=MOST_BYTES)] = 1024
     """UDP payload on the air, including the routing header."""
     interval_s: Annotated[float, Field(ge=1e-4, le=MOST_S)] = 1.0
     """Time between two packets of a source, at least 0.1 ms, because a node has one sequence number for each 0.1 ms."""
@@ -33,7 +37,7 @@ class Traffic(Section):
     """`on_off`: mean of the exponential periods in which a source is active."""
     off_s: Duration = 1.0
     """`on_off`: mean of the exponential pauses in between."""
-    packets: tuple[tuple[Duration, Annotated[int, Field(ge=64, le=2304)]], ...] = ()
+    packets: tuple[tuple[Duration, Annotated[int, Field(ge=LEAST_BYTES, le=MOST_BYTES)]], ...] = ()
     """`trace`: each packet of a source as [seconds after `start_s`, bytes as in `payload_bytes`]."""
     packets_csv: str = ""
     """`trace`: a file with a line `seconds,bytes` for each packet, which is read with the scenario."""

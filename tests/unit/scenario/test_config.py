@@ -176,6 +176,15 @@ def test_no_packet_of_a_spreadsheet_is_lost(tmp_path: Path, text: str, encoding:
     assert config.load(tmp_path / "s.toml").traffic.packets == ((0.5, 200), (1.5, 300))
 
 
+def test_a_heading_of_an_old_spreadsheet_is_in_latin_1_and_a_capture_is_no_text(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text('[traffic]\narrivals = "trace"\npackets_csv = "load.csv"\n')
+    (tmp_path / "load.csv").write_bytes("Zeit;Größe\r\n0,5;200\r\n".encode("latin-1"))
+    assert config.load(tmp_path / "s.toml").traffic.packets == ((0.5, 200),)
+    (tmp_path / "load.csv").write_bytes(b"\xd4\xc3\xb2\xa1\x02\x00\x04\x00")
+    with pytest.raises(ConfigError, match=r"load\.csv: is no text in UTF-8"):
+        config.load(tmp_path / "s.toml")
+
+
 @pytest.mark.parametrize(
     ("text", "wrong"),
     [
@@ -194,6 +203,8 @@ def test_no_packet_of_a_spreadsheet_is_lost(tmp_path: Path, text: str, encoding:
         ("size;time\n1500;100\n", "line 1: 'size;time': the cells of each line must be seconds and bytes"),
         ("seconds,kB\n1,100\n", "line 1: 'seconds,kB': the cells"),
         ("seconds,bytes\n", "load.csv: holds no line seconds,bytes"),
+        ("0.5,200\n1704067200.5,200\n", "line 2: '1704067200.5,200': seconds must be at most 1e+06"),
+        ("0.5,200\n1.5,40\n", "line 2: '1.5,40': bytes must be within [64, 2304]"),
     ],
 )
 def test_a_line_of_a_packet_file_that_is_none_is_named(tmp_path: Path, text: str, wrong: str) -> None:

@@ -502,7 +502,7 @@ def test_the_smallest_rectangle_may_lie_along_a_side_of_the_hull_alone(tmp_path:
         ('{"type": "FeatureCollection"}', "features are no list"),
         ('\ufeff<?xml version="1.0"?><osm/>', "it is XML or HTML: export it"),
         (f'{{"type": {"1" * 5000}}}', r"4300 digits\) .* has 5000 digits$"),
-        ("PK\x03\x04", "it is a ZIP archive: unpack it"),
+        ("PK\x03\x04", "it is a ZIP archive, as spreadsheets are: unpack it"),
         ('{"type": "Polygon", "crs": {"properties": {"name": "EPSG:3857"}}}', "its crs is EPSG:3857; convert the file"),
         ("SQLite format 3\0", "a GeoPackage or another SQLite database"),
     ],

@@ -14,6 +14,7 @@ from fanet_mw.scenario.text_files import decoded
 _KEYS: Final = {
     "ncols": "ncols", "nrows": "nrows", "cellsize": "cellsize", "dx": "dx", "dy": "dy", "xdim": "dx", "ydim": "dy",
     "xllcorner": "xllcorner", "yllcorner": "yllcorner", "xllcenter": "xllcenter", "yllcenter": "yllcenter",
+    "xllcentre": "xllcenter", "yllcentre": "yllcenter",
     "nodata_value": "nodata", "nodata": "nodata",
 }  # fmt: skip
 _SIDES: Final = ("cellsize", "dx", "dy")

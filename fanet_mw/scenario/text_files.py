@@ -11,20 +11,22 @@ _MARKS: Final = (
     (b"\xfe\xff", "utf-16"),
 )  # fmt: skip
 _NO_TEXT: Final = (
-    (b"PK\x03\x04", "a ZIP archive, as spreadsheets are: unpack it, or save it as text"),
-    (b"\x1f\x8b", "compressed by gzip: unpack it"),
+    (b"PK\x03\x04", "a ZIP archive: unpack it"), (b"\x1f\x8b", "compressed by gzip: unpack it"),
     (b"7z\xbc\xaf\x27\x1c", "a 7z archive: unpack it"), (b"BZh", "compressed by bzip2: unpack it"),
     (b"SQLite format 3", "a GeoPackage or another SQLite database: export it, for example by ogr2ogr"),
     (b"\0\0\x27\x0a", "a shapefile: export it, for example by ogr2ogr"),
     (b"<", "XML or HTML: export it, OpenStreetMap's for example by osmtogeojson"),
 )  # fmt: skip
 """How files of other kinds begin, and what each is."""
+_SPREADSHEET: Final = (b"[Content_Types].xml", b"vnd.oasis.opendocument")
 _CONTROLS: Final = frozenset(range(32)) - frozenset(b"\t\n\r\f\x1a")
 """Bytes that no text holds."""
 
 
 def decoded(data: bytes, *, otherwise: str = "utf-8") -> str:
     """The text of a file; raises ValueError."""
+    if data.startswith(b"PK") and any(mark in data[:128] for mark in _SPREADSHEET):
+        raise ValueError("it is a spreadsheet: save it as CSV")
     for start, what in _NO_TEXT:
         if data[:64].lstrip(b"\xef\xbb\xbf \t\r\n").startswith(start):
             raise ValueError(f"it is {what}")

@@ -15,7 +15,7 @@ from sim.world.arrays import Rows
 _FEET: Final = {"ft": 0.3048, "foot": 0.3048, "feet": 0.3048, "us-ft": 1200 / 3937, "us survey foot": 1200 / 3937}
 _VERTICAL_UNIT: Final = re.compile(r'VERT_CS\[.*?UNIT\["[^"]*",([\d.]+)')
 """The metres of a unit of height, in the text of a compound reference system."""
-_MEMORY_FILE: Final = re.compile(r"(?:/vsimem/)?[0-9a-f-]{36}\S*?: ?|/vsimem/\S*")
+_MEMORY_FILE: Final = re.compile(r"(?:/vsimem/)?[0-9a-f-]{36}\S*?(?:: ?|, )|/vsimem/\S*")
 
 
 def read(
@@ -65,6 +65,6 @@ def read(
             (lon,), (lat,) = transform(file.crs, "EPSG:4326", [middle_x], [middle_y])
             middle_deg = float(lat), float(lon)
     except (RasterioError, CPLE_BaseError) as error:
-        raise ValueError(_MEMORY_FILE.sub("", str(error.__cause__ or error))) from error
+        raise ValueError(f"GDAL cannot read it: {_MEMORY_FILE.sub('', str(error.__cause__ or error))}") from error
     last = metres.shape[0] - 1
     return metres[::-1], [(column - 0.5, last - (row - 0.5)) for column, row in cells], middle_deg

@@ -12,12 +12,17 @@ from sim.world.arrays import Rows
 Bytes = npt.NDArray[np.uint8]
 SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
 _MOST_PIXELS: Final = 64_000_000
+_KINDS: Final = {
+    0: "gray", 2: "colored", 3: "of a palette", 4: "gray and transparent", 6: "colored and transparent",
+}  # fmt: skip
 
 
 def brightness(data: bytes) -> Rows:
     """Brightness from 0 to 1 (PNG specification, third edition: chunks, filters)."""
     at, pixels, head = len(SIGNATURE), b"", b""
     while at < len(data):
+        if at + 8 > len(data):
+            raise ValueError("it is cut short")
         length, kind = struct.unpack_from(">I4s", data, at)
         body = data[at + 8 : at + 8 + length]
         head = body if kind == b"IHDR" else head
@@ -25,7 +30,8 @@ def brightness(data: bytes) -> Rows:
         at += 12 + length
     width, height, depth, color, _, _, interlace = struct.unpack(">IIBBBBB", head)
     if color != 0 or depth not in (8, 16) or interlace:
-        raise ValueError(f"color type {color}, {depth} bits, interlace {interlace}")
+        what = f"{_KINDS.get(color, f'of color type {color}')}, {depth} bits{', interlaced' * bool(interlace)}"
+        raise ValueError(f"its pixels are {what}; save it as grayscale of 8 or 16 bits")
     if not 0 < width * height <= _MOST_PIXELS:
         raise ValueError(f"{width} x {height} pixels")
     step = depth // 8

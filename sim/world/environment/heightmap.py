@@ -168,7 +168,7 @@ def _tile(name: str, data: bytes, lattice: list[_Place]) -> Heightmap:
     west = int(corner[4]) * (1 if corner[3] in "Ee" else -1)
     side = math.isqrt(len(data) // 2)
     if side < 2 or 2 * side * side != len(data):
-        raise ValueError(f"{len(data)} bytes are no square of 16-bit heights")
+        raise ValueError(f"{len(data)} bytes are no square of 16-bit heights: is it cut short?")
     metres = np.frombuffer(data, ">i2").reshape(side, side)[::-1].astype(np.float64)
     cells = [
         (half_turn(place.lon_deg - west) * (side - 1), (place.lat_deg - south) * (side - 1)) for _, place in lattice

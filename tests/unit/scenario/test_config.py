@@ -183,6 +183,9 @@ def test_a_heading_of_an_old_spreadsheet_is_in_latin_1_and_a_capture_is_no_text(
     (tmp_path / "load.csv").write_bytes(b"\xd4\xc3\xb2\xa1\x02\x00\x04\x00")
     with pytest.raises(ConfigError, match=r"load\.csv: is no text in UTF-8"):
         config.load(tmp_path / "s.toml")
+    (tmp_path / "load.csv").write_bytes(b"PK\x03\x04\x14\0\x06\0\x08\0[Content_Types].xml")
+    with pytest.raises(ConfigError, match="it is a spreadsheet: save it as CSV"):
+        config.load(tmp_path / "s.toml")
 
 
 @pytest.mark.parametrize(

@@ -291,6 +291,9 @@ def test_a_broken_geotiff_is_refused_in_one_sentence_whatever_gdal_raises(tmp_pa
             ground(path, (0, 0), origin_deg=PARIS[:2])
             read += 1
     assert 10 < read < 90
+    path.write_bytes(data[: len(data) // 2])
+    with pytest.raises(ConfigError, match=r"GDAL cannot read it: [^-]*$"):  # by no name of ours in memory
+        ground(path, (0, 0), origin_deg=PARIS[:2])
 
 
 def test_a_geotiff_without_the_extra_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -502,7 +505,7 @@ def test_the_smallest_rectangle_may_lie_along_a_side_of_the_hull_alone(tmp_path:
         ('{"type": "FeatureCollection"}', "features are no list"),
         ('\ufeff<?xml version="1.0"?><osm/>', "it is XML or HTML: export it"),
         (f'{{"type": {"1" * 5000}}}', r"4300 digits\) .* has 5000 digits$"),
-        ("PK\x03\x04", "it is a ZIP archive, as spreadsheets are: unpack it"),
+        ("PK\x03\x04", "it is a ZIP archive: unpack it"),
         ('{"type": "Polygon", "crs": {"properties": {"name": "EPSG:3857"}}}', "its crs is EPSG:3857; convert the file"),
         ("SQLite format 3\0", "a GeoPackage or another SQLite database"),
     ],

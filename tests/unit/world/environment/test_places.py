@@ -239,7 +239,7 @@ def test_a_picture_with_colors_is_refused(tmp_path: Path) -> None:
     data = bytearray(png(np.zeros((2, 2), int), 0))
     data[25] = 2  # color type RGB
     path.write_bytes(bytes(data))
-    with pytest.raises(ConfigError, match="color type 2"):
+    with pytest.raises(ConfigError, match="its pixels are colored, 8 bits; save it as grayscale"):
         heights_of(path)
 
 

@@ -15,7 +15,9 @@ _STATM: Final = Path("/proc/self/statm")
 _MB: Final = 1 << 20
 _NEEDED_MB: Final = {
     "simulate": 560, "sweep": 560, "plan": 560, "emulator": 560, "world": 560, "agent": 560, "router": 560,
-    "launch": 760, "replay": 560, "report": 860, "figures": 860,
+    "launch": 760, "replay": 760, "log export": 760, "report": 860, "figures": 860,
+    "record": 560, "view": 560, "top": 560, "inspect": 560, "topic": 420, "gateway": 420, "links": 420, "air": 420,
+    "order": 420, "autopilots": 420, "keys": 420,
 }  # fmt: skip
 """What commands need on two cores, measured as VmPeak (457, 590 and 739 MB) with a fifth more."""
 COMPILING_MB: Final = 760
@@ -26,11 +28,12 @@ _CORE_MB: Final = 40
 
 def require_for(words: Sequence[str]) -> None:
     """Raises ConfigError if there is too little for the command of these words."""
-    need_mb = _NEEDED_MB.get(words[0], 0) if words else 0
+    command = " ".join(words[: 2 if words[:1] == ["log"] else 1])
+    need_mb = _NEEDED_MB.get(command, 0)
     if need_mb and "--report" in words:
         need_mb = max(need_mb, _NEEDED_MB["report"])
     if need_mb and not {"--help", "-h"} & {*words}:
-        require(need_mb, what=f"fanet {words[0]}")
+        require(need_mb, what=f"fanet {command}")
 
 
 def require(need_mb: int, *, what: str) -> None:

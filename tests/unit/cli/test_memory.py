@@ -20,9 +20,9 @@ def fanet(limit_mb: int, *words: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize("limit_mb", [120, 400])
-@pytest.mark.parametrize("command", ["simulate", "sweep", "report", "replay", "launch"])
+@pytest.mark.parametrize("command", ["simulate", "sweep", "report", "replay", "launch", "log export", "record", "view"])
 def test_a_command_that_has_too_little_says_how_much_it_needs(command: str, limit_mb: int) -> None:
-    done = fanet(limit_mb, command, "quick")
+    done = fanet(limit_mb, *command.split(), "quick")
     assert done.returncode == 2
     assert done.stderr.startswith(f"fanet: fanet {command}: needs ")
     assert done.stderr.count("\n") == 1

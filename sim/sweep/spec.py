@@ -38,6 +38,8 @@ from sim.sweep.toml_values import toml_value
 
 MOST_RUNS: Final = 100_000
 """A file with more runs than this is taken for a mistake."""
+NO_CASE: Final = "-"
+"""The name of the case of a sweep that has none."""
 _Tree = Mapping[str, Any]
 
 
@@ -165,7 +167,7 @@ class Sweep(_Table):
 
     def settings(self) -> Iterator[Setting]:
         """All combinations of settings; the last axis changes fastest."""
-        for case in self.case or (Case(name="-"),):
+        for case in self.case or (Case(name=NO_CASE),):
             axes = {**self.grid, **case.grid}
             for values in itertools.product(*axes.values()):
                 changes = {**self.set, **case.set, **dict(zip(axes, values, strict=True))}

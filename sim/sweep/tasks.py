@@ -13,7 +13,7 @@ from fanet_mw.scenario.model import Scenario
 from fanet_mw.scenario.named_files import digest_of
 from sim.scenarios import catalog
 from sim.sweep import measures
-from sim.sweep.spec import MOST_RUNS, Setting, Sweep
+from sim.sweep.spec import MOST_RUNS, NO_CASE, Setting, Sweep
 from sim.world.possible_world import PossibleWorlds
 
 
@@ -56,6 +56,8 @@ def tasks_of(sweep: Sweep) -> list[Task]:
     worlds = PossibleWorlds()
     for setting in sweep.settings():
         overrides = setting.overrides()
+        if "seed" in setting.changes:
+            raise ConfigError("seed: every setting of a sweep has the same seeds: say seeds = [1, 5], or --seeds N")
         for seed in sweep.seed_list():
             try:
                 scenario = catalog.find(sweep.base, [*overrides, f"seed={seed}"])
@@ -63,7 +65,8 @@ def tasks_of(sweep: Sweep) -> list[Task]:
                     raise ConfigError("radio.lead_ms = 0 is for virtual time: must be > 0 in real time, for example 20")
                 worlds.require(scenario)
             except ConfigError as error:
-                mistakes.setdefault(str(error), []).append(f"case {setting.case}, {', '.join(overrides)}")
+                case = [] if setting.case == NO_CASE else [f"case {setting.case}"]
+                mistakes.setdefault(str(error), []).append(", ".join([*case, *overrides]))
                 break
             sets = [f"--set {shlex.quote(override)}" for override in overrides]
             verb = "launch" if setting.realtime else "simulate"
@@ -71,14 +74,15 @@ def tasks_of(sweep: Sweep) -> list[Task]:
             command = " ".join([f"fanet {verb}", shlex.quote(sweep.base), *sets, f"--seed {seed}", *slower])
             tasks.append(_task(scenario, setting, sweep.measure, command))
     if mistakes:
-        raise ConfigError("\n".join(f"{error} ({_first_of(settings)})" for error, settings in mistakes.items()))
+        raise ConfigError("\n".join(f"{error}{_first_of(settings)}" for error, settings in mistakes.items()))
     return tasks
 
 
 def _first_of(settings: Sequence[str]) -> str:
-    """The first setting with a mistake, and the number of others that have it, too."""
+    """The first setting with a mistake, and the number of others that have it, too; nothing where there is only one."""
     others = len(settings) - 1
-    return f"{settings[0]}{f'; and in {others} other settings' if others else ''}"
+    first = f"{settings[0]}{f'; and in {others} other settings' if others else ''}"
+    return f" ({first})" if first else ""
 
 
 def _task(scenario: Scenario, setting: Setting, measure: tuple[str, ...], command: str) -> Task:

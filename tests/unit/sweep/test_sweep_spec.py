@@ -125,12 +125,23 @@ def test_every_setting_that_cannot_run_is_named_before_the_first_run() -> None:
     assert "nodes.count=9)" not in str(error.value)
 
 
+@pytest.mark.parametrize("text", ["[set]\nseed = 5", "[grid]\nseed = [1, 2, 3]"])
+def test_seeds_among_the_settings_are_refused_and_not_dropped(text: str) -> None:
+    with pytest.raises(ConfigError, match="--seeds N"):
+        tasks_of(spec.parse(f'base = "quick"\n{text}', source="test"))
+
+
+def test_a_base_that_cannot_be_read_is_named_alone() -> None:
+    with pytest.raises(ConfigError, match=r"^/dev/zero: cannot be read: a device, not a regular file$"):
+        tasks_of(spec.parse('base = "/dev/zero"', source="test"))
+
+
 def test_a_mistake_of_many_settings_is_said_once() -> None:
     found = spec.parse('base = "quick"\n[grid]\nduration_s = [20, 30]\nnodes.count = [0]', source="test")
     with pytest.raises(ConfigError) as error:
         tasks_of(found)
     assert str(error.value).count("greater than or equal to 1") == 1
-    assert str(error.value).endswith("(case -, duration_s=20, nodes.count=0; and in 1 other settings)")
+    assert str(error.value).endswith("(duration_s=20, nodes.count=0; and in 1 other settings)")
 
 
 def test_a_measure_that_there_is_not_is_an_error() -> None:

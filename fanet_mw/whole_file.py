@@ -57,7 +57,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
     The old one stays until the new one is whole, and nothing is ever written through a link.
     """
     if path.exists() and not (path.is_file() or path.is_symlink()):
-        raise OSError(errno.EINVAL, "there is something that is no file")
+        raise OSError(errno.EINVAL, "not a regular file")
     fresh = path.with_name(f".{path.name}.{os.getpid()}.new")
     try:
         fresh.unlink(missing_ok=True)

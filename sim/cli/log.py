@@ -11,7 +11,7 @@ from rich.table import Table
 
 from fanet_mw.errors import ConfigError
 from sim.cli.command_groups import RUNNING, TOOLS
-from sim.cli.options import SwarmFlags, given
+from sim.cli.options import SwarmFlags, given, require_file_or_nothing
 from sim.console import Console
 
 if TYPE_CHECKING:
@@ -54,6 +54,7 @@ def record(
 
     if file.suffix != ".mcap":
         raise ConfigError(f"{file}: must be a file whose name ends in .mcap")
+    require_file_or_nothing(file)
     if file.exists() and not force and file.stat().st_size:
         raise ConfigError(f"{file}: exists; choose another file, or replace it with --force")
     signals: list[int] = []

@@ -128,6 +128,7 @@ class OutputFlags:
             raise ConfigError(f"--record {path}: must be a file whose name ends in .mcap")
         if os.path.lexists(path) and not self.force:
             raise ConfigError(f"--record {path}: exists; choose another file, or replace it with --force")
+        require_file_or_nothing(path)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.open("wb").close()
@@ -233,6 +234,12 @@ def warn_of(endpoint: str | None, *, listens: bool) -> None:
 
     if (warning := exposure(endpoint, listens=listens)) is not None:
         _err.print(warning, highlight=False, soft_wrap=True, markup=False)
+
+
+def require_file_or_nothing(path: Path) -> None:
+    """Raises ConfigError for a pipe, which would be waited for without end, and for whatever else is no file."""
+    if path.exists() and not path.is_file():
+        raise ConfigError(f"{path}: cannot be written: not a regular file")
 
 
 def given(scenario: Path | None) -> "Scenario | None":

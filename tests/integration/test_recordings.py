@@ -361,8 +361,9 @@ def test_a_recording_of_another_program_is_shown_and_moves_no_cursor(
 
 def test_a_pipe_is_no_recording_and_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.mcap")
-    with pytest.raises(ConfigError, match="a pipe, not a regular file"):
-        app(["log", "info", str(tmp_path / "pipe.mcap")], result_action="return_value", exit_on_error=False)
+    for words in (("log", "info"), ("record", "--force"), ("simulate", "quick", "--force", "--record")):
+        with pytest.raises(ConfigError, match="not a regular file"):
+            app([*words, str(tmp_path / "pipe.mcap")], result_action="return_value", exit_on_error=False)
 
 
 @pytest.mark.parametrize(

@@ -143,7 +143,7 @@ def test_a_shipped_flight_goes_as_it_does_when_the_worlds_truth_is_poisoned(name
 
 
 @pytest.mark.slow
-def test_three_uavs_confirm_by_a_spiral_what_lines_would_need_twelve_for() -> None:
+def test_three_uavs_search_all_by_a_spiral_and_confirm_everybody() -> None:
     found = mission_of(simulate(find("rescue", [*KEYS, *FEW, "duration_s=160"])))
     assert found["coverage"] == found["connected"] == 1.0
     assert found["confirmed"] == found["survivors"]

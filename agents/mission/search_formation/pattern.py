@@ -90,7 +90,7 @@ class Pattern:
         """The position of a place after this time of sweeping; before 0, where the sweep begins."""
         flown = self._flown.get(place, place)
         at = self.shape.at(flown, swept_s)
-        aside_m = self.shape.aside_m(flown, swept_s) if isinstance(self.shape, Lines) else 0.0
+        aside_m = self.shape.aside_m(flown, swept_s) if isinstance(self.shape, Lines | Sectors) else 0.0
         return at._replace(east=at.east + aside_m) if aside_m else at
 
     def tethers(self, place: int, swept_s: float) -> tuple[int, ...]:
@@ -166,15 +166,20 @@ def fitted(
     count = min(count, MOST_PLACES)
     match shape:
         case ShapeName.LINES:
-            made = lines.fitted(count, demands)
+            made = _lines(count, demands)
         case ShapeName.SPIRAL:
             made = spiral.fitted(count, demands)
         case ShapeName.SECTORS:
             made = sectors.fitted(count, sectors_wanted, demands)
         case ShapeName.RING:
-            made = ring.fitted(count, demands) or lines.fitted(count, demands)
+            made = ring.fitted(count, demands) or _lines(count, demands)
         case ShapeName.CIRCUIT:
             made = circuit.fitted(count, demands)
         case _:
             assert_never(shape)
     return None if made is None else Pattern(made, reach_m=demands.reach_m)
+
+
+def _lines(count: int, demands: Demands) -> Dimensions | None:
+    """Two lines or more, or one line abreast over the whole area."""
+    return lines.fitted(count, demands) or sectors.fitted(count, 1, demands)

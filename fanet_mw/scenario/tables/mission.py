@@ -51,13 +51,13 @@ class Mission(Section):
     """`none`: the paper's rule, by which every UAV that has received enough reports flies there. Otherwise UAVs search
     by a plan that one of them makes and floods, and `responders` of them fly to each survivor. `lines`: two lines
     abreast part from the middle of the area, with a chain between them; with UAVs enough more of them, in step, each
-    over its strip. `ring`: all UAVs on a square that grows from the middle to the edges, so that the loss of one
-    separates nobody; lines if they are too few for that. `spiral`: arms abreast turn about the middle, or a single one
-    winds outward; any number of UAVs is enough. `sectors`: a team abreast for each of `clusters.count` sectors, which
-    may lose contact with each other. `circuit`: all UAVs at equal distances on one closed way over the area, which n of
-    them have searched when each has flown the n-th part, out of each other's reach or not. `fastest`: that of these
-    shapes, with any number of sectors, which sweeps the area in the shortest time with this number of UAVs, whether or
-    not they stay connected."""
+    over its strip, with few of them one line. `ring`: all UAVs on a square that grows from the middle to the edges, so
+    that the loss of one separates nobody; lines if they are too few for that. `spiral`: arms abreast turn about the
+    middle, or a single one winds outward; any number of UAVs is enough. `sectors`: a team abreast for each of
+    `clusters.count` sectors, which may lose contact with each other. `circuit`: all UAVs at equal distances on one
+    closed way over the area, which n of them have searched when each has flown the n-th part, out of each other's reach
+    or not. `fastest`: that of these shapes, with any number of sectors, which sweeps the area in the shortest time with
+    this number of UAVs, whether or not they stay connected."""
     formation: Literal["none", "clusters"] = "none"
     """`clusters`: formation flight by clusters. The members of each cluster fly on a circle around their head, the
     other heads on a circle around the leader, and the leader, which is the head with the lowest id, flies `route_m`

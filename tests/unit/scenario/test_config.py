@@ -110,8 +110,8 @@ def test_the_sizes_of_messages_that_a_scenario_is_checked_with_are_those_of_the_
 
 
 def test_a_search_in_lines_by_too_few_uavs_is_refused_with_the_number_that_it_needs() -> None:
-    with pytest.raises(ConfigError, match=r"nodes\.count = 20: .* needs at least (\d+) UAVs") as refused:
-        catalog.find("rescue", ["nodes.count=20", "traffic.sources=19"])
+    with pytest.raises(ConfigError, match=r"nodes\.count = 12: .* needs at least (\d+) UAVs") as refused:
+        catalog.find("rescue", ["nodes.count=12", "traffic.sources=11"])
     least = int(re.search(r"at least (\d+)", str(refused.value))[1])  # type: ignore[index]
     assert catalog.find("rescue", [f"nodes.count={least}", f"traffic.sources={least - 1}"]).nodes.count == least
     with pytest.raises(ConfigError, match="needs at least"):
@@ -119,7 +119,7 @@ def test_a_search_in_lines_by_too_few_uavs_is_refused_with_the_number_that_it_ne
 
 
 def test_an_area_that_no_plan_can_name_enough_uavs_for_is_refused_and_a_spiral_searches_it_with_any() -> None:
-    wide = ["nodes.count=45", "world.area_m=9000"]
+    wide = ["nodes.count=45", "world.area_m=15000"]
     for search in ("lines", "sectors"):
         with pytest.raises(ConfigError, match=r"needs more than 79 UAVs .* a plan names at most 79"):
             catalog.find("rescue", [*wide, f"mission.search={search}"])

@@ -41,6 +41,8 @@ beginning: far enough for two teams not to be in each other's way, and near enou
 TURN_S: Final = 10.0
 """How long lines and sectors' teams wait at the edge of the area before they fly back, so that a UAV that has fallen
 behind gets there, too."""
+SHIFT: Final = 1.15
+"""The greatest speed at which a team shifts sideways at a turn, as a multiple of the speed of the sweep."""
 BACK: Final = 1.2
 """The speed on the way back, as a multiple of the speed of the sweep; most phones have been received by then."""
 
@@ -217,6 +219,16 @@ class Shape(Protocol):
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
         """The horizontal distance of a point from a team at an instant of the sweep."""
         ...
+
+
+def shifted_m(swept_s: float, sweep_s: float, *, lane_m: float, speed_m_s: float) -> float:
+    """How far to the east of their lanes a team's places are: at each turn at the edge they shift into the middle
+    between lanes, and back at the next one, so that what no camera shows on one sweep is shown on another.
+    """
+    turn, into_s = divmod(swept_s - sweep_s, sweep_s + TURN_S + sweep_s / BACK)
+    share = min(1.0, into_s / TURN_S)
+    most_m = min(lane_m / 2, SHIFT * TURN_S * speed_m_s)
+    return 0.0 if turn < 0 else most_m * (1 - share if turn % 2 else share)
 
 
 def nearest_m(places: Iterable[Enu], east_m: float, north_m: float) -> float:

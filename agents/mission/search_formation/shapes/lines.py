@@ -25,16 +25,15 @@ import math
 from typing import Final
 
 from agents.mission.search_formation.shapes.contract import (
-    BACK,
     EDGE_M,
     FIRST_M,
     FOLLOW_M,
     FOLLOWER_HIGHER_M,
-    TURN_S,
     Demands,
     Dimensions,
     RowKind,
     RowOfPlaces,
+    shifted_m,
     swept_m,
 )
 from fanet_mw.units import Enu
@@ -51,8 +50,6 @@ _SIDE_M: Final = 65.0
 still shift to either side."""
 _LEAST_LANES: Final = 2
 """The least number of lanes of a line, which has one at each end."""
-_SHIFT: Final = 1.15
-"""The greatest speed at which lines shift sideways at a turn, as a multiple of the speed of the sweep."""
 _LEAST_APART_M: Final = 60.0
 """The least distance of two lines on the same side of the middle."""
 _FREE: Final = 4
@@ -117,17 +114,13 @@ class Lines:
         return Enu(east, behind if line < self._half else -behind, formation.height_m + FOLLOWER_HIGHER_M)
 
     def aside_m(self, place: float, swept_s: float) -> float:
-        """How far to the east of its lane a place is: all but the easternmost shift into the middle between lanes at
-        each turn at the edge, and back at the next one, so that what no camera shows on one sweep is shown on another.
-        """
+        """How far to the east of its lane a place is (`shifted_m`); the easternmost lane stays where it is."""
         formation = self._formation
-        turn, into_s = divmod(swept_s - self.sweep_s, self.sweep_s + TURN_S + self.sweep_s / BACK)
-        if turn < 0 or place >= formation.fixed:
+        if place >= formation.fixed:
             return 0.0
-        shifted = min(1.0, into_s / TURN_S)
         lane = place % formation.lanes if place <= formation.teams * formation.lanes - 1 else formation.lanes // 2
-        most_m = min(self.lane_m / 2, _SHIFT * TURN_S * formation.speed_m_s)
-        return most_m * min(1.0, formation.lanes - 1 - lane) * (1 - shifted if turn % 2 else shifted)
+        whole_m = shifted_m(swept_s, self.sweep_s, lane_m=self.lane_m, speed_m_s=formation.speed_m_s)
+        return whole_m * min(1.0, formation.lanes - 1 - lane)
 
     def tethers(self, place: int) -> tuple[int, ...]:
         formation = self._formation

@@ -27,6 +27,7 @@ from agents.mission.search_formation.shapes.contract import (
     RowOfPlaces,
     ShapeName,
     nearest_m,
+    shifted_m,
     swept_m,
 )
 from fanet_mw.units import Enu
@@ -66,6 +67,13 @@ class Sectors:
         southern, east = -half + row * self._depth_m, -half + (column + share) * self._width_m
         outward_is_north = 2 * row + 1 >= self._rows
         return Enu(east, southern + along_m if outward_is_north else southern + self._depth_m - along_m, up_m)
+
+    def aside_m(self, place: float, swept_s: float) -> float:
+        """How far to the east of its lane a place is (`shifted_m`)."""
+        formation = self._formation
+        if place >= formation.fixed:
+            return 0.0
+        return shifted_m(swept_s, self.sweep_s, lane_m=self.lane_m, speed_m_s=formation.speed_m_s)
 
     def tethers(self, place: int) -> tuple[int, ...]:
         formation = self._formation

@@ -64,7 +64,7 @@ def test_every_spot_of_the_area_comes_within_range_of_a_lane() -> None:
 
 
 def test_too_few_have_no_formation() -> None:
-    assert fitted(20, DEMANDS) is None
+    assert fitted(13, DEMANDS) is None
 
 
 def planner_of(node: int, *, expected: int, lost: Collection[int] = (), take_off_ns: int = 0) -> FormationPlanner:

@@ -197,6 +197,15 @@ def test_lines_show_on_their_way_back_what_no_camera_has_shown_on_their_way_out(
     assert shown[-1] > 0.98
 
 
+@pytest.mark.parametrize("count", [6, 9, 15])
+def test_who_is_too_few_for_two_lines_flies_in_one(count: int) -> None:
+    pattern = formed(ShapeName.LINES, count, 1000)
+    assert (pattern.dimensions.teams, len(pattern.followers)) == (1, count - 6)
+    assert pattern.shape.sweep_s < 128
+    for second in range(0, 2 * round(pattern.shape.sweep_s) + 20, 4):
+        assert pieces([pattern.at(place, second) for place in range(count)]) == 1, second
+
+
 def test_twice_the_uavs_sweep_in_lines_in_half_the_time() -> None:
     times = [formed(ShapeName.LINES, count, 1000).shape.sweep_s for count in (20, 40, 80)]
     assert times == pytest.approx([61.2, 30.6, 10.2], abs=0.1)

@@ -249,9 +249,11 @@ class WorldActor(Actor):
                 self._guidance.land_at_once(row + 1)
         if self._estimate is not None and self._guidance.flown:
             self._estimate.advance(self._truth(now_ns))
-            flying = self._guidance.commanded(len(self._ids)) & ~self._guidance.grounded(engine.positions())
-            for row in np.flatnonzero(self._estimate.lost(now_ns) & flying & self._flies).tolist():
-                self._guidance.land_at_once(row + 1)
+            lost = self._estimate.lost(now_ns) & self._flies
+            if lost.any():
+                flying = self._guidance.commanded(len(self._ids)) & ~self._guidance.grounded(engine.positions())
+                for row in np.flatnonzero(lost & flying).tolist():
+                    self._guidance.land_at_once(row + 1)
         self._record_modes(now_ns)
         for first, second in engine.contacts():
             self._contact(first, second, now_ns)

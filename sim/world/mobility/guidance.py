@@ -225,10 +225,11 @@ class Guidance:
     def grounded(self, at: Rows) -> Flags:
         """The UAVs that stand on the ground with their motors off: they have landed, or wait to take off."""
         off = np.zeros(len(at), bool)
-        landing = [row for row, command in self._commands.items() if isinstance(command, _Land)]
-        off[[*landing, *self._waiting()]] = True
-        if not off.any():
+        rows = [row for row, command in self._commands.items() if isinstance(command, _Land)]
+        rows += self._waiting()
+        if not rows:
             return off
+        off[rows] = True
         return np.asarray(off & (at[:, 2] - self._surface_m(at) <= _ON_GROUND_M))
 
     def commanded(self, count: int) -> Flags:

@@ -38,18 +38,11 @@ SMALL: Final = {
         "rescue", (*_FEW_UAVS, "mission.avoid_by=[]"), _FIRST_SEEDS
     ),
 }
-_ONE_SWEEP: Final = ("duration_s=240",)
-WHOLE: Final = _cases(_ONE_SWEEP, (1,), (0.0, 0.3, 0.5, 0.7, 0.8))
 
 
 def over_networks(kept: Kept | None = None) -> Rows:
     """Scenario `rescue` in small."""
     return _table(SMALL, all_flown(SMALL, kept))
-
-
-def over_networks_whole(kept: Kept | None = None) -> Rows:
-    """Scenario `rescue` as it is, until the sweep is over."""
-    return _table(WHOLE, all_flown(WHOLE, kept))
 
 
 def _table(cases: Mapping[str, Case], kept: Kept) -> Rows:

@@ -8,26 +8,14 @@ from collections.abc import Mapping
 from typing import Final
 
 from tests.tables.kept import KEPT, Kept, OutOfTime
-from tests.tables.mission import SMALL, WHOLE
-from tests.tables.missions import (
-    CLEAR,
-    COUNTRY,
-    COUNTRY_IN_SMALL,
-    FROM_THE_GROUND,
-    PLACES,
-    RESCUE_CLEAR,
-    SHAPES,
-    Case,
-    fly,
-)
+from tests.tables.mission import SMALL
+from tests.tables.missions import CLEAR, COUNTRY_IN_SMALL, PLACES, Case, fly
 from tests.tables.paper_rescue import PAPER
 from tests.tables.small_rescues import ENGINES, SENSES
 
 TABLES: Final[Mapping[str, Mapping[str, Case]]] = {
-    "places": PLACES, "country": COUNTRY, "country-in-small": COUNTRY_IN_SMALL,
-    "from-the-ground": FROM_THE_GROUND, "shapes": SHAPES, "keeping-clear": CLEAR,
-    "keeping-clear-rescue": RESCUE_CLEAR, "mission-network": SMALL,
-    "mission-network-whole": WHOLE, "rescue-paper": PAPER, "engines": ENGINES, "senses": SENSES,
+    "places": PLACES, "country-in-small": COUNTRY_IN_SMALL, "keeping-clear": CLEAR,
+    "mission-network": SMALL, "rescue-paper": PAPER, "engines": ENGINES, "senses": SENSES,
 }  # fmt: skip
 
 

@@ -87,23 +87,18 @@ TABLES: Final[Mapping[str, Table]] = {
     "relay-failure": Table("explanation/roles.md", protocol.dead_relays, Tolerance(absolute=0.1, relative=0.1)),
     "clock-errors": Table("explanation/time.md", protocol.clock_errors, Tolerance(relative=0.2)),
     "mission-network": Table("results/mission.md", mission.over_networks, Tolerance(absolute=0.05, relative=0.1)),
-    "mission-network-whole": Table(
-        "results/mission.md", mission.over_networks_whole, Tolerance(absolute=0.05, relative=0.1)
-    ),
     "flight": Table("results/flight.md", flight.measured, Tolerance(absolute=0.02, relative=0.02)),
     "formation-flight": Table("explanation/formation-flight.md", formation_flight.measured, Tolerance(relative=0.05)),
     "places": Table("results/missions.md", missions.places, Tolerance(absolute=0.05, relative=0.02)),
-    "country": Table("results/missions.md", missions.country, Tolerance(absolute=0.05, relative=0.02)),
-    "from-the-ground": Table("results/missions.md", missions.from_the_ground, Tolerance(absolute=0.05, relative=0.02)),
+    "country-in-small": Table(
+        "results/missions.md", missions.country_in_small, Tolerance(absolute=0.05, relative=0.02)
+    ),
     "shapes": Table("results/missions.md", missions.shapes, Tolerance(absolute=1, relative=0.05)),
     "engines": Table(
         "results/small-rescues.md", small_rescues.engines, Tolerance(absolute=0.05, relative=0.05), ("times real time",)
     ),
     "senses": Table("results/small-rescues.md", small_rescues.senses, Tolerance(absolute=0.05, relative=0.05)),
     "keeping-clear": Table("results/keeping-clear.md", missions.keeping_clear, Tolerance(absolute=0.05, relative=0.02)),
-    "keeping-clear-rescue": Table(
-        "results/keeping-clear.md", missions.keeping_clear_rescue, Tolerance(absolute=0.05, relative=0.02)
-    ),
     "rescue-paper": Table(
         "results/rescue-paper.md", paper_rescue.paper_rescues, Tolerance(absolute=0.05, relative=0.02)
     ),

@@ -1,7 +1,8 @@
 """The pictures of when nodes let packets out, against what the protocol gives them: slots of heads, turns, rounds.
 
 slots of heads   place in the superframe over the time of the run: heads change, and a cluster keeps its slot
-turns            place in the superframe, a line for each node; under the last timetable
+turns            place in the superframe, a line for each node; under the last timetable, or over the time of the run if
+                 that came too late to show anything
 rounds           place in the round, a line for each node; turns are those of the node ids, and never change
 """
 
@@ -29,6 +30,8 @@ _MOST_NAMED: Final = 12
 """The greatest number of slots that are named above them."""
 _MOST_LINES: Final = 1000
 """The greatest number of slots that are told apart; a folder of somebody else may state any."""
+_LEAST_SHOWN: Final = 0.1
+"""The share of the packets that a timetable must be for, to be drawn."""
 _WINDOW_COLOR: Final = "#eeeeee"
 
 
@@ -119,6 +122,13 @@ def _in_turns(run: RunRecords, turns: Mapping[int, Mapping[str, Any]]) -> RunPic
     own = sorted((one for node, frame in turns.items() for one in spans_of(node, frame)), key=lambda one: one.start_ns)
     frame = _Frame(_ns(newest["start_ms"]), _ns(newest["period_ms"]), (0, _ns(newest.get("contention_ms", 0.0))), own)
     shown = [one for one in run.let_out if one.t_ns >= frame.start_ns]
+    if len(shown) < _LEAST_SHOWN * len(run.let_out):
+        return RunPicture(
+            _over_time(run),
+            "When packets were let out first. Timetables were made anew as the topology changed, and the last one, "
+            f"which began at {frame.start_ns / S:.3g} s, was in force for {len(shown):,} of {len(run.let_out):,} "
+            "packets, so that no turns are drawn.",
+        )
     picture = _by_node(run, frame, shown, "superframe", ("nodes with turns", "other nodes"), "contention window")
     owners = {one.node for one in own}
     owned = [one for one in shown if one.node in owners]
@@ -146,6 +156,15 @@ def _in_rounds(run: RunRecords) -> RunPicture:
     return RunPicture(_by_node(run, frame, run.let_out, "round", ("packets", ""), "slots of bulk"), said)
 
 
+def _over_time(run: RunRecords) -> Figure:
+    figure, (axes,) = canvas(1, width=7.5, height=4.4)
+    _scatter(axes, [(one.t_ns / S, one.node) for one in run.let_out], BLUE, "|", None, 16)
+    axes.set_xlabel("swarm time [s]")
+    axes.set_xlim(0, run.end_s)
+    _node_axis(axes, run)
+    return figure
+
+
 def _by_node(
     run: RunRecords, frame: _Frame, shown: Sequence[LetOut], called: str, labels: tuple[str, str], window: str
 ) -> Figure:
@@ -164,9 +183,7 @@ def _by_node(
         places = [(frame.place_ns(one) / MS, one.node) for one in shown if (one.node in owners) == wanted]
         _scatter(axes, places, color, marker, label if label == "packets" else f"packets of {label}", 16)
     _frame_axes(axes, frame.period_ns, called)
-    axes.set_ylabel("origin (node id)")
-    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_ylim(0.2, run.scenario.nodes.count + 0.8)
+    _node_axis(axes, run)
     legend_above(figure, axes)
     return figure
 
@@ -178,6 +195,12 @@ def _scatter(
         across, up = zip(*places, strict=True)
         width = 1.2 if marker == "|" else 0
         axes.scatter(across, up, color=color, s=size, marker=marker, zorder=3, label=label, linewidths=width)
+
+
+def _node_axis(axes: Axes, run: RunRecords) -> None:
+    axes.set_ylabel("origin (node id)")
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_ylim(0.2, run.scenario.nodes.count + 0.8)
 
 
 def _frame_axes(axes: Axes, period_ns: int, called: str) -> None:

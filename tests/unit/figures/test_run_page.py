@@ -216,6 +216,18 @@ def test_turns_are_shaded_behind_the_contention_window_each_on_the_line_of_its_o
     assert "Of 2 packets of nodes with turns, 1 were let out in a turn of the origin." in drawing.caption
 
 
+def test_a_last_timetable_that_came_too_late_leaves_the_packets_over_the_time_of_the_run(
+    make_scenario: MakeScenario,
+) -> None:
+    frame = {"start_ms": 9000.0, "period_ms": 400.0, "turn_ms": 50.0, "contention_ms": 100.0, "own": [0]}
+    run = run_of(make_scenario(**{"nodes.count": 3}), LetOut(1120 * MS, 1, 1), LetOut(1220 * MS, 2, 1))
+    drawing = slot_pictures.slots(run, {1: {"turns": frame}})
+    assert drawing is not None
+    assert "in force for 0 of 2 packets" in drawing.caption
+    (drawn_packets,) = drawing.figure.axes[0].collections
+    assert np.asarray(drawn_packets.get_offsets()).tolist() == [[1.12, 1], [1.22, 2]]
+
+
 def test_reports_have_a_line_of_their_own_with_their_bounds_beside_the_load(make_scenario: MakeScenario) -> None:
     scenario = make_scenario(**{"nodes.count": 3, "duration_s": 20})
     records = [

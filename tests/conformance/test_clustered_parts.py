@@ -128,7 +128,7 @@ def test_roles_name_the_node_itself_and_bear_the_word_of_others(node: Node) -> N
     assert Beacon.decode_frame(packet(1).header.encode() + beacon.encode_frame(OURS)) == beacon
     assert (beacon.node, beacon.head, beacon.role) == (OURS, 0, Role.ISOLATED)
     assert 0 < roles.hello_share(NOW_NS) <= 1
-    assert "state" not in roles.report() or roles.report()["state"] == "seeking"
+    assert roles.report()["state"] == "seeking"
 
 
 def test_what_hellos_say_of_two_hops_names_whom_the_node_hears(node: Node) -> None:

@@ -20,12 +20,13 @@ from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.neighbors import Neighbor, Neighbors
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.node.reader import decoded
-from fanet_mw.routing.clustered.contract import Access, HearsCopies, Relaying, Roles, TwoHops
+from fanet_mw.routing.clustered.contract import Access, HearsCopies, Relaying, TwoHops
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
 from fanet_mw.routing.clustered.forwarding.uplink import MOST_TRIES, Uplink
 from fanet_mw.routing.clustered.links.heard_load import HeardLoads
 from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
+from fanet_mw.routing.clustered.roles.assigned_roles import AssignedRoles
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.missing_packets import MissingPackets
 from fanet_mw.routing.packet_repair import Repair
@@ -47,7 +48,7 @@ class Parts(NamedTuple):
     uplink: Uplink
     repair: Repair | None
     floods: Floods
-    roles: Roles
+    roles: AssignedRoles
     access: Access
     relaying: Relaying
     contending: ContendingRelaying

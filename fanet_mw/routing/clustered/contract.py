@@ -1,74 +1,23 @@
 """The contracts of the parts of the clustered protocol. `build.py` chooses a class for each by `clusters.relay`.
 
-    Roles        whether this node is the leader, a cluster head or a member
     Access       when this node transmits a packet that it is the first to flood, and what contends for the channel
     Relaying     whether and when this node passes on a flood that began elsewhere
     TwoHops      what hellos say of the nodes within two hops; only some relaying rules need it
     HearsCopies  parts that cancel a transmission when another node has made it
 
-`Clustered` calls all of them. Roles also call a `ScheduledAccess`, to which they give the schedule; no other part knows
-any of its siblings. No part reads a clock: every instant is an argument.
+`Clustered` calls all of them, and the node's roles (`roles/assigned_roles.py`). These call a `ScheduledAccess`, too, to
+which they give the schedule; no other part knows any of its siblings. No part reads a clock: every instant is an
+argument.
 """
 
 from collections.abc import Container, Mapping, Sequence
 from typing import Protocol
 
 from fanet_mw.bus.messages import Reception
-from fanet_mw.node.neighbors import Neighbor
 from fanet_mw.node.packet import Packet, Relay
-from fanet_mw.routing.clustered.forwarding.gradient import RouteToHead
-from fanet_mw.units import NodeId
 from fanet_mw.wire import Kind
 from fanet_mw.wire.hello.beacon import Beacon
 from fanet_mw.wire.hello.neighbors import NeighborList
-
-
-class Roles(Protocol):
-    """The role of a node in its swarm, and how it changes."""
-
-    def start(self, now_ns: int) -> None:
-        """The node has started."""
-
-    def on_sign_of_life(self, node: int, *, born_ns: int, now_ns: int) -> None:
-        """A packet was received that `node` generated at `born_ns`."""
-
-    def on_control(self, packet: Packet, src: NodeId, *, now_ns: int) -> bool:
-        """A flooded control packet was received from the neighbor `src`.
-
-        Returns True if every node must pass it on at once. Raises MalformedFrameError for content that no node of this
-        swarm sends.
-        """
-
-    def on_hello(self, neighbor: Neighbor, *, born_ns: int, now_ns: int) -> None:
-        """A neighbor's hello was received, which the neighbor generated at `born_ns`."""
-
-    def on_impersonation(self, packet: Packet, *, now_ns: int) -> None:
-        """A packet was received that names this node as its origin, but that another node has made."""
-
-    def on_flooding(self, due_ns: int) -> None:
-        """An own application's packet will be flooded to all nodes from the instant `due_ns` on."""
-
-    def on_parent_lost(self, parent: NodeId, *, now_ns: int) -> None:
-        """The neighbor `parent`, the next hop to a head, did not acknowledge a unicast frame."""
-
-    def before_hello(self, now_ns: int) -> None:
-        """The node is about to send a hello; roles do now what they do once per hello interval."""
-
-    def beacon(self, route: RouteToHead | None, *, now_ns: int) -> Beacon:
-        """The beacon for the node's next hello: its role, and its route to a head."""
-
-    def hello_share(self, now_ns: int) -> float:
-        """The share of the hello interval after which the node should send its next hello."""
-
-    def next_wake_ns(self) -> int | None: ...
-
-    def wake(self, now_ns: int) -> None: ...
-
-    def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
-        """The nodes of each cluster by its head, the head first, as far as the node knows."""
-
-    def report(self) -> Mapping[str, object]:
-        """The state and the counters of the part, as JSON values."""
 
 
 class Access(Protocol):

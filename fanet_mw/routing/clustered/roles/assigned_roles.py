@@ -102,6 +102,9 @@ class AssignedRoles:
             self._do(actions, now_ns)
 
     def on_control(self, packet: Packet, src: NodeId, *, now_ns: int) -> bool:
+        """A flooded control packet; True if every node must pass it on at once. Raises MalformedFrameError for content
+        that no node of this swarm sends.
+        """
         kind, ours = packet.header.kind, packet.header.origin == self._port.node
         if kind == Kind.JOIN:
             join = decoded(packet.frame, Join.decode_frame)
@@ -177,9 +180,11 @@ class AssignedRoles:
             parts.refresh.on_beacon(neighbor.beacon, now_ns=now_ns)
 
     def on_flooding(self, due_ns: int) -> None:
+        """An own application's packet will be flooded to all nodes from the instant `due_ns` on."""
         self.parts.joining.on_flooding(due_ns)
 
     def on_parent_lost(self, parent: NodeId, *, now_ns: int) -> None:
+        """The next hop to a head did not acknowledge a unicast frame."""
         self.parts.failover.on_unreachable(parent, now_ns=now_ns)
 
     # --- the node's role in the swarm -----------------------------------------------------------------------------

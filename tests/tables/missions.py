@@ -64,7 +64,7 @@ def degraded(scenario: Scenario, loss: float) -> Scenario:
 
 
 _TEN: Final = tuple(range(1, 11))
-_OF_TOWN: Final = (1,)
+_OF_TOWN: Final = (1, 2)
 PLACES: Final[Mapping[str, Case]] = {
     "`town`": Case("town", (), _OF_TOWN),
 }

@@ -253,6 +253,14 @@ def test_whoever_is_left_of_a_row_closes_ranks_and_keeps_the_order(
             assert not set(closed.tethers(place, swept_s)) & vacant
 
 
+@pytest.mark.parametrize("lost", [[3], [0, 7], [14]])
+def test_a_line_that_has_closed_ranks_is_as_wide_as_before(lost: list[int]) -> None:
+    whole = formed(ShapeName.LINES)
+    left = [place for place in whole.line(0) if place not in lost]
+    easts = [whole.closed(frozenset(lost)).at(place, 30.0).east for place in (left[0], left[-1])]
+    assert easts == [whole.at(place, 30.0).east for place in (0, 14)]
+
+
 @pytest.mark.parametrize("lost", [[2], [61], [64], [68, 20], [3, 17, 36, 60, 65]])
 def test_more_than_two_lines_without_some_of_their_uavs_are_one_piece(lost: list[int]) -> None:
     whole = formed(ShapeName.LINES, 73, 2500)

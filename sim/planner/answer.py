@@ -5,6 +5,7 @@ Exit codes: 0 feasible, 1 not feasible, 2 the scenario or a flag is wrong (as wi
 
 import json
 import math
+from collections import defaultdict
 from collections.abc import Mapping
 from itertools import combinations
 from random import Random
@@ -48,7 +49,9 @@ from sim.planner import (
     plan_lossy,
     with_capacity,
 )
+from sim.planner.bulk_in_rounds import BulkLoad, greatest_load
 from sim.planner.expected_links import expected_links
+from sim.planner.motion import outdated
 from sim.planner.plan_text import item
 from sim.planner.problems_and_notes import clocks_apart
 from sim.planner.reception_probability import chance_of
@@ -100,7 +103,8 @@ def judge(
     def delivers(other: ScenarioPlan) -> bool:
         return _with_loss(other, at)[0].feasible
 
-    if change and not found.feasible:
+    moves = any(outdated(scenario, at, within_range(at, range_m=scenario.radio.range_m)))
+    if change and not found.feasible and not moves:  # nothing that is searched makes a timetable last
         lossy = missed is not None and missed.mean > flood_loss.MOST
         delivers_m = _delivers_m(scenario, at) if lossy else None
         cheapest = None  # for links that nodes nearest to each other do not have
@@ -149,7 +153,22 @@ def _judge_rounds(
     )
     carried = timing.turn_bytes / (timing.period_ns / S)
     longest = max((each.longest_bytes + HEADER_BYTES for each in urgent.values()), default=0)
+    bulk = {name: each for name, each in scenario.traffic_classes.items() if name not in urgent}
+    flooded = [name for name, each in bulk.items() if each.destination == "all"]
+    rates: dict[NodeId, float] = defaultdict(float)
+    for name in flooded:
+        for node in sources_of(scenario, name):
+            rates[NodeId(node)] += 1 / bulk[name].interval_s
+    load = None
+    if flooded:
+        longest_bulk = max(bulk[name].longest_bytes for name in flooded) + HEADER_BYTES
+        load = greatest_load(near, rates, timing, longest_bytes=longest_bulk)
     problems = list[str]()
+    if load is not None and load.needed > load.carried:
+        problems.append(
+            f"bulk: node {load.node} has {load.needed:.0f} packets a second to send, and its slots carry "
+            f"{load.carried:.0f}: the others wait, until they expire"
+        )
     if longest > timing.turn_bytes:
         problems.append(f"urgent packets of {longest} B are longer than rounds.turn_bytes = {timing.turn_bytes}")
     problems += clocks_apart(scenario, slack="rounds.turn_slack_us")
@@ -174,7 +193,7 @@ def _judge_rounds(
         item("turns", f"carry {carried / 1000:.1f} kB/s of urgent packets, the traffic has {offered / 1000:.1f} kB/s"),
         item(
             "bulk",
-            "goes in slots that nodes within two hops share, without a bound" if timing.slots else "goes in turns, too",
+            _of_bulk(load) if timing.slots else "goes in turns, too",
         ),
     ]
     content: dict[str, Any] = {
@@ -182,12 +201,20 @@ def _judge_rounds(
         "slots": timing.slots, "slot_ms": timing.slot_ns / MS, "hop_ms": law.hop_ns / MS, "hops": hops,
         "bound_ms": None if bound_ns is None else bound_ns / MS, "from_s": law.silent_ns / S,
         "carried_bytes_per_s": carried, "offered_bytes_per_s": offered,
+        "bulk": None if load is None else load._asdict(),
     }  # fmt: skip
     operator = _operator(scenario, [] if bound_ns is None else [bound_ns], known_gone_ns=law.silent_ns)
     if operator is not None:
         text.append(item("operator", operator))
         content["operator"] = operator
     return "\n".join(text), content, feasible
+
+
+def _of_bulk(load: BulkLoad | None) -> str:
+    shared = "goes in slots that nodes within two hops share, without a bound"
+    if load is None:
+        return shared
+    return f"{shared}; those of node {load.node} are {load.needed / load.carried:.0%} full at the starting positions"
 
 
 def _operator(scenario: Scenario, bounds: list[int], *, known_gone_ns: int = 0) -> str | None:

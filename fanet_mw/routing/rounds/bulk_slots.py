@@ -11,7 +11,7 @@ from typing import Final
 
 from fanet_mw.routing.rounds.round_timing import RoundTiming
 
-_SELDOM: Final = 8
+SELDOM: Final = 8
 """A node with little to send takes part in one of so many slots."""
 _MOST_SEARCHED: Final = 4096
 _MASK: Final = 0xFFFFFFFF
@@ -39,11 +39,11 @@ class BulkSlots:
         first = self._timing.slot_from(from_ns)
         for slot in range(first, first + _MOST_SEARCHED):
             own = _bid(self._node, slot)
-            if own % _SELDOM and not in_each_slot:
+            if own % SELDOM and not in_each_slot:
                 continue
             for node, takes_part in rivals:
                 theirs = _bid(node, slot)
-                if theirs >= own and (takes_part or not theirs % _SELDOM):
+                if theirs >= own and (takes_part or not theirs % SELDOM):
                     break
             else:
                 return self._timing.slot_start_ns(slot)

@@ -162,9 +162,11 @@ class Spreading:
         return sum(1 for entry in self._bulk.values() if not entry.sent)
 
     def due_bulk(self) -> int:
-        """The number of bulk packets, about, that wait for a slot and that this node is to send before others."""
-        bulk = self._bulk
-        return sum(1 for again, _, key in self._ready if not again and key in bulk and not bulk[key].spare)
+        """The number of bulk packets, about, that wait for a slot and that this node is to send before others, or has
+        sent and sends again.
+        """
+        ready = (self._bulk[key] for _, _, key in self._ready if key in self._bulk)
+        return sum(1 for entry in ready if entry.sent or not (entry.again or entry.spare))
 
     # --- what is heard --------------------------------------------------------------------------------------------
 
@@ -186,7 +188,9 @@ class Spreading:
         entry = self._entries[key] = _Spread(
             packet, (packet.header.priority, self._order), src, bulk_from_ns or 0, now_ns
         )
-        entry.having |= self._early.pop(key, 0) | 1 << (packet.header.origin - 1)
+        entry.having |= self._early.pop(key, 0)
+        if src is not None:
+            entry.having |= 1 << (packet.header.origin - 1)
         if src is not None and self._lossy:
             entry.reach(self._links[src])
         entry.sent = self._repeats if once else 0

@@ -1,6 +1,12 @@
-"""Likely delays in rounds: what packets of others took, over their hops, shows what the own ones will take."""
+"""Delays in rounds: bounds beside more urgent packets, and likely delays from what packets of others took."""
 
-from fanet_mw.routing.rounds.delay_law import LikelyDelay
+from fanet_mw.routing.rounds.delay_law import DelayLaw, LikelyDelay
+from fanet_mw.routing.rounds.round_timing import RoundTiming
+from fanet_mw.routing.rounds.topology import Topology
+from fanet_mw.units import NodeId, S
+from fanet_mw.wire import PRIORITY_REPORT, PRIORITY_SAFETY
+from fanet_mw.wire.rounds import HeardNodes
+from sim.scenarios import catalog
 
 WAY_NS = 100
 
@@ -35,3 +41,25 @@ def test_what_is_long_ago_is_forgotten() -> None:
     for _ in range(8000):
         likely.hear(50, way_ns=WAY_NS)
     assert likely.over_ns(WAY_NS) == 62
+
+
+def test_what_more_urgent_packets_use_of_the_turns_makes_a_bound_longer() -> None:
+    two = ["routing.protocol=rounds", "nodes.count=2", "clusters.count=1", "traffic.sources=1"]
+    scenario = catalog.find("clusters", two)
+    law = DelayLaw(RoundTiming.of(scenario), scenario)
+    topology = Topology(NodeId(1), count=2, epoch_ns=law.epoch_ns, lifetime_ns=10 * S)
+    topology.hear([HeardNodes(2, 0, 1, often=False)], now_ns=0)
+    topology.state(2, often=False, now_ns=0)
+
+    def stated(priority: int) -> int | None:
+        return law.bound_ns(topology, priority=priority, clock_error_ns=0, now_ns=S)
+
+    before = stated(PRIORITY_REPORT), stated(PRIORITY_SAFETY)
+    assert None not in before
+    for _ in range(3):
+        law.count(200, priority=PRIORITY_SAFETY, now_ns=S)
+    report, warning = stated(PRIORITY_REPORT), stated(PRIORITY_SAFETY)
+    assert report is not None
+    assert before[0] is not None
+    assert 1.02 * before[0] < report < 2 * before[0]
+    assert warning == before[1], "nothing is more urgent than a warning"

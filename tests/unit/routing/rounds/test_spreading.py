@@ -132,7 +132,7 @@ def test_new_bulk_goes_before_what_is_sent_again() -> None:
     assert bulk_sent(made, 3 * ROUND) == [2, 1]
 
 
-def test_what_others_send_first_and_what_is_sent_again_asks_for_no_more_slots() -> None:
+def test_what_others_send_first_asks_for_no_more_slots() -> None:
     made = spreading()
     made.take(bulk(1), src=None, now_ns=0, bulk_from_ns=0)
     assert bulk_sent(made, 0) == [1]
@@ -142,7 +142,7 @@ def test_what_others_send_first_and_what_is_sent_again_asks_for_no_more_slots() 
     first = made.next_bulk(nodes((2, 3)), start_ns=3 * ROUND)
     assert first is not None
     assert first.header.seq == 2
-    assert made.due_bulk() == 1, "3; others send 4 first, and 1 is sent again"
+    assert made.due_bulk() == 2, "3, and 1, which is sent again; others send 4 first"
     made.look_again(first, from_ns=3 * ROUND)
     assert bulk_sent(made, 3 * ROUND) == [2, 3, 4, 1]
 
@@ -182,6 +182,14 @@ def test_who_comes_near_has_got_elsewhere_what_is_old() -> None:
         made.on_held([key_of_packet(bulk(seq))], 2)
     made.assume(3, until_ns=ROUND)
     assert bulk_sent(made, 8 * ROUND) == [2]
+
+
+def test_an_own_packet_of_a_node_that_hears_nobody_is_kept_until_somebody_comes() -> None:
+    made = spreading()
+    made.take(packet(1, priority=wire.PRIORITY_BULK), src=None, now_ns=0, bulk_from_ns=0)
+    assert made.next_bulk(0, start_ns=0) is not None
+    made.look_again(bulk(1), from_ns=ROUND)
+    assert bulk_sent(made, 3 * ROUND, neighbors=(2,)) == [1]
 
 
 def test_the_origin_of_a_packet_is_known_to_have_it() -> None:

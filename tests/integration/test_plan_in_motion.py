@@ -1,0 +1,48 @@
+"""Plans of rounds and of timetables, held against runs: bulk in slots, and UAVs that move among each other."""
+
+import pytest
+
+from fanet_mw.scenario import Scenario
+from sim.planner.answer import judge
+from sim.results.result import Result
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
+
+TWELVE = (
+    "nodes.count=12", "clusters.count=11", "traffic.sources=11", "routing.protocol=rounds", "routing.lifetime_s=3",
+    "duration_s=14", "drain_s=4", "warmup_s=2",
+)  # fmt: skip
+
+
+def planned(*settings: str) -> tuple[Scenario, dict[str, object], bool]:
+    scenario = catalog.find("clusters", settings)
+    _, content, feasible = judge(scenario)
+    return scenario, content, feasible
+
+
+@pytest.mark.parametrize(("interval_s", "fits"), [(0.1, True), (0.05, False)])
+def test_bulk_that_the_slots_of_rounds_carry_arrives_and_more_does_not(interval_s: float, *, fits: bool) -> None:
+    scenario, content, feasible = planned(*TWELVE, f"traffic.interval_s={interval_s}")
+    load = content["bulk"]
+    assert isinstance(load, dict)
+    assert feasible == fits == (load["needed"] <= load["carried"])
+    pdr = Result(simulate(scenario)).summary["pdr"]
+    assert (pdr > 0.999) == fits, (pdr, load)
+
+
+def test_a_timetable_is_no_plan_for_uavs_that_move_among_each_other() -> None:
+    walking = ("nodes.count=12", "clusters.count=11", "traffic.sources=11", "mobility.speed_m_s=5", "world.area_m=900")
+    _, content, feasible = planned(*walking, "mobility.model=random_waypoint")
+    assert not feasible
+    (problem,) = content["problems"]
+    assert "two that are linked over 200 m may be out of range after 5.0 s" in problem
+    assert 'routing.protocol = "rounds"' in problem
+    assert "change" not in content, "nothing that is searched makes it feasible"
+
+
+@pytest.mark.parametrize(
+    "settings", [("mobility.model=formation",), ("mobility.model=random_waypoint", "duration_s=4")]
+)
+def test_a_timetable_is_a_plan_while_no_link_can_end(settings: tuple[str, ...]) -> None:
+    few = ("nodes.count=12", "clusters.count=11", "traffic.sources=11", "warmup_s=0", "drain_s=1")
+    assert planned(*few, "mobility.speed_m_s=5", *settings)[2]

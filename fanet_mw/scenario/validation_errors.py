@@ -4,7 +4,7 @@ An unknown key is answered with the known key that is spelt most like it.
 """
 
 import difflib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from pydantic import BaseModel, ValidationError
@@ -21,6 +21,21 @@ _REMOVED: Final = {
     "clusters.slots": 'removed with clusters.relay = "claimed"; take routing.protocol = "rounds"',
 }
 """Keys and values that older scenarios may have, and what to take instead."""
+_REMOVED_DEFAULTS: Final[Mapping[str, Mapping[str, Any]]] = {
+    "mission": {"coverage_map": False},
+    "clusters": {"slots": 0},
+}
+"""Removed keys with the value that did nothing, as every result folder of that time has them."""
+
+
+def without_removed_defaults(tree: Mapping[str, Any]) -> dict[str, Any]:
+    """A scenario that a run has written, without removed keys that had no effect in it."""
+    return {
+        name: {key: value for key, value in table.items() if key not in gone or value != gone[key]}
+        if isinstance(table, Mapping) and (gone := _REMOVED_DEFAULTS.get(name))
+        else table
+        for name, table in tree.items()
+    }
 
 
 def sentences(error: ValidationError) -> list[str]:

@@ -22,6 +22,7 @@ from fanet_mw.errors import ConfigError, MalformedFrameError
 from fanet_mw.foreign_file import json_of, open_regular, read_regular, toml_of
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.scenario.tables.world import FILE_KEYS
+from fanet_mw.scenario.validation_errors import without_removed_defaults
 from fanet_mw.trace import Record, name_of, parse
 from sim.records.bus_checks import BusChecks, Count, Number, Share
 from sim.results.file_names import LINKS_FILE, REPORTS_FILE, SCENARIO_FILE, SUMMARY_FILE, TLOG_FILE, TRACE_FILE
@@ -200,7 +201,7 @@ class RunFolder:
                 if "/" in name or (self.folder / name).is_symlink():
                     raise ConfigError(f"{path}: world.{key} = {name[:_SHORT]!r} is no file of this folder")
                 world[key] = str(self.folder.absolute() / name)
-        scenario = config.build(tree, source=str(path), imports=False)
+        scenario = config.build(without_removed_defaults(tree), source=str(path), imports=False)
         said = tuple(self.summary[key] for key in ("scenario", "seed", "nodes"))
         if said != (scenario.name, scenario.seed, scenario.nodes.count):
             raise ConfigError(f"{path}: is of another run than {SUMMARY_FILE}")

@@ -252,6 +252,18 @@ def test_nothing_that_a_folder_names_is_imported(folder: Path, monkeypatch: pyte
     assert (folder.parents[2] / "foreign").read_text() == "untouched"
 
 
+def test_a_run_of_before_keys_were_removed_is_read_if_they_had_no_effect_in_it(folder: Path) -> None:
+    text = (folder / "scenario.toml").read_text()
+    old = text.replace("[clusters]", "[clusters]\nslots = 0").replace("[mission]", "[mission]\ncoverage_map = false")
+    assert old.count("slots = 0") == old.count("coverage_map = false") == 1
+    forge(folder, "scenario.toml", old.encode())
+    Replay.read(folder)
+    report(folder)
+    forge(folder, "scenario.toml", old.replace("slots = 0", "slots = 8").encode())
+    with pytest.raises(ConfigError, match=r"clusters\.slots: removed"):
+        Replay.read(folder)
+
+
 def test_a_description_is_text_in_every_page(folder: Path) -> None:
     hostile = (
         "x</p><script>alert(1)</script>\n# A heading\n[a](javascript:alert(3)) ![p](http://127.0.0.1/b) | a |\n- b `c`"

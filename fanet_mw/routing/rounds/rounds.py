@@ -34,7 +34,7 @@ from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.routing.rounds.spreading import Spreading
 from fanet_mw.routing.rounds.topology import Topology
 from fanet_mw.trace import BoundExcludes, BoundStated, LikelyStated
-from fanet_mw.units import BROADCAST, US, NodeId, S, seconds_to_ns
+from fanet_mw.units import BROADCAST, US, NodeId, seconds_to_ns
 from fanet_mw.wire import FLAG_FLOOD, HEADER_BYTES, PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY, Content, Kind
 from fanet_mw.wire.hello.digest import MESSAGE_BYTES, Digest, capacity
 from fanet_mw.wire.rounds import (
@@ -64,8 +64,6 @@ _LASTING_HOPS: Final = 8
 """A link counts if it lasts until its end would be noticed, and a packet has gone so many hops after that."""
 _MUCH_BULK: Final = 4
 """A node that is to send so many bulk packets before others takes part in all bulk slots until they are sent."""
-_LATELY_NS: Final = 2 * S
-"""A relay takes part in all bulk slots for so long after a packet; where there is none, nobody need be told so."""
 _SPREAD_SLOTS: Final = 1.0
 """Neighbors that pass on the same warning start within so many slots."""
 _BEFORE_TURN_NS: Final = 1 * US
@@ -126,8 +124,6 @@ class RoundFlooding(RoutingProtocol):
         """A packet that is older proves nothing about who is near: a station far away may have repeated it."""
         self._often = False
         """Whether this node takes part in all bulk slots, as it has stated."""
-        self._latest_ns = -_LATELY_NS
-        """The instant of the latest packet that may go in a slot."""
         self._slot_ns: int | None = None
         """The next own bulk slot; None if there is no bulk."""
         self._slot_from_ns = 0
@@ -255,7 +251,6 @@ class RoundFlooding(RoutingProtocol):
     def _take(self, packet: Packet, *, src: int | None, now_ns: int, once: bool = False) -> None:
         """A packet is to go in the node's next turn."""
         self._law.count(len(packet.frame), priority=packet.header.priority, now_ns=now_ns)
-        self._latest_ns = now_ns
         evicted = self._spreading.take(packet, src=src, now_ns=now_ns, once=once)
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
@@ -379,7 +374,6 @@ class RoundFlooding(RoutingProtocol):
 
     def _take_bulk(self, packet: Packet, *, src: int | None, from_ns: int, now_ns: int) -> None:
         """A bulk packet may be sent from an instant on."""
-        self._latest_ns = now_ns
         spare = src is not None and not self._topology.dominates()
         if spare:
             from_ns += _SPARE_HOPS * self._law.hop_ns
@@ -534,8 +528,7 @@ class RoundFlooding(RoutingProtocol):
         self._now_ns = now_ns
         if now_ns >= self._topology.next_epoch_ns():
             waiting = self._spreading.due_bulk()  # what others are to send must not take the relays' slots
-            relays = now_ns < self._latest_ns + _LATELY_NS and self._topology.dominates()
-            self._often = relays or waiting >= (1 if self._often else _MUCH_BULK)
+            self._often = self._topology.dominates() or waiting >= (1 if self._often else _MUCH_BULK)
             self._topology.state(self._stayers(now_ns), often=self._often, now_ns=now_ns)
         self._repair_due(now_ns)
         if self._slot_ns is not None and self._slot_ns - self._lead_ns <= now_ns:

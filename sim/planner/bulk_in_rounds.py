@@ -1,8 +1,9 @@
 """How much bulk for all the slots of rounds carry at most, where nodes stand.
 
-In each slot one node of those within two hops of each other sends, drawn by a hash (`bulk_slots.py`). Relays take part
-in each slot, so one has a share of one in as many as there are relays within its two hops, and has to send the packets
-of all; who is no relay takes part in one slot of eight, with its own packets.
+In each slot one node of those within two hops of each other sends, drawn by a hash
+(`fanet_mw/routing/rounds/bulk_slots.py`). Relays take part in each slot, so one has a share of one in as many as there
+are relays within its two hops, and has to send the packets of all; who is no relay takes part in one slot of eight,
+with its own packets.
 """
 
 from collections.abc import Mapping

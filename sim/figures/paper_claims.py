@@ -94,6 +94,11 @@ def below(what: str, values: Values, threshold: float, unit: str = "", *, possib
     return Statement(what, _listed(values), "below", threshold, unit, possible)
 
 
+def alike(what: str, values: Values, within: float, unit: str = "") -> list[Statement]:
+    """Two statements that hold together if a difference lies within a limit on either side."""
+    return [above(what, values, -within, unit), below(what, values, within, unit)]
+
+
 def _listed(values: Values) -> Sequence[float]:
     return list(values.values()) if isinstance(values, Mapping) else values
 

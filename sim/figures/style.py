@@ -120,6 +120,14 @@ def line(
     )  # fmt: skip
 
 
+def crosses(axes: Axes, look: Look, points: Sequence[tuple[float, float]]) -> None:
+    """Points of the same setting at rest, beside a line of it in motion."""
+    axes.plot(
+        [x for x, _ in points], [y for _, y in points],
+        color=look.color, linestyle="none", marker="x", markersize=7, markeredgewidth=1.6, zorder=5,
+    )  # fmt: skip
+
+
 def reaches(
     intervals: Sequence[Interval], *, least: float = 0.0, most: float = math.inf
 ) -> tuple[list[float], list[float]]:

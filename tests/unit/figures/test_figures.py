@@ -217,7 +217,11 @@ def tiny(name: str, **changes: object):
     if "traffic" in found.set:  # classes of traffic, as a list
         del small["traffic.sources"]
     small = {key: value for key, value in small.items() if key not in grid}
-    sweep = found.model_copy(update={"seeds": 2, "grid": grid, "set": {**found.set, **small}})
+    cases = tuple(
+        case.model_copy(update={"grid": {key: grid.get(key, values) for key, values in case.grid.items()}})
+        for case in found.case
+    )
+    sweep = found.model_copy(update={"seeds": 2, "grid": grid, "set": {**found.set, **small}, "case": cases})
     rows = [(task, carry_out(task)) for task in tasks_of(sweep)]
     assert [done.error for _, done in rows if done.failed] == []
     return table_of(rows, sweep.varied())
@@ -236,12 +240,13 @@ def test_a_figure_has_its_picture_its_numbers_and_its_verdicts_beside_each_other
     assert "<svg" in (folder / "figure-9.svg").read_text()
     with (folder / "figure-9.csv").open() as file:
         rows = [row for row in csv.DictReader(file) if row["panel"] == "pdr"]
-    runs = [row for row in table.to_pylist() if (row["traffic.sources"], row["traffic.interval_s"]) == (8, 0.05)]
-    [drawn] = [row for row in rows if (row["sources"], row["interval_s"]) == ("8", "0.05")]
+    dense = [row for row in table.to_pylist() if (row["traffic.sources"], row["traffic.interval_s"]) == (8, 0.05)]
+    runs = [row for row in dense if row["case"] == "formation"]
+    [drawn] = [row for row in rows if (row["motion"], row["sources"], row["interval_s"]) == ("formation", "8", "0.05")]
     assert float(drawn["mean"]) == pytest.approx(statistics.mean(row["pdr"] for row in runs))
     about = json.loads((folder / "figure-9.json").read_text())
     assert [claim["verdict"] for claim in about["claims"]] == [claim.verdict for claim in claims]
-    assert about["runs"] == 8
+    assert about["runs"] == 16
 
 
 def test_the_same_table_gives_the_same_picture(nine, tmp_path) -> None:
@@ -270,19 +275,19 @@ def test_kept_tables_are_drawn_by_the_command_and_missing_ones_are_named(
     nine, tmp_path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     table, folder, _ = nine
-    older = table.set_column(table.column_names.index("code"), "code", [["0.0.9+0ld"] * 3 + [code()] * 5])
+    older = table.set_column(table.column_names.index("code"), "code", [["0.0.9+0ld"] * 3 + [code()] * 13])
     keep(older, tmp_path / "kept", "fig9", "quick")
     words = ["figures", "9", "--out", str(tmp_path / "drawn"), "--kept", str(tmp_path / "kept")]
     with pytest.raises(ConfigError, match="--kept is for --draw-only"):
         app(words, result_action="return_value", exit_on_error=False)
     assert app([*words, "--draw-only"], result_action="return_value") == 0
     said = capsys.readouterr().out
-    assert "figure-9: 3 of 8 finished runs are of other code (3 of 0.0.9+0ld; this is" in said
+    assert "figure-9: 3 of 16 finished runs are of other code (3 of 0.0.9+0ld; this is" in said
     assert (tmp_path / "drawn" / "figure-9.png").read_bytes() == (folder / "figure-9.png").read_bytes()
     about = json.loads((tmp_path / "drawn" / "figure-9.json").read_text())
-    assert about["runs_by_code"] == {"0.0.9+0ld": 3, code(): 5}
+    assert about["runs_by_code"] == {"0.0.9+0ld": 3, code(): 13}
     _, markdown = (path.read_text() for path in write([tmp_path / "drawn"], tmp_path / "drawn"))
-    assert f"the runs are of 2 codes: 0.0.9+0ld (3 runs), {code()} (5 runs)." in markdown
+    assert f"the runs are of 2 codes: 0.0.9+0ld (3 runs), {code()} (13 runs)." in markdown
     assert "`fanet figures 9 --quick --rerun-older` makes them of one." in markdown
     assert app([*words, "10", "--draw-only"], result_action="return_value") == 1
     assert "has no table of it: fig10" in " ".join(capsys.readouterr().out.split())

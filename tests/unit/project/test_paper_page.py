@@ -43,13 +43,15 @@ def test_every_kept_verdict_is_that_of_the_kept_table(name: str) -> None:
 def test_figure_9_agrees_when_the_pdr_falls_and_differs_when_it_rises(few: float, many: float, verdict: str) -> None:
     common = {"status": "ok", "code": "", "traffic.interval_s": 1.0, "copies.lost.collision": 9, "copies.lost.busy": 1}
     rows = [
-        {**common, "seed": seed, "traffic.sources": sources, "pdr": pdr + seed / 1000}
+        {**common, "case": case, "seed": seed, "traffic.sources": sources, "pdr": pdr + seed / 1000}
+        for case in ("formation", "at rest")
         for sources, pdr in ((1, few), (44, many))
         for seed in range(5)
     ]
-    falls, collide = FIGURES["9"].claims(Runs(pa.Table.from_pylist(rows)))
+    falls, collide, still = FIGURES["9"].claims(Runs(pa.Table.from_pylist(rows)))
     assert falls.verdict == verdict
     assert collide.verdict == "agrees"
+    assert still.verdict == "agrees"
 
 
 @pytest.mark.parametrize("name", KEPT)

@@ -304,7 +304,9 @@ def test_mavproxy_links_arms_loads_waypoints_and_flies_them(field: Field, tmp_pa
     try:
         terminal.type("", "online system")
         terminal.type("", "Received 7 parameters")
-        terminal.type("vehicle 2", "Saved 7 parameters to mav_2_1.parm")
+        terminal.type("vehicle 2", "Set vehicle 2")
+        if "mav_2_1.parm" not in terminal.said:  # it was, if MAVProxy heard vehicle 2 first
+            terminal.type("", "Saved 7 parameters to mav_2_1.parm")
         terminal.type("link", "0 lost")
         terminal.type("param show MPC*", r"MPC_XY_CRUISE +12\.0")
         terminal.type("param set MPC_XY_CRUISE 9", "> ")

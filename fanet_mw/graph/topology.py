@@ -15,16 +15,6 @@ Adjacency = Mapping[NodeId, tuple[NodeId, ...]]
 _MIN_CELL_M: Final = 1e-3
 
 
-def nodes_of(bits: int) -> list[NodeId]:
-    """The nodes of a set that is an integer, in order: bit i stands for node i + 1."""
-    nodes = []
-    while bits:
-        last = bits & -bits
-        nodes.append(NodeId(last.bit_length()))
-        bits ^= last
-    return nodes
-
-
 def symmetric(heard: Mapping[NodeId, Collection[NodeId]]) -> dict[NodeId, tuple[NodeId, ...]]:
     """Keep the links on which both ends hear each other; nodes that are named only by others are dropped."""
     nodes = sorted(heard)

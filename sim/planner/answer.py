@@ -5,26 +5,21 @@ Exit codes: 0 feasible, 1 not feasible, 2 the scenario or a flag is wrong (as wi
 
 import json
 import math
-from collections import defaultdict
 from collections.abc import Mapping
 from itertools import combinations
 from random import Random
 from typing import Any, Final
 
 from agents.applications.traffic import sources_of
-from agents.ground_control.telemetry_pace import pace_of
 from agents.positioning.steady_fix import error_m
 from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.errors import ConfigError
-from fanet_mw.graph.topology import levels, within_range
+from fanet_mw.graph.topology import within_range
 from fanet_mw.rng import stream
 from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE
 from fanet_mw.routing.clustered.timetable.turn_size import links
-from fanet_mw.routing.rounds.delay_law import DelayLaw
-from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
-from fanet_mw.wire import HEADER_BYTES
 from fanet_mw.wire.places import rounded
 from sim.planner import (
     ClassPlan,
@@ -49,12 +44,11 @@ from sim.planner import (
     plan_lossy,
     with_capacity,
 )
-from sim.planner.bulk_in_rounds import BulkLoad, greatest_load
 from sim.planner.expected_links import expected_links
 from sim.planner.motion import outdated
-from sim.planner.plan_text import item
-from sim.planner.problems_and_notes import clocks_apart
+from sim.planner.plan_text import describe_operator, item
 from sim.planner.reception_probability import chance_of
+from sim.planner.rounds_plan import judge_rounds
 from sim.world.environment.layout import positions
 
 _DRAWS: Final = 3
@@ -78,7 +72,7 @@ def judge(
     deadline_ns = _deadline_ns(scenario, deadline_s)
     at = dict(zip(map(NodeId, scenario.node_ids), positions(scenario), strict=True))
     if scenario.routing.protocol == "rounds":
-        return _judge_rounds(scenario, at, deadline_ns=deadline_ns)
+        return judge_rounds(scenario, at, deadline_ns=deadline_ns)
     sources = [NodeId(node) for node in sources_of(scenario)]
     if scenario.measures_links:
         announced = {node: rounded(place) for node, place in at.items()}
@@ -89,7 +83,7 @@ def judge(
         return describe(found), {"feasible": False, "problems": [found.reason]}, False
     found, missed = _with_loss(with_capacity(found, at), at)
     left = tuple(not_counted(scenario))
-    operator = _operator(scenario, [c.bound.delay_ns for c in found.classes if isinstance(c.bound, Bounded)])
+    operator = describe_operator(scenario, [c.bound.delay_ns for c in found.classes if isinstance(c.bound, Bounded)])
     text, content = [describe(found)], {**_json(found), "not_counted": list(left)}
     if operator is not None:
         text.append(item("operator", operator))
@@ -132,109 +126,6 @@ def _deadline_ns(scenario: Scenario, deadline_s: float | None) -> int | None:
         raise ConfigError(f"--deadline {deadline_s:g}: must be > 0 [s]")
     wanted_s = scenario.traffic.deadline_s if deadline_s is None else deadline_s
     return None if wanted_s is None else seconds_to_ns(wanted_s)
-
-
-def _judge_rounds(
-    scenario: Scenario, at: Mapping[NodeId, Enu], *, deadline_ns: int | None
-) -> tuple[str, dict[str, Any], bool]:
-    """The verdict on rounds: the bound over the hops that the starting positions need, and the load of the turns."""
-    timing = RoundTiming.of(scenario)
-    law = DelayLaw(timing, scenario)
-    near = within_range(at, range_m=scenario.radio.range_m, reaches=scenario.reaches)
-    ways = [levels(near, node) for node in at]
-    hops = max(max(hops_to.values()) for hops_to in ways)
-    bound_ns = None if law.loses_frames else law.over_ns(hops)
-    urgent = {
-        name: each for name, each in scenario.traffic_classes.items() if each.priority != "bulk" or not timing.slots
-    }
-    offered = sum(
-        len(sources_of(scenario, name)) / each.interval_s * (each.longest_bytes + HEADER_BYTES)
-        for name, each in urgent.items()
-    )
-    carried = timing.turn_bytes / (timing.period_ns / S)
-    longest = max((each.longest_bytes + HEADER_BYTES for each in urgent.values()), default=0)
-    bulk = {name: each for name, each in scenario.traffic_classes.items() if name not in urgent}
-    flooded = [name for name, each in bulk.items() if each.destination == "all"]
-    rates: dict[NodeId, float] = defaultdict(float)
-    for name in flooded:
-        for node in sources_of(scenario, name):
-            rates[NodeId(node)] += 1 / bulk[name].interval_s
-    load = None
-    if flooded:
-        longest_bulk = max(bulk[name].longest_bytes for name in flooded) + HEADER_BYTES
-        load = greatest_load(near, rates, timing, longest_bytes=longest_bulk)
-    problems = list[str]()
-    if load is not None and load.needed > load.carried:
-        problems.append(
-            f"bulk: node {load.node} has {load.needed:.0f} packets a second to send, and its slots carry "
-            f"{load.carried:.0f}: the others wait, until they expire"
-        )
-    if longest > timing.turn_bytes:
-        problems.append(f"urgent packets of {longest} B are longer than rounds.turn_bytes = {timing.turn_bytes}")
-    problems += clocks_apart(scenario, slack="rounds.turn_slack_us")
-    if any(len(hops_to) < len(at) for hops_to in ways):
-        problems.append("the nodes are not all connected at their starting positions")
-    if offered > carried:
-        problems.append(f"urgent packets of {offered:.0f} B/s are more than the {carried:.0f} B/s that turns carry")
-    if deadline_ns is not None and (bound_ns is None or bound_ns > deadline_ns):
-        problems.append(f"the bound is not within the deadline of {deadline_ns / MS:.0f} ms")
-    feasible = not problems
-    bound = "none: the channel loses frames" if bound_ns is None else f"at most {bound_ns / MS:.0f} ms over {hops} hops"
-    text = [
-        f"{'FEASIBLE' if feasible else 'NOT FEASIBLE'}  {scenario.name}: {scenario.nodes.count} nodes, a round of "
-        f"{timing.period_ns / MS:.1f} ms: turns of {timing.turn_ns / MS:.2f}, {timing.slots} slots of "
-        f"{timing.slot_ns / MS:.2f} for bulk",
-        *(item("problem", problem) for problem in problems),
-        item(
-            "urgent",
-            f"{bound} at the starting positions, {law.hop_ns / MS:.1f} ms for each further hop, while at most "
-            f"{scenario.rounds.burst_bytes} B are under way; from {law.silent_ns / S:.1f} s on, when links are known",
-        ),
-        item("turns", f"carry {carried / 1000:.1f} kB/s of urgent packets, the traffic has {offered / 1000:.1f} kB/s"),
-        item(
-            "bulk",
-            _of_bulk(load) if timing.slots else "goes in turns, too",
-        ),
-    ]
-    content: dict[str, Any] = {
-        "feasible": feasible, "problems": problems, "period_ms": timing.period_ns / MS, "turn_ms": timing.turn_ns / MS,
-        "slots": timing.slots, "slot_ms": timing.slot_ns / MS, "hop_ms": law.hop_ns / MS, "hops": hops,
-        "bound_ms": None if bound_ns is None else bound_ns / MS, "from_s": law.silent_ns / S,
-        "carried_bytes_per_s": carried, "offered_bytes_per_s": offered,
-        "bulk": None if load is None else load._asdict(),
-    }  # fmt: skip
-    operator = _operator(scenario, [] if bound_ns is None else [bound_ns], known_gone_ns=law.silent_ns)
-    if operator is not None:
-        text.append(item("operator", operator))
-        content["operator"] = operator
-    return "\n".join(text), content, feasible
-
-
-def _of_bulk(load: BulkLoad | None) -> str:
-    shared = "goes in slots that nodes within two hops share, without a bound"
-    if load is None:
-        return shared
-    return f"{shared}; those of node {load.node} are {load.needed / load.carried:.0%} full at the starting positions"
-
-
-def _operator(scenario: Scenario, bounds: list[int], *, known_gone_ns: int = 0) -> str | None:
-    """What a ground station in band may count on; None without a post on the ground. `known_gone_ns`: after so long
-    the swarm knows that a node is off the air.
-    """
-    if scenario.post is None:
-        return None
-    pace = pace_of(scenario)
-    delay = (
-        f"a command, and its acknowledgment, each within {max(bounds) / MS:.0f} ms, "
-        "when the post sends as often as a source"
-        if bounds
-        else "no bound for a command"
-    )
-    if bounds and known_gone_ns:
-        delay += f", but to a UAV that has left the air, which is known after {known_gone_ns / S:.1f} s"
-    return (
-        f"telemetry of each UAV every {pace.interval_ns / S:.1f} s or less often ({pace.share:.0%} of the air); {delay}"
-    )
 
 
 def _judge_lossy(

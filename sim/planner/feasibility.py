@@ -121,7 +121,7 @@ def evaluate(
         or (
             *cut_off,
             *out_of_hops,
-            *(outdated(scenario, site.positions, site.adjacency) if site.timetable else ()),
+            *outdated(scenario, site.positions, site.adjacency),
             *problems_and_notes.problems(scenario, judged.clusters, summed, (*cut_off, *out_of_hops)),
             *crowded,
             *apart,

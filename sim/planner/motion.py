@@ -12,11 +12,13 @@ _RIGID: Final = ("static", "formation")
 
 
 def outdated(scenario: Scenario, at: Mapping[NodeId, Enu], adjacency: Adjacency) -> Iterator[str]:
-    """A sentence about two UAVs that may fly out of range of each other while a timetable counts on their link."""
+    """A sentence about two UAVs that may fly out of range of each other while a timetable counts on their link; none
+    without a timetable.
+    """
     speed_m_s, range_m = scenario.mobility.speed_m_s, scenario.radio.range_m
     lengths = [at[a].minus(at[b]).norm() for a in adjacency for b in adjacency[a] if a < b]
     lengths = [length_m for length_m in lengths if length_m <= range_m]  # antennas of the ground reach farther
-    if scenario.mobility.model in _RIGID or not speed_m_s or not lengths:
+    if scenario.clusters.relay != "scheduled" or scenario.mobility.model in _RIGID or not speed_m_s or not lengths:
         return
     lasts_s = (range_m - max(lengths)) / (2 * speed_m_s)
     if lasts_s < scenario.duration_s:

@@ -4,8 +4,10 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from typing import Final
 
+from agents.ground_control.telemetry_pace import pace_of
 from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE
+from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, S
 from sim.planner.cheapest_change import ScenarioChange
 from sim.planner.demand import ClassPlan
@@ -86,6 +88,26 @@ def describe_change(change: ScenarioChange | None, found: ScenarioPlan) -> str:
     lines += [item("", f"then {_class(c, change.plan)}") for c in change.plan.classes]
     lines += [item("", note) for note in change.plan.notes if note not in found.notes]
     return "\n".join(lines)
+
+
+def describe_operator(scenario: Scenario, bounds: list[int], *, known_gone_ns: int = 0) -> str | None:
+    """What a ground station in band may count on; None without a post on the ground. `known_gone_ns`: after so long
+    the swarm knows that a node is off the air.
+    """
+    if scenario.post is None:
+        return None
+    pace = pace_of(scenario)
+    delay = (
+        f"a command, and its acknowledgment, each within {max(bounds) / MS:.0f} ms, "
+        "when the post sends as often as a source"
+        if bounds
+        else "no bound for a command"
+    )
+    if bounds and known_gone_ns:
+        delay += f", but to a UAV that has left the air, which is known after {known_gone_ns / S:.1f} s"
+    return (
+        f"telemetry of each UAV every {pace.interval_ns / S:.1f} s or less often ({pace.share:.0%} of the air); {delay}"
+    )
 
 
 def describe_optimum(found: Optimum | None, *, deadline_ns: int | None) -> str:

@@ -1,6 +1,5 @@
 """What went over the air, from a run's capture: who sent when and why, and what each cause took of the air."""
 
-import itertools
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -9,10 +8,9 @@ from typing import Final
 
 from emulator.channel.propagation import heard_m
 from emulator.pcap_reader import AirFrame, frames_of
-from fanet_mw.graph.greedy_dominating_set import greedy_dominating_set
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Posed
-from fanet_mw.units import MS, NodeId, S
+from fanet_mw.units import MS, S
 from sim.figures.colors import BLUE, GRAY, GREEN, ORANGE, PINK, RED
 from sim.figures.style import canvas, legend_above
 from sim.observation.air_causes import AirCauses, Cause, transmissions
@@ -105,7 +103,7 @@ def rows(air: Air) -> Rows:
 def against_dominating_set(run: RunRecords, air: Air) -> str:
     """How often each packet to everyone was sent, beside the size of a connected dominating set of the links then."""
     sent = [air.times[name] for name in run.sent if air.times[name] and run.scenario.traffic.destination == "all"]
-    least = [size for size in _dominating_sizes(run) if size]
+    least = [size for size in map(len, _dominating_sets(run)) if size]
     if not sent or not least:
         return ""
     mean, needed = sum(sent) / len(sent), sum(least) / len(least)
@@ -115,21 +113,35 @@ def against_dominating_set(run: RunRecords, air: Air) -> str:
     )
 
 
-def _dominating_sizes(run: RunRecords) -> Iterator[int]:
-    """The relays of the greatest part of the swarm at instants over the traffic's time."""
+def _dominating_sets(run: RunRecords) -> Iterator[set[int]]:
+    """The sets at instants over the traffic's time."""
     reach_m = heard_m(run.scenario.radio)
     begin_ns, end_ns = run.scenario.traffic_window_ns
     for step in range(_INSTANTS):
         at_ns = begin_ns + (end_ns - begin_ns) * step // _INSTANTS
         moved = {node: _at(track, at_ns)[2:] for node, track in run.tracks.items()}
         places: Mapping[int, tuple[float, ...]] = moved or run.places().at
-        links = [0] * (max(places, default=0) + 1)
-        for (a, here), (b, there) in itertools.permutations(places.items(), 2):
-            if math.dist(here, there) <= reach_m:
-                links[a] |= 1 << (b - 1)
-        best = max(places, key=lambda node: (links[node].bit_count(), -node), default=0)
-        yield greedy_dominating_set(links, NodeId(best)).bit_count() if best else 0
+        yield greedy_dominating_set(
+            {a: {b for b, there in places.items() if b != a and math.dist(here, there) <= reach_m}
+             for a, here in places.items()}
+        )  # fmt: skip
 
 
 def _at(track: Sequence[Posed], at_ns: int) -> Posed:
     return next((one for one in reversed(track) if one.t_ns <= at_ns), track[0])
+
+
+def greedy_dominating_set(links: Mapping[int, set[int]]) -> set[int]:
+    """A small connected set from which every node of the greatest part is reached: the node that reaches most of the
+    others first, then always the one next to the set that reaches most (Guha and Khuller, 1998, algorithm I).
+    """
+    if not links:
+        return set()
+    chosen = {max(links, key=lambda node: (len(links[node]), -node))}
+    covered = chosen | links[next(iter(chosen))]
+    while True:
+        best = max(covered - chosen, key=lambda node: (len(links[node] - covered), -node), default=None)
+        if best is None or not links[best] - covered:
+            return chosen
+        chosen.add(best)
+        covered |= links[best]

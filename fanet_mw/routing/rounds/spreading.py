@@ -19,9 +19,9 @@ from collections.abc import Iterable, Sequence
 from heapq import heappop, heappush
 from typing import Final
 
-from fanet_mw.graph.topology import nodes_of
 from fanet_mw.node.duplicates import key_of
 from fanet_mw.node.packet import Packet
+from fanet_mw.routing.rounds.topology import nodes_of
 from fanet_mw.units import US
 
 _MOST_EARLY: Final = 1024

@@ -8,12 +8,21 @@ per second in any case. A link counts if both its ends state it.
 from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
-from fanet_mw.graph.greedy_dominating_set import greedy_dominating_set
-from fanet_mw.graph.topology import nodes_of
+from fanet_mw.graph.connected_dominating_set import dominates
 from fanet_mw.units import NodeId, S
 from fanet_mw.wire.rounds import HeardNodes
 
 _MODULUS: Final = 256
+
+
+def nodes_of(bits: int) -> list[NodeId]:
+    """The nodes of a set, in order: bit i stands for node i + 1."""
+    nodes = []
+    while bits:
+        last = bits & -bits
+        nodes.append(NodeId(last.bit_length()))
+        bits ^= last
+    return nodes
 
 
 def _seldom(rival: tuple[NodeId, bool]) -> bool:
@@ -218,8 +227,8 @@ class Topology:
         """True if this node is one of the connected dominating set whose transmissions reach all nodes."""
         if self._dominates_for != self.changes:
             self._dominates_for = self.changes
-            relays = greedy_dominating_set(self.links, self._node)
-            self._dominates = bool(relays >> (self._node - 1) & 1)
+            near = [self._node, *nodes_of(self.links[self._node])]
+            self._dominates = dominates(self._node, {n: tuple(nodes_of(self.links[n])) for n in near})
         return self._dominates
 
     def absent(self, now_ns: int, *, doubt_ns: int) -> Sequence[NodeId] | None:

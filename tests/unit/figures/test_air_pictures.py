@@ -1,11 +1,12 @@
-"""The air of a run: why each frame was sent."""
+"""The air of a run: why each frame was sent, and the fewest senders that reach everyone."""
 
+import pytest
 from kit import MakeScenario
 
 from emulator.pcap_reader import AirFrame
 from fanet_mw.units import BROADCAST
 from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Header, Kind, filler
-from sim.report.air_pictures import Air, Cause
+from sim.report.air_pictures import Air, Cause, greedy_dominating_set
 
 
 def frame(sender: int, origin: int, seq: int, *, kind: Kind = Kind.DATA, attempt: int = 1) -> AirFrame:
@@ -28,3 +29,16 @@ def test_each_frame_has_its_cause(make_scenario: MakeScenario) -> None:
         Cause.OWN, Cause.RELAYED, Cause.AGAIN, Cause.AGAIN, Cause.HELLO, Cause.CONTROL, Cause.ACK, Cause.CONTROL,
     ]  # fmt: skip
     assert air.times == {(1, 7): 3, (1, 8): 1}
+
+
+@pytest.mark.parametrize(
+    ("links", "size"),
+    [
+        ({}, 0),
+        ({1: {2, 3, 4}, 2: {1}, 3: {1}, 4: {1}}, 1),
+        ({1: {2}, 2: {1, 3}, 3: {2, 4}, 4: {3, 5}, 5: {4}}, 3),
+        ({1: {2}, 2: {1}, 3: set()}, 1),
+    ],
+)
+def test_a_greedy_set_reaches_everyone_of_the_greatest_part(links: dict[int, set[int]], size: int) -> None:
+    assert len(greedy_dominating_set(links)) == size

@@ -16,6 +16,8 @@ PER_NS: Final = 100 * S
 """A load is the number of packets in this time."""
 AS_EXPECTED: Final = 0xFFFF
 """The load of a node that is assumed to send as the scenario states."""
+LEAST_LOAD: Final = 1
+"""The load of a node that sends nothing, or next to nothing."""
 MOST_LOAD: Final = 20_000
 """The greatest load that can be announced: 200 packets a second of one node."""
 
@@ -25,7 +27,7 @@ def interval_ns_of(load: int, *, expected_ns: int) -> int:
 
     A load of 0, which only a forged announcement has, counts as the least load.
     """
-    return expected_ns if load == AS_EXPECTED else PER_NS // max(1, load)
+    return expected_ns if load == AS_EXPECTED else PER_NS // max(LEAST_LOAD, load)
 
 
 class Loads(NamedTuple):

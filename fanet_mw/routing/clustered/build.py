@@ -19,7 +19,7 @@ from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTi
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
 from fanet_mw.routing.clustered.forwarding.uplink import Uplink
-from fanet_mw.routing.clustered.links.heard_load import HeardLoads
+from fanet_mw.routing.clustered.links.heard_load import HeardLoads, stated_loads
 from fanet_mw.routing.clustered.links.link_quality import LinkQuality
 from fanet_mw.routing.clustered.links.neighborhood import Neighborhood
 from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
@@ -241,7 +241,8 @@ def _by_timetable(ground: _Ground) -> Clustered:
     relaying = ScheduledRelaying(
         port, timetables, contending, resumed=resumed, repair=ground.repair, missing=ground.missing, followers=followers
     )
-    heard = HeardLoads(interval_s=scenario.traffic.interval_s) if scenario.hears_load else None
+    stated = stated_loads(scenario)
+    heard = HeardLoads(interval_s=scenario.traffic.interval_s, stated=stated) if scenario.hears_load else None
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
         floods=ground.floods, roles=_roles(ground, parts, access, timetabling, heard), access=access, relaying=relaying,

@@ -7,7 +7,7 @@ each node, at least 1 s apart, are kept as marks, and the load follows from them
 
     enough marks                the mean rate between the marks, plus twice its standard error
     nothing heard for long      at most the mean rate from the first mark until now, with one packet in the silence
-    too few marks               the load that the scenario states
+    too few marks               the load that the scenario states; the least load if none of its traffic is the node's
 
 The fields of a packet may be forged. A packet that is born in the future, or that implies more than the greatest
 load, is not used but counted.
@@ -18,8 +18,9 @@ from collections.abc import Iterable, Mapping
 from itertools import pairwise
 from typing import Final
 
+from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, NodeId, S, seconds_to_ns
-from fanet_mw.wire.loads import AS_EXPECTED, MOST_LOAD, PER_NS
+from fanet_mw.wire.loads import AS_EXPECTED, LEAST_LOAD, MOST_LOAD, PER_NS
 
 _APART_NS: Final = 1 * S
 """The least time between two marks of a node."""
@@ -44,9 +45,10 @@ _SHRUNK: Final = 0.75
 class HeardLoads:
     """The loads of all nodes, as one node estimates them."""
 
-    def __init__(self, *, interval_s: float) -> None:
-        """`interval_s`: the packet interval that the scenario states."""
+    def __init__(self, *, interval_s: float, stated: Mapping[NodeId, int]) -> None:
+        """`interval_s`: the packet interval that the scenario states; `stated`: see `stated_loads`."""
         self._interval_s = interval_s
+        self._stated = stated
         self._marks: dict[int, list[tuple[int, int]]] = {}
         """Of each origin, the births [ns] and sequence numbers of some packets, oldest first."""
         self._heard_ns: dict[int, int] = {}
@@ -73,11 +75,11 @@ class HeardLoads:
         marks.append((born_ns, seq))
         del marks[:-_KEPT]
 
-    def load(self, node: int, *, now_ns: int) -> int:
-        """The number of packets that a node sends in 100 s, rounded up; `AS_EXPECTED` with too few marks."""
+    def load(self, node: NodeId, *, now_ns: int) -> int:
+        """The number of packets that a node sends in 100 s, rounded up; what is stated with too few marks."""
         marks = self._marks.get(node, ())
         if len(marks) < _ENOUGH:
-            return AS_EXPECTED
+            return self._stated.get(node, AS_EXPECTED)
         (first_ns, first), (last_ns, last) = marks[0], marks[-1]
         mean = (last - first) * PER_NS / (last_ns - first_ns)
         parts = [(b - a) * PER_NS / (to_ns - from_ns) for (from_ns, a), (to_ns, b) in pairwise(marks)]
@@ -85,7 +87,7 @@ class HeardLoads:
         load = mean + _ERRORS * math.sqrt(variance / len(parts))
         if now_ns - self._heard_ns[node] > max(_QUIET_NS, 3 * PER_NS / mean):
             load = min(load, (last - first + 1) * PER_NS / (now_ns - first_ns))
-        return max(1, min(MOST_LOAD, math.ceil(load - 1e-6)))
+        return max(LEAST_LOAD, min(MOST_LOAD, math.ceil(load - 1e-6)))
 
     def loads(self, nodes: Iterable[NodeId], *, now_ns: int) -> dict[NodeId, int]:
         return {node: self.load(node, now_ns=now_ns) for node in nodes}
@@ -121,3 +123,18 @@ def packets(load: int, *, within_ns: int, interval_s: float) -> float:
     `interval_s` is the packet interval of the scenario, which applies if the load is `AS_EXPECTED`.
     """
     return within_ns / seconds_to_ns(interval_s) if load == AS_EXPECTED else load * within_ns / PER_NS
+
+
+def stated_loads(scenario: Scenario) -> Mapping[NodeId, int]:
+    """The least load for each node whose traffic the scenario states to be none, because all its classes name their
+    sources and it is not among them.
+    """
+    named: set[int] = set()
+    for traffic in scenario.traffic_classes.values():
+        if traffic.arrivals == "none":
+            continue
+        if not isinstance(traffic.sources, tuple):
+            return {}
+        named.update(traffic.sources)
+    nodes = range(1, scenario.node_count + 1) if named else ()
+    return {NodeId(node): LEAST_LOAD for node in nodes if node not in named}

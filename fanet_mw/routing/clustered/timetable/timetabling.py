@@ -19,7 +19,7 @@ from fanet_mw.routing.clustered.roles.leader import Leader
 from fanet_mw.routing.clustered.roles.leader_election import Authority, Lease
 from fanet_mw.routing.clustered.roles.membership import Membership, Version
 from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
-from fanet_mw.routing.clustered.timetable.fitted_timetable import NO_LOADS, FittedTimetable
+from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
 from fanet_mw.routing.clustered.timetable.followers import Followers
 from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
@@ -176,7 +176,7 @@ class FromPlaces:
             return  # a cluster without a head; no leader announces one
         measured = tuple(link for part in sorted(self._measured) for link in self._measured[part].links)
         head_of = {node: heads[cluster] for node, cluster in sorted(cluster_of.items())}
-        found = self._fit(schedule, at, head_of, measured, loads or NO_LOADS)
+        found = self._fit(schedule, at, head_of, measured, loads)
         # None if not even one packet of each head fits; `fanet plan` tells the user
         timetable = None
         if found is not None:

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from typing import Final, NamedTuple, TypeVar
 
-from fanet_mw.routing.clustered.links.heard_load import packets
+from fanet_mw.routing.clustered.links.heard_load import packets, stated_loads
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_ns
 from fanet_mw.routing.clustered.timetable.fitted_timetable import NO_LOADS, FittedTimetable
 from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
@@ -87,13 +87,14 @@ def fit(
     quick: bool = False,
 ) -> FittedTimetable | None:
     """The timetable of a swarm; None if not even one packet of each head fits. `head_of`: the head of each node but the
-    leader; `loads`: of those nodes that do not send as the scenario says.
+    leader; `loads`: of those nodes that do not send as the scenario says. Nodes without traffic get one turn each.
 
     With `quick` it is None, too, if the load only fits with an effort that may take seconds.
     """
     leads = leader or scenario.leader
     heads = tuple((node, head) for node, head in sorted(head_of.items()) if node != head)
     whole_ns = scenario.clusters.period_ns if period_ns is None else period_ns
+    loads = {**stated_loads(scenario), **loads}
     wishes = _wishes_by_load(scenario, head_of, leads, whole_ns, loads) if loads else None
     ordered = wishes or _wishes(scenario, head_of, leads, whole_ns)
 
@@ -153,6 +154,7 @@ def fit_measured(
     contention_ns = round(scenario.clusters.contention_ms * MS * whole_ns / scenario.clusters.period_ns)
     turns = Turns(origin_ns, whole_ns, contention_ns, turn, max(0, whole_ns - contention_ns) // turn)
     own = _sending_leader(scenario, leader)
+    loads = {**stated_loads(scenario), **loads}
     senders = [node for node, _ in places if node != leader or own]
     per_node = _per_node(scenario, senders, whole_ns, loads)
     each = {node: max(1, math.ceil(per_node[node] / LOAD - 1e-3)) for node in senders}
@@ -176,7 +178,10 @@ def least_interval_ns(scenario: Scenario, places: Places, head_of: Mapping[NodeI
     """The least interval of traffic at which the load fits the turns; it is searched for up to twice the load."""
     period_ns = scenario.clusters.period_ns
     heads = tuple((node, head) for node, head in sorted(head_of.items()) if node != head)
-    control, senders = _control(scenario, scenario.leader), _senders(scenario, head_of, scenario.leader)
+    silent = stated_loads(scenario)
+    everyone = _senders(scenario, head_of, scenario.leader)
+    senders = [node for node in everyone if node not in silent]
+    control = (*_control(scenario, scenario.leader), *(node for node in everyone if node in silent))
     enough = 2 * period_ns / seconds_to_ns(scenario.traffic.interval_s)
     best = 0
     for together in range(1, most_together(scenario) + 1):
@@ -184,7 +189,7 @@ def least_interval_ns(scenario: Scenario, places: Places, head_of: Mapping[NodeI
         geometry = links(scenario, turns)
 
         def fits(packets: int, geometry: Geometry, *, hard: bool) -> bool:
-            blocks = _blocks(packets * len(senders), len(senders))
+            blocks = 1 if silent else _blocks(packets * len(senders), len(senders))
             roots = (*control, *(node for node in senders for _ in range(packets // blocks)))
             return _table(places, roots, geometry, heads, blocks=blocks, hard=hard) is not None
 
@@ -272,7 +277,7 @@ def _wishes_by_load(
             roots = (*control, *(node for node in senders for _ in range(each[node])))
             yield _Wish(roots, together, hard, enough=enough)
 
-    expected = _per_node(scenario, senders, period_ns, NO_LOADS)
+    expected = _per_node(scenario, senders, period_ns, stated_loads(scenario))
     ample = {n: _DRAINING * sent if sent > expected[n] else expected[n] for n, sent in per_node.items()}
     yield from wishes({node: int(each) + 1 for node, each in ample.items()}, 1, hard=False)
     yield from wishes({node: int(per_node[node]) + 1 for node in senders}, 1, hard=False)

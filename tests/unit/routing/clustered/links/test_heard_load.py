@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.routing.clustered.links.heard_load import HeardLoads
+from fanet_mw.routing.clustered.links.heard_load import HeardLoads, stated_loads
 from fanet_mw.routing.clustered.timetable.fitted_timetable import NO_LOADS, FittedTimetable
 from fanet_mw.routing.clustered.timetable.turn_allocation import fit
 from fanet_mw.scenario import Scenario
@@ -24,7 +24,7 @@ NODE = NodeId(7)
 
 def heard_of(births_s: list[float], *, every: int = 1) -> HeardLoads:
     """What a node knows that has received each packet, or one in `every`, half a second after its birth."""
-    heard = HeardLoads(interval_s=1.0)
+    heard = HeardLoads(interval_s=1.0, stated={})
     for seq, born_s in enumerate(births_s):
         if seq % every == 0:
             born_ns = round(born_s * S)
@@ -77,7 +77,7 @@ def test_the_load_of_a_node_that_falls_silent_goes_down() -> None:
 
 def test_packets_that_waited_long_for_a_turn_are_no_silence() -> None:
     """Five a second are sent, two a second have turns: each is heard later than the one before."""
-    heard = HeardLoads(interval_s=1.0)
+    heard = HeardLoads(interval_s=1.0, stated={})
     for seq in range(80):
         heard.on_packet(NODE, seq, born_ns=seq * S // 5, now_ns=seq * S // 2)
     assert heard.load(NODE, now_ns=41 * S) == 500
@@ -97,7 +97,7 @@ def test_what_a_packet_cannot_truly_state_is_refused_and_counted() -> None:
 
 @given(st.lists(st.tuples(st.integers(0, 2**32 - 1), st.integers(0, 2**62), st.integers(0, 2**62)), max_size=30))
 def test_any_packets_give_a_load_that_can_be_announced(said: list[tuple[int, int, int]]) -> None:
-    heard = HeardLoads(interval_s=1.0)
+    heard = HeardLoads(interval_s=1.0, stated={})
     for seq, born_ns, now_ns in said:
         heard.on_packet(NODE, seq, born_ns=born_ns, now_ns=now_ns)
     load = heard.load(NODE, now_ns=2**62)
@@ -138,7 +138,7 @@ def test_a_load_beyond_the_greatest_is_malformed() -> None:
 def test_a_timetable_is_replaced_when_nodes_need_more_turns_or_far_fewer(
     before: Mapping[NodeId, int], now: Mapping[NodeId, int], replaced: bool
 ) -> None:
-    heard = HeardLoads(interval_s=1.0)
+    heard = HeardLoads(interval_s=1.0, stated={})
     assert not heard.worth_a_change(before, now, period_ns=S // 2, now_ns=0), "not at once"
     assert heard.worth_a_change(before, now, period_ns=S // 2, now_ns=3 * S) == replaced
     assert not heard.worth_a_change(before, before, period_ns=S // 2, now_ns=4 * S)
@@ -178,6 +178,25 @@ def test_a_node_gets_turns_for_what_it_sends(make_scenario: MakeScenario) -> Non
 def test_where_turns_are_plenty_nobody_loses_any(make_scenario: MakeScenario) -> None:
     line = Line(make_scenario)
     assert line.turns({NODE: 10}) == line.turns(NO_LOADS)
+
+
+def test_whose_traffic_is_stated_to_be_none_has_one_turn(make_scenario: MakeScenario) -> None:
+    line = Line(make_scenario, **{"traffic.interval_s": 0.05, "traffic.sources": (NODE,)})
+    usual, heard = line.turns(NO_LOADS), line.turns({NodeId(4): 800})
+    assert usual[NODE] == heard[NODE] == 11, "ten packets in a superframe, and one turn more"
+    assert all(usual[node] == 1 for node in usual if node != NODE)
+    assert heard[NodeId(4)] == 7, "four packets, and half as many again"
+
+
+def test_only_nodes_that_no_class_names_have_no_traffic(make_scenario: MakeScenario) -> None:
+    named = make_scenario(**{"nodes.count": 4, "traffic.sources": (2,)})
+    more = named.traffic.model_copy(update={"sources": (3,)})
+    drawn, none = (more.model_copy(update=keys) for keys in ({"sources": 1}, {"sources": 1, "arrivals": "none"}))
+    silent = {
+        sources: list(stated_loads(named.model_copy(update={"further_traffic": classes})))
+        for sources, classes in {"one": (), "two": (more,), "any": (more, drawn), "no more": (none,)}.items()
+    }
+    assert silent == {"one": [1, 3, 4], "two": [1, 4], "any": [], "no more": [1, 3, 4]}
 
 
 def test_turns_that_others_do_not_need_make_room(make_scenario: MakeScenario) -> None:

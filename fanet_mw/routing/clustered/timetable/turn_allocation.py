@@ -15,6 +15,7 @@ timetable from the same schedule and positions. Which turn of the superframe eac
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from itertools import islice
 from typing import Final, NamedTuple, TypeVar
 
@@ -91,12 +92,36 @@ def fit(
 
     With `quick` it is None, too, if the load only fits with an effort that may take seconds.
     """
-    leads = leader or scenario.leader
-    heads = tuple((node, head) for node, head in sorted(head_of.items()) if node != head)
-    whole_ns = scenario.clusters.period_ns if period_ns is None else period_ns
-    loads = {**stated_loads(scenario), **loads}
-    wishes = _wishes_by_load(scenario, head_of, leads, whole_ns, loads) if loads else None
-    ordered = wishes or _wishes(scenario, head_of, leads, whole_ns)
+    sent = {**stated_loads(scenario), **loads}
+    return _fit(
+        scenario,
+        places,
+        tuple(sorted(head_of.items())),
+        leader=leader or scenario.leader,
+        origin_ns=origin_ns,
+        whole_ns=scenario.clusters.period_ns if period_ns is None else period_ns,
+        sent=tuple(sorted(sent.items())),
+        quick=quick,
+    )
+
+
+@lru_cache(maxsize=16)
+def _fit(
+    scenario: Scenario,
+    places: Places,
+    members: tuple[tuple[NodeId, NodeId], ...],
+    *,
+    leader: NodeId,
+    origin_ns: int,
+    whole_ns: int,
+    sent: tuple[tuple[NodeId, int], ...],
+    quick: bool,
+) -> FittedTimetable | None:
+    """As `fit`. All nodes of a run in virtual time ask for the same one, which may take a second."""
+    head_of, loads = dict(members), dict(sent)
+    heads = tuple((node, head) for node, head in members if node != head)
+    wishes = _wishes_by_load(scenario, head_of, leader, whole_ns, loads) if loads else None
+    ordered = wishes or _wishes(scenario, head_of, leader, whole_ns)
 
     def made(wish: _Wish) -> FittedTimetable | None:
         turns = superframe(scenario, origin_ns=origin_ns, period_ns=whole_ns, together=wish.together)

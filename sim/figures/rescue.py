@@ -210,7 +210,7 @@ MISSION: Final = Recipe(
         value=loss_share,
         linear=True,
         variants={
-            "ours": "fanet-mw: 4 clusters, 5 s, counter, repair",
+            "ours": "fanet-mw: rounds",
             "paper": "the paper's method, 4 clusters, 5 s",
         },
     ),

@@ -49,6 +49,8 @@ _WRECK_M: Final = 0.5
 """A UAV that is nearer to the ground or a wall than this is not in flight."""
 _EMERGENCY_CHARGE: Final = 0.05
 """The share of its charge at which a flight controller lands where it is (PX4's BAT_EMERGEN_THR)."""
+_LEVEL_S: Final = 7.0
+"""The time in which the rotors' drag takes a level Iris along with the air: m / (4 lambda w)."""
 _CONTROL_S: Final = 0.05
 """The longest step of the guidance within a tick."""
 
@@ -146,6 +148,8 @@ class WorldActor(Actor):
             scenario, sensors_of(scenario, survivors, solids, self._drain, solid, gps, self._engine), topics
         )
         self._estimate = PositionEstimate(scenario, gps) if scenario.world.navigation == "estimated" else None
+        self._adrift = np.zeros(len(self._ids), bool)
+        """The UAVs that sink without knowing their places and velocities."""
         self._flies = np.ones(len(self._ids), bool)
         """The UAVs that have not crashed."""
         self._falling: set[int] = set()
@@ -251,9 +255,12 @@ class WorldActor(Actor):
             self._estimate.advance(self._truth(now_ns))
             lost = self._estimate.lost(now_ns) & self._flies
             if lost.any():
-                flying = self._guidance.commanded(len(self._ids)) & ~self._guidance.grounded(engine.positions())
-                for row in np.flatnonzero(lost & flying).tolist():
+                lost &= self._guidance.commanded(len(self._ids)) & ~self._guidance.grounded(engine.positions())
+                for row in np.flatnonzero(lost).tolist():
                     self._guidance.land_at_once(row + 1)
+            if lost.any() or self._adrift.any():
+                self._adrift = lost
+                engine.drift(lost, self._estimate.tilt_m_s2)
         self._record_modes(now_ns)
         for first, second in engine.contacts():
             self._contact(first, second, now_ns)
@@ -265,7 +272,10 @@ class WorldActor(Actor):
             return guidance.wanted(t_s, at, self._engine.velocities())
         wish = guidance.wanted(t_s, at, self._engine.velocities(), estimate.off_m)
         flown = ~guidance.grounded(at) & guidance.commanded(len(at))
-        return wish - estimate.off_m_s * flown[:, None]
+        wish = wish - estimate.off_m_s * flown[:, None]
+        if self._adrift.any():
+            wish[self._adrift, :2] = _LEVEL_S * estimate.tilt_m_s2[self._adrift, :2]
+        return wish
 
     def _truth(self, now_ns: int) -> Truth:
         return Truth(now_ns, self._engine.positions(), self._engine.velocities())

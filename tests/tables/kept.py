@@ -5,9 +5,9 @@ written from the file by everybody.
                                         shipped, the key of all settings, the code that flew it, and those figures of
                                         it that tables read, to six digits
 
-A mission whose line is there is not flown again, whichever code wrote the line. Whoever wants it measured anew removes
-its line, flies it (`python -m tests.tables.pieces TABLE`), writes the table (`scripts/tables TABLE`), and commits both.
-Lines are sorted, so that two branches that flew different missions merge.
+A mission whose line is there is not flown again, whichever code wrote the line: each table says which. Whoever wants
+it measured anew removes its line, flies it (`python -m tests.tables.pieces TABLE`), writes the table (`scripts/tables
+TABLE`), and commits both. Lines are sorted, so that two branches that flew different missions merge.
 """
 
 import hashlib
@@ -51,13 +51,13 @@ class Kept:
         self._fly = fly
         self._until_s = None if seconds is None else time.monotonic() + seconds
         self._longest_s = 0.0
-        self._runs = {line["key"]: line["run"] for line in _lines(path)}
+        self._runs = {line["key"]: {**line["run"], "code": line["code"]} for line in _lines(path)}
 
     def __contains__(self, scenario: Scenario) -> bool:
         return key_of(scenario) in self._runs
 
     def of(self, scenario: Scenario, differences: Iterable[str] = ()) -> Run:
-        """What this mission came to: as it was kept, or flown now.
+        """What this mission came to, and the `code` that flew it: as it was kept, or flown now.
 
         `differences` say to readers of the file what differs from the shipped scenario. Raises Missing if the mission
         is not there and may not be flown, and OutOfTime if the time does not suffice.
@@ -69,11 +69,17 @@ class Kept:
             began_s = time.monotonic()
             if self._until_s is not None and began_s + self._longest_s > self._until_s:
                 raise OutOfTime
-            self._runs[key] = rounded(self._fly(scenario))
+            run = rounded(self._fly(scenario))
+            self._runs[key] = {**run, "code": code()}
             self._longest_s = max(self._longest_s, time.monotonic() - began_s)
             named = {"scenario": scenario.name, "seed": scenario.seed, "differences": [*differences]}
-            _add(self._path, {**named, "key": key, "code": code(), "run": self._runs[key]})
+            _add(self._path, {**named, "key": key, "code": code(), "run": run})
         return self._runs[key]
+
+
+def codes(runs: Iterable[Run]) -> str:
+    """The codes that flew some missions, for a column of their table: without the version."""
+    return ", ".join(sorted({run["code"].rpartition("+")[2] for run in runs}))
 
 
 def key_of(scenario: Scenario) -> str:

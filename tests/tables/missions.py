@@ -5,7 +5,6 @@ A mission costs a minute of CPU or more, so those that were flown are kept (`kep
 table is written before all of its missions are there.
 """
 
-import itertools
 import statistics
 import time
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -22,14 +21,15 @@ from sim.run.virtual import simulate
 from sim.scenarios import catalog
 from sim.sweep.measures import enough_heard_s
 from sim.world.environment.survivors import Survivors
-from tests.tables.kept import KEPT, Kept, Missing, Run
+from tests.tables.kept import KEPT, Kept, Missing, Run, codes
 from tests.tables.markdown import Rows
 
 _NEAR_M: Final = (10.0, 20.0, 50.0)
 
 _OF_THE_SUMMARY: Final = (
     "survivors", "detected", "confirmed", "mistaken", "reopened", "time_to_confirm_s", "confirmed_error_m",
-    "uavs_approaching", "collisions", "coverage", "covered_95_s", "connected", "nearest_m",
+    "uavs_approaching", "collisions", "coverage", "covered_95_s", "connected", "nearest_m", "wait_s", "biconnected",
+    "diameter",
 )  # fmt: skip
 """What tables read of the summary's table `mission`."""
 
@@ -40,8 +40,6 @@ class Case(NamedTuple):
     scenario: str
     settings: tuple[str, ...]
     seeds: tuple[int, ...]
-    loss: float = 0.0
-    """Every link loses this share of the frames from the beginning to the end."""
 
     def missing(self, kept: Kept) -> list[int]:
         """The seeds of which no mission is kept."""
@@ -49,18 +47,10 @@ class Case(NamedTuple):
 
     def flown(self, kept: Kept, seed: int) -> Run:
         """What the mission with this seed came to."""
-        lossy = [f"every link loses {self.loss:.0%} of all frames"] if self.loss else []
-        return kept.of(self.with_seed(seed), [*self.settings, *lossy])
+        return kept.of(self.with_seed(seed), self.settings)
 
     def with_seed(self, seed: int) -> Scenario:
-        return degraded(catalog.find(self.scenario, [*self.settings, f"seed={seed}"]), self.loss)
-
-
-def degraded(scenario: Scenario, loss: float) -> Scenario:
-    """The scenario with a share of the frames lost on every link, from the beginning to the end."""
-    pairs = itertools.combinations(scenario.node_ids, 2)
-    faults = [{"kind": "degrade", "at_s": 0, "src": a, "dst": b, "loss_share": loss} for a, b in pairs] if loss else []
-    return Scenario.model_validate({**scenario.model_dump(), "faults": faults}) if loss else scenario
+        return catalog.find(self.scenario, [*self.settings, f"seed={seed}"])
 
 
 _TEN: Final = tuple(range(1, 11))
@@ -80,6 +70,12 @@ COUNTRY_IN_SMALL: Final[Mapping[str, Case]] = {
         "night", (*_SMALL, "sensors.gps_outages=[[0,0,240,30,110]]"), _TEN
     ),
 }
+_NO_LEADS: Final = ("radio.lead_ms=0", "radio.handover_ms=0", "duration_s=300")
+WHOLE: Final[Mapping[str, Case]] = {
+    "`rescue`, no leads": Case("rescue", _NO_LEADS, tuple(range(12, 21))),
+    **{f"`{name}`": Case(name, (), tuple(range(1, 6))) for name in ("rescue-base", "hills", "night", "town", "convoy")},
+}
+"""Missions as they are shipped, which cost minutes of CPU each."""
 SHAPES: Final[Mapping[str, Case]] = {
     **{f"`{shape}`, 20 UAVs": Case("rescue", (*_SMALL, f"mission.search={shape}"), ())
        for shape in ("lines", "spiral", "sectors")},
@@ -97,26 +93,39 @@ def fly(scenario: Scenario) -> Run:
     """What one mission comes to."""
     began_s = time.process_time()
     outcome = simulate(scenario)
-    world, records = outcome.reports["world"], outcome.records
+    records = outcome.records
     summary = finish(outcome, out=None)
     nearest = np.concatenate(list(_nearest_m(records)))
     return {
-        **{name: summary["mission"][name] for name in _OF_THE_SUMMARY},
-        "half_approached_s": half_approached_s(scenario.nodes.count, summary["mission"]["time_to_approach_s"]),
+        **of_summary(summary),
         **_under_rubble(scenario, records),
-        "pdr": summary["pdr"],
-        "reports": summary.get("reports", {}).get("pdr"),
         "solid": sum(1 for record in records if type(record) is Collided and not record.other),
-        "no_fly": world["no_fly_entries"],
-        "least_m": world["separation"].get("least_m"),
-        "least_charge": world.get("least_charge"),
-        "losses": world["separation"].get("losses"),
+        "least_charge": outcome.reports["world"].get("least_charge"),
         "near": [float((nearest <= limit).mean()) for limit in _NEAR_M],
         "landed": len({r.node for r in records if type(r) is FlightModeChanged and r.mode == "land"}),
         "fell": len({r.node for r in records if type(r) is FlightModeChanged and r.mode == "fallen"}),
         "enough_heard_s": enough_heard_s(outcome),
-        "simulated_s": summary["simulated_s"],
         "cpu_s": time.process_time() - began_s,
+    }
+
+
+def of_summary(summary: Run) -> Run:
+    """Those figures that tables read of the summary of a mission."""
+    mission, reports = summary["mission"], summary.get("reports", {})
+    bound = summary["bound"].get("classes", {}).get("report", {})
+    return {
+        **{name: mission[name] for name in _OF_THE_SUMMARY},
+        "half_approached_s": half_approached_s(summary["nodes"], mission["time_to_approach_s"]),
+        "pdr": summary["pdr"],
+        "bulk_ms": summary["delay_ms"],
+        "reports": reports.get("pdr"),
+        "reports_ms": reports.get("delay_ms"),
+        "stated": bound.get("stated_share"),
+        "broken": summary["bound"]["violations"],
+        "no_fly": summary["no_fly_entries"],
+        "least_m": summary["separation"].get("least_m"),
+        "losses": summary["separation"].get("losses"),
+        "simulated_s": summary["simulated_s"],
     }
 
 
@@ -187,18 +196,26 @@ def places_row(name: str, runs: Sequence[Run]) -> list[str]:
         f"{sum(found['collisions'] - found['solid'] for found in runs)} / {sum(found['solid'] for found in runs)}",
         f"{sum(found['no_fly'] for found in runs)}",
         f"{sum(found['landed'] for found in runs)} / {sum(found['fell'] for found in runs)}",
+        codes(runs),
     ]
 
 
 PLACES_HEAD: Final = [
     "scenario", "seeds", "everyone confirmed in", "confirmed", "mistaken", "last find [s], median", "error [m], median",
     "95 % covered after [s]", "connected, least [%]", "contacts with UAVs / solids", "no-fly areas entered",
-    "landed early / fell",
+    "landed early / fell", "code",
+]  # fmt: skip
+WHOLE_HEAD: Final = [
+    "scenario", "seeds", "confirmed", "last find [s]", "error [m]", "wait: median / worst [s]",
+    "95 % covered after [s]", "contacts", "least distance [m]", "connected, least [%]",
+    "reports: half / 95 % / worst [s]", "bounds of reports stated, least / broken", "bulk: PDR, least / 95 % [s]",
+    "code",
 ]  # fmt: skip
 CLEAR_HEAD: Final = [
     "others are known by", "seeds", "contacts with UAVs / solids", "nearer than 4 m", "least distance [m]",
     "nearest UAV: 1 % / median [m]",
     *(f"UAV-seconds within {limit:.0f} m [%]" for limit in _NEAR_M),
+    "code",
 ]  # fmt: skip
 
 
@@ -220,6 +237,7 @@ def clear_row(name: str, runs: Sequence[Run]) -> list[str]:
         f"{statistics.fmean(found['nearest_m']['p1'] for found in runs):.0f} / "
         f"{statistics.fmean(found['nearest_m']['p50'] for found in runs):.0f}",
         *(f"{100 * share:.2f}" for share in near),
+        codes(runs),
     ]
 
 
@@ -233,6 +251,46 @@ def country_in_small(kept: Kept | None = None) -> Rows:
     """A square kilometre with 20 UAVs: over a plain, over hills, and with an outage of GPS."""
     kept = all_flown(COUNTRY_IN_SMALL, kept)
     return [PLACES_HEAD, *(places_row(name, flown(case, kept)) for name, case in COUNTRY_IN_SMALL.items())]
+
+
+def whole(kept: Kept | None = None) -> Rows:
+    """The shipped missions in full size: what they find, and what their network does."""
+    kept = all_flown(WHOLE, kept)
+    return [WHOLE_HEAD, *(whole_row(name, flown(case, kept)) for name, case in WHOLE.items())]
+
+
+def whole_row(name: str, runs: Sequence[Run]) -> list[str]:
+    """One line of the table of whole missions: medians over the seeds, and the worst of any."""
+
+    def median(values: Sequence[float | None], digits: int = 0) -> str:
+        known = [value for value in values if value is not None]
+        return f"{statistics.median(known):.{digits}f}" if known else "-"
+
+    def seconds(name: str, part: str) -> list[float | None]:
+        told = [(run[name] or {}).get(part) for run in runs]
+        return [None if ms is None else ms / 1000 for ms in told]
+
+    def worst(values: Sequence[float | None], digits: int) -> str:
+        return f"{max(value for value in values if value is not None):.{digits}f}" if any(values) else "-"
+
+    finds, stated = any(run["survivors"] for run in runs), [run["stated"] for run in runs if run["stated"] is not None]
+    return [
+        name,
+        str(len(runs)),
+        f"{sum(run['confirmed'] for run in runs)} of {sum(run['survivors'] for run in runs)}" if finds else "-",
+        median([max(run["time_to_confirm_s"], default=None) for run in runs]),
+        median([run["confirmed_error_m"] for run in runs], 1),
+        f"{median([run['wait_s']['p50'] for run in runs])} / {worst([run['wait_s']['max'] for run in runs], 0)}",
+        median([run["covered_95_s"] for run in runs]),
+        f"{sum(run['collisions'] for run in runs)}",
+        f"{min(run['nearest_m']['least'] for run in runs):.1f}",
+        f"{100 * min(run['connected'] for run in runs):.1f}",
+        f"{median(seconds('reports_ms', 'p50'), 2)} / {median(seconds('reports_ms', 'p95'), 2)} / "
+        f"{worst(seconds('reports_ms', 'max'), 2)}",
+        f"{min(stated):.3f} / {sum(run['broken'] for run in runs)}" if stated else "-",
+        f"{min(run['pdr'] for run in runs):.3f} / {median(seconds('bulk_ms', 'p95'), 2)}",
+        codes(runs),
+    ]
 
 
 def shapes() -> Rows:

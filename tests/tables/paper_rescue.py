@@ -8,7 +8,7 @@ import statistics
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from tests.tables.kept import Kept, Run
+from tests.tables.kept import Kept, Run, codes
 from tests.tables.markdown import Rows
 from tests.tables.missions import Case, all_flown, flown
 
@@ -20,6 +20,7 @@ PAPER: Final[Mapping[str, Case]] = {
 _HEAD: Final = [
     "app_2 every [s]", "seeds", "anybody turns in", "UAVs that turn, of 45", "half have turned after [s]",
     "since three UAVs had heard one phone [s]", "app_2 delivered", "app_1 delivered", "connected [%]", "contacts",
+    "code",
 ]  # fmt: skip
 
 
@@ -43,6 +44,7 @@ def paper_row(interval_s: str, runs: Sequence[Run]) -> list[str]:
         _spread([run["pdr"] for run in runs], 2),
         _spread([100 * run["connected"] for run in runs], 0),
         f"{sum(run['collisions'] for run in runs)}",
+        codes(runs),
     ]
 
 

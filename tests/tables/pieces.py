@@ -8,14 +8,13 @@ from collections.abc import Mapping
 from typing import Final
 
 from tests.tables.kept import KEPT, Kept, OutOfTime
-from tests.tables.mission import SMALL
-from tests.tables.missions import CLEAR, COUNTRY_IN_SMALL, PLACES, Case, fly
+from tests.tables.missions import CLEAR, COUNTRY_IN_SMALL, PLACES, WHOLE, Case, fly
 from tests.tables.paper_rescue import PAPER
 from tests.tables.small_rescues import ENGINES, SENSES
 
 TABLES: Final[Mapping[str, Mapping[str, Case]]] = {
-    "places": PLACES, "country-in-small": COUNTRY_IN_SMALL, "keeping-clear": CLEAR,
-    "mission-network": SMALL, "rescue-paper": PAPER, "engines": ENGINES, "senses": SENSES,
+    "whole-missions": WHOLE, "places": PLACES, "country-in-small": COUNTRY_IN_SMALL, "keeping-clear": CLEAR,
+    "rescue-paper": PAPER, "engines": ENGINES, "senses": SENSES,
 }  # fmt: skip
 
 

@@ -4,7 +4,7 @@ import statistics
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from tests.tables.kept import Kept, Run
+from tests.tables.kept import Kept, Run, codes
 from tests.tables.markdown import Rows
 from tests.tables.missions import Case, all_flown, flown
 
@@ -40,7 +40,7 @@ def senses(kept: Kept | None = None) -> Rows:
     kept = all_flown(SENSES, kept)
     head = [
         "buried", "people are seen by", "searched from", "seeds", "detected", "confirmed", "last find [s]", "contacts",
-        "buried: detected", "buried: confirmed", "buried: last estimate off by [m], median", "area covered",
+        "buried: detected", "buried: confirmed", "buried: last estimate off by [m], median", "area covered", "code",
     ]  # fmt: skip
     return [head, *([*name.split(" | "), *_sense_cells(flown(case, kept))] for name, case in SENSES.items())]
 
@@ -54,6 +54,7 @@ def _sense_cells(runs: Sequence[Run]) -> list[str]:
         f"{sum(run['buried_confirmed'] for run in runs)} of {buried}" if buried else "-",
         f"{statistics.median(off_m):.0f}" if off_m else "-",
         f"{statistics.fmean(run['coverage'] for run in runs):.2f}",
+        codes(runs),
     ]
 
 
@@ -62,7 +63,7 @@ def engines(kept: Kept | None = None) -> Rows:
     kept = all_flown(ENGINES, kept)
     head = [
         "flown with", "seeds", "detected", "confirmed", "last find [s]", "contacts", "nearest UAV [m]",
-        "least charge at the end [%]", "landed early / fell", "times real time",
+        "least charge at the end [%]", "landed early / fell", "times real time", "code",
     ]  # fmt: skip
     return [head, *([name, *_engine_cells(flown(case, kept))] for name, case in ENGINES.items())]
 
@@ -74,6 +75,7 @@ def _engine_cells(runs: Sequence[Run]) -> list[str]:
         f"{100 * min(run['least_charge'] for run in runs):.0f}",
         f"{sum(run['landed'] for run in runs)} / {sum(run['fell'] for run in runs)}",
         f"{sum(run['simulated_s'] for run in runs) / sum(run['cpu_s'] for run in runs):.0f}",
+        codes(runs),
     ]
 
 

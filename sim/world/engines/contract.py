@@ -46,6 +46,11 @@ class Engine(ABC):
         them, or sink to it.
         """
 
+    def drift(self, rows: Flags, tilt_m_s2: Rows) -> None:  # noqa: B027  (where no air moves nobody is taken along)
+        """Let these bodies control nothing but their heights until the next call, with attitudes that are level but for
+        errors by which all would accelerate so much [n, 3].
+        """
+
     def power_w(self) -> Values | None:
         """The power that each battery delivers now; None for an engine without rotors."""
         return None

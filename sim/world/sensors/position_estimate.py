@@ -9,8 +9,8 @@
 That is a complementary filter with fixed gains, as those of PX4's EKF2 at 5 Hz settle to. b is a Gauss-Markov process
 of 0.05 m/s2, a tilt of 0.3 degrees, over 100 s. Only errors are computed, because whatever a filter predicts from true
 accelerations is true. A UAV that has had neither a fix nor optical flow for 5 s (EKF2_NOAID_TOUT) does not know its
-place: as in PX4, its flight controller then lands, and drifts with the error of its velocity. Not modeled: magnetic
-disturbances, and fixes that a filter rejects.
+place: as in PX4 (FlightTaskDescend) its flight controller then sinks with what it takes for a level attitude, wrong
+by b, and the air takes it along. Not modeled: magnetic disturbances, and fixes that a filter rejects.
 """
 
 from typing import Final
@@ -44,6 +44,8 @@ class PositionEstimate:
 
         self._gps = gps
         self._bias = drift("control_bias", _BIAS_M_S2, _BIAS_S)
+        self.tilt_m_s2 = np.zeros(shape)
+        """How fast each UAV accelerates whose flight controller believes that its attitude is level."""
         self._barometer = drift("control_barometer", sensors.barometer_drift_m, BAROMETER_S)
         self._flow = drift("control_flow", sensors.inertial_drift_m_s, FLOW_S) if sensors.inertial_hz else None
         self.off_m = np.zeros(shape)
@@ -65,7 +67,8 @@ class PositionEstimate:
             return
         seconds, before_ns = (now_ns - self._t_ns) / S, self._t_ns
         self._t_ns = now_ns
-        self.off_m_s += self._bias.at(now_ns) * seconds
+        self.tilt_m_s2 = self._bias.at(now_ns)
+        self.off_m_s += self.tilt_m_s2 * seconds
         self.off_m += self.off_m_s * seconds
         if self._flow is not None:
             self.off_m_s += _VELOCITY_GAIN * (self._flow.at(now_ns) - self.off_m_s)

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from fanet_mw.scenario import Scenario
+from sim.sweep.provenance import code
 from tests.tables.command import main
 from tests.tables.kept import Kept, Missing, OutOfTime, Run, key_of
 from tests.tables.markdown import Rows, Tolerance, begin, end, read
@@ -61,7 +62,8 @@ def test_a_line_has_six_digits_of_each_figure_and_a_flight_gives_the_same_as_its
     found = {"nearest_m": {"least": 1.23456789}, "time_to_confirm_s": [264.12349], "none": None, "count": 1234567}
     kept = Kept(tmp_path / "missions.jsonl", lambda _: found)
     flown = kept.of(make_scenario())
-    assert flown == {"nearest_m": {"least": 1.23457}, "time_to_confirm_s": [264.123], "none": None, "count": 1234567}
+    told = {"nearest_m": {"least": 1.23457}, "time_to_confirm_s": [264.123], "none": None, "count": 1234567}
+    assert flown == {**told, "code": code()}
     assert Kept(tmp_path / "missions.jsonl").of(make_scenario()) == flown
 
 

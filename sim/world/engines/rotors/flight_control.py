@@ -11,9 +11,10 @@ points east. Arrays are [components, UAVs].
 """
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from sim.world.arrays import Flags, Values
 from sim.world.engines.contract import GRAVITY_M_S2
@@ -31,6 +32,14 @@ _THRUST_RESERVE: Final = 0.9
 """The share of the greatest thrust that lift may take; the rest is for attitude."""
 _YAW_SHARE: Final = 0.3
 """The yaw loop is slower by this factor, because yaw has only the torques of the rotors."""
+
+
+class Drifting(NamedTuple):
+    """Bodies whose attitude is level, but for an error by which they accelerate."""
+
+    rows: npt.NDArray[np.intp]
+    tilt_m_s2: Values
+    """To the east and to the north [2, bodies]."""
 
 
 class FlightControl:
@@ -53,11 +62,16 @@ class FlightControl:
         """Forget what the loops of these UAVs have integrated while their motors were off."""
         self._integral[:, rows] = 0.0
 
-    def thrust_vector(self, wanted: Values, velocity: Values, dt_s: float) -> Values:
-        """The wanted total force of the rotors [N], in east, north, up, within the limits of tilt and thrust."""
+    def thrust_vector(self, wanted: Values, velocity: Values, dt_s: float, level: Drifting | None = None) -> Values:
+        """The wanted total force of the rotors [N], in east, north, up, within the limits of tilt and thrust.
+
+        `level`: the bodies that keep their heights alone.
+        """
         error = wanted - velocity
         mass, gravity = self._vehicle.mass_kg, GRAVITY_M_S2
         acceleration = self.velocity_per_s * error + still_drag_m_s2(self._vehicle, velocity) + self._integral
+        if level is not None:
+            acceleration[:2, level.rows] = level.tilt_m_s2
         lift = np.clip(acceleration[2] + gravity, _LEAST_LIFT * gravity, _THRUST_RESERVE * self._max_n / mass)
         size = np.sqrt(acceleration[0] ** 2 + acceleration[1] ** 2)
         room = np.sqrt(np.maximum((_THRUST_RESERVE * self._max_n / mass) ** 2 - lift**2, 0.0))

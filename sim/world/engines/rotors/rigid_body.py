@@ -16,7 +16,15 @@ import numpy as np
 from sim.world.arrays import Flags, Rows, Values
 from sim.world.engines.contacts import Contacts
 from sim.world.engines.contract import GRAVITY_M_S2, Engine
-from sim.world.engines.rotors.flight_control import FlightControl, allocation, body_up, cross, level_attitude, times
+from sim.world.engines.rotors.flight_control import (
+    Drifting,
+    FlightControl,
+    allocation,
+    body_up,
+    cross,
+    level_attitude,
+    times,
+)
 from sim.world.engines.rotors.power import electrical_w, rotor_power_w
 from sim.world.engines.rotors.vehicle_types import Vehicle, hover_rad_s
 from sim.world.environment.layout import ON_GROUND_M
@@ -66,6 +74,7 @@ class Rotors(Engine):
         self._power_w = np.zeros(count)
         self._dead = np.zeros(count, bool)
         self._stands = np.zeros(count, bool)
+        self._drifting: Drifting | None = None
         self._left_s = 0.0
         self._contacts.reset()
 
@@ -84,7 +93,7 @@ class Rotors(Engine):
 
     def _step(self, wanted: Values) -> None:
         vehicle, control = self.vehicle, self._control
-        force = control.thrust_vector(wanted, self._velocity, _DT_S)
+        force = control.thrust_vector(wanted, self._velocity, _DT_S, self._drifting)
         thrust = control.rotor_thrusts(force, self._attitude, self._rates)
         self._turn_rotors(thrust)
         up = body_up(self._attitude)
@@ -166,6 +175,10 @@ class Rotors(Engine):
     def stand(self, rows: Flags) -> None:
         self._control.restart(self._stands & ~rows)
         self._stands = rows
+
+    def drift(self, rows: Flags, tilt_m_s2: Rows) -> None:
+        found = np.flatnonzero(rows)
+        self._drifting = Drifting(found, tilt_m_s2[found, :2].T) if len(found) else None
 
     def fall(self, row: int) -> None:
         self._dead[row] = True

@@ -66,6 +66,17 @@ def test_without_gps_a_uav_lands_after_five_seconds_and_drifts_as_it_does(make_s
     assert made.velocity(1) == pytest.approx([0, 0, 0], abs=0.01)
 
 
+def test_without_gps_the_wind_takes_a_uav_along_as_it_sinks(make_scenario: MakeScenario) -> None:
+    """FlightTaskDescend of PX4 stays level: the velocity of the air is reached within m / (4 lambda w) = 7 s."""
+    out = {"sensors.gps_outages": ((0, 0, 9000, 25, 9000),)}
+    wind = {"world.engine": "rotors", "world.area_m": 2000.0, "world.wind_m_s": (8.0, 0.0)}
+    made = flying(make_scenario, **out, **wind).fly(30.1)
+    before, sinks_s = made.at(1), 40 / 2 + 2
+    made.fly(30)
+    assert made.at(1)[2] < 0.5
+    assert (made.at(1) - before)[:2] == pytest.approx([8 * (sinks_s - 7), 0], abs=40)
+
+
 def test_with_optical_flow_a_uav_flies_on_without_gps(make_scenario: MakeScenario) -> None:
     made = flying(make_scenario, **OUT, **{"sensors.inertial_hz": 5}).fly(70)
     assert (1, "failsafe") not in made.modes

@@ -8,7 +8,8 @@ The default SNR, 21.6 dB from 1 m2 at 100 m, is that of a 77 GHz single-chip rad
 virtual channels, 10 ms of integration, noise figure 15 dB (Texas Instruments AWR1843). A UAV's mean cross section at 24
 GHz is -8 to -19 dBsm (IEICE Communications Express 9(7), 2020: Phantom 3, 3DR Solo and others); 0.03 m2 is -15 dBsm.
 The return of a target fluctuates exponentially from scan to scan (Swerling 1), and so does the SNR of each reading. The
-speed is resolved to lambda / (2 T) = 0.19 m/s (77 GHz, T = 10 ms) up to 20 m/s; noise has any speed. For walls and
+speed is resolved to lambda / (2 T) = 0.19 m/s (77 GHz, T = 10 ms) and ambiguous by 40 m/s: 25 m/s reads as -15. UAVs
+within one cell of distance, angles and speed are one echo, that of the strongest. Noise has any speed. For walls and
 hillsides one ray is cast for each beam, at -10, 0 and +10 degrees, and one to the nearest place of each building, which
 may stand between them; returns of the flat ground are removed by the height above ground. Noise is taken for an echo
 with probability Pfa in each cell: that is the clutter. Not modeled: multiple paths, sidelobes, interference among the
@@ -48,6 +49,11 @@ def radar_snr_db(
 def detected_share(snr: Values, *, false_alarm: float) -> Values:
     """Probability that a Swerling 1 target of a mean SNR (as a ratio) is detected in one look."""
     return np.asarray(false_alarm ** (1 / (1 + snr)))
+
+
+def _folded(speed_m_s: float) -> float:
+    """A speed as it is read: that between the bounds which differs from it by whole ambiguities."""
+    return (speed_m_s + MOST_SPEED_M_S) % (2 * MOST_SPEED_M_S) - MOST_SPEED_M_S
 
 
 class RadarSensor(Sensor):
@@ -90,7 +96,15 @@ class RadarSensor(Sensor):
             found = found[~self._solids.blocked(np.broadcast_to(truth.at[row], (len(found), 3)), truth.at[found])]
         direction = offset[found] / distance[found][:, None]
         closing = -((truth.velocity[found] - truth.velocity[row]) * direction).sum(axis=1)
-        yield from self._echoes(distance[found], direction, closing, self._config.radar_uav_m2)
+        beam_rad, range_m = self._beam_rad, self._config.radar_resolution_m
+        strongest: dict[tuple[int, ...], Echo] = {}
+        for index, echo in self._echoes(distance[found], direction, closing, self._config.radar_uav_m2):
+            bearing, elevation = angles(direction[index])
+            of = (distance[found[index]] / range_m, bearing / beam_rad, elevation / beam_rad)
+            cell = tuple(math.floor(share) for share in (*of, closing[index] / SPEED_CELL_M_S))
+            if cell not in strongest or echo.snr_db > strongest[cell].snr_db:
+                strongest[cell] = echo
+        yield from strongest.values()
 
     def _walls(self, truth: Truth, row: int) -> Iterator[Echo]:
         if not self._solids.any:
@@ -105,7 +119,8 @@ class RadarSensor(Sensor):
                 rays[ray], distance[ray] = rays[aimed], distance[aimed]
         rays, distance = rays[: len(self._rays)], distance[: len(self._rays)]
         met = np.flatnonzero(np.isfinite(distance) & (distance > 0))
-        yield from self._echoes(distance[met], rays[met], rays[met] @ truth.velocity[row], self._config.radar_wall_m2)
+        closing = rays[met] @ truth.velocity[row]
+        yield from (echo for _, echo in self._echoes(distance[met], rays[met], closing, self._config.radar_wall_m2))
 
     def _between_rays(self, at: Values) -> Rows:
         """Directions to the nearest place of each building in range, which may stand between two rays of the scan."""
@@ -115,9 +130,11 @@ class RadarSensor(Sensor):
         found &= np.abs(way[:, 2]) <= math.sin(ELEVATION_RAD) * away
         return np.asarray(way[found] / away[found, None] * (1 + 1e-9))
 
-    def _echoes(self, distance: Values, direction: Values, closing: Values, area_m2: float) -> Iterator[Echo]:
+    def _echoes(
+        self, distance: Values, direction: Values, closing: Values, area_m2: float
+    ) -> Iterator[tuple[int, Echo]]:
         """The returns of targets with one cross section that exceed the threshold, with the errors that follow from
-        their SNR.
+        their SNR, each beside the number of its target.
         """
         config, random = self._config, self._random
         mean_db = config.radar_snr_db + 10 * math.log10(area_m2) - 40 * np.log10(np.maximum(distance, 1.0) / 100)
@@ -128,12 +145,15 @@ class RadarSensor(Sensor):
             fine = 1 / math.sqrt(2 * snr)
             bearing, elevation = angles(direction[index])
             across = self._beam_rad / 1.6 * fine
-            yield Echo(
-                max(0.0, float(distance[index] + errors[index, 0] * config.radar_resolution_m * fine)),
-                (bearing + float(errors[index, 1]) * across) % (2 * math.pi),
-                elevation + float(errors[index, 2]) * across,
-                float(closing[index]) + float(errors[index, 3]) * SPEED_CELL_M_S * fine,
-                10 * math.log10(snr),
+            yield (
+                index,
+                Echo(
+                    max(0.0, float(distance[index] + errors[index, 0] * config.radar_resolution_m * fine)),
+                    (bearing + float(errors[index, 1]) * across) % (2 * math.pi),
+                    elevation + float(errors[index, 2]) * across,
+                    _folded(float(closing[index]) + float(errors[index, 3]) * SPEED_CELL_M_S * fine),
+                    10 * math.log10(snr),
+                ),
             )
 
     def _clutter(self) -> Iterator[Echo]:

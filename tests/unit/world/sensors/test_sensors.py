@@ -263,6 +263,22 @@ def test_an_echo_tells_how_fast_the_range_shrinks(make_scenario: MakeScenario) -
     assert_sigma(false, MOST_SPEED_M_S / math.sqrt(3))
 
 
+def test_a_speed_beyond_what_is_unambiguous_is_folded(make_scenario: MakeScenario) -> None:
+    sensor = RadarSensor(make_scenario(**{"nodes.count": 2, "sensors.radar_hz": 5}), PLAIN)
+    at, velocity = np.array([(0.0, 0, 50), (30, 0, 50)]), np.array([(12.0, 0, 0), (-13, 0, 0)])
+    read = [told for step in range(40) for _, told in sensor.read(Truth(step, at, velocity), [0])]
+    told = [echo.closing_m_s for scan in read for echo in scan.echoes if abs(echo.range_m - 30) < 1]  # type: ignore[union-attr]
+    assert len(told) > 30
+    assert np.mean(told) == pytest.approx(-15, abs=0.1)
+
+
+@pytest.mark.parametrize(("apart_m", "told"), [(0.2, {1}), (0.8, {2})])
+def test_uavs_within_one_cell_are_one_echo(make_scenario: MakeScenario, apart_m: float, told: set[int]) -> None:
+    others = [(0, 20.1, 51), (0, 20.1 + apart_m, 51)]
+    found = scans(make_scenario, others, 60, **{"sensors.radar_false_alarm": 1e-9})
+    assert {len(echoes) for echoes in found} - {0} == told
+
+
 def test_walls_are_met_where_they_stand_and_hide_what_is_behind(make_scenario: MakeScenario) -> None:
     wall = Solids(Obstacles(None, (Box(40, 0, 10, 60, 80),)))
     found = scans(make_scenario, [(60, 0, 50)], 100, wall, **{"sensors.radar_false_alarm": 1e-9})

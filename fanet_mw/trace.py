@@ -109,6 +109,16 @@ class Detected(NamedTuple):
     rssi_dbm: float
 
 
+class Located(NamedTuple):
+    """A UAV first knew so well where a survivor is that it is worth a departure, here."""
+
+    t_ns: int
+    node: int
+    survivor: int
+    east_m: float
+    north_m: float
+
+
 class Approaching(NamedTuple):
     """A UAV changed course towards a survivor; `reporters` different nodes had reported it."""
 
@@ -338,6 +348,7 @@ Record = (
     | Dropped
     | RoleChanged
     | Detected
+    | Located
     | Approaching
     | Arrived
     | Confirmed
@@ -371,6 +382,7 @@ _KINDS: Final[dict[str, type[Any]]] = {
     "dropped": Dropped,
     "role_changed": RoleChanged,
     "detected": Detected,
+    "located": Located,
     "approaching": Approaching,
     "arrived": Arrived,
     "confirmed": Confirmed,
@@ -463,7 +475,7 @@ def parse(text: str) -> Record:
 __all__ = [
     "Approaching", "Arrived", "BoundExcludes", "BoundStated", "ClockSampled", "Collided", "Confirmed",
     "ConflictForeseen", "ConflictOver", "DeadlineLost", "DeadlineMet", "Delivered", "Detected", "DropReason", "Dropped",
-    "FlightModeChanged", "Generated", "KnownOnGround", "LetOut", "LikelyStated", "MissionModeChanged", "Ordered",
-    "PlacedInside", "Planned", "Posed", "ProcessEnded", "RadioFault", "Record", "Refuted", "RoleChanged", "Sighted",
-    "Warned", "kind_of", "line", "name_of", "parse",
+    "FlightModeChanged", "Generated", "KnownOnGround", "LetOut", "LikelyStated", "Located", "MissionModeChanged",
+    "Ordered", "PlacedInside", "Planned", "Posed", "ProcessEnded", "RadioFault", "Record", "Refuted", "RoleChanged",
+    "Sighted", "Warned", "kind_of", "line", "name_of", "parse",
 ]  # fmt: skip

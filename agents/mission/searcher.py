@@ -102,7 +102,8 @@ class Searcher:
         self._neighbors = neighbors = NeighborMotions(hello_interval_s=scenario.routing.hello_interval_s)
         self._radar = RadarWatch(own_motion, obstacles, neighbors, mission.avoid_by)
         aside_m, ahead_m = _view_m(scenario)
-        look_m = min(aside_m, ahead_m) if mission.search == "ring" else aside_m  # its lanes lead east and west as well
+        around = mission.search in ("ring", "fan")  # lanes lead east and west as well
+        look_m = min(aside_m, ahead_m) if around else aside_m
         self._place = place = FormationPlace(node, own_motion, reach_m=reach_m, look_m=look_m)
         least_m_s, _ = mission.approach_speeds_m_s
         nodes = scenario.nodes
@@ -442,6 +443,7 @@ def demands_of(scenario: Scenario) -> Demands:
         reach_m=scenario.radio.range_m,
         height_m=scenario.nodes.altitude_m,
         speed_m_s=scenario.mobility.speed_m_s,
+        base_m=scenario.world.base_m,
     )
 
 

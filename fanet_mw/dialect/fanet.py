@@ -1223,7 +1223,8 @@ class MAVLink_fanet_search_message(MAVLink_message):
     middle of the area and part, or more in step, with chains of
     relays between them. Spiral: teams abreast turn about the middle,
     or a single one winds outward. Sectors: each team sweeps its own.
-    Ring: one team on a square that grows. Followers fly behind.
+    Ring: one team on a square that grows. Fan: one team on a front
+    that spreads from a base. Followers fly behind.
     """
 
     id = MAVLINK_MSG_ID_FANET_SEARCH
@@ -2545,13 +2546,14 @@ class MAVLink(object):
         the middle of the area and part, or more in step, with chains
         of relays between them. Spiral: teams abreast turn about the
         middle, or a single one winds outward. Sectors: each team
-        sweeps its own. Ring: one team on a square that grows.
-        Followers fly behind.
+        sweeps its own. Ring: one team on a square that grows. Fan:
+        one team on a front that spreads from a base. Followers fly
+        behind.
 
         start_us                  : When everyone leaves for its place. [us] (type:uint64_t)
         half_width                : Lines: how far the outermost lanes are from the middle; others: half the width of the area. [m] (type:float)
-        first                     : How far each line is from where its sector begins, the middle mostly, when its sweep begins; spiral: how far from the middle the innermost lane is. [m] (type:float)
-        last                      : How far it is where it turns; spiral: how far the outermost lane is at last. [m] (type:float)
+        first                     : How far each line is from where its sector begins, the middle mostly, when its sweep begins; spiral: how far from the middle the innermost lane is; fan: how far the base is to the east of the middle. [m] (type:float)
+        last                      : How far it is where it turns; spiral: how far the outermost lane is at last; fan: how far the base is to the north of the middle. [m] (type:float)
         height                    : At which the lines fly. [m] (type:float)
         speed                     : Of the sweep. [m/s] (type:float)
         deploy_ds                 : How long everyone has to reach its place. [ds] (type:uint16_t)
@@ -2561,7 +2563,7 @@ class MAVLink(object):
         lanes                     : Places of each team. (type:uint8_t)
         relays                    : Places of the chain. (type:uint8_t)
         followers                 : Places behind the teams. (type:uint8_t)
-        shape                     : 0: lines, 1: spiral, 2: sectors, 3: ring, 4: circuit. (type:uint8_t)
+        shape                     : 0: lines, 1: spiral, 2: sectors, 3: ring, 4: circuit, 5: fan. (type:uint8_t)
         teams                     : Lines abreast; an even number for lines. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
@@ -2575,13 +2577,14 @@ class MAVLink(object):
         the middle of the area and part, or more in step, with chains
         of relays between them. Spiral: teams abreast turn about the
         middle, or a single one winds outward. Sectors: each team
-        sweeps its own. Ring: one team on a square that grows.
-        Followers fly behind.
+        sweeps its own. Ring: one team on a square that grows. Fan:
+        one team on a front that spreads from a base. Followers fly
+        behind.
 
         start_us                  : When everyone leaves for its place. [us] (type:uint64_t)
         half_width                : Lines: how far the outermost lanes are from the middle; others: half the width of the area. [m] (type:float)
-        first                     : How far each line is from where its sector begins, the middle mostly, when its sweep begins; spiral: how far from the middle the innermost lane is. [m] (type:float)
-        last                      : How far it is where it turns; spiral: how far the outermost lane is at last. [m] (type:float)
+        first                     : How far each line is from where its sector begins, the middle mostly, when its sweep begins; spiral: how far from the middle the innermost lane is; fan: how far the base is to the east of the middle. [m] (type:float)
+        last                      : How far it is where it turns; spiral: how far the outermost lane is at last; fan: how far the base is to the north of the middle. [m] (type:float)
         height                    : At which the lines fly. [m] (type:float)
         speed                     : Of the sweep. [m/s] (type:float)
         deploy_ds                 : How long everyone has to reach its place. [ds] (type:uint16_t)
@@ -2591,7 +2594,7 @@ class MAVLink(object):
         lanes                     : Places of each team. (type:uint8_t)
         relays                    : Places of the chain. (type:uint8_t)
         followers                 : Places behind the teams. (type:uint8_t)
-        shape                     : 0: lines, 1: spiral, 2: sectors, 3: ring, 4: circuit. (type:uint8_t)
+        shape                     : 0: lines, 1: spiral, 2: sectors, 3: ring, 4: circuit, 5: fan. (type:uint8_t)
         teams                     : Lines abreast; an even number for lines. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 

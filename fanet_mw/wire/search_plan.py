@@ -15,7 +15,8 @@ MOST_PLACES: Final = 79
 """The number of places of a formation that one message can assign."""
 _LINES: Final = 0
 _SPIRAL: Final = 1
-_LAST_SHAPE: Final = 4
+_FAN: Final = 5
+_LAST_SHAPE: Final = _FAN
 _LEAST_M: Final = 1.0
 """The least value of those lengths of a formation that must not be 0."""
 _FASTEST_M_S: Final = 1000.0
@@ -39,7 +40,7 @@ class Search(NamedTuple):
     relays: int
     followers: int
     shape: int = 0
-    """0: lines, 1: spiral, 2: sectors, 3: ring, 4: circuit."""
+    """0: lines, 1: spiral, 2: sectors, 3: ring, 4: circuit, 5: fan."""
     teams: int = 2
 
     def encode_frame(self, node: int) -> bytes:
@@ -77,13 +78,30 @@ class Search(NamedTuple):
         )
         lengths = (plan.half_width_m, plan.first_m, plan.last_m, plan.height_m)
         refuse_unless(
-            all(0 <= length <= FARTHEST_M for length in lengths)
-            and plan.last_m - plan.first_m >= (0.0 if shape == _SPIRAL else _LEAST_M)
-            and (shape == _LINES or (plan.first_m >= _LEAST_M and plan.half_width_m >= _LEAST_M))
+            0 <= plan.half_width_m <= FARTHEST_M
+            and 0 <= plan.height_m <= FARTHEST_M
+            and (_has_far_sides(plan) if shape == _FAN else _sweeps(plan))
             and 0.1 <= plan.speed_m_s <= _FASTEST_M_S,
             f"a formation of {lengths} m at {plan.speed_m_s} m/s",
         )
         return plan
+
+
+def _sweeps(plan: Search) -> bool:
+    """True if a formation has a way to sweep."""
+    return (
+        0 <= plan.first_m <= FARTHEST_M
+        and 0 <= plan.last_m <= FARTHEST_M
+        and plan.last_m - plan.first_m >= (0.0 if plan.shape == _SPIRAL else _LEAST_M)
+        and (plan.shape == _LINES or (plan.first_m >= _LEAST_M and plan.half_width_m >= _LEAST_M))
+    )
+
+
+def _has_far_sides(plan: Search) -> bool:
+    """True if the base of a fan, which `first_m` and `last_m` name, is outside the area."""
+    east_m, north_m = abs(plan.first_m), abs(plan.last_m)
+    is_outside = max(east_m, north_m) >= plan.half_width_m >= _LEAST_M
+    return is_outside and east_m <= FARTHEST_M and north_m <= FARTHEST_M
 
 
 class SearchStatus(NamedTuple):

@@ -10,6 +10,7 @@ from fanet_mw.trace import (
     Confirmed,
     Detected,
     FlightModeChanged,
+    Located,
     MissionModeChanged,
     PlacedInside,
     ProcessEnded,
@@ -22,6 +23,7 @@ from fanet_mw.wire.survivors import called
 
 _ABOUT_SURVIVORS: Final[Mapping[type[Any], str]] = {
     Detected: "hears the phone of {}",
+    Located: "knows where {} is",
     Approaching: "turns towards {}",
     Arrived: "arrives at {}",
     Confirmed: "confirms {}",

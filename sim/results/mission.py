@@ -39,6 +39,7 @@ from fanet_mw.trace import (
     Detected,
     FlightModeChanged,
     KnownOnGround,
+    Located,
     MissionModeChanged,
     PlacedInside,
     Posed,
@@ -89,8 +90,9 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
                 errors.append(math.hypot(at.east - record.east_m, at.north - record.north_m))
         else:
             found.add(record)
-    for detected in records_of(records, Detected):
-        heard.setdefault(detected.survivor, detected.t_ns)
+    located: dict[int, int] = {}
+    for first_known in records_of(records, Detected, Located):
+        (heard if type(first_known) is Detected else located).setdefault(first_known.survivor, first_known.t_ns)
     right, mistaken = found.right(), found.mistaken()
     persons, false_persons = found.persons()
     confirmed = [*right, *mistaken]
@@ -114,6 +116,9 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
             ]
         ),
         "wait_s": _waits([(one.t_ns - heard[one.survivor]) / S for one in right if one.survivor in heard]),
+        "located_wait_s": _waits(
+            [max(0, one.t_ns - located.get(one.survivor, one.t_ns)) / S for one in right if one.survivor in heard]
+        ),
         "post_knows_s": _known_after(_to_ground_s(right, records)),
         "uavs_approaching": len(first),
         "time_to_approach_s": sorted(round(t_ns / S, 3) for t_ns in first.values()),

@@ -173,8 +173,9 @@ def _mission_rows(mission: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if mission["inside"]:
         yield "inside", f"{mission['inside']} in buildings, median error {mission['inside_error_m']:.0f} m"
     if mission["wait_s"]["p50"] is not None:
-        wait = mission["wait_s"]
-        yield "waited", f"from heard to confirmed: median {wait['p50']:.0f} s, longest {wait['max']:.0f} s"
+        wait, since = mission["wait_s"], mission.get("located_wait_s", {"p50": None})
+        placed = "" if since["p50"] is None else f"; once located: {since['p50']:.0f} s, {since['max']:.0f} s"
+        yield "waited", f"from heard to confirmed: median {wait['p50']:.0f} s, longest {wait['max']:.0f} s{placed}"
     if mission["post_knows_s"]["count"]:
         knows = mission["post_knows_s"]
         yield (

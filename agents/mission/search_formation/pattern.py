@@ -7,9 +7,10 @@ from collections.abc import Callable, Mapping
 from itertools import pairwise
 from typing import Final, assert_never
 
-from agents.mission.search_formation.shapes import circuit, lines, ring, sectors, spiral
+from agents.mission.search_formation.shapes import circuit, fan, lines, ring, sectors, spiral
 from agents.mission.search_formation.shapes.circuit import Circuit
 from agents.mission.search_formation.shapes.contract import Demands, Dimensions, Shape, ShapeName
+from agents.mission.search_formation.shapes.fan import Fan
 from agents.mission.search_formation.shapes.lines import Lines
 from agents.mission.search_formation.shapes.ring import Ring
 from agents.mission.search_formation.shapes.sectors import Sectors
@@ -23,6 +24,7 @@ _SHAPES: Final[Mapping[ShapeName, Callable[[Dimensions], Shape]]] = {
     ShapeName.SECTORS: Sectors,
     ShapeName.RING: Ring,
     ShapeName.CIRCUIT: Circuit,
+    ShapeName.FAN: Fan,
 }
 _STEP_S: Final = 0.05
 """The time step over which the velocity of a place is computed."""
@@ -175,6 +177,8 @@ def fitted(
             made = ring.fitted(count, demands) or _lines(count, demands)
         case ShapeName.CIRCUIT:
             made = circuit.fitted(count, demands)
+        case ShapeName.FAN:
+            made = fan.fitted(count, demands) or _lines(count, demands)
         case _:
             assert_never(shape)
     return None if made is None else Pattern(made, reach_m=demands.reach_m)

@@ -22,7 +22,7 @@ from agents.mission.tasking.approach import VAGUE_M, Approach
 from agents.mission.tasking.auction import Auction
 from agents.mission.tasking.voice_descent import descent_ns
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Approaching
+from fanet_mw.trace import Approaching, Located
 from fanet_mw.units import NodeId, S
 from fanet_mw.wire.bids import Bid
 
@@ -82,6 +82,8 @@ class Bidding:
         self._auction = Auction(node)
         self._taken_back_ns: dict[int, int] = {}
         """The instant at which this UAV last withdrew its bid for each survivor by its own decision."""
+        self._located: set[int] = set()
+        """The survivors of whom the trace contains that this UAV knows where they are."""
         self._announced = False
         """True if the trace contains that this UAV approaches the present survivor."""
         self.survivor: int | None = None
@@ -122,7 +124,10 @@ class Bidding:
         """
         for survivor in self._survivors.sought():
             known = self._survivors.by_id[survivor]
-            if self._auction.has_bid(survivor) or not known.filter.near(self._own_motion.position, within_m=FAR_M):
+            if not known.filter.near(self._own_motion.position, within_m=FAR_M):
+                continue
+            self._note_place(survivor, known, now_ns)
+            if self._auction.has_bid(survivor):
                 continue
             if now_ns - self._taken_back_ns.get(survivor, _LONG_AGO_NS) < _AGAIN_NS:
                 continue
@@ -218,6 +223,14 @@ class Bidding:
         self._announced = True
         east_m, north_m = round(place.east_m, 2), round(place.north_m, 2)
         self._outbox.records.append(Approaching(now_ns, self._node, survivor, len(known.reporters), east_m, north_m))
+
+    def _note_place(self, survivor: int, known: KnownSurvivor, now_ns: int) -> None:
+        """Record once that this UAV knows where a survivor is."""
+        place = None if survivor in self._located else known.place()
+        if place is not None and place.sigma_m <= VAGUE_M:
+            self._located.add(survivor)
+            east_m, north_m = round(place.east_m, 2), round(place.north_m, 2)
+            self._outbox.records.append(Located(now_ns, self._node, survivor, east_m, north_m))
 
     def _is_reported(self, known: KnownSurvivor) -> bool:
         """True if enough different nodes have reported a survivor (`mission.reports_to_approach`)."""

@@ -47,12 +47,14 @@ class Mission(Section):
     `nodes.altitude_m`: with 20 dB, a phone is received within 31 m."""
     reports_to_approach: Count = 3
     """A UAV approaches a survivor when this many different nodes have reported that survivor (paper, 4.1)."""
-    search: Literal["none", "lines", "ring", "spiral", "sectors", "circuit", "fastest"] = "none"
+    search: Literal["none", "lines", "ring", "spiral", "sectors", "circuit", "fan", "fastest"] = "none"
     """`none`: the paper's rule, by which every UAV that has received enough reports flies there. Otherwise UAVs search
     by a plan that one of them makes and floods, and `responders` of them fly to each survivor. `lines`: two lines
     abreast part from the middle of the area, with a chain between them; with UAVs enough more of them, in step, each
     over its strip, with few of them one line. `ring`: all UAVs on a square that grows from the middle to the edges, so
-    that the loss of one separates nobody; lines if they are too few for that. `spiral`: arms abreast turn about the
+    that the loss of one separates nobody; lines if they are too few for that. `fan`: all UAVs on a front that spreads
+    from `world.base_m`, which is beside the area, to its far sides; lines if they are too few for these, or the base is
+    not beside it. `spiral`: arms abreast turn about the
     middle, or a single one winds outward; any number of UAVs is enough. `sectors`: a team abreast for each of
     `clusters.count` sectors, which may lose contact with each other. `circuit`: all UAVs at equal distances on one
     closed way over the area, which n of them have searched when each has flown the n-th part, out of each other's reach

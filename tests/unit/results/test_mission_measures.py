@@ -12,6 +12,7 @@ from fanet_mw.trace import (
     Detected,
     FlightModeChanged,
     KnownOnGround,
+    Located,
     MissionModeChanged,
     Posed,
     ProcessEnded,
@@ -97,6 +98,14 @@ def test_a_survivor_waits_from_the_first_reception_to_the_right_confirmation() -
     assert measured(heard)["wait_s"] == {"p50": None, "max": None}
     away = Confirmed(4 * S, 1, 1, -100.0, 0.0)
     assert measured([*heard, away, Refuted(6 * S, 1, 1, -100.0, 0.0), found[0]])["wait_s"]["max"] == 5.0
+
+
+def test_the_wait_since_a_survivor_was_located_is_told_beside_that_since_the_first_reception() -> None:
+    heard = [Detected(2 * S, 1, survivor, -80.0) for survivor in (1, 2)]
+    located = [Located(5 * S, 1, 1, 140.0, 0.0), Located(6 * S, 2, 1, 110.0, 0.0)]
+    found = [Confirmed(7 * S, 1, 1, 103.0, 4.0), Confirmed(15 * S, 1, 2, -100.0, 0.0)]
+    assert measured([*heard, *located, *found])["located_wait_s"] == {"p50": 1.0, "max": 2.0}, "2 is seen at once"
+    assert measured(heard)["located_wait_s"] == {"p50": None, "max": None}
 
 
 def test_the_post_knows_of_a_survivor_once_it_has_learned_of_the_right_confirmation() -> None:

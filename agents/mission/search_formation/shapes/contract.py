@@ -11,6 +11,7 @@
     sectors    one team sweeps each sector; more UAVs are free for survivors, but the swarm does not stay connected
     circuit    one team on a closed way over the whole area; any number of UAVs is used, and nobody need hear anybody
     ring       one team on a square that grows from the middle to the edge; no single loss separates anybody
+    fan        one team on a front that spreads from a base beside the area over all of it
 
 In all of them places of teams come first (team 0 lane by lane, team 1, ...), then relays, then followers. No place
 jumps. The sweep is the flight out to the edge of the area; it ends with a turn, and is repeated after the way back.
@@ -55,6 +56,7 @@ class ShapeName(IntEnum):
     SECTORS = 2
     RING = 3
     CIRCUIT = 4
+    FAN = 5
 
 
 class RowKind(IntEnum):
@@ -111,6 +113,8 @@ class Demands(NamedTuple):
     height_m: float
     speed_m_s: float
     """The speed of the sweep."""
+    base_m: tuple[float, float] = (0.0, 0.0)
+    """East and north of the place where the UAVs start."""
 
     def apart_m(self, reach_m: float) -> float:
         """The greatest distance of two neighboring lanes, if their UAVs have to be within `reach_m` of each other."""
@@ -135,10 +139,11 @@ class Dimensions(NamedTuple):
     """Lines: how far east and west of the middle the outermost lanes are. Other shapes: half the side of the area."""
     first_m: float
     """Lines: the distance of the innermost lines from the middle when a sweep begins. Sectors: the distance of each
-    team from the side where its sweep begins. Spiral: the half-side of the innermost square."""
+    team from the side where its sweep begins. Spiral: the half-side of the innermost square. Fan: how far the base is
+    to the east of the middle."""
     last_m: float
     """Lines and sectors: the same distance at the turn; the next lines began there. Spiral: the half-side of the
-    outermost square."""
+    outermost square. Fan: how far the base is to the north of the middle."""
     height_m: float
     speed_m_s: float
     shape: ShapeName = ShapeName.LINES

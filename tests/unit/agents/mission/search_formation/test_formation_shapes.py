@@ -25,12 +25,18 @@ from sim.scenarios import catalog
 REACH_M, SEEN_M, SPEED_M_S = 250.0, 131.0, 7.5
 
 
-def demands(area_m: float) -> Demands:
-    return Demands(area_m=area_m, seen_m=SEEN_M, reach_m=REACH_M, height_m=65, speed_m_s=SPEED_M_S)
+def demands(area_m: float, base: tuple[float, float] = (0.0, -0.54)) -> Demands:
+    """`base`: where the swarm starts, in sides of the area from its middle."""
+    return Demands(
+        area_m=area_m, seen_m=SEEN_M, reach_m=REACH_M, height_m=65, speed_m_s=SPEED_M_S,
+        base_m=(base[0] * area_m, base[1] * area_m),
+    )  # fmt: skip
 
 
-def formed(shape: ShapeName, count: int = 45, area_m: float = 2500, sectors: int = 4) -> Pattern:
-    made = fitted(count, demands(area_m), shape=shape, sectors_wanted=sectors)
+def formed(
+    shape: ShapeName, count: int = 45, area_m: float = 2500, sectors: int = 4, base: tuple[float, float] = (0.0, -0.54)
+) -> Pattern:
+    made = fitted(count, demands(area_m, base), shape=shape, sectors_wanted=sectors)
     assert made is not None
     return made
 
@@ -49,8 +55,11 @@ def pieces(places: Sequence[Enu]) -> int:
 
 
 anyone = st.builds(
-    lambda shape, count, area_m, sectors: fitted(count, demands(area_m), shape=shape, sectors_wanted=sectors),
+    lambda shape, count, area_m, sectors, base: fitted(
+        count, demands(area_m, base), shape=shape, sectors_wanted=sectors
+    ),
     st.sampled_from(ShapeName), st.integers(1, 120), st.floats(200, 3000), st.integers(1, 9),
+    st.tuples(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5)),
 ).filter(lambda made: made is not None)  # fmt: skip
 
 
@@ -95,6 +104,12 @@ def test_one_sweep_brings_a_lane_near_every_spot_of_the_area(shape: ShapeName, c
     lanes = [place for place in range(pattern.places) if pattern.kind(place) != "relay"]
     sweep_s = pattern.shape.sweep_s
     tracks = [pattern.at(place, 4.0 * step) for place in lanes for step in range(math.ceil(sweep_s / 4.0) + 1)]
+    if shape is ShapeName.FAN:  # the way to the places is a part of it
+        base = -0.54 * area_m
+        first = [pattern.at(place, 0.0) for place in lanes]
+        tracks += [
+            Enu(s * at.east, base + s * (at.north - base), 65) for at in first for s in (0.0, 0.2, 0.4, 0.6, 0.8)
+        ]
     half = round(area_m / 2) - 5
     for east, north in itertools.product(range(-half, half + 1, half // 8), repeat=2):
         assert any(math.hypot(at.east - east, at.north - north) <= SEEN_M for at in tracks), (east, north)
@@ -225,6 +240,37 @@ def test_where_uavs_are_too_few_for_a_ring_they_fly_in_lines() -> None:
     assert formed(ShapeName.RING, 43).dimensions.shape is ShapeName.LINES
 
 
+@pytest.mark.parametrize("base", [(0.0, -0.54), (0.6, 0.1), (0.54, -0.54)])
+def test_a_fan_spreads_from_its_base_in_one_piece_and_nobody_is_long_on_the_way(base: tuple[float, float]) -> None:
+    pattern = formed(ShapeName.FAN, base=base)
+    assert pattern.dimensions.shape is ShapeName.FAN
+    start, end_s = Enu(2500 * base[0], 2500 * base[1], 65), pattern.shape.sweep_s
+    for place in range(45):
+        first, last = (pattern.at(place, second).minus(start).horizontal() for second in (0, end_s))
+        assert first <= last / 4, "it begins near the base"
+    for second in range(0, round(end_s) + 20, 5):
+        front = [pattern.at(place, second) for place in range(45)]
+        assert pieces(front) == 1, second
+        assert min(a.minus(b).horizontal() for a, b in itertools.pairwise(front[:42])) > 20, second
+
+
+def test_a_fan_shows_cameras_more_on_its_way_than_lines_in_a_sweep() -> None:
+    scenario = catalog.find("rescue-base", [])
+    shown = {}
+    for shape in (ShapeName.LINES, ShapeName.FAN):
+        pattern, cells = formed(shape), PhotographedCells(scenario)
+        for step in range(round(pattern.shape.sweep_s / 3)):
+            cells.add([tuple(pattern.at(place, 3.0 * step)) for place in range(45)])
+        shown[shape] = cells.share
+    assert shown[ShapeName.FAN] > shown[ShapeName.LINES] + 0.1
+
+
+def test_uavs_that_are_too_few_for_a_fan_or_whose_base_is_in_the_area_fly_in_lines() -> None:
+    assert formed(ShapeName.FAN, 42).dimensions.shape is ShapeName.FAN
+    assert formed(ShapeName.FAN, 41).dimensions.shape is ShapeName.LINES
+    assert formed(ShapeName.FAN, base=(0.1, -0.4)).dimensions.shape is ShapeName.LINES
+
+
 lost_ones = st.builds(
     lambda pattern, seed, share: (
         pattern, frozenset(random.Random(seed).sample(range(pattern.places), int(share * (pattern.places - 1))))
@@ -246,7 +292,8 @@ def test_whoever_is_left_of_a_row_closes_ranks_and_keeps_the_order(
         assert turns <= (row.kind is RowKind.AROUND)
         assert all(row.first - 1 < at < row.first + row.size for at in flown) or row.kind is RowKind.AROUND
         for place, other in itertools.pairwise(left):
-            if closed.dimensions.shape in (ShapeName.LINES, ShapeName.RING) and row.kind is not RowKind.BETWEEN:
+            joined = (ShapeName.LINES, ShapeName.RING, ShapeName.FAN)
+            if closed.dimensions.shape in joined and row.kind is not RowKind.BETWEEN:
                 apart = closed.at(place, swept_s).minus(closed.at(other, swept_s)).norm()
                 assert apart <= 0.96 * REACH_M or len(left) < 8, (place, other)
         for place in left:
@@ -270,7 +317,7 @@ def test_more_than_two_lines_without_some_of_their_uavs_are_one_piece(lost: list
         assert pieces([pattern.at(place, second) for place in left]) == 1, second
 
 
-@pytest.mark.parametrize("shape", [ShapeName.LINES, ShapeName.RING])
+@pytest.mark.parametrize("shape", [ShapeName.LINES, ShapeName.RING, ShapeName.FAN])
 @pytest.mark.parametrize("lost", [[7], [31], [34], [0, 31, 36], [3, 12, 20, 32, 35]])
 def test_a_swarm_without_some_of_its_uavs_is_one_piece_that_turns_back_before_it_breaks(
     shape: ShapeName, lost: list[int]
@@ -285,13 +332,15 @@ def test_a_swarm_without_some_of_its_uavs_is_one_piece_that_turns_back_before_it
 @pytest.mark.parametrize(
     "impossible",
     [
-        {"shape": 5}, {"teams": 3}, {"shape": 1, "teams": 0}, {"shape": 2, "relays": 1}, {"shape": 1, "first_m": 0.5},
+        {"shape": 6}, {"shape": 5, "teams": 1, "lanes": 4, "last_m": 99.0}, {"teams": 3},
+        {"shape": 1, "teams": 0}, {"shape": 2, "relays": 1}, {"shape": 1, "first_m": 0.5},
         {"shape": 2, "half_width_m": 0.5}, {"shape": 2, "teams": 40}, {"lanes": 1},
     ],
 )  # fmt: skip
 def test_a_formation_that_nobody_could_fly_is_refused(impossible: dict[str, float]) -> None:
     plan = Search(7, 100.0, 16.0, 400.0, 65.0, 7.5, 30, 1, 1, (1, 2, 3, 4), 2, 0, 0)
-    for possible in (plan, plan._replace(shape=1), plan._replace(shape=2, teams=1, lanes=4)):
+    fan = plan._replace(shape=5, teams=1, lanes=4, first_m=0.0, last_m=-100.0)
+    for possible in (plan, plan._replace(shape=1), plan._replace(shape=2, teams=1, lanes=4), fan):
         assert Search.decode_frame(bytes(HEADER_BYTES) + possible.encode_frame(1)) == possible
     with pytest.raises(MalformedFrameError):
         Search.decode_frame(bytes(HEADER_BYTES) + plan._replace(**impossible).encode_frame(1))  # type: ignore[arg-type]

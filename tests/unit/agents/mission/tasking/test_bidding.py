@@ -3,7 +3,7 @@
 import pytest
 from search_board import FOLLOWER, LINE, TAKEN_UP_NS, UP_M, Board, lane_of
 
-from fanet_mw.trace import Approaching, Arrived
+from fanet_mw.trace import Approaching, Arrived, Located
 from fanet_mw.units import Enu, S
 from fanet_mw.wire.bids import Bid
 
@@ -23,7 +23,7 @@ def board_with_a_task(*, east_m: float) -> Board:
 def test_a_follower_bids_for_a_reported_survivor_near_its_line_wins_and_says_so() -> None:
     board = board_with_a_task(east_m=60)
     assert board.tasks.survivor == 1
-    assert [type(record) for record in board.out.records] == [Approaching]
+    assert [type(record) for record in board.out.records] == [Located, Approaching]
     board.tasks.close(1, now_ns=NOW_NS)
     assert board.tasks.survivor is None
 
@@ -88,7 +88,7 @@ def test_who_still_takes_off_comes_later_than_who_is_in_the_air() -> None:
 def test_a_responder_that_finds_nobody_takes_its_bid_back_and_does_not_bid_again_at_once() -> None:
     board = board_with_a_task(east_m=0)
     board.goal.at(board.tasks.survivor, NOW_NS)
-    assert [type(record) for record in board.out.records] == [Approaching, Arrived]
+    assert [type(record) for record in board.out.records] == [Located, Approaching, Arrived]
     later_ns = NOW_NS + 46 * S
     board.tasks.choose(later_ns)
     board.tasks.bid(later_ns)

@@ -1,0 +1,164 @@
+r"""The formation `fan`: all UAVs on a front that spreads from the base over the area, to its far sides.
+
+    o---o---o---o---o     each UAV flies straight away from the base to a place of its own on the far sides of the area,
+    |   \   |   /   |     and waits there; neighbors stay within radio reach, so the front is one chain from the sides
+    o-.  \  |  /  .-o     near the base to that opposite
+       `-. \|/ .-'
+           base           no time is lost on the way to the places: it is a part of the search
+
+All begin at the same share of their ways, so that they are equally far apart, and fly at the same speed from there. Up
+to a few that are left over fly behind the front. The words place, team, lane and follower are explained in
+`contract.py`; a fan is one team, and has no relays.
+"""
+
+import math
+from itertools import pairwise
+from typing import Final
+
+from agents.mission.search_formation.shapes.contract import (
+    BACK,
+    FOLLOW_M,
+    FOLLOWER_HIGHER_M,
+    Demands,
+    Dimensions,
+    RowKind,
+    RowOfPlaces,
+    ShapeName,
+    nearest_m,
+    swept_m,
+)
+from fanet_mw.units import Enu
+
+_EDGE_M: Final = 60.0
+"""The distance from the edge of the area at which UAVs wait, at most a quarter of half the area's side."""
+_APART_M: Final = 30.0
+"""The distance of two neighbors when the front begins to spread."""
+_HALVINGS: Final = 20
+
+Corners = tuple[tuple[float, float], ...]
+
+
+class Fan:
+    """The positions of the places of one fan. Its dimensions name the base: `first_m` to the east of the middle of the
+    area, `last_m` to the north.
+    """
+
+    def __init__(self, formation: Dimensions, *, most_m: float = math.inf) -> None:
+        """`most_m`: the greatest distance from the base that the UAVs that are left can span."""
+        self._formation = formation
+        self._base = formation.first_m, formation.last_m
+        self._corners = _far_sides(formation.half_width_m, self._base)
+        self._along_m = math.fsum(math.dist(a, b) for a, b in pairwise(self._corners))
+        self._begins = min(0.5, _APART_M / self.lane_m)
+        """The share of its way that each UAV has flown when the front begins to spread."""
+        self._most_m = most_m
+        self._ways: dict[float, tuple[float, float, float]] = {}
+        farthest_m = max(math.dist(self._base, corner) for corner in self._corners)
+        self._spread = formation._replace(
+            first_m=self._begins * farthest_m, last_m=farthest_m, speed_m_s=BACK * formation.speed_m_s
+        )
+
+    @property
+    def sweep_s(self) -> float:
+        return (self._spread.last_m - self._spread.first_m) / self._spread.speed_m_s
+
+    @property
+    def lane_m(self) -> float:
+        return self._along_m / max(1, self._formation.lanes - 1)
+
+    def at(self, place: float, swept_s: float) -> Enu:
+        formation = self._formation
+        flown_m = swept_m(self._spread, swept_s, faster_back=1.0) - self._spread.first_m
+        if place <= formation.lanes - 1:
+            east, north = self._on_front(place * self.lane_m, flown_m)
+            return Enu(east, north, formation.height_m)
+        along_m = formation.follower(round(place))[1] * self._along_m
+        east, north = self._on_front(along_m, flown_m, behind_m=FOLLOW_M)
+        return Enu(east, north, formation.height_m + FOLLOWER_HIGHER_M)
+
+    def _on_front(self, along_m: float, flown_m: float, *, behind_m: float = 0.0) -> tuple[float, float]:
+        """East and north of a UAV on the way from the base to a place that is so far along the far sides, when all have
+        flown so far since the front began to spread.
+        """
+        east, north, way_m = self._way(along_m)
+        out_m = min(way_m, self._begins * way_m + flown_m, self._most_m)
+        share = max(out_m - behind_m, self._begins * way_m / 2) / way_m if behind_m else out_m / way_m
+        return self._base[0] + share * east, self._base[1] + share * north
+
+    def _way(self, along_m: float) -> tuple[float, float, float]:
+        """How far to the east and the north of the base a place on the far sides is, and how far at all."""
+        way = self._ways.get(along_m)
+        if way is None:
+            east, north = self._on_sides(along_m)
+            east, north = east - self._base[0], north - self._base[1]
+            way = self._ways[along_m] = east, north, math.hypot(east, north)
+        return way
+
+    def _on_sides(self, along_m: float) -> tuple[float, float]:
+        """East and north of a place on the far sides of the area."""
+        for (east, north), (to_east, to_north) in pairwise(self._corners):
+            side_m = math.hypot(to_east - east, to_north - north)
+            if along_m <= side_m or (to_east, to_north) == self._corners[-1]:
+                share = min(1.0, along_m / side_m)
+                return east + share * (to_east - east), north + share * (to_north - north)
+            along_m -= side_m
+        raise AssertionError("a fan has sides")
+
+    def tethers(self, place: int) -> tuple[int, ...]:
+        lanes = self._formation.lanes
+        if place >= lanes:
+            return ()
+        return tuple(other for other in (place - 1, place + 1) if 0 <= other < lanes)
+
+    def rows(self) -> tuple[RowOfPlaces, ...]:
+        return (RowOfPlaces(0, self._formation.lanes, RowKind.SPAN),)
+
+    def drawn_in(self, left: tuple[int, ...], hop_m: float) -> "Fan":
+        """The front goes no farther than where so few are nowhere farther apart than a hop."""
+        count = max(1, left[0])
+
+        def is_spanned(most_m: float) -> bool:
+            fan = Fan(self._formation, most_m=most_m)
+            step = (self._formation.lanes - 1) / max(1, count - 1)
+            front = [fan.at(rank * step, self.sweep_s) for rank in range(count)]
+            return all(a.minus(b).horizontal() <= hop_m for a, b in pairwise(front))
+
+        least, most = 0.0, self._spread.last_m
+        if is_spanned(most):
+            return Fan(self._formation)
+        for _ in range(_HALVINGS):
+            middle = (least + most) / 2
+            least, most = (middle, most) if is_spanned(middle) else (least, middle)
+        return Fan(self._formation, most_m=least)
+
+    def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
+        return nearest_m((self.at(place, swept_s) for place in self._formation.line(team)), east_m, north_m)
+
+
+def _far_sides(half_m: float, base: tuple[float, float]) -> Corners:
+    """The corners of those sides of the square that are turned away from a base outside it, one after the other; none
+    for a base inside, from which all are.
+    """
+    east, north = base
+    corners = ((half_m, -half_m), (half_m, half_m), (-half_m, half_m), (-half_m, -half_m))
+    away = (east < half_m, north < half_m, east > -half_m, north > -half_m)  # the eastern side first
+    if all(away):
+        return ()
+    first = next(side for side in range(4) if away[side] and not away[side - 1])
+    count = sum(away)
+    return tuple(corners[(first + step) % 4] for step in range(count + 1))
+
+
+def fitted(count: int, demands: Demands) -> Dimensions | None:
+    """The fan of this number of UAVs; None if they are too few for the far sides, or the base is in the area."""
+    half = demands.area_m / 2
+    half -= min(_EDGE_M, half / 4, demands.seen_m / 2)
+    corners = _far_sides(half, demands.base_m)
+    if not corners:
+        return None
+    along_m = math.fsum(math.dist(a, b) for a, b in pairwise(corners))
+    lanes = max(2, 1 + math.ceil(along_m / demands.apart_m(demands.reach_m)))
+    if lanes > count:
+        return None
+    east, north = demands.base_m
+    return Dimensions(lanes, 0, count - lanes, half, east, north, demands.height_m, demands.speed_m_s, ShapeName.FAN, 1)

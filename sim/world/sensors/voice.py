@@ -10,10 +10,11 @@ has 82 dB at 1 m by ANSI S3.5-1997, and up to 90 dB if it is as loud as possible
 (Maekawa's limit for a single edge). Wind noise is that in a third-octave band behind a windscreen of diameter D at an
 airspeed V: Strasberg, J. Acoust. Soc. Am. 83(2), 1988. A call is detected if its SNR exceeds a threshold. The error of
 its direction is Gaussian along each of two axes, and falls with the square root of the SNR, as the Cramer-Rao bound
-does. Arrays of 12 to 16 microphones were flown on multirotors by Hoshiba et al., Sensors 17(11), 2017. A survivor calls
-in a share of the instants, drawn anew each time. People differ in how loud they shout (Pearsons et al.,
-EPA-600/1-77-025, 1977: men louder than women and children; the standard deviation is assumed), and a level is measured
-in turbulent air. Not modeled: echoes, and calls that mask each other.
+does. Arrays of 12 to 16 microphones were flown on multirotors by Hoshiba et al., Sensors 17(11), 2017. Calls last a
+second, survivors call in a share of their seconds, and all UAVs hear the same calls. People differ in how loud they
+shout (Pearsons et al., EPA-600/1-77-025, 1977: men louder than women and children; the standard deviation is assumed),
+and a level is measured in turbulent air. Not modeled: echoes, calls that mask each other, and the silence of rotors
+that stand still on the ground.
 """
 
 import math
@@ -25,7 +26,7 @@ import numpy as np
 from fanet_mw.bus.messages import Call, Message, Voice
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import S
-from sim.world.arrays import Values
+from sim.world.arrays import Flags, Values
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors
 from sim.world.sensors.contract import Sensor, Truth, angles, generator, shaken
@@ -68,6 +69,9 @@ class VoiceSensor(Sensor):
         self._wind = np.array([*scenario.world.wind_m_s, 0.0])
         self._buried_db = np.where(survivors.buried, self._config.burial_voice_db, 0.0)
         self._random = generator(scenario.seed, "voice")
+        self._seed, self._begin_ns = scenario.seed, generator(scenario.seed, "calls").random(len(survivors.places)) * S
+        self._second, self._drawn = -1, [self._begin_ns, self._begin_ns]
+        """The last second that was asked for, and what was drawn for the one before and for it."""
         self._loudness_db = generator(scenario.seed, "loudness").normal(
             0.0, self._config.voice_loudness_db, len(survivors.places)
         )
@@ -76,8 +80,8 @@ class VoiceSensor(Sensor):
         config, places = self._config, self._survivors.places
         airspeed = np.linalg.norm(truth.velocity - self._wind, axis=1)
         noise_db = power_sum_db(config.voice_rotor_db, wind_noise_db(airspeed))
+        calling = self._calling(truth.now_ns)
         for row in rows:
-            calling = self._random.random(len(places)) < config.voice_share
             offset = places - truth.at[row]
             loud_db = (
                 config.voice_level_db + self._loudness_db + self._random.normal(0.0, config.voice_error_db, len(places))
@@ -95,6 +99,16 @@ class VoiceSensor(Sensor):
             )
             if calls:
                 yield row, Voice(truth.now_ns, calls)
+
+    def _calling(self, now_ns: int) -> Flags:
+        """Who calls now; each one's seconds begin at an instant of its own."""
+        if now_ns // S != self._second:
+            self._second = now_ns // S
+            self._drawn = [
+                generator(self._seed, "calls", str(self._second + part)).random(len(self._begin_ns)) for part in (-1, 0)
+            ]
+        before, now = self._drawn
+        return np.asarray(np.where(now_ns % S < self._begin_ns, before, now) < self._config.voice_share)
 
     def _call(self, offset: Values, level: float, snr: float) -> Call:
         sigma = min(_WORST_SIGMA_RAD, self._sigma_rad * math.pow(10.0, -snr / 20))

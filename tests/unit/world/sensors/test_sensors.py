@@ -176,6 +176,20 @@ def test_a_survivor_calls_in_its_share_of_the_instants(make_scenario: MakeScenar
     assert_share(sum(reading is not None for reading in told), 2000, 0.3)
 
 
+def test_whoever_listens_hears_the_same_calls_and_they_last_a_second(make_scenario: MakeScenario) -> None:
+    keys = {"nodes.count": 2, "sensors.voice_hz": 10, "sensors.voice_share": 0.4}
+    sensor, at = voice(make_scenario, (0, 0, 0), **keys), np.array([(0.0, 0, 8), (3, 0, 8)])
+    heard = np.zeros((2, 3000), bool)
+    for step in range(3000):
+        for row, _ in sensor.read(Truth(step * S // 10, at, at * 0), [0, 1]):
+            heard[row, step] = True
+    assert (heard[0] == heard[1]).all()
+    begun = np.flatnonzero(heard[0, 1:] & ~heard[0, :-1])
+    ended = np.flatnonzero(~heard[0, 1:] & heard[0, :-1])
+    assert set((ended[-len(begun) + 1 :] - begun[: len(begun) - 1]) % 10) == {0}
+    assert_share(int(heard[0, ::10].sum()), 300, 0.4)
+
+
 def test_the_error_of_a_voices_direction_falls_with_the_root_of_its_snr(make_scenario: MakeScenario) -> None:
     sensor = voice(make_scenario, (6, 0, 0), **{"sensors.voice_share": 1.0})
     calls = [reading.calls[0] for reading in readings(sensor, (0, 0, 2), 600)]

@@ -20,7 +20,8 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from emulator.channel.propagation import LinkTable, audible_mw, milliwatt, noise_mw
+from emulator.channel.link_budget import audible_mw, milliwatt, noise_mw
+from emulator.channel.propagation import LinkTable
 from emulator.kernel import state as s
 from emulator.kernel.state import Reals
 from fanet_mw.bus.radio_control import (

@@ -10,14 +10,8 @@ import numpy.typing as npt
 
 from emulator.channel.error_rate import SHORT_BYTES, header_rates, log_success_per_bit
 from emulator.channel.fading import law_of, tables
-from emulator.channel.propagation import (
-    LinkTable,
-    carrier_sense_mw,
-    energy_mw,
-    milliwatt,
-    noise_mw,
-    sensitivities_mw,
-)
+from emulator.channel.link_budget import carrier_sense_mw, energy_mw, milliwatt, noise_mw, sensitivities_mw
+from emulator.channel.propagation import LinkTable
 from emulator.kernel import state as s
 from emulator.kernel.entry import KernelEntry
 from emulator.kernel.fading_gain import WAVE_COLUMNS

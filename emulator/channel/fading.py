@@ -23,8 +23,7 @@ from typing import Final
 import numpy as np
 
 from emulator.channel.path_loss import SPEED_OF_LIGHT_M_S
-from emulator.kernel.fading_gain import NAKAGAMI, NONE, RICIAN, ROOT, TABLE, WAVES
-from emulator.kernel.state import Reals
+from emulator.kernel.state import NAKAGAMI, NONE, RICIAN, ROOT, TABLE, WAVES, Reals
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario.tables.radio import Radio
 from fanet_mw.units import S

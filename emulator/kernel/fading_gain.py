@@ -4,18 +4,12 @@ import math
 from typing import Final
 
 from emulator.kernel.jit import jit
-from emulator.kernel.state import FADING, FADING_SHAPE, WAVES_FROM_NS, Ints, Reals
+from emulator.kernel.state import FADING, FADING_SHAPE, NAKAGAMI, ROOT, TABLE, WAVES, WAVES_FROM_NS, Ints, Reals
 
-NONE: Final = 0
-NAKAGAMI: Final = 1
-RICIAN: Final = 2
-WAVES: Final = 32
-TABLE: Final = 4096  # a power of two: see `gain`
 COSINE, SHAPED = 0, 1
 """The rows of the table: cos(2 pi i / TABLE), and by |h| the gain (Rician: what scales h to be normal)."""
 _MASK = TABLE - 1
 _QUARTER = TABLE // 4
-ROOT = math.sqrt(WAVES)
 _PER_AMPLITUDE = (TABLE - 1) / ROOT
 _K, _K_RATE, _L, _L_RATE, _AT = 0, WAVES, 2 * WAVES, 3 * WAVES, 4 * WAVES
 WAVE_COLUMNS: Final = 4 * WAVES + 6

@@ -12,6 +12,7 @@ Instants are swarm ns. A link is one direction of a pair of stations; the links 
 (compressed rows, `ptr`). A station transmits one frame at a time, so a link carries at most one.
 """
 
+import math
 from typing import Final
 
 import numpy as np
@@ -220,3 +221,11 @@ ATTEMPT_ROWS: Final = 16
     FADING_SHAPE,  # m of Nakagami fading, or K of Rician fading as a ratio
     REALS,
 ) = range(13)
+
+# --- fading ---------------------------------------------------------------------------------------------------------
+NONE: Final = 0
+NAKAGAMI: Final = 1
+RICIAN: Final = 2
+WAVES: Final = 32
+TABLE: Final = 4096  # a power of two: see `gain`
+ROOT = math.sqrt(WAVES)

@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple
 
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.scenario.quantities import unit_of
+from fanet_mw.scenario.tables.sections import meanings, tables_of
 
 Schema = Mapping[str, Any]
 _REFERENCE: Final = "#/$defs/"
@@ -49,7 +50,7 @@ class KeyTable(NamedTuple):
 
 def json_schema() -> dict[str, Any]:
     """The JSON schema of a scenario file, with descriptions, for editors and other tools."""
-    schema = _single_lines(Scenario.model_json_schema())
+    schema = _single_lines(_described(Scenario.model_json_schema()))
     assert isinstance(schema, dict), "the schema of a model is an object"
     del schema["description"]
     keys = schema["properties"]
@@ -60,6 +61,15 @@ def json_schema() -> dict[str, Any]:
         **schema,
         "title": "fanet-mw scenario",
     }
+
+
+def _described(schema: dict[str, Any]) -> dict[str, Any]:
+    """A schema with the meaning of each key."""
+    for table in set(tables_of(Scenario)):
+        keys = schema["properties"] if table is Scenario else schema["$defs"][table.__name__]["properties"]
+        for key, meaning in meanings(table).items():
+            keys[key]["description"] = meaning
+    return schema
 
 
 @cache

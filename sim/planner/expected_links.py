@@ -28,7 +28,7 @@ def expected_links(scenario: Scenario, at: Mapping[NodeId, Enu], *, draw: int) -
     import numpy as np
 
     from emulator.channel.error_rate import header_rates, log_success_per_bit
-    from emulator.channel.propagation import noise_mw, received_dbm
+    from emulator.channel.link_budget import noise_mw, received_dbm
     from emulator.channel.shadowing import Shadowing
     from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
 

@@ -32,7 +32,7 @@ def _by_error_rate(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance:
     import numpy as np
 
     from emulator.channel.error_rate import header_rates, log_success_per_bit
-    from emulator.channel.propagation import milliwatt, noise_mw, received_dbm
+    from emulator.channel.link_budget import milliwatt, noise_mw, received_dbm
     from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
 
     radio = scenario.radio

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from emulator.channel.propagation import heard_m
+from emulator.channel.link_budget import heard_m
 from emulator.pcap_reader import AirFrame, frames_of
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Posed

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from emulator.channel.propagation import heard_m
+from emulator.channel.link_budget import heard_m
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import (

@@ -11,7 +11,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
-from emulator.channel.propagation import heard_m
+from emulator.channel.link_budget import heard_m
 from fanet_mw.trace import Delivered
 from fanet_mw.units import MS, S
 from sim.figures.colors import BLUE, DARK, GREEN, ORANGE, RED

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from emulator.channel.propagation import heard_m
+from emulator.channel.link_budget import heard_m
 from fanet_mw.trace import Posed, ProcessEnded, RadioFault
 from fanet_mw.units import S
 from sim.records.record_kinds import records_of

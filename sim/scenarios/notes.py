@@ -7,12 +7,10 @@ import re
 from collections.abc import Iterator
 from typing import Final, get_args
 
-from pydantic.fields import FieldInfo
-
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.routing import PROTOCOLS
-from fanet_mw.scenario.tables.sections import Section
+from fanet_mw.scenario.tables.sections import Section, meanings
 from fanet_mw.scenario.tables.world import FASTEST_AIR_M_S
 from fanet_mw.units import S
 from fanet_mw.wire.search_plan import MOST_PLACES
@@ -57,25 +55,25 @@ def _without_effect(scenario: Scenario) -> Iterator[str]:
     """Keys that were set for something else than what was chosen, by the first words of their documentation."""
     protocol = scenario.routing.protocol
     if protocol in PROTOCOLS and protocol not in _CLUSTERED and scenario.mission.formation == "none":
-        unused = [key for key, _ in _changed(scenario.clusters)]
+        unused = list(_changed(scenario.clusters))
         if unused:
             yield f"clusters.{', clusters.'.join(unused)}: no effect with routing.protocol = {protocol!r}"
-    if protocol in PROTOCOLS and protocol != "rounds" and (unused := [key for key, _ in _changed(scenario.rounds)]):
+    if protocol in PROTOCOLS and protocol != "rounds" and (unused := list(_changed(scenario.rounds))):
         yield f"rounds.{', rounds.'.join(unused)}: no effect with routing.protocol = {protocol!r}"
     for table in ("nodes", "routing", "clusters", "radio", "mobility", "clock", "world", "traffic", "mission"):
         section = getattr(scenario, table)
         unused_by: dict[str, list[str]] = {}
-        for key, field in _changed(section):
-            for other in _prevented_by(section, key, field.description or ""):
+        for key in _changed(section):
+            for other in _prevented_by(section, key):
                 if _is_given(section, key):
                     unused_by.setdefault(other, []).append(f"{table}.{key}")
         for other, keys in unused_by.items():
             yield f"{', '.join(keys)}: no effect with {table}.{other} = {getattr(section, other)!r}"
 
 
-def _prevented_by(section: Section, key: str, documentation: str) -> Iterator[str]:
+def _prevented_by(section: Section, key: str) -> Iterator[str]:
     """The keys of the table whose values leave this one without an effect."""
-    fields = type(section).model_fields
+    fields, documentation = type(section).model_fields, meanings(type(section)).get(key, "")
     said = _ONLY_WITH.match(documentation)
     wanted = set(_WORDS.findall(said[0])) if said else set()
     if wanted and wanted <= fields.keys() and all(getattr(section, other) in _OFF for other in wanted):
@@ -91,7 +89,7 @@ def _prevented_by(section: Section, key: str, documentation: str) -> Iterator[st
 
 def _is_given(section: Section, key: str) -> bool:
     """False for a value that follows from other keys of the table."""
-    others = {name: getattr(section, name) for name, _ in _changed(section) if name != key}
+    others = {name: getattr(section, name) for name in _changed(section) if name != key}
     try:
         return bool(getattr(type(section)(**others), key) != getattr(section, key))
     except ValueError:  # without it the others are not allowed
@@ -138,11 +136,11 @@ def _odd_band(scenario: Scenario) -> Iterator[str]:
         )
 
 
-def _changed(section: Section) -> Iterator[tuple[str, FieldInfo]]:
+def _changed(section: Section) -> Iterator[str]:
     """The keys of a table with another value than by default."""
     for key, field in type(section).model_fields.items():
         if getattr(section, key) != field.get_default(call_default_factory=True):
-            yield key, field
+            yield key
 
 
 def _guessed(scenario: Scenario) -> Iterator[str]:

@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import viser
 
-from emulator.channel.propagation import heard_m
+from emulator.channel.link_budget import heard_m
 from fanet_mw.units import MS, Enu, S
 from sim.figures import colors
 from sim.observation.surroundings import Surroundings, surroundings

@@ -8,8 +8,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from emulator.channel.error_rate import log_success_per_bit
+from emulator.channel.link_budget import received_dbm
 from emulator.channel.path_loss import SPEED_OF_LIGHT_M_S
-from emulator.channel.propagation import received_dbm
 from emulator.channel.shadowing import Shadowing
 from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
 from emulator.medium import Medium

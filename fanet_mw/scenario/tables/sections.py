@@ -4,7 +4,12 @@ The bounds exist so that all that a run computes stays finite: instants fit 64 b
 enough to be counted, powers are those of some radio or noise. They are too wide to restrict any experiment.
 """
 
-from collections.abc import Mapping
+import ast
+import inspect
+import sys
+from collections.abc import Iterator, Mapping
+from functools import cache
+from itertools import pairwise
 from typing import Annotated, Any, Final, Literal, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -45,9 +50,7 @@ Id = Annotated[int, Field(ge=1, le=MAX_NODES)]
 class Section(BaseModel):
     """The base of every table of a scenario file."""
 
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", validate_default=True, allow_inf_nan=False, use_attribute_docstrings=True
-    )
+    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True, allow_inf_nan=False)
 
     @model_validator(mode="before")
     @classmethod
@@ -58,6 +61,32 @@ class Section(BaseModel):
             if field is not None and _has_truth(value) and not {bool, Any} & _types(field.annotation):
                 raise PydanticCustomError(NO_TRUTH, "{key}: must not be true or false", {"key": name})
         return tree
+
+
+def tables_of(table: type[Section]) -> Iterator[type[Section]]:
+    """A table and all tables within it."""
+    yield table
+    for field in table.model_fields.values():
+        for inner in _types(field.annotation):
+            if isinstance(inner, type) and issubclass(inner, Section):
+                yield from tables_of(inner)
+
+
+@cache
+def meanings(table: type[Section]) -> Mapping[str, str]:
+    """What the string below each key of a table says. pydantic would read the sources of all tables at each start."""
+    inherited = {key: said for base in table.__bases__ if base is not Section for key, said in meanings(base).items()}
+    source = ast.parse(inspect.getsource(sys.modules[table.__module__]))
+    body = next(node.body for node in source.body if isinstance(node, ast.ClassDef) and node.name == table.__name__)
+    return inherited | {
+        key.target.id: inspect.cleandoc(said.value.value)
+        for key, said in pairwise(body)
+        if isinstance(key, ast.AnnAssign)
+        and isinstance(key.target, ast.Name)
+        and isinstance(said, ast.Expr)
+        and isinstance(said.value, ast.Constant)
+        and isinstance(said.value.value, str)
+    }
 
 
 def _has_truth(value: object) -> bool:

@@ -24,13 +24,15 @@ from fanet_mw.errors import FanetError, HostError
 from fanet_mw.hosts.service import BUS_EXIT_CODE
 from sim.run.launcher.parent_death import be_killed_with_parent
 
-_PRELOAD: Final = ["agents.__main__", "emulator.__main__", "sim.world.__main__"]
+_PRELOAD: Final = ["agents.__main__", "emulator.__main__", "sim.world.__main__", "sim.run.launcher.services"]
 _NICENESS: Final = 4
 """The niceness of a child that runs with lower priority, added to that of the launcher. With 10, two busy loops beside
 `rescue` on two processors slow the swarm's clock to 0.56; with 4 it stays at 1, and the emulator still goes first."""
 _FOR_THE_LAUNCHER: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _LAUNCHES_WHEN_IMPORTED: Final = 79
 """The exit code of a child whose import of the main program starts a swarm."""
+_MUST_COMPILE: Final = 78
+"""The exit code of the first child if the emulator's kernel is not compiled yet."""
 Entry = Callable[..., int]
 
 
@@ -123,8 +125,11 @@ _started: Final[dict[str, int]] = {}
 them, too."""
 
 
-def _nothing() -> None:
-    pass
+def _first() -> None:
+    """Ask what only a process knows that has loaded the emulator; the launcher has not."""
+    from emulator.compile_kernel import must_compile
+
+    sys.exit(_MUST_COMPILE if must_compile() else 0)
 
 
 def _start_server() -> None:
@@ -169,11 +174,12 @@ class Processes:
         self._recipes: dict[str, ChildRecipe] = {}
         self._empty = asyncio.Event()
 
-    async def warm_up(self) -> None:
+    async def warm_up(self) -> bool:
         """Wait until the server has imported what children need; otherwise the first `start` would block the event
-        loop. Raises HostError if children cannot import the main program because it starts a swarm of its own then.
+        loop. Returns True if the emulator's kernel will be compiled. Raises HostError if children cannot import the
+        main program because it starts a swarm of its own then.
         """
-        first = self._context.Process(target=_nothing)
+        first = self._context.Process(target=_first)
 
         def run() -> int | None:
             _start_server()
@@ -185,11 +191,13 @@ class Processes:
                 return code
             return None
 
-        if await asyncio.to_thread(run) == _LAUNCHES_WHEN_IMPORTED:
+        code = await asyncio.to_thread(run)
+        if code == _LAUNCHES_WHEN_IMPORTED:
             raise HostError(
                 "the processes of a swarm import the program that launches it, and this program launches a swarm "
                 'whenever it is imported: put the launch below `if __name__ == "__main__":`'
             )
+        return code == _MUST_COMPILE
 
     def start(self, name: str, entry: Entry, arguments: Mapping[str, Any], *, gives_way: bool = False) -> None:
         """Start a child; `entry(**arguments)` must be importable and picklable."""

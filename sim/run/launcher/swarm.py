@@ -21,7 +21,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from emulator.compile_kernel import COMPILING_NOTICE, must_compile
 from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import ClockRequest
 from fanet_mw.bus.topics import Topics
@@ -138,7 +137,10 @@ class SwarmRun:
         with contextlib.closing(self._collector), contextlib.closing(self._pauses):
             began = time.monotonic()
             try:
-                await self.processes.warm_up()
+                if await self.processes.warm_up():
+                    from emulator.compile_kernel import COMPILING_NOTICE  # with numba, which nothing else needs here
+
+                    self._tell(COMPILING_NOTICE)
                 self._check_not_over()
                 on_started(self)
                 await self._start_all()
@@ -412,8 +414,6 @@ async def launch(
     if (note := limits.many(processes=processes)) is not None:
         on_event(note)
     limits.prepare(processes=processes)
-    if must_compile():
-        on_event(COMPILING_NOTICE)
     bus, endpoint = _bus(listen, connect, zenoh_config)
     with bus, registered(swarm, endpoint) as known:
         on_event(f"swarm {swarm} on {endpoint}" + ("" if known else "; other commands must be told so: --connect"))

@@ -13,7 +13,7 @@ from kit import examples
 from test_emulator_kernel import Output, medium, run
 
 from emulator.channel.fading import law_of, lift
-from emulator.kernel.fading_gain import RICIAN
+from emulator.kernel.state import RICIAN
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import Poses, Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.bus.radio_control import Cut, Degrade, Jam

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kit import examples
 
+from emulator.channel.link_budget import heard_m, milliwatt, noise_mw, reach_m, received_dbm
 from emulator.channel.path_loss import (
     ENVIRONMENTS,
     air_to_air_db,
@@ -21,16 +22,7 @@ from emulator.channel.path_loss import (
     uma_av_db,
     uma_av_sight_probability,
 )
-from emulator.channel.propagation import (
-    Blocked,
-    LinkTable,
-    heard_m,
-    milliwatt,
-    noise_mw,
-    pair_codes,
-    reach_m,
-    received_dbm,
-)
+from emulator.channel.propagation import Blocked, LinkTable, pair_codes
 from emulator.channel.shadowing import Shadowing
 from emulator.kernel.state import AUDIBLE, LINK_DST, LINK_POWER, LINK_SRC
 from fanet_mw.errors import ConfigError

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -158,6 +159,39 @@ def test_affinity_finds_the_middle_of_two_groups() -> None:
     positions = {NodeId(n + 1): Enu(float(x), float(y), 0.0) for n, (x, y) in enumerate(places)}
     swarm = Swarm(positions, within_range(positions, range_m=RANGE_M))
     assert heads_of(AffinityPropagation(RANGE_M).divide(swarm)) == (1, 6)
+
+
+def exemplars_by_matrix(swarm: Swarm, method: AffinityPropagation) -> set[int]:
+    """Frey and Dueck (Science 315, 2007), equations 1 to 3, over whole matrices; beyond the range nothing is alike."""
+    nodes = sorted(swarm.adjacency)
+    s = np.full((len(nodes), len(nodes)), -np.inf)
+    for i, node in enumerate(nodes):
+        s[i, i] = method.preference * (1 + i * 1e-6)
+        for k, other in enumerate(nodes):
+            if other in swarm.adjacency[node]:
+                s[i, k] = -(math.dist(swarm.positions[node], swarm.positions[other]) ** 2) / RANGE_M**2
+    r, a = np.zeros_like(s), np.zeros_like(s)
+    for _ in range(method.rounds):
+        sums = a + s
+        rivals = np.array([[np.delete(row, k).max() for k in range(len(nodes))] for row in sums])
+        r = method.damping * r + (1 - method.damping) * np.where(np.isfinite(s), s - rivals, 0.0)
+        support = np.maximum(r, 0.0)
+        np.fill_diagonal(support, 0.0)
+        others = support.sum(axis=0)
+        fresh = np.minimum(0.0, np.diag(r) + others - support)
+        np.fill_diagonal(fresh, others)
+        a = method.damping * a + (1 - method.damping) * fresh
+    return {nodes[k] for k in np.flatnonzero(np.diag(r) + np.diag(a) > 0)}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_affinity_propagation_follows_its_equations(seed: int) -> None:
+    random = stream(seed, "affinity")
+    positions = {NodeId(n): Enu(random.uniform(0, 500), random.uniform(0, 500), 0.0) for n in range(1, 17)}
+    swarm = Swarm(positions, within_range(positions, range_m=RANGE_M))
+    method = AffinityPropagation(RANGE_M, rounds=60, settled=60)
+    assert exemplars_by_matrix(swarm, method) <= set(heads_of(method.divide(swarm)))
+    assert len(exemplars_by_matrix(swarm, method)) > 1
 
 
 def test_two_heads_that_meet_keep_their_clusters_for_the_contention_interval() -> None:

@@ -70,6 +70,13 @@ def test_a_survivor_goes_from_not_heard_to_confirmed_and_a_mistake_is_reopened(r
     ]  # fmt: skip
 
 
+def test_a_place_is_between_the_records_before_and_after_the_instant(make_scenario: Callable[..., Scenario]) -> None:
+    zigzag = [Posed(t * S, node, east, 0.0, 60.0) for t, east in enumerate([0.0, 10.0, 0.0, 30.0]) for node in (1, 2)]
+    seen = Replay(make_scenario(**KEYS), zigzag)
+    instants = (0.0, 0.5, 1.0, 1.5, 2.5, 3.0, 9.0)
+    assert [seen.at(t)[1].position.east for t in instants] == pytest.approx([0, 5, 10, 5, 15, 30, 30])
+
+
 def test_the_cluster_of_a_uav_is_that_of_the_instant(replay: Replay) -> None:
     assert [(state.role, state.head) for state in replay.at(2.5).values()] == [("head", 1), ("", 0)]
     assert [(state.role, state.head) for state in replay.at(3.0).values()] == [("head", 1), ("member", 1)]

@@ -22,6 +22,7 @@ from fanet_mw.wire import (
     filler,
 )
 from fanet_mw.wire.aggregation import unbundle
+from fanet_mw.wire.hello.digest import Digest
 from fanet_mw.wire.rounds import HeldPacket, decode_held
 
 OURS, NEAR, NEW = NodeId(2), NodeId(3), NodeId(4)
@@ -49,9 +50,10 @@ def hear(
     priority: int = PRIORITY_BULK,
     origin: NodeId | None = None,
     made_ns: int | None = None,
+    hop_limit: int = 8,
 ) -> None:
     made_us, hops = (at_ns if made_ns is None else made_ns) // 1000, 0 if origin is None else 2
-    header = Header(made_us, seq, origin or src, BROADCAST, src, kind, 8, hops, priority, FLAG_FLOOD)
+    header = Header(made_us, seq, origin or src, BROADCAST, src, kind, hop_limit, hops, priority, FLAG_FLOOD)
     node.hear(Reception(header.encode() + filler(40), src, at_ns, -60.0), at_ns)
 
 
@@ -142,6 +144,21 @@ def test_a_warning_goes_at_once_and_in_the_turn(make_node: MakeNode) -> None:
     assert [each.start_ns - born_ns < timing.slot_ns for each in node.requests] == [True]
     turns = [each.start_ns for each in run(node, born_ns + timing.period_ns, from_ns=born_ns)]
     assert timing.turn_start_ns(OURS, from_ns=born_ns) in turns
+
+
+def test_a_packet_that_may_go_one_hop_is_sent_again_by_its_origin_alone(make_node: MakeNode) -> None:
+    node = make_node(**{"routing.hop_limit": 1})
+    run(node, 1 * S)
+    node.send(filler(40), destination=BROADCAST, priority=PRIORITY_REPORT, app="a", born_ns=1 * S, now_ns=1 * S)
+    hear(node, 7, src=NEAR, at_ns=1 * S, priority=PRIORITY_REPORT, hop_limit=1)
+    run(node, 8 * S, from_ns=1 * S)
+    nothing = Digest((), complete=True).encode_frames(NEW)
+    header = Header(8_000_000, 1, NEW, BROADCAST, NEW, Kind.HELLO, 1, 0, PRIORITY_CONTROL, 0)
+    node.hear(Reception(header.encode() + nothing, NEW, 8 * S, -60.0), 8 * S)
+    packets = [
+        wire.decode_header(packet) for each in run(node, 10 * S, from_ns=8 * S) for packet in unbundle(each.frame)
+    ]
+    assert {header.origin for header in packets if header.kind == Kind.DATA} == {OURS}
 
 
 def test_what_comes_before_a_late_wake_up_does_not_cost_the_turn_that_was_asked_for(make_node: MakeNode) -> None:

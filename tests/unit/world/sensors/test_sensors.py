@@ -254,6 +254,8 @@ def test_a_uav_is_detected_as_often_as_a_swerling_1_target(make_scenario: MakeSc
     share = 1e-9 ** (1 / (1 + snr))
     assert_share(sum(bool(echoes) for echoes in found), 800, share)
     assert float(detected_share(np.array([snr]), false_alarm=1e-9)[0]) == pytest.approx(share)
+    told = [10 ** (echo.snr_db / 10) for echoes in found for echo in echoes]
+    assert min(told) > -math.log(1e-9) - 1 - 1e-6, "what is told as an echo is above the threshold, less the noise"
 
 
 def test_ranges_and_bearings_err_as_their_snr_says(make_scenario: MakeScenario) -> None:

@@ -13,12 +13,12 @@ from fanet_mw.units import S
 from sim.run.virtual import Observed, simulate
 
 KEYS = {
-    "nodes.count": 7, "nodes.spacing_m": 40, "nodes.altitude_m": 40, "duration_s": 80, "warmup_s": 1, "drain_s": 1,
+    "nodes.count": 7, "nodes.spacing_m": 40, "nodes.altitude_m": 40, "duration_s": 60, "warmup_s": 1, "drain_s": 1,
     "mission.survivors": 1, "mission.search": "lines", "mobility.model": "onboard", "mobility.speed_m_s": 7.5,
     "world.area_m": 240, "radio.range_m": 250, "traffic.arrivals": "none", "nodes.telemetry_hz": 0,
     "ground.at_m": (0.0, -150.0),
 }  # fmt: skip
-AT_S = 30
+AT_S = 20
 POST = 8
 
 
@@ -38,8 +38,8 @@ def track(records: Sequence[Record], node: int) -> dict[int, Posed]:
 def test_all_fly_home_and_land_when_they_are_recalled(
     make_scenario: Callable[..., Scenario], order: str, mode: str
 ) -> None:
-    records = flown(make_scenario, {"at_s": AT_S, "order": order}, duration_s=100)
-    for node in range(1, 8):
+    records = flown(make_scenario, {"at_s": AT_S, "order": order}, duration_s=80)
+    for node in range(1, POST):
         of_node = dict(modes(records, node))
         assert of_node[mode] == pytest.approx(AT_S, abs=2.0)
         start, *_, end = track(records, node).values()
@@ -52,7 +52,7 @@ def test_one_that_is_recalled_and_released_before_it_is_home_takes_part_again(
     make_scenario: Callable[..., Scenario],
 ) -> None:
     orders = {"at_s": AT_S, "order": "recall", "node": 3}, {"at_s": AT_S + 6, "order": "release", "node": 3}
-    records = flown(make_scenario, *orders, **{"world.base_m": (0.0, -220.0), "duration_s": 70})
+    records = flown(make_scenario, *orders, **{"world.base_m": (0.0, -220.0), "duration_s": 50})
     after = [mode for mode, t_s in modes(records, 3) if t_s > AT_S]
     assert after[0] == "recall"
     assert after[-1] in ("search", "respond")
@@ -71,14 +71,16 @@ def one_stays(make_scenario: Callable[..., Scenario]) -> Sequence[Record]:
 
 def test_one_stays_over_a_place_and_the_nearest_that_can_be_spared_is_sent(one_stays: Sequence[Record]) -> None:
     chosen = next(r.other for r in one_stays if isinstance(r, Ordered))
-    over = [one for t_s, one in track(one_stays, chosen).items() if t_s > AT_S + 30]
+    over = [one for t_s, one in track(one_stays, chosen).items() if t_s > AT_S + 25]
     assert max(math.hypot(one.east_m - STAY_M[0], one.north_m - STAY_M[1]) for one in over) < 12
     assert [mode for mode, _ in modes(one_stays, chosen)][-1] == "errand"
 
 
 def test_one_searches_around_a_place_up_to_the_radius(make_scenario: Callable[..., Scenario]) -> None:
     order = {"at_s": 15, "order": "search", "node": 2, "place_m": (0.0, 0.0), "radius_m": 80.0}
-    records = flown(make_scenario, order, **{"sensors.camera_hz": 2.0, "sensors.camera_fov_deg": 90.0})
+    records = flown(
+        make_scenario, order, **{"sensors.camera_hz": 2.0, "sensors.camera_fov_deg": 90.0, "duration_s": 80}
+    )
     around = [one for t_s, one in track(records, 2).items() if t_s > 35]
     seen = [
         (east, north) for east in range(-80, 81, 10) for north in range(-80, 81, 10) if math.hypot(east, north) <= 80

@@ -55,7 +55,7 @@ def test_no_frame_collides_where_all_is_urgent() -> None:
 def overloaded() -> Mapping[str, Any]:
     """Urgent packets beside more bulk than the air can carry."""
     bulk = {"name": "bulk", "payload_bytes": 1024, "interval_s": 0.03, "arrivals": "cbr", "sources": 14}
-    return flown(further_traffic=[bulk], traffic={"name": "finds"}, duration_s=12)
+    return flown(further_traffic=[bulk], traffic={"name": "finds"}, warmup_s=2.5, drain_s=3, duration_s=8.5)
 
 
 def test_bulk_beyond_what_the_air_carries_leaves_the_bounds_alone() -> None:
@@ -69,7 +69,7 @@ def test_bulk_beyond_what_the_air_carries_leaves_the_bounds_alone() -> None:
 
 
 def test_bulk_within_what_the_air_carries_reaches_everybody() -> None:
-    summary = flown(traffic={"payload_bytes": 1024, "priority": "bulk", "interval_s": 0.2})
+    summary = flown(traffic={"payload_bytes": 1024, "priority": "bulk", "interval_s": 0.2}, duration_s=11)
     assert summary["pdr"] == 1.0
     assert summary["air"]["pdr"] > 0.98, "bulk slots keep apart who could collide"
 
@@ -121,7 +121,7 @@ def test_no_bound_is_stated_while_clocks_may_be_further_apart_than_the_slack_of_
 ) -> None:
     """Of clocks 12 s apart, all that was stated excluded those whose statements about links seemed too old."""
     timing = {"turn_slack_us": slack_us, "bulk_share": 0}
-    summary = flown(clock={**clock, "drift_ppm": 1}, rounds=timing)
+    summary = flown(clock={**clock, "drift_ppm": 1}, rounds=timing, duration_s=11)
     assert summary["pdr"] == 1.0
     assert not summary["bound"]
 
@@ -137,7 +137,7 @@ def test_bounds_do_not_count_on_those_who_fly_away() -> None:
     """UAVs that mix at 20 m/s on 700 m leave each other's range all the time, and often the swarm."""
     mixing = {"model": "random_waypoint", "speed_m_s": 20.0}
     summary = flown(
-        seed=3, duration_s=30, nodes={"layout": "disc", "spacing_m": 100, "telemetry_hz": 1}, world={"area_m": 700},
+        seed=3, duration_s=22, nodes={"layout": "disc", "spacing_m": 100, "telemetry_hz": 1}, world={"area_m": 700},
         mobility=mixing, rounds={"bulk_share": 0},
     )  # fmt: skip
     bound = summary["bound"]
@@ -163,7 +163,7 @@ def test_bulk_for_a_neighbor_takes_one_frame_and_no_wait_for_a_slot() -> None:
 @pytest.mark.parametrize("speed_m_s", [20.0, *slow(10.0)])
 def test_bulk_for_one_finds_its_way_in_a_swarm_that_mixes(speed_m_s: float) -> None:
     mixing = {"model": "random_waypoint", "speed_m_s": speed_m_s}
-    lives = {"duration_s": 30, "drain_s": 7, "routing": {"lifetime_s": 6}}
+    lives = {"duration_s": 22, "drain_s": 7, "routing": {"lifetime_s": 6}}
     summary = to_one(traffic=ONE, mobility=mixing, world={"area_m": 500}, **lives)
     assert summary["reachable"]["traffic"]["pdr"] >= 0.99
     assert summary["frames"]["closes"]
@@ -201,6 +201,7 @@ def test_a_late_wake_up_of_a_process_costs_no_turn(monkeypatch: pytest.MonkeyPat
         "traffic": {"interval_s": 0.25, "payload_bytes": 64},
         "radio": {"lead_ms": 100, "handover_ms": 30},
         "rounds": {"bulk_share": 0},
+        "duration_s": 10,
     }
     exact = flown(**often)
     monkeypatch.setattr("sim.run.virtual.make_uav", WokenLate)

@@ -22,6 +22,7 @@ GEOMETRIES = st.builds(
     interference_m=st.sampled_from([250.0, 400.0, 600.0]),
     turns=st.integers(20, 900),
     hop_turns=st.integers(1, 12),
+    margin_m=st.just(0.0),
 )
 GRID: Places = tuple((NodeId(i + 1), Enu(200.0 * (i % 9), 200.0 * (i // 9), 50.0)) for i in range(45))
 
@@ -38,6 +39,9 @@ def senders_of(table: Timetable, turns: int) -> dict[int, list[NodeId]]:
     found: dict[int, list[NodeId]] = {}
     for turn in table.turns:
         found.setdefault(turn.offset % turns, []).append(turn.node)
+    for node, offsets in table.spare.items():
+        for offset in offsets:
+            found.setdefault(offset, []).append(node)
     return found
 
 
@@ -88,6 +92,28 @@ def test_every_flood_reaches_all_that_are_connected_undisturbed_and_relays_only_
         assert set(heard) == connected(at, root, geometry.link_m)
         assert set(at) - set(heard) == set(table.uncovered[root])
         assert table.spans[root] == turns[-1].offset - turns[0].offset + 1
+
+
+@given(PLACES, GEOMETRIES)
+@example(GRID, Geometry(250, 250, 400, 1))
+def test_in_a_turn_that_floods_leave_a_node_all_its_neighbors_hear_it(places: Places, geometry: Geometry) -> None:
+    table = table_of(places, geometry, 1)
+    if table is None:
+        return
+    at = dict(places)
+    by_turn = senders_of(table, geometry.turns)
+    for node, offsets in table.spare.items():
+        assert table.near[node] == {o for o in at if o != node and distance(at[o], at[node]) <= geometry.link_m}
+        for offset in offsets:
+            others = [o for o in by_turn[offset] if o != node]
+            assert not table.near[node] & set(others)
+            assert all(distance(at[o], at[n]) > geometry.interference_m for o in others for n in table.near[node])
+
+
+def test_floods_of_a_second_leave_each_node_of_the_grid_a_turn_every_fifteen_milliseconds() -> None:
+    table = table_of(GRID, Geometry(250, 250, 375, 1), 1)
+    assert table is not None
+    assert min(len(offsets) for offsets in table.spare.values()) * 15 >= 375 * 1.2
 
 
 def test_a_member_s_flood_goes_to_its_head_on_a_shortest_way_before_anyone_else_relays() -> None:

@@ -18,6 +18,7 @@ from fanet_mw.routing.clustered.contract import HearsCopies, ScheduledAccess
 from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTiming
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
+from fanet_mw.routing.clustered.forwarding.one_hop import OneHop
 from fanet_mw.routing.clustered.forwarding.uplink import Uplink
 from fanet_mw.routing.clustered.links.heard_load import HeardLoads, stated_loads
 from fanet_mw.routing.clustered.links.link_quality import LinkQuality
@@ -182,7 +183,8 @@ def _in_slots(ground: _Ground, rule: Rule, *hear_copies: HearsCopies) -> Cluster
     relaying = ContendingRelaying(ground.port, rule, ground.contention)
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
-        floods=ground.floods, roles=roles, access=access, relaying=relaying, contending=relaying, two_hops=None,
+        floods=ground.floods, roles=roles, access=access, relaying=relaying, contending=relaying,
+        one_hop=OneHop(ground.port, ground.neighbors), two_hops=None,
     )  # fmt: skip
     return _protocol(ground, whole, *hear_copies, parts.refresh)
 
@@ -196,7 +198,7 @@ def _by_choice(ground: _Ground, membership: Membership, choice: RelayChoice) -> 
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
         floods=ground.floods, roles=roles, access=access, relaying=relaying, contending=contending,
-        two_hops=relaying,
+        one_hop=OneHop(ground.port, ground.neighbors), two_hops=relaying,
     )  # fmt: skip
     return _protocol(ground, whole, parts.refresh)
 
@@ -219,14 +221,15 @@ def _by_timetable(ground: _Ground) -> Clustered:
     lead_ns = scenario.radio.lead_ns
     roots = RootRelease(port.node, ground.queue(), reserved=reserved(scenario), lead_ns=lead_ns)
     calls = CallRelease(TxQueue(capacity=scenario.routing.queue_frames), lead_ns=lead_ns)
+    spare = CallRelease(ground.queue(), lead_ns=lead_ns)
     followers = Followers(port.node)
     delays = StatedDelays(
         port, timetables=timetables, roots=roots, lease=parts.lease, admission=_admission(port), followers=followers
     )
     resumed = None if ground.missing is None else ResumedFloods(port, timetables, ground.floods)
     access = TurnAccess(
-        port, timetables=timetables, roots=roots, calls=calls, slots=_slots(ground, parts.membership), delays=delays,
-        floods=ground.floods, contention=ground.contention, resumed=resumed, followers=followers,
+        port, timetables=timetables, roots=roots, calls=calls, spare=spare, slots=_slots(ground, parts.membership),
+        delays=delays, floods=ground.floods, contention=ground.contention, resumed=resumed, followers=followers,
     )  # fmt: skip
     timetabling = FromPlaces(
         port,
@@ -246,7 +249,7 @@ def _by_timetable(ground: _Ground) -> Clustered:
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
         floods=ground.floods, roles=_roles(ground, parts, access, timetabling, heard), access=access, relaying=relaying,
-        contending=contending, two_hops=None, loads=heard, delays=delays, missing=ground.missing,
+        contending=contending, one_hop=None, two_hops=None, loads=heard, delays=delays, missing=ground.missing,
     )  # fmt: skip
     return _protocol(ground, whole, parts.refresh, calls)
 

@@ -1,8 +1,9 @@
 """The clustered protocol at one node: it hands each event to the parts of the protocol, and decides nothing itself.
 
     event                              parts that handle it
-    packet of an own application       access: it floods the packet from here, or sends it towards a head
-    packet on its way to a head        access: the same
+    packet of an own application       one_hop, if it is for a neighbor; otherwise
+                                       access: it floods the packet from here, or sends it towards a head
+    packet on its way to a head        the same
     flooded packet                     roles, if it is a control packet; relaying decides whether and when to pass it on
     hello                              neighbors, roles, gradient, repair; then access, which may have a route now
 
@@ -23,6 +24,7 @@ from fanet_mw.node.reader import decoded
 from fanet_mw.routing.clustered.contract import Access, HearsCopies, Relaying, TwoHops
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
+from fanet_mw.routing.clustered.forwarding.one_hop import OneHop
 from fanet_mw.routing.clustered.forwarding.uplink import MOST_TRIES, Uplink
 from fanet_mw.routing.clustered.links.heard_load import HeardLoads
 from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
@@ -54,6 +56,8 @@ class Parts(NamedTuple):
     contending: ContendingRelaying
     """Relaying in contention with other nodes, outside of slots and turns. `relaying` is this part itself, or hands it
     those packets about which it does not decide."""
+    one_hop: OneHop | None
+    """The way to a neighbor for which a packet is; None where turns are for that (`timetable/turn_access.py`)."""
     two_hops: TwoHops | None
     """What hellos say of the neighbors' neighbors; None if hellos say nothing of them."""
     loads: HeardLoads | None = None
@@ -93,7 +97,8 @@ class Clustered(RoutingProtocol):
         parts.floods.keep(packet, flooded=False, now_ns=due_ns)
         if packet.header.destination == BROADCAST:
             parts.roles.on_flooding(due_ns)
-        parts.access.originate(packet, due_ns=due_ns, now_ns=now_ns)
+        if parts.one_hop is None or not parts.one_hop.send(packet, start_ns=due_ns, now_ns=now_ns):
+            parts.access.originate(packet, due_ns=due_ns, now_ns=now_ns)
 
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> Sequence[Relay]:
         parts, header = self.parts, packet.header
@@ -109,11 +114,18 @@ class Clustered(RoutingProtocol):
             at_once = kind != _DATA and parts.roles.on_control(packet, reception.src, now_ns=now_ns)
             return parts.relaying.on_flood(packet, reception, at_once=at_once, now_ns=now_ns)
         if flags & FLAG_TO_HEAD:
-            if is_used_up(header):
-                self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
-            else:
-                parts.access.forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
+            self._pass_on(packet, now_ns)
         return ()
+
+    def _pass_on(self, packet: Packet, now_ns: int) -> None:
+        """Send a packet that is on its way to a head farther."""
+        parts, start_ns = self.parts, now_ns + self._lead_ns
+        if packet.header.destination == self._port.node:
+            return
+        if is_used_up(packet.header):
+            self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
+        elif parts.one_hop is None or not parts.one_hop.send(packet, start_ns=start_ns, now_ns=now_ns):
+            parts.access.forward(packet, start_ns=start_ns, now_ns=now_ns)
 
     def most_packet_bytes(self, priority: int) -> int:
         return self.parts.access.most_packet_bytes(priority)
@@ -137,6 +149,9 @@ class Clustered(RoutingProtocol):
 
     def on_status(self, status: TxStatus, *, now_ns: int) -> None:
         parts = self.parts
+        missed = None if parts.one_hop is None else parts.one_hop.failed(status)
+        if missed is not None:
+            parts.access.forward(missed, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
         failed = parts.uplink.on_status(status)
         if failed is None:
             return
@@ -230,7 +245,9 @@ class Clustered(RoutingProtocol):
     # --- for people -----------------------------------------------------------------------------------------------
 
     def waiting(self) -> int:
-        return len(self.parts.uplink) + self.parts.access.waiting() + self.parts.contending.waiting()
+        one_hop = self.parts.one_hop
+        alone = 0 if one_hop is None else len(one_hop)
+        return alone + len(self.parts.uplink) + self.parts.access.waiting() + self.parts.contending.waiting()
 
     def report(self) -> Mapping[str, object]:
         parts = self.parts

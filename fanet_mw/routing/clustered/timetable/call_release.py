@@ -1,8 +1,8 @@
-"""Releases hellos, and packets that neighbors have missed, in a node's calls.
+"""Releases in a node's calls what only its neighbors need, so no node relays it.
 
-A timetable for lossy links gives each node *calls* (`redundant_scheduling.py`); other timetables have none. A call is a
-turn in which the node sends one frame that only its neighbors need, so no node relays it. Missed packets wait for a
-call in the queue of this file; a hello reserves the next call when it is due (`reserve`).
+A timetable for lossy links gives each node *calls* (`redundant_scheduling.py`): missed packets wait for one in a queue
+of this file, a hello reserves the next one when it is due (`reserve`). Another timetable gives each node those *spare
+turns* that its floods leave (`list_scheduling.py`): packets for one neighbor wait for them in a second queue.
 """
 
 from collections.abc import Sequence
@@ -33,6 +33,21 @@ class CallRelease(TurnRelease):
         self._free_ns = turn.start_ns + 1
         self._arm(now_ns)
         return turn.start_ns
+
+    def has_turn(self, *, now_ns: int) -> bool:
+        """True if any known timetable gives this node a call from now on."""
+        return self._turn(max(now_ns + self._lead_ns, self._free_ns)) is not None
+
+    def last_ns(self, *, now_ns: int) -> int | None:
+        """The start of the call in which the packet that was queued last goes at the latest; None if it is unknown."""
+        earliest_ns, start_ns = max(now_ns + self._lead_ns, self._free_ns), None
+        for _ in range(len(self._queue)):
+            turn = self._turn(earliest_ns)
+            if turn is None:
+                return None
+            start_ns = turn.start_ns
+            earliest_ns = start_ns + 1
+        return start_ns
 
     @property
     def pending(self) -> TxQueue:

@@ -14,7 +14,7 @@ The computation uses integers and one named random stream, so all machines get t
 per packet and try for 45 nodes.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Final, NamedTuple
 
 from fanet_mw.rng import stream
@@ -164,25 +164,46 @@ class Packing:
             if under_way[-number].done:
                 del under_way[-number]
 
+    def spare(self, hears: Sequence[int]) -> list[list[int]]:
+        """For each row, the turns that floods leave in which it can reach all its neighbors at once; who has
+        fewest goes first.
+        """
+        found: list[list[int]] = [[] for _ in hears]
+        for turn in range(self._turns):
+            wanted = ((-len(turns), -row, row, hears[row]) for row, turns in enumerate(found) if hears[row])
+            following = self._filled[(turn + 1) % self._turns].sending
+            offers = sorted(self._possible(turn, wanted), reverse=True)
+            _, chosen, self._filled[turn] = self._choose(offers, self._filled[turn], following)
+            for _, _, row, _ in chosen:
+                found[row].append(turn)
+        return found
+
     def _offers(self, offset: int, under_way: dict[int, Flood]) -> list[_Offer]:
-        """The transmissions that would be possible in this turn if no other flood used it."""
+        """The transmissions of floods that would be possible in this turn if no other one used it."""
+        return self._possible(
+            offset,
+            (
+                (worth + age(flood, offset) // self._hop_turns, -number, row, receivers)
+                for number, flood in under_way.items()
+                for ready, worth, row, receivers in flood.offers()
+                if ready <= offset
+            ),
+        )
+
+    def _possible(self, offset: int, wanted: Iterable[_Offer]) -> list[_Offer]:
+        """Those transmissions that disturb none for which this turn is taken, nor are disturbed by one."""
         there = self._filled[offset % self._turns]
         following = self._filled[(offset + 1) % self._turns].sending
         barred = self._filled[(offset - 1) % self._turns].deaf | there.sending | there.disturbed
         disturbs = self._disturbs
-        found = []
-        for number, flood in under_way.items():
-            older = age(flood, offset) // self._hop_turns
-            for ready, worth, row, receivers in flood.offers():
-                if (
-                    ready <= offset
-                    and not barred >> row & 1
-                    and not disturbs[row] & there.meant
-                    and not receivers & there.disturbed
-                    and not there.disturbed & disturbs[row] & following
-                ):
-                    found.append((worth + older, -number, row, receivers))
-        return found
+        return [
+            offer
+            for offer in wanted
+            if not barred >> offer[2] & 1
+            and not disturbs[offer[2]] & there.meant
+            and not offer[3] & there.disturbed
+            and not there.disturbed & disturbs[offer[2]] & following
+        ]
 
     def _shuffled(self, offers: list[_Offer]) -> list[_Offer]:
         random: Callable[[], float] = self._random

@@ -37,6 +37,10 @@ class NodeTimetable(NamedTuple):
     """The later turns in which this node repeats what it has transmitted in each of its root turns."""
     calls: tuple[int, ...]
     """The turns in which this node transmits frames that only its neighbors need."""
+    spare: tuple[int, ...]
+    """The turns in which this node transmits packets for one of its neighbors."""
+    near: frozenset[NodeId]
+    """The neighbors that hear it in these turns."""
     together: int
     frame_bytes: int
     whole: bool
@@ -64,6 +68,8 @@ class NodeTimetable(NamedTuple):
             roots=tuple(sorted(offsets[0] for offsets in own)),
             again={offsets[0]: tuple(offsets[1:]) for offsets in own},
             calls=table.calls.get(node, ()),
+            spare=table.spare.get(node, ()),
+            near=table.near.get(node, frozenset()),
             together=found.together,
             frame_bytes=found.frame_bytes,
             whole=found.whole,

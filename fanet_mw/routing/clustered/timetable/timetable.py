@@ -60,6 +60,10 @@ class Timetable(NamedTuple):
     """For each root, the number of hops to the farthest node, if each relay passes on the first copy that it hears."""
     sure: bool = True
     """False if it uses links that errors of positions may have made."""
+    spare: Mapping[NodeId, tuple[int, ...]] = MappingProxyType({})
+    """For each node, the turns that floods leave it: it can transmit to its neighbors alone, and disturbs nobody."""
+    near: Mapping[NodeId, frozenset[NodeId]] = MappingProxyType({})
+    """For each node, its neighbors, which all hear it in these turns."""
 
     def roots(self) -> list[Turn]:
         """The turns in which roots transmit new packets; repetitions are not among them."""
@@ -95,7 +99,8 @@ def timetable(
     head_of = dict(heads)
     ordered = _in_order(roots, dict(positions))
     floods = [Flood(swarm, swarm.nodes.row[root], swarm.way(root, head_of.get(root, root))) for root, _ in ordered]
-    if not Packing(swarm, geometry, effort).place(floods):
+    packing = Packing(swarm, geometry, effort)
+    if not packing.place(floods):
         return None
     block = [
         Turn(offset, swarm.nodes.ids[row], root, instance)
@@ -106,7 +111,14 @@ def timetable(
     uncovered = _uncovered(swarm.nodes, ordered, floods)
     hops = _hops(swarm.nodes, swarm.hears, ordered, floods)
     used = len({turn.offset % whole for turn in turns})
-    return Timetable(turns, _spans(turns), uncovered, used, hops=hops, sure=swarm.sure)
+    ids = swarm.nodes.ids
+    starts = range(0, blocks * geometry.turns, geometry.turns)
+    spare = {
+        ids[row]: tuple(start + offset for start in starts for offset in offsets)
+        for row, offsets in enumerate(packing.spare(swarm.hears))
+    }
+    near = {ids[row]: frozenset(swarm.nodes.of(heard)) for row, heard in enumerate(swarm.hears)}
+    return Timetable(turns, _spans(turns), uncovered, used, hops=hops, sure=swarm.sure, spare=spare, near=near)
 
 
 @lru_cache(maxsize=16)

@@ -4,6 +4,9 @@ Until a timetable gives the node turns, it sends its packets to a head, as in th
 turn contend in the window at the beginning of each superframe: hellos, joins, unicasts to a head, and packets that
 neighbors have missed. Over lossy links, hellos and missed packets have turns of their own, the calls, and each frame is
 repeated in later turns that `redundant_scheduling.py` has chosen.
+
+A packet for one neighbor is not flooded: it goes in the next turn that floods leave this node. Its receiver needs no
+relay, and a turn for one hop is sooner free than one for a flood.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,8 +27,8 @@ from fanet_mw.routing.clustered.timetable.root_release import RootRelease, Turns
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
 from fanet_mw.routing.clustered.timetable.turn_size import most_packet_bytes
-from fanet_mw.units import US, S, earliest, seconds_to_ns
-from fanet_mw.wire import Kind
+from fanet_mw.units import BROADCAST, US, S, earliest, seconds_to_ns
+from fanet_mw.wire import PRIORITY_BULK, Kind
 
 _MOST_ANSWERS: Final = 2
 """The greatest number of missed packets that wait for calls; any further ones contend."""
@@ -44,6 +47,7 @@ class TurnAccess:
         timetables: TimetablesInForce,
         roots: RootRelease,
         calls: CallRelease,
+        spare: CallRelease,
         slots: SlotAccess,
         delays: StatedDelays,
         floods: Floods,
@@ -55,6 +59,7 @@ class TurnAccess:
         self._timetables = timetables
         self._roots = roots
         self._calls = calls
+        self._spare = spare
         self._slots = slots
         self._delays = delays
         self._floods = floods
@@ -83,6 +88,8 @@ class TurnAccess:
         if timetable is None:
             self._calls.drain()  # neighbors will state again what they lack
         stranded = [] if self._roots.has_turn(now_ns=now_ns) else self._stranded(now_ns)
+        if not self._spare.has_turn(now_ns=now_ns):
+            stranded += self._kept(self._spare.drain(), through_ns=None, now_ns=now_ns)
         for packet in [*stranded, *self._slots.drain()]:
             self.forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
 
@@ -113,6 +120,10 @@ class TurnAccess:
         )
         self._calls.follow(
             [TurnsInForce(one.valid_ns, one.turns, one.calls, one.frame_bytes, 1) for one in timetables],
+            now_ns=now_ns,
+        )
+        self._spare.follow(
+            [TurnsInForce(one.valid_ns, one.turns, one.spare, one.frame_bytes, 1) for one in timetables],
             now_ns=now_ns,
         )
 
@@ -147,8 +158,17 @@ class TurnAccess:
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         self.forward(packet, start_ns=due_ns, now_ns=now_ns)
         bound_ns = self._delays.greatest_bound_ns(packet, now_ns=now_ns)
-        through_ns = None if bound_ns is None else self._roots.through_ns(packet, now_ns=now_ns)
+        through_ns = None if bound_ns is None else self._over_ns(packet, now_ns)
         self._delays.state(packet, bound_ns, through_ns=through_ns, now_ns=now_ns)
+
+    def _over_ns(self, packet: Packet, now_ns: int) -> int | None:
+        """The instant at which all that the node sends of a packet that was just queued is over; None: unknown."""
+        timetable = self._timetables.at(now_ns)
+        flooded = packet.header.destination == BROADCAST or not self._spare.holds(key_of_packet(packet))
+        if timetable is None or flooded:
+            return self._roots.through_ns(packet, now_ns=now_ns)
+        start_ns = self._spare.last_ns(now_ns=now_ns)
+        return None if start_ns is None else start_ns + timetable.turns.turn_ns
 
     def forward(self, packet: Packet, *, start_ns: int, now_ns: int, tries: int = 0) -> None:
         if self._roots.has_turn(now_ns=now_ns):
@@ -161,6 +181,11 @@ class TurnAccess:
         """Queue a packet for the turns of this node; with `last` it goes behind all others, including later ones."""
         newest = self._timetables.newest
         assert newest is not None, "a node without a timetable has no turn"
+        if self._is_for_neighbor(packet, now_ns):
+            evicted = self._spare.push(packet, now_ns=now_ns)
+            if evicted is not None:
+                self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
+            return
         size = newest.frame_bytes
         if packet.header.kind == Kind.DATA:
             reserved = self._roots.reserved
@@ -171,6 +196,20 @@ class TurnAccess:
         evicted = self._roots.push(packet, last=last, now_ns=now_ns)
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
+
+    def _is_for_neighbor(self, packet: Packet, now_ns: int) -> bool:
+        """True if a packet is bulk for one neighbor, which will hear it in a turn that floods leave, because all nodes
+        keep the same timetable.
+        """
+        header, timetable = packet.header, self._timetables.at(now_ns + self._lead_ns)
+        return (
+            timetable is not None
+            and header.destination in timetable.near
+            and header.priority == PRIORITY_BULK
+            and len(packet.frame) <= timetable.frame_bytes
+            and self._spare.has_turn(now_ns=now_ns)
+            and self._followers.have(timetable.version, timetable.table.spans)
+        )
 
     def flood_control(
         self, kind: Kind, inner: bytes, *, now_ns: int, urgent: bool = False, patient: bool = False
@@ -221,6 +260,7 @@ class TurnAccess:
             self._slots.next_wake_ns(),
             self._roots.next_wake_ns(),
             self._calls.next_wake_ns(),
+            self._spare.next_wake_ns(),
             self._delays.next_wake_ns(),
             None if self._resumed is None else self._resumed.next_wake_ns(),
         )
@@ -230,8 +270,9 @@ class TurnAccess:
         self._delays.wake(now_ns)
         if self._resumed is not None:
             self._resumed.wake(now_ns)
-        for packet in self._roots.expire(before_us=(now_ns - self._lifetime_ns) // US):
-            self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+        for release in (self._roots, self._spare):
+            for packet in release.expire(before_us=(now_ns - self._lifetime_ns) // US):
+                self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         for packets, start_ns in self._roots.due(now_ns=now_ns):
             kept = self._kept(packets, through_ns=self._through_ns(start_ns), now_ns=now_ns)
             if kept:
@@ -242,6 +283,11 @@ class TurnAccess:
                 self.forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
         for packets, start_ns in self._calls.due(now_ns=now_ns):
             self._floods.answer(packets, start_ns=start_ns)
+        for packets, start_ns in self._spare.due(now_ns=now_ns):
+            timetable = self._timetables.at(start_ns)
+            assert timetable is not None, "a spare turn is one of a timetable"
+            kept = self._kept(packets, through_ns=start_ns + timetable.turns.turn_ns, now_ns=now_ns)
+            self._port.transmit_together(kept, flags=0, at_ns=(start_ns,))
 
     def _through_ns(self, start_ns: int) -> int | None:
         """The end of the flood that begins in one of the node's turns; None if no timetable is in force."""
@@ -266,7 +312,7 @@ class TurnAccess:
     # --- for people -----------------------------------------------------------------------------------------------
 
     def waiting(self) -> int:
-        return self._slots.waiting() + len(self._roots)
+        return self._slots.waiting() + len(self._roots) + len(self._spare)
 
     def report(self) -> Mapping[str, object]:
         newest = self._timetables.newest

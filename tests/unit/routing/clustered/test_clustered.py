@@ -53,6 +53,15 @@ def sent(node: Node, kind: Kind = Kind.DATA) -> list[wire.Header]:
     return [header for r in node.requests if (header := wire.decode_header(r.frame)).kind == kind]
 
 
+def test_a_packet_that_has_reached_its_receiver_goes_no_farther(make_node: MakeNode) -> None:
+    node = make_node()
+    name_head(node)
+    hear(node, data(flags=FLAG_TO_HEAD, destination=OURS), filler(40))
+    assert node.report()["waiting"] == 0
+    hear(node, data(flags=FLAG_TO_HEAD, destination=THEIRS), filler(60))
+    assert node.report()["waiting"] == 1, "that of another one waits for the slot"
+
+
 def test_a_hop_limit_ends_a_packet_on_its_way_to_a_head(make_node: MakeNode) -> None:
     node = make_node()
     hear(node, data(flags=FLAG_TO_HEAD, hop_limit=1), filler(40))

@@ -51,6 +51,10 @@ class BoundExcludes(NamedTuple):
     other: int
 
 
+LIKELY_SHARE: Final = 0.99
+"""The share of a packet's copies for which a likely delay is stated."""
+
+
 class LikelyStated(NamedTuple):
     """The origin stated, when it accepted a packet, a delay within which at least this share of its copies arrive.
 

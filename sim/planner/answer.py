@@ -16,9 +16,9 @@ from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.errors import ConfigError
 from fanet_mw.graph.topology import within_range
 from fanet_mw.rng import stream
-from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE
 from fanet_mw.routing.clustered.timetable.turn_size import links
 from fanet_mw.scenario import Scenario
+from fanet_mw.trace import LIKELY_SHARE
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.places import rounded
 from sim.planner import (

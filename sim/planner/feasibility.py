@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 from fanet_mw import wire
 from fanet_mw.bounds import Bounded, DelayBound, Refused, paper
-from fanet_mw.graph.topology import levels, within_range
+from fanet_mw.graph.topology import Adjacency, components, levels, within_range
 from fanet_mw.routing.clustered.clustering import Cluster, Swarm
 from fanet_mw.routing.clustered.clustering.division import Division
 from fanet_mw.routing.clustered.tdma.turn_timing import receipt_ns
@@ -24,7 +24,7 @@ from fanet_mw.routing.clustered.timetable.reserved_room import reserved
 from fanet_mw.routing.clustered.timetable.turn_size import links, schedule_parts, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S
-from sim.planner import contention_window, flood_hops, problems_and_notes, reachability
+from sim.planner import contention_window, flood_hops, problems_and_notes
 from sim.planner.demand import ClassPlan, TrafficClass
 from sim.planner.flood_cost import FloodCost
 from sim.planner.goodput_bound import Goodput, any_protocol
@@ -35,6 +35,8 @@ from sim.planner.site import Site
 from sim.planner.timetable_plan import Candidate, TimetablePlan, judge, table_for
 from sim.planner.uplink_delay import Ways, access_outcome, ways
 
+_NAMED: Final = 12
+"""So many nodes that are cut off are named."""
 _ASSUMED_UPLINK_NS: Final = 1 * S
 
 
@@ -96,7 +98,7 @@ def evaluate(
         if judged.unfit or judged.cut_off or deadline_ns is None
         else tuple(problems_and_notes.late(summed, deadline_ns))
     )
-    cut_off = tuple(reachability.problems(judged.cut_off))
+    cut_off = tuple(_in_parts(judged.cut_off))
     uplinks_ns = contention_window.uplinks_ns(scenario, found.through, classes)
     crowded = tuple(contention_window.too_short(scenario, site.adjacency, uplinks_ns)) if site.timetable else ()
     clocks = problems_and_notes.clocks_apart if site.timetable else problems_and_notes.refused_time
@@ -266,7 +268,7 @@ def _in_turns(site: Site, found: FittedTimetable | Refused, candidates: Sequence
         for c in candidates
     )
     turns = TimetablePlan(found.turns, found.table.used, len(found.table.roots()), found.table, found.together)
-    return _Judged(judged, reachability.missed(found.table.uncovered, leader=scenario.leader), turns)
+    return _Judged(judged, _missed(found.table.uncovered, leader=scenario.leader), turns)
 
 
 def _in_slots(site: Site, candidates: Sequence[Candidate], jitter_ns: int) -> _Judged:
@@ -277,7 +279,7 @@ def _in_slots(site: Site, candidates: Sequence[Candidate], jitter_ns: int) -> _J
         _cluster(candidate, slot_ns=slot_ns, period_ns=period_ns, guard_ns=site.guard_ns, jitter_ns=jitter_ns)
         for candidate in candidates
     )
-    return _Judged(judged, reachability.split(site.adjacency, leader=site.scenario.leader))
+    return _Judged(judged, _split(site.adjacency, leader=site.scenario.leader))
 
 
 def _refused(candidate: Candidate, why: Refused, period_ns: int) -> ClusterPlan:
@@ -353,3 +355,25 @@ def _paper(clusters: Sequence[ClusterPlan], scenario: Scenario) -> DelayBound:
             return found
         worst_ns = max(worst_ns, found.delay_ns)
     return Bounded(worst_ns)
+
+
+def _split(adjacency: Adjacency, *, leader: NodeId) -> tuple[NodeId, ...]:
+    """The nodes that have no connection with the leader over any number of hops."""
+    return tuple(sorted(node for part in components(adjacency) if leader not in part for node in part))
+
+
+def _missed(uncovered: Mapping[NodeId, Sequence[NodeId]], *, leader: NodeId) -> tuple[NodeId, ...]:
+    """The nodes that a timetable does not reach: those that the leader's floods miss, or else those
+    of some other root.
+    """
+    found = uncovered.get(leader) or next((nodes for _, nodes in sorted(uncovered.items()) if nodes), ())
+    return tuple(found)
+
+
+def _in_parts(cut_off: Sequence[NodeId]) -> Iterator[str]:
+    """A sentence about the nodes that are cut off; nothing if there are none."""
+    if cut_off:
+        named = ", ".join(map(str, cut_off[:_NAMED]))
+        rest = f" and {len(cut_off) - _NAMED} more" if len(cut_off) > _NAMED else ""
+        noun = "node" if len(cut_off) == 1 else "nodes"
+        yield f"the swarm is in parts: no flood of the leader's part reaches {noun} {named}{rest}"

@@ -6,8 +6,8 @@ from typing import Final
 
 from agents.ground_control.telemetry_pace import pace_of
 from fanet_mw.bounds import Bounded, DelayBound, Refused
-from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE
 from fanet_mw.scenario import Scenario
+from fanet_mw.trace import LIKELY_SHARE
 from fanet_mw.units import MS, S
 from sim.planner.cheapest_change import ScenarioChange
 from sim.planner.demand import ClassPlan

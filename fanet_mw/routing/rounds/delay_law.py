@@ -36,7 +36,6 @@ _SILENT_HELLOS: Final = 1.6
 _MOST_USED: Final = 0.75
 _MOST_URGENT: Final = 0.5
 """No bound is stated while more urgent packets use a greater share of turns."""
-LIKELY_SHARE: Final = 0.99
 _KEPT: Final = 0.997
 """The share of received packets whose ratio is not exceeded; the rest of what may be missing never arrives."""
 _FEWEST: Final = 300

@@ -27,13 +27,13 @@ from fanet_mw.node.reader import decoded
 from fanet_mw.node.received_motion import motion_in
 from fanet_mw.routing.packet_repair import FLOOD_OVER_NS, Repair
 from fanet_mw.routing.rounds.bulk_slots import BulkSlots
-from fanet_mw.routing.rounds.delay_law import LIKELY_SHARE, MOST_HOPS, DelayLaw, LikelyDelay
+from fanet_mw.routing.rounds.delay_law import MOST_HOPS, DelayLaw, LikelyDelay
 from fanet_mw.routing.rounds.lasting_links import LastingLinks
 from fanet_mw.routing.rounds.one_way import OneWay
 from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.routing.rounds.spreading import Spreading
 from fanet_mw.routing.rounds.topology import Topology
-from fanet_mw.trace import BoundExcludes, BoundStated, LikelyStated
+from fanet_mw.trace import LIKELY_SHARE, BoundExcludes, BoundStated, LikelyStated
 from fanet_mw.units import BROADCAST, US, NodeId, seconds_to_ns
 from fanet_mw.wire import FLAG_FLOOD, HEADER_BYTES, PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY, Content, Kind
 from fanet_mw.wire.hello.digest import MESSAGE_BYTES, Digest, capacity

@@ -19,7 +19,7 @@ from sim.figures.all_figures import FIGURES, chosen
 from sim.figures.finished_runs import Runs, differences, max_per_seed, mean_per_seed
 from sim.figures.kept_tables import keep, read_kept
 from sim.figures.paper_claims import Claim, Finding, Reason, Statement, Verdict, above, below
-from sim.figures.render import render
+from sim.figures.recipe import render
 from sim.figures.rescue import confirmed_s, loss_share
 from sim.figures.statistics import DISTANCE, SHARE, interval, quantile_975
 from sim.figures.style import beside, canvas, legend_above, reaches, spaced

@@ -48,11 +48,6 @@ class Superframe(NamedTuple):
             start_ns += self.period_ns
         return Slot(start_ns, start_ns + usable_ns)
 
-    def slot_at(self, t_ns: int) -> int | None:
-        """The slot in whose usable part an instant lies; None in a guard time, or in the rest of the superframe."""
-        slot, rest = divmod((t_ns - self.origin_ns) % self.period_ns, self.slot_ns)
-        return slot if slot < self.slots and rest < self.slot_ns - self.guard_ns else None
-
     def report(self) -> Mapping[str, object]:
         """The geometry as JSON values; cluster k has slot k."""
         return {

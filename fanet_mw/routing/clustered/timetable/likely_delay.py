@@ -8,10 +8,9 @@ from typing import Final
 
 from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.packet_repair import RIPE_NS
+from fanet_mw.trace import LIKELY_SHARE
 from fanet_mw.units import NodeId
 
-LIKELY_SHARE: Final = 0.99
-"""The share of copies for which the likely delay is stated."""
 _LATE_HELLO: Final = 1.1
 """The longest time between two hellos, in hello intervals."""
 _BUSY: Final = 2

@@ -200,7 +200,8 @@ class Searcher:
         if not self._return_home.leaves and self._orders.errand is None:
             self._bidding.bid(now_ns, delay_s=self._flight.take_off_s)
             self._bidding.choose(now_ns)
-            goes = self._bidding.is_absent(now_ns) or (self._place.plan is None and self._bidding.survivor is not None)
+            goes = self._bidding.is_absent(now_ns) or self._place.strays(now_ns)
+            goes = goes or (self._place.plan is None and self._bidding.survivor is not None)
             self._plans.be_absent(self._percent, now_ns, goes=goes)
         self._mode.review(self._bidding.survivor, now_ns)
 

@@ -134,6 +134,12 @@ class FormationPlace:
         ahead_m, aside_m = along(moves, here.east - lane.east, here.north - lane.north)
         return abs(aside_m) <= _LEASH_M and abs(ahead_m) <= _LAG_M
 
+    def strays(self, now_ns: int) -> bool:
+        """True for a UAV that has left a row for somebody, as others may while they are near each other, or comes late
+        to it: it is too far away to hold the row together.
+        """
+        return self.searches and self.is_taken_up(now_ns) and self.is_free(now_ns) and not self.is_near(now_ns)
+
     def can_be_spared(self, now_ns: int) -> bool:
         """True if the others of its row can close ranks without this UAV, and the row stays as long as it is."""
         pattern, place, at_s = self.pattern, self.place, self.swept_s(now_ns)

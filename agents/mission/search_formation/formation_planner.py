@@ -226,6 +226,7 @@ class FormationPlanner:
         """The first plan of a formation, for all UAVs that were received and stay, `but` these."""
         staying = (node for node, member in self._members.items() if not member.leaves and node not in but)
         nodes = sorted(staying)[: pattern.places]
+        pattern = pattern.begun_around([self._members[node].position for node in nodes])
         alone = len(nodes) == 1
         places = [(nodes[0] - 1) % pattern.places] if alone else list(range(pattern.places))
         goals = [pattern.at(place, 0.0) for place in places]

@@ -3,7 +3,7 @@
 The words place, team, lane, relay and follower are explained in `shapes/contract.py`.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from typing import Final, assert_never
 
@@ -54,6 +54,18 @@ class Pattern:
         """The same formation without the UAVs of these places."""
         return Pattern(self.dimensions, reach_m=self._reach_m, vacant=vacant)
 
+    def begun_around(self, positions: Sequence[Enu]) -> "Pattern":
+        """A ring begins as large as the swarm that stands about the middle of the area, rather than draw together
+        first; other formations begin as they are.
+        """
+        made = self.dimensions
+        east, north = [at.east for at in positions], [at.north for at in positions]
+        sides_m = [max(east, default=0.0), -min(east, default=0.0), max(north, default=0.0), -min(north, default=0.0)]
+        if made.shape is not ShapeName.RING or min(sides_m) <= 0:
+            return self
+        first_m = max(made.first_m, min(made.last_m / 2, sum(sides_m) / 4))
+        return Pattern(made._replace(first_m=first_m), reach_m=self._reach_m)
+
     def spans(self, vacant: frozenset[int]) -> bool:
         """True if the UAVs of the other places can sweep all that this formation sweeps."""
         if self.dimensions.shape is ShapeName.CIRCUIT or not vacant:
@@ -91,6 +103,8 @@ class Pattern:
     def at(self, place: int, swept_s: float) -> Enu:
         """The position of a place after this time of sweeping; before 0, where the sweep begins."""
         flown = self._flown.get(place, place)
+        if isinstance(self.shape, Ring) and place < self.dimensions.lanes:
+            return self.shape.at((flown + self.shape.turned(swept_s)) % self.dimensions.lanes, swept_s)
         at = self.shape.at(flown, swept_s)
         aside_m = self.shape.aside_m(flown, swept_s) if isinstance(self.shape, Lines | Sectors) else 0.0
         return at._replace(east=at.east + aside_m) if aside_m else at

@@ -241,7 +241,7 @@ def nearest_m(places: Iterable[Enu], east_m: float, north_m: float) -> float:
     return min(math.hypot(place.east - east_m, place.north - north_m) for place in places)
 
 
-def swept_m(formation: Dimensions, swept_s: float, *, faster_back: float = BACK) -> float:
+def swept_m(formation: Dimensions, swept_s: float, *, faster_back: float = BACK, turn_s: float = TURN_S) -> float:
     """The distance of a line from the middle, or of a sector's team from the side where its sweep begins.
 
     The team flies out at the speed of the sweep, waits, flies back `faster_back` times as fast, and begins again.
@@ -249,7 +249,7 @@ def swept_m(formation: Dimensions, swept_s: float, *, faster_back: float = BACK)
     if swept_s <= 0:
         return formation.first_m
     out_s = (formation.last_m - formation.first_m) / formation.speed_m_s
-    along_s = swept_s % (out_s + TURN_S + out_s / faster_back)
+    along_s = swept_s % (out_s + turn_s + out_s / faster_back)
     if along_s <= out_s:
         return formation.first_m + along_s * formation.speed_m_s
-    return formation.last_m - max(0.0, along_s - out_s - TURN_S) * formation.speed_m_s * faster_back
+    return formation.last_m - max(0.0, along_s - out_s - turn_s) * formation.speed_m_s * faster_back

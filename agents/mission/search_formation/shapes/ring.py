@@ -39,6 +39,8 @@ _BEHIND: Final = 0.4
 _CORNERS: Final = 4
 _CATCHES_UP: Final = 0.6
 """A UAV within this share of half a side from its middle catches up with the ring when it has left it."""
+_TURN_S: Final = 30.0
+"""How long the ring waits at the edge: all is searched, and who was heard there last is still to be seen."""
 _SLOWER: Final = BACK / math.sqrt(2)
 """The speed of the sides, as a multiple of the speed of the sweep: the corners, which are faster by the root of 2, fly
 no faster than others on a way back, so that whoever has fallen behind can catch up."""
@@ -77,6 +79,14 @@ class Ring:
         side, on_side = divmod(place, self._formation.lanes / _CORNERS)
         return int(side) % _CORNERS, 2 * on_side * _CORNERS / self._formation.lanes - 1
 
+    def turned(self, swept_s: float) -> float:
+        """By how many places all of the ring have moved along it: at each turn at the edge they move between their
+        ways, as lines do, and back at the next one.
+        """
+        turn, into_s = divmod(swept_s - self.sweep_s, 2 * self.sweep_s + _TURN_S)
+        share = min(1.0, into_s / _TURN_S)
+        return 0.0 if turn < 0 else (1 - share if turn % 2 else share) / 2
+
     def tethers(self, place: int) -> tuple[int, ...]:
         lanes = self._formation.lanes
         if place >= lanes:
@@ -104,7 +114,7 @@ class Ring:
     def _half_m(self, swept_s: float) -> float:
         formation = self._formation
         slower = formation._replace(speed_m_s=formation.speed_m_s * _SLOWER)
-        return min(self._most_m, swept_m(slower, swept_s, faster_back=1.0))
+        return min(self._most_m, swept_m(slower, swept_s, faster_back=1.0, turn_s=_TURN_S))
 
 
 def fitted(count: int, demands: Demands) -> Dimensions | None:

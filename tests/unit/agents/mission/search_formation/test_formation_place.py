@@ -4,6 +4,9 @@ import pytest
 from search_board import FOLLOWER, LINE, PLAN, TAKEN_UP_NS, UP_M, Board
 
 from agents.mission.finding.phone_localization import Estimate
+from agents.mission.search_formation.formation_planner import plan_of
+from agents.mission.search_formation.pattern import fitted
+from agents.mission.search_formation.shapes.contract import Demands, ShapeName
 from fanet_mw.units import STILL, US, Enu, NodeId, S
 
 
@@ -53,3 +56,18 @@ def test_a_uav_knows_how_far_its_place_keeps_it_from_a_survivor_for_good() -> No
     assert misses_m(FOLLOWER, 300, 0) == 0.0
     assert misses_m(LINE, 0, 520, STILL) == 0.0, "a line that waits for its turn comes back"
     assert misses_m(middle_relay, 0, 520, STILL) == pytest.approx(20), "a relay that stands stays"
+
+
+def test_who_has_left_a_ring_for_somebody_strays_until_it_is_back_and_nobody_of_a_line_does() -> None:
+    made = fitted(45, Demands(2500, 137, 250, UP_M, 7.5), shape=ShapeName.RING)
+    assert made is not None
+    now_ns = TAKEN_UP_NS + 5 * S
+    ring = plan_of(made, tuple(range(1, 46)), planner=1, start_us=PLAN.start_us, deploy_ds=PLAN.deploy_ds)
+    for node, plan, strays in ((NodeId(4), ring, True), (NodeId(5), ring, False), (LINE, PLAN, False)):
+        board = Board(node, Enu(0, 0, UP_M))
+        board.place.adopt(plan, 0)
+        lane = board.place.lane(now_ns)[0]
+        for off_m, far in ((20, False), (300, True)):
+            board.own_motion.fix(lane._replace(east=lane.east + off_m, north=lane.north + off_m), STILL, now_ns=now_ns)
+            assert board.place.strays(now_ns) == (strays and far), (node, off_m)
+            assert not board.place.strays(TAKEN_UP_NS - 1)

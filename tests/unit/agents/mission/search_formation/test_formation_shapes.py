@@ -200,16 +200,21 @@ def test_one_more_uav_is_never_slower(shape: ShapeName) -> None:
     assert all(after <= before + 1e-9 for before, after in itertools.pairwise(times))
 
 
-@pytest.mark.parametrize(("count", "area_m"), [(45, 2500), (20, 1000), (41, 1000)])
-def test_lines_show_on_their_way_back_what_no_camera_has_shown_on_their_way_out(count: int, area_m: float) -> None:
-    pattern = formed(ShapeName.LINES, count, area_m)
+@pytest.mark.parametrize(
+    ("shape", "count", "area_m"),
+    [(ShapeName.LINES, 45, 2500), (ShapeName.LINES, 20, 1000), (ShapeName.LINES, 41, 1000), (ShapeName.RING, 20, 1000)],
+)
+def test_lines_and_rings_show_on_their_way_back_what_no_camera_has_shown_on_their_way_out(
+    shape: ShapeName, count: int, area_m: float
+) -> None:
+    pattern = formed(shape, count, area_m)
     keys = [f"world.area_m={area_m}", f"nodes.count={count}", "nodes.spacing_m=50"]
     cells, shown = PhotographedCells(catalog.find("rescue", keys)), []
-    for second in range(math.ceil(2 * pattern.shape.sweep_s) + 10):
+    for second in range(math.ceil(2 * pattern.shape.sweep_s) + 30):
         cells.add(pattern.at(place, second) for place in range(pattern.dimensions.fixed))
         shown.append(cells.share)
     assert shown[math.ceil(pattern.shape.sweep_s)] < 0.85
-    assert shown[-1] > 0.98
+    assert shown[-1] > (0.98 if shape is ShapeName.LINES else 0.92), "neighbors in a ring are farther apart"
 
 
 @pytest.mark.parametrize("count", [6, 9, 15])
@@ -233,6 +238,21 @@ def test_a_ring_is_so_large_that_it_hangs_by_no_single_uav() -> None:
         apart = np.array([[a.minus(b).norm() for a in places] for b in places])
         assert coherence(apart <= REACH_M).biconnected, second
         assert np.sort(apart, axis=1)[:, 1].min() > 20.0, second
+
+
+def test_a_ring_begins_as_large_as_the_swarm_that_stands_around_the_middle_and_waits_at_the_edge() -> None:
+    ring, lines = formed(ShapeName.RING), formed(ShapeName.LINES)
+    around = [Enu(200.0 * (i % 9) - 800, 200.0 * (i // 9) - 400, 65) for i in range(45)]
+    begun = ring.begun_around(around)
+    assert begun.dimensions == ring.dimensions._replace(first_m=595.0), "half of where it ends, 600 m at most"
+    assert ring.begun_around([at._replace(north=at.north / 4) for at in around]).dimensions.first_m == 450.0
+    beside = [at._replace(north=at.north - 1350) for at in around]
+    assert ring.begun_around(beside) is ring, "from a base it draws together in the middle"
+    assert lines.begun_around(around) is lines
+    end_s = begun.shape.sweep_s
+    for since_s, waits in ((0.1, True), (29, True), (31, False)):
+        at = begun.at(3, end_s + since_s)
+        assert (max(abs(at.east), abs(at.north)) == pytest.approx(1190)) == waits, "who was heard last is to be seen"
 
 
 def test_where_uavs_are_too_few_for_a_ring_they_fly_in_lines() -> None:

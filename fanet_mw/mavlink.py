@@ -204,12 +204,11 @@ class Encoder:
             )
         )  # fmt: skip
 
-    def vfr_hud(self, position: Enu, velocity: Enu, *, yaw: float | None) -> bytes:
-        """VFR_HUD; the air speed is that over the ground, because nothing measures another."""
+    def vfr_hud(self, position: Enu, velocity: Enu, *, airspeed_m_s: float, yaw: float | None) -> bytes:
         ground_m_s = velocity.horizontal()
         heading = 0 if yaw is None else round(math.degrees(yaw)) % 360
         alt_m = to_geodetic(position, self._origin).alt_m
-        return self.pack(common.MAVLink_vfr_hud_message(ground_m_s, ground_m_s, heading, 0, alt_m, velocity.up))
+        return self.pack(common.MAVLink_vfr_hud_message(airspeed_m_s, ground_m_s, heading, 0, alt_m, velocity.up))
 
     def mission_current(self, at: int, *, items: int, flies: bool) -> bytes:
         """MISSION_CURRENT; without items the mission is the swarm's own task, of which MAVLink knows nothing."""

@@ -24,7 +24,7 @@ from emulator.channel import fading  # noqa: E402  (the tree's root is on the pa
 from emulator.channel.path_loss import SPEED_OF_LIGHT_M_S  # noqa: E402
 from emulator.channel.propagation import received_dbm  # noqa: E402
 from emulator.kernel import state  # noqa: E402
-from emulator.kernel.fading_gain import gain  # noqa: E402
+from emulator.kernel.fading_gain import WAVES, gain  # noqa: E402
 from emulator.kernel.state import Reals  # noqa: E402
 from fanet_mw.bus.messages import Altimeter, Camera, Inertial, Radar, WindEstimate  # noqa: E402
 from fanet_mw.scenario import Radio, Scenario, config  # noqa: E402
@@ -33,7 +33,7 @@ from sim.figures.colors import BLUE, GRAY, GREEN, RED  # noqa: E402
 from sim.figures.style import applied, canvas  # noqa: E402
 from sim.scenarios import catalog  # noqa: E402
 from sim.world.environment.diffraction import loss_db as edge_loss_db  # noqa: E402
-from sim.world.environment.obstacles import obstacles  # noqa: E402
+from sim.world.environment.obstacles import Box, Obstacles, obstacles  # noqa: E402
 from sim.world.environment.solids import Solids  # noqa: E402
 from sim.world.environment.survivors import Survivors  # noqa: E402
 from sim.world.sensors.altimeter import AltimeterSensor  # noqa: E402
@@ -166,6 +166,59 @@ def _camera(axes: Axes) -> None:
     axes.legend(loc="best", fontsize="small")
 
 
+def _rangefinder(axes: Axes) -> None:
+    """A UAV that climbs slowly on its way over a house 12 m high."""
+    house = Solids(Obstacles(None, (Box(60.0, 0.0, 20.0, 20.0, 12.0),)))
+    sensor = AltimeterSensor(_scenario("sensors.altimeter_hz=5"), house)
+    east = np.arange(0.0, 120.0, 0.6)
+    at = np.column_stack([east, east * 0, 20 + east / 30])
+    told = []
+    for step, place in enumerate(at):
+        (_, reading), *_ = sensor.read(Truth(step * S // 5, np.tile(place, (3, 1)), np.zeros((3, 3))), [0])
+        assert isinstance(reading, Altimeter)
+        told.append(reading.above_ground_m)
+    axes.plot(east, told, ".", color=BLUE, markersize=2, label="measured")
+    axes.plot(east, at[:, 2] - house.surface_m(at), color=GRAY, linestyle=":", label="truth")
+    axes.set(title="Rangefinder, over a house", xlabel="east [m]", ylabel="above what is below [m]")
+    axes.legend(loc="best", fontsize="small")
+
+
+def _directions(axes: Axes) -> None:
+    """How far off directions are, beside the laws: of calls, of people straight below, of UAVs."""
+    keys = ("sensors.voice_hz=1", "sensors.voice_share=1", "sensors.voice_error_db=0", "sensors.voice_loudness_db=0",
+            "sensors.camera_hz=1", "sensors.radar_hz=5", "sensors.radar_false_alarm=1e-9")  # fmt: skip
+    scenario = _scenario(*keys)
+    config_, people, still = scenario.sensors, Survivors(scenario), np.zeros((3, 3))
+    voice, camera = VoiceSensor(scenario, people, PLAIN), CameraSensor(scenario, people, PLAIN)
+    radar, beam_deg = RadarSensor(scenario, PLAIN), config_.radar_beam_deg
+
+    def rms_deg(off_rad: list[float]) -> float:
+        return math.degrees(math.sqrt(np.mean(np.square(off_rad))))
+
+    rows: list[list[tuple[float, float, float]]] = [[], [], []]
+    for far in (3.0, 5.0, 7.0, 9.0, 12.0):
+        at = np.array([[0.6 * far, 0, 0.8 * far], [0, 900, 50], [0, 900, 90]])
+        told = [call for s in range(300) for _, read in voice.read(Truth(s * S, at, still), [0]) for call in read.calls]  # type: ignore[union-attr]
+        off = [call.elevation_rad + math.asin(0.8) for call in told]
+        rows[0].append((far, rms_deg(off), config_.voice_sigma_deg * 10 ** (-told[0].snr_db / 20)))
+    for far in (15.0, 30.0, 45.0, 60.0, 75.0, 90.0):
+        at = np.array([[0.0, 0, far], [far, 0, far], [0, 900, 50]])
+        seen = [one for s in range(300) for _, read in camera.read(Truth(s * S, at, still), [0]) for one in read.people]  # type: ignore[union-attr]
+        off = [math.pi / 2 + one.elevation_rad for one in seen]
+        rows[1].append((far, rms_deg(off) / math.sqrt(2), config_.camera_sigma_deg))
+        found = [one for s in range(300) for _, read in radar.read(Truth(s * S, at, still), [0]) for one in read.echoes]  # type: ignore[union-attr]
+        laws = [beam_deg / 1.6 / math.sqrt(2 * 10 ** (echo.snr_db / 10)) for echo in found]
+        rows[2].append(
+            (far, rms_deg([e.bearing_rad - math.pi / 2 for e in found]), math.sqrt(np.mean(np.square(laws))))
+        )
+    for name, found_, color in zip(("call", "person", "UAV, by radar"), rows, (GREEN, RED, BLUE), strict=True):
+        away, off_deg, law = np.array(found_).T
+        axes.plot(away, off_deg, ".", color=color, label=name)
+        axes.plot(away, law, color=color, linestyle=":")
+    axes.set(title="Directions", xlabel="distance [m]", ylabel="off, RMS [degrees]", yscale="log", ylim=(0.05, 20))
+    axes.legend(loc="lower right", fontsize="small")
+
+
 def _inertial(axes: Axes) -> None:
     sensor, told, true = InertialSensor(_scenario("sensors.inertial_hz=5")), [], []
     times = np.arange(0, 120, 0.2)
@@ -283,7 +336,7 @@ def correlation() -> Figure:
     random = np.random.Generator(np.random.PCG64(1))
     for both, color in ((False, "tab:blue"), (True, "tab:orange")):
         drawn = []
-        for seed in range(60):
+        for seed in range(240):
             at, velocity = random.uniform(0, 5000, (60, 3)), np.zeros((60, 3))
             velocity[::2, 0], velocity[1::2, 1] = 1.0, float(both)
             waves = fading.Waves(keys, seed=seed).of(at, velocity, 0)
@@ -291,7 +344,8 @@ def correlation() -> Figure:
         gains = np.array(drawn)
         who = "both nodes move" if both else "one node moves"
         axes.plot(way, (gains * gains[:, :1]).mean(axis=0) / (gains[:, 0] ** 2).mean(), ".", color=color, label=who)
-        axes.plot(way, j0 ** (4 if both else 2), color=color, lw=1, label="J0^4" if both else "J0^2 (Clarke, Jakes)")
+        law = j0**4 if both else (j0**2 - 1 / WAVES) / (1 - 1 / WAVES)
+        axes.plot(way, law, color=color, lw=1, label="J0^4" if both else f"J0^2 (Clarke, Jakes) by {WAVES} waves")
     axes.set(xlabel="way of a node [wavelengths]", ylabel="correlation of the power")
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
@@ -325,8 +379,11 @@ def edge() -> Figure:
 def main() -> None:
     """All pictures."""
     with applied():
-        figure, grid = canvas(2, 5, width=4.0, height=3.4)
-        drawn = (_gps, _height, _phone, _voice, _camera, _shares, _radar, _inertial, _wind, _outage)
+        figure, grid = canvas(2, 6, width=4.0, height=3.4)
+        drawn = (
+            _gps, _height, _rangefinder, _phone, _voice, _camera,
+            _directions, _shares, _radar, _inertial, _wind, _outage,
+        )  # fmt: skip
         for draw, axes in zip(drawn, grid, strict=True):
             draw(axes)
         figure.savefig(REFERENCE / "sensors.png", dpi=90, metadata={"Software": None})

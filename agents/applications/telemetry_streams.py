@@ -4,9 +4,9 @@ Without an operator the streams are those that a log needs. An operator who is h
 draws, and changes the rate of each by message.
 
 Position and velocity are those of the receiver. Attitude, time and the quality of GPS are those of a real flight
-controller. Without one the attitude is inferred: a multirotor tilts so that thrust and gravity add up to its
-acceleration, and it faces where it flies. The battery is as its sensor reads it; without a sensor nothing is known of
-it.
+controller. Without one the attitude is inferred: a multirotor tilts so that thrust, gravity and the drag of an Iris
+add up to its acceleration, and it faces where it flies. The battery is as its sensor reads it; without a sensor nothing
+is known of it. Without an estimate of the wind the air stands still.
 """
 
 import math
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from fanet_mw.application import Application, AppPort
-from fanet_mw.bus.messages import Battery, FlightState, Gps, SensorReading
+from fanet_mw.bus.messages import Battery, FlightState, Gps, SensorReading, WindEstimate
 from fanet_mw.flavors import Mode
 from fanet_mw.mavlink import AUTOPILOT_COMPONENT, ORIGIN, Attitude, BatteryState, Encoder, Geodetic, common
 from fanet_mw.units import MS, STILL, Enu, NodeId, S
@@ -24,6 +24,10 @@ GRAVITY_M_S2: Final = 9.80665
 MAX_TILT: Final = math.radians(35)
 """The usual tilt limit of a multirotor's position controller; it keeps noise in the velocity from looking like
 acrobatics."""
+DRAG_PER_S: Final = 0.14
+"""What the rotors of an Iris lose for each m/s of airspeed, and what its frame does for each square of it: 4 lambda w /
+m, and c / m of the vehicle that the world flies."""
+DRAG_PER_M: Final = 0.0105
 TURNING_M_S: Final = 0.5
 """Below this speed the course is noise, and the heading is kept."""
 
@@ -108,6 +112,7 @@ class TelemetryStreams:
         self.height_off_m = 0.0
         """By how much the receiver is wrong in height; the flight controller tells heights without it."""
         self._acceleration = STILL
+        self._wind = STILL
         self._yaw: float | None = None
         """The heading; it is unknown until the UAV has flown. A heading of 0 would also shorten hellos, because MAVLink
         drops trailing zeros."""
@@ -156,7 +161,9 @@ class TelemetryStreams:
             common.MAVLINK_MSG_ID_LOCAL_POSITION_NED: lambda now_ns: encoder.local_position(
                 self._estimate, self.velocity, now_ns=now_ns
             ),
-            common.MAVLINK_MSG_ID_VFR_HUD: lambda _: encoder.vfr_hud(self._estimate, self.velocity, yaw=self._yaw),
+            common.MAVLINK_MSG_ID_VFR_HUD: lambda _: encoder.vfr_hud(
+                self._estimate, self.velocity, airspeed_m_s=self._airflow.norm(), yaw=self._yaw
+            ),
             common.MAVLINK_MSG_ID_MISSION_CURRENT: lambda _: encoder.mission_current(
                 self.flown.mission_at, items=self.flown.mission_items, flies=self.flown.mission_flies
             ),
@@ -264,6 +271,10 @@ class TelemetryStreams:
         self._flight = reading._replace(roll_rad=roll, pitch_rad=pitch, yaw_rad=yaw)
         self._yaw = yaw
 
+    def on_wind(self, reading: WindEstimate) -> None:
+        """The flight controller has estimated the wind."""
+        self._wind = reading.velocity
+
     def on_battery(self, reading: Battery) -> None:
         """The sensor of the battery has given a reading; consumption counts from the first reading."""
         if self._read_ns is not None:
@@ -276,12 +287,14 @@ class TelemetryStreams:
 
     @property
     def attitude(self) -> Attitude:
-        """That of the flight controller, or the tilt that the present acceleration needs, facing the direction of
-        flight.
+        """That of the flight controller, or the tilt that the present acceleration and drag need, facing the direction
+        of flight.
         """
         if self._flight is not None:
             return Attitude(self._flight.roll_rad, self._flight.pitch_rad, self._flight.yaw_rad)
-        east, north, up = self._acceleration
+        air = self._airflow
+        drag = DRAG_PER_S + DRAG_PER_M * air.norm()
+        east, north, up = (a + drag * v for a, v in zip(self._acceleration, (air.east, air.north, 0.0), strict=True))
         yaw = self._yaw or 0.0
         forward = east * math.sin(yaw) + north * math.cos(yaw)
         right = east * math.cos(yaw) - north * math.sin(yaw)
@@ -292,6 +305,11 @@ class TelemetryStreams:
         pitch = math.atan2(-forward, thrust_up)
         roll = math.atan2(right, math.hypot(forward, thrust_up))
         return Attitude(roll, pitch, yaw)
+
+    @property
+    def _airflow(self) -> Enu:
+        """The velocity through the air."""
+        return self.velocity.minus(self._wind)
 
     def next_due_ns(self) -> int | None:
         """The instant at which the next telemetry is due; None if there is no telemetry."""
@@ -363,6 +381,8 @@ class Telemetry(Application):
     def on_sensor(self, reading: SensorReading, now_ns: int) -> None:
         if isinstance(reading, Battery):
             self._streams.on_battery(reading)
+        elif isinstance(reading, WindEstimate):
+            self._streams.on_wind(reading)
         elif isinstance(reading, FlightState):
             self._streams.on_flight(reading)
 

@@ -4,15 +4,18 @@ import math
 from collections import Counter
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.applications.telemetry_streams import GRAVITY_M_S2, MAX_TILT, TelemetryStreams
+from agents.applications.telemetry_streams import DRAG_PER_M, DRAG_PER_S, GRAVITY_M_S2, MAX_TILT, TelemetryStreams
 from fanet_mw import mavlink
-from fanet_mw.bus.messages import Battery, FlightState, Gps
-from fanet_mw.mavlink import Attitude
+from fanet_mw.bus.messages import Battery, FlightState, Gps, WindEstimate
+from fanet_mw.mavlink import Attitude, common
 from fanet_mw.units import MS, Enu, NodeId, S
+from sim.world.engines.rotors.rigid_body import Rotors
+from sim.world.engines.rotors.vehicle_types import IRIS
 
 NODE = NodeId(3)
 START = Enu(100.0, 200.0, 50.0)
@@ -168,10 +171,23 @@ def test_a_fix_that_comes_again_or_late_changes_nothing() -> None:
 # --- attitude -----------------------------------------------------------------------------------------------------
 
 
-def test_level_flight_is_level_and_faces_where_it_goes() -> None:
+@pytest.mark.parametrize("speed_m_s", [3.0, 7.5, 12.0])
+def test_steady_flight_leans_against_drag_as_rotors_do_and_faces_where_it_goes(speed_m_s: float) -> None:
+    streams, rotors = make(), Rotors(IRIS)
+    fly(streams, Enu(speed_m_s, 0.0, 0.0), Enu(speed_m_s, 0.0, 0.0))
+    velocity = np.array([[speed_m_s, 0.0, 0.0]])
+    rotors.reset(np.array([[0.0, 0.0, 50.0]]), velocity)
+    rotors.advance(8.0, velocity)
+    assert streams.attitude == pytest.approx((0.0, -float(rotors.tilts_rad()[0]), math.pi / 2), abs=math.radians(0.7))
+
+
+def test_who_hovers_in_wind_leans_into_it_and_has_an_airspeed() -> None:
     streams = make()
-    fly(streams, Enu(5.0, 0.0, 0.0), Enu(5.0, 0.0, 0.0))
-    assert streams.attitude == pytest.approx((0.0, 0.0, math.pi / 2))
+    fly(streams, Enu(0.0, 2.0, 0.0), Enu(0.0, 0.0, 0.0), Enu(0.0, 0.0, 0.0))
+    streams.on_wind(WindEstimate(0, Enu(8.0, 0.0, 0.0)))
+    assert streams.attitude.roll == pytest.approx(-math.atan((0.14 + 0.0105 * 8) * 8 / GRAVITY_M_S2))
+    (hud,) = mavlink.decode(streams.one(common.MAVLINK_MSG_ID_VFR_HUD, 0) or b"")
+    assert (hud.airspeed, hud.groundspeed) == (8.0, 0.0)
 
 
 @pytest.mark.parametrize("course", [0.0, 1.0, 2.5, -2.0])
@@ -179,7 +195,8 @@ def test_speeding_up_puts_the_nose_down_whatever_the_course(course: float) -> No
     streams = make()
     east, north = math.sin(course), math.cos(course)
     fly(streams, Enu(5.0 * east, 5.0 * north, 0.0), Enu(5.4 * east, 5.4 * north, 0.0))  # 2 m/s^2
-    assert streams.attitude == pytest.approx((0.0, -math.atan(2.0 / GRAVITY_M_S2), course))
+    needed = 2.0 + (DRAG_PER_S + DRAG_PER_M * 5.4) * 5.4
+    assert streams.attitude == pytest.approx((0.0, -math.atan(needed / GRAVITY_M_S2), course))
 
 
 def test_a_right_turn_banks_right() -> None:
@@ -210,10 +227,12 @@ gentle = st.floats(-0.4, 0.4)
 
 
 @given(st.floats(-10, 10), st.floats(-10, 10), st.builds(Enu, gentle, gentle, gentle))
-def test_thrust_points_where_acceleration_and_gravity_want_it(east: float, north: float, change: Enu) -> None:
+def test_thrust_points_where_acceleration_drag_and_gravity_want_it(east: float, north: float, change: Enu) -> None:
     streams = make()
-    fly(streams, Enu(east, north, 0.0), Enu(east + change.east, north + change.north, change.up))
-    wanted = Enu(5 * change.east, 5 * change.north, 5 * change.up + GRAVITY_M_S2)
+    now = Enu(east + change.east, north + change.north, change.up)
+    fly(streams, Enu(east, north, 0.0), now)
+    drag = DRAG_PER_S + DRAG_PER_M * now.norm()
+    wanted = Enu(5 * change.east + drag * now.east, 5 * change.north + drag * now.north, 5 * change.up + GRAVITY_M_S2)
     assert thrust(streams.attitude) == pytest.approx(tuple(part / wanted.norm() for part in wanted), abs=1e-9)
 
 

@@ -45,6 +45,8 @@ _TRACED_NS: Final = S
 """The interval at which positions go into the trace."""
 _STILL_NS: Final = S
 """The longest interval at which a world in which nothing moves publishes its poses and fixes."""
+_LEGS_M: Final = 1.0
+"""A UAV that is higher above the ground or a roof than this, and touches something, has not landed: it is at a wall."""
 _WRECK_M: Final = 0.5
 """A UAV that is nearer to the ground or a wall than this is not in flight."""
 _EMERGENCY_CHARGE: Final = 0.05
@@ -130,6 +132,7 @@ class WorldActor(Actor):
         starts, self._on_ground = np.split(places, [len(self._ids)])
         solid = obstacles(scenario, places) if scenario.world.has_obstacles else None
         solids = Solids(solid)
+        self._surface_m = solids.surface_m
         self._engine = make_engine(scenario, solid)
         if flight is None:
             self._engine.reset(starts)
@@ -301,13 +304,18 @@ class WorldActor(Actor):
             self._falling.discard(node)
             self._cut(node)
         touching = [node for node in (first, second) if node and self._flies[node - 1]]
-        if not touching or (first == 0 and self._guidance.may_touch_down(second)):
+        if not touching or (first == 0 and self._touches_down(second)):
             return
         self._incidents.collisions += 1
         self.records.append(Collided(now_ns, second, first))
         if self._scenario.world.crash == "falls":
             for node in touching:
                 self._crash(node, radio_dies=self._scenario.world.crash_radio == "dies")
+
+    def _touches_down(self, node: int) -> bool:
+        """True for a UAV that is meant to land, and has touched what is below it, not a wall."""
+        at = self._engine.positions()[node - 1]
+        return self._guidance.may_touch_down(node) and at[2] - float(self._surface_m(at[None])[0]) <= _LEGS_M
 
     def _crash(self, node: int, *, radio_dies: bool) -> None:
         """Let a UAV fall from now on, because it has touched something or its battery is empty."""

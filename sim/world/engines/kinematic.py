@@ -49,9 +49,9 @@ class Kinematic(Engine):
         if self._solids is None:
             stopped = self._at[:, 2] < 0
             self._at[stopped, 2] = 0.0
+            self._velocity[stopped] = 0.0
         else:
-            stopped = self._solids.stop(came_from, self._at)
-        self._velocity[stopped] = 0.0
+            self._solids.stop(came_from, self._at, self._velocity)
         self._contacts.notice(came_from, self._at)
 
     def positions(self) -> Rows:

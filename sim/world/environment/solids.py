@@ -104,10 +104,24 @@ class Solids:
         gap[near] = least
         return gap
 
-    def stop(self, before: Rows, after: Rows) -> Flags:
-        """Put those bodies of `after` where something solid stops them on their straight path from `before`; returns
-        which these are.
+    def stop(self, before: Rows, after: Rows, velocity: Rows) -> Flags:
+        """Put those bodies of `after` where something solid stops them on their straight path from `before`, from where
+        they may still rise or fall beside a wall, and change their velocities; returns which these are.
         """
+        up = after[:, 2].copy()
+        stopped = self._put_back(before, after)
+        rows = np.flatnonzero(stopped)
+        if len(rows):
+            beside = after[rows]
+            beside[:, 2] = up[rows]
+            held = self._put_back(after[rows], beside)
+            after[rows] = beside
+            velocity[rows, :2] = 0.0
+            velocity[rows[held], 2] = 0.0
+        return stopped
+
+    def _put_back(self, before: Rows, after: Rows) -> Flags:
+        """Put those bodies of `after` where something solid stops them; returns which these are."""
         path = after - before
         length = np.linalg.norm(path, axis=1)
         gap = self.gap_m(after)

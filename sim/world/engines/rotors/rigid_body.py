@@ -4,9 +4,9 @@
     motors: first-order lag towards the wanted speed, faster up than down; symplectic Euler at `STEP_HZ`
 
 The battery delivers the power that the rotors take (`power.py`); an empty one stops them. A body that reaches the
-ground or a wall stops there, upright. One that stands with its motors off is held by friction, which at a coefficient
-of 0.6 is stronger than the drag of an Iris below 23 m/s of wind. Not modeled: ground effect, downwash on UAVs below,
-blade flapping, bouncing.
+ground or a wall stops there, upright; beside a wall it may still rise or fall. One that stands with its motors off is
+held by friction, which at a coefficient of 0.6 is stronger than the drag of an Iris below 23 m/s of wind. Not modeled:
+ground effect, downwash on UAVs below, blade flapping, bouncing, and less speed of the rotors at less voltage.
 """
 
 from typing import Final
@@ -153,13 +153,13 @@ class Rotors(Engine):
         if self._solids is None:
             inside = self._at[2] < 0
             self._at[2, inside] = 0.0
+            self._velocity[:, inside] = 0.0
         else:
-            after = np.ascontiguousarray(self._at.T)
-            inside = self._solids.stop(before.T, after)
-            self._at = np.ascontiguousarray(after.T)
+            after, velocity = np.ascontiguousarray(self._at.T), np.ascontiguousarray(self._velocity.T)
+            inside = self._solids.stop(before.T, after, velocity)
+            self._at, self._velocity = np.ascontiguousarray(after.T), np.ascontiguousarray(velocity.T)
         if not inside.any():
             return
-        self._velocity[:, inside] = 0.0
         self._rates[:, inside] = 0.0
         self._attitude[:, inside] = [[1.0], [0.0], [0.0], [0.0]]
 

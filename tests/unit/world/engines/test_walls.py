@@ -1,0 +1,59 @@
+"""Bodies at walls: nobody hangs on one, and nobody lands on one."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fanet_mw.bus.messages import SetpointKind
+from fanet_mw.scenario import Scenario
+from sim.world.engines.contract import Engine
+from sim.world.engines.kinematic import Kinematic
+from sim.world.engines.rotors.rigid_body import Rotors
+from sim.world.engines.rotors.vehicle_types import IRIS
+from sim.world.environment.obstacles import Box, Obstacles
+from sim.world.environment.solids import Solids
+from tests.unit.world.mobility.test_setpoints import Flying
+
+MakeScenario = Callable[..., Scenario]
+WALL = Solids(Obstacles(None, (Box(20.0, 0.0, 10.0, 40.0, 60.0),)))
+
+
+def at_wall(engine: Engine, up_m_s: float, seconds: float) -> np.ndarray:
+    """Where a body is that was flown against a wall at 5 m/s, and on into it and up or down."""
+    engine.reset(np.array([[5.0, 0.0, 12.0]]))
+    for _ in range(70):
+        engine.advance(0.05, np.array([[5.0, 0.0, 0.0]]))
+    assert engine.positions()[0, 0] == pytest.approx(15, abs=0.1)
+    for _ in range(round(20 * seconds)):
+        engine.advance(0.05, np.array([[5.0, 0.0, up_m_s]]))
+    return engine.positions()[0]
+
+
+@pytest.mark.parametrize("engine", [Kinematic(WALL), Rotors(IRIS, solids=WALL)])
+def test_a_body_at_a_wall_sinks_beside_it(engine: Engine) -> None:
+    assert at_wall(engine, -3.0, 7)[2] < 0.5
+
+
+@pytest.mark.parametrize("engine", [Kinematic(WALL), Rotors(IRIS, solids=WALL)])
+def test_a_wreck_falls_from_a_wall(engine: Engine) -> None:
+    at_wall(engine, 0.0, 0)
+    engine.fall(0)
+    for _ in range(80):
+        engine.advance(0.05, np.array([[5.0, 0.0, 0.0]]))
+    assert engine.positions()[0, 2] < 0.5
+
+
+def test_who_is_blown_against_a_wall_while_it_lands_has_not_landed(make_scenario: MakeScenario) -> None:
+    keys: dict[str, Any] = {
+        "nodes.count": 1, "nodes.altitude_m": 40, "world.area_m": 2000.0, "world.navigation": "estimated",
+        "world.buildings": ((40, 0, 20, 300, 90),), "world.crash": "falls",
+        "world.engine": "rotors", "world.wind_m_s": (12.0, 0.0), "sensors.gps_outages": ((0, 0, 9000, 1, 9000),),
+    }  # fmt: skip
+    flying = Flying(make_scenario, **keys)
+    flying.ask(1, SetpointKind.HOLD)
+    flying.fly(20)
+    assert (1, "failsafe") in flying.modes
+    assert flying.collisions == [(1, 0)]
+    assert flying.at(1) == pytest.approx([30, 0, 0], abs=12)

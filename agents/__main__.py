@@ -17,11 +17,11 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
 from fanet_mw.flavors import Flavor
 from fanet_mw.gateway.connections import Address, address_of
+from fanet_mw.geodesy import Geodetic
 from fanet_mw.hosts import interrupts, loop, service
 from fanet_mw.hosts.bus import Bus, HostBus, config_of
 from fanet_mw.hosts.clock import START_PATIENCE_S
 from fanet_mw.hosts.realtime import RealtimeHost, SwarmAddress
-from fanet_mw.mavlink import Geodetic
 from fanet_mw.radios.udp import PORT
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId

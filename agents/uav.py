@@ -36,7 +36,7 @@ from fanet_mw.bus.messages import (
 )
 from fanet_mw.bus.topics import Topics
 from fanet_mw.extensions import load
-from fanet_mw.mavlink import Geodetic
+from fanet_mw.geodesy import Geodetic
 from fanet_mw.motion import Motion
 from fanet_mw.node.node import Node
 from fanet_mw.node.reader import Reader

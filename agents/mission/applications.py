@@ -27,7 +27,7 @@ from fanet_mw.bus.messages import (
     WindEstimate,
 )
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.mavlink import Geodetic
+from fanet_mw.geodesy import Geodetic
 from fanet_mw.node.reader import decoded
 from fanet_mw.node.received_motion import motion_in
 from fanet_mw.scenario import Scenario

@@ -46,7 +46,7 @@ from mcap_protobuf.writer import Writer
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import Poses
 from fanet_mw.errors import ConfigError
-from fanet_mw.mavlink import Geodetic, to_geodetic
+from fanet_mw.geodesy import Geodetic, to_geodetic
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record, RoleChanged
 from fanet_mw.units import Enu, S

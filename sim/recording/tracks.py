@@ -10,7 +10,7 @@ from typing import Final
 from xml.etree import ElementTree as Xml
 
 from fanet_mw.errors import ConfigError
-from fanet_mw.mavlink import Geodetic, to_geodetic
+from fanet_mw.geodesy import Geodetic, to_geodetic
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Confirmed, PlacedInside, Posed
 from fanet_mw.units import Enu, S

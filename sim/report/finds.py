@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from agents.mission.finding.known_survivors import SAME_PLACE_M
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.mavlink import Geodetic, to_geodetic
+from fanet_mw.geodesy import Geodetic, to_geodetic
 from fanet_mw.trace import Approaching, Confirmed, Detected, PlacedInside, Posed, Refuted
 from fanet_mw.units import US, Enu, S
 from fanet_mw.wire import FOUND

@@ -9,9 +9,9 @@ from fanet_mw.autopilot.link import AutopilotLink
 from fanet_mw.autopilot.serving import Autopilot, serve_world
 from fanet_mw.flavors import Flavor
 from fanet_mw.gateway.gateway import per_uav
+from fanet_mw.geodesy import Geodetic
 from fanet_mw.hosts import interrupts
 from fanet_mw.hosts.clock import START_PATIENCE_S, ClockListener
-from fanet_mw.mavlink import Geodetic
 from fanet_mw.scenario.fingerprint import fingerprint
 from fanet_mw.units import NodeId
 from sim.observation.bus_feed import BusFeed

@@ -19,7 +19,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from fanet_mw.errors import ConfigError
-from fanet_mw.mavlink import Geodetic, to_enu
+from fanet_mw.geodesy import Geodetic, to_enu
 from fanet_mw.scenario import outlines
 from sim.world.arrays import Rows
 from sim.world.environment.given_file import content

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from fanet_mw.errors import ConfigError
-from fanet_mw.mavlink import Geodetic
+from fanet_mw.geodesy import Geodetic
 from sim.world.arrays import Rows
 
 _FEET: Final = {"ft": 0.3048, "foot": 0.3048, "feet": 0.3048, "us-ft": 1200 / 3937, "us survey foot": 1200 / 3937}

@@ -19,7 +19,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from fanet_mw.errors import ConfigError
-from fanet_mw.mavlink import Geodetic, to_geodetic
+from fanet_mw.geodesy import Geodetic, to_geodetic
 from fanet_mw.scenario import ascii_grid
 from fanet_mw.scenario.outlines import half_turn
 from fanet_mw.units import Enu

@@ -57,3 +57,13 @@ def test_a_command_imports_only_what_it_needs(arguments: tuple[str, ...], says: 
 
     assert says in printed
     assert sorted(modules.intersection(without)) == []
+
+
+def test_a_launcher_leaves_what_its_processes_do_to_the_server_that_they_are_forked_from() -> None:
+    """It starts in half the time without, and a user waits for both, one after the other."""
+    names = subprocess.run(
+        [sys.executable, "-c", "import sys, sim.run.launcher.swarm; print(*sys.modules)"],
+        env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=60, check=True,
+    ).stdout.split()  # fmt: skip
+    assert "numpy" in names
+    assert not {"numba", "pymavlink", "emulator.medium", "agents.uav", "sim.world.world"}.intersection(names)

@@ -11,7 +11,7 @@ from fanet_mw.units import S
 from sim.run.virtual import simulate
 
 KEYS = {
-    "nodes.count": 6, "nodes.spacing_m": 40, "nodes.altitude_m": 40, "duration_s": 130, "warmup_s": 1, "drain_s": 1,
+    "nodes.count": 6, "nodes.spacing_m": 40, "nodes.altitude_m": 40, "duration_s": 105, "warmup_s": 1, "drain_s": 1,
     "mission.survivors": 1, "mission.search": "lines", "mobility.model": "onboard", "mobility.speed_m_s": 7.5,
     "world.area_m": 240, "radio.range_m": 250, "traffic.arrivals": "none", "nodes.telemetry_hz": 0,
 }  # fmt: skip
@@ -23,7 +23,7 @@ def test_after_the_last_sweep_all_land_where_they_started_and_wait_one_sweep_for
 ) -> None:
     keys = {
         **KEYS,
-        "duration_s": 130 if passes else 70,
+        "duration_s": 105 if passes else 70,
         "mission.sweeps": sweeps,
         "sensors.camera_hz": camera_hz,
         "sensors.camera_fov_deg": 90.0,

@@ -42,7 +42,7 @@ def test_within_reach_the_post_knows_of_a_find_at_once_and_gets_all_load(
 def test_a_post_out_of_reach_learns_of_a_find_from_the_uavs_that_come_home(
     make_scenario: Callable[..., Scenario],
 ) -> None:
-    keys = {**KEYS, "ground.at_m": (0.0, -560.0), "world.base_m": (0.0, -430.0)}
+    keys = {**KEYS, "ground.at_m": (0.0, -560.0), "world.base_m": (0.0, -430.0), "duration_s": 100}
     records = simulate(make_scenario(**keys)).records
     found = next(r for r in records if isinstance(r, Confirmed))
     known = [r for r in records if isinstance(r, KnownOnGround)]

@@ -11,7 +11,7 @@ from sim.run.virtual import simulate
 
 CUT, CUT_FOR_A_WHILE = 2, 4
 KEYS = {
-    "nodes.count": 6, "nodes.spacing_m": 40, "nodes.altitude_m": 40, "duration_s": 105, "warmup_s": 1, "drain_s": 1,
+    "nodes.count": 6, "nodes.spacing_m": 40, "nodes.altitude_m": 40, "duration_s": 92, "warmup_s": 1, "drain_s": 1,
     "mission.survivors": 1, "mission.search": "spiral", "mission.lost_link_s": 8, "mobility.model": "onboard",
     "world.area_m": 600, "radio.range_m": 250, "traffic.arrivals": "none", "nodes.telemetry_hz": 0,
     "faults": [

@@ -11,13 +11,13 @@ from fanet_mw.units import S
 from sim.run.virtual import simulate
 
 KEYS = {
-    "nodes.count": 8, "nodes.spacing_m": 60, "nodes.altitude_m": 40, "duration_s": 62, "warmup_s": 1, "drain_s": 1,
+    "nodes.count": 8, "nodes.spacing_m": 60, "nodes.altitude_m": 40, "duration_s": 32, "warmup_s": 1, "drain_s": 1,
     "mission.survivors": 1, "mission.survivor_positions_m": ((60.0, 120.0),), "mission.search": "lines",
     "mobility.model": "onboard", "mobility.speed_m_s": 7.5, "world.area_m": 320, "radio.range_m": 250,
     "nodes.telemetry_hz": 0, "traffic.arrivals": "none", "sensors.camera_hz": 2.0, "sensors.camera_fov_deg": 90.0,
     "ground.at_m": (0.0, -100.0),
 }  # fmt: skip
-WHOLE_S = 50
+WHOLE_S = 26
 
 
 @pytest.mark.parametrize("protocol", ["rounds", *slow("clustered")])

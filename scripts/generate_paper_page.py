@@ -30,6 +30,11 @@ hand. Findings and reasons are on the page of each figure; beside each picture a
 (`pictures/*.csv`), the same picture as `pictures/*.svg`, and the verdicts (`pictures/*.json`)."""
 _BACK: Final = "One of the figures of [the paper's claims](paper.md)."
 
+_SENSORS: Final = """Flown on 23 November 2026: since then phones fade and their shadowing is correlated in space, and
+errors of GPS are slow and common to the swarm ([sensors](../reference/sensors.md))."""
+_WITH_OLD_SENSORS: Final = frozenset({"figure-12", "mission", "reports"})
+"""Figures whose runs hear phones, and were flown before phones were as they are."""
+
 
 def pages() -> dict[Path, str]:
     """The text of each page: the overview, then a page for each figure."""
@@ -39,7 +44,8 @@ def pages() -> dict[Path, str]:
         DOCUMENT: _written("The paper's claims", [Text(_HEAD), Text(links), *overview([KEPT]), *commands([KEPT])])
     }
     for figure in figures:
-        written[_page_of(figure.name)] = _written(figure.title, [Text(_BACK), *figure.blocks])
+        older = [Text(_SENSORS)] if figure.name in _WITH_OLD_SENSORS else []
+        written[_page_of(figure.name)] = _written(figure.title, [Text(_BACK), *figure.blocks, *older])
     return written
 
 

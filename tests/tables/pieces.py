@@ -9,12 +9,11 @@ from typing import Final
 
 from tests.tables.kept import KEPT, Kept, OutOfTime
 from tests.tables.missions import CLEAR, COUNTRY_IN_SMALL, PLACES, WHOLE, Case, fly
-from tests.tables.paper_rescue import PAPER
 from tests.tables.small_rescues import ENGINES, SENSES
 
 TABLES: Final[Mapping[str, Mapping[str, Case]]] = {
     "whole-missions": WHOLE, "places": PLACES, "country-in-small": COUNTRY_IN_SMALL, "keeping-clear": CLEAR,
-    "rescue-paper": PAPER, "engines": ENGINES, "senses": SENSES,
+    "engines": ENGINES, "senses": SENSES,
 }  # fmt: skip
 
 

@@ -17,7 +17,6 @@ from tests.tables import (
     missions,
     models,
     motion,
-    paper_rescue,
     plans,
     protocol,
     sensors,
@@ -87,19 +86,15 @@ TABLES: Final[Mapping[str, Table]] = {
     "clock-errors": Table("explanation/time.md", protocol.clock_errors, Tolerance(relative=0.2)),
     "flight": Table("results/flight.md", flight.measured, Tolerance(absolute=0.02, relative=0.02)),
     "formation-flight": Table("explanation/formation-flight.md", formation_flight.measured, Tolerance(relative=0.05)),
+    "whole-missions": Table("results/missions.md", missions.whole, Tolerance(absolute=0.05, relative=0.02)),
     "places": Table("results/missions.md", missions.places, Tolerance(absolute=0.05, relative=0.02)),
     "country-in-small": Table(
         "results/missions.md", missions.country_in_small, Tolerance(absolute=0.05, relative=0.02)
     ),
     "shapes": Table("results/missions.md", missions.shapes, Tolerance(absolute=1, relative=0.05)),
-    "engines": Table(
-        "results/small-rescues.md", small_rescues.engines, Tolerance(absolute=0.05, relative=0.05), ("times real time",)
-    ),
+    "engines": Table("results/small-rescues.md", small_rescues.engines, Tolerance(absolute=0.05, relative=0.05)),
     "senses": Table("results/small-rescues.md", small_rescues.senses, Tolerance(absolute=0.05, relative=0.05)),
     "keeping-clear": Table("results/keeping-clear.md", missions.keeping_clear, Tolerance(absolute=0.05, relative=0.02)),
-    "rescue-paper": Table(
-        "results/rescue-paper.md", paper_rescue.paper_rescues, Tolerance(absolute=0.05, relative=0.02)
-    ),
     "installations": Table(
         "results/installations.md", installations.installations, Tolerance(relative=0.1), installations.MACHINE
     ),

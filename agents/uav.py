@@ -151,7 +151,7 @@ class Uav(Actor):
                 scenario, node, self._streams, position=position, on_mission_key=limits.change
             )
             asked_for = [
-                *_asked_for(scenario, node, self._streams, position, onboard_map, limits),
+                *_asked_for(scenario, node, self._streams, position, onboard_map, limits, self._node),
                 self._ground_control,
             ]
         else:
@@ -321,12 +321,13 @@ def _asked_for(
     position: Enu,
     onboard_map: OnboardMap,
     limits: SearchLimits,
+    radio: Node,
 ) -> Sequence[Application]:
     """The applications of a UAV that a scenario asks for, in the order in which they are called."""
     mission = scenario.mission
     applications: list[Application]
     rescue = (
-        PlannedSearch(scenario, node, position=position, onboard_map=onboard_map, limits=limits)
+        PlannedSearch(scenario, node, position=position, onboard_map=onboard_map, limits=limits, radio=radio)
         if mission.search != "none"
         else Rescue(scenario, node)
     )

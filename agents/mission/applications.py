@@ -11,6 +11,7 @@ from agents.mission.courses import course_at
 from agents.mission.finding.plausibility import Plausibility
 from agents.mission.flight.search_limits import SearchLimits
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
+from agents.mission.navigation.silent_neighbors import HeardByRadio
 from agents.mission.outbox import Outbox
 from agents.mission.paper_rule import PaperRule
 from agents.mission.searcher import Searcher, phone_model
@@ -90,12 +91,15 @@ class PlannedSearch(Application):
         position: Enu,
         onboard_map: OnboardMap = NO_MAP,
         limits: SearchLimits | None = None,
+        radio: HeardByRadio | None = None,
     ) -> None:
-        """`onboard_map`: the map that the UAV carries. `limits`: what an operator may change in flight."""
+        """`onboard_map`: the map that the UAV carries. `limits`: what an operator may change in flight. `radio`: what
+        the node knows of others beside their messages.
+        """
         self._outbox = Outbox()
         self._searcher = Searcher(
             scenario, node, position=position, outbox=self._outbox, onboard_map=onboard_map,
-            limits=limits or SearchLimits(scenario),
+            limits=limits or SearchLimits(scenario), radio=radio,
         )  # fmt: skip
         self._plausibility = Plausibility(phone_model(scenario))
         self._origin = Geodetic(*scenario.world.origin_deg, 0.0)

@@ -38,6 +38,7 @@ from agents.mission.navigation.known_obstacles import KnownObstacles
 from agents.mission.navigation.neighbor_motions import NeighborMotions, RadarWatch
 from agents.mission.navigation.onboard_map import OnboardMap
 from agents.mission.navigation.own_motion import OwnMotion
+from agents.mission.navigation.silent_neighbors import HeardByRadio, SilentNeighbors
 from agents.mission.orders import KnownOrders, record_of
 from agents.mission.outbox import Outbox
 from agents.mission.search_formation.formation_place import FormationPlace
@@ -69,7 +70,7 @@ _MOST_DECADES: Final = 12.0
 _OFFSET_DB: Final = 1.0
 """The standard deviation that is assumed for the difference between one phone's power and the mean of all phones."""
 _REVIEW_NS: Final = 1 * S
-_ROLL_NS: Final = 400 * MS
+_ROLL_NS: Final = 200 * MS
 """The interval at which it is found who is lost."""
 _LEAST_RECOGNIZED: Final = 0.1
 """The least share of the people in an image that a camera must recognize from the height of the search."""
@@ -93,6 +94,7 @@ class Searcher:
         outbox: Outbox,
         onboard_map: OnboardMap,
         limits: SearchLimits,
+        radio: HeardByRadio | None = None,
     ) -> None:
         mission, reach_m, speed_m_s = scenario.mission, scenario.radio.range_m, approach_speed_m_s(scenario, node)
         self._random = stream(scenario.seed, "mission", node).random
@@ -107,7 +109,8 @@ class Searcher:
         self._place = place = FormationPlace(node, own_motion, reach_m=reach_m, look_m=look_m)
         least_m_s, _ = mission.approach_speeds_m_s
         nodes = scenario.nodes
-        roll_call = RollCall(node, hello_interval_s=scenario.routing.hello_interval_s)
+        silent = None if radio is None else SilentNeighbors(radio, neighbors, own_motion, obstacles, reach_m=reach_m)
+        roll_call = RollCall(node, hello_interval_s=scenario.routing.hello_interval_s, silent=silent)
         planner = FormationPlanner(
             node, roll_call, expected=nodes.count, deploy_speed_m_s=_DEPLOY * least_m_s,
             take_off_ns=take_off_ns(nodes.altitude_m) if nodes.on_ground else 0,
@@ -136,12 +139,15 @@ class Searcher:
             airspeed_m_s=FASTEST_AIR_M_S[scenario.world.vehicle], height_m=scenario.nodes.altitude_m, limits=limits,
             beside=beside,
         )  # fmt: skip
+        connectivity = ConnectivityMaintenance(
+            own_motion, neighbors, place, self._bidding, reach_m=reach_m, speed_m_s=speed_m_s
+        )
         velocity_choice = VelocityChoice(
             own_motion,
             obstacles,
             most_m_s=speed_m_s,
             hard=[ReciprocalAvoidance(own_motion, self._radar.avoided, obstacles)],
-            soft=[ConnectivityMaintenance(own_motion, neighbors, place, self._bidding, reach_m=reach_m)],
+            soft=[connectivity],
         )
         heard = scenario.sensors.voice_hz > 0
         listening = VoiceDescent(scenario, node, own_motion, neighbors, speed_m_s=speed_m_s) if heard else None
@@ -158,7 +164,7 @@ class Searcher:
             beside=beside,
         ) if nodes.on_ground else None  # fmt: skip
         self._flight = Flight(
-            own_motion, place, goal, velocity_choice, take_off=take_off, return_home=self._return_home
+            own_motion, place, goal, velocity_choice, connectivity, take_off=take_off, return_home=self._return_home
         )
         self._mode = ModeRecord(node, place, self._flight, self._return_home, orders, outbox)
         self._node, self._post = node, scenario.post

@@ -5,7 +5,7 @@ happens to a packet next, and sends through its port. Both are sans-IO: each ins
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from random import Random
 from typing import ClassVar, Protocol
 
@@ -176,6 +176,10 @@ class RoutingProtocol(ABC):
         clusters.
         """
         return {}
+
+    def parted(self, now_ns: int) -> Collection[NodeId]:
+        """The nodes to which there was a way, and is none any more, as far as this node knows."""
+        return ()
 
     def least_interval_ns(self, deadline_ns: int) -> int | None:
         """The least interval between packets of this node that meets this deadline at all nodes; None if it is unknown,

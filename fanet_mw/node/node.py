@@ -21,6 +21,7 @@ from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.node.packet_numbering import PacketNumbering
 from fanet_mw.node.port import NodePort
 from fanet_mw.node.reader import BUNDLE, Looked, Reader
+from fanet_mw.node.silences import Silences
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Delivered, Generated, Record
 from fanet_mw.units import BROADCAST, US, Enu, NodeId
@@ -72,6 +73,8 @@ class Node:
         Other packets are delivered as well, but nobody takes them."""
         self.hellos: list[Packet] = []
         """The hellos of neighbors, in which the applications and the clock read more than routing does."""
+        self.silences = Silences(count=scenario.node_count)
+        """How long neighbors have sent nothing."""
         self._copies = 0
         """The number of frames that were only copies, as most are."""
         self._others = 0
@@ -226,6 +229,7 @@ class Node:
 
     def hear(self, reception: Reception, now_ns: int) -> bool:
         """Handle a reception; returns True if it was only a copy of a packet that was handled before."""
+        self.silences.on_frame(reception.src, now_ns)
         reader, frame, handled = self._reader, reception.frame, self._duplicates
         seen = reader.last
         if frame is not seen.frame:
@@ -350,6 +354,10 @@ class Node:
     def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
         """The nodes of each cluster as far as this node knows, by head."""
         return self._protocol.clusters()
+
+    def parted(self, now_ns: int) -> Collection[NodeId]:
+        """The nodes to which no way leads any more; none under a protocol that does not know ways to all."""
+        return self._protocol.parted(now_ns)
 
     def least_interval_ns(self, deadline_ns: int) -> int | None:
         """The least interval between packets of this node that meets a deadline; None: unknown, or there is none."""

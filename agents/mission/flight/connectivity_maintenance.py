@@ -2,6 +2,7 @@
 that the swarm stays one network while it searches.
 """
 
+import math
 from typing import Final
 
 from agents.mission.navigation.half_planes import HalfPlane, Velocity
@@ -17,9 +18,10 @@ _TETHER: Final = 0.95
 """The greatest distance of two UAVs that must stay connected, as a share of the radio's reach."""
 _TETHER_S: Final = 4.0
 """A UAV may use up the rest of that distance in this time at the earliest."""
-_CLOSING_S: Final = 2.0
-"""The same while ranks are closed over somebody who is lost, and every second counts."""
-
+_CLOSING, _CLOSING_S = 0.97, 1.0
+"""The same two while ranks are closed over somebody who is lost, and every second counts."""
+_HASTE: Final = 0.95
+"""Whoever is too far away for that is approached at this share of the greatest speed."""
 
 _EARLY_TIES: Final = 2
 """With so many of its nearest neighbors a UAV stays connected before the sweep; whoever leaves them before it has the
@@ -40,10 +42,12 @@ class ConnectivityMaintenance:
         bidding: Bidding,
         *,
         reach_m: float,
+        speed_m_s: float,
     ) -> None:
+        """`speed_m_s`: the greatest speed of this UAV."""
         self._own_motion, self._neighbors = own_motion, neighbors
         self._formation, self._bidding = formation, bidding
-        self._tether_m = _TETHER * reach_m
+        self._reach_m, self._haste_m_s = reach_m, _HASTE * speed_m_s
 
     def planes(self, now_ns: int) -> list[HalfPlane]:
         plan, pattern, place = self._formation.plan, self._formation.pattern, self._formation.place
@@ -57,19 +61,42 @@ class ConnectivityMaintenance:
             ]
         else:
             ties = self._nearest_motions(now_ns)
-        planes, closes = [], pattern is not None and bool(pattern.vacant)
+        planes, closes = [], self._formation.closing_s(now_ns) is not None
         for motion in ties:
             if motion is None:
                 continue
             plane = tether_plane(
                 motion.offset_from(self._own_motion.position, now_ns),
                 (motion.velocity.east, motion.velocity.north),
-                tether_m=self._tether_m,
+                tether_m=(_CLOSING if closes else _TETHER) * self._reach_m,
                 within_s=_CLOSING_S if closes else _TETHER_S,
+                haste_m_s=self._haste_m_s,
             )
             if plane is not None:
                 planes.append(plane)
         return planes
+
+    def beyond_gap(self, now_ns: int) -> Motion | None:
+        """The likely motion of a UAV to which this one is tied and that is out of reach because somebody between is
+        lost: from its place in the whole formation it hurries here as this UAV hurries there. None if there is nobody,
+        or if they should have met.
+        """
+        plan, pattern, place = self._formation.plan, self._formation.pattern, self._formation.place
+        closing_s, swept_s = self._formation.closing_s(now_ns), self._formation.swept_s(now_ns)
+        if plan is None or pattern is None or place is None or closing_s is None or swept_s is None:
+            return None
+        if self._bidding.is_absent(now_ns) or pattern.may_leave(place, swept_s):
+            return None
+        here, found = self._own_motion.position, None
+        for other in pattern.tethers(place, swept_s):
+            if self._neighbors.motion(plan.nodes[other], now_ns=now_ns) is not None:
+                continue
+            at = pattern.whole_at(other, swept_s)
+            way = here.minus(at)
+            left_m = way.horizontal() - self._haste_m_s * closing_s
+            if left_m > _CLOSING * self._reach_m and (found is None or left_m < found[0]):
+                found = left_m, Motion(at, pattern.velocity(other, swept_s), now_ns)
+        return None if found is None else found[1]
 
     def _nearest_motions(self, now_ns: int) -> list[Motion | None]:
         """The nearest neighbors of a UAV on the way to its place, within whose reach it stays when it responds."""
@@ -99,12 +126,14 @@ class ConnectivityMaintenance:
         return (min(near)[1],) if near else ()
 
 
-def tether_plane(offset: Enu, other_velocity: Velocity, *, tether_m: float, within_s: float) -> HalfPlane | None:
+def tether_plane(
+    offset: Enu, other_velocity: Velocity, *, tether_m: float, within_s: float, haste_m_s: float = math.inf
+) -> HalfPlane | None:
     """The half-plane of velocities that keep this UAV within `tether_m` of another for `within_s`; None if the other is
     so near that no limit is needed.
 
     Both UAVs may fly apart, so each of them may use half of the distance that is left. If none is left, this UAV alone
-    makes up for what is missing.
+    makes up for what is missing, at `haste_m_s` at most, so that there is such a velocity.
     """
     distance = offset.horizontal()
     if distance < 0.3 * tether_m:
@@ -112,4 +141,4 @@ def tether_plane(offset: Enu, other_velocity: Velocity, *, tether_m: float, with
     nx, ny = offset.east / distance, offset.north / distance
     slack_m = tether_m - distance
     parting = (slack_m / within_s) * (0.5 if slack_m > 0 else 1.0)
-    return HalfPlane(nx, ny, other_velocity[0] * nx + other_velocity[1] * ny - parting)
+    return HalfPlane(nx, ny, min(haste_m_s, other_velocity[0] * nx + other_velocity[1] * ny - parting))

@@ -1,5 +1,6 @@
 """The flight of a searching UAV from one position fix to the next: to its goal or home, within its constraints."""
 
+from agents.mission.flight.connectivity_maintenance import ConnectivityMaintenance
 from agents.mission.flight.goal import Goal
 from agents.mission.flight.return_home import ReturnHome
 from agents.mission.flight.take_off import TakeOff
@@ -18,13 +19,14 @@ class Flight:
         place: FormationPlace,
         goal: Goal,
         velocity_choice: VelocityChoice,
+        connectivity: ConnectivityMaintenance,
         *,
         take_off: TakeOff | None,
         return_home: ReturnHome,
     ) -> None:
         """`take_off`: None for a UAV that is in the air from the start."""
         self._own_motion, self._place, self._goal = own_motion, place, goal
-        self._velocity_choice = velocity_choice
+        self._velocity_choice, self._connectivity = velocity_choice, connectivity
         self._take_off, self._return_home = take_off, return_home
         self.velocity: Enu | None = None
         """A new velocity to fly, until the application takes it; None if there is no new one."""
@@ -40,7 +42,11 @@ class Flight:
             self.velocity = None
         elif not self._return_home.leaves:
             goal, feed = self._goal.at(survivor, now_ns)
-            self.velocity = self._velocity_choice.velocity(goal, feed, now_ns)
+            hastily = self._place.closing_s(now_ns) is not None
+            beyond = self._connectivity.beyond_gap(now_ns)
+            if beyond is not None:
+                goal, feed = beyond.position._replace(up=goal.up), beyond.velocity
+            self.velocity = self._velocity_choice.velocity(goal, feed, now_ns, hastily=hastily)
         elif self._return_home.land_if_there(now_ns):
             self.velocity = None
         else:

@@ -19,6 +19,8 @@ from fanet_mw.units import Enu
 
 _LANE_GAIN: Final = 0.4
 """The rate at which a deviation from the wanted place is corrected [1/s]."""
+_HASTY_GAIN: Final = 0.6
+"""The same while ranks are closed: others wait for this UAV."""
 _LEAST_M_S: Final = 1.0
 """The least speed at which a UAV flies around a corner."""
 
@@ -48,11 +50,11 @@ class VelocityChoice:
         self._most_m_s = most_m_s
         self._hard, self._soft = hard, soft
 
-    def velocity(self, goal: Enu, feed: Enu, now_ns: int) -> Enu:
+    def velocity(self, goal: Enu, feed: Enu, now_ns: int, *, hastily: bool = False) -> Enu:
         """The velocity to fly to a place `goal`, which moves at the velocity `feed`."""
         here, obstacles = self._own_motion.position, self._obstacles
-        off = goal.minus(here)
-        wanted = feed.east + _LANE_GAIN * off.east, feed.north + _LANE_GAIN * off.north
+        off, gain = goal.minus(here), _HASTY_GAIN if hastily else _LANE_GAIN
+        wanted = feed.east + gain * off.east, feed.north + gain * off.north
         corner = obstacles.way_to(here, goal, feed, now_ns=now_ns)
         if corner is not None:
             wanted = self._towards(corner, speed_m_s=math.hypot(*wanted))

@@ -138,6 +138,11 @@ class KnownObstacles:
     # --- queries --------------------------------------------------------------------------------------------------
 
     @property
+    def hides(self) -> bool:
+        """True if there is something on the map that may stand between two UAVs."""
+        return bool(self._map.buildings) or self.has_hills
+
+    @property
     def has_hills(self) -> bool:
         """True if the map has the heights of the ground."""
         return bool(self._map.heights_m)

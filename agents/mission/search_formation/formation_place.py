@@ -32,6 +32,10 @@ _LAG_M: Final = 140.0
 """The greatest distance by which a UAV of a team, or a relay, may be behind its place."""
 
 
+_CLOSES_S: Final = 30.0
+"""The time within which ranks are closed."""
+
+
 class FormationPlace:
     """The place of one UAV in the plan that it follows."""
 
@@ -49,6 +53,7 @@ class FormationPlace:
         its place from there."""
         self._left_ns = 0
         """The instant at which it leaves that position."""
+        self._closing_ns = 0
 
     def adopt(self, plan: Search, now_ns: int) -> None:
         made, before = pattern_of(plan, reach_m=self._reach_m), self.pattern
@@ -58,7 +63,7 @@ class FormationPlace:
         if first:
             self.depart(now_ns)
 
-    def close_ranks(self, lost: Collection[int]) -> None:
+    def close_ranks(self, lost: Collection[int], now_ns: int) -> None:
         """Fly on without these UAVs: the others of a row share its length."""
         if self.plan is None or self.pattern is None:
             return
@@ -68,7 +73,14 @@ class FormationPlace:
         if len(vacant) >= len(self.plan.nodes) - 1:
             vacant = frozenset()  # it is alone, and waits for the others at its place
         if vacant != self.pattern.vacant:
+            if not vacant <= self.pattern.vacant:
+                self._closing_ns = now_ns
             self.pattern = self.pattern.closed(vacant)
+
+    def closing_s(self, now_ns: int) -> float | None:
+        """How long this UAV has been closing ranks over the last one who was lost; None if it is not, or has done."""
+        since_s = (now_ns - self._closing_ns) / S
+        return since_s if self.pattern is not None and self.pattern.vacant and since_s <= _CLOSES_S else None
 
     def depart(self, now_ns: int) -> None:
         """Fly to the place from here, and not before the plan begins."""

@@ -1,8 +1,8 @@
 """Plans the search: one node decides which UAV takes which place of the formation, and floods the plan.
 
     every node: sends its status at once, and then every STATUS_S
-    planner:    the lowest id that was received recently; it plans when all nodes have been received, or after
-                _PATIENCE_NS
+    planner:    the lowest id that was received recently, of each part of a swarm that has come apart; it plans when
+                all nodes have been received, or after _PATIENCE_NS
     lost nodes: the others close ranks by themselves (`roll_call.py`), and the plan remains, so that a UAV that only
                 seemed to be lost has its place still
     newcomers:  a node that has no place gets one that nobody has, or that of a node that was not received for _LOST_NS
@@ -176,6 +176,7 @@ class FormationPlanner:
             node >= self._node
             or member.leaves
             or node in self._roll_call.lost
+            or node in self._roll_call.parted
             or now_ns - member.heard_ns > _LOST_NS
             or self._lacks_plan(member)
             for node, member in self._members.items()

@@ -43,7 +43,7 @@ class Pattern:
         """
         self.dimensions = dimensions
         self.vacant = vacant
-        whole = _SHAPES[dimensions.shape](dimensions)
+        whole = self._whole = _SHAPES[dimensions.shape](dimensions)
         self._reach_m, self._hop_m = reach_m, _HOP * reach_m
         self._left = tuple(len(row.places) - len(vacant.intersection(row.places)) for row in whole.rows())
         self._flown = {place: at for row in whole.rows() for place, at in row.shared(vacant).items()}
@@ -103,11 +103,11 @@ class Pattern:
     def at(self, place: int, swept_s: float) -> Enu:
         """The position of a place after this time of sweeping; before 0, where the sweep begins."""
         flown = self._flown.get(place, place)
-        if isinstance(self.shape, Ring) and place < self.dimensions.lanes:
-            return self.shape.at((flown + self.shape.turned(swept_s)) % self.dimensions.lanes, swept_s)
-        at = self.shape.at(flown, swept_s)
-        aside_m = self.shape.aside_m(flown, swept_s) if isinstance(self.shape, Lines | Sectors) else 0.0
-        return at._replace(east=at.east + aside_m) if aside_m else at
+        return _position(self.shape, flown, swept_s)
+
+    def whole_at(self, place: int, swept_s: float) -> Enu:
+        """The position of a place if nobody were lost."""
+        return _position(self._whole, place, swept_s)
 
     def tethers(self, place: int, swept_s: float) -> tuple[int, ...]:
         """The places that must stay within radio reach of this one to keep the swarm connected, past those that are
@@ -145,6 +145,16 @@ class Pattern:
         flown = self._flown.get(place, place)
         a, b = self.shape.at(flown, early), self.shape.at(flown, early + _STEP_S)
         return Enu((b.east - a.east) / _STEP_S, (b.north - a.north) / _STEP_S, (b.up - a.up) / _STEP_S)
+
+
+def _position(shape: Shape, place: float, swept_s: float) -> Enu:
+    """The position of a place of a shape, turned and shifted between its lanes as the shape is then."""
+    if isinstance(shape, Ring):
+        lanes = shape.rows()[0].size
+        return shape.at((place + shape.turned(swept_s)) % lanes if place < lanes else place, swept_s)
+    at = shape.at(place, swept_s)
+    aside_m = shape.aside_m(place, swept_s) if isinstance(shape, Lines | Sectors) else 0.0
+    return at._replace(east=at.east + aside_m) if aside_m else at
 
 
 def fastest(count: int, demands: Demands) -> Pattern | None:

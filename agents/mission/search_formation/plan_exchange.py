@@ -13,12 +13,14 @@ from agents.mission.search_formation.pattern import Pattern
 from agents.mission.search_formation.roll_call import RollCall
 from fanet_mw.motion import Motion
 from fanet_mw.trace import Planned
-from fanet_mw.units import US, NodeId, S
+from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire.roll import Roll
 from fanet_mw.wire.search_plan import Search, SearchStatus
 
 _FIRST_STATUS_S: Final = 2
 """A UAV sends its first status at a random instant within this time after its start."""
+_ALARM_NS: Final = 2 * S
+"""The least time between two floods by which a UAV tells all who is lost."""
 _FALLS_M_S: Final = 6.0
 """Nobody sinks this fast on purpose."""
 
@@ -46,6 +48,8 @@ class PlanExchange:
         self._random = random
         self._next_status_ns = 0
         self._adopted_ns = 0
+        self._next_alarm_ns = 0
+        """The earliest instant at which this UAV floods again who is lost."""
         """The instant at which this UAV began to follow its plan."""
         self._flies_home = False
         """True if this UAV takes no place any more, whatever the plan says."""
@@ -68,8 +72,13 @@ class PlanExchange:
     def close_ranks(self, now_ns: int) -> None:
         """Find who is lost, and fly on without them."""
         if self._place.plan is not None:
-            self._roll_call.review(self._place.plan, since_ns=self._adopted_ns, now_ns=now_ns)
-            self._place.close_ranks({*self._roll_call.lost, *self._planner.leavers, *self._planner.absent})
+            self._roll_call.review(
+                self._place.plan, since_ns=self._adopted_ns, falls=_falls(self._own_motion.velocity), now_ns=now_ns
+            )
+            if self._roll_call.has_news and now_ns >= self._next_alarm_ns:
+                self._roll_call.has_news, self._next_alarm_ns = False, now_ns + _ALARM_NS
+                self._outbox.packets.append(OutgoingPacket(self.hello_frames(now_ns)))
+            self._place.close_ranks({*self._roll_call.lost, *self._planner.leavers, *self._planner.absent}, now_ns)
 
     def say_status(self, percent: int, now_ns: int) -> None:
         """Send this UAV's status: its position, its plan, and the percentage of its battery that it may still spend."""
@@ -105,7 +114,7 @@ class PlanExchange:
     def on_hello(self, node: int, motion: Motion, *, now_ns: int) -> bool:
         """A neighbor's hello states how it flies; returns True if it was lost."""
         self._planner.on_neighbor(node, motion.position, now_ns=now_ns)
-        returned, falls = node in self._roll_call.lost, motion.velocity.up <= -_FALLS_M_S
+        returned, falls = node in self._roll_call.lost, _falls(motion.velocity)
         self._roll_call.on_hello(node, now_ns=now_ns, falls=falls)
         return returned and not falls
 
@@ -136,3 +145,8 @@ class PlanExchange:
             self._place.leave()
         place = self._place.place
         self._outbox.records.append(Planned(now_ns, self._node, plan.revision, -1 if place is None else place))
+
+
+def _falls(velocity: Enu) -> bool:
+    """True for a UAV that falls from the sky."""
+    return velocity.up <= -_FALLS_M_S

@@ -3,15 +3,19 @@
     heard     the latest instant at which anybody is known to have heard a UAV; each hello tells them all on
     lost      said by a UAV that has heard it itself until lately, when nobody is known to have heard it for some time;
               it is told on with the instant at which the UAV was last heard, and a later one takes it back
-    falls     a UAV whose hello says that it falls is lost at once
+    falls     a UAV that falls says so at once, and is lost
+    silent    a neighbor whose radio sends nothing for unusually long is lost as well, without a hello being missed
     away      a UAV that this one never heard itself is lost only after much longer, because news take a second a hop:
               then it is cut off with a part of the swarm
 
-So all UAVs of a part agree within a second a hop on who is lost, without a leader.
+Whoever finds a UAV lost by its own receiver floods its roll at once. So all UAVs of a part agree soon on who is lost,
+within a second a hop if that flood is lost, without a leader.
 """
 
+from collections.abc import Collection
 from typing import Final
 
+from agents.mission.navigation.silent_neighbors import SilentNeighbors
 from fanet_mw.node.neighbors import neighbor_lifetime_ns
 from fanet_mw.units import NodeId, S
 from fanet_mw.wire.roll import LONG_AGO, ROLL_NS, Roll
@@ -22,6 +26,8 @@ _SILENT_NS: Final = 3 * S
 long as a neighbor lasts."""
 _NEIGHBOR_NS: Final = 15 * S
 """A UAV was a neighbor until lately if it was heard within this time."""
+_ROUND_NS: Final = ROLL_NS
+"""Who was heard within this time is not silent."""
 _AWAY_NS: Final = 40 * S
 """A UAV that was not a neighbor is lost after this time; news from the far end of a swarm are fresher."""
 _AHEAD: Final = 2
@@ -31,8 +37,8 @@ _AHEAD: Final = 2
 class RollCall:
     """The UAVs of the plan as one UAV knows them."""
 
-    def __init__(self, node: NodeId, *, hello_interval_s: float) -> None:
-        self._node = node
+    def __init__(self, node: NodeId, *, hello_interval_s: float, silent: SilentNeighbors | None = None) -> None:
+        self._node, self._silent = node, silent
         self._silent_ns = max(_SILENT_NS, neighbor_lifetime_ns(hello_interval_s))
         self._heard: dict[int, int] = {}
         """The latest instant at which each UAV is known to have been heard, in units of `ROLL_NS`."""
@@ -40,10 +46,16 @@ class RollCall:
         """The instant at which this UAV last heard each other one itself."""
         self.lost: dict[int, int] = {}
         """The UAVs that are lost, each with the instant at which this UAV has learned it."""
+        self._falls = False
+        self.parted: Collection[int] = ()
+        """The UAVs to which no way leads any more, by the radio: they are lost, or in another part of the swarm."""
+        self.has_news = False
+        """True once this UAV itself has found somebody lost, until the caller has told all of it."""
 
     def on_hello(self, node: int, *, now_ns: int, falls: bool = False) -> None:
         """A neighbor was heard; `falls`: its hello says that it falls from the sky."""
         self._neighbor_ns[node] = now_ns
+        self.has_news |= falls and node not in self.lost
         self._take(node, now_ns // ROLL_NS, lost=falls, now_ns=now_ns)
 
     def on_roll(self, roll: Roll, plan: Search | None, *, now_ns: int) -> None:
@@ -65,17 +77,24 @@ class RollCall:
         if lost and (known is None or heard >= known):
             self.lost.setdefault(node, now_ns)
 
-    def review(self, plan: Search, *, since_ns: int, now_ns: int) -> None:
-        """Find who is lost, to be called twice a second; `since_ns`: the instant at which this UAV began to follow
-        the plan, before which nobody need have been heard.
+    def review(self, plan: Search, *, since_ns: int, falls: bool = False, now_ns: int) -> None:
+        """Find who is lost, to be called several times a second; `since_ns`: the instant at which this UAV began to
+        follow the plan, before which nobody need have been heard. `falls`: this UAV falls itself.
         """
+        self.parted = () if self._silent is None else self._silent.parted(now_ns=now_ns)
+        self.has_news |= falls and not self._falls
+        self._falls = falls
         for node in plan.nodes:
             if node in (0, self._node) or node in self.lost:
                 continue
             silent_ns = now_ns - self._heard.get(node, since_ns // ROLL_NS) * ROLL_NS
-            near = now_ns - self._neighbor_ns.get(node, -_NEIGHBOR_NS) < _NEIGHBOR_NS
-            if silent_ns > (self._silent_ns if near else _AWAY_NS):
+            near, gone = now_ns - self._neighbor_ns.get(node, -_NEIGHBOR_NS) < _NEIGHBOR_NS, False
+            if near and self._silent is not None and silent_ns > _ROUND_NS:
+                near = self._silent.might_be_heard(NodeId(node), now_ns=now_ns)
+                gone = near and self._silent.has(NodeId(node), now_ns=now_ns)
+            if gone or silent_ns > (self._silent_ns if near else _AWAY_NS):
                 self.lost[node] = now_ns
+                self.has_news |= near
                 self._heard.setdefault(node, since_ns // ROLL_NS)
 
     def roll(self, plan: Search, *, now_ns: int) -> Roll:
@@ -83,5 +102,7 @@ class RollCall:
         at = now_ns // ROLL_NS
         heard = {**self._heard, self._node: at}
         ages = tuple(min(LONG_AGO, max(0, at - heard[node])) if node in heard else LONG_AGO for node in plan.nodes)
-        lost = frozenset(place for place, node in enumerate(plan.nodes) if node in self.lost)
+        lost = frozenset(
+            place for place, node in enumerate(plan.nodes) if node in self.lost or (node == self._node and self._falls)
+        )
         return Roll(at, plan.planner, plan.revision, ages, lost)

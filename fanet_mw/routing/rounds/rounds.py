@@ -12,7 +12,7 @@ IPSN 2011; LWB, SenSys 2012), without their synchronous transmissions, which 802
 nodes that use the same turn far apart.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import ClassVar, Final
 
 from fanet_mw.bus.messages import Reception, TxStatus
@@ -565,6 +565,9 @@ class RoundFlooding(RoutingProtocol):
             priority=PRIORITY_REPORT if self._timing.slots else PRIORITY_BULK,
             clock_error_ns=self._port.clock_error_ns, now_ns=self._now_ns,
         )  # fmt: skip
+
+    def parted(self, now_ns: int) -> Collection[NodeId]:
+        return self._topology.parted(now_ns)
 
     def bounds(self, priority: int) -> bool:
         return priority < PRIORITY_BULK or not self._timing.slots

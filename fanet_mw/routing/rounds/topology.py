@@ -207,6 +207,11 @@ class Topology:
         self._arrange(now_ns)
         return node not in self._unreached_ns
 
+    def parted(self, now_ns: int) -> Sequence[NodeId]:
+        """The nodes to which there was a way, and is none any more."""
+        self._arrange(now_ns)
+        return [node for node in self._unreached_ns if self._known >> (node - 1) & 1]
+
     @property
     def is_partial(self) -> bool:
         """True while this node has links, and there are nodes to which it knows no way."""

@@ -1,11 +1,12 @@
 """A UAV stays within radio reach of those it is tied to."""
 
+import pytest
 from search_board import COUNT, FOLLOWER, LINE, REACH_M, TAKEN_UP_NS, Board, lane_of
 
 from agents.mission.flight.connectivity_maintenance import ConnectivityMaintenance, tether_plane
 from agents.mission.navigation.half_planes import nearest
 from fanet_mw.motion import Motion
-from fanet_mw.units import Enu, S
+from fanet_mw.units import Enu, NodeId, S
 
 
 def test_who_is_tied_does_not_fly_out_of_reach() -> None:
@@ -24,14 +25,18 @@ def test_a_uav_of_a_line_is_tied_to_those_beside_it_and_a_follower_to_the_neares
         for other in range(1, COUNT + 1):
             if other != node:
                 board.neighbors.on_hello(other, Motion(lane_of(other, now_ns), Enu(0, 0, 0), now_ns))
-        tied = ConnectivityMaintenance(board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M)
+        tied = ConnectivityMaintenance(
+            board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
+        )
         assert len(tied.planes(now_ns)) == ties
 
 
 def test_who_is_on_the_way_to_its_place_stays_within_reach_of_the_two_nearest() -> None:
     now_ns = 20 * S
     board = Board(LINE, Enu(0.0, 0.0, 65.0))
-    tied = ConnectivityMaintenance(board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M)
+    tied = ConnectivityMaintenance(
+        board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
+    )
     assert tied.planes(now_ns) == []
     for other, east in ((1, 230.0), (2, -200.0), (3, 240.0)):
         board.neighbors.on_hello(other, Motion(Enu(east, 0.0, 65.0), Enu(0, 0, 0), now_ns))
@@ -39,14 +44,43 @@ def test_who_is_on_the_way_to_its_place_stays_within_reach_of_the_two_nearest() 
     assert not board.place.is_taken_up(now_ns)
 
 
-def test_who_closes_ranks_over_a_lost_uav_may_use_up_its_reach_in_half_the_time() -> None:
+def test_who_closes_ranks_over_a_lost_uav_may_use_up_a_little_more_of_its_reach_in_a_quarter_of_the_time() -> None:
     now_ns = TAKEN_UP_NS + 20 * S
     board = Board(LINE, lane_of(LINE, now_ns))
     for other in range(1, COUNT + 1):
         if other != LINE:
             board.neighbors.on_hello(other, Motion(lane_of(other, now_ns), Enu(0, 0, 0), now_ns))
-    tied = ConnectivityMaintenance(board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M)
+    tied = ConnectivityMaintenance(
+        board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
+    )
     before = {(plane.east, plane.north): plane.least for plane in tied.planes(now_ns)}
-    board.place.close_ranks({FOLLOWER})
+    board.place.close_ranks({FOLLOWER}, now_ns)
     after = {(plane.east, plane.north): plane.least for plane in tied.planes(now_ns)}
-    assert after == {way: 2 * least for way, least in before.items()}
+    for way, least in before.items():
+        assert after[way] == pytest.approx(4 * least - 0.02 * REACH_M / 2)
+
+
+def test_who_is_too_far_away_is_approached_as_fast_as_a_uav_flies() -> None:
+    plane = tether_plane(Enu(339, 0, 0), (0.0, 7.5), tether_m=237, within_s=2, haste_m_s=9.0)
+    assert plane is not None
+    assert nearest((0.0, 7.5), [plane], limit=10, hard=0)[0] == pytest.approx(9.0)
+
+
+def test_the_two_beside_a_gap_fly_towards_each_other_until_they_should_have_met() -> None:
+    for node, way in ((LINE, 1), (NodeId(LINE + 2), -1)):
+        behind, beyond = NodeId(node - way), []
+        board = Board(node, lane_of(node, TAKEN_UP_NS))
+        tied = ConnectivityMaintenance(
+            board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
+        )
+        for since_s in (0, 3, 8):
+            now_ns = TAKEN_UP_NS + (60 + since_s) * S
+            board.own_motion.position = lane_of(node, now_ns).minus(Enu(-9.0 * since_s * way, 0, 0))
+            board.neighbors.on_hello(behind, Motion(lane_of(behind, now_ns), Enu(0, 7.5, 0), now_ns))
+            assert since_s or tied.beyond_gap(now_ns) is None, "nobody is lost"
+            if not since_s:
+                board.place.close_ranks({LINE + 1}, now_ns)
+            mate = tied.beyond_gap(now_ns)
+            beyond.append(None if mate is None else mate.position)
+        there = NodeId(node + 2 * way)
+        assert beyond == [lane_of(there, TAKEN_UP_NS + 60 * S), lane_of(there, TAKEN_UP_NS + 63 * S), None]

@@ -67,8 +67,11 @@ def test_too_few_have_no_formation() -> None:
     assert fitted(13, DEMANDS) is None
 
 
-def planner_of(node: int, *, expected: int, lost: Collection[int] = (), take_off_ns: int = 0) -> FormationPlanner:
+def planner_of(
+    node: int, *, expected: int, lost: Collection[int] = (), parted: Collection[int] = (), take_off_ns: int = 0
+) -> FormationPlanner:
     roll_call = RollCall(NodeId(node), hello_interval_s=1.0)
+    roll_call.parted = parted
     roll_call.lost.update(dict.fromkeys(lost, 0))
     return FormationPlanner(
         NodeId(node), roll_call, expected=expected, deploy_speed_m_s=9, take_off_ns=take_off_ns,
@@ -76,8 +79,10 @@ def planner_of(node: int, *, expected: int, lost: Collection[int] = (), take_off
     )  # fmt: skip
 
 
-def planner_with(nodes: int, *, node: int = 1, lost: Collection[int] = ()) -> FormationPlanner:
-    made = planner_of(node, expected=nodes, lost=lost)
+def planner_with(
+    nodes: int, *, node: int = 1, lost: Collection[int] = (), parted: Collection[int] = ()
+) -> FormationPlanner:
+    made = planner_of(node, expected=nodes, lost=lost, parted=parted)
     for other in range(1, nodes + 1):
         place = Enu(200.0 * ((other - 1) % 9 - 4), 200.0 * ((other - 1) // 9 - 2), 50)
         made.status(SearchStatus(0, place, other, 0, 100), now_ns=0)
@@ -353,3 +358,14 @@ def test_a_restarted_planner_whom_nobody_tells_the_plan_makes_one_that_replaces_
     (plan,) = swarm.plans
     assert plan is not None
     assert (plan.planner, plan.revision) == (1, 2)
+
+
+def test_each_part_of_a_swarm_that_has_come_apart_has_one_planner() -> None:
+    parts = range(1, 20), range(20, 46)
+    leads = [
+        node
+        for part, away in (parts, parts[::-1])
+        for node in part
+        if planner_with(45, node=node, parted=away).review(formation(), now_ns=15 * S)
+    ]
+    assert leads == [1, 20]

@@ -8,8 +8,10 @@ from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.formation_planner import FormationPlanner
 from agents.mission.search_formation.plan_exchange import PlanExchange
 from agents.mission.search_formation.roll_call import RollCall
+from fanet_mw.motion import Motion
 from fanet_mw.units import Enu, NodeId, S
 from fanet_mw.wire import HEADER_BYTES
+from fanet_mw.wire.roll import Roll
 from fanet_mw.wire.search_plan import SearchStatus
 
 NOW_NS = TAKEN_UP_NS + 40 * S
@@ -65,3 +67,15 @@ def test_who_is_absent_keeps_its_own_place_in_its_plan() -> None:
     exchange.plans.close_ranks(NOW_NS)
     assert exchange.place.pattern is not None
     assert exchange.place.pattern.vacant == frozenset()
+
+
+def test_who_finds_a_neighbor_lost_floods_that_once() -> None:
+    exchange, out = Exchange(LINE), NodeId(6)
+    motion = Motion(lane_of(out, NOW_NS), Enu(0, 7.5, 0), NOW_NS)
+    exchange.plans.on_hello(out, motion, now_ns=NOW_NS)
+    told = []
+    for after_s in (1, 4, 5, 8):
+        exchange.plans.close_ranks(NOW_NS + after_s * S)
+        told.append([Roll.decode_frame(bytes(HEADER_BYTES) + packet.frames).lost for packet in exchange.out.packets])
+        exchange.out.packets.clear()
+    assert told == [[], [{PLAN.nodes.index(out)}], [], []]

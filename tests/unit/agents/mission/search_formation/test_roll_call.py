@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from agents.mission.navigation.silent_neighbors import SilentNeighbors
 from agents.mission.search_formation.formation_planner import plan_of
 from agents.mission.search_formation.pattern import fitted
 from agents.mission.search_formation.roll_call import RollCall
@@ -145,3 +146,64 @@ def test_who_says_that_it_falls_is_lost_at_once_and_who_is_heard_again_in_flight
     assert set(told.lost) == {2}, "who is out of reach learns it from hellos"
     call.on_hello(2, now_ns=14 * S)
     assert not call.lost
+
+
+class Radio(SilentNeighbors):
+    """Says which neighbors' radios are silent."""
+
+    def __init__(self, *silent: int) -> None:
+        self.silent = silent
+
+        self.far: tuple[int, ...] = ()
+
+    def has(self, node: NodeId, *, now_ns: int) -> bool:
+        return node in self.silent
+
+    def might_be_heard(self, node: NodeId, *, now_ns: int) -> bool:
+        return node not in self.far
+
+    def parted(self, *, now_ns: int) -> tuple[NodeId, ...]:
+        return ()
+
+
+def test_a_neighbor_whose_radio_falls_silent_is_lost_before_a_hello_is_missed_and_that_is_told_once() -> None:
+    plan, radio = ring_plan(), Radio()
+    call = RollCall(NodeId(1), hello_interval_s=1.0, silent=radio)
+    for node in (2, 3):
+        call.on_hello(node, now_ns=10 * S)
+    radio.silent = (2, 30)
+    call.review(plan, since_ns=10 * S, now_ns=11 * S)
+    assert set(call.lost) == {2}, "30 was no neighbor"
+    assert call.has_news
+    call.has_news = False
+    call.review(plan, since_ns=10 * S, now_ns=12 * S)
+    assert not call.has_news
+    call.on_hello(2, now_ns=13 * S)
+    assert not call.lost
+
+
+def test_who_falls_says_so_before_its_next_hello() -> None:
+    plan = ring_plan()
+    falling, other = (RollCall(NodeId(node), hello_interval_s=1.0) for node in (2, 40))
+    other.on_hello(2, now_ns=10 * S)
+    falling.review(plan, since_ns=0, now_ns=10 * S)
+    assert not falling.has_news
+    falling.review(plan, since_ns=0, falls=True, now_ns=11 * S)
+    assert falling.has_news
+    other.on_roll(falling.roll(plan, now_ns=11 * S), plan, now_ns=11 * S)
+    assert set(other.lost) == {2}
+    falling.review(plan, since_ns=0, now_ns=12 * S)
+    other.on_hello(2, now_ns=12 * S)
+    assert not other.lost, "it has caught itself"
+
+
+def test_a_neighbor_that_has_flown_out_of_reach_is_not_lost_for_want_of_news_which_go_a_long_way_round() -> None:
+    plan, radio = ring_plan(), Radio()
+    call = RollCall(NodeId(1), hello_interval_s=1.0, silent=radio)
+    for node in (2, 3):
+        call.on_hello(node, now_ns=10 * S)
+    radio.far = (2,)
+    call.review(plan, since_ns=10 * S, now_ns=14 * S)
+    assert set(call.lost) == {3}
+    call.review(plan, since_ns=10 * S, now_ns=52 * S)
+    assert set(call.lost) == set(range(2, COUNT + 1))

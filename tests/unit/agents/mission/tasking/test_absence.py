@@ -84,7 +84,7 @@ def test_a_line_can_do_without_as_many_as_its_others_can_close_up_for_and_a_late
     late_ns = TAKEN_UP_NS + 160 * S
     for lost, spared in ((0, True), (2, True), (3, False)):  # 14 hops of 169 m may become 11 of 215 m
         board = Board(LINE, lane_of(LINE, late_ns))
-        board.place.close_ranks(set(range(6, 6 + lost)))
+        board.place.close_ranks(set(range(6, 6 + lost)), late_ns)
         assert board.place.can_be_spared(late_ns) == spared, lost
     relay = NodeId(PLAN.nodes[2 * PLAN.lanes + 1])
     assert not Board(relay, lane_of(relay, late_ns)).place.can_be_spared(late_ns)

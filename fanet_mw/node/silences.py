@@ -1,0 +1,36 @@
+"""How long each neighbor has sent nothing, and how long it usually does."""
+
+from typing import Final
+
+from fanet_mw.units import NodeId, S
+
+_FORGETS: Final = 0.97
+"""The share of the longest silence that remains with each further frame."""
+_MOST_NS: Final = 4 * S
+"""A longer silence counts as this one, and so does that before the first frame."""
+_UNUSUAL: Final = 2.5
+"""A silence is unusual if it is this many times as long as the longest one of late."""
+
+
+class Silences:
+    """The frames that one node hears, whatever is in them."""
+
+    def __init__(self, *, count: int) -> None:
+        self._heard_ns = [0] * (count + 1)
+        """The instant of the last frame of each neighbor; 0: none."""
+        self._longest_ns = [0.0] * (count + 1)
+        """The longest silence of late between two frames of each neighbor."""
+
+    def on_frame(self, src: int, now_ns: int) -> None:
+        """A frame came from this node."""
+        if src < len(self._heard_ns):
+            heard_ns, longest_ns = self._heard_ns[src], self._longest_ns[src] * _FORGETS
+            self._heard_ns[src] = now_ns
+            if now_ns - heard_ns > longest_ns:
+                longest_ns = min(now_ns - heard_ns, _MOST_NS)
+            self._longest_ns[src] = longest_ns
+
+    def is_unusual(self, node: NodeId, *, least_ns: int, now_ns: int) -> bool:
+        """True if a node that was heard before has been silent for an unusually long time, `least_ns` at least."""
+        heard_ns = self._heard_ns[node]
+        return heard_ns > 0 and now_ns - heard_ns > max(least_ns, _UNUSUAL * self._longest_ns[node])

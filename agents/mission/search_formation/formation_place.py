@@ -32,7 +32,7 @@ _LAG_M: Final = 140.0
 """The greatest distance by which a UAV of a team, or a relay, may be behind its place."""
 
 
-_CLOSES_S: Final = 30.0
+_CLOSES_S: Final = 15.0
 """The time within which ranks are closed."""
 
 
@@ -78,9 +78,13 @@ class FormationPlace:
             self.pattern = self.pattern.closed(vacant)
 
     def closing_s(self, now_ns: int) -> float | None:
-        """How long this UAV has been closing ranks over the last one who was lost; None if it is not, or has done."""
+        """How long this UAV's row has been closing ranks over the last one who was lost; None if it is not, or has
+        done.
+        """
         since_s = (now_ns - self._closing_ns) / S
-        return since_s if self.pattern is not None and self.pattern.vacant and since_s <= _CLOSES_S else None
+        if self.pattern is None or self.place is None or since_s > _CLOSES_S:
+            return None
+        return since_s if self.pattern.has_gap_beside(self.place) else None
 
     def depart(self, now_ns: int) -> None:
         """Fly to the place from here, and not before the plan begins."""

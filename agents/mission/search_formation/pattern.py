@@ -105,6 +105,14 @@ class Pattern:
         flown = self._flown.get(place, place)
         return _position(self.shape, flown, swept_s)
 
+    def has_gap_beside(self, place: int) -> bool:
+        """True if somebody of the row of a place is lost, or of a row that ends there."""
+        return any(
+            self.vacant.intersection(row.places)
+            for row in self._whole.rows()
+            if place in row.places or set(self._whole.tethers(place)).intersection(row.places)
+        )
+
     def whole_at(self, place: int, swept_s: float) -> Enu:
         """The position of a place if nobody were lost."""
         return _position(self._whole, place, swept_s)

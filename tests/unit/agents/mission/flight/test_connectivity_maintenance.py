@@ -55,6 +55,8 @@ def test_who_closes_ranks_over_a_lost_uav_may_use_up_a_little_more_of_its_reach_
     )
     before = {(plane.east, plane.north): plane.least for plane in tied.planes(now_ns)}
     board.place.close_ranks({FOLLOWER}, now_ns)
+    assert {(plane.east, plane.north): plane.least for plane in tied.planes(now_ns)} == before, "of another row"
+    board.place.close_ranks({LINE + 7}, now_ns)
     after = {(plane.east, plane.north): plane.least for plane in tied.planes(now_ns)}
     for way, least in before.items():
         assert after[way] == pytest.approx(4 * least - 0.02 * REACH_M / 2)

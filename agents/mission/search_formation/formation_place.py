@@ -53,7 +53,10 @@ class FormationPlace:
         its place from there."""
         self._left_ns = 0
         """The instant at which it leaves that position."""
+        self._gaps: frozenset[int] = frozenset()
+        """The places of those who are lost."""
         self._closing_ns = 0
+        """The instant at which the last of them was lost."""
 
     def adopt(self, plan: Search, now_ns: int) -> None:
         made, before = pattern_of(plan, reach_m=self._reach_m), self.pattern
@@ -63,18 +66,26 @@ class FormationPlace:
         if first:
             self.depart(now_ns)
 
-    def close_ranks(self, lost: Collection[int], now_ns: int) -> None:
-        """Fly on without these UAVs: the others of a row share its length."""
+    def close_ranks(self, lost: Collection[int], now_ns: int, *, away: Collection[int] = ()) -> None:
+        """Fly on without these UAVs: the others of a row share its length. `away`: those that left by themselves, so
+        that nothing is urgent.
+        """
         if self.plan is None or self.pattern is None:
             return
         vacant = frozenset(
-            place for place, node in enumerate(self.plan.nodes) if node != self._node and (not node or node in lost)
+            place
+            for place, node in enumerate(self.plan.nodes)
+            if node != self._node and (not node or node in lost or node in away)
         )
         if len(vacant) >= len(self.plan.nodes) - 1:
             vacant = frozenset()  # it is alone, and waits for the others at its place
+        gaps = frozenset(
+            place for place in vacant if self.plan.nodes[place] in lost and self.plan.nodes[place] not in away
+        )
+        if not gaps <= self._gaps:
+            self._closing_ns = now_ns
+        self._gaps = gaps
         if vacant != self.pattern.vacant:
-            if not vacant <= self.pattern.vacant:
-                self._closing_ns = now_ns
             self.pattern = self.pattern.closed(vacant)
 
     def closing_s(self, now_ns: int) -> float | None:
@@ -82,9 +93,9 @@ class FormationPlace:
         done.
         """
         since_s = (now_ns - self._closing_ns) / S
-        if self.pattern is None or self.place is None or since_s > _CLOSES_S:
+        if self.pattern is None or self.place is None or not self._gaps or since_s > _CLOSES_S:
             return None
-        return since_s if self.pattern.has_gap_beside(self.place) else None
+        return since_s if self.pattern.has_beside(self.place, self._gaps) else None
 
     def depart(self, now_ns: int) -> None:
         """Fly to the place from here, and not before the plan begins."""

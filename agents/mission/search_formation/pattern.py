@@ -105,10 +105,10 @@ class Pattern:
         flown = self._flown.get(place, place)
         return _position(self.shape, flown, swept_s)
 
-    def has_gap_beside(self, place: int) -> bool:
-        """True if somebody of the row of a place is lost, or of a row that ends there."""
+    def has_beside(self, place: int, others: frozenset[int]) -> bool:
+        """True if one of these places is in the row of a place, or in a row that ends there."""
         return any(
-            self.vacant.intersection(row.places)
+            others.intersection(row.places)
             for row in self._whole.rows()
             if place in row.places or set(self._whole.tethers(place)).intersection(row.places)
         )

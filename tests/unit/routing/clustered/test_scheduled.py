@@ -35,6 +35,8 @@ from fanet_mw.wire import (
     filler,
 )
 from fanet_mw.wire.hello.digest import Digest, Holding
+from fanet_mw.wire.places import Places
+from fanet_mw.wire.schedule import Member, Schedule
 
 US, ROOT, BEFORE, AFTER = NodeId(2), NodeId(3), NodeId(4), NodeId(5)
 TURNS = Turns(origin_ns=0, period_ns=100 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_superframe=29)
@@ -124,6 +126,26 @@ def test_what_comes_together_goes_on_together_in_each_of_our_turns_of_it(node: N
     node.hear(Reception(wire.bundle(frames), ROOT, end_ns, -60.0), end_ns)
     sent = [(r.start_ns / MS, [wire.decode_header(f).seq for f in wire.unbundle(r.frame)]) for r in node.requests]
     assert sent == [(1040 + 8 * 2, [1, 2]), (1040 + 10 * 2, [1, 2])]
+
+
+def test_a_part_of_an_assignment_of_before_takes_no_part_of_the_newest_away(make_scenario: MakeScenario) -> None:
+    keys = {"nodes.count": 4, "clusters.count": 3, "clusters.relay": "scheduled", "radio.lead_ms": 0}
+    node = Node(US, make_scenario(**keys, **{"clusters.flooding_period_s": 1}), make_protocol, position=Enu(0, 0, 50))
+    node.start(0)
+    members = [Member(NodeId(n), n - 2, is_head=True) for n in (2, 3, 4)]
+    parts = {0: members[:2], 1: members[2:]}
+    for seq, (epoch, part) in enumerate([(2, 0), (1, 1), (2, 1)], start=1):
+        assert access_of(node)._timetables.newest is None
+        now_ns = seq * 100 * MS
+        named = tuple(parts[part])
+        places = Places(tuple(Enu(100.0 * one.node, 0.0, 50.0) for one in named), Enu(100.0, 0.0, 50.0))
+        told = Schedule(0, 1_000_000, 333_333, epoch, ROOT - 2, 3, part, 2, named, 0).encode_frame(1)
+        header = Header(now_ns // 1000, seq, ROOT - 2, BROADCAST, ROOT - 2, Kind.SCHEDULE, 9, 0, 0, FLAG_FLOOD)
+        node.hear(Reception(header.encode() + told + places.encode_frames(1), NodeId(1), now_ns, -60.0), now_ns)
+    assert node.dropped == {}
+    newest = access_of(node)._timetables.newest
+    assert newest is not None
+    assert newest.version.epoch == 2
 
 
 def test_a_packet_that_waits_for_its_turn_answers_nobody(node: Node) -> None:

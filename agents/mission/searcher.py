@@ -31,7 +31,7 @@ from agents.mission.flight.goal import Goal
 from agents.mission.flight.reciprocal_avoidance import ReciprocalAvoidance
 from agents.mission.flight.return_home import ReturnHome, ReturnReason
 from agents.mission.flight.search_limits import SearchLimits
-from agents.mission.flight.take_off import TakeOff, take_off_ns
+from agents.mission.flight.take_off import TakeOff, take_off_ns, turns_ns
 from agents.mission.flight.velocity_choice import VelocityChoice
 from agents.mission.mode_record import ModeRecord
 from agents.mission.navigation.known_obstacles import KnownObstacles
@@ -113,7 +113,7 @@ class Searcher:
         roll_call = RollCall(node, hello_interval_s=scenario.routing.hello_interval_s, silent=silent)
         planner = FormationPlanner(
             node, roll_call, expected=nodes.count, deploy_speed_m_s=_DEPLOY * least_m_s,
-            take_off_ns=take_off_ns(nodes.altitude_m) if nodes.on_ground else 0,
+            take_off_ns=take_off_ns(nodes.altitude_m) if nodes.on_ground else 0, turns_ns=turns_ns,
             of_few=lambda count, now_ns: None if self._is_swept(now_ns) else _of_few(scenario, count),
         )  # fmt: skip
         self._plans = PlanExchange(

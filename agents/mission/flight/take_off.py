@@ -1,5 +1,6 @@
 """The take-off of a UAV that stands on its pad: straight up to the height of the lanes, clear of those beside it."""
 
+from collections.abc import Mapping
 from typing import Final
 
 from agents.mission.flight.reciprocal_avoidance import CLEARANCE_M
@@ -22,6 +23,8 @@ _UP: Final = 0.9
 """A UAV has taken off once it has climbed this share of the height; it climbs the rest on its way."""
 _STOPPED_M_S: Final = 0.3
 """A UAV that climbs more slowly than this has not received its setpoint, or has reached the height."""
+_TURN_NS: Final = 8 * S
+"""How long after one UAV that stands right beside another the other takes off."""
 _REPEAT_NS: Final = 2 * S
 """The interval at which the setpoint is sent again while the UAV does not climb."""
 
@@ -29,6 +32,15 @@ _REPEAT_NS: Final = 2 * S
 def take_off_ns(height_m: float) -> int:
     """The time from the start to the end of a take-off that waits for nobody; a second is for getting up to speed."""
     return _LISTEN_NS + seconds_to_ns(_UP * height_m / _CLIMB_M_S + 1.0)
+
+
+def turns_ns(pads: Mapping[int, Enu]) -> int:
+    """How much longer take-offs last if UAVs stand so near to each other that they take off in turns."""
+    turns: dict[int, int] = {}
+    for node, pad in sorted(pads.items()):
+        before = [turn for other, turn in turns.items() if pads[other].minus(pad).horizontal() < CLEARANCE_M]
+        turns[node] = 1 + max(before, default=-1)
+    return min(_PATIENCE_NS - _LISTEN_NS, max(turns.values(), default=0) * _TURN_NS)
 
 
 class TakeOff:

@@ -20,7 +20,7 @@ become followers, on whom nothing depends. The words place, team, relay and
 follower are explained in `shapes/contract.py`; how the area is split into lanes is in `shapes/`.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from typing import Final, NamedTuple
 
 from agents.mission.hungarian import assign
@@ -82,14 +82,16 @@ class FormationPlanner:
         deploy_speed_m_s: float,
         of_few: Callable[[int, int], Pattern | None],
         take_off_ns: int = 0,
+        turns_ns: Callable[[Mapping[int, Enu]], int] = lambda _: 0,
     ) -> None:
         """`of_few`: the formation for so many UAVs at an instant, when others have flown home; None if the search is
         over. `take_off_ns`: the time that UAVs need
-        for their take-off, before which the first plan does not begin.
+        for their take-off, before which the first plan does not begin; `turns_ns`: how much longer that lasts where
+        those who stand at these places take off in turns.
         """
         self._node = node
         self._roll_call = roll_call
-        self._take_off_ns, self._of_few = take_off_ns, of_few
+        self._take_off_ns, self._turns_ns, self._of_few = take_off_ns, turns_ns, of_few
         self._expected = expected
         self._deploy_speed = deploy_speed_m_s
         self._members: dict[int, _HeardUav] = {}
@@ -247,7 +249,10 @@ class FormationPlanner:
             holders[places[column]] = node
         _fill(holders, pattern)
         assert self._began_ns is not None, "a plan is made in a review"
-        start_ns = max(now_ns + _NOTICE_NS, self._began_ns + self._take_off_ns)
+        off_ns = self._began_ns + self._take_off_ns
+        if self._take_off_ns:
+            off_ns += self._turns_ns({node: self._members[node].position for node in nodes})
+        start_ns = max(now_ns + _NOTICE_NS, off_ns)
         farthest_m = max(costs[row][column] for row, column in enumerate(chosen)) ** 0.5
         return plan_of(
             pattern,

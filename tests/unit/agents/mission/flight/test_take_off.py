@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import pytest
 
-from agents.mission.flight.take_off import TakeOff, take_off_ns
+from agents.mission.flight.take_off import TakeOff, take_off_ns, turns_ns
 from agents.mission.navigation.known_obstacles import KnownObstacles
 from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.onboard_map import NO_MAP
@@ -94,3 +94,12 @@ def test_who_stands_too_near_to_one_with_a_lower_id_waits_until_that_one_has_cli
 def test_a_neighbor_that_never_leaves_its_pad_holds_nobody_up_for_good() -> None:
     pad = Pad().wait(50, beside={4: (8.0, 0.0)})
     assert pad.told_s[0] == 40.0
+
+
+@pytest.mark.parametrize(("apart_m", "turns_s"), [(15, 0), (6, 24), (3, 24)])
+def test_the_take_off_of_four_lasts_longer_by_their_turns_if_they_stand_beside_each_other(
+    apart_m: float, turns_s: float
+) -> None:
+    pads = {node: Enu(apart_m * node, 0.0, 0.1) for node in range(1, 5)}
+    assert turns_ns(pads) == turns_s * S
+    assert turns_ns({}) == 0

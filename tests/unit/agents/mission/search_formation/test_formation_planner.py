@@ -6,6 +6,7 @@ from collections.abc import Collection, Sequence
 
 import pytest
 
+from agents.mission.flight.take_off import turns_ns
 from agents.mission.search_formation.formation_planner import FormationPlanner, pattern_of, plan_of
 from agents.mission.search_formation.pattern import Pattern, fitted, of_few
 from agents.mission.search_formation.roll_call import RollCall
@@ -74,7 +75,7 @@ def planner_of(
     roll_call.parted = parted
     roll_call.lost.update(dict.fromkeys(lost, 0))
     return FormationPlanner(
-        NodeId(node), roll_call, expected=expected, deploy_speed_m_s=9, take_off_ns=take_off_ns,
+        NodeId(node), roll_call, expected=expected, deploy_speed_m_s=9, take_off_ns=take_off_ns, turns_ns=turns_ns,
         of_few=lambda count, now_ns: of_few(count, DEMANDS) if now_ns < 300 * S else None,
     )  # fmt: skip
 
@@ -119,15 +120,15 @@ def test_uavs_that_hear_nobody_take_different_places_and_keep_them() -> None:
 
 def test_the_first_plan_begins_when_all_have_had_time_to_take_off() -> None:
     begins_s = []
-    for take_off_s in (0, 5, 30):
+    for take_off_s, apart_m in ((0, 15), (5, 15), (30, 15), (30, 3)):
         planner = planner_of(1, expected=45, take_off_ns=take_off_s * S)
         planner.review(None, now_ns=S)
         for other in range(1, 46):
-            planner.status(SearchStatus(0, Enu(15.0 * other, 0.0, 0.1), other, 0, 100), now_ns=0)
+            planner.status(SearchStatus(0, Enu(float(apart_m * other), 0.0, 0.1), other, 0, 100), now_ns=0)
         assert planner.review(formation(), now_ns=3 * S)
         assert planner.plan is not None
         begins_s.append(planner.plan.start_us * US / S)
-    assert begins_s == [10, 10, 31], "from the notice of 7 s, or from the first review"
+    assert begins_s == [10, 10, 31, 68], "from the notice of 7 s, or from the first review; in turns, for 37 s at most"
 
 
 def test_who_is_out_for_a_survivor_becomes_a_follower_and_until_it_is_back_others_close_ranks() -> None:

@@ -30,6 +30,10 @@ class StoppableUav(Actor):
         self._earlier: list[Mapping[str, Any]] = []
         """The reports of lives that are over."""
 
+    def end_at(self, at_ns: int) -> None:
+        """The program ends at this instant; nudge the UAV if it runs already."""
+        self._changes.insert(0, (at_ns, False))
+
     def start(self, now_ns: int) -> None:
         assert self._uav is not None, "it lives at first"
         self._enter(self._uav)

@@ -1,0 +1,39 @@
+"""A UAV's program in virtual time ends when it is told to, and is silent from then on."""
+
+from fanet_mw.actor import Actor
+from fanet_mw.bus.messages import Message
+from fanet_mw.hosts.virtual import VirtualHost
+from fanet_mw.units import S
+from sim.run.stoppable_uav import StoppableUav
+
+
+class Ticking(Actor):
+    """Acts once a second, and remembers when."""
+
+    def __init__(self) -> None:
+        super().__init__("ticking", ())
+        self.at_s: list[int] = []
+
+    def start(self, now_ns: int) -> None:
+        """It begins at the first second."""
+
+    def receive(self, topic: str, message: Message, now_ns: int) -> bool:
+        return True
+
+    def wake(self, now_ns: int) -> None:
+        self.at_s.append(now_ns // S)
+
+    def next_wake_ns(self) -> int:
+        return (len(self.at_s) + 1) * S
+
+
+def test_a_program_ends_while_it_runs() -> None:
+    inner = Ticking()
+    uav = StoppableUav(lambda: inner, [(10**18, None)])
+    host = VirtualHost([uav])
+    host.start()
+    host.run(3 * S)
+    uav.end_at(3 * S)
+    host.nudge(uav)
+    host.run(6 * S)
+    assert inner.at_s == [1, 2, 3]

@@ -1,14 +1,10 @@
 """What motion does to a timetable: whether links that it counts on may end during the run."""
 
 from collections.abc import Iterator, Mapping
-from typing import Final
 
 from fanet_mw.graph.topology import Adjacency
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId
-
-_RIGID: Final = ("static", "formation")
-"""The mobility models that change no distance."""
 
 
 def outdated(scenario: Scenario, at: Mapping[NodeId, Enu], adjacency: Adjacency) -> Iterator[str]:
@@ -18,7 +14,7 @@ def outdated(scenario: Scenario, at: Mapping[NodeId, Enu], adjacency: Adjacency)
     speed_m_s, range_m = scenario.mobility.speed_m_s, scenario.radio.range_m
     lengths = [at[a].minus(at[b]).norm() for a in adjacency for b in adjacency[a] if a < b]
     lengths = [length_m for length_m in lengths if length_m <= range_m]  # antennas of the ground reach farther
-    if scenario.clusters.relay != "scheduled" or scenario.mobility.model in _RIGID or not speed_m_s or not lengths:
+    if scenario.clusters.relay != "scheduled" or scenario.mobility.rigid or not lengths:
         return
     lasts_s = (range_m - max(lengths)) / (2 * speed_m_s)
     if lasts_s < scenario.duration_s:

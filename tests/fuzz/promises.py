@@ -3,7 +3,7 @@
     python tests/fuzz/promises.py 500 --seed 1
 
 A line per setting that broke a promise; the exit status is 1 if one did. Drawn are the number of UAVs, their grid,
-rates, loads, leads, protocols with bounds, and motion: at rest or in formation to 20 m/s.
+rates, loads, leads, protocols with bounds, and motion to 20 m/s: none, in formation, or to random waypoints.
 """
 
 import argparse
@@ -25,7 +25,7 @@ def drawn(numbers: random.Random) -> dict[str, Any]:
     count = numbers.randint(4, 28)
     payload = numbers.randint(40, 500)
     in_rounds = numbers.random() < 0.6
-    speed = numbers.choice([0.0, 0.0, numbers.uniform(1, 20)])
+    model = numbers.choice(["static", "static", "formation", "random_waypoint"])
     standard, rate = numbers.choice([("b", 2), ("b", 5.5), ("b", 11), ("g", 6), ("g", 24), ("g", 54)])
     lead_ms = numbers.choice([0, 0, numbers.randint(5, 60)])
     tree: dict[str, Any] = {
@@ -43,7 +43,8 @@ def drawn(numbers: random.Random) -> dict[str, Any]:
             "channel": "range", "range_m": 250, "cw_min": numbers.choice([7, 15]), "standard": standard,
             "rate_mbps": rate, "lead_ms": lead_ms, "handover_ms": lead_ms / 3,
         },
-        "mobility": {"model": "formation" if speed else "static", "speed_m_s": max(speed, 1.0)},
+        "mobility": {"model": model, "speed_m_s": numbers.uniform(1, 20)},
+        "world": {"area_m": numbers.uniform(200, 1000)},
     }  # fmt: skip
     if in_rounds:
         share = numbers.choice([0.0, 0.4, 0.7])
@@ -79,9 +80,7 @@ def main() -> int:
         bound = finish(simulate(scenario), out=None)["bound"]
         flown += 1
         deliveries += bound.get("deliveries") or 0
-        kind = (
-            f"{tree['routing']['protocol']}, {'in motion' if tree['mobility']['model'] == 'formation' else 'at rest'}"
-        )
+        kind = f"{tree['routing']['protocol']}, {tree['mobility']['model']}"
         stated.setdefault(kind, []).append(bound.get("stated_share") or 0.0)
         if bound.get("violations"):
             broken += bound["violations"]

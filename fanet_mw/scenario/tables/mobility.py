@@ -12,6 +12,7 @@ from fanet_mw.scenario.tables.sections import (
 )
 
 MOBILITY_MODELS: Final = ("static", "formation", "random_waypoint", "crossing", "onboard")
+_RIGID: Final = ("static", "formation")
 
 
 class Mobility(Section):
@@ -42,3 +43,8 @@ class Mobility(Section):
     geofence: Literal["brake", "return"] = "brake"
     """`onboard`: what becomes of a UAV whose velocity setpoints take it to the geofence, 50 m outside the area: it
     brakes before it, or it returns as soon as it is beyond, and obeys no setpoint until it has landed."""
+
+    @property
+    def rigid(self) -> bool:
+        """True if no distance between UAVs changes."""
+        return self.model in _RIGID or self.speed_m_s == 0

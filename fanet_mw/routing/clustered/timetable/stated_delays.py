@@ -97,14 +97,16 @@ class StatedDelays:
 
     def own(self) -> RootTurns | None:
         """The node's share of the newest timetable; None if it states no bounds, as when frames may be lost."""
-        timetable = None if self._port.scenario.measures_links else self._timetables.newest
+        scenario = self._port.scenario
+        # the links of a timetable end when UAVs move among each other, and who learns of that learns it too late
+        timetable = None if scenario.measures_links or not scenario.mobility.rigid else self._timetables.newest
         if timetable is None or not timetable.roots or not timetable.whole:
             return None
         if timetable.table.uncovered[self._port.node]:
             return None
         if self._ends_early(timetable):
             return None
-        if not timetable.table.sure and self._port.scenario.mobility.model != "static":
+        if not timetable.table.sure and scenario.mobility.model != "static":
             return None
         return self._own_of(self._port.node, timetable)
 

@@ -96,7 +96,7 @@ class DropReason(StrEnum):
     OUT_OF_TURN = "out_of_turn"
     """The packet was heard in no turn of its flood, and so there was none in which to relay it."""
     ADMISSION = "admission"
-    """The packet came too soon for the node's bound to meet `traffic.deadline_s`, and was refused at its origin."""
+    """The packet would have missed `traffic.deadline_s`, or made others miss it, and was refused at its origin."""
     BOUND_LOST = "bound_lost"
     """The packet could no longer be everywhere within the bound that its origin had stated for it, because the turns
     that it waited for were given up, or went to the announcements of a node that took office; it was not let out.

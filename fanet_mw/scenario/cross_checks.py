@@ -277,12 +277,15 @@ def _wrong_for_rivals(scenario: Scenario) -> Sequence[str]:
 
 def _unkept_deadline(scenario: Scenario) -> Sequence[str]:
     """A deadline without a bound that could be compared with it."""
-    deadline_s = scenario.traffic.deadline_s
-    if deadline_s is None or (scenario.routing.protocol, scenario.clusters.relay) == ("clustered", "scheduled"):
+    deadline_s, protocol = scenario.traffic.deadline_s, scenario.routing.protocol
+    if deadline_s is None or (protocol, scenario.clusters.relay) == ("clustered", "scheduled"):
+        return ()
+    if protocol == "rounds" and scenario.rounds.bulk_share and scenario.traffic.priority == "bulk":
         return ()
     return (
-        f"traffic.deadline_s = {deadline_s:g} needs a protocol with a bound: "
-        'routing.protocol = "clustered" and clusters.relay = "scheduled"',
+        f"traffic.deadline_s = {deadline_s:g} needs a protocol that refuses what would be late: "
+        'routing.protocol = "rounds" with bulk in slots (rounds.bulk_share, traffic.priority = "bulk"), or '
+        '"clustered" with clusters.relay = "scheduled"',
     )
 
 

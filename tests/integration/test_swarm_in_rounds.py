@@ -68,6 +68,24 @@ def test_bulk_beyond_what_the_air_carries_leaves_the_bounds_alone() -> None:
     assert summary["frames"]["closes"]
 
 
+def test_bulk_with_a_deadline_is_refused_at_its_origin_or_arrives_in_time() -> None:
+    traffic = {"payload_bytes": 1000, "priority": "bulk", "interval_s": 0.12, "deadline_s": 2}
+    tables = {"mobility": {"model": "formation", "speed_m_s": 10}, "rounds": {"turn_bytes": 600}, "duration_s": 20}
+    summary = flown(traffic=traffic, **tables)
+    refused, packets = summary["admission"]["refused"], summary["generated"]
+    assert 0.1 * packets < refused < 0.8 * packets, "it was to be more than the air carries"
+    assert summary["delay_ms"]["p99"] < 2000
+    assert summary["pdr"] * packets > 0.99 * (packets - refused)
+
+
+def test_a_likely_delay_of_bulk_is_stated_and_kept_in_motion() -> None:
+    traffic = {"payload_bytes": 1000, "priority": "bulk", "interval_s": 0.4}
+    tables = {"mobility": {"model": "formation", "speed_m_s": 10}, "rounds": {"turn_bytes": 600}, "duration_s": 30}
+    likely = flown(traffic=traffic, **tables)["likely"]
+    assert likely["stated_share"] > 0.3
+    assert likely["within_share"] >= likely["share"]
+
+
 def test_bulk_within_what_the_air_carries_reaches_everybody() -> None:
     summary = flown(traffic={"payload_bytes": 1024, "priority": "bulk", "interval_s": 0.2}, duration_s=11)
     assert summary["pdr"] == 1.0

@@ -26,6 +26,7 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.node.reader import decoded
 from fanet_mw.node.received_motion import motion_in
 from fanet_mw.routing.packet_repair import FLOOD_OVER_NS, Repair
+from fanet_mw.routing.rounds.admission import BulkAdmission
 from fanet_mw.routing.rounds.bulk_slots import BulkSlots
 from fanet_mw.routing.rounds.delay_law import MOST_HOPS, DelayLaw, LikelyDelay
 from fanet_mw.routing.rounds.lasting_links import LastingLinks
@@ -34,7 +35,7 @@ from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.routing.rounds.spreading import Spreading
 from fanet_mw.routing.rounds.topology import Topology
 from fanet_mw.trace import LIKELY_SHARE, BoundExcludes, BoundStated, LikelyStated
-from fanet_mw.units import BROADCAST, US, NodeId, seconds_to_ns
+from fanet_mw.units import BROADCAST, MS, US, NodeId, seconds_to_ns
 from fanet_mw.wire import FLAG_FLOOD, HEADER_BYTES, PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY, Content, Kind
 from fanet_mw.wire.hello.digest import MESSAGE_BYTES, Digest, capacity
 from fanet_mw.wire.rounds import (
@@ -64,6 +65,8 @@ _LASTING_HOPS: Final = 8
 """A link counts if it lasts until its end would be noticed, and a packet has gone so many hops after that."""
 _MUCH_BULK: Final = 4
 """A node that is to send so many bulk packets before others takes part in all bulk slots until they are sent."""
+_OTHERS_LATER: Final = 1.75
+"""Bulk may reach some other node so many times later than this one, which may lie better."""
 _SPREAD_SLOTS: Final = 1.0
 """Neighbors that pass on the same warning start within so many slots."""
 _BEFORE_TURN_NS: Final = 1 * US
@@ -90,6 +93,9 @@ class RoundFlooding(RoutingProtocol):
         self._lead_ns = radio.lead_ns
         self._law = DelayLaw(timing, scenario)
         self._likely = LikelyDelay() if self._law.loses_frames else None
+        self._bulk_likely = LikelyDelay()
+        deadline_s = scenario.traffic.deadline_s
+        self._admission = BulkAdmission(None if deadline_s is None else seconds_to_ns(deadline_s))
         self._topology = Topology(
             port.node,
             count=scenario.node_count,
@@ -163,8 +169,15 @@ class RoundFlooding(RoutingProtocol):
         if self._in_turns(packet):
             self._state_bound(packet, now_ns)
             self._take(packet, src=None, now_ns=now_ns)
-        else:
-            self._send_bulk(packet, from_ns=due_ns, now_ns=now_ns)
+            return
+        if packet.header.destination == BROADCAST:
+            if not self._admission.admit(self._port.node, now_ns=now_ns):
+                self._port.drop(DropReason.ADMISSION, packet, now_ns=now_ns)
+                return
+            heard_ns = self._bulk_likely.over_ns(self._law.way_ns(self._topology.farthest(now_ns)))
+            if self._admission.steady and heard_ns is not None:
+                self._state_likely(packet, round(_OTHERS_LATER * heard_ns), now_ns=now_ns)
+        self._send_bulk(packet, from_ns=due_ns, now_ns=now_ns)
 
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         src, header = reception.src, packet.header
@@ -179,8 +192,8 @@ class RoundFlooding(RoutingProtocol):
             return
         if header.kind == _DATA:
             self._hold(packet, now_ns)
-            if self._likely is not None and self._in_turns(packet):
-                self._compare(self._likely, packet, now_ns)
+            if header.destination == BROADCAST:
+                self._compare(packet, now_ns)
         if header.destination == self._port.node:
             return
         if is_used_up(header):
@@ -211,25 +224,37 @@ class RoundFlooding(RoutingProtocol):
         )  # fmt: skip
         if law_ns is None:
             return
-        lifetime_ns = self._port.scenario.routing.lifetime_ns(header.priority)
-        absent = self._law.absent(self._topology, now_ns=now_ns) or ()
-        stated = header.origin_us * US, self._port.node, header.seq
         if self._likely is not None:
-            likely_ns = self._likely.over_ns(self._law.way_ns(max(self._topology.hops(now_ns).values())))
-            if likely_ns is not None and likely_ns <= lifetime_ns and not absent:
-                self._port.record(LikelyStated(*stated, likely_ns, LIKELY_SHARE))
-        elif law_ns <= lifetime_ns:
+            likely_ns = self._likely.over_ns(self._law.way_ns(self._topology.farthest(now_ns)))
+            self._state_likely(packet, likely_ns, now_ns=now_ns)
+        elif law_ns <= self._port.scenario.routing.lifetime_ns(header.priority):
             self._stated += 1
+            stated = header.origin_us * US, self._port.node, header.seq
             self._port.record(BoundStated(*stated, law_ns))
-            for other in absent:
+            for other in self._law.absent(self._topology, now_ns=now_ns) or ():
                 self._port.record(BoundExcludes(*stated, other))
 
-    def _compare(self, likely: LikelyDelay, packet: Packet, now_ns: int) -> None:
+    def _state_likely(self, packet: Packet, likely_ns: int | None, *, now_ns: int) -> None:
+        """State by when nearly all nodes have an own packet, if that is known and a way leads to each."""
+        header = packet.header
+        if likely_ns is None or likely_ns > self._port.scenario.routing.lifetime_ns(header.priority):
+            return
+        if self._law.absent(self._topology, now_ns=now_ns) == ():
+            origin_ns = header.origin_us * US
+            self._port.record(LikelyStated(origin_ns, self._port.node, header.seq, likely_ns, LIKELY_SHARE))
+
+    def _compare(self, packet: Packet, now_ns: int) -> None:
         """How long a packet of another node took shows how long the own ones may take."""
-        hops = self._topology.hops_to(NodeId(packet.header.origin), now_ns)
-        if hops is not None:
-            delay_ns = now_ns + self._port.scenario.radio.handover_ns - packet.header.origin_us * US
-            likely.hear(delay_ns, way_ns=self._law.way_ns(hops))
+        bulk = not self._in_turns(packet)
+        likely, origin = self._bulk_likely if bulk else self._likely, NodeId(packet.header.origin)
+        hops = None if likely is None else self._topology.hops_to(origin, now_ns)
+        if likely is None or hops is None:
+            return
+        delay_ns = now_ns + self._port.scenario.radio.handover_ns - packet.header.origin_us * US
+        likely.hear(delay_ns, way_ns=self._law.way_ns(hops))
+        if bulk:
+            far_ns = delay_ns * self._law.way_ns(self._topology.farthest(now_ns)) // self._law.way_ns(hops)
+            self._admission.hear(origin, far_ns, now_ns=now_ns)
 
     def _in_turns(self, packet: Packet) -> bool:
         """True for a packet that travels in turns; bulk does only where no window is left to it."""
@@ -590,4 +615,5 @@ class RoundFlooding(RoutingProtocol):
             "repaired": self._repair.repaired if self._repair else 0,
             "repeated": self._spreading.repeated,
             "bounds_stated": self._stated,
+            "admitted_each_ms": self._admission.interval_ns / MS,
         }

@@ -170,6 +170,11 @@ class Topology:
         self._arrange(now_ns)
         return {node: hops for hops, ring in enumerate(self._rings) for node in nodes_of(ring)}
 
+    def farthest(self, now_ns: int) -> int:
+        """The most hops to any node to which a way is known."""
+        self._arrange(now_ns)
+        return len(self._rings) - 1
+
     def hops_to(self, node: NodeId, now_ns: int) -> int | None:
         """The hops to one node; None if no way is known."""
         self._arrange(now_ns)

@@ -51,9 +51,9 @@ class Traffic(Section):
     destination: Literal["all"] | Id = "all"
     """The id of one node, or `all`: packets are flooded."""
     deadline_s: SomeTime | None = None
-    """`clusters.relay = "scheduled"`: nodes refuse packets that would break this deadline, and record whether their
-    bound meets it; unset: all packets are accepted. Each class has a deadline of its own; the records are about that of
-    the first class."""
+    """Nodes refuse packets that would miss this deadline: with `clusters.relay = "scheduled"` by their bound, and they
+    record whether it meets the deadline; bulk in `rounds` by how long packets took lately. Unset: all are accepted.
+    Each class has a deadline of its own; the records, and `rounds`, know that of the first class."""
     targets: tuple[Id, ...] = ()
     """The nodes at which deliveries count if the destination is `all`; empty: all other nodes."""
 

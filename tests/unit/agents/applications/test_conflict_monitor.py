@@ -176,18 +176,6 @@ def test_of_two_that_fly_side_by_side_for_long_the_one_with_the_higher_id_leaves
     assert (velocity.east, velocity.north) == pytest.approx((-7.07, -7.07) if leaves else (10, 0), abs=0.01)
 
 
-@pytest.mark.parametrize(("node", "stood_s", "goes_back"), [(3, 6, False), (3, 9, True), (9, 9, False), (9, 16, True)])
-def test_who_stands_at_the_geofence_while_it_avoids_others_flies_back_and_the_lower_id_first(
-    monitor, node: int, stood_s: int, goes_back: bool
-) -> None:
-    uav, here = monitor(node), Enu(290, 290, 50)
-    for second in range(stood_s):
-        uav.on_hello(OTHER, Motion(here._replace(east=280), Enu(0.5, 0.5, 0), second * S), now_ns=second * S)
-        uav.on_fix(Motion(here, Enu(5, 5, 0) if not second else Enu(0, 0, 0), second * S))
-    assert uav.course is not None
-    assert (uav.course.position.minus(here).east < 0) == goes_back
-
-
 def test_who_begins_to_avoid_before_it_is_back_at_its_height_descends_no_farther_than_before(monitor) -> None:
     uav = monitor(9)  # the lower id is above, so this one goes down
     uav.on_hello(OTHER, at(200, 24, WEST), now_ns=0)

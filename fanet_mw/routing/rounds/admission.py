@@ -1,0 +1,81 @@
+"""Admission of own bulk: what the swarm could not deliver in time as it moves now is refused where it is born.
+
+    each second:  most packets took longer than deadline / 2  -> a source gets 4/5 of its share of what arrives
+                  most took less than deadline / 4            -> a little more, until nothing is refused any more
+
+What arrives while delays grow is what the air carries, and all nodes hear the same, so all sources slow down alike. By
+the time it is known how long packets took, what waits may have doubled. Without a deadline nothing is refused.
+"""
+
+from collections import Counter, deque
+from typing import Final
+
+from fanet_mw.units import NodeId, S
+
+_EACH_NS: Final = S
+_LATELY_NS: Final = 2 * S
+"""Delays are those of packets that arrived in this time."""
+_SHARED_NS: Final = 10 * S
+"""The sources are those of packets that arrived in this time."""
+_FEWEST: Final = 10
+_MOST: Final = 0.9
+"""The share of packets that were not slower."""
+_LESS: Final = 1.25
+_MORE: Final = 0.95
+_STEADY_JUDGED: Final = 6
+_STEADY: Final = 1.25
+"""A delay that has grown by more during so many judgements is no statement about packets to come."""
+
+
+class BulkAdmission:
+    """Whether one node's own bulk packets are accepted."""
+
+    def __init__(self, deadline_ns: int | None) -> None:
+        self._deadline_ns = deadline_ns
+        self.interval_ns = 0
+        """The least time between accepted packets; 0 while none is refused."""
+        self._arrived = deque[tuple[int, NodeId, int]]()
+        """The packets that arrived lately: when, whose, and how long one of this node's would have taken."""
+        self._accepted_ns: int | None = None
+        self._judged_ns = 0
+        self._lately_ns = deque[int](maxlen=_STEADY_JUDGED)
+        """The mean delay of each of the last judgements."""
+
+    def hear(self, origin: NodeId, delay_ns: int, *, now_ns: int) -> None:
+        """A packet arrived, or one of this node's was accepted; `delay_ns` is how long one from here to the farthest
+        node would have taken, 0 if that is not known.
+        """
+        self._arrived.append((now_ns, origin, delay_ns))
+        if now_ns >= self._judged_ns + _EACH_NS:
+            self._judged_ns = now_ns
+            self._judge(now_ns)
+
+    def admit(self, node: NodeId, *, now_ns: int) -> bool:
+        """True if a packet of this node that is born now is accepted."""
+        if self._accepted_ns is not None and now_ns < self._accepted_ns + self.interval_ns:
+            return False
+        self._accepted_ns = now_ns
+        self.hear(node, 0, now_ns=now_ns)
+        return True
+
+    def _judge(self, now_ns: int) -> None:
+        while self._arrived[0][0] < now_ns - _SHARED_NS:
+            self._arrived.popleft()
+        delays_ns = sorted(delay_ns for t_ns, _, delay_ns in self._arrived if delay_ns and t_ns >= now_ns - _LATELY_NS)
+        most_ns = delays_ns[int(_MOST * len(delays_ns))] if len(delays_ns) >= _FEWEST else 0
+        self._lately_ns.append(sum(delays_ns) // max(1, len(delays_ns)))
+        if self._deadline_ns is None:
+            return
+        if most_ns > self._deadline_ns // 2:
+            sources = len(Counter(origin for _, origin, _ in self._arrived))
+            passed_ns = max(now_ns - self._arrived[0][0], _EACH_NS)
+            share_ns = round(_LESS * passed_ns * sources / len(self._arrived))
+            self.interval_ns = max(self.interval_ns, share_ns)
+        elif self.interval_ns and most_ns < self._deadline_ns // 4:
+            self.interval_ns = round(_MORE * self.interval_ns)
+
+    @property
+    def steady(self) -> bool:
+        """True if delays have not grown lately."""
+        lately_ns, half = list(self._lately_ns), _STEADY_JUDGED // 2
+        return len(lately_ns) == _STEADY_JUDGED and sum(lately_ns[half:]) <= _STEADY * sum(lately_ns[:half])

@@ -83,6 +83,7 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
     found += _blind_warnings(scenario)
     found += _deaf_search(scenario)
     found += _impossible_formation(scenario)
+    found += _motionless_search(scenario)
     found += _unasked_return(scenario)
     found += _never_taking_off(scenario)
     found += _impossible_faults(scenario)
@@ -237,6 +238,12 @@ def _impossible_formation(scenario: Scenario) -> Iterator[str]:
         yield f'{wanted} routing.protocol = "clustered", which makes clusters'
     if scenario.clusters.count > _MOST_CLUSTERS_ABREAST:
         yield f"{wanted} clusters.count = {scenario.clusters.count} <= {_MOST_CLUSTERS_ABREAST}"
+
+
+def _motionless_search(scenario: Scenario) -> Iterator[str]:
+    """A search whose UAVs stay where they are."""
+    if scenario.mission.search != "none" and not scenario.mobility.speed_m_s:
+        yield f'mission.search = "{scenario.mission.search}" needs mobility.speed_m_s > 0'
 
 
 def _unasked_return(scenario: Scenario) -> Iterator[str]:

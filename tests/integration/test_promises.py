@@ -53,10 +53,13 @@ def test_bounds_hold_the_lead_and_the_handover(handover_ms: int) -> None:
 
 
 def test_new_timetables_break_no_promise() -> None:
-    """A swarm that moves gets another timetable every few seconds, while packets are promised all the time."""
-    keys = ('mobility.model="random_waypoint"', "mobility.speed_m_s=5", "clusters.reassign_s=2", "duration_s=36")
-    keys += ("clusters.resume=false",)
-    bound = summary_of(*keys)["bound"]
+    """The leader makes another timetable for sources that begin later, while packets are promised all the time."""
+    later = '{name="later", payload_bytes=200, interval_s=0.25, sources=[9, 10], start_s=16}'
+    first = "{payload_bytes=200, interval_s=1.0, sources=14}"
+    keys = ('clusters.load="heard"', "clusters.reassign_s=2", "duration_s=36", f"traffic=[{first}, {later}]")
+    outcome = simulate(catalog.find("clusters", [*GRID, *keys]))
+    assert max(r["epoch"] for r in outcome.reports.values() if r.get("kind") == "agent") > 1
+    bound = finish(outcome, out=None)["bound"]
     assert bound["deliveries"] > 1000
     assert bound["stated_share"] > 0.5
     assert bound["violations"] == 0

@@ -109,6 +109,11 @@ def test_the_sizes_of_messages_that_a_scenario_is_checked_with_are_those_of_the_
     assert {**sizes, "positions": len(positions), "COLLISION": len(warning)} == MESSAGE_BYTES
 
 
+def test_a_search_by_uavs_that_do_not_fly_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"mission.search = .* needs mobility.speed_m_s > 0"):
+        catalog.find("rescue", ["mobility.speed_m_s=0"])
+
+
 def test_a_search_in_lines_by_too_few_uavs_is_refused_with_the_number_that_it_needs() -> None:
     with pytest.raises(ConfigError, match=r"nodes\.count = 12: .* needs at least (\d+) UAVs") as refused:
         catalog.find("rescue", ["nodes.count=12", "traffic.sources=11"])

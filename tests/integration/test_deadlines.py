@@ -83,6 +83,6 @@ def test_nodes_that_join_later_make_the_way_too_long_for_the_deadline() -> None:
     assert summary["admission"]["deadline_ms"] == pytest.approx(500 * (few + many), abs=0.01)
 
 
-def test_a_deadline_needs_a_protocol_that_states_a_bound() -> None:
-    with pytest.raises(ConfigError, match="needs a protocol with a bound"):
+def test_a_deadline_needs_a_protocol_that_refuses_what_would_be_late() -> None:
+    with pytest.raises(ConfigError, match="needs a protocol that refuses what would be late"):
         catalog.find("clusters", ["traffic.deadline_s=1", "clusters.relay=all"])

@@ -26,7 +26,9 @@ def test_who_stands_at_the_base_climbs_straight_up_and_only_then_flies_to_its_pl
     """All leave pads 15 m apart at once, and nobody flies off while others still climb, because the plan leaves time
     for the climb. Pads that are only 6 m apart are left one after the other.
     """
-    outcome = simulate(make_scenario(**KEYS, **{"nodes.spacing_m": spacing_m, "world.terrain_m": terrain_m}))
+    lasts_s = KEYS["duration_s"] if spacing_m >= 15 else 72  # the plan waits for those who take off in turns
+    pads = {"nodes.spacing_m": spacing_m, "world.terrain_m": terrain_m, "duration_s": lasts_s}
+    outcome = simulate(make_scenario(**{**KEYS, **pads}))
     posed: dict[int, list[Posed]] = defaultdict(list)
     modes: dict[int, list[FlightModeChanged]] = defaultdict(list)
     wanted: dict[int, list[str]] = defaultdict(list)

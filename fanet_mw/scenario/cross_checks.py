@@ -283,7 +283,7 @@ def _wrong_for_rivals(scenario: Scenario) -> Sequence[str]:
 
 
 def _unkept_deadline(scenario: Scenario) -> Sequence[str]:
-    """A deadline without a bound that could be compared with it."""
+    """A deadline under a protocol that refuses no packet for it."""
     deadline_s, protocol = scenario.traffic.deadline_s, scenario.routing.protocol
     if deadline_s is None or (protocol, scenario.clusters.relay) == ("clustered", "scheduled"):
         return ()

@@ -18,7 +18,8 @@ _TETHER: Final = 0.95
 """The greatest distance of two UAVs that must stay connected, as a share of the radio's reach."""
 _TETHER_S: Final = 4.0
 """A UAV may use up the rest of that distance in this time at the earliest."""
-_CLOSING, _CLOSING_S = 0.97, 1.0
+_CLOSING: Final = 0.97
+_CLOSING_S: Final = 1.0
 """The same two while ranks are closed over somebody who is lost, and every second counts."""
 _HASTE: Final = 0.95
 """Whoever is too far away for that is approached at this share of the greatest speed."""

@@ -26,8 +26,6 @@ _SILENT_NS: Final = 3 * S
 long as a neighbor lasts."""
 _NEIGHBOR_NS: Final = 15 * S
 """A UAV was a neighbor until lately if it was heard within this time."""
-_ROUND_NS: Final = ROLL_NS
-"""Who was heard within this time is not silent."""
 _AWAY_NS: Final = 40 * S
 """A UAV that was not a neighbor is lost after this time; news from the far end of a swarm are fresher."""
 _AHEAD: Final = 2
@@ -89,7 +87,9 @@ class RollCall:
                 continue
             silent_ns = now_ns - self._heard.get(node, since_ns // ROLL_NS) * ROLL_NS
             near, gone = now_ns - self._neighbor_ns.get(node, -_NEIGHBOR_NS) < _NEIGHBOR_NS, False
-            if near and self._silent is not None and silent_ns > _ROUND_NS:
+            if (
+                near and self._silent is not None and silent_ns > ROLL_NS
+            ):  # who was heard since the last roll is not silent
                 near = self._silent.might_be_heard(NodeId(node), now_ns=now_ns)
                 gone = near and self._silent.has(NodeId(node), now_ns=now_ns)
             if gone or silent_ns > (self._silent_ns if near else _AWAY_NS):

@@ -29,6 +29,8 @@ FOLLOWER_HIGHER_M: Final = 12.0
 """Followers fly this much higher than teams, so that a follower may cross a team."""
 FOLLOW_M: Final = 110.0
 """The distance of a follower behind its team, in lines and sectors."""
+_SQUARE_EDGE_M: Final = 60.0
+"""Rings and fans turn no farther from the edge of the area than this."""
 _WIDE: Final = 0.9
 """Two places that must be within reach of each other are at most this share of the radio's reach apart."""
 _LANES: Final = 1.35
@@ -124,6 +126,11 @@ class Demands(NamedTuple):
     def hop_m(self) -> float:
         """The greatest distance of two neighboring relays."""
         return _WIDE * self.reach_m
+
+    @property
+    def edge_m(self) -> float:
+        """The distance from the edge of the area at which rings and fans turn."""
+        return min(_SQUARE_EDGE_M, self.area_m / 8, self.seen_m / 2)
 
 
 class Dimensions(NamedTuple):

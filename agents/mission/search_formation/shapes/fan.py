@@ -29,8 +29,6 @@ from agents.mission.search_formation.shapes.contract import (
 )
 from fanet_mw.units import Enu
 
-_EDGE_M: Final = 60.0
-"""The distance from the edge of the area at which UAVs wait, at most a quarter of half the area's side."""
 _APART_M: Final = 30.0
 """The distance of two neighbors when the front begins to spread."""
 _HALVINGS: Final = 20
@@ -151,8 +149,7 @@ def _far_sides(half_m: float, base: tuple[float, float]) -> Corners:
 
 def fitted(count: int, demands: Demands) -> Dimensions | None:
     """The fan of this number of UAVs; None if they are too few for the far sides, or the base is in the area."""
-    half = demands.area_m / 2
-    half -= min(_EDGE_M, half / 4, demands.seen_m / 2)
+    half = demands.area_m / 2 - demands.edge_m
     corners = _far_sides(half, demands.base_m)
     if not corners:
         return None

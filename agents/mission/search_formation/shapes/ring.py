@@ -27,8 +27,6 @@ from agents.mission.search_formation.shapes.contract import (
 )
 from fanet_mw.units import Enu
 
-_EDGE_M: Final = 60.0
-"""The distance from the edge of the area at which the ring turns, at most a quarter of half the area's side."""
 _FIRST_M: Final = 45.0
 """The distance of two neighbors along the square when it begins to grow, if it is no larger than `_INNER` then."""
 _INNER: Final = 0.8
@@ -120,9 +118,8 @@ class Ring:
 def fitted(count: int, demands: Demands) -> Dimensions | None:
     """The ring of this number of UAVs; None if they are too few to span the edge of the area."""
     half = demands.area_m / 2
-    edge = min(_EDGE_M, half / 4, demands.seen_m / 2)
-    last = half - edge
-    apart_m = min(demands.hop_m, 2 * math.sqrt(demands.seen_m**2 - edge**2))
+    last = half - demands.edge_m
+    apart_m = min(demands.hop_m, 2 * math.sqrt(demands.seen_m**2 - demands.edge_m**2))
     of_side = count // _CORNERS
     if of_side < 2 or of_side * apart_m < 2 * last:
         return None

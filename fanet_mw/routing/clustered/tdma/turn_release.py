@@ -33,6 +33,10 @@ class TurnRelease(ABC):
     def _turn(self, earliest_ns: int) -> OwnTurn | None:
         """The first turn of the node from an instant on."""
 
+    def has_turn(self, *, now_ns: int) -> bool:
+        """True if this node has a turn from now on."""
+        return self._turn(max(now_ns + self._lead_ns, self._free_ns)) is not None
+
     def __len__(self) -> int:
         return len(self._queue)
 

@@ -34,10 +34,6 @@ class CallRelease(TurnRelease):
         self._arm(now_ns)
         return turn.start_ns
 
-    def has_turn(self, *, now_ns: int) -> bool:
-        """True if any known timetable gives this node a call from now on."""
-        return self._turn(max(now_ns + self._lead_ns, self._free_ns)) is not None
-
     def last_ns(self, *, now_ns: int) -> int | None:
         """The start of the call in which the packet that was queued last goes at the latest; None if it is unknown."""
         earliest_ns, start_ns = max(now_ns + self._lead_ns, self._free_ns), None

@@ -51,10 +51,6 @@ class RootRelease(TurnRelease):
         self._in_force = in_force
         self._arm(now_ns)
 
-    def has_turn(self, *, now_ns: int) -> bool:
-        """True if any known timetable gives this node a turn from now on."""
-        return self._turn(max(now_ns + self._lead_ns, self._free_ns)) is not None
-
     def push(self, packet: Packet, *, now_ns: int, last: bool = False) -> Packet | None:
         """Queue a packet; returns the packet that was evicted for it, if any. With `last` it goes behind all others."""
         return self._push(packet, _LAST if last else self._rank(packet), now_ns)

@@ -17,6 +17,7 @@ from fanet_mw.node.header_check import CONTROL
 from fanet_mw.node.node import Node
 from fanet_mw.node.packet_watch import PacketNews, RadioStage
 from fanet_mw.units import seconds_to_ns
+from fanet_mw.wire import PRIORITY_BULK
 from fanet_mw.wire.application_message import DELIVERED, NO_LISTENER
 
 _MOST_WATCHED: Final = 8192
@@ -116,6 +117,6 @@ class Statuses:
             return  # it will be sent again
         fate = _REASONS.get(reason, Fate.DROPPED)
         deadline_s = self._node.scenario.traffic.deadline_s
-        refused = fate is Fate.REFUSED and deadline_s is not None
+        refused = fate is Fate.REFUSED and deadline_s is not None and self._node.bounds(PRIORITY_BULK)
         interval_ns = self._node.least_interval_ns(seconds_to_ns(deadline_s or 0)) if refused else None
         self.tell(application, Status(handle, fate, t_ns, reason, last=True, interval_ns=interval_ns))

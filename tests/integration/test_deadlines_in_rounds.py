@@ -3,7 +3,7 @@
 import pytest
 
 from fanet_mw.application import Application, Data, Fate, Status
-from fanet_mw.units import MS, NodeId, S
+from fanet_mw.units import BROADCAST, MS, NodeId, S
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_REPORT
 from sim.run.virtual import Observed
 from sim.scenarios import catalog
@@ -48,3 +48,37 @@ def test_a_deadline_is_held_against_the_bound_of_its_own_priority(priority: int,
     observed.host.start()
     observed.host.run(9 * S)
     assert [got for got, _ in sender.fates] == [fate]
+
+
+class Burst(Application):
+    """Sends bulk to all ten times a second from 6 s on, and keeps what became of it."""
+
+    name = "burst"
+    follows = (Fate.ADMITTED, Fate.REFUSED)
+
+    def __init__(self) -> None:
+        self._due_ns = 6 * S
+        self.told: list[Status] = []
+
+    def wake(self, now_ns: int) -> None:
+        if now_ns >= self._due_ns:
+            self._due_ns += S // 10
+            self.port.send(Data(9, b"x" * 400), destination=NodeId(BROADCAST), priority=PRIORITY_BULK)
+
+    def next_wake_ns(self) -> int | None:
+        return self._due_ns
+
+    def on_status(self, status: Status, now_ns: int) -> None:
+        self.told.append(status)
+
+
+def test_whose_bulk_is_refused_is_told_so_and_no_interval_that_is_for_reports() -> None:
+    load = ["traffic.arrivals=cbr", "traffic.interval_s=0.02", "traffic.payload_bytes=1000", "traffic.deadline_s=1"]
+    burst = Burst()
+    scenario = catalog.find("quick", ["routing.protocol=rounds", "duration_s=14", *load])
+    observed = Observed(scenario, applications=lambda node: [burst] if node == 1 else [])
+    observed.host.start()
+    observed.host.run(12 * S)
+    refused = [status for status in burst.told if status.fate is Fate.REFUSED]
+    assert refused
+    assert {status.interval_ns for status in refused} == {None}

@@ -7,7 +7,7 @@ What arrives while delays grow is what the air carries, and all nodes hear the s
 the time it is known how long packets took, what waits may have doubled. Without a deadline nothing is refused.
 """
 
-from collections import Counter, deque
+from collections import deque
 from typing import Final
 
 from fanet_mw.units import NodeId, S
@@ -35,16 +35,14 @@ class BulkAdmission:
         self.interval_ns = 0
         """The least time between accepted packets; 0 while none is refused."""
         self._arrived = deque[tuple[int, NodeId, int]]()
-        """The packets that arrived lately: when, whose, and how long one of this node's would have taken."""
+        """The packets that arrived lately: when, whose, and how long they took; 0 for those of this node."""
         self._accepted_ns: int | None = None
         self._judged_ns = 0
         self._lately_ns = deque[int](maxlen=_STEADY_JUDGED)
         """The mean delay of each of the last judgements."""
 
     def hear(self, origin: NodeId, delay_ns: int, *, now_ns: int) -> None:
-        """A packet arrived, or one of this node's was accepted; `delay_ns` is how long one from here to the farthest
-        node would have taken, 0 if that is not known.
-        """
+        """A packet arrived that took so long; 0 for one of this node that was accepted."""
         self._arrived.append((now_ns, origin, delay_ns))
         if now_ns >= self._judged_ns + _EACH_NS:
             self._judged_ns = now_ns
@@ -67,7 +65,7 @@ class BulkAdmission:
         if self._deadline_ns is None:
             return
         if most_ns > self._deadline_ns // 2:
-            sources = len(Counter(origin for _, origin, _ in self._arrived))
+            sources = len({origin for _, origin, _ in self._arrived})
             passed_ns = max(now_ns - self._arrived[0][0], _EACH_NS)
             share_ns = round(_LESS * passed_ns * sources / len(self._arrived))
             self.interval_ns = max(self.interval_ns, share_ns)

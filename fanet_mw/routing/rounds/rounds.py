@@ -245,16 +245,15 @@ class RoundFlooding(RoutingProtocol):
 
     def _compare(self, packet: Packet, now_ns: int) -> None:
         """How long a packet of another node took shows how long the own ones may take."""
-        bulk = not self._in_turns(packet)
-        likely, origin = self._bulk_likely if bulk else self._likely, NodeId(packet.header.origin)
-        hops = None if likely is None else self._topology.hops_to(origin, now_ns)
-        if likely is None or hops is None:
-            return
+        origin = NodeId(packet.header.origin)
         delay_ns = now_ns + self._port.scenario.radio.handover_ns - packet.header.origin_us * US
-        likely.hear(delay_ns, way_ns=self._law.way_ns(hops))
-        if bulk:
-            far_ns = delay_ns * self._law.way_ns(self._topology.farthest(now_ns)) // self._law.way_ns(hops)
-            self._admission.hear(origin, far_ns, now_ns=now_ns)
+        likely = self._likely
+        if not self._in_turns(packet):
+            likely = self._bulk_likely
+            self._admission.hear(origin, delay_ns, now_ns=now_ns)
+        hops = None if likely is None else self._topology.hops_to(origin, now_ns)
+        if likely is not None and hops is not None:
+            likely.hear(delay_ns, way_ns=self._law.way_ns(hops))
 
     def _in_turns(self, packet: Packet) -> bool:
         """True for a packet that travels in turns; bulk does only where no window is left to it."""

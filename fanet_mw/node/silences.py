@@ -7,7 +7,7 @@ from fanet_mw.units import NodeId, S
 _FORGETS: Final = 0.97
 """The share of the longest silence that remains with each further frame."""
 _MOST_NS: Final = 4 * S
-"""A longer silence counts as this one, and so does that before the first frame."""
+"""A longer silence counts as this one."""
 _UNUSUAL: Final = 2.5
 """A silence is unusual if it is this many times as long as the longest one of late."""
 

@@ -55,7 +55,7 @@ class SilentNeighbors:
         return self._is_within(_NEAR * self._reach_m, node, now_ns)
 
     def might_be_heard(self, node: NodeId, *, now_ns: int) -> bool:
-        """True if a neighbor of late would still be in reach if it had flown on as it flew."""
+        """True if a recent neighbor would still be in reach had it kept its velocity."""
         return self._is_within(self._reach_m, node, now_ns)
 
     def _is_within(self, metres: float, node: NodeId, now_ns: int) -> bool:

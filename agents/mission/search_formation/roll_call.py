@@ -4,12 +4,12 @@
     lost      said by a UAV that has heard it itself until lately, when nobody is known to have heard it for some time;
               it is told on with the instant at which the UAV was last heard, and a later one takes it back
     falls     a UAV that falls says so at once, and is lost
-    silent    a neighbor whose radio sends nothing for unusually long is lost as well, without a hello being missed
-    away      a UAV that this one never heard itself is lost only after much longer, because news take a second a hop:
-              then it is cut off with a part of the swarm
+    silent    a neighbor whose radio sends nothing for unusually long is lost as well, before a hello is overdue
+    away      a UAV that this one has not heard itself for long, or that may be out of its reach, is lost only after
+              much longer, because news take a second a hop: then it is cut off with a part of the swarm
 
-Whoever finds a UAV lost by its own receiver floods its roll at once. So all UAVs of a part agree soon on who is lost,
-within a second a hop if that flood is lost, without a leader.
+Whoever finds by its own receiver that a UAV is lost floods its roll at once. So all UAVs of a part agree soon on who is
+lost, within a second a hop if that flood is lost, without a leader.
 """
 
 from collections.abc import Collection
@@ -48,7 +48,7 @@ class RollCall:
         self.parted: Collection[int] = ()
         """The UAVs to which no way leads any more, by the radio: they are lost, or in another part of the swarm."""
         self.has_news = False
-        """True once this UAV itself has found somebody lost, until the caller has told all of it."""
+        """True once this UAV itself has found somebody lost, or falls, until the caller has told all of it."""
 
     def on_hello(self, node: int, *, now_ns: int, falls: bool = False) -> None:
         """A neighbor was heard; `falls`: its hello says that it falls from the sky."""
@@ -87,9 +87,8 @@ class RollCall:
                 continue
             silent_ns = now_ns - self._heard.get(node, since_ns // ROLL_NS) * ROLL_NS
             near, gone = now_ns - self._neighbor_ns.get(node, -_NEIGHBOR_NS) < _NEIGHBOR_NS, False
-            if (
-                near and self._silent is not None and silent_ns > ROLL_NS
-            ):  # who was heard since the last roll is not silent
+            # who was heard since the last roll is not silent
+            if near and self._silent is not None and silent_ns > ROLL_NS:
                 near = self._silent.might_be_heard(NodeId(node), now_ns=now_ns)
                 gone = near and self._silent.has(NodeId(node), now_ns=now_ns)
             if gone or silent_ns > (self._silent_ns if near else _AWAY_NS):

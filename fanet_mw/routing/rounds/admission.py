@@ -3,14 +3,14 @@
     each second:  most packets took longer than deadline / 2  -> a source gets 4/5 of its share of what arrives
                   most took less than deadline / 4            -> a little more, until nothing is refused any more
 
-What arrives while delays grow is what the air carries, and all nodes hear the same, so all sources slow down alike. By
-the time it is known how long packets took, what waits may have doubled. Without a deadline nothing is refused.
+What arrives while delays grow is what the air carries, and all nodes hear the same, so all sources slow down alike.
+The limit is half the deadline, because delays may double before they are known. Without a deadline nothing is refused.
 """
 
 from collections import deque
 from typing import Final
 
-from fanet_mw.units import NodeId, S
+from fanet_mw.units import MS, NodeId, S
 
 _EACH_NS: Final = S
 _LATELY_NS: Final = 2 * S
@@ -18,13 +18,18 @@ _LATELY_NS: Final = 2 * S
 _SHARED_NS: Final = 10 * S
 """The sources are those of packets that arrived in this time."""
 _FEWEST: Final = 10
+"""Fewer packets say nothing about delays."""
 _MOST: Final = 0.9
-"""The share of packets that were not slower."""
+"""Most packets are this share of them."""
 _LESS: Final = 1.25
+"""The interval of a source that slows down, in those of its share."""
 _MORE: Final = 0.95
+"""The interval of a source that speeds up, in those of a second before."""
+_LEAST_NS: Final = MS
+"""A shorter interval refuses nobody."""
 _STEADY_JUDGED: Final = 6
 _STEADY: Final = 1.25
-"""A delay that has grown by more during so many judgements is no statement about packets to come."""
+"""Delays grow if the later half of so many judgements has a mean this many times that of the earlier half."""
 
 
 class BulkAdmission:
@@ -70,7 +75,8 @@ class BulkAdmission:
             share_ns = round(_LESS * passed_ns * sources / len(self._arrived))
             self.interval_ns = max(self.interval_ns, share_ns)
         elif self.interval_ns and most_ns < self._deadline_ns // 4:
-            self.interval_ns = round(_MORE * self.interval_ns)
+            faster_ns = round(_MORE * self.interval_ns)
+            self.interval_ns = faster_ns if faster_ns >= _LEAST_NS else 0
 
     @property
     def steady(self) -> bool:

@@ -100,7 +100,8 @@ class RowOfPlaces(NamedTuple):
         if len(left) == 1:
             return {left[0]: self.first + (self.size - 1) / 2}
         step = (self.size - 1) / (len(left) - 1)
-        return {place: self.first + rank * step for rank, place in enumerate(left)}
+        last = self.places[-1]  # beyond which nothing is rounded
+        return {place: min(self.first + rank * step, last) for rank, place in enumerate(left)}
 
 
 class Demands(NamedTuple):

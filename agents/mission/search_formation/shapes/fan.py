@@ -1,13 +1,13 @@
 r"""The formation `fan`: all UAVs on a front that spreads from the base over the area, to its far sides.
 
     o---o---o---o---o     each UAV flies straight away from the base to a place of its own on the far sides of the area,
-    |   \   |   /   |     and waits there; neighbors stay within radio reach, so the front is one chain from the sides
-    o-.  \  |  /  .-o     near the base to that opposite
+    |   \   |   /   |     and waits there; neighbors stay within radio reach, so the front is one chain from one end of
+    o-.  \  |  /  .-o     the far sides to the other
        `-. \|/ .-'
            base           no time is lost on the way to the places: it is a part of the search
 
-All begin at the same share of their ways, so that they are equally far apart, and fly at the same speed from there. Up
-to a few that are left over fly behind the front. The words place, team, lane and follower are explained in
+All begin at the same share of their ways, so that they are equally far apart, and fly at the same speed from there. A
+few UAVs left over fly behind the front. The words place, team, lane and follower are explained in
 `contract.py`; a fan is one team, and has no relays.
 """
 
@@ -112,13 +112,13 @@ class Fan:
         return (RowOfPlaces(0, self._formation.lanes, RowKind.SPAN),)
 
     def drawn_in(self, left: tuple[int, ...], hop_m: float) -> "Fan":
-        """The front goes no farther than where so few are nowhere farther apart than a hop."""
-        count = max(1, left[0])
+        """The fan whose front stops where so few still span it with gaps of at most a hop."""
+        row = self.rows()[0]
+        flown = row.shared(frozenset(row.places[max(1, left[0]) :])).values() or row.places
 
         def is_spanned(most_m: float) -> bool:
             fan = Fan(self._formation, most_m=most_m)
-            step = (self._formation.lanes - 1) / max(1, count - 1)
-            front = [fan.at(rank * step, self.sweep_s) for rank in range(count)]
+            front = [fan.at(place, self.sweep_s) for place in flown]
             return all(a.minus(b).horizontal() <= hop_m for a, b in pairwise(front))
 
         least, most = 0.0, self._spread.last_m

@@ -3,18 +3,20 @@
 If the neighbor does not answer, it is forgotten until its next hello, and the packet goes the way of all others.
 """
 
+from typing import Final
+
 from fanet_mw.bus.messages import TxOutcome, TxStatus
 from fanet_mw.node.contract import Port
 from fanet_mw.node.neighbors import Neighbors
 from fanet_mw.node.packet import Packet
 from fanet_mw.units import NodeId
 
-_UNICAST = 0
+_UNICAST: Final = 0
 """The phase flags of a packet that goes to its receiver."""
 
 
 class OneHop:
-    """The packets of one node that are under way to a neighbor for which they are."""
+    """The packets of one node that are under way to the neighbor that is their receiver."""
 
     def __init__(self, port: Port, neighbors: Neighbors) -> None:
         self._port = port
@@ -34,7 +36,9 @@ class OneHop:
         return True
 
     def failed(self, status: TxStatus) -> Packet | None:
-        """A transmission has ended; returns the packet if it was one of these, and did not arrive."""
+        """A transmission has ended; returns the packet, to be sent another way, if it was one of these and has not
+        arrived.
+        """
         packet = self._under_way.pop(status.seq, None)
         if packet is None or status.outcome is TxOutcome.ACKED:
             return None

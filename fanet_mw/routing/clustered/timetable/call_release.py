@@ -1,8 +1,9 @@
 """Releases in a node's calls what only its neighbors need, so no node relays it.
 
 A timetable for lossy links gives each node *calls* (`redundant_scheduling.py`): missed packets wait for one in a queue
-of this file, a hello reserves the next one when it is due (`reserve`). Another timetable gives each node those *spare
-turns* that its floods leave (`list_scheduling.py`): packets for one neighbor wait for them in a second queue.
+of this file, a hello reserves the next one when it is due (`reserve`). Another timetable gives each node *spare
+turns*, which the floods of all leave unused (`list_scheduling.py`): packets for one neighbor wait for them in a second
+queue.
 """
 
 from collections.abc import Sequence
@@ -13,7 +14,7 @@ from fanet_mw.routing.clustered.timetable.root_release import TurnsInForce
 
 
 class CallRelease(TurnRelease):
-    """The queue of packets that neighbors have missed, and the node's next call."""
+    """One queue of packets for neighbors, and the node's next call or spare turn."""
 
     _in_force: Sequence[TurnsInForce] = ()
     """The node's calls by each timetable that is in force or announced."""

@@ -8,7 +8,8 @@ The beginnings of floods are spread evenly over the superframe, or over a part o
 sends a packet at most once, to all its neighbors that lack it. A neighbor that only this node can serve counts half
 more, because nobody else could serve it later. With more `tries` each turn is filled several times with a slightly
 random order, and the fullest result is taken. A flood that is not complete at the last turn continues in the first
-turns of the next superframe, around the floods that begin there.
+turns of the next superframe, around the floods that begin there. Turns that floods leave unused are then given to nodes
+as spare turns (`spare`).
 
 The computation uses integers and one named random stream, so all machines get the same result. It takes about 0.5 ms
 per packet and try for 45 nodes.
@@ -165,8 +166,8 @@ class Packing:
                 del under_way[-number]
 
     def spare(self, hears: Sequence[int]) -> list[list[int]]:
-        """For each row, the turns that floods leave in which it can reach all its neighbors at once; who has
-        fewest goes first.
+        """For each row, the turns in which it reaches all its neighbors without disturbing a flood; the row with fewest
+        so far chooses first.
         """
         found: list[list[int]] = [[] for _ in hears]
         for turn in range(self._turns):

@@ -52,3 +52,26 @@ def test_delays_that_grow_are_not_steady() -> None:
     assert not source.admission.steady
     source.live(10, others_took_s=3.0)
     assert source.admission.steady
+
+
+def test_own_packets_say_nothing_about_delays() -> None:
+    admission = BulkAdmission(4 * S)
+    for tenth in range(100):
+        admission.admit(_OWN, now_ns=tenth * S // 10)
+        if tenth % 5 == 0:
+            admission.hear(NodeId(2), 3 * S, now_ns=tenth * S // 10)
+    assert admission.interval_ns == 0, "two packets a second are too few to judge by"
+
+
+def test_sources_that_send_seldom_are_counted_for_ten_seconds() -> None:
+    admission = BulkAdmission(4 * S)
+    for number in range(100):
+        admission.hear(NodeId(2 + number % 50), 3 * S, now_ns=number * S // 10)
+    assert 5 * S < admission.interval_ns < 8 * S, "fifty sources share ten packets a second"
+
+
+def test_an_interval_that_means_nothing_ends() -> None:
+    source = _Source()
+    source.live(10, others_took_s=3.0)
+    source.live(400, others_took_s=0.9)
+    assert source.admission.interval_ns == 0

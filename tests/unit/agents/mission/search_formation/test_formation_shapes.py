@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from agents.mission.search_formation.formation_planner import pattern_of, plan_of
 from agents.mission.search_formation.pattern import Pattern, fitted
-from agents.mission.search_formation.shapes.contract import Demands, RowKind, ShapeName
+from agents.mission.search_formation.shapes.contract import Demands, RowKind, RowOfPlaces, ShapeName
+from agents.mission.search_formation.shapes.fan import Fan
 from agents.mission.search_formation.shapes.sectors import rows_of
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.units import Enu
@@ -69,6 +70,13 @@ def test_who_is_tied_to_a_place_has_that_place_tied_to_its_own(pattern: Pattern)
     assert {(here, there) for here in ties for there in ties[here]} == {
         (here, there) for there in ties for here in ties[there]
     }
+
+
+@pytest.mark.parametrize("shape", ShapeName)
+def test_nobody_is_tied_to_a_follower_nor_a_follower_to_anybody(shape: ShapeName) -> None:
+    pattern = formed(shape, 50)
+    for follower in range(pattern.dimensions.fixed, pattern.places):
+        assert not pattern.shape.tethers(follower)
 
 
 @given(anyone, st.floats(0, 2000))
@@ -318,6 +326,29 @@ def test_whoever_is_left_of_a_row_closes_ranks_and_keeps_the_order(
                 assert apart <= 0.96 * REACH_M or len(left) < 8, (place, other)
         for place in left:
             assert not set(closed.tethers(place, swept_s)) & vacant
+
+
+def test_no_rounding_takes_the_last_uav_of_a_row_beyond_its_end() -> None:
+    for size in range(2, 100):
+        row = RowOfPlaces(0, size, RowKind.SPAN)
+        for lost in range(1, size - 1):
+            last = list(row.shared(frozenset(range(lost))).values())[-1]
+            assert last <= size - 1
+            assert last == pytest.approx(size - 1)
+
+
+def test_the_front_of_a_fan_goes_as_far_as_those_who_are_left_span_it() -> None:
+    for count in (30, 32, 36):
+        shape = formed(ShapeName.FAN, count, 1800).shape
+        assert isinstance(shape, Fan)
+        lanes = shape.rows()[0].size
+        for left in range(2, lanes):
+            few = shape.drawn_in((left,), 150.0)
+            flown = list(shape.rows()[0].shared(frozenset(range(left, lanes))).values())
+            front = [few.at(place, few.sweep_s) for place in flown]
+            most_m = max(a.minus(b).horizontal() for a, b in itertools.pairwise(front))
+            assert most_m <= 150.001
+            assert most_m > 140 or left > lanes / 2, "it goes as far as it can"
 
 
 @pytest.mark.parametrize("lost", [[3], [0, 7], [14]])

@@ -182,6 +182,15 @@ def test_a_neighbor_whose_radio_falls_silent_is_lost_before_a_hello_is_missed_an
     assert not call.lost
 
 
+def test_who_is_lost_from_afar_takes_nothing_from_the_news_of_a_silent_neighbor() -> None:
+    plan, radio = ring_plan(), Radio(2)
+    call = RollCall(NodeId(1), hello_interval_s=1.0, silent=radio)
+    call.on_hello(2, now_ns=98 * S)
+    call.review(plan, since_ns=10 * S, now_ns=100 * S)
+    assert {2, 45} <= set(call.lost), "45 was never heard"
+    assert call.has_news
+
+
 def test_who_falls_says_so_before_its_next_hello() -> None:
     plan = ring_plan()
     falling, other = (RollCall(NodeId(node), hello_interval_s=1.0) for node in (2, 40))

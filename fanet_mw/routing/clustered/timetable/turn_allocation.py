@@ -2,7 +2,8 @@
 
 These uses are tried one after the other until a timetable is found:
 
-    1  Each node gets a few more turns than its load needs, so that queues can drain.
+    1  Each node gets a few more turns than its load needs, so that queues can drain; if the air is idle all the same,
+       as many in each half, quarter or eighth of the superframe, so that a packet waits less.
     2  Each node gets as many turns as it needs. Several of its packets share a frame if they fit, which takes fewer
        but longer turns.
     3  Nodes get fewer turns than they need. A node sends what its turns can carry, and has no delay bound.
@@ -55,6 +56,9 @@ _DRAINING: Final = 1.5
 so that the packets that wait already are sent, too."""
 _CALLS_PER_S: Final = 3
 """How often per second a node may transmit a frame that only its neighbors need, with measured links."""
+
+_MOST_PARTS: Final = 8
+"""The most parts of a superframe in each of which a node has turns for its load."""
 
 _BLOCK: Final = 300
 """The least number of packets in a block: with fewer, turns are filled less densely; more take long to compute."""
@@ -137,12 +141,22 @@ def _fit(
         if wish.enough:
             found = made(wish)
             if found is not None:
-                return found
+                return _more_often(wish, made) or found
         elif quick:
             return None
         else:
             scarce.append(wish)
     return _first_made(scarce, made)
+
+
+def _more_often(wish: _Wish, made: Callable[[_Wish], FittedTimetable | None]) -> FittedTimetable | None:
+    """The same turns in each of several parts of the superframe, so that nobody waits long for one, if twice as many
+    would fit: half of the air is left for what is for one neighbor.
+    """
+    parts = 1
+    while wish.blocks == 1 and parts < _MOST_PARTS and made(wish._replace(blocks=4 * parts)) is not None:
+        parts *= 2
+    return made(wish._replace(blocks=parts)) if parts > 1 else None
 
 
 def _first_made(wishes: Sequence[_Wish], made: Callable[[_Wish], FittedTimetable | None]) -> FittedTimetable | None:

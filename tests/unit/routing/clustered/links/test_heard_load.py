@@ -1,8 +1,10 @@
 """How much nodes send is learnt from the numbers and births of their packets, and decides how many turns they get."""
 
+import math
 import random
 from collections import Counter
 from collections.abc import Callable, Mapping
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -153,7 +155,7 @@ class Line:
 
     def __init__(self, make_scenario: MakeScenario, **keys: Any) -> None:
         common = {"clusters.relay": "scheduled", "nodes.count": 9, "clusters.flooding_period_s": 0.5}
-        self.scenario = make_scenario(**common, **{"clusters.load": "heard", "traffic.interval_s": 0.5} | keys)
+        self.scenario = make_scenario(**common | {"clusters.load": "heard", "traffic.interval_s": 0.5} | keys)
 
     def fitted(self, loads: Mapping[NodeId, int]) -> FittedTimetable:
         places = tuple((NodeId(node), Enu(150.0 * node, 0, 50)) for node in range(1, 10))
@@ -163,21 +165,40 @@ class Line:
         return found
 
     def turns(self, loads: Mapping[NodeId, int]) -> Mapping[NodeId, int]:
-        """The root turns of each node."""
-        return Counter(turn.root for turn in self.fitted(loads).table.roots())
+        """The root turns of each node, in each of the parts of the superframe in which it has them for its load."""
+        found = self.fitted(loads).table.roots()
+        counts = Counter(turn.root for turn in found)
+        parts = math.gcd(*counts.values())
+        return {node: count // parts for node, count in counts.items()}
 
 
 def test_a_node_gets_turns_for_what_it_sends(make_scenario: MakeScenario) -> None:
     line = Line(make_scenario)
     usual, heard = line.turns(NO_LOADS), line.turns({NODE: 1000})
-    assert usual[NODE] == 2
-    assert heard[NODE] == 8, "five packets, and half as many again"
-    assert all(heard[node] == usual[node] for node in usual if node != NODE)
+    assert usual[NODE] == usual[NodeId(3)]
+    assert heard[NODE] == 4 * heard[NodeId(3)], "eight for two: five packets, and half as many again"
 
 
 def test_where_turns_are_plenty_nobody_loses_any(make_scenario: MakeScenario) -> None:
     line = Line(make_scenario)
     assert line.turns({NODE: 10}) == line.turns(NO_LOADS)
+
+
+def test_where_the_air_is_idle_turns_come_more_often_and_each_packet_waits_less(make_scenario: MakeScenario) -> None:
+    """In a superframe of one second, of 800 turns, a flood of nine nodes takes some eight."""
+    often = {
+        period_s: Line(make_scenario, **{"clusters.flooding_period_s": period_s, "traffic.interval_s": 5.0}).fitted(
+            NO_LOADS
+        )
+        for period_s in (0.15, 0.3, 1.0)
+    }
+    counts = {period_s: len(found.table.offsets_of(NODE)) for period_s, found in often.items()}
+    assert counts == {0.15: 1, 0.3: 2, 1.0: 8}
+    offsets = often[1.0].table.offsets_of(NODE)
+    gaps = {after - before for before, after in pairwise(offsets)}
+    assert len(gaps) == 1, "evenly spread"
+    used = {turn.offset % often[1.0].turns.per_superframe for turn in often[1.0].table.turns}
+    assert len(often[1.0].table.spare[NODE]) > 0.1 * len(used), "half of the air is left for others"
 
 
 def test_whose_traffic_is_stated_to_be_none_has_one_turn(make_scenario: MakeScenario) -> None:

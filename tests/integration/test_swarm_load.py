@@ -19,8 +19,8 @@ GRID = [
     "warmup_s=5",
     "clusters.reassign_s=0",
 ]
-MORE = Traffic(name="more", interval_s=0.25, payload_bytes=1000, arrivals="cbr", sources=(4, 9))
-"""Four more packets a second of two nodes, for which no timetable by `[traffic]` has turns."""
+MORE = Traffic(name="more", interval_s=0.04, payload_bytes=1000, arrivals="cbr", sources=(4, 9))
+"""Twenty-five more packets a second of two nodes, for which no timetable by `[traffic]` has turns."""
 
 
 def summary_of(*settings: str, more: bool) -> dict[str, Any]:
@@ -34,7 +34,7 @@ def test_nodes_that_send_more_get_turns_for_it_and_their_bounds_hold() -> None:
     assert heard["classes"]["more"]["pdr"] > 0.99
     assert heard["pdr"] > 0.99
     assert heard["bound"]["violations"] == said["bound"]["violations"] == 0
-    assert heard["bound"]["classes"]["more"]["stated_share"] > 0.2
+    assert heard["bound"]["classes"]["more"]["stated_share"] > 0.1
     assert "more" not in said["bound"]["classes"], "nothing is promised to what has no turns"
 
 

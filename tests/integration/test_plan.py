@@ -173,7 +173,7 @@ def test_a_load_that_does_not_fit_is_told_with_the_one_that_does(nodes: int, int
 
 
 @pytest.mark.parametrize(
-    ("settings", "deadline_s"), [(("clusters.flooding_period_s=0.1",), None), ((), 0.3), (("clusters.relay=all",), 0.3)]
+    ("settings", "deadline_s"), [(("clusters.flooding_period_s=0.1",), None), ((), 0.2), (("clusters.relay=all",), 0.3)]
 )
 def test_the_change_that_it_proposes_makes_it_feasible(settings: tuple[str, ...], deadline_s: float | None) -> None:
     _, plan, feasible = planned(*TWENTY, *settings, deadline_s=deadline_s, change=True)

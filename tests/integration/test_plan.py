@@ -264,16 +264,16 @@ def with_classes(*classes: dict[str, Any]) -> Scenario:
 
 
 def test_classes_of_one_priority_wait_for_each_other_and_the_plan_counts_both() -> None:
-    """Each class alone would take at most 289 ms; in the run packets of both come at once, and one takes 481 ms."""
-    _, alone, feasible = judge(with_classes({"name": "a", "interval_s": 0.5}))
+    """Each class alone would take at most 110 ms; in the run packets of both come at once, and one takes 150 ms."""
+    _, alone, feasible = judge(with_classes({"name": "a", "interval_s": 0.16}))
     assert feasible
-    scenario = with_classes({"name": "a", "interval_s": 0.5}, {"name": "b", "interval_s": 0.5})
+    scenario = with_classes({"name": "a", "interval_s": 0.16}, {"name": "b", "interval_s": 0.16})
     _, plan, feasible = judge(scenario)
     assert feasible
     bounds_ms = [each["bound_ms"] for each in plan["classes"]]
     slowest_ms = finish(simulate(scenario), out=None)["delay_ms"]["max"]
     assert alone["classes"][0]["bound_ms"] < slowest_ms <= min(bounds_ms)
-    assert max(bounds_ms) < 1.1 * slowest_ms
+    assert max(bounds_ms) < 1.2 * slowest_ms
 
 
 def test_reports_fill_nothing_of_the_room_that_turns_have_for_bulk() -> None:

@@ -30,7 +30,7 @@ def test_reports_take_nothing_from_the_bound_of_bulk_and_have_one_of_their_own()
 
 
 def test_random_arrivals_have_a_bound_as_long_as_few_of_them_wait() -> None:
-    summary = summary_of('traffic.arrivals="poisson"')
+    summary = summary_of('traffic.arrivals="poisson"', "traffic.interval_s=0.2")
     bound = summary["bound"]
     assert bound["violations"] == 0
     assert 0.6 < bound["stated_share"] < 1
@@ -48,7 +48,9 @@ def test_no_bound_is_stated_where_lost_packets_are_repaired_later() -> None:
 def test_bounds_hold_the_lead_and_the_handover(handover_ms: int) -> None:
     bound = summary_of("radio.lead_ms=30", f"radio.handover_ms={handover_ms}")["bound"]
     assert bound["violations"] == 0
-    assert bound["within_share"] == 1.0
+    assert bound["within_share"] == bound["stated_share"] > 0.99, (
+        "the first packet may come before all have shown turns"
+    )
     assert 0.7 < bound["observed_max_ms"] / bound["worst_ms"] <= 1 - 30 / bound["worst_ms"], "a lead is for the receipt"
 
 

@@ -4,10 +4,12 @@
     a warning that names this UAV -> the same, even if no hello of the other UAV is received
     far enough apart, sideways    -> back to the course
     still side by side after long -> the one with the higher id flies to the middle of the area
+    one stands at the geofence    -> it flies back towards the middle for a while, lower ids first
 
 No agreement about heights is needed, because the ids decide: of two UAVs the one with the lower id goes one level up
 for the other, the other one level down. So any two part, no two of three that are in conflict with each other share a
-level, and a warning need not state a direction. The height of a level is the distance to be kept.
+level, and a warning need not state a direction. The height of a level is the distance to be kept; all levels are a
+little higher, by the error of a measured height, so that nobody is truly more than two of them below the mission's.
 
 Both UAVs are assumed to keep their horizontal velocity. Not modeled: turns that the other UAV has planned, and
 conflicts that the change of height itself causes, until the next hello shows them. In a planned search, UAVs avoid each
@@ -32,12 +34,21 @@ _PAST_NS: Final = 3 * S
 """If the other UAV is only known by its warning, the conflict is over this long after the closest approach."""
 _LONG_NS: Final = 20 * S
 """Two UAVs that have been in conflict for longer than this fly side by side, or stand at the geofence."""
+_STANDS_NS: Final = 6 * S
+"""A UAV that has stood still so long while it avoids others, pressed against the geofence, flies back; and so much
+later for each UAV with a lower id that it avoids."""
+_STILL_M_S: Final = 1.5
+"""A UAV at the geofence is not faster than this."""
+_BACK_NS: Final = 12 * S
+"""How long it flies back."""
 _LEAVES_M_S: Final = 5.0
 """The least speed with which one of them then leaves the other."""
 _CLIMB_M_S: Final = 4.0
 """A comfortable climb rate for a small multirotor."""
 _LEVELS: Final = 2
 """The greatest number of levels up or down, for which `nodes.altitude_m` must leave room."""
+_SURE: Final = 3.0
+"""All levels are higher than that by this multiple of the standard deviation of a measured height."""
 _AHEAD_S: Final = 10.0
 """Setpoints lie this far ahead. The farther they are, the less does the error of a fix turn the course."""
 _SOON_S: Final = 2.0
@@ -109,8 +120,10 @@ class ConflictMonitor:
         self._node = node
         self._horizon_s = mission.collision_horizon_s
         self._distance_m = mission.collision_distance_m
-        self._floor_m = scenario.nodes.altitude_m - _LEVELS * mission.collision_distance_m
-        """The height below which it does not descend, however often it begins anew before it is back at its height."""
+        self._room_m = _LEVELS * mission.collision_distance_m
+        self._floor_m = scenario.nodes.altitude_m - max(0.0, self._room_m - _SURE * vertical_sigma_m(scenario))
+        """The measured height below which it does not descend, however often it begins anew before it is back at its
+        height; the true one is then hardly ever two levels below that of the mission."""
         self._clear_m = _CLEAR * mission.collision_distance_m
         self._repeat_ns = seconds_to_ns(mission.collision_repeat_s)
         self._lifetime_ns = neighbor_lifetime_ns(scenario.routing.hello_interval_s)
@@ -121,6 +134,12 @@ class ConflictMonitor:
         self._others: dict[NodeId, Motion] = {}
         self._threats: dict[NodeId, _Threat] = {}
         self._avoidance: _Avoidance | None = None
+        self._still_since_ns: int | None = None
+        """The instant from which this UAV has stood still while it avoids others."""
+        self._back_until_ns = 0
+        """Until this instant it flies back from the geofence."""
+        self._back = Enu(0.0, 0.0, 0.0)
+        """Its horizontal velocity meanwhile."""
         self._wanted: Course | None = None
         """The mission's course; None if the UAV flies in formation."""
 
@@ -236,14 +255,15 @@ class ConflictMonitor:
         if before is None:
             return
         if not self._threats:
-            self._avoidance = None
+            self._avoidance = self._still_since_ns = None
             self.course = self._wanted or Course(own.position, HOME)
             return
         levels = sum(1 if node > self._node else -1 for node in self._threats)
-        level_m = before.up_m + max(-_LEVELS, min(_LEVELS, levels)) * self._distance_m
-        level_m = max(level_m, self._floor_m)
+        middle_m = max(before.up_m, self._floor_m + self._room_m)
+        level_m = middle_m + max(-_LEVELS, min(_LEVELS, levels)) * self._distance_m
         climb_m_s = max(-_CLIMB_M_S, min(_CLIMB_M_S, (level_m - own.position.up) / _SOON_S))
         sideways = self._leaving(own, before.velocity) or self._sideways(own.position) or before.velocity
+        sideways = self._flying_back(own, before.velocity) or sideways
         velocity = sideways._replace(up=climb_m_s)
         ahead = Motion(own.position, velocity, 0).position_at(round(_AHEAD_S * S))
         self.course = Course(ahead, max(_LEAST_M_S, velocity.norm()))
@@ -256,9 +276,27 @@ class ConflictMonitor:
             node < self._node and own.at_ns - threat.since_ns > _LONG_NS for node, threat in self._threats.items()
         ):
             return None
-        way = _level(own.position)
-        scale = -max(_LEAVES_M_S, velocity.norm()) / max(way.norm(), 1e-9)
-        return Enu(way.east * scale, way.north * scale, 0.0)
+        return _to_the_middle(own.position, velocity)
+
+    def _flying_back(self, own: Motion, velocity: Enu) -> Enu | None:
+        """The horizontal velocity of this UAV, which no mission has told where to be, once it has stood still: one that
+        keeps its velocity, as whoever has the lowest id does, would stand at the geofence for ever. Its direction
+        remains, since those who all fly to the middle meet there.
+        """
+        now_ns = own.at_ns
+        if now_ns < self._back_until_ns:
+            return self._back
+        if self._wanted is not None or own.velocity.horizontal() > _STILL_M_S:
+            self._still_since_ns = None
+            return None
+        if self._still_since_ns is None:
+            self._still_since_ns = now_ns
+        rank = 1 + sum(node < self._node for node in self._threats)
+        if now_ns - self._still_since_ns <= rank * _STANDS_NS:
+            return None
+        self._still_since_ns, self._back_until_ns = None, now_ns + _BACK_NS
+        self._back = _to_the_middle(own.position, velocity)
+        return self._back
 
     def _sideways(self, here: Enu) -> Enu | None:
         """The horizontal velocity towards the mission's goal; None if there is no goal."""
@@ -270,5 +308,18 @@ class ConflictMonitor:
         return Enu(way.east * scale, way.north * scale, 0.0)
 
 
+def vertical_sigma_m(scenario: Scenario) -> float:
+    """The standard deviation of a height by GPS."""
+    sensors = scenario.sensors
+    return sensors.gps_vertical * math.hypot(sensors.gps_common_m, sensors.gps_bias_m, scenario.world.gps_sigma_m)
+
+
 def _level(vector: Enu) -> Enu:
     return Enu(vector.east, vector.north, 0.0)
+
+
+def _to_the_middle(here: Enu, velocity: Enu) -> Enu:
+    """The horizontal velocity towards the middle of the area, with the speed of this one, and not slowly."""
+    way = _level(here)
+    scale = -max(_LEAVES_M_S, velocity.norm()) / max(way.norm(), 1e-9)
+    return Enu(way.east * scale, way.north * scale, 0.0)

@@ -19,7 +19,8 @@ OTHER = NodeId(7)
 def monitor(make_scenario):
     def make(node: int = 3, **keys: Any) -> ConflictMonitor:
         wanted = {"nodes.count": 9, "mission.collision_horizon_s": 12, "mission.collision_distance_m": 15}
-        return ConflictMonitor(make_scenario(**wanted, **keys), NodeId(node))
+        exact = {"sensors.gps_vertical": 0.0}  # heights, so that levels are where they are said to be
+        return ConflictMonitor(make_scenario(**wanted, **exact | keys), NodeId(node))
 
     return make
 
@@ -176,14 +177,44 @@ def test_of_two_that_fly_side_by_side_for_long_the_one_with_the_higher_id_leaves
     assert (velocity.east, velocity.north) == pytest.approx((-7.07, -7.07) if leaves else (10, 0), abs=0.01)
 
 
-def test_who_begins_to_avoid_before_it_is_back_at_its_height_descends_no_farther_than_before(monitor) -> None:
-    uav = monitor(9)  # the lower id is above, so this one goes down
-    uav.on_hello(OTHER, at(200, 24, WEST), now_ns=0)
-    uav.on_fix(at(0, 24, EAST))
+def level_m(uav: ConflictMonitor, up_m: float, others: tuple[int, ...]) -> float:
+    """How high a UAV goes, which is near that level, for others that come towards it."""
+    for other in others:
+        uav.on_hello(NodeId(other), at(200, up_m, WEST), now_ns=0)
+    uav.on_fix(at(0, up_m, EAST))
+    course = uav.course
+    for step in range(1, 400):  # as it flies there
+        if course is None:
+            break
+        up_m += (course.position.up - up_m) / 100
+        uav.on_fix(at(0.01 * step, up_m, EAST, step))
+        course = uav.course
+    return up_m
+
+
+@pytest.mark.parametrize(("vertical", "higher_m"), [(0.0, 0.0), (2.0, 12.65), (10.0, 30.0)])
+def test_levels_are_higher_by_three_times_the_error_of_a_height_and_apart_as_ever(
+    monitor, vertical: float, higher_m: float
+) -> None:
+    """By GPS 2.11 m along a horizontal axis, and `gps_vertical` times as much upwards."""
+    for node, level in ((1, 30.0), (3, 0.0), (9, -30.0)):
+        others = tuple(other for other in (1, 3, 9) if other != node)
+        uav = monitor(node, **{"sensors.gps_vertical": vertical})
+        assert level_m(uav, 50.0, others) == pytest.approx(50 + level + higher_m, abs=0.7)
+
+
+@pytest.mark.parametrize(("node", "stood_s", "goes_back"), [(3, 6, False), (3, 9, True), (9, 9, False), (9, 16, True)])
+def test_who_stands_at_the_geofence_while_it_avoids_others_flies_back_and_the_lower_id_first(
+    monitor, node: int, stood_s: int, goes_back: bool
+) -> None:
+    uav, here = monitor(node), Enu(290, 290, 50)
+    for second in range(stood_s):
+        uav.on_hello(OTHER, Motion(here._replace(east=280), Enu(0.5, 0.5, 0), second * S), now_ns=second * S)
+        uav.on_fix(Motion(here, Enu(5, 5, 0) if not second else Enu(0, 0, 0), second * S))
     assert uav.course is not None
-    assert uav.course.position.up == pytest.approx(24 - 10 * 2.0), "at 2 m/s, to two levels below 50 m in 2 s"
-    lower = monitor(9)
-    lower.on_hello(OTHER, at(200, 19, WEST), now_ns=0)
-    lower.on_fix(at(0, 19, EAST))
-    assert lower.course is not None
-    assert lower.course.position.up > 19, "and up to them from below"
+    assert (uav.course.position.minus(here).east < 0) == goes_back
+
+
+def test_who_begins_to_avoid_before_it_is_back_at_its_height_descends_no_farther_than_before(monitor) -> None:
+    for up_m in (32.0, 40.0):  # the lower ids are above, so this one goes down
+        assert level_m(monitor(9, **{"sensors.gps_vertical": 2.0}), up_m, (7, 8)) == pytest.approx(20 + 12.65, abs=0.7)

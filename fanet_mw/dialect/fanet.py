@@ -370,7 +370,6 @@ MAVLINK_MSG_ID_FANET_TIME = 53005
 MAVLINK_MSG_ID_FANET_JOIN = 53006
 MAVLINK_MSG_ID_FANET_DIGEST = 53007
 MAVLINK_MSG_ID_FANET_PLACES = 53008
-MAVLINK_MSG_ID_FANET_NEIGHBORS = 53009
 MAVLINK_MSG_ID_FANET_ROUTING = 53010
 MAVLINK_MSG_ID_FANET_LINKS = 53011
 MAVLINK_MSG_ID_FANET_MESSAGE = 53012
@@ -814,49 +813,6 @@ class MAVLink_fanet_places_message(MAVLink_message):
 # Define name on the class for backwards compatibility (it is now msgname).
 # Done with setattr to hide the class variable from mypy.
 setattr(MAVLink_fanet_places_message, "name", mavlink_msg_deprecated_name_property())
-
-
-class MAVLink_fanet_neighbors_message(MAVLink_message):
-    """
-    Part of a hello: the neighbors that the sender hears. More than
-    fit come in several messages.
-    """
-
-    id = MAVLINK_MSG_ID_FANET_NEIGHBORS
-    msgname = "FANET_NEIGHBORS"
-    fieldnames = ["node", "nodes", "facts", "count", "version"]
-    ordered_fieldnames = ["node", "nodes", "facts", "count", "version"]
-    fieldtypes = ["uint16_t", "uint16_t", "uint8_t", "uint8_t", "uint8_t"]
-    fielddisplays_by_name: Dict[str, str] = {}
-    fieldenums_by_name: Dict[str, str] = {}
-    fieldunits_by_name: Dict[str, str] = {}
-    native_format = bytearray(b"<HHBBB")
-    orders = [0, 1, 2, 3, 4]
-    lengths = [1, 16, 16, 1, 1]
-    array_lengths = [0, 16, 16, 0, 0]
-    crc_extra = 112
-    unpacker = struct.Struct("<H16H16BBB")
-    instance_field = None
-    instance_offset = -1
-
-    def __init__(self, node: int, nodes: Sequence[int], facts: Sequence[int], count: int, version: int):
-        MAVLink_message.__init__(self, MAVLink_fanet_neighbors_message.id, MAVLink_fanet_neighbors_message.msgname)
-        self._fieldnames = MAVLink_fanet_neighbors_message.fieldnames
-        self._instance_field = MAVLink_fanet_neighbors_message.instance_field
-        self._instance_offset = MAVLink_fanet_neighbors_message.instance_offset
-        self.node = node
-        self.nodes = nodes
-        self.facts = facts
-        self.count = count
-        self.version = version
-
-    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
-        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.node, self.nodes[0], self.nodes[1], self.nodes[2], self.nodes[3], self.nodes[4], self.nodes[5], self.nodes[6], self.nodes[7], self.nodes[8], self.nodes[9], self.nodes[10], self.nodes[11], self.nodes[12], self.nodes[13], self.nodes[14], self.nodes[15], self.facts[0], self.facts[1], self.facts[2], self.facts[3], self.facts[4], self.facts[5], self.facts[6], self.facts[7], self.facts[8], self.facts[9], self.facts[10], self.facts[11], self.facts[12], self.facts[13], self.facts[14], self.facts[15], self.count, self.version), force_mavlink1=force_mavlink1)
-
-
-# Define name on the class for backwards compatibility (it is now msgname).
-# Done with setattr to hide the class variable from mypy.
-setattr(MAVLink_fanet_neighbors_message, "name", mavlink_msg_deprecated_name_property())
 
 
 class MAVLink_fanet_routing_message(MAVLink_message):
@@ -1514,7 +1470,6 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_FANET_JOIN: MAVLink_fanet_join_message,
     MAVLINK_MSG_ID_FANET_DIGEST: MAVLink_fanet_digest_message,
     MAVLINK_MSG_ID_FANET_PLACES: MAVLink_fanet_places_message,
-    MAVLINK_MSG_ID_FANET_NEIGHBORS: MAVLink_fanet_neighbors_message,
     MAVLINK_MSG_ID_FANET_ROUTING: MAVLink_fanet_routing_message,
     MAVLINK_MSG_ID_FANET_LINKS: MAVLink_fanet_links_message,
     MAVLINK_MSG_ID_FANET_MESSAGE: MAVLink_fanet_message_message,
@@ -2260,34 +2215,6 @@ class MAVLink(object):
 
         """
         self.send(self.fanet_places_encode(east, north, up, leader_east, leader_north, leader_up, first, count, version), force_mavlink1=force_mavlink1)
-
-    def fanet_neighbors_encode(self, node: int, nodes: Sequence[int], facts: Sequence[int], count: int, version: int) -> MAVLink_fanet_neighbors_message:
-        """
-        Part of a hello: the neighbors that the sender hears. More than fit
-        come in several messages.
-
-        node                      : The sender. (type:uint16_t)
-        nodes                     : Neighbors, ascending. (type:uint16_t)
-        facts                     : Bit 0: it hears the sender. Bit 1: the sender wants it to relay. (type:uint8_t)
-        count                     : How many entries of this message are used. (type:uint8_t)
-        version                   : 1. (type:uint8_t)
-
-        """
-        return MAVLink_fanet_neighbors_message(node, nodes, facts, count, version)
-
-    def fanet_neighbors_send(self, node: int, nodes: Sequence[int], facts: Sequence[int], count: int, version: int, force_mavlink1: bool = False) -> None:
-        """
-        Part of a hello: the neighbors that the sender hears. More than fit
-        come in several messages.
-
-        node                      : The sender. (type:uint16_t)
-        nodes                     : Neighbors, ascending. (type:uint16_t)
-        facts                     : Bit 0: it hears the sender. Bit 1: the sender wants it to relay. (type:uint8_t)
-        count                     : How many entries of this message are used. (type:uint8_t)
-        version                   : 1. (type:uint8_t)
-
-        """
-        self.send(self.fanet_neighbors_encode(node, nodes, facts, count, version), force_mavlink1=force_mavlink1)
 
     def fanet_routing_encode(self, length: int, type: int, part: int, parts: int, data: Sequence[int]) -> MAVLink_fanet_routing_message:
         """

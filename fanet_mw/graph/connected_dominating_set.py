@@ -5,17 +5,13 @@ a relay loses may be lost to others, too.
 """
 
 from collections.abc import Mapping
-from types import MappingProxyType
-from typing import Final
 
 from fanet_mw.graph.topology import Adjacency, components
 from fanet_mw.rng import priority_hash
 from fanet_mw.units import NodeId
 
-_EQUAL: Final[Mapping[NodeId, float]] = MappingProxyType({})
 
-
-def dominates(node: NodeId, adjacency: Adjacency, *, priority: Mapping[NodeId, float] = _EQUAL) -> bool:
+def dominates(node: NodeId, adjacency: Adjacency) -> bool:
     """True if `node` belongs to the set, as it decides by itself; `adjacency` needs only the node and its neighbors.
 
     It does not belong if any two of its neighbors hear each other or are connected over nodes that are all stronger
@@ -27,9 +23,9 @@ def dominates(node: NodeId, adjacency: Adjacency, *, priority: Mapping[NodeId, f
     near = {n: frozenset(adjacency[n]) for n in (node, *adjacency[node])}
     if _complete(adjacency[node], near):
         return False
-    ours = _strength(node, priority)
+    ours = _strength(node)
     known = frozenset().union(*near.values()) - {node}
-    stronger = {n for n in known if _strength(n, priority) > ours}
+    stronger = {n for n in known if _strength(n) > ours}
     links = {
         n: tuple(m for m in sorted(stronger) if m in near.get(n, ()) or n in near.get(m, ())) for n in sorted(stronger)
     }
@@ -40,8 +36,8 @@ def dominates(node: NodeId, adjacency: Adjacency, *, priority: Mapping[NodeId, f
     )
 
 
-def _strength(node: NodeId, priority: Mapping[NodeId, float]) -> tuple[float, int, NodeId]:
-    return priority.get(node, 0.0), priority_hash(node), node
+def _strength(node: NodeId) -> tuple[int, NodeId]:
+    return priority_hash(node), node
 
 
 def _complete(nodes: tuple[NodeId, ...], near: Mapping[NodeId, frozenset[NodeId]]) -> bool:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 MESSAGE_BYTES: Final = {
     "FANET_ROUTE": 36, "positions": 61, "COLLISION": 31, "FANET_BEACON": 33, "FANET_SCHEDULE": 266,
-    "FANET_SURVIVOR": 43, "FANET_DIGEST": 255, "FANET_PLACES": 189, "FANET_NEIGHBORS": 64, "FANET_LINKS": 240,
+    "FANET_SURVIVOR": 43, "FANET_DIGEST": 255, "FANET_PLACES": 189, "FANET_LINKS": 240,
     "FANET_LOADS": 126,
 }  # fmt: skip
 """The lengths of messages on the air, their MAVLink frame included (docs/reference/air-format.md); `positions` are
@@ -42,8 +42,6 @@ _LINKS: Final = 36
 """The number of links in one FANET_LINKS message."""
 _MOST_LINKS_MESSAGES: Final = 4
 """The number of FANET_LINKS messages in one frame."""
-_TELLS_NEIGHBORS: Final = ("heads", "cds", "mpr")
-"""The relay rules with which a hello states which nodes its sender hears."""
 _MOST_IN_ROUNDS: Final = 488
 """The nodes about which one FANET_HEARD can tell (64 bytes, of which 3 for node and epoch)."""
 _HELLO_IN_TURN: Final = 36 + 61 + 255
@@ -194,7 +192,6 @@ def _too_small_frames(scenario: Scenario) -> Iterator[str]:
         if clustered:
             hello += size["FANET_BEACON"]
             hello += size["FANET_DIGEST"] if scenario.repair_ns else 0
-            hello += size["FANET_NEIGHBORS"] if relay in _TELLS_NEIGHBORS else 0
         least["hellos"] = hello
     if clustered:
         places = _SCHEDULE_PLACES * size["FANET_PLACES"] if relay == "scheduled" else 0

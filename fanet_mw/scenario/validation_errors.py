@@ -17,13 +17,18 @@ _MOST_UNKNOWN: Final = 8
 _LONGEST_VALUE: Final = 80
 _REMOVED: Final = {
     "clusters.relay = 'claimed'": 'removed; take routing.protocol = "rounds" for turns without a leader',
+    **{
+        f"clusters.relay = '{rule}'": 'removed; take "counter" for fewer relays, or routing.protocol = "rounds"'
+        for rule in ("gossip", "heads", "cds", "mpr")
+    },
+    "clusters.gossip_degree": 'removed with clusters.relay = "gossip"; take "counter"',
     "mission.coverage_map": "removed: as much was searched without it; free UAVs follow their place in the formation",
     "clusters.slots": 'removed with clusters.relay = "claimed"; take routing.protocol = "rounds"',
 }
 """Keys and values that older scenarios may have, and what to take instead."""
 _REMOVED_DEFAULTS: Final[Mapping[str, Mapping[str, Any]]] = {
     "mission": {"coverage_map": False},
-    "clusters": {"slots": 0},
+    "clusters": {"slots": 0, "gossip_degree": 6.0},
 }
 """Removed keys with the value that did nothing, as every result folder of that time has them."""
 

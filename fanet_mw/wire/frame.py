@@ -356,7 +356,6 @@ TIME: Final = Spec(53005, 172, struct.Struct("<QIIIIHHHBBB"))
 JOIN: Final = Spec(53006, 221, struct.Struct("<ffffffHHB"))
 DIGEST: Final = Spec(53007, 37, struct.Struct("<24I24I24HBBB"))
 PLACES: Final = Spec(53008, 1, struct.Struct("<28h28h28hhhhBBB"))
-NEIGHBORS: Final = Spec(53009, 112, struct.Struct("<H16H16BBB"))
 ROUTING: Final = Spec(53010, 255, struct.Struct("<BBBB240B"))
 LINKS: Final = Spec(53011, 92, struct.Struct("<IHH36H36H36B36bBBBB"))
 MESSAGE: Final = Spec(53012, 170, struct.Struct("<QIIIIHHHBBBB"))
@@ -372,7 +371,7 @@ FOUND: Final = Spec(53023, 195, struct.Struct("<QIfffffHBB"))
 ROLL: Final = Spec(53025, 30, struct.Struct("<IHH79BB"))
 ORDER: Final = Spec(53026, 213, struct.Struct("<QfffHHHBB"))
 SPECS: Final = (
-    ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES, NEIGHBORS, ROUTING, LINKS,
+    ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES, ROUTING, LINKS,
     MESSAGE, RECEIPT, TARGETS, LOADS, HEARD, HELD, SEARCH, STATUS, BIDS, FOUND,
     ROLL, ORDER,
 )  # fmt: skip

@@ -52,16 +52,11 @@ def flood_cost(scenario: Scenario, adjacency: Adjacency, root: NodeId, *, payloa
 
 
 def relay_share(scenario: Scenario, adjacency: Adjacency) -> float:
-    """The share of the nodes that relays a flood: all, or about `gossip_degree` or `counter` nodes of each
-    neighborhood.
-
-    With the rules `heads`, `cds` and `mpr` fewer nodes relay; since it is not estimated how many, all are
-    counted. With `counter` at most twice the threshold of each neighborhood relays, because nodes out of range of each
-    other do not receive each other's copies.
+    """The share of the nodes that relays a flood: all, or with `counter` at most twice the threshold of each
+    neighborhood, because nodes out of range of each other do not receive each other's copies.
     """
     clusters = scenario.clusters
     neighbors = sum(len(near) for near in adjacency.values()) / max(1, len(adjacency))
-    if clusters.relay not in ("gossip", "counter") or neighbors == 0:
+    if clusters.relay != "counter" or neighbors == 0:
         return 1.0
-    wanted = clusters.gossip_degree if clusters.relay == "gossip" else 2.0 * clusters.counter
-    return min(1.0, wanted / neighbors)
+    return min(1.0, 2.0 * clusters.counter / neighbors)

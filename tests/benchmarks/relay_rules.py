@@ -12,20 +12,15 @@ from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 
-RULES = {
-    "all": [], "gossip": ["clusters.gossip_degree=6"], "counter": ["clusters.counter=2"], "heads": [], "cds": [],
-    "mpr": [], "scheduled": [],
-}  # fmt: skip
+RULES = {"all": [], "counter": ["clusters.counter=2"], "scheduled": []}
 SWARMS = {"grid": [], "dense": ["nodes.layout=disc", "nodes.radius_m=250"]}
-FEWER = ["clusters.count=8"]
-"""With every node a head `heads` is `all`."""
 
 
 def measured(rule: str, swarm: str, *, seconds: int) -> list[dict[str, Any]]:
     """The summaries of seeds 1 to 3."""
     chosen = [
         f"clusters.relay={rule}", "clusters.flooding_period_s=1", f"duration_s={seconds}",
-        *SWARMS[swarm], *RULES[rule], *(FEWER if rule == "heads" else []),
+        *SWARMS[swarm], *RULES[rule],
     ]  # fmt: skip
     return [finish(simulate(catalog.find("clusters", [*chosen, f"seed={seed}"])), out=None) for seed in (1, 2, 3)]
 

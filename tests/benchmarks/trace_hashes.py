@@ -37,7 +37,7 @@ _BASES: Final = (
     ("crossing", ["duration_s=24", "traffic.interval_s=0.5"]),
 )
 _RULES: Final = {
-    "all": [], "gossip": [], "counter": [], "heads": [], "cds": [], "mpr": [], "scheduled": [],
+    "all": [], "counter": [], "scheduled": [],
     "measured": ["clusters.relay=scheduled", "clusters.links=measured"],
 }  # fmt: skip
 """What the draws take turns in: the values of `clusters.relay`, and timetables from measured links."""

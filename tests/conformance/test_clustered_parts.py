@@ -19,7 +19,6 @@ from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, PRIORITY_BULK, Header, Kind, filler
 from fanet_mw.wire.hello.beacon import Beacon, Role
 from fanet_mw.wire.hello.digest import Digest
-from fanet_mw.wire.hello.neighbors import NeighborList
 
 OURS, THEIRS = NodeId(2), NodeId(3)
 NOW_NS = 1 * S
@@ -129,20 +128,6 @@ def test_roles_name_the_node_itself_and_bear_the_word_of_others(node: Node) -> N
     assert (beacon.node, beacon.head, beacon.role) == (OURS, 0, Role.ISOLATED)
     assert 0 < roles.hello_share(NOW_NS) <= 1
     assert roles.report()["state"] == "seeking"
-
-
-def test_what_hellos_say_of_two_hops_names_whom_the_node_hears(node: Node) -> None:
-    two_hops = protocol_of(node).parts.two_hops
-    if two_hops is None:
-        assert node.scenario.clusters.relay in ("all", "gossip", "counter", "scheduled"), (
-            "hellos say nothing of neighbors"
-        )
-        return
-    assert two_hops.neighbor_list(NOW_NS).heard == ()
-    beacon = Beacon(THEIRS, 0, 0, 0, 0, 0, Role.ISOLATED, 255)
-    two_hops.on_neighbor_list(NeighborList(THEIRS, ()), beacon, now_ns=NOW_NS)
-    said = two_hops.neighbor_list(NOW_NS + MS)
-    assert (said.node, [other.node for other in said.heard]) == (OURS, [THEIRS])
 
 
 def test_every_part_reports_what_json_can_say_and_keys_of_its_own(node: Node) -> None:

@@ -66,7 +66,7 @@ SETTINGS: Final[dict[str, tuple[str, ...]]] = {
     "olsr": ("routing.protocol=olsr", "traffic.destination=9"),
     "dsdv": ("routing.protocol=dsdv", "traffic.destination=9"),
     "geographic": ("routing.protocol=geographic", "traffic.destination=9"),
-    "all": ("clusters.relay=all", "clusters.repair_s=5", "clusters.reassign_s=1"),
+    "all": ("clusters.relay=all", "mobility.model=crossing", "clusters.repair_s=5", "clusters.reassign_s=1"),
     "relay-counter": ("clusters.relay=counter", "clock.sync=beacons", "clock.offset_ms=5", "clock.drift_ppm=20"),
     "scheduled": ("clusters.relay=scheduled",),
     "measured": (
@@ -75,8 +75,6 @@ SETTINGS: Final[dict[str, tuple[str, ...]]] = {
         "clusters.repair_s=5",
         "clusters.load=heard",
     ),
-    "cds": ("clusters.relay=cds", "mobility.model=crossing", "clusters.repair_s=5"),
-    "mpr": ("clusters.relay=mpr", "clusters.method=wca", "clusters.reassign_s=1", "clock.sync=beacons"),
 }
 """Swarms of every routing protocol, and of `clustered` every way to relay, repair and keep time but one."""
 SMALL: Final = (

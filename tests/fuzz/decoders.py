@@ -37,7 +37,6 @@ from fanet_mw.wire import rounds
 from fanet_mw.wire.bids import checked_bids
 from fanet_mw.wire.hello.beacon import Beacon
 from fanet_mw.wire.hello.digest import Digest
-from fanet_mw.wire.hello.neighbors import NeighborList
 from fanet_mw.wire.hello.time_beacon import TimeBeacon
 from fanet_mw.wire.join import Join
 from fanet_mw.wire.links import Links
@@ -100,11 +99,6 @@ def _of_the_air(found: Corpus) -> Iterator[Decoder]:
     ):  # fmt: skip
         yield Decoder(kind.__name__, _there_and_back(kind.decode_frame, _encode_frame), of(spec.msgid))
     yield Decoder("Digest", _there_and_back(Digest.decode_frames, lambda m: m.encode_frames(3)), of(wire.DIGEST.msgid))
-    yield Decoder(
-        "NeighborList",
-        _there_and_back(NeighborList.decode_frames, lambda m: m.encode_frames()),
-        of(wire.NEIGHBORS.msgid),
-    )
     yield Decoder("Links", _there_and_back(Links.decode_frames, lambda m: m.encode_frames()), of(wire.LINKS.msgid))
     yield Decoder("piece", _there_and_back(pieces.decode_piece, _encode_piece), of(wire.MESSAGE.msgid))
     yield Decoder(

@@ -29,7 +29,7 @@ def test_near_misses_off_a_real_time_air_end_no_process_and_close_the_books(monk
     times = ["duration_s=5", "warmup_s=1", "drain_s=1"]
     settings = [
         "radio.lead_ms=150",
-        "clusters.relay=cds",
+        "clusters.relay=counter",
         "clusters.flooding_period_s=0.5",
         "clusters.repair_s=5",
         "clock.sync=beacons",

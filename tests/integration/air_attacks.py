@@ -17,7 +17,6 @@ from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, Kind
 from fanet_mw.wire.hello.beacon import Beacon, Role
 from fanet_mw.wire.hello.digest import Digest, Holding
-from fanet_mw.wire.hello.neighbors import HeardNeighbor, NeighborList
 from fanet_mw.wire.hello.time_beacon import TimeBeacon
 from fanet_mw.wire.join import Join
 from fanet_mw.wire.links import Link, Links
@@ -130,14 +129,6 @@ def ghosts(step_ms: float = 2) -> Plan:
     return every(step_ms, ghost)
 
 
-def ghost_neighbors() -> Plan:
-    def lie(t_ns: int, seq: int) -> bytes:
-        heard = tuple(HeardNeighbor(NodeId(100 + k), hears_us=True) for k in range(16))
-        return hello(t_ns, seq, beacon(), NeighborList(EVIL, heard).encode_frames())
-
-    return every(200, lie)
-
-
 def ghost_links() -> Plan:
     """Links of a node that is not there, in the leader's name."""
 
@@ -223,7 +214,6 @@ ATTACKS: Final[Mapping[str, Attack]] = {
     "sequence numbers of the far future": Attack("`forged`", far_sequences, ("clusters.repair_s=20",)),
     "joins of heads 255 hops away": Attack("`forged` if their hops cannot be; no process ends", joins_from_afar),
     "500 joins a second of nodes that are not there": Attack("`unknown_node`; the leader counts none of them", ghosts),
-    "neighbors that are not there": Attack("`malformed`", ghost_neighbors, ("clusters.relay=cds",)),
     "links of a node that is not there, as the leader": Attack(
         "`malformed`", ghost_links, ("clusters.relay=scheduled", "clusters.links=measured")
     ),

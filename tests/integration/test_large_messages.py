@@ -8,7 +8,6 @@ from kit import slow
 from fanet_mw import wire
 from fanet_mw.application import Application, Data, Fate, Received, Status
 from fanet_mw.errors import DropReason, LocalProtocolError
-from fanet_mw.routing.clustered.build import RELAYS
 from fanet_mw.trace import Delivered, Dropped, Generated
 from fanet_mw.units import NodeId, S
 from sim.run.virtual import simulate
@@ -66,13 +65,7 @@ class Courier(Application):
             self.lost.append(status)
 
 
-_ALIKE = ("cds", "heads", "gossip", "counter", "mpr")
-"""The first two choose relays as `mpr` does, by what neighbors say of theirs; the others contend as `all` does."""
-
-
-@pytest.mark.parametrize(
-    "relay", [pytest.param(name, marks=pytest.mark.slow) if name in _ALIKE else name for name in sorted(RELAYS)]
-)
+@pytest.mark.parametrize("relay", ["all", *slow("counter"), "scheduled"])
 def test_whatever_relays_messages_of_all_lengths_reach_everyone(relay: str) -> None:
     couriers: dict[int, Courier] = {}
 

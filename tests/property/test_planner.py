@@ -336,16 +336,6 @@ def test_every_packet_goes_through_all_nodes_between_it_and_its_head() -> None:
     assert {n: row[0] for n, row in found.through.items()} == {1: 1, 2: 2, 3: 0, 4: 1, 5: 1}
 
 
-@pytest.mark.parametrize("rule", ["heads", "cds", "mpr"])
-def test_relays_that_are_not_estimated_are_planned_as_if_all_relayed(rule: str) -> None:
-    def planned(relay: str) -> ScenarioPlan:
-        scenario = catalog.find("clusters", [f"clusters.relay={relay}", "traffic.interval_s=2", "clusters.count=8"])
-        at = {NodeId(n): place for n, place in zip(scenario.node_ids, positions(scenario), strict=True)}
-        return plan(scenario, at)
-
-    assert [cluster.flood for cluster in planned(rule).clusters] == [c.flood for c in planned("all").clusters]
-
-
 def test_a_lifetime_is_that_of_the_class(planned) -> None:
     keys = {"mission.survivors": 4, "routing.report_lifetime_s": 4, "routing.lifetime_s": 30}
     (problem,) = planned(**keys).problems

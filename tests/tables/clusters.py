@@ -7,7 +7,7 @@ from typing import Any, Final
 from unittest import mock
 
 from fanet_mw.routing.clustered.roles.neighbor_failure_detector import NeighborFailureDetector
-from tests.benchmarks import head_changes, moving_swarm, relay_rules, relay_sets
+from tests.benchmarks import head_changes, moving_swarm, relay_rules
 from tests.tables.markdown import Rows
 from tests.tables.summaries import summarized
 
@@ -109,22 +109,6 @@ def settings_of_rescue() -> Rows:
             f"{100 * statistics.mean(run['air']['busy'] for run in found):.0f}",
         ])  # fmt: skip
     return rows
-
-
-def few_relays() -> Rows:
-    """Transmissions and sub-slots of one flood."""
-    rows = [["swarm", "all relay", "Wu-Li", "Guha-Khuller", "shortest relays", "MPR"]]
-    for name, make in (("grid", relay_sets.grid), ("uniform", relay_sets.uniform)):
-        for count in (45, 200, 1000):
-            adjacency = make(count)
-            found = relay_sets.floods(adjacency, seed_of=count)
-            pairs = [" / ".join(_three_digits(mean) for mean in pair) for pair in found.by_method.values()]
-            rows.append([f"{name}, {count}, {found.hops:.0f} hops", *pairs, _three_digits(found.mpr)])
-    return rows
-
-
-def _three_digits(mean: float) -> str:
-    return f"{mean:.0f}" if mean >= 99.95 else f"{mean:.1f}"
 
 
 def rules() -> Rows:

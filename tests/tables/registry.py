@@ -66,7 +66,6 @@ TABLES: Final[Mapping[str, Table]] = {
     "silent-neighbors": Table(
         "explanation/roles.md", clusters.silent_neighbors, Tolerance(absolute=0.02, relative=0.1)
     ),
-    "few-relays": Table("explanation/clusters.md", clusters.few_relays, Tolerance(relative=0.01)),
     "rescue-settings": Table(
         "explanation/protocol.md", clusters.settings_of_rescue, Tolerance(absolute=0.02, relative=0.1)
     ),

@@ -1,8 +1,7 @@
 """Builds the clustered protocol of one node: the only place that asks which `clusters.relay` a scenario has.
 
 clusters.relay          roles      access            relaying
-all, gossip, counter    assigned   slots of heads    contending, by that rule
-heads, cds, mpr         assigned   slots of heads    contending, by nodes that hellos choose
+all, counter            assigned   slots of heads    contending, by that rule
 scheduled               assigned   timetable         by turn; contending until there is one
 """
 
@@ -22,16 +21,8 @@ from fanet_mw.routing.clustered.forwarding.one_hop import OneHop
 from fanet_mw.routing.clustered.forwarding.uplink import Uplink
 from fanet_mw.routing.clustered.links.heard_load import HeardLoads, stated_loads
 from fanet_mw.routing.clustered.links.link_quality import LinkQuality
-from fanet_mw.routing.clustered.links.neighborhood import Neighborhood
+from fanet_mw.routing.clustered.relaying.all_and_counter import CounterRule, RelayAll, Rule
 from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
-from fanet_mw.routing.clustered.relaying.gateways_cds_mpr import (
-    DominatingSet,
-    HeadsFirst,
-    MultipointRelays,
-    NeighborKnowledgeRelaying,
-    RelayChoice,
-)
-from fanet_mw.routing.clustered.relaying.gossip_and_counter import CounterRule, GossipRule, RelayAll, Rule
 from fanet_mw.routing.clustered.roles.assigned_roles import AssignedRoles, RoleParts
 from fanet_mw.routing.clustered.roles.contract import NoTimetable, Timetabling
 from fanet_mw.routing.clustered.roles.failover import Failover
@@ -145,35 +136,13 @@ def _by_all(ground: _Ground) -> Clustered:
     return _in_slots(ground, RelayAll())
 
 
-def _by_gossip(ground: _Ground) -> Clustered:
-    return _in_slots(ground, GossipRule(ground.port.scenario.clusters, ground.neighbors, ground.random))
-
-
 def _by_counter(ground: _Ground) -> Clustered:
     rule = CounterRule(ground.port.scenario.clusters, ground.random)
     return _in_slots(ground, rule, rule.open_until)
 
 
-def _by_set(ground: _Ground) -> Clustered:
-    return _by_choice(ground, _membership(ground), DominatingSet(_near(ground)))
-
-
-def _by_mpr(ground: _Ground) -> Clustered:
-    return _by_choice(ground, _membership(ground), MultipointRelays(_near(ground)))
-
-
-def _by_heads(ground: _Ground) -> Clustered:
-    membership = _membership(ground)
-    choice = HeadsFirst(ground.port.node, lifetime_ns=ground.lifetime_ns, membership=membership)
-    return _by_choice(ground, membership, choice)
-
-
 def _membership(ground: _Ground) -> Membership:
     return Membership(ground.port.node)
-
-
-def _near(ground: _Ground) -> Neighborhood:
-    return Neighborhood(ground.port.node, lifetime_ns=ground.lifetime_ns)
 
 
 def _in_slots(ground: _Ground, rule: Rule, *hear_copies: HearsCopies) -> Clustered:
@@ -184,23 +153,9 @@ def _in_slots(ground: _Ground, rule: Rule, *hear_copies: HearsCopies) -> Cluster
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
         floods=ground.floods, roles=roles, access=access, relaying=relaying, contending=relaying,
-        one_hop=OneHop(ground.port, ground.neighbors), two_hops=None,
+        one_hop=OneHop(ground.port, ground.neighbors),
     )  # fmt: skip
     return _protocol(ground, whole, *hear_copies, parts.refresh)
-
-
-def _by_choice(ground: _Ground, membership: Membership, choice: RelayChoice) -> Clustered:
-    parts = _role_parts(ground, membership, takes_slot=True)
-    access = _slots(ground, membership)
-    roles = _roles(ground, parts, access, NoTimetable())
-    contending = ContendingRelaying(ground.port, RelayAll(), ground.contention)
-    relaying = NeighborKnowledgeRelaying(ground.port, choice, contending)
-    whole = Parts(
-        neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
-        floods=ground.floods, roles=roles, access=access, relaying=relaying, contending=contending,
-        one_hop=OneHop(ground.port, ground.neighbors), two_hops=relaying,
-    )  # fmt: skip
-    return _protocol(ground, whole, parts.refresh)
 
 
 def _slots(ground: _Ground, membership: Membership) -> SlotAccess:
@@ -249,7 +204,7 @@ def _by_timetable(ground: _Ground) -> Clustered:
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
         floods=ground.floods, roles=_roles(ground, parts, access, timetabling, heard), access=access, relaying=relaying,
-        contending=contending, one_hop=None, two_hops=None, loads=heard, delays=delays, missing=ground.missing,
+        contending=contending, one_hop=None, loads=heard, delays=delays, missing=ground.missing,
     )  # fmt: skip
     return _protocol(ground, whole, parts.refresh, calls)
 
@@ -324,10 +279,6 @@ def _protocol(ground: _Ground, whole: Parts, *hear_copies: HearsCopies) -> Clust
 
 RELAYS: Final[Mapping[str, Callable[[_Ground], Clustered]]] = {
     "all": _by_all,
-    "gossip": _by_gossip,
     "counter": _by_counter,
-    "heads": _by_heads,
-    "cds": _by_set,
-    "mpr": _by_mpr,
     "scheduled": _by_timetable,
 }

@@ -21,7 +21,7 @@ from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.neighbors import Neighbor, Neighbors
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.node.reader import decoded
-from fanet_mw.routing.clustered.contract import Access, HearsCopies, Relaying, TwoHops
+from fanet_mw.routing.clustered.contract import Access, HearsCopies, Relaying
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
 from fanet_mw.routing.clustered.forwarding.one_hop import OneHop
@@ -37,7 +37,6 @@ from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Kind
 from fanet_mw.wire.hello.beacon import Beacon
 from fanet_mw.wire.hello.digest import MESSAGE_BYTES as DIGEST_BYTES
 from fanet_mw.wire.hello.digest import Digest, capacity
-from fanet_mw.wire.hello.neighbors import MESSAGE_BYTES, NeighborList
 
 _DATA: Final = int(Kind.DATA)
 
@@ -58,8 +57,6 @@ class Parts(NamedTuple):
     those packets about which it does not decide."""
     one_hop: OneHop | None
     """The way to a neighbor for which a packet is; None where turns are for that (`timetable/turn_access.py`)."""
-    two_hops: TwoHops | None
-    """What hellos say of the neighbors' neighbors; None if hellos say nothing of them."""
     loads: HeardLoads | None = None
     """The loads of the nodes, as this node hears them; None if timetables are made for what the scenario says."""
     delays: StatedDelays | None = None
@@ -173,22 +170,14 @@ class Clustered(RoutingProtocol):
         return self.parts.roles.hello_share(now_ns)
 
     def hello_inner(self, room: int, *, now_ns: int) -> bytes:
-        """What the protocol adds to a hello: its beacon, the digest of recent packets, and what the node knows of its
-        neighbors, in this order and as far as they fit into `room` bytes.
-        """
+        """What the protocol adds to a hello: its beacon, and the digest of recent packets as far as there is room."""
         parts = self.parts
-        near = None if parts.two_hops is None else parts.two_hops.neighbor_list(now_ns)
         parts.gradient.advance(now_ns)
         route = parts.gradient.route(now_ns=now_ns)
         parts.roles.before_hello(now_ns)
         inner = parts.roles.beacon(route, now_ns=now_ns).encode_frame(self._port.node)
-        left = room - len(inner) - (0 if near is None else MESSAGE_BYTES)
-        digest = None if parts.repair is None else self._digest(parts.repair, left, now_ns)
-        if digest is not None:
-            inner += digest.encode_frames(self._port.node)
-        if near is not None:
-            inner += near.encode_frames(room - len(inner))
-        return inner
+        digest = None if parts.repair is None else self._digest(parts.repair, room - len(inner), now_ns)
+        return inner if digest is None else inner + digest.encode_frames(self._port.node)
 
     def _digest(self, repair: Repair, room: int, now_ns: int) -> Digest | None:
         """What the node's hello states of packets; None if it states nothing."""
@@ -215,12 +204,6 @@ class Clustered(RoutingProtocol):
                 parts.missing.notice(parts.repair.lacks(digest), now_ns=now_ns)
         for held in parts.uplink.released(now_ns=now_ns):
             parts.access.forward(held, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
-        if parts.two_hops is not None:
-            near = decoded(packet.frame, NeighborList.decode_frames)
-            if near is not None and any(heard.node > count for heard in near.heard):
-                raise MalformedFrameError("neighbors that are not there")
-            if near is not None and near.node == reception.src:
-                parts.two_hops.on_neighbor_list(near, beacon, now_ns=now_ns)
 
     # --- time -----------------------------------------------------------------------------------------------------
 

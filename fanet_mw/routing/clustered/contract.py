@@ -2,7 +2,6 @@
 
     Access       when this node transmits a packet that it is the first to flood, and what contends for the channel
     Relaying     whether and when this node passes on a flood that began elsewhere
-    TwoHops      what hellos say of the nodes within two hops; only some relaying rules need it
     HearsCopies  parts that cancel a transmission when another node has made it
 
 `Clustered` calls all of them, and the node's roles (`roles/assigned_roles.py`). These call a `ScheduledAccess`, too, to
@@ -16,8 +15,6 @@ from typing import Protocol
 from fanet_mw.bus.messages import Reception
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.wire import Kind
-from fanet_mw.wire.hello.beacon import Beacon
-from fanet_mw.wire.hello.neighbors import NeighborList
 
 
 class Access(Protocol):
@@ -92,16 +89,6 @@ class Relaying(Protocol):
 
     def report(self) -> Mapping[str, object]:
         """The state and the counters of the part, as JSON values."""
-
-
-class TwoHops(Protocol):
-    """What a node learns and tells in hellos about the nodes within two hops."""
-
-    def neighbor_list(self, now_ns: int) -> NeighborList:
-        """The statement for the node's next hello; it is asked for once per hello, before the hello is written."""
-
-    def on_neighbor_list(self, said: NeighborList, beacon: Beacon, *, now_ns: int) -> None:
-        """A neighbor's hello was received with this statement about its neighbors."""
 
 
 class HearsCopies(Protocol):

@@ -30,11 +30,10 @@ class Clusters(Section):
     """The shortest time between two packets that a head releases in its slot."""
     pacing: Literal["burst", "spread"] = "spread"
     """`burst` releases at `release_gap_ms`; `spread` divides the slot evenly among the queued packets."""
-    relay: Literal["all", "gossip", "counter", "heads", "cds", "mpr", "scheduled"] = "all"
-    """Which nodes relay a flooded packet. `all`: all nodes; `gossip`: each with probability min(1, gossip_degree /
-    neighbors); `counter`: each that has received fewer than `counter` copies after U(0, assess_ms); `heads`: cluster
-    heads and the nodes that connect them; `cds`: a connected dominating set; `mpr`: multipoint relays; `scheduled`: the
-    nodes that a collision-free timetable names, each in a turn of its own."""
+    relay: Literal["all", "counter", "scheduled"] = "all"
+    """Which nodes relay a flooded packet. `all`: all nodes; `counter`: each that has received fewer than `counter`
+    copies after U(0, assess_ms); `scheduled`: the nodes that a collision-free timetable names, each in a turn of its
+    own."""
     contention_ms: Milliseconds = 40.0
     """`scheduled`: length of the contention window at the beginning of each period, for hellos, joins,
     unicasts and all else that has no turn."""
@@ -53,8 +52,6 @@ class Clusters(Section):
     interference_m: Length = 0.0
     """`scheduled`: the greatest distance at which nodes may disturb each other; 0: twice `radio.range_m`, but with
     `radio.channel = "range"` only that and what errors of GPS may add."""
-    gossip_degree: Annotated[float, Field(gt=0, le=1e6)] = 6.0
-    """`gossip`: the mean number of neighbors of a node that relay."""
     counter: Annotated[int, Field(ge=2, le=1_000_000)] = 3
     """`counter`: a node that has received this many copies does not relay."""
     assess_ms: Milliseconds = 100.0

@@ -4,7 +4,6 @@
     messages of a search              `fanet_mw/wire/`: survivors, bids, searched cells
     FANET_BEACON                      `beacon.py`: cluster, role, leader, and the distance from a head
     FANET_DIGEST                      `digest.py`: which recent packets the sender holds, so that others can repair
-    FANET_NEIGHBORS                   `neighbors.py`: whom the sender hears
     FANET_TIME                        `time_beacon.py`: when an earlier hello ended, in swarm time
 
 `fanet_mw/node/node.py` (`say_hello`) puts a hello together. `fanet_mw/node/reader.py` (`decoded`) decodes a hello that

@@ -20,7 +20,7 @@ EVERYTHING = {
     "nodes.count": 3,
     "clock.sync": "beacons",
     "clock.drift_ppm": 20,
-    "clusters.relay": "cds",
+    "clusters.relay": "counter",
     "clusters.repair_s": 10,
     "mission.search": "lines",
     "mission.collision_horizon_s": 15,
@@ -90,7 +90,7 @@ def test_a_hello_is_decoded_once_per_reception(make_scenario: MakeScenario) -> N
     assert calls["Content.of"] == 1
     decoders = {name: count for name, count in calls.items() if name.endswith((".decode_frame", ".decode_frames"))}
     assert set(decoders) == {
-        "Beacon.decode_frame", "Digest.decode_frames", "NeighborList.decode_frames", "TimeBeacon.decode_frame",
+        "Beacon.decode_frame", "Digest.decode_frames", "TimeBeacon.decode_frame",
     }  # fmt: skip
     assert set(decoders.values()) == {1}
     assert calls["kinematics_of"] == calls["told_in"] == 1

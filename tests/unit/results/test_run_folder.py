@@ -254,7 +254,9 @@ def test_nothing_that_a_folder_names_is_imported(folder: Path, monkeypatch: pyte
 
 def test_a_run_of_before_keys_were_removed_is_read_if_they_had_no_effect_in_it(folder: Path) -> None:
     text = (folder / "scenario.toml").read_text()
-    old = text.replace("[clusters]", "[clusters]\nslots = 0").replace("[mission]", "[mission]\ncoverage_map = false")
+    old = text.replace("[clusters]", "[clusters]\nslots = 0\ngossip_degree = 6.0").replace(
+        "[mission]", "[mission]\ncoverage_map = false"
+    )
     assert old.count("slots = 0") == old.count("coverage_map = false") == 1
     forge(folder, "scenario.toml", old.encode())
     Replay.read(folder)

@@ -101,10 +101,10 @@ def test_the_sizes_of_messages_that_a_scenario_is_checked_with_are_those_of_the_
     node = NodeId(5)
     positions = TelemetryStreams(node, position=Enu(1, 2, 3), telemetry_hz=0).beacon_frames(0)
     warning = Encoder(node).collision(NodeId(3), closest_s=1, altitude_m=1, horizontal_m=1)
-    specs = (wire.ROUTE, wire.BEACON, wire.SCHEDULE, wire.SURVIVOR, wire.DIGEST, wire.PLACES, wire.NEIGHBORS,
-             wire.LINKS, wire.LOADS)  # fmt: skip
+    specs = (wire.ROUTE, wire.BEACON, wire.SCHEDULE, wire.SURVIVOR, wire.DIGEST, wire.PLACES, wire.LINKS,
+             wire.LOADS)  # fmt: skip
     names = {53000: "ROUTE", 53001: "BEACON", 53002: "SCHEDULE", 53003: "SURVIVOR", 53007: "DIGEST", 53008: "PLACES",
-             53009: "NEIGHBORS", 53011: "LINKS", 53015: "LOADS"}  # fmt: skip
+             53011: "LINKS", 53015: "LOADS"}  # fmt: skip
     sizes = {f"FANET_{names[spec.msgid]}": wire.OVERHEAD + spec.layout.size for spec in specs}
     assert {**sizes, "positions": len(positions), "COLLISION": len(warning)} == MESSAGE_BYTES
 
@@ -145,6 +145,7 @@ def test_formation_flight_needs_clusters_and_uavs_that_fly_themselves() -> None:
 @pytest.mark.parametrize(
     ("key", "instead"),
     [
+        ("clusters.relay=cds", r"clusters\.relay = 'cds': removed; take \"counter\" for fewer relays"),
         ("clusters.relay=claimed", r"clusters\.relay = 'claimed': removed; take routing\.protocol = \"rounds\""),
         ("mission.coverage_map=true", r"mission\.coverage_map: removed: as much was searched without it"),
         ("clusters.slots=8", r"clusters\.slots: removed .* take routing\.protocol = \"rounds\""),

@@ -15,7 +15,7 @@ from sim.scenarios import catalog
 ROOT = Path(__file__).parents[3]
 TABLES = {(table.path, table.heading): table for table in tables()}
 DIMENSIONLESS = {
-    "time_scale", "camera_cycles", "exponent", "phone_exponent", "nakagami_m", "gossip_degree", "charge", "bulk_share",
+    "time_scale", "camera_cycles", "exponent", "phone_exponent", "nakagami_m", "charge", "bulk_share",
     "gps_vertical",
 }  # fmt: skip
 """Keys of numbers that are pure: factors, exponents; shares are known by their bound."""

@@ -1,3 +1,3 @@
 """What a node knows of links and loads: `link_quality` (measured), `link_state` (the swarm's, at the leader),
-`heard_load` (what others send), `neighborhood` (two hops).
+`heard_load` (what others send).
 """

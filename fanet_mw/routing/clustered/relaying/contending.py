@@ -9,7 +9,7 @@ from fanet_mw.node.contract import Port
 from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTiming
-from fanet_mw.routing.clustered.relaying.gossip_and_counter import Rule
+from fanet_mw.routing.clustered.relaying.all_and_counter import Rule
 from fanet_mw.units import MS
 
 _CONTROL_JITTER_NS: Final = 100 * MS

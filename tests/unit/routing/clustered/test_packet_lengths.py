@@ -45,6 +45,6 @@ def test_in_a_timetable_reports_have_room_whether_they_are_urgent_or_not(make_sc
     assert lengths(make_scenario, "scheduled", 1200, **REPORTS) == (1200, 1200)
 
 
-@pytest.mark.parametrize("relay", ["all", "gossip", "counter", "heads", "cds", "mpr"])
+@pytest.mark.parametrize("relay", ["all", "counter"])
 def test_who_contends_sends_frames_of_any_length(make_scenario: MakeScenario, relay: str) -> None:
     assert lengths(make_scenario, relay, 100) == (2268, 2268)

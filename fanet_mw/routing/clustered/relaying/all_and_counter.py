@@ -1,20 +1,16 @@
 """Rules by which a node decides by itself whether it passes on a flooded packet.
 
     all      it passes on each packet, at once
-    gossip   it passes on each packet with probability min(1, degree / neighbors)
     counter  it passes on a packet after a random delay, unless it has heard enough copies by then
 
-`gossip` is after GOSSIP1 (Haas, Halpern, Li, ToN 14(3), 2006), `counter` after Ni et al. (MobiCom 1999, 3.2). `counter`
-adapts to the density: in a sparse swarm no node hears enough copies to stay silent, in a dense one most nodes do.
-Rules by which neighbors or a timetable decide are in `gateways_cds_mpr.py` and
-`timetable/scheduled_relaying.py`.
+`counter` is after Ni et al. (MobiCom 1999, 3.2). It adapts to the density: in a sparse swarm no node hears enough
+copies to stay silent, in a dense one most nodes do. Where a timetable decides: `timetable/scheduled_relaying.py`.
 A copy that was heard before never gets here (`fanet_mw/node/duplicates.py`); the hop limit is checked by the callers.
 """
 
 from collections.abc import Callable
 from typing import Protocol
 
-from fanet_mw.node.neighbors import Neighbors
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.random_assessment_delay import Assessment
 from fanet_mw.scenario import Clusters
@@ -41,19 +37,6 @@ class RelayAll:
 
     def relays_now(self, packet: Packet, *, now_ns: int) -> bool:
         return True
-
-
-class GossipRule:
-    """A packet is relayed with a probability that depends on the number of neighbors."""
-
-    def __init__(self, clusters: Clusters, neighbors: Neighbors, random: Callable[[], float]) -> None:
-        self.open_until = Assessment(enough=1)
-        self._degree = clusters.gossip_degree
-        self._neighbors = neighbors
-        self._random = random
-
-    def relays_now(self, packet: Packet, *, now_ns: int) -> bool:
-        return self._random() * self._neighbors.count(now_ns=now_ns) <= self._degree
 
 
 class CounterRule:

@@ -57,7 +57,7 @@ def members_of(scenario: Scenario, positions: Mapping[NodeId, Enu]) -> list[Clus
     others = {node: at for node, at in positions.items() if node != scenario.leader}
     swarm = Swarm(others or positions, within_range(others or positions, range_m=range_m, reaches=scenario.reaches))
     division = Division(settings.method, count=settings.count, range_m=range_m, options=settings.options)
-    clusters = division.divide(swarm, now_ns=0)
+    clusters = division.divide(swarm)
     if scenario.clusters.relay == "scheduled" and others and scenario.leader in positions:
         clusters.append(Cluster(scenario.leader, (scenario.leader,)))
     return clusters

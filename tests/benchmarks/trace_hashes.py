@@ -42,7 +42,6 @@ _RULES: Final = {
 }  # fmt: skip
 """What the draws take turns in: the values of `clusters.relay`, and timetables from measured links."""
 _CHOICES: Final = {
-    "clusters.method": ("balanced", "lowest_id", "highest_degree", "wca", "lasting_degree", "affinity"),
     "clusters.repair_s": (0, 5, 10),
     "clusters.links": ("auto", "places", "measured"),
     "clusters.flooding_period_s": (0.5, 1, 2),

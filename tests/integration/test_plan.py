@@ -42,7 +42,6 @@ def without_capacity(*settings: str) -> ScenarioPlan:
         (),
         pytest.param(("clusters.count=8",), marks=pytest.mark.slow),
         pytest.param(("radio.lead_ms=10", "clusters.flooding_period_s=1"), marks=pytest.mark.slow),
-        ("clusters.method=wca", "nodes.count=21", "clusters.count=20", "traffic.sources=20", "nodes.spacing_m=75"),
     ],
 )
 def test_the_bound_that_is_planned_is_the_one_that_the_nodes_compute_in_flight(settings: tuple[str, ...]) -> None:

@@ -145,14 +145,6 @@ def test_a_swarm_that_turns_inside_out_gets_other_clusters_at_a_bounded_rate() -
     assert 1 <= swarm.protocol(NodeId(1)).report()["epoch"] - before <= 6
 
 
-@pytest.mark.parametrize("method", ["lowest_id", "highest_degree", "wca", "lasting_degree", "affinity"])
-def test_with_the_other_methods_every_member_hears_its_head(method: str) -> None:
-    swarm = settled_swarm(method=method)
-    for node in range(2, NODES + 1):
-        head = head_of(swarm, node)
-        assert head == node or swarm.hear_each_other(NodeId(node), head)
-
-
 def timetabled() -> Swarm:
     """Every node a head, the leader in the middle of a line: whoever dies between it and the others is a relay."""
     return settled_swarm(relay="scheduled", count=NODES - 1)

@@ -1,4 +1,4 @@
-"""Measured tables of clusters, slots and relays: how lasting, how short and how few they are. Each costs minutes."""
+"""Measured tables of clusters and relays. Each costs minutes."""
 
 import statistics
 from collections.abc import Iterator, Sequence
@@ -7,14 +7,11 @@ from typing import Any, Final
 from unittest import mock
 
 from fanet_mw.routing.clustered.roles.neighbor_failure_detector import NeighborFailureDetector
-from tests.benchmarks import head_changes, moving_swarm, relay_rules
+from tests.benchmarks import moving_swarm, relay_rules
 from tests.tables.markdown import Rows
 from tests.tables.summaries import summarized
 
 _SEEDS: Final = (1, 2, 3)
-_WALK_SEEDS, _WALK_S = 10, 300
-_REFERENCE: Final = "lowest-ID, kept (LCC)"
-"""The method with which the others are compared."""
 _MOBILITIES: Final = {"static": "at rest", "formation": "formation", "random_waypoint": "random waypoint"}
 _UAVS: Final = (45, 100, 200, 500, 1000)
 _OF_RESCUE: Final = {
@@ -29,28 +26,6 @@ _NO_REPORTS: Final = mock.patch.object(NeighborFailureDetector, "find_suspect", 
 _TOGETHER: Final = (
     ("all", 1.0), ("all", 0.2),
 )  # fmt: skip
-
-
-def lasting_heads() -> Rows:
-    """Head changes per minute of the clustering methods, on random waypoints."""
-    sides_m = (2500.0, 1000.0)
-    rows = [["method", *(f"{side_m:.0f} m: heads, changes (standard deviation)" for side_m in sides_m)]]
-    cells = {name: [] for name in head_changes.RULES}
-    for side_m in sides_m:
-        found = {
-            name: [
-                head_changes.run(rule, side_m=side_m, seed=seed, seconds=_WALK_S) for seed in range(1, _WALK_SEEDS + 1)
-            ]
-            for name, rule in head_changes.RULES.items()
-        }
-        reference = statistics.mean(run.changes_per_min for run in found[_REFERENCE])
-        for name, runs in found.items():
-            changes = [run.changes_per_min for run in runs]
-            mean = statistics.mean(changes)
-            heads = statistics.mean(run.heads for run in runs)
-            compared = "" if name == _REFERENCE else f" [{100 * (mean / reference - 1):+.0f} %]"
-            cells[name].append(f"{heads:.1f}, {mean:.1f} ({statistics.stdev(changes):.1f}){compared}")
-    return [*rows, *([name, *found] for name, found in cells.items())]
 
 
 def new_clusters() -> Rows:

@@ -55,7 +55,6 @@ TABLES: Final[Mapping[str, Table]] = {
     "assumptions": Table("explanation/lossy-links.md", protocol.assumptions, Tolerance(absolute=0.02, relative=0.1)),
     "phones": Table("explanation/finding.md", protocol.phones, Tolerance(absolute=1, relative=0.1)),
     "warnings": Table("explanation/protocol.md", protocol.warnings, Tolerance(absolute=0.1, relative=0.3)),
-    "lasting-heads": Table("explanation/clusters.md", clusters.lasting_heads, Tolerance(absolute=0.2, relative=0.02)),
     "methods-in-motion": Table("results/motion.md", motion.methods, Tolerance(absolute=0.02, relative=0.1)),
     "urgent-in-motion": Table("results/motion.md", motion.urgent, Tolerance(absolute=0.02, relative=0.1)),
     "one-receiver": Table("results/motion.md", motion.one_receiver, Tolerance(absolute=0.02, relative=0.1)),

@@ -13,7 +13,7 @@ from fanet_mw.scenario.tables.sections import (
 )
 from fanet_mw.units import seconds_to_ns
 
-METHODS: Final = ("balanced", "lowest_id", "highest_degree", "wca", "lasting_degree", "affinity")
+METHODS: Final = ("balanced",)
 
 
 class Clusters(Section):
@@ -57,8 +57,8 @@ class Clusters(Section):
     assess_ms: Milliseconds = 100.0
     """`counter`: copies are counted for U(0, assess_ms)."""
     method: Annotated[str, PartName("clusters.method", METHODS)] = "balanced"
-    """How the leader divides the swarm into clusters. All methods but `balanced` make as many clusters as the topology
-    requires, whatever `count` is, so that every member hears its head."""
+    """How the leader divides the swarm into clusters: equal parts that hold together, or a method of another
+    package."""
     options: Annotated[dict[str, Any], OptionsOf("clusters.method", METHODS)] = Field(default_factory=Options)
     """The options of a method from another package, as that package documents them."""
     reassign_s: Duration = 10.0

@@ -26,7 +26,7 @@ class Cells:
 
     @property
     def promise(self) -> Promise:
-        return Promise(dominating=False, independent=False)
+        return Promise(dominating=False)
 
     def divide(self, swarm: Swarm) -> list[Cluster]:
         cells: dict[tuple[int, int], list[NodeId]] = {}

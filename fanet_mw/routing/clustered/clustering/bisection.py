@@ -30,7 +30,7 @@ class Balanced(NamedTuple):
 
     @property
     def promise(self) -> Promise:
-        return Promise(dominating=False, independent=False)
+        return Promise(dominating=False)
 
     def divide(self, swarm: Swarm) -> list[Cluster]:
         return balanced(swarm.positions, swarm.adjacency, count=self.clusters)

@@ -11,7 +11,6 @@ from typing import Final, NamedTuple, Protocol
 from fanet_mw.graph.topology import Adjacency
 from fanet_mw.units import Enu, NodeId
 
-_NOTHING: Final[Mapping[NodeId, float]] = MappingProxyType({})
 _UNKNOWN: Final[Mapping[NodeId, Enu]] = MappingProxyType({})
 
 
@@ -27,10 +26,6 @@ class Swarm(NamedTuple):
 
     positions: Mapping[NodeId, Enu]
     adjacency: Adjacency
-    energy: Mapping[NodeId, float] = _NOTHING
-    """The energy that is left, from 0 to 1; 1 for a node that is missing here."""
-    mobility: Mapping[NodeId, float] = _NOTHING
-    """The aggregate local mobility of a node [dB^2]; 0 for a node that is missing here."""
     velocities: Mapping[NodeId, Enu] = _UNKNOWN
     """Velocities [m/s]; a node that is missing here is at rest."""
     previous: Sequence[Cluster] = ()
@@ -38,12 +33,9 @@ class Swarm(NamedTuple):
 
 
 class Promise(NamedTuple):
-    """What a method guarantees: with `dominating` each member hears its head, with `independent` no two heads hear each
-    other.
-    """
+    """What a method guarantees: with `dominating` each member hears its head."""
 
     dominating: bool
-    independent: bool
 
 
 class Clustering(Protocol):
@@ -55,8 +47,3 @@ class Clustering(Protocol):
     def divide(self, swarm: Swarm) -> list[Cluster]:
         """The clusters, in an order that depends only on the inputs."""
         ...
-
-
-def heads_of(clusters: Sequence[Cluster]) -> tuple[NodeId, ...]:
-    """The heads, in ascending order."""
-    return tuple(sorted(cluster.head for cluster in clusters))

@@ -13,26 +13,12 @@ from typing import Any, Final
 
 from fanet_mw.extensions import load
 from fanet_mw.graph.topology import Adjacency, levels
-from fanet_mw.routing.clustered.clustering import (
-    AffinityPropagation,
-    Balanced,
-    Cluster,
-    Clustering,
-    LastingDegree,
-    Maintenance,
-    Swarm,
-    Weights,
-    by_degree,
-    by_id,
-)
+from fanet_mw.routing.clustered.clustering import Balanced, Cluster, Clustering, Swarm
 from fanet_mw.routing.clustered.clustering.bisection import among
-from fanet_mw.routing.clustered.clustering.head_election import Score
 from fanet_mw.scenario.tables.clusters import METHODS
-from fanet_mw.units import NodeId, S
+from fanet_mw.units import NodeId
 
 _WORSE: Final = 1.25
-_CONTENTION_NS: Final = 3 * S
-"""Two heads that come into range of each other wait this long before one of them gives way (Basu et al. 2001)."""
 
 
 class Division:
@@ -42,33 +28,20 @@ class Division:
         self, method: str, *, count: int, range_m: float, options: Mapping[str, Any] = MappingProxyType({})
     ) -> None:
         """A method that is not in this package comes from an extension, and is made with the same arguments."""
-        scores: dict[str, Score] = {"lowest_id": by_id, "highest_degree": by_degree}
-        scores["wca"] = Weights(range_m).__call__
-        scores["lasting_degree"] = LastingDegree(range_m).__call__
-        self._once: Clustering = AffinityPropagation(range_m) if method == "affinity" else Balanced(count)
-        self._count = count if method == "balanced" else None
+        self._method: Clustering = Balanced(count)
+        self._count: int | None = count
         if method not in METHODS:
-            self._once = load("clusters.method", method)(count=count, range_m=range_m, options=options)
-            self._count = None if self._once.promise.dominating else count
-        self._over_time = (
-            Maintenance(scores[method], keep=math.inf, contention_ns=_CONTENTION_NS, patient=True)
-            if method in scores
-            else None
-        )
+            self._method = load("clusters.method", method)(count=count, range_m=range_m, options=options)
+            self._count = None if self._method.promise.dominating else count
 
-    def divide(self, swarm: Swarm, *, now_ns: int) -> list[Cluster]:
+    def divide(self, swarm: Swarm) -> list[Cluster]:
         """Divide the swarm; `swarm.previous` is the division that stands."""
-        if self._over_time is None:
-            return self._once.divide(swarm)
-        self._over_time.clusters = list(swarm.previous)
-        return self._over_time.step(swarm, now_ns=now_ns)
+        return self._method.divide(swarm)
 
-    def renew(
-        self, present: Sequence[Cluster], swarm: Swarm, stand_ins: Mapping[NodeId, NodeId], *, now_ns: int
-    ) -> list[Cluster]:
+    def renew(self, present: Sequence[Cluster], swarm: Swarm, stand_ins: Mapping[NodeId, NodeId]) -> list[Cluster]:
         """The clusters from now on, in the order of their slots; the present ones if they are good enough."""
         kept = carried_on(present, swarm, stand_ins)
-        fresh = self.divide(swarm._replace(previous=kept), now_ns=now_ns)
+        fresh = self.divide(swarm._replace(previous=kept))
         if kept and self._keeps_promise(kept, len(fresh), swarm.adjacency):
             fair = math.ceil(len(swarm.adjacency) / len(kept)) if self._count else len(swarm.adjacency)
             if cost(kept, swarm.adjacency, fair=fair) <= _WORSE * cost(fresh, swarm.adjacency, fair=fair):

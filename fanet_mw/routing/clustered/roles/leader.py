@@ -227,7 +227,7 @@ class Leader:
         members = {node: place for node, place in places.items() if node != self._authority.leader}
         links, near = self._near(places, measured), self._near(members, measured)
         swarm = Swarm(members, near, velocities=self._roster.velocities())
-        clusters = self._division.renew(before.clusters, swarm, self._roster.stand_ins, now_ns=now_ns)
+        clusters = self._division.renew(before.clusters, swarm, self._roster.stand_ins)
         same = [(c.head, sorted(c.members)) for c in clusters] == [(c.head, sorted(c.members)) for c in before.clusters]
         if measured:
             moved = worth_a_change(before.measured, measured)

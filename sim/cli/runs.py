@@ -191,7 +191,6 @@ def plan(
     *,
     choice: ScenarioFlags = ScenarioFlags(),
     deadline: float | None = None,
-    search: Annotated[bool, Parameter(negative="")] = False,
     json: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Say before take-off whether a clustered scenario is feasible and what it guarantees, or else what to change.
@@ -204,15 +203,13 @@ def plan(
         A shipped scenario's name (see `fanet scenarios`) or a .toml file.
     deadline
         Every packet must reach all nodes within this time [s]; by default traffic.deadline_s, if that is set.
-    search
-        Find the cluster count, flooding period and slots that meet the deadline with the least airtime per packet.
     json
         Print the plan as JSON.
 
     """
     from sim.planner.answer import show
 
-    return show(choice.scenario(scenario), deadline=deadline, search=search, as_json=json)
+    return show(choice.scenario(scenario), deadline=deadline, as_json=json)
 
 
 @contextmanager

@@ -1,8 +1,7 @@
 """Analysis before take-off: whether a scenario is feasible, which delays its traffic classes get, and what would help.
 
 `plan` judges a scenario with given positions and returns a `ScenarioPlan`. `cheapest_change` finds a change that
-makes a scenario feasible, `optimum` the configuration that meets a deadline with the least airtime. `describe` turns
-results into text, and `answer` is what `fanet plan` says of a scenario.
+makes a scenario feasible. `describe` turns results into text, and `answer` is what `fanet plan` says of a scenario.
 """
 
 from sim.planner.cheapest_change import ScenarioChange, cheapest_change
@@ -12,7 +11,6 @@ from sim.planner.flood_loss import Loss, loss
 from sim.planner.head_slot import ClusterPlan
 from sim.planner.lossy_plan import LossyPlan, plan_lossy
 from sim.planner.not_counted import not_counted
-from sim.planner.optimum import Optimum, optimum
 from sim.planner.plan import plan, with_capacity
 from sim.planner.plan_text import (
     describe,
@@ -20,7 +18,6 @@ from sim.planner.plan_text import (
     describe_loss,
     describe_lossy,
     describe_not_counted,
-    describe_optimum,
 )
 from sim.planner.scenario_plan import ScenarioPlan
 from sim.planner.site import Site
@@ -31,7 +28,6 @@ __all__ = [
     "ClusterPlan",
     "Loss",
     "LossyPlan",
-    "Optimum",
     "ScenarioChange",
     "ScenarioPlan",
     "Site",
@@ -44,11 +40,9 @@ __all__ = [
     "describe_loss",
     "describe_lossy",
     "describe_not_counted",
-    "describe_optimum",
     "evaluate",
     "loss",
     "not_counted",
-    "optimum",
     "plan",
     "plan_lossy",
     "vary",

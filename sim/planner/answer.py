@@ -25,7 +25,6 @@ from sim.planner import (
     ClassPlan,
     Loss,
     LossyPlan,
-    Optimum,
     ScenarioChange,
     ScenarioPlan,
     cheapest_change,
@@ -35,11 +34,9 @@ from sim.planner import (
     describe_loss,
     describe_lossy,
     describe_not_counted,
-    describe_optimum,
     flood_loss,
     loss,
     not_counted,
-    optimum,
     plan,
     plan_lossy,
     with_capacity,
@@ -58,12 +55,10 @@ _GPS_DRAWS: Final = 20
 
 
 def judge(
-    scenario: Scenario, *, deadline_s: float | None = None, search: bool = False, change: bool = True
+    scenario: Scenario, *, deadline_s: float | None = None, change: bool = True
 ) -> tuple[str, dict[str, Any], bool]:
-    """(text, JSON, feasible) for a scenario at its starting positions.
-
-    `change`: search the cheapest change if it is not feasible. `search`: search the configuration with the least
-    airtime.
+    """(text, JSON, feasible) for a scenario at its starting positions; `change`: search the cheapest change if it is
+    not feasible.
     """
     if scenario.routing.protocol not in ("clustered", "rounds"):
         raise ConfigError(
@@ -114,10 +109,6 @@ def judge(
             )
         text.append(describe_change(cheapest, found))
         content["change"] = None if cheapest is None else _change_json(cheapest)
-    if search:
-        best = optimum(scenario, at, reported=reported, deadline_ns=deadline_ns, sources=sources, delivers=delivers)
-        text.append(describe_optimum(best, deadline_ns=deadline_ns))
-        content["search"] = None if best is None else _optimum_json(best)
     return "\n".join(text), content, found.feasible
 
 
@@ -287,21 +278,12 @@ def _change_json(change: ScenarioChange) -> dict[str, Any]:
     }
 
 
-def _optimum_json(best: Optimum) -> dict[str, Any]:
-    return {
-        "set": list(best.variant.arguments),
-        "airtime_per_packet_ms": best.airtime_ns / MS,
-        "relays_per_packet_ms": best.floods_ns / MS,
-        "classes": [_class_json(c, best.plan.deadline_ns) for c in best.plan.classes],
-    }
-
-
 def _ms(outcome: DelayBound) -> float | None:
     return outcome.delay_ns / MS if isinstance(outcome, Bounded) else None
 
 
-def show(scenario: Scenario, *, deadline: float | None, search: bool, as_json: bool) -> int:
+def show(scenario: Scenario, *, deadline: float | None, as_json: bool) -> int:
     """Print the plan; returns 0 if it is feasible, otherwise 1."""
-    text, content, feasible = judge(scenario, deadline_s=deadline, search=search)
+    text, content, feasible = judge(scenario, deadline_s=deadline)
     print(json.dumps(content, indent=2) if as_json else text)
     return 0 if feasible else 1

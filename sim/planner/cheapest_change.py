@@ -29,7 +29,7 @@ _PERIODS: Final = (0.1, 0.2, 0.4, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0, 5.0, 10.0)
 """Periods to try, as multiples of the scenario's own period."""
 _TURN_PERIODS_S: Final = (0.1, 0.2, 0.25, 0.3, 0.4, 0.5, 0.7, 1.0, 2.0, 5.0)
 _TIGHT_PERIOD_S: Final = 4.0
-WINDOWS: Final = (31, 15, 7, 3, 1)
+_WINDOWS: Final = (31, 15, 7, 3, 1)
 _SLOWER: Final = (1.1, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 20.0, 50.0, 100.0)
 
 
@@ -63,7 +63,7 @@ def cheapest_change(
         return None
     for group, quick in ((_changes(site, delivers_m), True), (_tightest(scenario), False), (_lighter(scenario), True)):
         for variant in sorted(group, key=lambda v: v.size):
-            if variant.scenario.measures_links or hopeless(site.of(variant.scenario), sources):
+            if variant.scenario.measures_links or _hopeless(site.of(variant.scenario), sources):
                 continue  # a timetable over lossy links is planned otherwise (`lossy_plan.py`)
             found = judge(site.of(variant.scenario), sources, deadline_ns, quick=quick)
             if quick and isinstance(found, ScenarioPlan) and found.feasible:
@@ -73,7 +73,7 @@ def cheapest_change(
     return None
 
 
-def hopeless(site: Site, sources: Sequence[NodeId] | None) -> bool:
+def _hopeless(site: Site, sources: Sequence[NodeId] | None) -> bool:
     """True if no timetable at all can carry the load in this scenario's turns, so that none need be computed."""
     classes = demands(site.scenario, sources)
     if not site.timetable or isinstance(classes, Refused) or site.scenario.traffic.destination != "all":
@@ -96,7 +96,7 @@ def _turn_options(site: Site, delivers_m: float | None) -> Iterator[dict[str, Va
     scenario = site.scenario
     clusters, radio = scenario.clusters, scenario.radio
     counts = dict.fromkeys((clusters.count, scenario.node_count - 1))
-    windows = dict.fromkeys((radio.cw_min, *(w for w in WINDOWS if w < radio.cw_min)))
+    windows = dict.fromkeys((radio.cw_min, *(w for w in _WINDOWS if w < radio.cw_min)))
     periods = dict.fromkeys((clusters.flooding_period_s, *_TURN_PERIODS_S))
     others = product(_clock_options(scenario), _hello_options(site), _link_options(site, delivers_m))
     for count, window, period_s, (clocks, hellos, links) in product(counts, windows, periods, [*others]):

@@ -14,7 +14,6 @@ from sim.planner.demand import ClassPlan
 from sim.planner.flood_loss import Loss
 from sim.planner.head_slot import ClusterPlan
 from sim.planner.lossy_plan import Drawn, LossyPlan
-from sim.planner.optimum import Optimum
 from sim.planner.scenario_plan import ScenarioPlan
 from sim.planner.timetable_plan import TimetablePlan
 
@@ -108,25 +107,6 @@ def describe_operator(scenario: Scenario, bounds: list[int], *, known_gone_ns: i
     return (
         f"telemetry of each UAV every {pace.interval_ns / S:.1f} s or less often ({pace.share:.0%} of the air); {delay}"
     )
-
-
-def describe_optimum(found: Optimum | None, *, deadline_ns: int | None) -> str:
-    """The configuration of least airtime, as text."""
-    goal = "any proven bound" if deadline_ns is None else f"a proven bound within {deadline_ns / MS:g} ms"
-    if found is None:
-        return item("least airtime", f"nothing that was searched has {goal}")
-    plan = found.plan
-    lines = [
-        item("least airtime", " ".join(f"--set {argument}" for argument in found.variant.arguments)),
-        item(
-            "",
-            f"{found.airtime_ns / MS:.1f} ms of air per packet, {found.floods_ns / MS:.1f} ms of it relays; "
-            f"the least with {goal}, of {found.tried} tried",
-        ),
-        item("", _shape(plan)),
-    ]
-    lines += [item("", _class(c, plan)) for c in plan.classes]
-    return "\n".join(lines)
 
 
 def item(label: str, text: str) -> str:

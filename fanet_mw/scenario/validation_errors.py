@@ -21,6 +21,9 @@ _REMOVED: Final = {
         f"clusters.relay = '{rule}'": 'removed; take "counter" for fewer relays, or routing.protocol = "rounds"'
         for rule in ("gossip", "heads", "cds", "mpr")
     },
+    **dict.fromkeys(
+        ("world.heightmap_white_m", "world.heightmap_pixel_m"), "removed with pictures as heights; take a GeoTIFF"
+    ),
     "clusters.gossip_degree": 'removed with clusters.relay = "gossip"; take "counter"',
     "mission.coverage_map": "removed: as much was searched without it; free UAVs follow their place in the formation",
     "clusters.slots": 'removed with clusters.relay = "claimed"; take routing.protocol = "rounds"',
@@ -28,6 +31,7 @@ _REMOVED: Final = {
 """Keys and values that older scenarios may have, and what to take instead."""
 _REMOVED_DEFAULTS: Final[Mapping[str, Mapping[str, Any]]] = {
     "mission": {"coverage_map": False},
+    "world": {"heightmap_white_m": 100.0, "heightmap_pixel_m": 10.0},
     "clusters": {"slots": 0, "gossip_degree": 6.0},
 }
 """Removed keys with the value that did nothing, as every result folder of that time has them."""

@@ -79,15 +79,10 @@ class World(Section):
     """Distance between neighboring hills."""
     heightmap: str = ""
     """A file with heights of the ground, in place of random hills: an ASCII grid (.asc), an SRTM tile (.hgt), a GeoTIFF
-    (.tif, an extra of the package), or a grayscale picture (.png). What says where on earth it lies is laid there; of a
-    picture, and of an ASCII grid in metres, the middle is put at the origin. The lowest point is at height 0. A path is
-    relative to the scenario file's folder."""
+    (.tif, an extra of the package). What says where on earth it lies is laid there; of an ASCII grid in metres the
+    middle is put at the origin. The lowest point is at height 0. A path is relative to the scenario file's folder."""
     heightmap_sha256: Sha256 = ""
     """Beginning of the SHA-256 of that file, which is filled in when the scenario is read. Another file is refused."""
-    heightmap_white_m: Annotated[float, Field(gt=0, le=9000)] = 100.0
-    """`heightmap`: height of a white pixel above a black one, in a picture."""
-    heightmap_pixel_m: Annotated[float, Field(gt=0, le=1e5)] = 10.0
-    """`heightmap`: width of a pixel, in a picture."""
     buildings_geojson: str = ""
     """A file with outlines of buildings (GeoJSON), in place of `buildings`. A path is relative to the scenario file's
     folder."""

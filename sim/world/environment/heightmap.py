@@ -1,10 +1,8 @@
-"""Reads heights of the ground from a file: an ASCII grid (`.asc`), a tile of SRTM (`.hgt`), a GeoTIFF (`.tif`), or a
-grayscale picture (`.png`).
+"""Reads heights of the ground from a file: an ASCII grid (`.asc`), a tile of SRTM (`.hgt`), or a GeoTIFF (`.tif`).
 
 A file in longitude and latitude, or with a reference system, is laid where it belongs about `world.origin_deg`, and
-its lowest point within the area is at height 0. Of a picture, and of an ASCII grid in metres, the middle is put at the
-origin and the lowest point of the file at height 0; of a picture, black is 0, white is `world.heightmap_white_m`, and a
-pixel is `world.heightmap_pixel_m` wide. Cells without a height (voids) within the area are refused.
+its lowest point within the area is at height 0. Of an ASCII grid in metres the middle is put at the origin and the
+lowest point of the file at height 0. Cells without a height (voids) within the area are refused.
 """
 
 import math
@@ -25,7 +23,6 @@ from fanet_mw.scenario.outlines import half_turn
 from fanet_mw.units import Enu
 from sim.world.arrays import Flags, Rows, Values
 from sim.world.environment.given_file import content
-from sim.world.environment.grayscale_png import SIGNATURE, brightness
 
 _MOST_CELLS: Final = 64_000_000
 _LOWEST_M: Final = -500.0
@@ -88,19 +85,16 @@ class Heightmap(NamedTuple):
 
 
 @lru_cache(maxsize=4)
-def read(
-    path: Path, *, white_m: float, pixel_m: float, origin_deg: tuple[float, float], area_m: float, digest: str = ""
-) -> Heightmap:
+def read(path: Path, *, origin_deg: tuple[float, float], area_m: float, digest: str = "") -> Heightmap:
     """Heights of the area, and a cell beyond it; raises ConfigError with the file's name."""
     data = content(path, key="world.heightmap", digest=digest)
     try:
-        found = _read(path, data, white_m, pixel_m, _lattice(origin_deg, area_m))
+        found = _read(path, data, _lattice(origin_deg, area_m))
     except ConfigError:
         raise
     except (ValueError, KeyError, IndexError, struct.error, zlib.error) as error:
         raise ConfigError(
-            f"world.heightmap: {path} is neither an ASCII grid, an SRTM tile (.hgt), a GeoTIFF nor a plain grayscale "
-            f"PNG: {error}"
+            f"world.heightmap: {path} is neither an ASCII grid, an SRTM tile (.hgt) nor a GeoTIFF: {error}"
         ) from error
     if min(found.metres.shape) < 2:
         raise ConfigError(f"world.heightmap: {path} must hold at least 2 x 2 heights")
@@ -122,11 +116,9 @@ def _lattice(origin_deg: tuple[float, float], area_m: float) -> list[_Place]:
     return [_Place(at, to_geodetic(at, origin)) for at in every]
 
 
-def _read(path: Path, data: bytes, white_m: float, pixel_m: float, lattice: list[_Place]) -> Heightmap:
+def _read(path: Path, data: bytes, lattice: list[_Place]) -> Heightmap:
     if path.suffix.lower() == ".hgt":
         return _tile(path.name, data, lattice)
-    if data.startswith(SIGNATURE):
-        return _centered(brightness(data)[::-1] * white_m, (pixel_m, pixel_m))
     if data.startswith(_TIFF):
         from sim.world.environment import geotiff  # it needs an extra of the package
 

@@ -180,8 +180,6 @@ def heightmap_of(world: World) -> heightmap.Heightmap:
     """The heights of the scenario's file."""
     return heightmap.read(
         Path(world.heightmap),
-        white_m=world.heightmap_white_m,
-        pixel_m=world.heightmap_pixel_m,
         origin_deg=world.origin_deg,
         area_m=world.area_m,
         digest=world.heightmap_sha256,

@@ -86,7 +86,6 @@ def test_an_order_after_the_end_is_noted() -> None:
         (["radio.capture_db=4"], "radio.capture_db: no effect with radio.capture = False"),
         (["clock.limit_s=3"], "clock.limit_s: no effect with clock.sync = 'none'"),
         (["mission.formation_m=30"], "mission.formation_m: no effect with mission.formation = 'none'"),
-        (["world.heightmap_white_m=50"], "world.heightmap_white_m: no effect with world.heightmap = ''"),
         (["radio.channel=friis", "radio.frequency_mhz=2437", "radio.tx_power_dbm=20"], None),
         (["radio.channel=log_distance", "radio.exponent=4"], None),
         (["routing.protocol=gossip", "routing.gossip_p=0.3"], None),

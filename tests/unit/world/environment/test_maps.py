@@ -537,5 +537,5 @@ def test_heights_without_a_place_take_the_middle_of_the_buildings(tmp_path: Path
     both = config.build({"world": {**world, "buildings_geojson": buildings}})
     assert both.world.origin_deg[0] == pytest.approx(48.8568, abs=1e-4)
     assert heightmap.read(
-        tmp_path / "hill.asc", white_m=1, pixel_m=1, origin_deg=both.world.origin_deg, area_m=100
+        tmp_path / "hill.asc", origin_deg=both.world.origin_deg, area_m=100
     ).metres.max() == pytest.approx(10)

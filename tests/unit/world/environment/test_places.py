@@ -2,8 +2,6 @@
 
 import json
 import math
-import struct
-import zlib
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
@@ -191,56 +189,12 @@ def test_a_heightmap_that_is_none_is_refused_by_name(
         heights_of(tmp_path / "none.asc")
 
 
-def heights_of(path: Path, *, white_m: float = 1, pixel_m: float = 1, area_m: float = 1) -> heightmap.Heightmap:
-    return heightmap.read(path, white_m=white_m, pixel_m=pixel_m, origin_deg=PARIS[:2], area_m=area_m)
+def heights_of(path: Path, *, area_m: float = 1) -> heightmap.Heightmap:
+    return heightmap.read(path, origin_deg=PARIS[:2], area_m=area_m)
 
 
 def town_of(path: Path) -> footprints.Town:
     return footprints.read(path, origin_deg=PARIS[:2], height_m=19.0, area_m=1000.0)
-
-
-def png(values: np.ndarray, kind: int, depth: int = 8) -> bytes:
-    """A grayscale picture of which every line has the same filter (PNG specification, 9.2)."""
-    step = depth // 8
-    raw = values.astype(">u2" if step == 2 else np.uint8).tobytes()
-    width = values.shape[1] * step
-    lines, above = b"", bytes(width)
-    for i in range(len(values)):
-        line, coded = raw[i * width : (i + 1) * width], bytearray()
-        for x in range(width):
-            a, b, c = (line[x - step] if x >= step else 0), above[x], (above[x - step] if x >= step else 0)
-            p = a + b - c
-            paeth = min((a, b, c), key=lambda v: abs(p - v))
-            coded.append((line[x] - (0, a, b, (a + b) // 2, paeth)[kind]) % 256)
-        lines, above = lines + bytes([kind]) + bytes(coded), line
-
-    def chunk(name: bytes, body: bytes) -> bytes:
-        return struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
-
-    head = struct.pack(">IIBBBBB", values.shape[1], values.shape[0], depth, 0, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(lines)) + chunk(b"IEND", b"")
-
-
-@pytest.mark.parametrize("kind", [0, 1, 2, 3, 4])
-@pytest.mark.parametrize("depth", [8, 16])
-def test_a_picture_of_any_filter_and_depth_gives_its_heights(tmp_path: Path, kind: int, depth: int) -> None:
-    white = 2**depth - 1
-    values = np.random.default_rng(1).integers(0, white + 1, (7, 5))
-    values[0, 0], values[1, 1] = 0, white
-    path = tmp_path / "hills.png"
-    path.write_bytes(png(values, kind, depth))
-    found = heights_of(path, white_m=80.0, pixel_m=5.0, area_m=20.0)
-    assert found.cell_m == 5.0
-    assert found.metres[::-1] == pytest.approx(values / white * 80.0)
-
-
-def test_a_picture_with_colors_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "colors.png"
-    data = bytearray(png(np.zeros((2, 2), int), 0))
-    data[25] = 2  # color type RGB
-    path.write_bytes(bytes(data))
-    with pytest.raises(ConfigError, match="its pixels are colored, 8 bits; save it as grayscale"):
-        heights_of(path)
 
 
 # --- buildings from files ---------------------------------------------------------------------------------------------

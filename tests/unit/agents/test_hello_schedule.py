@@ -26,7 +26,7 @@ EVERYTHING = {
     "mission.collision_horizon_s": 15,
     "mission.collision_distance_m": 10,
 }
-"""Hellos then say where their sender flies, what it holds, whom it hears, what time it is and what it has found."""
+"""Hellos then say where their sender flies, what it holds, what time it is and what it has found."""
 MakeScenario = Callable[..., Scenario]
 
 
@@ -84,7 +84,7 @@ def test_a_hello_is_decoded_once_per_reception(make_scenario: MakeScenario) -> N
     with counted_calls() as calls:
         hearer.receive(NAMES.radio_rx(OTHER), reception, end_ns)
     ours = sum(message in wire_ids() for message, _ in wire.inner_frames(frame))
-    assert ours >= 4, "the hello has to carry something of each kind"
+    assert ours >= 3, "the hello has to carry something of each kind"
     assert calls["mcrf4xx"] == 1 + ours + 1, "its header, each message in it and its position are checked once"
     assert calls["checked"] == 1
     assert calls["Content.of"] == 1

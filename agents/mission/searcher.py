@@ -98,6 +98,7 @@ class Searcher:
     ) -> None:
         mission, reach_m, speed_m_s = scenario.mission, scenario.radio.range_m, approach_speed_m_s(scenario, node)
         self._random = stream(scenario.seed, "mission", node).random
+        self._radio = radio
         self._survivors = survivors = KnownSurvivors(phone_model(scenario))
         obstacles = KnownObstacles(onboard_map, scenario.world.no_fly_m)
         own_motion = OwnMotion(position, obstacles)
@@ -229,6 +230,8 @@ class Searcher:
             self._next_roll_ns = now_ns + _ROLL_NS
             self._plans.close_ranks(now_ns)
         self._flight.fix(position, velocity, self._bidding.survivor, now_ns=now_ns)
+        if self._radio is not None:
+            self._radio.hold(self._flight.held)
 
     def on_battery(self, charge: float, *, now_ns: int) -> None:
         """A reading of the battery; a UAV that must leave gives up its place and its task at once."""

@@ -177,9 +177,14 @@ class RoutingProtocol(ABC):
         """
         return {}
 
-    def parted(self, now_ns: int) -> Collection[NodeId]:
-        """The nodes to which there was a way, and is none any more, as far as this node knows."""
+    def parted(self, now_ns: int, *, without: Collection[int] = ()) -> Collection[NodeId]:
+        """The nodes to which there was a way, and is none any more past those who are known to be lost (`without`), as
+        far as this node knows.
+        """
         return ()
+
+    def hold(self, nodes: Collection[NodeId]) -> None:  # noqa: B027
+        """The UAV flies so that these neighbors stay in reach, until it says otherwise."""
 
     def least_interval_ns(self, deadline_ns: int) -> int | None:
         """The least interval between packets of this node that meets this deadline at all nodes; None if it is unknown,

@@ -355,9 +355,13 @@ class Node:
         """The nodes of each cluster as far as this node knows, by head."""
         return self._protocol.clusters()
 
-    def parted(self, now_ns: int) -> Collection[NodeId]:
-        """The nodes to which no way leads any more; none under a protocol that does not know ways to all."""
-        return self._protocol.parted(now_ns)
+    def parted(self, now_ns: int, *, without: Collection[int] = ()) -> Collection[NodeId]:
+        """The nodes to which no way leads any more past lost ones; none under a protocol that does not know ways."""
+        return self._protocol.parted(now_ns, without=without)
+
+    def hold(self, nodes: Collection[NodeId]) -> None:
+        """The UAV flies so that these neighbors stay in reach, until it says otherwise."""
+        self._protocol.hold(nodes)
 
     def least_interval_ns(self, deadline_ns: int) -> int | None:
         """The least interval between packets of this node that meets a deadline; None: unknown, or there is none."""

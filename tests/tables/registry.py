@@ -14,6 +14,7 @@ from tests.tables import (
     flight,
     formation_flight,
     installations,
+    losses,
     missions,
     models,
     motion,
@@ -85,6 +86,7 @@ TABLES: Final[Mapping[str, Table]] = {
     "flight": Table("results/flight.md", flight.measured, Tolerance(absolute=0.02, relative=0.02)),
     "formation-flight": Table("explanation/formation-flight.md", formation_flight.measured, Tolerance(relative=0.05)),
     "whole-missions": Table("results/missions.md", missions.whole, Tolerance(absolute=0.05, relative=0.02)),
+    "losses": Table("explanation/search.md", losses.healing, Tolerance()),
     "places": Table("results/missions.md", missions.places, Tolerance(absolute=0.05, relative=0.02)),
     "country-in-small": Table(
         "results/missions.md", missions.country_in_small, Tolerance(absolute=0.05, relative=0.02)

@@ -34,7 +34,7 @@ _PASSED_ON: Final = 3
 """The greatest number of verdicts in one hello."""
 _LATELY_NS: Final = 4 * S
 """Parts of a swarm that meet tell each other no verdict that was flooded within this time."""
-_TURN_NS: Final = 250 * MS
+_TURN_NS: Final = 150 * MS
 _TURNS: Final = 6
 """Who hears a lost UAV again waits for its turn, one of so many of this length by its id, so that not all speak."""
 _TELLERS: Final = 4

@@ -12,7 +12,7 @@ from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.pattern import Pattern
 from agents.mission.tasking.bidding import Bidding
 from fanet_mw.motion import Motion
-from fanet_mw.units import Enu
+from fanet_mw.units import Enu, NodeId
 
 _TETHER: Final = 0.95
 """The greatest distance of two UAVs that must stay connected, as a share of the radio's reach."""
@@ -24,6 +24,7 @@ _CLOSING_S: Final = 1.0
 _HASTE: Final = 0.95
 """Whoever is too far away for that is approached at this share of the greatest speed."""
 
+_KEPT_M_S: Final = 1e-6
 _EARLY_TIES: Final = 2
 """With so many of its nearest neighbors a UAV stays connected before the sweep; whoever leaves them before it has the
 plan may never hear it."""
@@ -49,25 +50,26 @@ class ConnectivityMaintenance:
         self._own_motion, self._neighbors = own_motion, neighbors
         self._formation, self._bidding = formation, bidding
         self._reach_m, self._haste_m_s = reach_m, _HASTE * speed_m_s
+        self._ties: list[tuple[NodeId, HalfPlane]] = []
+        """The UAVs in reach to which this one is tied, and the limits that keep it there."""
 
     def planes(self, now_ns: int) -> list[HalfPlane]:
         plan, pattern, place = self._formation.plan, self._formation.pattern, self._formation.place
+        self._ties = []
         if (plan is not None and place is None) or self._bidding.is_absent(now_ns):
             return []
-        ties: list[Motion | None]
+        ties: list[tuple[NodeId, Motion]]
         if plan is not None and pattern is not None and place is not None and self._formation.is_taken_up(now_ns):
-            ties = [
-                self._neighbors.motion(plan.nodes[other], now_ns=now_ns)
-                for other in self._tied_to(pattern, place, now_ns)
-            ]
+            nodes = (NodeId(plan.nodes[other]) for other in self._tied_to(pattern, place, now_ns))
+            motions = ((node, self._neighbors.motion(node, now_ns=now_ns)) for node in nodes)
+            ties = [(node, motion) for node, motion in motions if motion is not None]
         else:
             ties = self._nearest_motions(now_ns)
         planes, closes = [], self._formation.closing_s(now_ns) is not None
-        for motion in ties:
-            if motion is None:
-                continue
+        for node, motion in ties:
+            offset = motion.offset_from(self._own_motion.position, now_ns)
             plane = tether_plane(
-                motion.offset_from(self._own_motion.position, now_ns),
+                offset,
                 (motion.velocity.east, motion.velocity.north),
                 tether_m=(_CLOSING if closes else _TETHER) * self._reach_m,
                 within_s=_CLOSING_S if closes else _TETHER_S,
@@ -75,7 +77,17 @@ class ConnectivityMaintenance:
             )
             if plane is not None:
                 planes.append(plane)
+                if offset.norm() <= _CLOSING * self._reach_m:
+                    self._ties.append((node, plane))
         return planes
+
+    def held(self, velocity: Enu) -> list[NodeId]:
+        """Those who stay in reach because the velocity that was chosen keeps to their limits."""
+        return [
+            node
+            for node, plane in self._ties
+            if velocity.east * plane.east + velocity.north * plane.north >= plane.least - _KEPT_M_S
+        ]
 
     def beyond_gap(self, now_ns: int) -> Motion | None:
         """The likely motion of a UAV to which this one is tied and that is out of reach because somebody between is
@@ -99,12 +111,14 @@ class ConnectivityMaintenance:
                 found = left_m, Motion(at, pattern.velocity(other, swept_s), now_ns)
         return None if found is None else found[1]
 
-    def _nearest_motions(self, now_ns: int) -> list[Motion | None]:
+    def _nearest_motions(self, now_ns: int) -> list[tuple[NodeId, Motion]]:
         """The nearest neighbors of a UAV on the way to its place, within whose reach it stays when it responds."""
         here = self._own_motion.position
         absent = self._bidding.responders(now_ns) if self._bidding.may_be_absent else ()
-        heard = [motion for node, motion in self._neighbors.by_node(now_ns=now_ns) if node not in absent]
-        return [*sorted(heard, key=lambda motion: motion.offset_from(here, now_ns).norm())[:_EARLY_TIES]]
+        heard = [
+            (NodeId(node), motion) for node, motion in self._neighbors.by_node(now_ns=now_ns) if node not in absent
+        ]
+        return sorted(heard, key=lambda one: one[1].offset_from(here, now_ns).norm())[:_EARLY_TIES]
 
     def _tied_to(self, pattern: Pattern, place: int, now_ns: int) -> tuple[int, ...]:
         """The places within whose reach this UAV stays: those to which its place is tied, past a UAV that may leave its

@@ -1,5 +1,7 @@
 """The flight of a searching UAV from one position fix to the next: to its goal or home, within its constraints."""
 
+from collections.abc import Collection
+
 from agents.mission.flight.connectivity_maintenance import ConnectivityMaintenance
 from agents.mission.flight.goal import Goal
 from agents.mission.flight.return_home import ReturnHome
@@ -7,7 +9,7 @@ from agents.mission.flight.take_off import TakeOff
 from agents.mission.flight.velocity_choice import VelocityChoice
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.search_formation.formation_place import FormationPlace
-from fanet_mw.units import STILL, Enu
+from fanet_mw.units import STILL, Enu, NodeId
 
 
 class Flight:
@@ -30,6 +32,8 @@ class Flight:
         self._take_off, self._return_home = take_off, return_home
         self.velocity: Enu | None = None
         """A new velocity to fly, until the application takes it; None if there is no new one."""
+        self.held: Collection[NodeId] = ()
+        """The neighbors that stay in reach, because this UAV flies so."""
 
     def altimeter(self, above_ground_m: float | None, *, now_ns: int) -> None:
         """The rangefinder has measured the height over whatever is below; None if nothing is within its range."""
@@ -38,6 +42,7 @@ class Flight:
     def fix(self, position: Enu, velocity: Enu, survivor: int | None, *, now_ns: int) -> None:
         """A position fix: choose a velocity. `survivor` is the one to whom this UAV flies, if any."""
         self._own_motion.fix(position, velocity, now_ns=now_ns)
+        self.held = ()
         if self.takes_off and self._climbs(now_ns):
             self.velocity = None
         elif not self._return_home.leaves:
@@ -47,6 +52,7 @@ class Flight:
             if beyond is not None:
                 goal, feed = beyond.position._replace(up=goal.up), beyond.velocity
             self.velocity = self._velocity_choice.velocity(goal, feed, now_ns, hastily=hastily)
+            self.held = self._connectivity.held(self.velocity)
         elif self._return_home.land_if_there(now_ns):
             self.velocity = None
         else:

@@ -24,8 +24,11 @@ class HeardByRadio(Protocol):
     def silences(self) -> Silences:
         """How long neighbors have sent nothing."""
 
-    def parted(self, now_ns: int) -> Collection[NodeId]:
-        """The nodes to which no way leads any more."""
+    def parted(self, now_ns: int, *, without: Collection[int] = ()) -> Collection[NodeId]:
+        """The nodes to which no way leads any more past those who are lost."""
+
+    def hold(self, nodes: Collection[NodeId]) -> None:
+        """From now on this UAV flies so that these neighbors stay in reach, until it says otherwise."""
 
 
 class SilentNeighbors:
@@ -44,9 +47,9 @@ class SilentNeighbors:
         self._reach_m = reach_m
         self._least_ns = _HIDDEN_NS if obstacles.hides else _LEAST_NS
 
-    def parted(self, *, now_ns: int) -> Collection[NodeId]:
-        """The UAVs that are in another part of the swarm, or gone."""
-        return self._radio.parted(now_ns)
+    def parted(self, lost: Collection[int], *, now_ns: int) -> Collection[NodeId]:
+        """The UAVs that are in another part of the swarm, or gone: only lost ones lead there."""
+        return self._radio.parted(now_ns, without=lost)
 
     def has(self, node: NodeId, *, now_ns: int) -> bool:
         """True if a neighbor that must be in reach, by how it flew, is silent for an unusually long time."""

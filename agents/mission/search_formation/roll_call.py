@@ -79,7 +79,7 @@ class RollCall:
         """Find who is lost, to be called several times a second; `since_ns`: the instant at which this UAV began to
         follow the plan, before which nobody need have been heard. `falls`: this UAV falls itself.
         """
-        self.parted = () if self._silent is None else self._silent.parted(now_ns=now_ns)
+        self.parted = () if self._silent is None else self._silent.parted(self.lost, now_ns=now_ns)
         self.has_news |= falls and not self._falls
         self._falls = falls
         for node in plan.nodes:

@@ -2,9 +2,11 @@
 
 Each hello says where its sender is and how fast it flies. Two nodes that fly on straight lose each other when their
 distance exceeds the range (link expiration time; Su, Lee and Gerla, 2001). Nodes that hardly recede from each other are
-taken to stay, and so is one whose position is not known.
+taken to stay, and so are one whose position is not known, and those that a UAV keeps in reach: it will not fly straight
+on, however fast it is.
 """
 
+from collections.abc import Iterator, Mapping
 from typing import Final
 
 from fanet_mw.motion import Motion
@@ -19,12 +21,17 @@ _AGAIN: Final = 1.5
 class LastingLinks:
     """The links of one node that will last."""
 
-    def __init__(self, *, range_m: float, horizon_ns: int) -> None:
-        """`horizon_ns`: how long a link must last to count."""
+    def __init__(self, *, range_m: float, horizon_ns: int, reaches: Mapping[NodeId, float] = {}) -> None:
+        """`horizon_ns`: how long a link must last to count. `reaches`: of nodes with an antenna of their own, how many
+        times as long their links are.
+        """
         self._range_m = range_m
+        self._farther_m = {node: times * range_m for node, times in reaches.items()}
         self._horizon_ns = horizon_ns
         self._motions: dict[NodeId, Motion] = {}
         self._given_up = 0
+        self.held = 0
+        """The neighbors that this node keeps in reach by how it flies."""
 
     def hear(self, node: NodeId, motion: Motion) -> None:
         """A neighbor has told where it is."""
@@ -33,9 +40,8 @@ class LastingLinks:
     def among(self, near: int, own: Motion) -> int:
         """Those of a set of neighbors whose links will last, if this node flies on as it does now."""
         lasting = near
-        for node, motion in self._motions.items():
-            bit = 1 << (node - 1)
-            if near & bit and not self._lasts(motion, own, again=bool(self._given_up & bit)):
+        for bit, motion, range_m in self._known(near & ~self.held, own):
+            if not self._lasts(motion, own, range_m, again=bool(self._given_up & bit)):
                 lasting &= ~bit
         self._given_up = near & ~lasting
         return lasting
@@ -43,13 +49,21 @@ class LastingLinks:
     def gone(self, near: int, own: Motion) -> int:
         """Those of a set of neighbors that are out of range already, as they flew when they were last heard."""
         found = 0
-        for node, motion in self._motions.items():
-            bit = 1 << (node - 1)
-            if near & bit and motion.offset_from(own.position, own.at_ns).norm() > self._range_m:
+        for bit, motion, range_m in self._known(near, own):
+            if motion.offset_from(own.position, own.at_ns).norm() > range_m:
                 found |= bit
         return found
 
-    def _lasts(self, motion: Motion, own: Motion, *, again: bool) -> bool:
+    def _known(self, nodes: int, own: Motion) -> Iterator[tuple[int, Motion, float]]:
+        """Those of some nodes whose motion is known, and how far the link with each reaches; where somebody was before
+        it was away says nothing.
+        """
+        for node, motion in self._motions.items():
+            bit = 1 << (node - 1)
+            if nodes & bit and own.at_ns - motion.at_ns <= self._horizon_ns:
+                yield bit, motion, self._farther_m.get(node, self._range_m)
+
+    def _lasts(self, motion: Motion, own: Motion, range_m: float, *, again: bool) -> bool:
         here = motion.offset_from(own.position, own.at_ns)
         v, w = motion.velocity, own.velocity
         drift = Enu(v.east - w.east, v.north - w.north, v.up - w.up)
@@ -57,4 +71,4 @@ class LastingLinks:
         receding_m_s = (here.east * drift.east + here.north * drift.north + here.up * drift.up) / max(distance_m, 1.0)
         seconds = self._horizon_ns / S * (_AGAIN if again else 1.0)
         later = Enu(here.east + drift.east * seconds, here.north + drift.north * seconds, here.up + drift.up * seconds)
-        return later.norm() <= self._range_m or (distance_m <= self._range_m and receding_m_s < _RECEDING_M_S)
+        return later.norm() <= range_m or (distance_m <= range_m and receding_m_s < _RECEDING_M_S)

@@ -106,7 +106,9 @@ class RoundFlooding(RoutingProtocol):
         self._lasting = None
         if radio.channel == "range":
             self._lasting = LastingLinks(
-                range_m=radio.range_m, horizon_ns=self._law.silent_ns + _LASTING_HOPS * self._law.hop_ns
+                range_m=radio.range_m * scenario.reaches.get(port.node, 1.0),
+                horizon_ns=self._law.silent_ns + _LASTING_HOPS * self._law.hop_ns,
+                reaches=scenario.reaches,
             )
         self._spreading = Spreading(
             capacity=scenario.routing.queue_frames, repeats=rounds.repeats, patience_ns=self._law.hop_ns,
@@ -590,8 +592,12 @@ class RoundFlooding(RoutingProtocol):
             clock_error_ns=self._port.clock_error_ns, now_ns=self._now_ns,
         )  # fmt: skip
 
-    def parted(self, now_ns: int) -> Collection[NodeId]:
-        return self._topology.parted(now_ns)
+    def parted(self, now_ns: int, *, without: Collection[int] = ()) -> Collection[NodeId]:
+        return self._topology.parted(now_ns, without=without)
+
+    def hold(self, nodes: Collection[NodeId]) -> None:
+        if self._lasting is not None:
+            self._lasting.held = sum(1 << (node - 1) for node in nodes)
 
     def bounds(self, priority: int) -> bool:
         return priority < PRIORITY_BULK or not self._timing.slots

@@ -5,7 +5,7 @@ and whenever a node was started. A node states at the beginning of an epoch whet
 per second in any case. A link counts if both its ends state it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from fanet_mw.graph.connected_dominating_set import dominates
@@ -60,6 +60,9 @@ class Topology:
         """The instant since which each node without a way is known to have none."""
         self._known = 0
         """The nodes to which there has been a way."""
+        self._parted: list[NodeId] = []
+        self._parted_for = (-1, 0)
+        """The state of the links for which those were found to whom no way leads any more, and who is left out."""
         self._rivals: list[tuple[NodeId, bool]] = []
         self._rivals_for: tuple[int, int] | None = None
         """The neighbors, and the state of what is known, for which the rivals were found."""
@@ -212,10 +215,20 @@ class Topology:
         self._arrange(now_ns)
         return node not in self._unreached_ns
 
-    def parted(self, now_ns: int) -> Sequence[NodeId]:
-        """The nodes to which there was a way, and is none any more."""
+    def parted(self, now_ns: int, *, without: Collection[int] = ()) -> Sequence[NodeId]:
+        """The nodes to which there was a way, and is none any more; none leads over those `without` whom it is to be,
+        because they are known to be lost before their neighbors state that.
+        """
         self._arrange(now_ns)
-        return [node for node in self._unreached_ns if self._known >> (node - 1) & 1]
+        passed = sum(1 << (node - 1) for node in without)
+        if self._parted_for != (self.changes, passed):
+            self._parted_for = self.changes, passed
+            ring = reached = 1 << (self._node - 1)
+            while ring:
+                ring = self._around(ring) & ~(reached | passed)
+                reached |= ring
+            self._parted = nodes_of(self._known & ~reached)
+        return self._parted
 
     @property
     def is_partial(self) -> bool:

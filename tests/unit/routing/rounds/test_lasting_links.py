@@ -40,6 +40,31 @@ def test_a_link_that_was_given_up_counts_again_only_with_a_margin() -> None:
     assert links.among(BIT, OWN)
 
 
+def test_a_link_lasts_however_fast_both_part_if_this_node_keeps_the_other_in_reach() -> None:
+    links = LastingLinks(range_m=250.0, horizon_ns=6 * S)
+    links.hear(OTHER, Motion(Enu(200.0, 0.0, 50.0), Enu(20.0, 0.0, 0.0), 0))
+    links.held = BIT
+    assert links.among(BIT, OWN) == BIT
+    links.held = 0
+    assert not links.among(BIT, OWN)
+
+
+def test_where_somebody_was_before_it_was_away_says_nothing_when_it_is_heard_again() -> None:
+    links = LastingLinks(range_m=250.0, horizon_ns=6 * S)
+    links.hear(OTHER, Motion(Enu(0.0, 240.0, 50.0), Enu(0.0, -10.0, 0.0), 0))
+    assert not links.among(BIT, OWN._replace(at_ns=5 * S, position=Enu(300.0, 0.0, 50.0)))
+    assert links.among(BIT, OWN._replace(at_ns=60 * S)) == BIT, "it is heard, so it is somewhere near"
+    assert not links.gone(BIT, OWN._replace(at_ns=60 * S))
+
+
+def test_links_with_a_post_that_has_an_antenna_of_its_own_reach_farther() -> None:
+    links = LastingLinks(range_m=250.0, horizon_ns=6 * S, reaches={OTHER: 5.6})
+    for east_m, lasts in ((-1300.0, True), (-1350.0, False)):
+        links.hear(OTHER, Motion(Enu(east_m, 0.0, 0.0), STILL, 0))
+        assert links.among(BIT, OWN) == (BIT if lasts else 0)
+        assert not links.gone(BIT, OWN)
+
+
 def test_who_should_be_out_of_range_by_now_is_gone() -> None:
     links = LastingLinks(range_m=250.0, horizon_ns=6 * S)
     links.hear(OTHER, Motion(Enu(200.0, 0.0, 50.0), Enu(20.0, 0.0, 0.0), 0))

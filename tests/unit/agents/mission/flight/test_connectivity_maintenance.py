@@ -86,3 +86,17 @@ def test_the_two_beside_a_gap_fly_towards_each_other_until_they_should_have_met(
             beyond.append(None if mate is None else mate.position)
         there = NodeId(node + 2 * way)
         assert beyond == [lane_of(there, TAKEN_UP_NS + 60 * S), lane_of(there, TAKEN_UP_NS + 63 * S), None]
+
+
+def test_who_flies_within_its_limits_keeps_those_to_whom_it_is_tied_and_are_in_reach() -> None:
+    now_ns = TAKEN_UP_NS + 60 * S
+    here = lane_of(LINE, now_ns)
+    for apart_m, held in ((220.0, True), (245.0, False)):
+        board = Board(LINE, here)
+        tied = ConnectivityMaintenance(
+            board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
+        )
+        board.neighbors.on_hello(NodeId(LINE + 1), Motion(here.minus(Enu(apart_m, 0, 0)), Enu(0, 7.5, 0), now_ns))
+        (plane,) = tied.planes(now_ns)
+        assert (tied.held(Enu(plane.east * plane.least, 7.5, 0.0)) == [LINE + 1]) is held
+        assert tied.held(Enu(plane.east * (plane.least - 0.5), 7.5, 0.0)) == [], "a limit was dropped for another one"

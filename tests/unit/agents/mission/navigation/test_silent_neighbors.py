@@ -1,5 +1,7 @@
 """A neighbor that is near and sends nothing is missed; one that may be out of reach, or hidden, is not so soon."""
 
+from collections.abc import Collection
+
 import pytest
 
 from agents.mission.navigation.known_obstacles import KnownObstacles
@@ -21,8 +23,11 @@ class Radio:
     def __init__(self) -> None:
         self.silences = Silences(count=3)
 
-    def parted(self, now_ns: int) -> tuple[NodeId, ...]:
+    def parted(self, now_ns: int, *, without: Collection[int] = ()) -> tuple[NodeId, ...]:
         return ()
+
+    def hold(self, nodes: Collection[NodeId]) -> None:
+        raise AssertionError("nobody steers here")
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Who is lost, as all UAVs of a part of the swarm come to know it from hello to hello."""
 
 import random
+from collections.abc import Collection
 
 import pytest
 from hypothesis import given
@@ -162,7 +163,7 @@ class Radio(SilentNeighbors):
     def might_be_heard(self, node: NodeId, *, now_ns: int) -> bool:
         return node not in self.far
 
-    def parted(self, *, now_ns: int) -> tuple[NodeId, ...]:
+    def parted(self, lost: Collection[int], *, now_ns: int) -> tuple[NodeId, ...]:
         return ()
 
 

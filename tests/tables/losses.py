@@ -1,0 +1,108 @@
+"""What UAVs lost in flight do to the others: from the lines that `scripts/losses.py` has printed into a file."""
+
+import json
+import statistics
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from tests.tables.markdown import Rows
+
+_FILE: Final = Path(__file__).parents[2] / "docs" / "results" / "data" / "losses.jsonl"
+_ASKED_S: Final = 15.0
+_AGAIN_S: Final = 3.0
+_WORDS: Final = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five"}
+_CURVE_FROM: Final = 6
+"""So many losses one after the other are a line of the curve."""
+Copy = dict[str, Any]
+
+
+def _copies() -> list[Copy]:
+    return [json.loads(line) for line in _FILE.read_text().splitlines()]
+
+
+def healing() -> Rows:
+    """How soon the others are one network again, and their reports have bounds again."""
+    head = [
+        "mission", "lost", "times (flights)", "one network again within 15 s", "never apart", "median / worst [s]",
+        "bounds again 3 s after that", "as often as without a loss", "broken",
+    ]  # fmt: skip
+    groups: dict[tuple[str, str], list[Copy]] = {}
+    for copy in _copies():
+        if len(copy["losses"]) < _CURVE_FROM:
+            groups.setdefault((copy["scenario"], _lost(copy)), []).append(copy)
+    return [head, *(_healing_row(*name, copies) for name, copies in groups.items())]
+
+
+def _lost(copy: Copy) -> str:
+    number = _WORDS[len(copy["losses"])]
+    if number == "one":
+        return number
+    every_s = copy["losses"][1][0] - copy["losses"][0][0]
+    return f"{number}, every {every_s:.0f} s" if every_s else f"{number} at once"
+
+
+def _healing_row(mission: str, lost: str, copies: Sequence[Copy]) -> list[str]:
+    heal_s = [one for copy in copies for one in copy["heal_s"]]
+    judged = [copy for copy in copies if "bounded" in copy]
+    again = sum(copy["bounds_s"] <= copy["heal_s"][-1] + _AGAIN_S for copy in judged)
+    broken = [copy["broken"] for copy in judged if "broken" in copy]
+    as_good = sum((copy["bounded"][0] or 0) >= (copy["bounded"][1] or 0) for copy in judged)
+    return [
+        mission,
+        lost,
+        f"{len(copies)} ({len({copy['seed'] for copy in copies})})",
+        f"{sum(one <= _ASKED_S for one in heal_s)} of {len(heal_s)}",
+        f"{sum(not one for one in heal_s)}",
+        f"{statistics.median(heal_s):.1f} / {max(heal_s):.1f}",
+        f"{again} of {len(judged)}",
+        f"{as_good} of {len(judged)}",
+        f"{sum(broken)}" if broken else "-",
+    ]
+
+
+def to_the_end() -> Rows:
+    """What becomes of the search, where a copy was flown to its end."""
+    head = ["mission", "lost", "times", "everyone found in", "connected since", "reports delivered", "contacts"]
+    groups: dict[tuple[str, str], list[Copy]] = {}
+    for copy in _copies():
+        if "found" in copy and len(copy["losses"]) < _CURVE_FROM:
+            groups.setdefault((copy["scenario"], _lost(copy)), []).append(copy)
+    return [
+        head,
+        *(
+            [
+                *name,
+                f"{len(copies)}",
+                f"{sum(copy['found'] == copy['of'] for copy in copies)}",
+                _mean_and_least([copy["connected"] for copy in copies]),
+                _mean_and_least([copy["pdr"] for copy in copies]),
+                f"{sum(copy['contacts'] for copy in copies)}",
+            ]
+            for name, copies in groups.items()
+        ),
+    ]
+
+
+def _mean_and_least(shares: Sequence[float]) -> str:
+    return f"{statistics.fmean(shares):.3f}, least {min(shares):.3f}"
+
+
+def curve() -> Rows:
+    """What is left as more and more are lost, one after the other."""
+    flown = [copy for copy in _copies() if len(copy["losses"]) >= _CURVE_FROM]
+    head = ["lost", "living in one network since the loss before", "area covered", "found"]
+    rows = []
+    for rank in range(4, min((len(copy["curve"]) for copy in flown), default=0), 5):
+        here = [copy["curve"][rank] for copy in flown]
+        rows.append(
+            [
+                f"{here[0][0]}",
+                " / ".join(
+                    f"{statistics.fmean(one[1] for one in copy['curve'][rank - 4 : rank + 1]):.2f}" for copy in flown
+                ),
+                " / ".join(f"{one[2]:.2f}" for one in here),
+                " / ".join(f"{one[3]}" for one in here),
+            ]
+        )
+    return [head, *rows]

@@ -39,10 +39,10 @@ heads collide there: 0.90 to 1.00 over ten seeds, 0.96 on average, without repai
 
 def scenario_of(protocol: str, *, destination: int | str, moving: bool = False) -> Scenario:
     """Nine nodes, 3 x 3, 200 m apart: everyone sends once a second."""
-    times = {"duration_s": 30, "warmup_s": 18, "drain_s": 4} if moving else {}
+    times = {"duration_s": 22, "warmup_s": 10, "drain_s": 4} if moving else {}
     return config.build(
         {
-            "name": "small", "duration_s": 45, "warmup_s": 25, "drain_s": 8, **times,
+            "name": "small", "duration_s": 31, "warmup_s": 15, "drain_s": 6, **times,
             "nodes": {"count": 9, "layout": "grid", "columns": 3, "telemetry_hz": 0},
             "traffic": {"destination": destination, "payload_bytes": 300},
             "routing": {"protocol": protocol},
@@ -58,8 +58,13 @@ def test_each_protocol_that_a_scenario_may_name_can_be_made() -> None:
     assert tuple(MAKERS) == PROTOCOLS
 
 
-@lru_cache
 def run(protocol: str, destination: int | str, *, moving: bool = False) -> tuple[Outcome, dict[str, Any]]:
+    return _flown(protocol, destination, moving)
+
+
+@lru_cache
+def _flown(protocol: str, destination: int | str, moving: bool) -> tuple[Outcome, dict[str, Any]]:
+    """Once, however it is asked for: to a cache `moving=False` is another call than none."""
     outcome = simulate(scenario_of(protocol, destination=destination, moving=moving))
     return outcome, finish(outcome, out=None)
 
@@ -154,16 +159,6 @@ def test_no_packet_passes_a_node_twice(protocol: str) -> None:
     sent = transmissions(scenario_of(protocol, destination=1, moving=True))
     assert len(sent) > 40
     assert max(sent.values()) <= MOST_PASSES.get(protocol, 1)
-
-
-@pytest.mark.parametrize("protocol", sorted(PROTOCOLS))
-def test_the_same_seed_gives_the_same_trace(protocol: str) -> None:
-    short = scenario_of(protocol, destination=1, moving=True).model_copy(
-        update={"duration_s": 9.0, "warmup_s": 3.0, "drain_s": 1.0}
-    )
-    first, again = (finish(simulate(short), out=None) for _ in range(2))
-    assert first["generated"] > 20
-    assert first["trace_sha256"] == again["trace_sha256"]
 
 
 # --- hostile input --------------------------------------------------------------------------------------------------

@@ -2,11 +2,10 @@
 
     *.toml here -> a piece of a line becomes another -> the tests that should notice -> caught | survived
 
-The list is written by hand: each bug is a mistake that somebody could make and that a user would feel. A tool that
-makes mutants by itself (mutmut, cosmic-ray) was not taken: it plants thousands, a third of which change nothing that
-anybody could observe, cannot reach into the compiled kernel, and would take days on two cores. Kernel and tests run
-uncompiled here, because a compilation takes longer than the tests. Exit codes: 0 at most 5 % survived, 1 more did, or
-a bug could not be planted or judged.
+The list is written by hand: each bug is a mistake that somebody could make, that a user would feel, and that
+`random_bugs.py` does not make by itself, as it turns conditions and comparisons and leaves out calls. Kernel and tests
+run uncompiled here, because a compilation takes longer than the tests. Exit codes: 0 at most 5 % survived, 1 more did,
+or a bug could not be planted or judged.
 """
 
 import argparse

@@ -9,7 +9,7 @@ from typing import Final, assert_never
 
 from agents.mission.search_formation.shapes import circuit, fan, lines, ring, sectors, spiral
 from agents.mission.search_formation.shapes.circuit import Circuit
-from agents.mission.search_formation.shapes.contract import Demands, Dimensions, Shape, ShapeName
+from agents.mission.search_formation.shapes.contract import Demands, Dimensions, Shape, ShapeName, Swarm, swarm_at
 from agents.mission.search_formation.shapes.fan import Fan
 from agents.mission.search_formation.shapes.lines import Lines
 from agents.mission.search_formation.shapes.ring import Ring
@@ -25,6 +25,10 @@ _SHAPES: Final[Mapping[ShapeName, Callable[[Dimensions], Shape]]] = {
     ShapeName.RING: Ring,
     ShapeName.CIRCUIT: Circuit,
     ShapeName.FAN: Fan,
+}
+_BEGUN_AROUND: Final[Mapping[ShapeName, Callable[[Dimensions, Swarm], Dimensions]]] = {
+    ShapeName.LINES: lines.begun_around,
+    ShapeName.RING: ring.begun_around,
 }
 _STEP_S: Final = 0.05
 """The time step over which the velocity of a place is computed."""
@@ -55,16 +59,13 @@ class Pattern:
         return Pattern(self.dimensions, reach_m=self._reach_m, vacant=vacant)
 
     def begun_around(self, positions: Sequence[Enu]) -> "Pattern":
-        """A ring begins as large as the swarm that stands about the middle of the area, rather than draw together
-        first; other formations begin as they are.
+        """A ring and lines begin where the swarm stands about the middle of the area, rather than draw together first;
+        other formations begin as they are.
         """
-        made = self.dimensions
-        east, north = [at.east for at in positions], [at.north for at in positions]
-        sides_m = [max(east, default=0.0), -min(east, default=0.0), max(north, default=0.0), -min(north, default=0.0)]
-        if made.shape is not ShapeName.RING or min(sides_m) <= 0:
+        begun = _BEGUN_AROUND.get(self.dimensions.shape)
+        if begun is None:
             return self
-        first_m = max(made.first_m, min(made.last_m / 2, sum(sides_m) / 4))
-        return Pattern(made._replace(first_m=first_m), reach_m=self._reach_m)
+        return Pattern(begun(self.dimensions, swarm_at(positions, reach_m=self._reach_m)), reach_m=self._reach_m)
 
     def spans(self, vacant: frozenset[int]) -> bool:
         """True if the UAVs of the other places can sweep all that this formation sweeps."""
@@ -102,8 +103,7 @@ class Pattern:
 
     def at(self, place: int, swept_s: float) -> Enu:
         """The position of a place after this time of sweeping; before 0, where the sweep begins."""
-        flown = self._flown.get(place, place)
-        return _position(self.shape, flown, swept_s)
+        return self.shape.flown_at(self._flown.get(place, place), swept_s)
 
     def has_beside(self, place: int, others: frozenset[int]) -> bool:
         """True if one of these places is in the row of a place, or in a row that ends there."""
@@ -115,7 +115,7 @@ class Pattern:
 
     def whole_at(self, place: int, swept_s: float) -> Enu:
         """The position of a place if nobody were lost."""
-        return _position(self._whole, place, swept_s)
+        return self._whole.flown_at(place, swept_s)
 
     def tethers(self, place: int, swept_s: float) -> tuple[int, ...]:
         """The places that must stay within radio reach of this one to keep the swarm connected, past those that are
@@ -137,8 +137,6 @@ class Pattern:
         """
         if self.kind(place) == "follower":
             return True
-        if not isinstance(self.shape, Ring):
-            return False
         rank = place - sum(other < place for other in self.vacant)
         at = self._flown.get(place, place)
         return rank % 2 == 1 and self.shape.may_leave(at, swept_s, reach_m=self._hop_m, left=self._left[0])
@@ -153,16 +151,6 @@ class Pattern:
         flown = self._flown.get(place, place)
         a, b = self.shape.at(flown, early), self.shape.at(flown, early + _STEP_S)
         return Enu((b.east - a.east) / _STEP_S, (b.north - a.north) / _STEP_S, (b.up - a.up) / _STEP_S)
-
-
-def _position(shape: Shape, place: float, swept_s: float) -> Enu:
-    """The position of a place of a shape, turned and shifted between its lanes as the shape is then."""
-    if isinstance(shape, Ring):
-        lanes = shape.rows()[0].size
-        return shape.at((place + shape.turned(swept_s)) % lanes if place < lanes else place, swept_s)
-    at = shape.at(place, swept_s)
-    aside_m = shape.aside_m(place, swept_s) if isinstance(shape, Lines | Sectors) else 0.0
-    return at._replace(east=at.east + aside_m) if aside_m else at
 
 
 def fastest(count: int, demands: Demands) -> Pattern | None:

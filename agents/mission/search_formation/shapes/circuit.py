@@ -21,6 +21,7 @@ from agents.mission.search_formation.shapes.contract import (
     Dimensions,
     RowKind,
     RowOfPlaces,
+    Shape,
     ShapeName,
     nearest_m,
 )
@@ -29,7 +30,7 @@ from fanet_mw.units import Enu
 _LEAST_LANES: Final = 2
 
 
-class Circuit:
+class Circuit(Shape):
     """The positions of the places on one circuit."""
 
     def __init__(self, formation: Dimensions) -> None:

@@ -19,9 +19,9 @@ Everything here is geometry, in metres and seconds.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from enum import IntEnum
-from typing import Final, NamedTuple, Protocol, Self
+from typing import Final, NamedTuple, Protocol
 
 from fanet_mw.units import Enu
 
@@ -195,6 +195,22 @@ class Dimensions(NamedTuple):
         return team, (which // self.teams + 0.5) / of_team
 
 
+class Swarm(NamedTuple):
+    """How UAVs stand before they take up a formation."""
+
+    uavs: int
+    sides_m: tuple[float, float, float, float]
+    """How far from the middle of the area they are to the east, west, north and south."""
+    reach_m: float
+    """The reach of their radios."""
+
+
+def swarm_at(positions: Sequence[Enu], *, reach_m: float) -> Swarm:
+    east, north = [at.east for at in positions], [at.north for at in positions]
+    sides_m = max(east, default=0.0), -min(east, default=0.0), max(north, default=0.0), -min(north, default=0.0)
+    return Swarm(len(positions), sides_m, reach_m)
+
+
 class Shape(Protocol):
     """The contract of a shape: the positions of the places of one formation over time.
 
@@ -217,6 +233,16 @@ class Shape(Protocol):
         """The position of a place at an instant of the sweep; of a number between two places of a row, between them."""
         ...
 
+    def flown_at(self, place: float, swept_s: float) -> Enu:
+        """The same, turned or shifted between its lanes as the formation is then."""
+        return self.at(place, swept_s)
+
+    def may_leave(self, place: float, swept_s: float, *, reach_m: float, left: int) -> bool:
+        """True while a UAV of a team at this place may leave it, if those beside it do not, with so many that are left
+        of its row.
+        """
+        return False
+
     def tethers(self, place: int) -> tuple[int, ...]:
         """The places that must stay within radio reach of this one to keep the swarm connected; none for a follower."""
         ...
@@ -225,7 +251,7 @@ class Shape(Protocol):
         """The rows in which UAVs close ranks; followers are in none."""
         ...
 
-    def drawn_in(self, left: tuple[int, ...], hop_m: float) -> Self:
+    def drawn_in(self, left: tuple[int, ...], hop_m: float) -> "Shape":
         """The same formation, no larger than so many UAVs of each row can span with hops of `hop_m`."""
         ...
 
@@ -234,11 +260,11 @@ class Shape(Protocol):
         ...
 
 
-def shifted_m(swept_s: float, sweep_s: float, *, lane_m: float, speed_m_s: float) -> float:
+def shifted_m(swept_s: float, sweep_s: float, *, lane_m: float, speed_m_s: float, faster_back: float = BACK) -> float:
     """How far to the east of their lanes a team's places are: at each turn at the edge they shift into the middle
     between lanes, and back at the next one, so that what no camera shows on one sweep is shown on another.
     """
-    turn, into_s = divmod(swept_s - sweep_s, sweep_s + TURN_S + sweep_s / BACK)
+    turn, into_s = divmod(swept_s - sweep_s, sweep_s + TURN_S + sweep_s / faster_back)
     share = min(1.0, into_s / TURN_S)
     most_m = min(lane_m / 2, SHIFT * TURN_S * speed_m_s)
     return 0.0 if turn < 0 else most_m * (1 - share if turn % 2 else share)

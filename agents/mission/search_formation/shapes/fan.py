@@ -23,6 +23,7 @@ from agents.mission.search_formation.shapes.contract import (
     Dimensions,
     RowKind,
     RowOfPlaces,
+    Shape,
     ShapeName,
     nearest_m,
     swept_m,
@@ -36,7 +37,7 @@ _HALVINGS: Final = 20
 Corners = tuple[tuple[float, float], ...]
 
 
-class Fan:
+class Fan(Shape):
     """The positions of the places of one fan. Its dimensions name the base: `first_m` to the east of the middle of the
     area, `last_m` to the north.
     """

@@ -12,6 +12,14 @@ where the next one began, and chains join neighboring ones unless these are with
 The words place, lane, team, relay and follower are explained in `contract.py`; the teams of this formation are its
 lines, from the northernmost to the southernmost.
 
+Lines of a swarm that stands spread over the middle of the area begin where it stands, bent back at both ends:
+
+             .-o--o--o--o--o-.        what is between them was heard by those who stood there; beside that the
+            o                 o       outermost lanes begin near the middle, and catch up by the edge of the area;
+                 (heard)              on the way back all fly to the middle
+            o                 o
+             '-o--o--o--o--o-'
+
 On its way back each UAV flies between the lanes of its way out.
 
 Between two turns each place of a line moves straight at constant speed. A relay does so, too, but changes its velocity
@@ -21,10 +29,12 @@ instants is within reach all the time. Followers start later than their line, an
 single place.
 """
 
+import itertools
 import math
 from typing import Final
 
 from agents.mission.search_formation.shapes.contract import (
+    BACK,
     EDGE_M,
     FIRST_M,
     FOLLOW_M,
@@ -33,6 +43,8 @@ from agents.mission.search_formation.shapes.contract import (
     Dimensions,
     RowKind,
     RowOfPlaces,
+    Shape,
+    Swarm,
     shifted_m,
     swept_m,
 )
@@ -42,7 +54,8 @@ _CHAIN_HIGHER_M: Final = 6.0
 """Relays fly this much higher than the lines."""
 _BUNCHED_M: Final = 280.0
 """While the lines are near each other, relays due north and south of each other would be too close together. They are
-therefore displaced to the east and the west as well, at first by up to this distance."""
+therefore displaced to the east and the west as well, at first by up to this distance; by half of it between lines that
+begin around the swarm, where it only has to be no long way to their places."""
 _STRAIGHT_M: Final = 300.0
 """Once the lines have flown this far, the relays are no longer displaced: the chain is a straight line to the north."""
 _SIDE_M: Final = 65.0
@@ -52,11 +65,22 @@ _LEAST_LANES: Final = 2
 """The least number of lanes of a line, which has one at each end."""
 _LEAST_APART_M: Final = 60.0
 """The least distance of two lines on the same side of the middle."""
+_BENT: Final = 3
+"""Of lines that begin around the swarm, so many lanes at each end are bent back to the middle."""
+_BENT_HOP: Final = 0.86
+"""Neighbors in the bent part are at most this share of the radio's reach apart: less than elsewhere, because the
+outermost are the fastest, and have the farthest way to their places."""
+_AROUND: Final = 0.6
+"""Lines that begin around the swarm do so at this share of the radio's reach from the middle at most: on the way to
+places farther out rows part before they have spread, and whoever goes aside for a survivor tears the swarm."""
+_DENSE: Final = 0.85
+"""UAVs that stand in a square grid at this share of the radio's reach, or nearer to each other, hear all between them.
+"""
 _FREE: Final = 4
 """More than two lines are flown only if they leave so many followers, who are free for survivors."""
 
 
-class Lines:
+class Lines(Shape):
     """The positions of the places of all lines, their chains and their followers."""
 
     def __init__(self, formation: Dimensions, *, most_m: float = math.inf, gaps_m: tuple[float, ...] = ()) -> None:
@@ -85,7 +109,15 @@ class Lines:
 
     @property
     def sweep_s(self) -> float:
-        return (self._formation.last_m - self._formation.first_m) / self._formation.speed_m_s
+        formation = self._formation
+        straight_s = (formation.last_m - formation.first_m) / formation.speed_m_s
+        return max(straight_s, self._back_s) if _is_bent(formation) else straight_s
+
+    @property
+    def _back_s(self) -> float:
+        """The time of the way back to the middle, and of the outermost lanes of bent lines from there."""
+        formation = self._formation
+        return (formation.last_m - min(FIRST_M, formation.first_m)) / (BACK * formation.speed_m_s)
 
     @property
     def lane_m(self) -> float:
@@ -93,34 +125,40 @@ class Lines:
 
     def at(self, place: float, swept_s: float) -> Enu:
         formation = self._formation
-        inner_m, lanes = self._inner_m(swept_s), formation.lanes
+        lanes = formation.lanes
         if place <= formation.teams * lanes - 1:
             line, lane = divmod(place, lanes)
+            inner_m = self._inner_m(swept_s, lane)
             return Enu(self._lane(lane), self._north_m(int(line), inner_m), formation.height_m)
         if place < formation.fixed:
+            inner_m = self._inner_m(swept_s, lanes // 2)
             chain, row = next((c, row) for c, row in enumerate(self._chains) if place < row.first + row.size)
             share = 1 - 2 * (place - row.first + 1) / (row.size + 1)
             up_m, middle = formation.height_m + _CHAIN_HIGHER_M, self._lane(lanes // 2)
             if chain != self._half - 1:
                 ends = self._north_m(chain, inner_m), self._north_m(chain + 1, inner_m)
                 return Enu(middle, (sum(ends) + share * (ends[0] - ends[1])) / 2, up_m)
-            east = -_BUNCHED_M * share * max(0.0, 1 - (inner_m - formation.first_m) / _STRAIGHT_M)
+            begins_m = self._begins_m(swept_s, lanes // 2)
+            bunched_m = _BUNCHED_M / 2 if begins_m > FIRST_M else _BUNCHED_M
+            east = -bunched_m * share * max(0.0, 1 - (inner_m - begins_m) / _STRAIGHT_M)
             return Enu(middle + east, share * inner_m, up_m)
         line, share = formation.follower(round(place))
-        outward_m = self._outward_m[line]
+        outward_m, lane = self._outward_m[line], share * (lanes - 1)
         behind_m = FOLLOW_M if not outward_m else min(FOLLOW_M, self._apart_m / 2)
-        behind = max(inner_m + outward_m - behind_m, formation.first_m * 0.5)
+        behind = max(self._inner_m(swept_s, lane) + outward_m - behind_m, self._starts_m(lane) * 0.5)
         east = formation.half_width_m * (2 * share - 1)
         return Enu(east, behind if line < self._half else -behind, formation.height_m + FOLLOWER_HIGHER_M)
 
-    def aside_m(self, place: float, swept_s: float) -> float:
-        """How far to the east of its lane a place is (`shifted_m`); the easternmost lane stays where it is."""
-        formation = self._formation
+    def flown_at(self, place: float, swept_s: float) -> Enu:
+        """The easternmost lane stays where it is when the others shift."""
+        at, formation = self.at(place, swept_s), self._formation
         if place >= formation.fixed:
-            return 0.0
+            return at
         lane = place % formation.lanes if place <= formation.teams * formation.lanes - 1 else formation.lanes // 2
-        whole_m = shifted_m(swept_s, self.sweep_s, lane_m=self.lane_m, speed_m_s=formation.speed_m_s)
-        return whole_m * min(1.0, formation.lanes - 1 - lane)
+        whole_m = shifted_m(
+            swept_s, self.sweep_s, lane_m=self.lane_m, speed_m_s=formation.speed_m_s, faster_back=self._faster_back
+        )
+        return at._replace(east=at.east + whole_m * min(1.0, formation.lanes - 1 - lane))
 
     def tethers(self, place: int) -> tuple[int, ...]:
         formation = self._formation
@@ -159,11 +197,34 @@ class Lines:
 
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
         """The distance of a point from a line to the north or south; a line is taken to be as wide as the area."""
-        return abs(north_m - self._north_m(team, self._inner_m(swept_s)))
+        last = self._formation.lanes - 1
+        lane = max(0.0, min(1.0, (east_m / self._formation.half_width_m + 1) / 2)) * last
+        return abs(north_m - self._north_m(team, self._inner_m(swept_s, lane)))
 
-    def _inner_m(self, swept_s: float) -> float:
-        """How far from the middle the innermost lines are."""
-        return min(self._most_m, swept_m(self._formation, swept_s))
+    def _inner_m(self, swept_s: float, lane: float) -> float:
+        """How far from the middle the innermost lines are at a lane."""
+        formation = self._formation
+        if not _is_bent(formation):
+            return min(self._most_m, swept_m(formation, swept_s))
+        first_m = self._begins_m(swept_s, lane)
+        flown = formation._replace(first_m=first_m, speed_m_s=(formation.last_m - first_m) / self.sweep_s)
+        return min(self._most_m, swept_m(flown, swept_s, faster_back=self._faster_back))
+
+    def _begins_m(self, swept_s: float, lane: float) -> float:
+        """How far from the middle a lane begins this sweep."""
+        return self._starts_m(lane) if swept_s <= self.sweep_s else min(FIRST_M, self._formation.first_m)
+
+    @property
+    def _faster_back(self) -> float:
+        return self.sweep_s / self._back_s
+
+    def _starts_m(self, lane: float) -> float:
+        """How far from the middle a lane begins."""
+        first_m = self._formation.first_m
+        if not _is_bent(self._formation):
+            return first_m
+        from_end = min(lane, self._formation.lanes - 1 - lane)
+        return FIRST_M + min(1.0, from_end / _BENT) * (first_m - FIRST_M)
 
     def _north_m(self, line: int, inner_m: float) -> float:
         out_m = inner_m + self._outward_m[line]
@@ -174,17 +235,45 @@ class Lines:
         return self._formation.half_width_m * (2 * lane / (self._formation.lanes - 1) - 1)
 
 
+def _is_bent(formation: Dimensions) -> bool:
+    """True for lines that begin around the swarm: others begin no farther from the middle than `FIRST_M`."""
+    return formation.first_m > FIRST_M
+
+
+def begun_around(made: Dimensions, swarm: Swarm) -> Dimensions:
+    """The lines that begin where the swarm stands, if nobody between them is unheard: it must be dense enough for that,
+    and wide enough for all lanes but the bent ones.
+    """
+    east_m, west_m, north_m, south_m = swarm.sides_m
+    aside_m, beyond_m = min(east_m, west_m), min(north_m, south_m)
+    if made.teams != 2 or made.lanes <= 2 * _BENT or beyond_m <= FIRST_M:
+        return made
+    lane_m = 2 * made.half_width_m / (made.lanes - 1)
+    is_dense = (east_m + west_m) * (north_m + south_m) <= swarm.uavs * (_DENSE * swarm.reach_m) ** 2
+    if not is_dense or made.half_width_m - _BENT * lane_m > aside_m:
+        return made
+    step_m = math.sqrt(max(0.0, (_BENT_HOP * swarm.reach_m) ** 2 - lane_m**2))
+    first_m = min(beyond_m, made.last_m / 2, FIRST_M + _BENT * step_m, _AROUND * swarm.reach_m)
+    return made._replace(first_m=max(made.first_m, first_m))
+
+
 def fitted(count: int, demands: Demands) -> Dimensions | None:
     """As many lines as this number of UAVs can sweep a square area with in one piece; None if they are too few for two.
-    More lines take less time.
+    More lines take less time. Those who are too few to go on to `EDGE_M` turn where all beyond them are heard, and fly
+    so much slower that more UAVs need no more time.
     """
     half = demands.area_m / 2
-    edge, side = min(EDGE_M, half / 2), min(_SIDE_M, half / 2)
+    side = min(_SIDE_M, half / 2)
     half_width = half - side
     lanes = max(_LEAST_LANES, math.ceil(2 * half_width / demands.apart_m(demands.reach_m)) + 1)
-    first = min(FIRST_M, (half - edge) / 2)
+    near = min(EDGE_M, half / 2)
+    swept = half - near - min(FIRST_M, (half - near) / 2)
     found: Dimensions | None = None
-    for of_half in range(1, count // (2 * lanes) + 1):
+    for of_half, edge in itertools.product(range(1, count // (2 * lanes) + 1), (near, max(near, demands.edge_m))):
+        if found is not None and found.teams == 2 * of_half:
+            continue
+        first = min(FIRST_M, (half - edge) / 2)
+        speed_m_s = (half - edge - first) / swept * demands.speed_m_s
         apart = (half - edge - first) / of_half
         relays = _relays(2 * (first + apart), demands.hop_m) + 2 * (of_half - 1) * _relays(apart, demands.hop_m)
         followers = count - 2 * of_half * lanes - relays
@@ -192,7 +281,7 @@ def fitted(count: int, demands: Demands) -> Dimensions | None:
             continue
         if of_half == 1 or (apart >= _LEAST_APART_M and followers >= _FREE):
             found = Dimensions(
-                lanes, relays, followers, half_width, first, first + apart, demands.height_m, demands.speed_m_s,
+                lanes, relays, followers, half_width, first, first + apart, demands.height_m, speed_m_s,
                 teams=2 * of_half,
             )  # fmt: skip
     return found

@@ -22,7 +22,9 @@ from agents.mission.search_formation.shapes.contract import (
     Dimensions,
     RowKind,
     RowOfPlaces,
+    Shape,
     ShapeName,
+    Swarm,
     swept_m,
 )
 from fanet_mw.units import Enu
@@ -44,7 +46,7 @@ _SLOWER: Final = BACK / math.sqrt(2)
 no faster than others on a way back, so that whoever has fallen behind can catch up."""
 
 
-class Ring:
+class Ring(Shape):
     """The positions of the places of one ring."""
 
     def __init__(self, formation: Dimensions, *, most_m: float = math.inf) -> None:
@@ -77,7 +79,11 @@ class Ring:
         side, on_side = divmod(place, self._formation.lanes / _CORNERS)
         return int(side) % _CORNERS, 2 * on_side * _CORNERS / self._formation.lanes - 1
 
-    def turned(self, swept_s: float) -> float:
+    def flown_at(self, place: float, swept_s: float) -> Enu:
+        lanes = self._formation.lanes
+        return self.at((place + self._turned(swept_s)) % lanes if place < lanes else place, swept_s)
+
+    def _turned(self, swept_s: float) -> float:
         """By how many places all of the ring have moved along it: at each turn at the edge they move between their
         ways, as lines do, and back at the next one.
         """
@@ -98,7 +104,6 @@ class Ring:
         return Ring(self._formation, most_m=left[0] * hop_m / 8)
 
     def may_leave(self, place: float, swept_s: float, *, reach_m: float, left: int) -> bool:
-        """True while a UAV at this place may leave the ring if those beside it do not, with so many that are left."""
         _, share = self._side(place)
         return abs(share) <= _CATCHES_UP and self._half_m(swept_s) <= left * reach_m / 16
 
@@ -113,6 +118,13 @@ class Ring:
         formation = self._formation
         slower = formation._replace(speed_m_s=formation.speed_m_s * _SLOWER)
         return min(self._most_m, swept_m(slower, swept_s, faster_back=1.0, turn_s=_TURN_S))
+
+
+def begun_around(made: Dimensions, swarm: Swarm) -> Dimensions:
+    """The ring that begins as large as the swarm that stands about the middle, rather than draw together first."""
+    if min(swarm.sides_m) <= 0:
+        return made
+    return made._replace(first_m=max(made.first_m, min(made.last_m / 2, math.fsum(swarm.sides_m) / 4)))
 
 
 def fitted(count: int, demands: Demands) -> Dimensions | None:

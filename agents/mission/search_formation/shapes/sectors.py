@@ -25,6 +25,7 @@ from agents.mission.search_formation.shapes.contract import (
     Dimensions,
     RowKind,
     RowOfPlaces,
+    Shape,
     ShapeName,
     nearest_m,
     shifted_m,
@@ -33,7 +34,7 @@ from agents.mission.search_formation.shapes.contract import (
 from fanet_mw.units import Enu
 
 
-class Sectors:
+class Sectors(Shape):
     """The positions of the places of all teams and of their followers."""
 
     def __init__(self, formation: Dimensions) -> None:
@@ -68,12 +69,12 @@ class Sectors:
         outward_is_north = 2 * row + 1 >= self._rows
         return Enu(east, southern + along_m if outward_is_north else southern + self._depth_m - along_m, up_m)
 
-    def aside_m(self, place: float, swept_s: float) -> float:
-        """How far to the east of its lane a place is (`shifted_m`)."""
-        formation = self._formation
+    def flown_at(self, place: float, swept_s: float) -> Enu:
+        at, formation = self.at(place, swept_s), self._formation
         if place >= formation.fixed:
-            return 0.0
-        return shifted_m(swept_s, self.sweep_s, lane_m=self.lane_m, speed_m_s=formation.speed_m_s)
+            return at
+        aside_m = shifted_m(swept_s, self.sweep_s, lane_m=self.lane_m, speed_m_s=formation.speed_m_s)
+        return at._replace(east=at.east + aside_m)
 
     def tethers(self, place: int) -> tuple[int, ...]:
         formation = self._formation

@@ -27,6 +27,7 @@ from agents.mission.search_formation.shapes.contract import (
     Dimensions,
     RowKind,
     RowOfPlaces,
+    Shape,
     ShapeName,
     nearest_m,
 )
@@ -38,7 +39,7 @@ _ARMS_M: Final = 60.0
 """The least distance between the innermost lanes of two arms, measured along the square on which they fly."""
 
 
-class Spiral:
+class Spiral(Shape):
     """The positions of the places of one spiral."""
 
     def __init__(self, formation: Dimensions) -> None:

@@ -225,13 +225,23 @@ def test_lines_and_rings_show_on_their_way_back_what_no_camera_has_shown_on_thei
     assert shown[-1] > (0.98 if shape is ShapeName.LINES else 0.92), "neighbors in a ring are farther apart"
 
 
-@pytest.mark.parametrize("count", [6, 9, 15])
+@pytest.mark.parametrize("count", [6, 9, 14])
 def test_who_is_too_few_for_two_lines_flies_in_one(count: int) -> None:
     pattern = formed(ShapeName.LINES, count, 1000)
     assert (pattern.dimensions.teams, len(pattern.followers)) == (1, count - 6)
     assert pattern.shape.sweep_s < 128
     for second in range(0, 2 * round(pattern.shape.sweep_s) + 20, 4):
         assert pieces([pattern.at(place, second) for place in range(count)]) == 1, second
+
+
+def test_who_is_just_too_few_for_lines_to_the_edge_turns_where_all_beyond_is_heard() -> None:
+    pattern = formed(ShapeName.LINES, 15, 1000)
+    assert (pattern.dimensions.teams, pattern.dimensions.relays, pattern.dimensions.last_m) == (2, 3, 440.0)
+    assert formed(ShapeName.LINES, 16, 1000).dimensions.last_m == 475.0
+    assert formed(ShapeName.LINES, 30, 1000).dimensions.teams == 4
+    flown = [pattern.at(place, second) for second in range(round(pattern.shape.sweep_s) + 1) for place in range(15)]
+    corners = [(east, north) for east in range(-500, 501, 50) for north in (-500, 500)]
+    assert all(min(math.hypot(at.east - e, at.north - n) for at in flown) < SEEN_M for e, n in corners)
 
 
 def test_twice_the_uavs_sweep_in_lines_in_half_the_time() -> None:
@@ -248,19 +258,65 @@ def test_a_ring_is_so_large_that_it_hangs_by_no_single_uav() -> None:
         assert np.sort(apart, axis=1)[:, 1].min() > 20.0, second
 
 
+AROUND = [Enu(200.0 * (i % 9) - 800, 200.0 * (i // 9) - 400, 65) for i in range(45)]
+"""45 UAVs that stand over the middle of the area, as those of `rescue` do."""
+
+
 def test_a_ring_begins_as_large_as_the_swarm_that_stands_around_the_middle_and_waits_at_the_edge() -> None:
-    ring, lines = formed(ShapeName.RING), formed(ShapeName.LINES)
-    around = [Enu(200.0 * (i % 9) - 800, 200.0 * (i // 9) - 400, 65) for i in range(45)]
-    begun = ring.begun_around(around)
+    ring, fan = formed(ShapeName.RING), formed(ShapeName.FAN)
+    begun = ring.begun_around(AROUND)
     assert begun.dimensions == ring.dimensions._replace(first_m=595.0), "half of where it ends, 600 m at most"
-    assert ring.begun_around([at._replace(north=at.north / 4) for at in around]).dimensions.first_m == 450.0
-    beside = [at._replace(north=at.north - 1350) for at in around]
-    assert ring.begun_around(beside) is ring, "from a base it draws together in the middle"
-    assert lines.begun_around(around) is lines
+    assert ring.begun_around([at._replace(north=at.north / 4) for at in AROUND]).dimensions.first_m == 450.0
+    beside = [at._replace(north=at.north - 1350) for at in AROUND]
+    assert ring.begun_around(beside).dimensions == ring.dimensions, "from a base it draws together in the middle"
+    assert fan.begun_around(AROUND) is fan
     end_s = begun.shape.sweep_s
     for since_s, waits in ((0.1, True), (29, True), (31, False)):
         at = begun.at(3, end_s + since_s)
         assert (max(abs(at.east), abs(at.north)) == pytest.approx(1190)) == waits, "who was heard last is to be seen"
+
+
+def test_lines_begin_where_the_swarm_stands_and_leave_out_only_what_it_has_heard() -> None:
+    lines = formed(ShapeName.LINES)
+    begun = lines.begun_around(AROUND)
+    assert begun.dimensions == lines.dimensions._replace(first_m=150.0), "0.6 of the reach at most"
+    assert begun.shape.sweep_s < lines.shape.sweep_s - 15
+    flown = [begun.at(place, second) for second in range(round(begun.shape.sweep_s) + 1) for place in range(45)]
+    unheard = [
+        (east, north)
+        for east in range(-1225, 1226, 50)
+        for north in range(-1225, 1226, 50)
+        if min(math.hypot(at.east - east, at.north - north) for at in (*AROUND, *flown)) > SEEN_M
+    ]
+    assert len(unheard) <= 0.01 * 50 * 50
+
+
+def test_lines_that_begin_around_the_swarm_hang_together_all_the_way_and_come_back_to_the_middle() -> None:
+    begun = formed(ShapeName.LINES).begun_around(AROUND)
+    end_s = begun.shape.sweep_s
+    for second in range(0, 4 * round(end_s), 3):
+        places = [begun.at(place, second) for place in range(45)]
+        assert pieces(places) == 1, second
+        assert max(begun.velocity(place, second).norm() for place in range(40)) < 1.37 * 7.5, second
+        for place in range(40):
+            for tied in begun.shape.tethers(place):
+                assert places[place].minus(places[tied]).horizontal() <= 0.95 * REACH_M, (second, place, tied)
+    middle = [abs(begun.at(7, end_s + since_s).north) for since_s in (0, 10, 10 + 1209 / 9)]
+    assert middle == pytest.approx([1225, 1225, 16], abs=1), "out, a turn, and back to the middle at 9 m/s"
+
+
+@pytest.mark.parametrize(
+    ("swarm", "why"),
+    [
+        ([at._replace(north=at.north - 1350) for at in AROUND], "it comes from a base"),
+        ([at._replace(east=at.east * 1.4, north=at.north * 1.4) for at in AROUND], "it does not hear all between it"),
+        ([at._replace(east=at.east / 2) for at in AROUND], "it is not wide enough"),
+        ([at._replace(north=at.north / 40) for at in AROUND], "it stands in the middle anyway"),
+    ],
+)
+def test_lines_of_another_swarm_begin_in_the_middle(swarm: list[Enu], why: str) -> None:
+    lines = formed(ShapeName.LINES)
+    assert lines.begun_around(swarm).dimensions == lines.dimensions, why
 
 
 def test_where_uavs_are_too_few_for_a_ring_they_fly_in_lines() -> None:

@@ -54,7 +54,8 @@ class Case(NamedTuple):
 
 _TEN: Final = tuple(range(1, 11))
 _TOWN: Final = Case("town", ("mission.search=lines",), (1, 2))
-PLACES: Final[Mapping[str, Case]] = {"`town`, in lines": _TOWN}
+_RING: Final = Case("town", (), (1, 2))
+PLACES: Final[Mapping[str, Case]] = {"`town`": _RING, "`town`, in lines": _TOWN}
 _SMALL: Final = (
     "nodes.count=20", "nodes.spacing_m=100", "nodes.telemetry_hz=0", "clusters.count=4", "traffic.interval_s=4",
     "world.area_m=1000", "mission.survivors=8", "duration_s=150",
@@ -83,7 +84,8 @@ SHAPES: Final[Mapping[str, Case]] = {
     ), ()),
 }  # fmt: skip
 CLEAR: Final[Mapping[str, Case]] = {
-    "`town`, in lines: hellos of neighbors and radar": _TOWN,
+    "`town`: hellos of neighbors and radar": _RING,
+    "`town`, in lines: the same": _TOWN,
     "`rescue` in small: hellos of neighbors": Case("rescue", _SMALL, _TEN),
 }
 

@@ -10,7 +10,7 @@ FULL_ONE_DAY = {
     "DuplicateSet.young",  # two generations of 32,768 packets: `DuplicateSet`
     "DuplicateSet.old",
     "PhoneSensor._shadow",  # emptied when it is full: `KEPT_VALUES`
-    "PaperRule._sightings[]",  # one of each survivor by each node
+    "PaperRule._readings[]",  # one of each survivor by each node
 }
 COME_AND_GO = 20
 

@@ -35,6 +35,14 @@ def test_a_swarm_that_was_silent_for_a_minute_has_lost_nobody() -> None:
     assert summary["bound"]["violations"] == 0
 
 
+def test_a_hello_that_waits_for_its_window_makes_nobody_send_again_what_all_have() -> None:
+    """It is made when it can go, 4 s apart; one that was made when it was due would not know of the last seconds."""
+    sixteen = ["nodes.count=16", "traffic.sources=16", "clusters.count=15", "traffic.interval_s=0.2"]
+    long = ["clusters.flooding_period_s=4", "clusters.contention_ms=20", "routing.hello_interval_s=2", "radio.cw_min=1"]
+    outcome = simulate(catalog.find("clusters", [*sixteen, *long, "duration_s=24", "warmup_s=4"]))
+    assert [outcome.reports[f"agent-{node}"]["repaired"] for node in range(1, 17)] == [0] * 16
+
+
 def test_with_interference_beyond_the_range_too() -> None:
     summary = summary_of("clusters.flooding_period_s=1", "radio.channel=log_distance")
     assert summary["pdr"] >= 0.99

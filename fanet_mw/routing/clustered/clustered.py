@@ -163,6 +163,9 @@ class Clustered(RoutingProtocol):
 
     # --- hellos ---------------------------------------------------------------------------------------------------
 
+    def hello_due_ns(self, start_ns: int) -> int:
+        return self.parts.access.hello_due_ns(start_ns)
+
     def hello_start_ns(self, start_ns: int) -> int:
         return self.parts.access.hello_start_ns(start_ns)
 

@@ -50,6 +50,9 @@ class Access(Protocol):
     def answer(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         """Send a packet again that a neighbor has missed, which was to be announced at `due_ns`."""
 
+    def hello_due_ns(self, start_ns: int) -> int:
+        """The instant, at or after `start_ns`, for which the next hello is to be made."""
+
     def hello_start_ns(self, start_ns: int) -> int:
         """The earliest instant at which a hello, due at `start_ns`, may be transmitted."""
 

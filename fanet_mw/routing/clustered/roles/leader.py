@@ -123,6 +123,7 @@ class Leader:
             objection_ns=max(OBJECTION_NS, _OBJECTION_PERIODS * clusters.period_ns if needs_every_link else 0),
             sure_m=sure_m(self._range_m) if needs_every_link else None,
             settled_ns=settled_ns(scenario),
+            rigid=scenario.mobility.rigid,
         )
         self._division = Division(
             clusters.method, count=clusters.count, range_m=self._range_m, options=clusters.options

@@ -4,6 +4,7 @@
     of a companion       the same, moved by as much as the leader has strayed from straight flight since: a node whose
                          velocity was the leader's. So a formation that turns keeps its shape before its updates have
                          come. One that has sent none although the leader has turned long ago has not turned along
+    in a rigid formation  where it was beside the leader: what errors their velocities have adds up to nothing
 
     a node joins              -> it is known until it has given no sign of life for `lost_ns`, in which it should have
                                  sent two position updates
@@ -67,36 +68,41 @@ class OwnFlight:
         nearest = min(self._flown, key=lambda motion: abs(motion.at_ns - t_ns))
         return Motion(nearest.position_at(t_ns), nearest.velocity, t_ns)
 
-    def turned_ns(self, from_ns: int) -> int | None:
-        """When the leader's velocity was first another one than at an instant; None if it has flown straight."""
-        then = self.at(from_ns)
-        if then is None:
-            return None
-        for motion in self._flown:
-            if motion.at_ns > from_ns and not alike(motion, then):
-                return motion.at_ns
-        return None
+    def turned_ns(self, then: Motion) -> int | None:
+        """When the leader's velocity was first another one than it was then; None if it has flown straight."""
+        return next((own.at_ns for own in self._flown if own.at_ns > then.at_ns and not alike(own, then)), None)
 
 
 class Roster:
     """The nodes that one leader knows; the leader itself is not among them."""
 
     def __init__(
-        self, liveness: Liveness, *, lost_ns: int, objection_ns: int, sure_m: float | None, settled_ns: int
+        self,
+        liveness: Liveness,
+        *,
+        lost_ns: int,
+        objection_ns: int,
+        sure_m: float | None,
+        settled_ns: int,
+        rigid: bool = False,
     ) -> None:
         """A node is forgotten `lost_ns` after its last sign of life, or `objection_ns` after it was reported silent.
 
         `sure_m`: a report counts only if the reported node was all the time within this distance of the reporting one,
         so that they should have heard each other; None means that every report counts.
         `settled_ns`: the time after which all updates about one turn have come.
+        `rigid`: the nodes fly as one formation, in which no distance changes.
         """
         self.own = OwnFlight()
         self._settled_ns = settled_ns
+        self._rigid = rigid
         self._liveness = liveness
         self._lost_ns = lost_ns
         self._objection_ns = objection_ns
         self._sure_m = sure_m
         self._motions: dict[NodeId, Motion] = {}
+        self._beside: dict[NodeId, Motion | None] = {}
+        """The leader's own motion at the instant of each of these; None if it is not known."""
         self._reports: dict[NodeId, _SilentNode] = {}
 
     def __contains__(self, node: NodeId) -> bool:
@@ -120,6 +126,7 @@ class Roster:
     def on_join(self, node: NodeId, motion: Motion) -> None:
         """A node was at a position with a velocity at an instant (`motion`)."""
         self._motions[node] = motion
+        self._beside[node] = self.own.at(motion.at_ns)
 
     def on_report(self, silent: NodeId, by: NodeId, there: Motion, *, now_ns: int) -> int | None:
         """The node `by`, which flies at `there`, reports that a node is silent.
@@ -155,7 +162,7 @@ class Roster:
             if now_ns - last_ns > self._lost_ns or (
                 report is not None and now_ns >= report.since_ns + self._objection_ns
             ):
-                del self._motions[node]
+                del self._motions[node], self._beside[node]
 
     def forget_reports(self) -> None:
         """Forget reports about nodes that are no longer known, because an assignment without them has been made."""
@@ -163,27 +170,31 @@ class Roster:
 
     def places(self, t_ns: int, *, now_ns: int) -> dict[NodeId, Enu]:
         """The positions of all nodes at an instant, if they fly on straight, or with the leader, by id."""
-        return {node: self._place(self._motions[node], t_ns, now_ns) for node in sorted(self._motions)}
+        return {node: self._place(node, t_ns, now_ns) for node in sorted(self._motions)}
 
-    def _place(self, motion: Motion, t_ns: int, now_ns: int) -> Enu:
+    def _place(self, node: NodeId, t_ns: int, now_ns: int) -> Enu:
+        motion, beside, here = self._motions[node], self._beside[node], self.own.at(now_ns)
         straight = motion.position_at(t_ns)
-        beside, here = self.own.at(motion.at_ns), self.own.at(now_ns)
         if beside is None or here is None or not alike(motion, beside):
             return straight
-        if now_ns - motion.at_ns > self._settled_ns:
-            turned_ns = self.own.turned_ns(motion.at_ns)
-            if turned_ns is None or now_ns - turned_ns > self._settled_ns:
-                return straight
+        turned_ns = self.own.turned_ns(beside)
+        if turned_ns is not None and now_ns - turned_ns > self._settled_ns:
+            return straight
+        if self._rigid:
+            return here.position_at(t_ns).minus(beside.position.minus(motion.position))
+        if turned_ns is None and now_ns - motion.at_ns > self._settled_ns:
+            return straight
         return straight.minus(beside.position_at(t_ns).minus(here.position_at(t_ns)))
 
     def is_turning(self, now_ns: int) -> bool:
         """True while it is not known which companions have turned with the leader."""
-        for motion in self._motions.values():
-            turned_ns = self.own.turned_ns(motion.at_ns)
+        for node, motion in self._motions.items():
+            beside = self._beside[node]
+            if beside is None or not alike(motion, beside):
+                continue
+            turned_ns = self.own.turned_ns(beside)
             if turned_ns is not None and now_ns - turned_ns <= self._settled_ns:
-                beside = self.own.at(motion.at_ns)
-                if beside is not None and alike(motion, beside):
-                    return True
+                return True
         return False
 
     def velocities(self) -> Mapping[NodeId, Enu]:

@@ -71,6 +71,9 @@ class SlotAccess:
     def answer(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         self._floods.contend_again(packet, due_ns=due_ns, now_ns=now_ns)
 
+    def hello_due_ns(self, start_ns: int) -> int:
+        return start_ns
+
     def hello_start_ns(self, start_ns: int) -> int:
         return start_ns
 

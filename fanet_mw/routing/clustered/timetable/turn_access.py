@@ -70,6 +70,8 @@ class TurnAccess:
         self._has_shown: NodeTimetable | None = None
         """The timetable in whose turns the node has last begun a flood."""
         self._lifetime_ns = seconds_to_ns(port.scenario.routing.lifetime_s)
+        self._hello_sent_ns = self._hello_waits_ns = 0
+        """The instant of the node's latest hello, and the time by which that was put off until a window."""
 
     def start(self, now_ns: int) -> None:
         self._delays.start(now_ns)
@@ -244,6 +246,16 @@ class TurnAccess:
             self._floods.contend_again(packet, due_ns=due_ns, now_ns=now_ns)
         elif not self._calls.holds(key):
             self._calls.push(packet, now_ns=now_ns)
+
+    def hello_due_ns(self, start_ns: int) -> int:
+        """The instant at which a hello may be sent, so that it is not made long before: its digest would lack what has
+        come meanwhile, and neighbors would send it again. Hellos come as often as without windows, but one a window.
+        """
+        due_ns = start_ns - min(self._hello_waits_ns, (start_ns - self._hello_sent_ns) // 2)
+        timetable = self._timetables.at(start_ns)
+        sent_ns = due_ns if timetable is None or timetable.calls else self._contention.not_before(due_ns)
+        self._hello_waits_ns, self._hello_sent_ns = sent_ns - due_ns, sent_ns
+        return sent_ns
 
     def hello_start_ns(self, start_ns: int) -> int:
         timetable = self._timetables.at(start_ns)

@@ -3,7 +3,7 @@
 import math
 from typing import Final
 
-from fanet_mw.routing.clustered.roles.position_updates import STRAYED
+from fanet_mw.routing.clustered.roles.position_updates import STRAYED, UNLIKE
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_ns
 from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
 from fanet_mw.routing.clustered.timetable.reserved_room import bulk_report_bytes, reserved
@@ -83,10 +83,11 @@ def _disturbed_m(scenario: Scenario) -> float:
     """The greatest reported distance at which nodes may disturb each other with `radio.channel = "range"`.
 
     The error of GPS is added to the range, and in a swarm that moves the distance by which both nodes may have strayed
-    from the positions that the leader extrapolates (`STRAYED`).
+    from the positions that the leader extrapolates (`STRAYED`, `UNLIKE`).
     """
-    range_m = scenario.radio.range_m
-    strayed_m = 0.0 if scenario.mobility.model == "static" else 2 * STRAYED * (scenario.clusters.link_m or range_m)
+    range_m, mobility = scenario.radio.range_m, scenario.mobility
+    strayed = 0.0 if mobility.model == "static" else UNLIKE if mobility.rigid else STRAYED
+    strayed_m = 2 * strayed * (scenario.clusters.link_m or range_m)
     return range_m + distance_error_m(scenario) + strayed_m
 
 

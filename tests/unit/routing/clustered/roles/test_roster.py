@@ -15,8 +15,10 @@ NODE = NodeId(2)
 class Formation:
     """A leader that flies east and turns north at 20 s, and a node 200 m west of it that joined at 5 s."""
 
-    def __init__(self, velocity: Enu = EAST) -> None:
-        self.roster = Roster(Liveness(), lost_ns=60 * S, objection_ns=0, sure_m=None, settled_ns=SETTLED_S * S)
+    def __init__(self, velocity: Enu = EAST, *, rigid: bool = False) -> None:
+        self.roster = Roster(
+            Liveness(), lost_ns=60 * S, objection_ns=0, sure_m=None, settled_ns=SETTLED_S * S, rigid=rigid
+        )
         self.now_s = 0
         self.fly(until_s=5)
         self.roster.on_join(NODE, Motion(Enu(-150.0, 0.0, 50.0), velocity, 5 * S))
@@ -72,3 +74,17 @@ def test_a_node_on_a_way_of_its_own_does_not_turn_with_the_leader() -> None:
     straight = Motion(Enu(-150.0, 0.0, 50.0), Enu(-5.0, 3.0, 0.0), 5 * S)
     assert formation.roster.places(30 * S, now_ns=25 * S)[NODE] == straight.position_at(30 * S)
     assert not formation.roster.is_turning(25 * S)
+
+
+@pytest.mark.parametrize("until_s", [6, TURN_S, TURN_S + SETTLED_S - 1])
+def test_in_a_rigid_formation_an_error_of_a_velocity_moves_nobody(until_s: int) -> None:
+    """When a formation sets out, fixes of the same second show speeds that differ by a metre a second."""
+    formation = Formation(velocity=Enu(8.6, 0.3, 0.0), rigid=True)
+    formation.fly(until_s)
+    assert beside(formation.offset(), -200, 0)
+
+
+def test_in_a_rigid_formation_too_a_node_that_has_not_turned_along_flies_on() -> None:
+    formation = Formation(rigid=True)
+    formation.fly(TURN_S + SETTLED_S + 2)
+    assert not beside(formation.offset(), -200, 0)

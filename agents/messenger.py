@@ -51,7 +51,7 @@ class Messenger:
         wait_ns = S + (2 * seconds_to_ns(scenario.clusters.flooding_period_s) if clustered else 0)
         self._node = node
         self._listeners = listeners
-        self._sender = Sender(node.node, scenario.node_ids, room=self._room, wait_ns=wait_ns)
+        self._sender = Sender(node.node, scenario.node_ids, room=self._room, wait_ns=wait_ns, holds=node.holds)
         self._receiver = Receiver(node.node, self._has_listener, random=stream(scenario.seed, "receipts", node.node))
         self._in_time_ns: int | None = None
         """The instant at which the last message with a deadline was accepted."""
@@ -156,7 +156,7 @@ class Messenger:
 
     def _originate(
         self, application: Application, packet: PieceToSend, *, confirmed: bool, born_ns: int, now_ns: int
-    ) -> None:
+    ) -> int:
         watched = packet.first or not confirmed
         seq = self._node.send(
             packet.inner, destination=packet.destination, priority=packet.priority, app=application.name,
@@ -164,12 +164,14 @@ class Messenger:
         )  # fmt: skip
         if watched:
             self._statuses.watch(seq, application, packet.number, first=packet.first, confirmed=confirmed)
+        return seq
 
     def _send_due(self, now_ns: int) -> None:
         for packet in self._sender.due(now_ns):
             owner = self._statuses.owner(packet.number)
             if owner is not None:
-                self._originate(owner, packet, confirmed=True, born_ns=now_ns, now_ns=now_ns)
+                seq = self._originate(owner, packet, confirmed=True, born_ns=now_ns, now_ns=now_ns)
+                self._sender.handed_over(packet.number, seq)
 
     # --- in -------------------------------------------------------------------------------------------------------
 

@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 from random import Random
 from typing import Final, NamedTuple
 
+from fanet_mw.delivery.retransmission_timeout import RetransmissionTimeout
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.units import MS, US, NodeId, earliest
+from fanet_mw.units import MS, US, NodeId, S, earliest
 from fanet_mw.wire.application_message import DELIVERED, GIVEN_UP, MISSING, NO_LISTENER, Head, Piece, Receipt
 
 MOST_BYTES: Final = 4 << 20
@@ -26,10 +27,10 @@ RECEIPT_NS: Final = 20 * MS
 """A receipt waits this long for other receipts to the same node, and at random up to `_SPREAD_NS` longer, because nodes
 that have received the same broadcast must not all answer at the same instant."""
 _SPREAD_NS: Final = 80 * MS
-_PAUSE_NS: Final = 250 * MS
-"""What is missing of a message is told when no piece has come for this long, because until then more may be coming."""
-_PATIENT_NS: Final = 600 * MS
-"""It is told after this time in any case: before the sender, which waits for a second or longer, sends all again."""
+_FIRST_GAP_NS: Final = 400 * MS
+"""The gap between the pieces of a message that is taken to be usual until measured: what is missing is told when a gap
+is longer than gaps usually are."""
+_MOST_PAUSE_NS: Final = 5 * S
 _MOST_DONE: Final = 8192
 """The number of messages that are remembered as handed over."""
 _MOST_FLOWS: Final = 4096
@@ -55,6 +56,8 @@ class _Incoming:
     """False for a message to which nobody listens: it is passed over when its turn in its flow has come."""
     pieces: dict[int, bytes] = field(default_factory=dict)
     frame: bytes = b""
+    came_ns: int | None = None
+    """When its last new piece came, if no receipt has gone since then; an old piece asks for a receipt."""
 
     @property
     def held(self) -> int:
@@ -74,8 +77,6 @@ class _Owed(NamedTuple):
 
     receipt: Receipt
     priority: int
-    since_ns: int
-    """When the first piece came that it confirms."""
     due_ns: int
 
 
@@ -87,6 +88,8 @@ class Receiver:
         self._node = node
         self._listens = listens
         self._random = random
+        self._gaps = RetransmissionTimeout(_MOST_PAUSE_NS)
+        """The gaps between the pieces of a message, by sender."""
         self._incoming: dict[tuple[NodeId, int], _Incoming] = {}
         self._bytes: dict[NodeId, int] = {}
         """The number of bytes of pieces that are kept, by sender."""
@@ -161,6 +164,11 @@ class Receiver:
             self._bytes[origin] = kept + size
             message.pieces[head.piece] = piece.data
             message.frame = frame
+            if message.came_ns is None:
+                self._gaps.expect(origin, _FIRST_GAP_NS)
+            else:
+                self._gaps.measured(origin, now_ns - message.came_ns)
+            message.came_ns = now_ns
         if name not in self._incoming:
             self._keep(name, message)
         followers += self._hand_over(name, message)[1:]
@@ -241,14 +249,15 @@ class Receiver:
         held = message.held if message is not None else 0
         owed = self._receipts.setdefault(origin, {})
         before = owed.get(number)
-        since_ns = now_ns if before is None else before.since_ns
         wait_ns = RECEIPT_NS
-        if outcome == MISSING and message is not None and not message.whole:
-            wait_ns = max(RECEIPT_NS, min(_PAUSE_NS, since_ns + _PATIENT_NS - now_ns))
+        if outcome == MISSING and message is not None and message.came_ns == now_ns and not message.whole:
+            wait_ns = min(
+                self._gaps.wait_ns(origin), _MOST_PAUSE_NS
+            )  # a piece that was here already asks for a receipt
         due_ns = now_ns + wait_ns + int(self._random.random() * _SPREAD_NS)
         if before is not None and before.receipt.outcome == outcome != MISSING:
             due_ns = min(due_ns, before.due_ns)
-        owed[number] = _Owed(Receipt(held, number, outcome), priority, since_ns, due_ns)
+        owed[number] = _Owed(Receipt(held, number, outcome), priority, due_ns)
         self._receipts_ns = earliest(self._receipts_ns, due_ns)
 
     # --- out ------------------------------------------------------------------------------------------------------
@@ -269,6 +278,8 @@ class Receiver:
             }
             for number in ready:
                 del owed[number]
+                if (message := self._incoming.get((origin, number))) is not None:
+                    message.came_ns = None  # the sender begins anew, at its own time
             if not owed:
                 del self._receipts[origin]
             latest = [self._latest(origin, each.receipt) for each in ready.values()]

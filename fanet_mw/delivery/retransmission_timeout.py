@@ -16,6 +16,10 @@ class RetransmissionTimeout:
         self._first_wait_ns = first_wait_ns
         self._known: dict[NodeId, tuple[int, int]] = {}
 
+    def expect(self, target: NodeId, takes_ns: int) -> None:
+        """Take a time for that of a first measurement, unless there is one."""
+        self._known.setdefault(target, (takes_ns, takes_ns // 2))
+
     def measured(self, target: NodeId, took_ns: int) -> None:
         """A target's receipt has taken this long."""
         known = self._known.get(target)

@@ -10,7 +10,8 @@ bounded, too: the caller asks `full` first, and refuses a message that does not 
 """
 
 import heapq
-from collections.abc import Callable, Collection, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final, NamedTuple
@@ -132,6 +133,9 @@ class _OutgoingMessage:
     again_ns: int = 0
     """The instant at which missing pieces are sent again; 0 while the message waits for room in the window."""
     sent_ns: int = 0
+    """When its last packet was handed over, or last known to wait in this node."""
+    last_seq: int | None = None
+    """The sequence number of that packet."""
     rounds: int = 0
 
     @property
@@ -142,10 +146,19 @@ class _OutgoingMessage:
 class Sender:
     """The confirmed messages of one node that are under way."""
 
-    def __init__(self, node: NodeId, everyone: Collection[int], *, room: Callable[[int], int], wait_ns: int) -> None:
+    def __init__(
+        self,
+        node: NodeId,
+        everyone: Collection[int],
+        *,
+        room: Callable[[int], int],
+        wait_ns: int,
+        holds: Callable[[int], bool] = lambda _: False,
+    ) -> None:
         """`room` tells the room for inner frames in one packet of a priority. `wait_ns`: how long to wait for a target
-        of which no receipt has come.
+        of which no receipt has come. `holds` tells by its number whether a packet still waits in this node.
         """
+        self._holds = holds
         self._node = node
         self._nodes = everyone
         self.fragmentation = Fragmentation(len(everyone) - (node in everyone), room)
@@ -267,6 +280,8 @@ class Sender:
             if message.until_ns <= now_ns:
                 self.told.append(Told(number, EXPIRED, tuple(message.lacking), last=True))
                 self._close(message)
+            elif 0 < message.again_ns <= now_ns and message.last_seq is not None and self._holds(message.last_seq):
+                self._await_receipts(message, now_ns)
             elif 0 < message.again_ns <= now_ns:
                 self._window.over(message.fragments.pieces, rounds=message.rounds)
                 message.again_ns = 0
@@ -280,32 +295,47 @@ class Sender:
         return packets
 
     def _round(self, message: _OutgoingMessage, now_ns: int) -> list[PieceToSend]:
-        """Send the missing pieces of a message; a target that has all of them is sent the last one again, to ask for
-        its receipt.
+        """Send all pieces of a message the first time, later those that targets have said to lack; a target that has
+        said nothing, or has all of them, is sent the last one again, to ask for its receipt.
         """
         whole, last = (1 << message.fragments.pieces) - 1, 1 << (message.fragments.pieces - 1)
-        wanted = {target: (whole & ~held) or last for target, held in message.lacking.items()}
+        unknown = last if message.rounds else whole
+        wanted = {target: (whole & ~held or last) if held else unknown for target, held in message.lacking.items()}
+        alone, together = self._divided(wanted)
         packets: list[PieceToSend] = []
-        if len(wanted) <= FEW:
-            for target, bits in wanted.items():
-                packets += self._packets(message, bits, target, (), (target,))
-        else:
-            union = 0
-            for bits in wanted.values():
-                union |= bits
+        for target, bits in alone.items():
+            packets += self._packets(message, bits, target, (), (target,))
+        if together:
             all_lack = len(wanted) == len(self._everyone)
             named = () if all_lack or (message.everyone and len(wanted) > MOST_NAMED) else tuple(wanted)
-            packets += self._packets(message, union, BROADCAST, named, tuple(wanted))
+            packets += self._packets(message, together, BROADCAST, named, tuple(wanted))
         if message.rounds:
             self.repeated += len(packets)
         else:
             packets[0] = packets[0]._replace(first=True)
         message.rounds += 1
+        message.last_seq = None
+        self._window.sent(message.fragments.pieces, rounds=message.rounds)
+        self._await_receipts(message, now_ns)
+        return packets
+
+    @staticmethod
+    def _divided(wanted: Mapping[NodeId, int]) -> tuple[dict[NodeId, int], int]:
+        """The pieces that few targets want, which go to each of them alone, and the pieces that go to all together."""
+        counts = Counter(piece for bits in wanted.values() for piece in range(bits.bit_length()) if bits >> piece & 1)
+        together = sum(1 << piece for piece, count in counts.items() if count > FEW)
+        return {target: rest for target, bits in wanted.items() if (rest := bits & ~together)}, together
+
+    def handed_over(self, number: int, seq: int) -> None:
+        """A packet of a message has become the packet of this sequence number."""
+        message = self._messages.get(number)
+        if message is not None:
+            message.last_seq = seq
+
+    def _await_receipts(self, message: _OutgoingMessage, now_ns: int) -> None:
         message.sent_ns = now_ns
         message.again_ns = now_ns + self._patience_ns(message)
-        self._window.sent(message.fragments.pieces, rounds=message.rounds)
         heapq.heappush(self._timers, (message.again_ns, message.number))
-        return packets
 
     def _patience_ns(self, message: _OutgoingMessage) -> int:
         most_ns = max(map(self._round_trips.wait_ns, message.lacking), default=0)

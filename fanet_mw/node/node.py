@@ -134,6 +134,10 @@ class Node:
         """True while a packet of an application of this node has not been let out."""
         return bool(self._own.held)
 
+    def holds(self, seq: int) -> bool:
+        """True while the packet of this number, of an application of this node, has not been let out."""
+        return self._own.holds(seq)
+
     def moved(self, position: Enu, velocity: Enu) -> None:
         """Set the node's own position and velocity, as its navigation knows them."""
         self.port.position, self.port.velocity = position, velocity

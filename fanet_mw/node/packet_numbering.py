@@ -56,6 +56,10 @@ class PacketNumbering:
         self._duplicates.put(hash_of(frame), duplicates.DELIVERED | PHASES[flags & wire.PHASE_MASK])
         return _new(Packet, (header, frame))
 
+    def holds(self, seq: int) -> bool:
+        """True while no frame of the data packet of this number has been announced, and the node has not dropped it."""
+        return seq.to_bytes(4, "little") + self._node.to_bytes(2, "little") in self.held
+
     def handed_on(self, seq: int) -> bool:
         """True if this is the number of a data packet that the node has originated since its start and handed over; it
         may come back.

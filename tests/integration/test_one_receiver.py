@@ -4,6 +4,8 @@ from typing import Any
 
 import pytest
 
+from fanet_mw.application import Application, Data
+from fanet_mw.units import S
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
@@ -26,3 +28,46 @@ def test_a_packet_for_a_neighbor_is_one_frame_and_does_not_wait(relay: str, p50_
     assert found["delay_ms"]["max"] < worst_ms
     if relay == "scheduled":
         assert found["bound"]["stated_share"] == found["bound"]["within_share"] == 1.0
+
+
+def test_a_packet_for_a_node_five_hops_away_is_five_frames() -> None:
+    """The first are flooded; then the receiver has shown the way to itself."""
+    far = ("traffic.destination=12", "traffic.sources=[1]", "traffic.interval_s=0.05")
+    silent, found = (
+        summary_of("clusters.relay=counter", "traffic.arrivals=none"),
+        summary_of("clusters.relay=counter", *far),
+    )
+    assert found["pdr"] == 1.0
+    assert found["frames"]["sent"] - silent["frames"]["sent"] <= 6.5 * found["generated"]
+    assert found["delay_ms"]["p50"] < 15
+
+
+class Courier(Application):
+    """Node 2 sends a long message to all."""
+
+    name, ports = "courier", (1,)
+
+    def __init__(self, node: int, *, confirm: bool) -> None:
+        self._due_ns = 11 * S if node == 2 else None
+        self._confirm = confirm
+
+    def next_wake_ns(self) -> int | None:
+        return self._due_ns
+
+    def wake(self, now_ns: int) -> None:
+        self._due_ns = None
+        self.port.send(Data(1, bytes(12_000)), confirm=self._confirm, lifetime_ns=30 * S)
+
+
+@pytest.mark.parametrize("relay", ["counter", "scheduled"])
+def test_a_message_that_all_confirm_takes_less_than_twice_the_frames(relay: str) -> None:
+    scenario = catalog.find("clusters", [*GRID, f"clusters.relay={relay}", "traffic.arrivals=none", "duration_s=24"])
+
+    def frames(*, confirm: bool | None) -> int:
+        outcome = simulate(
+            scenario, applications=lambda node: [] if confirm is None else [Courier(node, confirm=confirm)]
+        )
+        return int(finish(outcome, out=None)["frames"]["sent"])
+
+    silent = frames(confirm=None)
+    assert frames(confirm=True) - silent < 2 * (frames(confirm=False) - silent)

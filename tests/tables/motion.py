@@ -120,14 +120,17 @@ def costs() -> Rows:
 
 
 def one_receiver() -> Rows:
-    """Packets for one node, in rounds and by protocols that keep routes: 44 sources of 1,024 bytes a second."""
+    """Packets for one node, in rounds, clustered, and by protocols that keep routes: 44 sources of 1,024 bytes a
+    second.
+    """
     rows = [[
         "motion", "protocol", "delivered", "of reachable", "p50 [ms]", "p95 [ms]", "worst [ms]",
         "frames, control included",
     ]]  # fmt: skip
     for motion, moves in MOTIONS.items():
-        for protocol in ("rounds", "aodv", "olsr", "dsdv", "geographic"):
-            keys = (f"routing.protocol={protocol}", "traffic.destination=12")
+        for protocol in ("rounds", "counter", "aodv", "olsr", "dsdv", "geographic"):
+            chosen = "clusters.relay" if protocol == "counter" else "routing.protocol"
+            keys = (f"{chosen}={protocol}", "traffic.destination=12")
             found = summarized("clusters", *keys, *moves, *_DURATION)
             delay = found["delay_ms"]
             rows.append([

@@ -17,7 +17,7 @@ from fanet_mw.routing.clustered.contract import HearsCopies, ScheduledAccess
 from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTiming
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
-from fanet_mw.routing.clustered.forwarding.one_hop import OneHop
+from fanet_mw.routing.clustered.forwarding.one_way import OneWay, is_receipt
 from fanet_mw.routing.clustered.forwarding.uplink import Uplink
 from fanet_mw.routing.clustered.links.heard_load import HeardLoads, stated_loads
 from fanet_mw.routing.clustered.links.link_quality import LinkQuality
@@ -153,9 +153,20 @@ def _in_slots(ground: _Ground, rule: Rule, *hear_copies: HearsCopies) -> Cluster
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
         floods=ground.floods, roles=roles, access=access, relaying=relaying, contending=relaying,
-        one_hop=OneHop(ground.port, ground.neighbors),
+        one_way=OneWay(ground.port, ground.neighbors),
     )  # fmt: skip
     return _protocol(ground, whole, *hear_copies, parts.refresh)
+
+
+def _way_beside_turns(ground: _Ground) -> OneWay:
+    """The way of packets for one node where nodes have turns: where turns bound delays, only receipts go there, in the
+    windows between turns, and packets with a bound are flooded; where they do not, all packets go at once.
+    """
+    scenario = ground.port.scenario
+    if scenario.mobility.rigid and not scenario.measures_links:
+        not_before = ground.contention.not_before
+        return OneWay(ground.port, ground.neighbors, takes=is_receipt, not_before=not_before)
+    return OneWay(ground.port, ground.neighbors)
 
 
 def _slots(ground: _Ground, membership: Membership) -> SlotAccess:
@@ -182,9 +193,11 @@ def _by_timetable(ground: _Ground) -> Clustered:
         port, timetables=timetables, roots=roots, lease=parts.lease, admission=_admission(port), followers=followers
     )
     resumed = None if ground.missing is None else ResumedFloods(port, timetables, ground.floods)
+    one_way = _way_beside_turns(ground)
     access = TurnAccess(
         port, timetables=timetables, roots=roots, calls=calls, spare=spare, slots=_slots(ground, parts.membership),
         delays=delays, floods=ground.floods, contention=ground.contention, resumed=resumed, followers=followers,
+        one_way=one_way,
     )  # fmt: skip
     timetabling = FromPlaces(
         port,
@@ -204,7 +217,7 @@ def _by_timetable(ground: _Ground) -> Clustered:
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
         floods=ground.floods, roles=_roles(ground, parts, access, timetabling, heard), access=access, relaying=relaying,
-        contending=contending, one_hop=None, loads=heard, delays=delays, missing=ground.missing,
+        contending=contending, one_way=one_way, loads=heard, delays=delays, missing=ground.missing,
     )  # fmt: skip
     return _protocol(ground, whole, parts.refresh, calls)
 

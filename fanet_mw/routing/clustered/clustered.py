@@ -1,9 +1,9 @@
 """The clustered protocol at one node: it hands each event to the parts of the protocol, and decides nothing itself.
 
     event                              parts that handle it
-    packet of an own application       one_hop, if it is for a neighbor; otherwise
-                                       access: it floods the packet from here, or sends it towards a head
-    packet on its way to a head        the same
+    packet of an own application       one_way, if it is for one node; floods, if no way to that node is known;
+                                       access, if it is for all: it floods it from here, or sends it towards a head
+    packet on its way                  the same
     flooded packet                     roles, if it is a control packet; relaying decides whether and when to pass it on
     hello                              neighbors, roles, gradient, repair; then access, which may have a route now
 
@@ -24,7 +24,7 @@ from fanet_mw.node.reader import decoded
 from fanet_mw.routing.clustered.contract import Access, HearsCopies, Relaying
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
-from fanet_mw.routing.clustered.forwarding.one_hop import OneHop
+from fanet_mw.routing.clustered.forwarding.one_way import OneWay
 from fanet_mw.routing.clustered.forwarding.uplink import MOST_TRIES, Uplink
 from fanet_mw.routing.clustered.links.heard_load import HeardLoads
 from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
@@ -55,8 +55,7 @@ class Parts(NamedTuple):
     contending: ContendingRelaying
     """Relaying in contention with other nodes, outside of slots and turns. `relaying` is this part itself, or hands it
     those packets about which it does not decide."""
-    one_hop: OneHop | None
-    """The way to a neighbor for which a packet is; None where turns are for that (`timetable/turn_access.py`)."""
+    one_way: OneWay
     loads: HeardLoads | None = None
     """The loads of the nodes, as this node hears them; None if timetables are made for what the scenario says."""
     delays: StatedDelays | None = None
@@ -94,7 +93,9 @@ class Clustered(RoutingProtocol):
         parts.floods.keep(packet, flooded=False, now_ns=due_ns)
         if packet.header.destination == BROADCAST:
             parts.roles.on_flooding(due_ns)
-        if parts.one_hop is None or not parts.one_hop.send(packet, start_ns=due_ns, now_ns=now_ns):
+        if parts.one_way.takes(packet):
+            self._send_one_way(packet, start_ns=due_ns, now_ns=now_ns)
+        else:
             parts.access.originate(packet, due_ns=due_ns, now_ns=now_ns)
 
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> Sequence[Relay]:
@@ -107,22 +108,35 @@ class Clustered(RoutingProtocol):
             if parts.missing is not None:
                 parts.missing.receive(origin, seq, now_ns=now_ns)
         parts.floods.keep(packet, flooded=bool(flags & FLAG_FLOOD), now_ns=now_ns)
+        parts.one_way.learn(header, reception.src)
         if flags & FLAG_FLOOD:
+            if parts.one_way.must_show(packet, now_ns=now_ns):
+                parts.roles.show(now_ns)
             at_once = kind != _DATA and parts.roles.on_control(packet, reception.src, now_ns=now_ns)
-            return parts.relaying.on_flood(packet, reception, at_once=at_once, now_ns=now_ns)
-        if flags & FLAG_TO_HEAD:
+            relaying = parts.contending if parts.one_way.takes(packet) else parts.relaying
+            return relaying.on_flood(packet, reception, at_once=at_once, now_ns=now_ns)
+        if flags & FLAG_TO_HEAD or parts.one_way.takes(packet):
             self._pass_on(packet, now_ns)
         return ()
 
     def _pass_on(self, packet: Packet, now_ns: int) -> None:
-        """Send a packet that is on its way to a head farther."""
+        """Send a packet that is on its way to a head, or to its receiver, farther."""
         parts, start_ns = self.parts, now_ns + self._lead_ns
         if packet.header.destination == self._port.node:
             return
         if is_used_up(packet.header):
             self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
-        elif parts.one_hop is None or not parts.one_hop.send(packet, start_ns=start_ns, now_ns=now_ns):
+            return
+        if parts.one_way.takes(packet):
+            self._send_one_way(packet, start_ns=start_ns, now_ns=now_ns)
+        else:
             parts.access.forward(packet, start_ns=start_ns, now_ns=now_ns)
+
+    def _send_one_way(self, packet: Packet, *, start_ns: int, now_ns: int) -> None:
+        """Send a packet to its receiver, or flood it from here if no way is known."""
+        parts = self.parts
+        if not parts.one_way.send(packet, start_ns=start_ns, now_ns=now_ns):
+            parts.floods.contend_again(packet, due_ns=start_ns - self._lead_ns, now_ns=now_ns)
 
     def most_packet_bytes(self, priority: int) -> int:
         return self.parts.access.most_packet_bytes(priority)
@@ -146,9 +160,9 @@ class Clustered(RoutingProtocol):
 
     def on_status(self, status: TxStatus, *, now_ns: int) -> None:
         parts = self.parts
-        missed = None if parts.one_hop is None else parts.one_hop.failed(status)
+        missed = parts.one_way.failed(status)
         if missed is not None:
-            parts.access.forward(missed, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
+            self._send_one_way(missed, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
         failed = parts.uplink.on_status(status)
         if failed is None:
             return
@@ -231,9 +245,12 @@ class Clustered(RoutingProtocol):
     # --- for people -----------------------------------------------------------------------------------------------
 
     def waiting(self) -> int:
-        one_hop = self.parts.one_hop
-        alone = 0 if one_hop is None else len(one_hop)
-        return alone + len(self.parts.uplink) + self.parts.access.waiting() + self.parts.contending.waiting()
+        return (
+            len(self.parts.one_way)
+            + len(self.parts.uplink)
+            + self.parts.access.waiting()
+            + self.parts.contending.waiting()
+        )
 
     def report(self) -> Mapping[str, object]:
         parts = self.parts

@@ -114,14 +114,27 @@ def test_a_message_of_which_pieces_keep_coming_is_answered_once_when_it_is_whole
     assert said(receiver, last_ns + S) == {}
 
 
-def test_the_sender_of_a_long_message_hears_of_it_before_it_sends_all_again() -> None:
-    receiver, heard = made(), []
-    for piece in range(12):
-        hear(receiver, head(piece=piece, pieces=60), BORN_NS + piece * 40 * MS)
-        heard += [BORN_NS + piece * 40 * MS for _ in said(receiver, BORN_NS + piece * 40 * MS)]
-    heard += [at_ns for at_ns in range(BORN_NS + 480 * MS, BORN_NS + S, 10 * MS) if said(receiver, at_ns)]
-    assert heard
-    assert heard[0] <= BORN_NS + 700 * MS
+def test_what_is_missing_is_told_when_a_gap_is_longer_than_gaps_usually_are() -> None:
+    """Pieces that come twice a second are waited for longer than those that come every 40 ms."""
+    waited: list[int] = []
+    for gap_ns in (40 * MS, 500 * MS):
+        receiver, last_ns = made(), BORN_NS
+        for piece in range(30):
+            which = head(piece=piece, pieces=60)._replace(lifetime_ms=60_000)
+            last_ns = BORN_NS + piece * gap_ns
+            assert said(receiver, last_ns) == {}, "more pieces are coming"
+            hear(receiver, which, last_ns)
+        waited.append(next(ns for ns in range(0, 6 * S, 10 * MS) if said(receiver, last_ns + ns)))
+    short_ns, long_ns = waited
+    assert 300 * MS <= short_ns <= 400 * MS
+    assert 500 * MS < long_ns <= 1200 * MS
+
+
+def test_who_is_sent_a_piece_again_says_at_once_what_it_lacks() -> None:
+    receiver = made()
+    hear(receiver, head(piece=1, pieces=2), BORN_NS)
+    hear(receiver, head(piece=1, pieces=2), BORN_NS + 100 * MS)
+    assert said(receiver, BORN_NS + 100 * MS + LATEST_RECEIPT_NS) == {7: (MISSING, 0b10)}
 
 
 def test_a_message_to_which_nobody_listens_keeps_the_place_of_those_before_it() -> None:
@@ -179,10 +192,11 @@ def test_a_message_that_comes_twice_is_handed_over_once_and_confirmed_twice() ->
 def test_what_is_missing_is_told_once_no_more_pieces_come() -> None:
     receiver, at_ns = made(), BORN_NS
     for piece in (0, 2):
-        hear(receiver, head(piece=piece, pieces=4), at_ns, priority=3 - piece)
+        which = head(piece=piece, pieces=4)._replace(lifetime_ms=5000)
+        hear(receiver, which, at_ns, priority=3 - piece)
         at_ns += 200 * MS
         assert receiver.due(at_ns) == []
-    due_ns = BORN_NS + 200 * MS + 250 * MS + 80 * MS
+    due_ns = BORN_NS + 200 * MS + 1275 * MS + 80 * MS
     ((origin, receipts, priority),) = receiver.due(due_ns)
     assert (origin, priority) == (FROM, 1)
     assert [(r.number, r.held, r.outcome) for r in receipts] == [(7, 0b101, MISSING)]

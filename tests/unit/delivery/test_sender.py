@@ -110,6 +110,39 @@ def test_a_target_that_has_every_piece_is_asked_again_by_the_last_one() -> None:
     assert pieces(sender.due(BORN_NS + WAIT_NS)) == [3]
 
 
+def test_a_target_that_has_said_nothing_is_asked_by_the_last_piece_and_then_sent_what_it_lacks() -> None:
+    sender = made()
+    number = send(sender, bytes(1000))
+    sender.due(BORN_NS)
+    assert pieces(sender.due(BORN_NS + WAIT_NS)) == [3]
+    sender.receipt(A, Receipt(0b1000, number, MISSING), BORN_NS + WAIT_NS + 100 * MS)
+    assert pieces(sender.due(BORN_NS + 3 * WAIT_NS)) == [0, 1, 2]
+
+
+def test_patience_begins_when_the_last_piece_has_left_the_node() -> None:
+    waiting = {77}
+    sender = Sender(OWN, (OWN, A), room=lambda _: 400, wait_ns=WAIT_NS, holds=waiting.__contains__)
+    sender.start(1)
+    number = send(sender, bytes(1000))
+    for seq, _ in zip(range(74, 78), sender.due(BORN_NS), strict=True):
+        sender.handed_over(number, seq)
+    assert sender.due(BORN_NS + WAIT_NS) == []
+    waiting.clear()
+    assert sender.next_wake_ns() == BORN_NS + 2 * WAIT_NS
+    assert pieces(sender.due(BORN_NS + 2 * WAIT_NS)) == [3]
+
+
+def test_pieces_that_few_lack_go_to_each_of_them_and_the_others_to_all() -> None:
+    sender = Sender(OWN, [NodeId(n) for n in range(1, 12)], room=lambda _: 400, wait_ns=WAIT_NS)
+    number = send(sender, bytes(900), to=None)
+    every = (1 << len(sender.due(BORN_NS))) - 1
+    for node in range(2, 12):
+        held = every & ~0b1 & ~(0b10 if node == 5 else 0)
+        sender.receipt(NodeId(node), Receipt(held, number, MISSING), BORN_NS + MS)
+    again = [(packet.destination, piece(packet).head.piece) for packet in sender.due(BORN_NS + WAIT_NS)]
+    assert again == [(NodeId(5), 1), (BROADCAST, 0)]
+
+
 def test_a_receipt_teaches_how_long_to_wait_for_the_next() -> None:
     """RFC 6298: 400 ms smoothed and 200 of variation, so 1200 ms; then half of both differences."""
     sender = made()
@@ -292,8 +325,8 @@ def test_together_go_the_pieces_that_any_target_lacks_and_who_lacks_some_is_name
     every = (1 << len(first)) - 1
     for node in range(2, 6):
         delivered(sender, number, NodeId(node), BORN_NS + MS)
-    for node, lacks in ((6, 0), (7, 1), (8, 1)):
-        sender.receipt(NodeId(node), Receipt(every & ~(1 << lacks), number, MISSING), BORN_NS + MS)
+    for node in (6, 7, 8):
+        sender.receipt(NodeId(node), Receipt(every & ~0b11, number, MISSING), BORN_NS + MS)
     again = sender.due(BORN_NS + WAIT_NS)
     assert pieces(again) == [0, 1]
     assert {piece(packet).targets for packet in again} == {frozenset((6, 7, 8))}

@@ -183,6 +183,11 @@ class AssignedRoles:
         """An own application's packet will be flooded to all nodes from the instant `due_ns` on."""
         self.parts.joining.on_flooding(due_ns)
 
+    def show(self, now_ns: int) -> None:
+        """Flood a word of this node, by which others learn the way to it."""
+        if self.parts.failover.placed:
+            self._join(now_ns)
+
     def on_parent_lost(self, parent: NodeId, *, now_ns: int) -> None:
         """The next hop to a head did not acknowledge a unicast frame."""
         self.parts.failover.on_unreachable(parent, now_ns=now_ns)

@@ -56,10 +56,11 @@ def sent(node: Node, kind: Kind = Kind.DATA) -> list[wire.Header]:
 def test_a_packet_that_has_reached_its_receiver_goes_no_farther(make_node: MakeNode) -> None:
     node = make_node()
     name_head(node)
-    hear(node, data(flags=FLAG_TO_HEAD, destination=OURS), filler(40))
-    assert node.report()["waiting"] == 0
-    hear(node, data(flags=FLAG_TO_HEAD, destination=THEIRS), filler(60))
-    assert node.report()["waiting"] == 1, "that of another one waits for the slot"
+    for flags in (0, FLAG_TO_HEAD):
+        hear(node, data(flags=flags, destination=OURS)._replace(seq=5 + flags), filler(40))
+    assert sent(node) == []
+    hear(node, data(flags=0, destination=THEIRS)._replace(seq=9), filler(60))
+    assert len(sent(node)) == 1, "that of another one is flooded, because no way is known"
 
 
 def test_a_hop_limit_ends_a_packet_on_its_way_to_a_head(make_node: MakeNode) -> None:

@@ -34,7 +34,7 @@ def test_a_packet_for_a_node_five_hops_away_is_five_frames() -> None:
     """The first are flooded; then the receiver has shown the way to itself."""
     far = ("traffic.destination=12", "traffic.sources=[1]", "traffic.interval_s=0.05")
     silent, found = (
-        summary_of("clusters.relay=counter", "traffic.arrivals=none"),
+        summary_of("clusters.relay=counter", "traffic.sources=0", "traffic.arrivals=none"),
         summary_of("clusters.relay=counter", *far),
     )
     assert found["pdr"] == 1.0
@@ -61,7 +61,9 @@ class Courier(Application):
 
 @pytest.mark.parametrize("relay", ["counter", "scheduled"])
 def test_a_message_that_all_confirm_takes_less_than_twice_the_frames(relay: str) -> None:
-    scenario = catalog.find("clusters", [*GRID, f"clusters.relay={relay}", "traffic.arrivals=none", "duration_s=24"])
+    scenario = catalog.find(
+        "clusters", [*GRID, f"clusters.relay={relay}", "traffic.sources=0", "traffic.arrivals=none", "duration_s=24"]
+    )
 
     def frames(*, confirm: bool | None) -> int:
         outcome = simulate(

@@ -38,6 +38,8 @@ class AirTime(NamedTuple):
     node: int
     length_ns: int
     cause: Cause
+    priority: int | None = None
+    """The most urgent priority among its packets of applications; None if it carries none."""
 
 
 class AirCauses:
@@ -53,10 +55,12 @@ class AirCauses:
 
     def frame(self, start_ns: int, node: int, payload: bytes, *, frame_bytes: int, attempt: int = 1) -> AirTime:
         """A transmission of a node; `payload` may be cut off, `frame_bytes` is its whole length."""
-        causes = {self._cause_of(header, node, attempt) for header in _headers(payload)}
+        headers = list(_headers(payload))
+        causes = {self._cause_of(header, node, attempt) for header in headers}
+        priority = min((header.priority for header in headers if header.kind == Kind.DATA), default=None)
         cause = next((cause for cause in Cause if cause in causes), Cause.CONTROL)
         length_ns = airtime.airtime_ns(frame_bytes + _MAC_BYTES, self._radio, rate_mbps=self._radio.rate_mbps)
-        return AirTime(start_ns, node, length_ns, cause)
+        return AirTime(start_ns, node, length_ns, cause, priority)
 
     def ack(self, start_ns: int) -> AirTime:
         """An acknowledgment, which does not say whose it is."""

@@ -50,7 +50,11 @@ def blocks_of_run(folder: Path, out: Path) -> list[Block]:
                 save(drawn.figure, pictures, f"{name}-{kind}")
                 blocks.append(Picture(pictures / f"{name}-{kind}.png", drawn.caption))
                 if kind == "air" and air is not None:
-                    blocks += [air_pictures.rows(air), Text(air_pictures.against_dominating_set(run, air))]
+                    blocks += [
+                        air_pictures.rows(air),
+                        air_pictures.losses(summary),
+                        Text(air_pictures.against_dominating_set(run, air)),
+                    ]
     if summary["mode"] == "realtime":
         blocks += [Heading("Lateness", 3), run_rows.lateness(summary)]
     return [*blocks, Commands([f"fanet simulate {shlex.quote(str(folder / 'scenario.toml'))}"])]
@@ -77,7 +81,7 @@ def _drawings(
         partial(run_pictures.delivery, run),
         partial(run_pictures.links, run, links),
         partial(slot_pictures.slots, run, reports),
-        _nothing if air is None else partial(air_pictures.picture, run, air),
+        _nothing if air is None else partial(air_pictures.picture, run, air, links),
         *(
             partial(draw, run) if run.searches else _nothing
             for draw in (mission_pictures.progress, mission_pictures.waits, mission_pictures.tracks)

@@ -5,12 +5,14 @@ from kit import MakeScenario
 
 from emulator.pcap_reader import AirFrame
 from fanet_mw.units import BROADCAST
-from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Header, Kind, filler
-from sim.report.air_pictures import Air, Cause, greedy_dominating_set
+from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, PRIORITY_SAFETY, Header, Kind, filler
+from sim.report.air_pictures import Air, Cause, greedy_dominating_set, losses, rows
 
 
-def frame(sender: int, origin: int, seq: int, *, kind: Kind = Kind.DATA, attempt: int = 1) -> AirFrame:
-    header = Header(0, seq, origin, BROADCAST, sender, kind, 8, 0, PRIORITY_BULK, FLAG_FLOOD)
+def frame(
+    sender: int, origin: int, seq: int, *, kind: Kind = Kind.DATA, attempt: int = 1, priority: int = PRIORITY_BULK
+) -> AirFrame:
+    header = Header(0, seq, origin, BROADCAST, sender, kind, 8, 0, priority, FLAG_FLOOD)
     payload = header.encode() + filler(40)
     return AirFrame(seq, "sent", sender, None, None, len(payload), attempt, None, payload)
 
@@ -29,6 +31,28 @@ def test_each_frame_has_its_cause(make_scenario: MakeScenario) -> None:
         Cause.OWN, Cause.RELAYED, Cause.AGAIN, Cause.AGAIN, Cause.HELLO, Cause.CONTROL, Cause.ACK, Cause.CONTROL,
     ]  # fmt: skip
     assert air.times == {(1, 7): 3, (1, 8): 1}
+
+
+def test_shares_of_the_air_are_told_by_cause_and_priority(make_scenario: MakeScenario) -> None:
+    sent = [frame(1, 1, 7), frame(2, 1, 7), frame(1, 1, 8, priority=PRIORITY_SAFETY), frame(1, 1, 9, kind=Kind.HELLO)]
+    assert [row[:4] for row in rows(Air(make_scenario(), sent)).rows] == [
+        ["own packets", "safety", "1", "25 %"],
+        ["own packets", "bulk", "1", "25 %"],
+        ["relayed", "bulk", "1", "25 %"],
+        ["hellos", "-", "1", "25 %"],
+    ]
+
+
+def test_what_was_lost_is_told_with_its_reason() -> None:
+    summary = {
+        "copies": {"on_air": 200, "lost": {"half_duplex": 5, "collision": 20}},
+        "frames": {"sent": 50, "dropped": {"collision": 1}},
+    }
+    assert [list(row) for row in losses(summary).rows] == [
+        ["copies at stations in range", "collision", "20", "10 %"],
+        ["copies at stations in range", "half duplex", "5", "2.5 %"],
+        ["frames that no station received", "collision", "1", "2 %"],
+    ]
 
 
 @pytest.mark.parametrize(

@@ -103,7 +103,7 @@ class Searcher:
         obstacles = KnownObstacles(onboard_map, scenario.world.no_fly_m)
         own_motion = OwnMotion(position, obstacles)
         self._neighbors = neighbors = NeighborMotions(hello_interval_s=scenario.routing.hello_interval_s)
-        self._radar = RadarWatch(own_motion, obstacles, neighbors, mission.avoid_by)
+        self._radar = RadarWatch(own_motion, obstacles, neighbors)
         aside_m, ahead_m = _view_m(scenario)
         around = mission.search in ("ring", "fan")  # lanes lead east and west as well
         look_m = min(aside_m, ahead_m) if around else aside_m

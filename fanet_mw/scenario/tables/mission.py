@@ -70,8 +70,6 @@ class Mission(Section):
     route_m: tuple[tuple[Coordinate, Coordinate], ...] = ()
     """`formation`: east and north of the waypoints through which the leader flies at `mobility.speed_m_s`; empty: it
     stays where it is."""
-    avoid_by: tuple[Literal["hellos", "radar"], ...] = ("hellos", "radar")
-    """`search`: by what UAVs detect others to avoid them: the positions in hellos, and their own radar."""
     reserve_charge: Annotated[float, Field(ge=0, le=1)] = 0.15
     """`search`: the share of its battery with which a UAV must come home. If it would come home with less, it flies
     home and lands, and others take over its place and task; needs `sensors.battery_hz`."""

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from tests.tables.markdown import Rows
 
-_FILE: Final = Path(__file__).parents[2] / "docs" / "results" / "data" / "losses.jsonl"
+_DATA: Final = Path(__file__).parents[2] / "docs" / "results" / "data"
 _ASKED_S: Final = 15.0
 _AGAIN_S: Final = 3.0
 _WORDS: Final = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five"}
@@ -17,8 +17,12 @@ _CURVE_FROM: Final = 6
 Copy = dict[str, Any]
 
 
+def _lines(name: str) -> list[Copy]:
+    return [json.loads(line) for line in (_DATA / f"{name}.jsonl").read_text().splitlines()]
+
+
 def _copies() -> list[Copy]:
-    return [json.loads(line) for line in _FILE.read_text().splitlines()]
+    return _lines("losses")
 
 
 def healing() -> Rows:
@@ -28,7 +32,10 @@ def healing() -> Rows:
         "bounds again 3 s after that", "as often as without a loss", "broken",
     ]  # fmt: skip
     groups: dict[tuple[str, str], list[Copy]] = {}
-    for copy in _copies():
+    once = {
+        (copy["scenario"], copy["seed"], str(copy["losses"])): copy for copy in _copies()
+    }  # some were flown on, too
+    for copy in once.values():
         if len(copy["losses"]) < _CURVE_FROM:
             groups.setdefault((copy["scenario"], _lost(copy)), []).append(copy)
     return [head, *(_healing_row(*name, copies) for name, copies in groups.items())]
@@ -55,8 +62,8 @@ def _healing_row(mission: str, lost: str, copies: Sequence[Copy]) -> list[str]:
         f"{sum(one <= _ASKED_S for one in heal_s)} of {len(heal_s)}",
         f"{sum(not one for one in heal_s)}",
         f"{statistics.median(heal_s):.1f} / {max(heal_s):.1f}",
-        f"{again} of {len(judged)}",
-        f"{as_good} of {len(judged)}",
+        f"{again} of {len(judged)}" if judged else "-",
+        f"{as_good} of {len(judged)}" if judged else "-",
         f"{sum(broken)}" if broken else "-",
     ]
 
@@ -106,3 +113,27 @@ def curve() -> Rows:
             ]
         )
     return [head, *rows]
+
+
+def partitions() -> Rows:
+    """What a partition of the air does, from the lines that `scripts/partitions.py` has printed."""
+    found = _lines("partitions")
+    head = [
+        "times (flights)", "one planner in each part after 3 s", "after 10 s", "one for all 3 s after the air is whole",
+        "who found what is known to all by then", "least distance [m]",
+    ]  # fmt: skip
+
+    def planned(after_s: str) -> str:
+        return f"{sum(all(planners == 1 for _, planners in one['parts'][after_s]) for one in found)}"
+
+    return [
+        head,
+        [
+            f"{len(found)} ({len({one['seed'] for one in found})})",
+            planned("3"),
+            planned("10"),
+            f"{sum(one['merged']['3'] == 1 for one in found)}",
+            f"{sum(not one['unknown']['3'] for one in found)}",
+            f"{min(one['least_m'] for one in found)}",
+        ],
+    ]

@@ -8,8 +8,8 @@
     away      a UAV that this one has not heard itself for long, or that may be out of its reach, is lost only after
               much longer, because news take a second a hop: then it is cut off with a part of the swarm
 
-Whoever finds by its own receiver that a UAV is lost floods its roll at once. So all UAVs of a part agree soon on who is
-lost, within a second a hop if that flood is lost, without a leader.
+Whoever finds by its own receiver that a UAV is lost, or back, floods its roll at once. So all UAVs of a part agree soon
+on who is lost, within a second a hop if that flood is lost, without a leader.
 """
 
 from collections.abc import Collection
@@ -48,12 +48,12 @@ class RollCall:
         self.parted: Collection[int] = ()
         """The UAVs to which no way leads any more, by the radio: they are lost, or in another part of the swarm."""
         self.has_news = False
-        """True once this UAV itself has found somebody lost, or falls, until the caller has told all of it."""
+        """True once this UAV itself has found somebody lost or back, or falls, until the caller has told all of it."""
 
     def on_hello(self, node: int, *, now_ns: int, falls: bool = False) -> None:
         """A neighbor was heard; `falls`: its hello says that it falls from the sky."""
         self._neighbor_ns[node] = now_ns
-        self.has_news |= falls and node not in self.lost
+        self.has_news |= falls != (node in self.lost)  # it falls, or is back
         self._take(node, now_ns // ROLL_NS, lost=falls, now_ns=now_ns)
 
     def on_roll(self, roll: Roll, plan: Search | None, *, now_ns: int) -> None:

@@ -181,6 +181,7 @@ def test_a_neighbor_whose_radio_falls_silent_is_lost_before_a_hello_is_missed_an
     assert not call.has_news
     call.on_hello(2, now_ns=13 * S)
     assert not call.lost
+    assert call.has_news, "all are told that it is back"
 
 
 def test_who_is_lost_from_afar_takes_nothing_from_the_news_of_a_silent_neighbor() -> None:

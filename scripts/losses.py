@@ -235,10 +235,12 @@ def judged(flight: Flight, copy: Copy) -> dict[str, Any]:
     losses, every_s, to_end = copy
     lost, torn = {loss.node for loss in losses}, flight.torn(losses, from_ns=losses[0].at_ns)
     heal_s = []
-    for loss in losses if every_s else losses[:1]:
-        end_ns = loss.at_ns
+    for rank, loss in enumerate(losses if every_s else losses[:1]):
+        end_ns, until_ns = loss.at_ns, loss.at_ns + round(_BEGINS_S * S)
+        if every_s and rank + 1 < len(losses):
+            until_ns = min(until_ns, losses[rank + 1].at_ns - 1)  # what begins later is of the next one
         for t_ns, is_torn in torn:
-            counts = t_ns - loss.at_ns <= _BEGINS_S * S or t_ns - end_ns <= _APART_S * S
+            counts = t_ns <= until_ns or (end_ns > loss.at_ns and t_ns - end_ns <= _APART_S * S)
             if t_ns >= loss.at_ns and is_torn and counts:
                 end_ns = t_ns + S // 10
         heal_s.append(round((end_ns - loss.at_ns) / S, 1))

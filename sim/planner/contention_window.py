@@ -36,12 +36,15 @@ def room_ns(window_ns: int) -> int:
 
 
 def hellos_ns(scenario: Scenario, adjacency: Adjacency) -> int:
-    """The airtime of the hellos of one superframe, where the most nodes are within two hops of each other."""
+    """The airtime of the hellos of one superframe, one a node at most, where the most nodes are within two hops of
+    each other.
+    """
     every_ns = seconds_to_ns(scenario.routing.hello_interval_s)
     if not every_ns or not adjacency:
         return 0
     crowd = 1 + max(map(len, two_hop(adjacency).values()))
-    return crowd * scenario.clusters.period_ns * contended_ns(scenario.radio, _HELLO_BYTES) // every_ns
+    period_ns = scenario.clusters.period_ns
+    return crowd * contended_ns(scenario.radio, _HELLO_BYTES) * period_ns // max(every_ns, period_ns)
 
 
 def least_ms(needed_ns: int) -> int:

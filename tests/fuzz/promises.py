@@ -3,7 +3,8 @@
     python tests/fuzz/promises.py 500 --seed 1
 
 A line per setting that broke a promise; the exit status is 1 if one did. Drawn are the number of UAVs, their grid,
-rates, loads, leads, protocols with bounds, and motion to 20 m/s: none, in formation, or to random waypoints.
+rates, loads, leads, protocols with bounds, motion to 20 m/s (none, in formation, or to random waypoints), clocks that
+drift, and long superframes that are nearly full.
 """
 
 import argparse
@@ -23,7 +24,7 @@ _DURATION_S, _WARMUP_S, _DRAIN_S, _LIFETIME_S = 26, 8, 8, 8
 def drawn(numbers: random.Random) -> dict[str, Any]:
     """The tables of one scenario."""
     count = numbers.randint(4, 28)
-    payload = numbers.randint(40, 500)
+    payload = numbers.randint(64, 500)
     in_rounds = numbers.random() < 0.6
     model = numbers.choice(["static", "static", "formation", "random_waypoint"])
     standard, rate = numbers.choice([("b", 2), ("b", 5.5), ("b", 11), ("g", 6), ("g", 24), ("g", 54)])
@@ -59,6 +60,13 @@ def drawn(numbers: random.Random) -> dict[str, Any]:
         tree["clusters"] = {
             "relay": "scheduled", "count": count - 1, "flooding_period_s": numbers.uniform(0.3, 1.5), "guard_ms": 1,
         }  # fmt: skip
+        if numbers.random() < 0.4:
+            tree["clusters"] |= {"flooding_period_s": numbers.uniform(1.5, 4), "contention_ms": 20}
+            tree["routing"]["hello_interval_s"] = numbers.uniform(0.5, 2)
+            tree["traffic"]["interval_s"] = numbers.uniform(0.08, 0.5)
+    if numbers.random() < 0.3:
+        tree["clock"] = {"sync": "beacons", "offset_ms": numbers.uniform(0, 50), "drift_ppm": numbers.uniform(0, 20)}
+        tree["rounds" if in_rounds else "clusters"]["turn_slack_us"] = 400
     return tree
 
 

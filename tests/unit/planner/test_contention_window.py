@@ -12,15 +12,18 @@ LINE = within_range({NodeId(i): Enu(200.0 * i, 0.0, 0.0) for i in range(1, 8)}, 
 
 
 def test_those_within_two_hops_count_with_what_each_says_in_a_superframe() -> None:
-    """Five nodes, two hellos each: 137 + 64 bytes at 11 Mb/s and the preamble, DIFS, a mean backoff of 7 / 2 slots."""
-    scenario = catalog.find("clusters", ["clusters.flooding_period_s=2", "routing.hello_interval_s=1"])
-    assert hellos_ns(scenario, LINE) == pytest.approx(5 * 2 * (192 + 147 + 50 + 70) * 1000, rel=0.01)
+    """Five nodes, one hello each although two fall due, or half a one: 137 + 64 bytes at 11 Mb/s, the preamble, DIFS,
+    and a mean backoff of 7 / 2 slots.
+    """
+    for hello_s, each in ((1, 1), (4, 0.5)):
+        scenario = catalog.find("clusters", ["clusters.flooding_period_s=2", f"routing.hello_interval_s={hello_s}"])
+        assert hellos_ns(scenario, LINE) == pytest.approx(5 * each * (192 + 147 + 50 + 70) * 1000, rel=0.01)
 
 
-@pytest.mark.parametrize(("hello_s", "fits"), [(1.0, False), (2.0, True)])
-def test_a_window_that_is_too_short_is_told_with_what_it_needs(hello_s: float, *, fits: bool) -> None:
+@pytest.mark.parametrize(("rate_mbps", "fits"), [(1, False), (11, True)])
+def test_a_window_that_is_too_short_is_told_with_what_it_needs(rate_mbps: float, *, fits: bool) -> None:
     keys = ["clusters.flooding_period_s=4", "clusters.contention_ms=20", "radio.cw_min=1"]
-    scenario = catalog.find("clusters", [*keys, f"routing.hello_interval_s={hello_s}"])
+    scenario = catalog.find("clusters", [*keys, f"radio.rate_mbps={rate_mbps}"])
     places = dict(zip(scenario.node_ids, positions(scenario), strict=True))
     adjacency = within_range(places, range_m=scenario.radio.range_m)
     said = list(too_short(scenario, adjacency))

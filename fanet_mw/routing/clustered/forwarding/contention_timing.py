@@ -1,10 +1,15 @@
 """When a frame that contends may start: after a random jitter; if turns are in force, only in a contention window."""
 
 from collections.abc import Callable
+from typing import Final
 
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 
 Random = Callable[[], float]
+_SHARE: Final = 4
+"""The data of one node take this part of a window at most: what is more would be sent beyond it, into turns."""
+_WINDOWS: Final = 256
+"""More windows than lie ahead of a full queue."""
 
 
 class ContentionTiming:
@@ -20,6 +25,8 @@ class ContentionTiming:
         The attribute itself is None in a protocol without turns."""
         self.most_jitter_ns: int | None = None
         """The longest jitter; None if there is no limit."""
+        self._used_ns: dict[int, int] = {}
+        """The airtime of this node's data in windows, by the starts of their superframes."""
 
     def start_ns(self, *, due_ns: int, now_ns: int, jitter_ns: int = 0) -> int:
         """The earliest start of a frame that was to be announced at `due_ns`, with a jitter of up to `jitter_ns`.
@@ -41,3 +48,26 @@ class ContentionTiming:
         """A random instant from `from_ns` on, at which a frame is to be announced that then contends at once."""
         jitter_ns = 0 if self.most_jitter_ns is None else int(self._jitter() * self.most_jitter_ns)
         return self.not_before(from_ns + jitter_ns + self._lead_ns) - self._lead_ns
+
+    def has_room(self, start_ns: int, airtime_ns: int) -> bool:
+        """Count a frame of data to the window in which it starts; False if this node has filled its share of that."""
+        turns = None if self.turns_at is None else self.turns_at(start_ns)
+        if turns is None:
+            return True
+        window_ns = turns.superframe_start_ns(start_ns)
+        used_ns = self._used_ns.get(window_ns, 0)
+        if used_ns and used_ns + airtime_ns > turns.contention_ns // _SHARE:
+            return False
+        self._used_ns[window_ns] = used_ns + airtime_ns
+        if len(self._used_ns) > _WINDOWS:
+            del self._used_ns[min(self._used_ns)]
+        return True
+
+    def with_room(self, start_ns: int, airtime_ns: int) -> int:
+        """The earliest start of a frame of data that is due, in the first window in which it has room."""
+        start_ns = self.not_before(start_ns)
+        while not self.has_room(start_ns, airtime_ns):
+            turns = None if self.turns_at is None else self.turns_at(start_ns)
+            assert turns is not None, "only windows can be full"
+            start_ns = turns.contending_ns(turns.superframe_start_ns(start_ns) + turns.contention_ns, self._window)
+        return start_ns

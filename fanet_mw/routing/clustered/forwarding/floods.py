@@ -8,6 +8,7 @@ parts decide whether and when a node floods; this part carries it out.
 from collections.abc import Sequence
 from typing import Final
 
+from fanet_mw.airtime import longest_access_ns
 from fanet_mw.node.contract import Port
 from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.packet import Packet
@@ -49,9 +50,13 @@ class Floods:
         return packet
 
     def contend_again(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
-        """Transmit a packet that a neighbor has missed, which was due at `due_ns`, as soon as it may contend."""
-        if self._goes_on(packet):  # a packet that goes no farther needs no instant
-            start_ns = self._contention.start_ns(due_ns=due_ns, now_ns=now_ns)
+        """Transmit a packet that a neighbor has missed, which was due at `due_ns`, as soon as it may contend, unless
+        the window is full: a neighbor that lacks it still will say so again.
+        """
+        if not self._goes_on(packet):  # a packet that goes no farther needs no instant
+            return
+        start_ns = self._contention.start_ns(due_ns=due_ns, now_ns=now_ns)
+        if self._contention.has_room(start_ns, longest_access_ns(len(packet.frame), self._port.scenario.radio)):
             self._port.transmit_together([packet], flags=FLAG_FLOOD, at_ns=(start_ns,))
 
     def begin(self, packets: Sequence[Packet], *, start_ns: int, again_ns: Sequence[int] = ()) -> None:

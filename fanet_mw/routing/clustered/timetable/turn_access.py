@@ -12,6 +12,7 @@ relay, and a turn for one hop is sooner free than one for a flood.
 from collections.abc import Mapping, Sequence
 from typing import Final
 
+from fanet_mw.airtime import longest_access_ns
 from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port
 from fanet_mw.node.duplicates import key_of_packet
@@ -179,7 +180,8 @@ class TurnAccess:
         if self._roots.has_turn(now_ns=now_ns):
             self._let_out(packet, now_ns=now_ns)
         else:
-            start_ns = self._contention.not_before(start_ns)
+            access_ns = longest_access_ns(len(packet.frame), self._port.scenario.radio)
+            start_ns = self._contention.with_room(start_ns, access_ns)
             self._slots.forward(packet, start_ns=start_ns, now_ns=now_ns, tries=tries)
 
     def _let_out(self, packet: Packet, *, last: bool = False, now_ns: int) -> None:

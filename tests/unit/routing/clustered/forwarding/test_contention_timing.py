@@ -1,6 +1,7 @@
 """The instants from which frames without a turn may go."""
 
 from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTiming
+from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.units import MS
 
 LEAD_NS, DUE_NS = 20 * MS, 1000 * MS
@@ -24,3 +25,26 @@ def test_a_process_that_was_woken_late_announces_the_same_instant_as_long_as_it_
 
 def test_a_process_that_was_woken_after_the_instant_announces_no_instant_in_the_past() -> None:
     assert start_ns(late_ns=2 * LEAD_NS) == DUE_NS + 2 * LEAD_NS
+
+
+def in_windows(*, window: float = 0.0) -> ContentionTiming:
+    """Windows of 20 ms every 500 ms."""
+    contention = ContentionTiming(lead_ns=0, jitter=lambda: 0.0, window=lambda: window)
+    contention.turns_at = lambda _: Turns(0, 500 * MS, 20 * MS, 1 * MS, 480)
+    return contention
+
+
+def test_a_quarter_of_a_window_is_for_one_nodes_data_and_the_rest_goes_later() -> None:
+    contention = in_windows()
+    assert [contention.with_room(400 * MS, 2 * MS) // MS for _ in range(5)] == [500, 500, 1000, 1000, 1500]
+
+
+def test_what_a_neighbor_will_ask_for_again_is_left_out_of_a_full_window() -> None:
+    contention = in_windows()
+    assert [contention.has_room(501 * MS, 2 * MS) for _ in range(3)] == [True, True, False]
+    assert contention.has_room(1001 * MS, 2 * MS)
+
+
+def test_a_frame_that_is_longer_than_the_share_has_a_window_for_itself() -> None:
+    contention = in_windows()
+    assert [contention.with_room(400 * MS, 9 * MS) // MS for _ in range(3)] == [500, 1000, 1500]

@@ -20,18 +20,25 @@ before the turn and after the flood.
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 
 def done_ns(starts_ns: Sequence[int], floods_ns: Sequence[int], *, period_ns: int) -> list[int]:
     """done(n) for n = 1 up to the number of turns; for each turn of a superframe, ascending, its start and the duration
     of a flood that begins in it.
     """
+    return list(_done_ns(tuple(starts_ns), tuple(floods_ns), period_ns))
+
+
+@lru_cache(maxsize=1024)
+def _done_ns(starts_ns: tuple[int, ...], floods_ns: tuple[int, ...], period_ns: int) -> tuple[int, ...]:
+    """All nodes of a run ask for the same few, and each takes the square of the number of turns."""
     count = len(starts_ns)
     horizon = [later * period_ns + start for later in range(3) for start in starts_ns]
-    return [
+    return tuple(
         max(horizon[begin + n] - horizon[begin] + floods_ns[(begin + n) % count] for begin in range(count))
         for n in range(1, count + 1)
-    ]
+    )
 
 
 def worst_ns(completions_ns: Sequence[int], *, period_ns: int, interval_ns: int, together: int = 1) -> int | None:

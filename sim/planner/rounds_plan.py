@@ -43,7 +43,6 @@ def judge_rounds(
     near = within_range(at, range_m=scenario.radio.range_m, reaches=scenario.reaches)
     ways = [levels(near, node) for node in at]
     hops = max(max(hops_to.values()) for hops_to in ways)
-    bound_ns = None if law.loses_frames else law.over_ns(hops)
     urgent = {
         name: each for name, each in scenario.traffic_classes.items() if each.priority != "bulk" or not timing.slots
     }
@@ -51,6 +50,11 @@ def judge_rounds(
         len(sources_of(scenario, name)) / each.interval_s * (each.longest_bytes + HEADER_BYTES)
         for name, each in urgent.items()
     )
+    used = sum(
+        len(sources_of(scenario, name)) / each.interval_s * law.turns_of(each.longest_bytes + HEADER_BYTES)
+        for name, each in urgent.items()
+    ) * (timing.period_ns / S)  # fmt: skip
+    bound_ns = None if law.loses_frames else law.over_ns(hops, used=used)
     carried = timing.turn_bytes / (timing.period_ns / S)
     longest = max((each.longest_bytes + HEADER_BYTES for each in urgent.values()), default=0)
     bulk = {name: each for name, each in scenario.traffic_classes.items() if name not in urgent}

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from fanet_mw import wire
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.routing.rounds.bulk_slots import BulkSlots
-from fanet_mw.routing.rounds.round_timing import RoundTiming
+from fanet_mw.routing.rounds.round_timing import InStep, RoundTiming
 from fanet_mw.routing.rounds.topology import Topology
 from fanet_mw.scenario import config
 from fanet_mw.units import BROADCAST, MS, NodeId, S
@@ -22,6 +22,7 @@ from fanet_mw.wire.rounds import (
     encode_heard,
     encode_held,
 )
+from sim.scenarios import catalog
 
 INSTANTS = st.integers(0, 10**13)
 
@@ -171,3 +172,20 @@ def test_a_statement_from_the_future_or_too_old_is_not_believed(short: int, epoc
     topology.hear([HeardNodes(2, short, 0b1)], now_ns=now_ns)
     age = (epoch + 1 - short) % 256 - 1
     assert (NodeId(2) in topology.hops(now_ns)) is (age <= 8)
+
+
+def test_a_frame_in_its_senders_turn_shows_that_both_keep_the_same_rounds() -> None:
+    scenario = catalog.find("rescue", ["clock.sync=beacons"])
+    timing = RoundTiming.of(scenario)
+    known = InStep(timing, certain=False)
+    begins_ns = timing.turn_start_ns(7, from_ns=S)
+    ends_ns = begins_ns + timing.turn_ns // 2
+    seven = 1 << 6
+    assert not known.among(-1), "nobody, before a frame was heard"
+    known.hear(7, ends_ns)
+    assert known.among(-1) == seven
+    known.hear(7, begins_ns + timing.nodes * timing.turn_ns)
+    assert known.among(-1) == seven, "among the slots a frame shows nothing"
+    known.hear(7, ends_ns - timing.turn_ns)
+    assert not known.among(-1), "its clock is behind by a turn"
+    assert InStep(timing, certain=True).among(seven) == seven

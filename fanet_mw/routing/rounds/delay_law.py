@@ -1,24 +1,27 @@
 """The delay bound of packets in turns: rounds x hops, with what surrounds each hop.
 
     hop = period + turn + lead + handover
-    D   = ((h + margin) * hop + ceil(B / room) * period) / (1 - urgent)
+    D   = ((h + margin) * hop + (1 + used) * ceil(B / room) * period) / (1 - urgent)
 
 A packet that was heard is announced one lead before the next own turn, at most one period later; its frame ends within
 the turn, and is handed over. `h` is the greatest distance that the node knows to another; `margin` is for a topology
 that changes meanwhile. All urgent packets that are under way together, `B` bytes, delay each other once: every node
 serves them at the same rate, `room` bytes of a frame per round, so what waited for one node's turn does not wait
 again for the next one's (tandem of equal servers; Le Boudec and Thiran, Network Calculus, 1.4.3). More urgent packets
-that come later overtake it on its way: `urgent` is the share of `room` that was theirs lately.
+that come later overtake it on its way: `urgent` is the share of turns that was theirs lately. Packets alike of other
+origins, which each node has heard in another order, delay it again in so far as turns are full: `used` is the share
+that they use as a rule (by trial: without it 17 of 3,600 deliveries over a line of 25 nodes came up to 8 % too late).
 Assumed: no frame is lost; over any channel but `range` a likely delay is stated instead (`LikelyDelay`). None is
 stated while clocks may be further apart than the slack of turns holds, while more waits for turns, everywhere alike,
-than three quarters of `rounds.burst_bytes`, or while no way has been found yet to a node that may only just have
-started. A bound does not apply to nodes without a way, and counts on links that will last only (`lasting_links.py`).
+than three quarters of `rounds.burst_bytes`, or while no way has been found yet
+to a node that may only just have started. A bound does not apply to nodes without a way, and counts on links that will
+last only (`lasting_links.py`).
 What waits follows from what was heard, because all nodes hear the same packets and serve them at the same rate (a leaky
 bucket).
 """
 
-from collections import Counter
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from fanet_mw.routing.rounds.round_timing import RoundTiming
@@ -36,6 +39,8 @@ _SILENT_HELLOS: Final = 1.6
 _MOST_USED: Final = 0.75
 _MOST_URGENT: Final = 0.5
 """No bound is stated while more urgent packets use a greater share of turns."""
+_WINDOWS: Final = 2
+"""Of so many windows, about, what usually comes is the mean."""
 _KEPT: Final = 0.997
 """The share of received packets whose ratio is not exceeded; the rest of what may be missing never arrives."""
 _FEWEST: Final = 300
@@ -74,14 +79,16 @@ class DelayLaw:
         """The instant for which that is known."""
         self._window_ns = max(self._burst_ns, timing.period_ns)
         self._window = 0
-        self._came: Counter[int] = Counter()
-        self._came_before: Counter[int] = Counter()
-        """The bytes of each priority that came in the present window and in the one before."""
+        self._came: defaultdict[int, float] = defaultdict(float)
+        self._came_before: Mapping[int, float] = {}
+        """The turns that packets of each priority fill which came in the present window and in the one before."""
+        self._usually: dict[int, float] = {}
+        """The same as a mean over many windows."""
 
     def count(self, size: int, *, priority: int, now_ns: int) -> None:
         """A packet for turns came, own or another node's."""
         self._turn_window(now_ns)
-        self._came[priority] += size
+        self._came[priority] += self.turns_of(size)
         self._serve(now_ns)
         self._waiting_bytes += size
         self._greatest = max(self._greatest, size)
@@ -102,18 +109,26 @@ class DelayLaw:
     def _turn_window(self, now_ns: int) -> None:
         window = now_ns // self._window_ns
         if window != self._window:
-            self._came_before = self._came if window == self._window + 1 else Counter()
-            self._came, self._window = Counter(), window
+            for priority in self._usually.keys() | self._came.keys():
+                usual = self._usually.get(priority, 0.0)
+                self._usually[priority] = usual + (self._came[priority] - usual) / _WINDOWS
+            self._came_before = self._came if window == self._window + 1 else {}
+            self._came, self._window = defaultdict(float), window
 
     def _urgent_share(self, priority: int, now_ns: int) -> float:
         """The share of turns that packets more urgent than `priority` have used lately."""
         self._turn_window(now_ns)
         passed = now_ns % self._window_ns / self._window_ns
         before, came = (
-            sum(size for other, size in counted.items() if other < priority)
+            sum(turns for other, turns in counted.items() if other < priority)
             for counted in (self._came_before, self._came)
         )
-        return max(before, (1 - passed) * before + came) / (self._room * self._window_ns / self._timing.period_ns)
+        return max(before, (1 - passed) * before + came) / (self._window_ns / self._timing.period_ns)
+
+    def _used_share(self, priority: int) -> float:
+        """The share of turns that packets not less urgent than `priority` use as a rule."""
+        used = sum(turns for other, turns in self._usually.items() if other <= priority)
+        return used * self._timing.period_ns / self._window_ns
 
     def bound_ns(self, topology: Topology, *, priority: int, clock_error_ns: int, now_ns: int) -> int | None:
         """The bound for a packet that is handed over now, if all clocks are within `clock_error_ns`; None if none can
@@ -129,11 +144,17 @@ class DelayLaw:
         hops, urgent = topology.hops(now_ns), self._urgent_share(priority, now_ns)
         if len(hops) == 1 or urgent > _MOST_URGENT:
             return None
-        return round(self.over_ns(max(hops.values())) / (1 - urgent))
+        return round(self.over_ns(max(hops.values()), used=self._used_share(priority)) / (1 - urgent))
 
-    def over_ns(self, hops: int) -> int:
-        """The bound over so many hops if nothing more urgent comes and no frame is lost."""
-        return self.way_ns(hops) + self._burst_ns
+    def over_ns(self, hops: int, *, used: float = 0.0) -> int:
+        """The bound over so many hops if nothing more urgent comes and no frame is lost; packets alike use a share of
+        turns.
+        """
+        return self.way_ns(hops) + round((1 + used) * self._burst_ns)
+
+    def turns_of(self, size: int) -> float:
+        """The turns that a packet fills, beside others of its size."""
+        return 1 / max(1, self._room // size)
 
     def way_ns(self, hops: int) -> int:
         """The same if nothing else waits."""

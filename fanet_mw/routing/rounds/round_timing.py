@@ -62,6 +62,15 @@ class RoundTiming(NamedTuple):
         offset_ns = (node - 1) * self.turn_ns
         return -((offset_ns - from_ns) // self.period_ns) * self.period_ns + offset_ns
 
+    def keeps(self, node: int, end_ns: int) -> bool | None:
+        """True if a frame of a node that ended at an instant was in that node's turn, False if it was in another one;
+        None among the slots.
+        """
+        within_ns = (end_ns - 1) % self.period_ns
+        if within_ns >= self.nodes * self.turn_ns:
+            return None
+        return within_ns // self.turn_ns == node - 1
+
     def slot_start_ns(self, number: int) -> int:
         """The start of a bulk slot."""
         round_number, slot = divmod(number, self.slots)
@@ -77,3 +86,28 @@ class RoundTiming(NamedTuple):
         within_ns = (from_ns - self.nodes * self.turn_ns) % self.period_ns
         usable_ns = max(1, self.slots - 2) * self.slot_ns
         return from_ns if within_ns < usable_ns else from_ns + self.period_ns - within_ns
+
+
+class InStep:
+    """Which neighbors of a node keep the rounds that it keeps, by when their frames of turns came.
+
+    A node whose time is not that of the swarm yet, or no more, sends in turns of others. No bound can count on it.
+    """
+
+    def __init__(self, timing: RoundTiming, *, certain: bool) -> None:
+        """`certain`: all clocks are exact."""
+        self._timing = timing
+        self._keeping = -1 if certain else 0
+        """The nodes in step, bit i for node i + 1."""
+        self._certain = certain
+
+    def hear(self, node: int, end_ns: int) -> None:
+        """A frame that belongs into a node's turn has ended."""
+        keeps = None if self._certain else self._timing.keeps(node, end_ns)
+        if keeps is not None:
+            own = 1 << (node - 1)
+            self._keeping = self._keeping | own if keeps else self._keeping & ~own
+
+    def among(self, nodes: int) -> int:
+        """Those of a set of nodes that are in step."""
+        return nodes & self._keeping

@@ -31,7 +31,7 @@ from fanet_mw.routing.rounds.bulk_slots import BulkSlots
 from fanet_mw.routing.rounds.delay_law import MOST_HOPS, DelayLaw, LikelyDelay
 from fanet_mw.routing.rounds.lasting_links import LastingLinks
 from fanet_mw.routing.rounds.one_way import OneWay
-from fanet_mw.routing.rounds.round_timing import RoundTiming
+from fanet_mw.routing.rounds.round_timing import InStep, RoundTiming
 from fanet_mw.routing.rounds.spreading import Spreading
 from fanet_mw.routing.rounds.topology import Topology
 from fanet_mw.trace import LIKELY_SHARE, BoundExcludes, BoundStated, LikelyStated
@@ -124,6 +124,7 @@ class RoundFlooding(RoutingProtocol):
         self._random = port.stream("rounds").random
         self._heard_ns: dict[NodeId, int] = {}
         """The instant at which each neighbor was last heard."""
+        self._in_step = InStep(timing, certain=not scenario.clock.modelled)
         self._one_way = OneWay(port, timing, self._topology, self._heard_ns)
         self._blind_ns = self._lead_ns + radio.handover_ns
         """The time that passes from the decision to send until others know of it, airtime and waiting left out."""
@@ -187,6 +188,7 @@ class RoundFlooding(RoutingProtocol):
         if young:
             self._hears(src, now_ns)
         if header.kind == Kind.ROUND:
+            self._in_step.hear(src, reception.end_ns)
             if not young:
                 self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
                 return
@@ -491,7 +493,7 @@ class RoundFlooding(RoutingProtocol):
 
     def _stayers(self, now_ns: int) -> int:
         """The neighbors with which this node has links that will last."""
-        near = self._neighbors(now_ns)
+        near = self._in_step.among(self._neighbors(now_ns))
         if self._lasting is None:
             return near
         own = Motion(self._port.position, self._port.velocity, now_ns)
@@ -529,6 +531,7 @@ class RoundFlooding(RoutingProtocol):
 
     def on_hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         self._hears(reception.src, now_ns)
+        self._in_step.hear(reception.src, reception.end_ns)
         if self._lasting is not None:
             told = motion_in(packet.frame, own=self._port.node, now_ns=now_ns, place=self._place)
             if told is not None:

@@ -1,5 +1,7 @@
 """Delays in rounds: bounds beside more urgent packets, and likely delays from what packets of others took."""
 
+import pytest
+
 from fanet_mw.routing.rounds.delay_law import DelayLaw, LikelyDelay
 from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.routing.rounds.topology import Topology
@@ -43,13 +45,19 @@ def test_what_is_long_ago_is_forgotten() -> None:
     assert likely.over_ns(WAY_NS) == 62
 
 
-def test_what_more_urgent_packets_use_of_the_turns_makes_a_bound_longer() -> None:
+def of_two() -> tuple[DelayLaw, Topology]:
+    """The law at one of two nodes that hear each other."""
     two = ["routing.protocol=rounds", "nodes.count=2", "clusters.count=1", "traffic.sources=1"]
     scenario = catalog.find("clusters", two)
     law = DelayLaw(RoundTiming.of(scenario), scenario)
     topology = Topology(NodeId(1), count=2, epoch_ns=law.epoch_ns, lifetime_ns=10 * S)
     topology.hear([HeardNodes(2, 0, 1, often=False)], now_ns=0)
     topology.state(2, often=False, now_ns=0)
+    return law, topology
+
+
+def test_what_more_urgent_packets_use_of_the_turns_makes_a_bound_longer() -> None:
+    law, topology = of_two()
 
     def stated(priority: int) -> int | None:
         return law.bound_ns(topology, priority=priority, clock_error_ns=0, now_ns=S)
@@ -63,3 +71,22 @@ def test_what_more_urgent_packets_use_of_the_turns_makes_a_bound_longer() -> Non
     assert before[0] is not None
     assert 1.02 * before[0] < report < 2 * before[0]
     assert warning == before[1], "nothing is more urgent than a warning"
+
+
+def test_packets_alike_make_a_bound_longer_by_the_share_of_turns_that_they_use() -> None:
+    """Each has its turn before the next one comes, so nothing waits here; elsewhere they meet in another order."""
+    found_ns = {}
+    for share in (0.1, 0.3):
+        law, topology = of_two()
+        every_ns = round(law._timing.period_ns / share)
+        for number in range(100):
+            law.count(law._room * 5 // 8, priority=PRIORITY_REPORT, now_ns=number * every_ns)
+        now_ns = 99 * every_ns + every_ns // 2
+        topology.hear([HeardNodes(2, now_ns // law.epoch_ns % 256, 1, often=False)], now_ns=now_ns)
+        topology.state(2, often=False, now_ns=now_ns)
+        found_ns[share], warning_ns = (
+            law.bound_ns(topology, priority=priority, clock_error_ns=0, now_ns=now_ns)
+            for priority in (PRIORITY_REPORT, PRIORITY_SAFETY)
+        )
+        assert warning_ns == law.over_ns(1), "a warning waits for none of them"
+    assert found_ns[0.3] - found_ns[0.1] == pytest.approx(0.2 * law._burst_ns, rel=0.2)

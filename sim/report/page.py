@@ -55,7 +55,7 @@ _TABLE_1: Final = Rows(
         (
             "node movement speed",
             "5-10 m/s",
-            "1-20 m/s in figure 8; 7.5 m/s in figures 9 and 10, beside it at rest; 0 in figure 11; 7.5 m/s, to a "
+            "1-20 m/s in figure 8; 7.5 m/s in figures 9 to 11, beside it at rest; 7.5 m/s, to a "
             "survivor 5-10 m/s by UAV, in figure 12",
             "a trend needs more than two speeds",
         ),
@@ -100,7 +100,7 @@ _UNSAID: Final = Rows(
             "each use has settings of its own",
         ),
         (
-            "mobility, figures 8 to 10",
+            "mobility, figures 8 to 11",
             "clusters in formation",
             "waypoints; a rigid formation",
             "relative motion not said",

@@ -158,15 +158,20 @@ class Topology:
         if self._arranged_for == self.changes:
             return
         self._arranged_for = self.changes
-        ring = reached = 1 << (self._node - 1)
-        self._rings = []
-        while ring:
-            self._rings.append(ring)
-            ring = self._around(ring) & ~reached
-            reached |= ring
+        self._rings, reached = self._spread()
         since, away = self._unreached_ns, nodes_of(~reached & (1 << self._count) - 1)
         self._unreached_ns = {node: since.get(node, now_ns) for node in away}
         self._known |= reached
+
+    def _spread(self, without: int = 0) -> tuple[list[int], int]:
+        """The nodes that are so many hops away, by ways past others, and all of them together."""
+        rings, ring = list[int](), 1 << (self._node - 1)
+        reached = ring
+        while ring:
+            rings.append(ring)
+            ring = self._around(ring) & ~(reached | without)
+            reached |= ring
+        return rings, reached
 
     def hops(self, now_ns: int) -> Mapping[NodeId, int]:
         """The hops to each node to which a way is known, this node included."""
@@ -223,10 +228,7 @@ class Topology:
         passed = sum(1 << (node - 1) for node in without)
         if self._parted_for != (self.changes, passed):
             self._parted_for = self.changes, passed
-            ring = reached = 1 << (self._node - 1)
-            while ring:
-                ring = self._around(ring) & ~(reached | passed)
-                reached |= ring
+            _, reached = self._spread(passed)
             self._parted = nodes_of(self._known & ~reached)
         return self._parted
 

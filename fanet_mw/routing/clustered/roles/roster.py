@@ -173,9 +173,9 @@ class Roster:
         return {node: self._place(node, t_ns, now_ns) for node in sorted(self._motions)}
 
     def _place(self, node: NodeId, t_ns: int, now_ns: int) -> Enu:
-        motion, beside, here = self._motions[node], self._beside[node], self.own.at(now_ns)
+        motion, beside, here = self._motions[node], self._accompanied(node), self.own.at(now_ns)
         straight = motion.position_at(t_ns)
-        if beside is None or here is None or not alike(motion, beside):
+        if beside is None or here is None:
             return straight
         turned_ns = self.own.turned_ns(beside)
         if turned_ns is not None and now_ns - turned_ns > self._settled_ns:
@@ -188,14 +188,14 @@ class Roster:
 
     def is_turning(self, now_ns: int) -> bool:
         """True while it is not known which companions have turned with the leader."""
-        for node, motion in self._motions.items():
-            beside = self._beside[node]
-            if beside is None or not alike(motion, beside):
-                continue
-            turned_ns = self.own.turned_ns(beside)
-            if turned_ns is not None and now_ns - turned_ns <= self._settled_ns:
-                return True
-        return False
+        companions = (beside for node in self._motions if (beside := self._accompanied(node)) is not None)
+        turns_ns = (turned_ns for beside in companions if (turned_ns := self.own.turned_ns(beside)) is not None)
+        return any(now_ns - turned_ns <= self._settled_ns for turned_ns in turns_ns)
+
+    def _accompanied(self, node: NodeId) -> Motion | None:
+        """The leader's motion when a node with the same velocity joined; None if its velocity was another one."""
+        beside = self._beside[node]
+        return beside if beside is not None and alike(self._motions[node], beside) else None
 
     def velocities(self) -> Mapping[NodeId, Enu]:
         """The velocities of the nodes [m/s], by id."""

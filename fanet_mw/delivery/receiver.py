@@ -251,9 +251,7 @@ class Receiver:
         before = owed.get(number)
         wait_ns = RECEIPT_NS
         if outcome == MISSING and message is not None and message.came_ns == now_ns and not message.whole:
-            wait_ns = min(
-                self._gaps.wait_ns(origin), _MOST_PAUSE_NS
-            )  # a piece that was here already asks for a receipt
+            wait_ns = min(self._gaps.wait_ns(origin), _MOST_PAUSE_NS)  # an old piece asks for its receipt at once
         due_ns = now_ns + wait_ns + int(self._random.random() * _SPREAD_NS)
         if before is not None and before.receipt.outcome == outcome != MISSING:
             due_ns = min(due_ns, before.due_ns)

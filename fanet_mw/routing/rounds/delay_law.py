@@ -13,9 +13,8 @@ origins, which each node has heard in another order, delay it again in so far as
 that they use as a rule (by trial: without it 17 of 3,600 deliveries over a line of 25 nodes came up to 8 % too late).
 Assumed: no frame is lost; over any channel but `range` a likely delay is stated instead (`LikelyDelay`). None is
 stated while clocks may be further apart than the slack of turns holds, while more waits for turns, everywhere alike,
-than three quarters of `rounds.burst_bytes`, or while no way has been found yet
-to a node that may only just have started. A bound does not apply to nodes without a way, and counts on links that will
-last only (`lasting_links.py`).
+than three quarters of `rounds.burst_bytes`, or while no way has been found yet to a node that may only just have
+started. A bound does not apply to nodes without a way, and counts only on links that will last (`lasting_links.py`).
 What waits follows from what was heard, because all nodes hear the same packets and serve them at the same rate (a leaky
 bucket).
 """
@@ -40,7 +39,7 @@ _MOST_USED: Final = 0.75
 _MOST_URGENT: Final = 0.5
 """No bound is stated while more urgent packets use a greater share of turns."""
 _WINDOWS: Final = 2
-"""Of so many windows, about, what usually comes is the mean."""
+"""The smoothing of what usually comes: each window counts one in so many."""
 _KEPT: Final = 0.997
 """The share of received packets whose ratio is not exceeded; the rest of what may be missing never arrives."""
 _FEWEST: Final = 300
@@ -83,7 +82,7 @@ class DelayLaw:
         self._came_before: Mapping[int, float] = {}
         """The turns that packets of each priority fill which came in the present window and in the one before."""
         self._usually: dict[int, float] = {}
-        """The same as a mean over many windows."""
+        """The same, smoothed over the windows so far."""
 
     def count(self, size: int, *, priority: int, now_ns: int) -> None:
         """A packet for turns came, own or another node's."""

@@ -188,10 +188,10 @@ class RoundFlooding(RoutingProtocol):
         if young:
             self._hears(src, now_ns)
         if header.kind == Kind.ROUND:
-            self._in_step.hear(src, reception.end_ns)
             if not young:
                 self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
                 return
+            self._in_step.hear(src, reception.end_ns)
             self._on_round(packet, src, now_ns)
             return
         if header.kind == _DATA:

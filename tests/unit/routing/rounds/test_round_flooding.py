@@ -23,7 +23,7 @@ from fanet_mw.wire import (
 )
 from fanet_mw.wire.aggregation import unbundle
 from fanet_mw.wire.hello.digest import Digest
-from fanet_mw.wire.rounds import HeldPacket, decode_held
+from fanet_mw.wire.rounds import HeldPacket, decode_heard, decode_held
 
 OURS, NEAR, NEW = NodeId(2), NodeId(3), NodeId(4)
 MakeNode = Callable[..., Node]
@@ -170,3 +170,25 @@ def test_what_comes_before_a_late_wake_up_does_not_cost_the_turn_that_was_asked_
     run(node, turn_ns - 100 * MS)
     hear(node, 8, src=NEAR, at_ns=turn_ns - 90 * MS, priority=PRIORITY_REPORT)
     assert turn_ns in [each.start_ns for each in run(node, turn_ns - 80 * MS, from_ns=turn_ns - 90 * MS)]
+
+
+@pytest.mark.parametrize(("made_ns", "counts"), [(None, False), (1 * S, True)], ids=["fresh", "repeated later"])
+def test_who_sends_in_another_ones_turn_is_no_link_but_a_frame_that_somebody_repeats_shows_nothing(
+    make_node: MakeNode, made_ns: int | None, *, counts: bool
+) -> None:
+    node = make_node(**{"clock.sync": "beacons", "clock.drift_ppm": 10})
+    timing = RoundTiming.of(node.scenario)
+
+    def in_turn_of(other: NodeId, seq: int, *, from_ns: int, made_ns: int | None = None) -> int:
+        at_ns = timing.turn_start_ns(other, from_ns=from_ns) + timing.turn_ns // 2
+        hear(node, seq, src=NEAR, at_ns=at_ns, kind=Kind.ROUND, priority=PRIORITY_CONTROL, made_ns=made_ns)
+        return at_ns
+
+    run(node, 5 * S)
+    at_ns = in_turn_of(NEAR, 1, from_ns=5 * S)
+    run(node, at_ns + S, from_ns=at_ns)
+    at_ns = in_turn_of(NEAR, 2, from_ns=at_ns + S)
+    at_ns = in_turn_of(NEW, 3, from_ns=at_ns, made_ns=made_ns)
+    sent = run(node, at_ns + S, from_ns=at_ns)
+    told = [one for each in sent for packet in unbundle(each.frame) for one in decode_heard(packet) if one.node == OURS]
+    assert bool(told[-1].heard >> (NEAR - 1) & 1) == counts

@@ -136,7 +136,7 @@ class Clustered(RoutingProtocol):
         """Send a packet to its receiver, or flood it from here if no way is known."""
         parts = self.parts
         if not parts.one_way.send(packet, start_ns=start_ns, now_ns=now_ns):
-            parts.floods.contend_again(packet, due_ns=start_ns - self._lead_ns, now_ns=now_ns)
+            parts.floods.contend(packet, due_ns=start_ns - self._lead_ns, now_ns=now_ns)
 
     def most_packet_bytes(self, priority: int) -> int:
         return self.parts.access.most_packet_bytes(priority)

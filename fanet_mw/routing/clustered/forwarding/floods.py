@@ -56,8 +56,18 @@ class Floods:
         if not self._goes_on(packet):  # a packet that goes no farther needs no instant
             return
         start_ns = self._contention.start_ns(due_ns=due_ns, now_ns=now_ns)
-        if self._contention.has_room(start_ns, longest_access_ns(len(packet.frame), self._port.scenario.radio)):
+        if self._contention.has_room(start_ns, self._access_ns(packet)):
             self._port.transmit_together([packet], flags=FLAG_FLOOD, at_ns=(start_ns,))
+
+    def contend(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
+        """Flood a packet that was due at `due_ns` from here, in the first window with room: nobody will ask for it."""
+        if self._goes_on(packet):
+            due_ns = self._contention.start_ns(due_ns=due_ns, now_ns=now_ns)
+            start_ns = self._contention.with_room(due_ns, self._access_ns(packet))
+            self._port.transmit_together([packet], flags=FLAG_FLOOD, at_ns=(start_ns,))
+
+    def _access_ns(self, packet: Packet) -> int:
+        return longest_access_ns(len(packet.frame), self._port.scenario.radio)
 
     def begin(self, packets: Sequence[Packet], *, start_ns: int, again_ns: Sequence[int] = ()) -> None:
         """Begin the floods of several packets in one frame, which is transmitted at `start_ns` and repeated at later

@@ -46,17 +46,15 @@ def judge_rounds(
     urgent = {
         name: each for name, each in scenario.traffic_classes.items() if each.priority != "bulk" or not timing.slots
     }
-    offered = sum(
-        len(sources_of(scenario, name)) / each.interval_s * (each.longest_bytes + HEADER_BYTES)
+    packets = [  # how many a second, and how long they are
+        (len(sources_of(scenario, name)) / each.interval_s, each.longest_bytes + HEADER_BYTES)
         for name, each in urgent.items()
-    )
-    used = sum(
-        len(sources_of(scenario, name)) / each.interval_s * law.turns_of(each.longest_bytes + HEADER_BYTES)
-        for name, each in urgent.items()
-    ) * (timing.period_ns / S)  # fmt: skip
+    ]
+    offered = sum(rate * size for rate, size in packets)
+    used = sum(rate * law.turns_of(size) for rate, size in packets) * timing.period_ns / S
     bound_ns = None if law.loses_frames else law.over_ns(hops, used=used)
     carried = timing.turn_bytes / (timing.period_ns / S)
-    longest = max((each.longest_bytes + HEADER_BYTES for each in urgent.values()), default=0)
+    longest = max((size for _, size in packets), default=0)
     bulk = {name: each for name, each in scenario.traffic_classes.items() if name not in urgent}
     flooded = [name for name, each in bulk.items() if each.destination == "all"]
     rates: dict[NodeId, float] = defaultdict(float)
@@ -78,8 +76,10 @@ def judge_rounds(
     problems += clocks_apart(scenario, slack="rounds.turn_slack_us")
     if any(len(hops_to) < len(at) for hops_to in ways):
         problems.append("the nodes are not all connected at their starting positions")
-    if offered > carried:
-        problems.append(f"urgent packets of {offered:.0f} B/s are more than the {carried:.0f} B/s that turns carry")
+    if used > 1:
+        problems.append(
+            f"urgent packets of {offered:.0f} B/s need {used:.2f} turns of each node in a round, it has one"
+        )
     if deadline_ns is not None and (bound_ns is None or bound_ns > deadline_ns):
         problems.append(f"the bound is not within the deadline of {deadline_ns / MS:.0f} ms")
     feasible = not problems

@@ -30,6 +30,18 @@ def test_bulk_that_the_slots_of_rounds_carry_arrives_and_more_does_not(interval_
     assert (pdr > 0.999) == fits, (pdr, load)
 
 
+@pytest.mark.parametrize(("interval_s", "fits"), [(0.15, True), (0.09, False)])
+def test_urgent_packets_that_overfill_the_turns_though_their_bytes_do_not_are_no_plan(
+    interval_s: float, *, fits: bool
+) -> None:
+    """A turn of 700 bytes has room for one packet of 400 bytes."""
+    urgent = ("traffic.priority=report", "traffic.payload_bytes=400", "rounds.turn_bytes=700", "traffic.arrivals=cbr")
+    scenario, content, feasible = planned(*TWELVE, *urgent, f"traffic.interval_s={interval_s}", "rounds.bulk_share=0")
+    assert content["offered_bytes_per_s"] < content["carried_bytes_per_s"]
+    assert feasible == fits
+    assert (Result(simulate(scenario)).summary["pdr"] > 0.999) == fits
+
+
 def test_a_timetable_is_no_plan_for_uavs_that_move_among_each_other() -> None:
     walking = ("nodes.count=12", "clusters.count=11", "traffic.sources=11", "mobility.speed_m_s=5", "world.area_m=900")
     _, content, feasible = planned(*walking, "mobility.model=random_waypoint")

@@ -5,7 +5,9 @@ and whenever a node was started. A node states at the beginning of an epoch whet
 per second in any case. A link counts if both its ends state it.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from functools import reduce
+from operator import or_
 from typing import Final, NamedTuple
 
 from fanet_mw.graph.connected_dominating_set import dominates
@@ -62,7 +64,7 @@ class Topology:
         """The nodes to which there has been a way."""
         self._parted: list[NodeId] = []
         self._parted_for = (-1, 0)
-        """The state of the links for which those were found to whom no way leads any more, and who is left out."""
+        """The state of the links, and the nodes left out, for which the parted nodes were found."""
         self._rivals: list[tuple[NodeId, bool]] = []
         self._rivals_for: tuple[int, int] | None = None
         """The neighbors, and the state of what is known, for which the rivals were found."""
@@ -158,20 +160,19 @@ class Topology:
         if self._arranged_for == self.changes:
             return
         self._arranged_for = self.changes
-        self._rings, reached = self._spread()
+        self._rings = list(self._rings_from(self._node))
+        reached = reduce(or_, self._rings)
         since, away = self._unreached_ns, nodes_of(~reached & (1 << self._count) - 1)
         self._unreached_ns = {node: since.get(node, now_ns) for node in away}
         self._known |= reached
 
-    def _spread(self, without: int = 0) -> tuple[list[int], int]:
-        """The nodes that are so many hops away, by ways past others, and all of them together."""
-        rings, ring = list[int](), 1 << (self._node - 1)
-        reached = ring
+    def _rings_from(self, start: int, *, without: int = 0) -> Iterator[int]:
+        """The nodes that are 0, 1, 2 and so on hops away from one, by ways past others."""
+        ring = reached = 1 << (start - 1)
         while ring:
-            rings.append(ring)
+            yield ring
             ring = self._around(ring) & ~(reached | without)
             reached |= ring
-        return rings, reached
 
     def hops(self, now_ns: int) -> Mapping[NodeId, int]:
         """The hops to each node to which a way is known, this node included."""
@@ -202,11 +203,7 @@ class Topology:
 
     def _toward(self, destination: NodeId) -> int:
         own = self.links[self._node]
-        ring = reached = 1 << (destination - 1)
-        while ring and not ring & own:
-            ring = self._around(ring) & ~reached
-            reached |= ring
-        return ring & own
+        return next((ring & own for ring in self._rings_from(destination) if ring & own), 0)
 
     def _around(self, nodes: int) -> int:
         """The nodes with links to some of these."""
@@ -221,14 +218,14 @@ class Topology:
         return node not in self._unreached_ns
 
     def parted(self, now_ns: int, *, without: Collection[int] = ()) -> Sequence[NodeId]:
-        """The nodes to which there was a way, and is none any more; none leads over those `without` whom it is to be,
-        because they are known to be lost before their neighbors state that.
+        """The nodes to which there was a way, and is none any more. Ways over nodes in `without` do not count, because
+        these are lost and their neighbors have not said so yet.
         """
         self._arrange(now_ns)
         passed = sum(1 << (node - 1) for node in without)
         if self._parted_for != (self.changes, passed):
             self._parted_for = self.changes, passed
-            _, reached = self._spread(passed)
+            reached = reduce(or_, self._rings_from(self._node, without=passed))
             self._parted = nodes_of(self._known & ~reached)
         return self._parted
 

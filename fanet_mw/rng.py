@@ -23,9 +23,9 @@ _FIRST: Final = 0xBF58_476D_1CE4_E5B9
 _SECOND: Final = 0x94D0_49BB_1331_11EB
 
 
-def priority_hash(node: int, turn: int = 0, number: int = 0) -> int:
+def priority_hash(node: int) -> int:
     """64 bits that every node computes alike, for what a swarm decides at random without a message or a seed."""
-    x = (node * _STEP + turn * _FIRST + number * _SECOND) & _MASK
+    x = node * _STEP & _MASK
     x = (x ^ x >> 30) * _FIRST & _MASK
     x = (x ^ x >> 27) * _SECOND & _MASK
     return x ^ x >> 31

@@ -121,7 +121,7 @@ class ConflictMonitor:
         self._horizon_s = mission.collision_horizon_s
         self._distance_m = mission.collision_distance_m
         self._room_m = _LEVELS * mission.collision_distance_m
-        self._floor_m = scenario.nodes.altitude_m - max(0.0, self._room_m - _SURE * vertical_sigma_m(scenario))
+        self._floor_m = scenario.nodes.altitude_m - max(0.0, self._room_m - _SURE * _vertical_sigma_m(scenario))
         """The measured height below which it does not descend, however often it begins anew before it is back at its
         height; the true one is then hardly ever two levels below that of the mission."""
         self._clear_m = _CLEAR * mission.collision_distance_m
@@ -308,7 +308,7 @@ class ConflictMonitor:
         return Enu(way.east * scale, way.north * scale, 0.0)
 
 
-def vertical_sigma_m(scenario: Scenario) -> float:
+def _vertical_sigma_m(scenario: Scenario) -> float:
     """The standard deviation of a height by GPS."""
     sensors = scenario.sensors
     return sensors.gps_vertical * math.hypot(sensors.gps_common_m, sensors.gps_bias_m, scenario.world.gps_sigma_m)

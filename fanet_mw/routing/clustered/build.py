@@ -193,11 +193,9 @@ def _by_timetable(ground: _Ground) -> Clustered:
         port, timetables=timetables, roots=roots, lease=parts.lease, admission=_admission(port), followers=followers
     )
     resumed = None if ground.missing is None else ResumedFloods(port, timetables, ground.floods)
-    one_way = _way_beside_turns(ground)
     access = TurnAccess(
         port, timetables=timetables, roots=roots, calls=calls, spare=spare, slots=_slots(ground, parts.membership),
         delays=delays, floods=ground.floods, contention=ground.contention, resumed=resumed, followers=followers,
-        one_way=one_way,
     )  # fmt: skip
     timetabling = FromPlaces(
         port,
@@ -217,7 +215,7 @@ def _by_timetable(ground: _Ground) -> Clustered:
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
         floods=ground.floods, roles=_roles(ground, parts, access, timetabling, heard), access=access, relaying=relaying,
-        contending=contending, one_way=one_way, loads=heard, delays=delays, missing=ground.missing,
+        contending=contending, one_way=_way_beside_turns(ground), loads=heard, delays=delays, missing=ground.missing,
     )  # fmt: skip
     return _protocol(ground, whole, parts.refresh, calls)
 

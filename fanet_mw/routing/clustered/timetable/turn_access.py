@@ -19,7 +19,6 @@ from fanet_mw.node.duplicates import key_of_packet
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTiming
 from fanet_mw.routing.clustered.forwarding.floods import Floods
-from fanet_mw.routing.clustered.forwarding.one_way import OneWay
 from fanet_mw.routing.clustered.slots.slot_access import SlotAccess
 from fanet_mw.routing.clustered.timetable.call_release import CallRelease
 from fanet_mw.routing.clustered.timetable.followers import Followers
@@ -56,7 +55,6 @@ class TurnAccess:
         contention: ContentionTiming,
         resumed: ResumedFloods | None,
         followers: Followers,
-        one_way: OneWay,
     ) -> None:
         self._port = port
         self._timetables = timetables
@@ -69,7 +67,6 @@ class TurnAccess:
         self._contention = contention
         self._resumed = resumed
         self._followers = followers
-        self._one_way = one_way
         self._lead_ns = port.scenario.radio.lead_ns
         self._has_shown: NodeTimetable | None = None
         """The timetable in whose turns the node has last begun a flood."""
@@ -213,7 +210,6 @@ class TurnAccess:
             timetable is not None
             and header.destination in timetable.near
             and header.priority == PRIORITY_BULK
-            and not self._one_way.takes(packet)  # others that hear it would carry it on
             and len(packet.frame) <= timetable.frame_bytes
             and self._spare.has_turn(now_ns=now_ns)
             and self._followers.have(timetable.version, timetable.table.spans)

@@ -125,7 +125,7 @@ class RoutingProtocol(ABC):
         return self.hello_due_ns(start_ns)
 
     def hello_due_ns(self, start_ns: int) -> int:
-        """The instant, at or after `start_ns`, for which the node's next hello is to be made."""
+        """The instant for which the node's next hello, due at `start_ns`, is to be made; asked once for each hello."""
         return start_ns
 
     def on_hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:  # noqa: B027

@@ -224,7 +224,7 @@ class Node:
         return self._protocol.first_hello_ns(earliest_ns, start_ns)
 
     def hello_due_ns(self, start_ns: int) -> int:
-        """The instant, at or after `start_ns`, for which the next hello is to be made."""
+        """The instant for which the next hello, due at `start_ns`, is to be made; asked once for each hello."""
         return self._protocol.hello_due_ns(start_ns)
 
     def hello_share(self, now_ns: int) -> float:

@@ -51,7 +51,7 @@ class Access(Protocol):
         """Send a packet again that a neighbor has missed, which was to be announced at `due_ns`."""
 
     def hello_due_ns(self, start_ns: int) -> int:
-        """The instant, at or after `start_ns`, for which the next hello is to be made."""
+        """The instant for which the next hello, due at `start_ns`, is to be made; asked once for each hello."""
 
     def hello_start_ns(self, start_ns: int) -> int:
         """The earliest instant at which a hello, due at `start_ns`, may be transmitted."""

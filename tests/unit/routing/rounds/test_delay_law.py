@@ -76,11 +76,11 @@ def test_what_more_urgent_packets_use_of_the_turns_makes_a_bound_longer() -> Non
 def test_packets_alike_make_a_bound_longer_by_the_share_of_turns_that_they_use() -> None:
     """Each has its turn before the next one comes, so nothing waits here; elsewhere they meet in another order."""
     found_ns = {}
-    for share in (0.1, 0.3):
+    for share in (0.3, 0.7):
         law, topology = of_two()
-        every_ns = round(law._timing.period_ns / share)
+        every_ns = round(law._timing.period_ns / 2 / share)  # two fill a turn
         for number in range(100):
-            law.count(law._room * 5 // 8, priority=PRIORITY_REPORT, now_ns=number * every_ns)
+            law.count(law._room * 3 // 8, priority=PRIORITY_REPORT, now_ns=number * every_ns)
         now_ns = 99 * every_ns + every_ns // 2
         topology.hear([HeardNodes(2, now_ns // law.epoch_ns % 256, 1, often=False)], now_ns=now_ns)
         topology.state(2, often=False, now_ns=now_ns)
@@ -89,4 +89,15 @@ def test_packets_alike_make_a_bound_longer_by_the_share_of_turns_that_they_use()
             for priority in (PRIORITY_REPORT, PRIORITY_SAFETY)
         )
         assert warning_ns == law.over_ns(1), "a warning waits for none of them"
-    assert found_ns[0.3] - found_ns[0.1] == pytest.approx(0.2 * law._burst_ns, rel=0.2)
+    assert found_ns[0.7] - found_ns[0.3] == pytest.approx(0.4 * law._burst_ns, rel=0.2)
+
+
+def test_after_a_silence_turns_count_as_empty() -> None:
+    law, topology = of_two()
+    for number in range(100):
+        law.count(100, priority=PRIORITY_REPORT, now_ns=number * law._timing.period_ns)
+    now_ns = 100 * law._timing.period_ns + 60 * S
+    topology.hear([HeardNodes(2, now_ns // law.epoch_ns % 256, 1, often=False)], now_ns=now_ns)
+    topology.state(2, often=False, now_ns=now_ns)
+    found_ns = law.bound_ns(topology, priority=PRIORITY_REPORT, clock_error_ns=0, now_ns=now_ns)
+    assert found_ns == pytest.approx(law.over_ns(1), rel=1e-3)

@@ -92,6 +92,11 @@ class Lines(Shape):
         self._half = half = formation.teams // 2
         """The number of lines to the north of the middle, and to the south."""
         self._apart_m = formation.last_m - formation.first_m
+        straight_s = self._apart_m / formation.speed_m_s
+        back_s = (formation.last_m - min(FIRST_M, formation.first_m)) / (BACK * formation.speed_m_s)
+        """The time of the way back to the middle, and of the outermost lanes of bent lines from there."""
+        self._sweep_s = max(straight_s, back_s) if _is_bent(formation) else straight_s
+        self._faster_back = self._sweep_s / back_s
         gaps_m = gaps_m or (self._apart_m,) * (formation.teams - 1)
         northern, southern = gaps_m[: half - 1][::-1], gaps_m[half:]
         self._outward_m = tuple(
@@ -109,15 +114,7 @@ class Lines(Shape):
 
     @property
     def sweep_s(self) -> float:
-        formation = self._formation
-        straight_s = (formation.last_m - formation.first_m) / formation.speed_m_s
-        return max(straight_s, self._back_s) if _is_bent(formation) else straight_s
-
-    @property
-    def _back_s(self) -> float:
-        """The time of the way back to the middle, and of the outermost lanes of bent lines from there."""
-        formation = self._formation
-        return (formation.last_m - min(FIRST_M, formation.first_m)) / (BACK * formation.speed_m_s)
+        return self._sweep_s
 
     @property
     def lane_m(self) -> float:
@@ -213,10 +210,6 @@ class Lines(Shape):
     def _begins_m(self, swept_s: float, lane: float) -> float:
         """How far from the middle a lane begins this sweep."""
         return self._starts_m(lane) if swept_s <= self.sweep_s else min(FIRST_M, self._formation.first_m)
-
-    @property
-    def _faster_back(self) -> float:
-        return self.sweep_s / self._back_s
 
     def _starts_m(self, lane: float) -> float:
         """How far from the middle a lane begins."""

@@ -1,5 +1,7 @@
 """Plans of rounds and of timetables, held against runs: bulk in slots, and UAVs that move among each other."""
 
+from typing import Any
+
 import pytest
 
 from fanet_mw.scenario import Scenario
@@ -14,7 +16,7 @@ TWELVE = (
 )  # fmt: skip
 
 
-def planned(*settings: str) -> tuple[Scenario, dict[str, object], bool]:
+def planned(*settings: str) -> tuple[Scenario, dict[str, Any], bool]:
     scenario = catalog.find("clusters", settings)
     _, content, feasible = judge(scenario)
     return scenario, content, feasible
@@ -38,6 +40,8 @@ def test_urgent_packets_that_overfill_the_turns_though_their_bytes_do_not_are_no
     urgent = ("traffic.priority=report", "traffic.payload_bytes=400", "rounds.turn_bytes=700", "traffic.arrivals=cbr")
     scenario, content, feasible = planned(*TWELVE, *urgent, f"traffic.interval_s={interval_s}", "rounds.bulk_share=0")
     assert content["offered_bytes_per_s"] < content["carried_bytes_per_s"]
+    _, idle, _ = planned(*TWELVE, *urgent, "traffic.interval_s=100", "rounds.bulk_share=0")
+    assert content["bound_ms"] > 1.1 * idle["bound_ms"], "packets alike make it longer by the share of turns they use"
     assert feasible == fits
     assert (Result(simulate(scenario)).summary["pdr"] > 0.999) == fits
 

@@ -137,6 +137,21 @@ def test_who_is_sent_a_piece_again_says_at_once_what_it_lacks() -> None:
     assert said(receiver, BORN_NS + 100 * MS + LATEST_RECEIPT_NS) == {7: (MISSING, 0b10)}
 
 
+def test_the_time_until_its_sender_sends_missing_pieces_again_is_no_gap_between_pieces() -> None:
+    waits_ns = []
+    for rounds in (1, 6):
+        receiver, at_ns = made(), BORN_NS
+        for piece in range(2 * rounds):
+            hear(receiver, head(piece=piece, pieces=60)._replace(lifetime_ms=60_000), at_ns)
+            if piece % 2:
+                told_ns = next(ns for ns in range(0, 6 * S, 10 * MS) if said(receiver, at_ns + ns))
+                at_ns += 3 * S  # after its receipt the sender begins anew
+            else:
+                at_ns += 40 * MS
+        waits_ns.append(told_ns)
+    assert waits_ns[1] < waits_ns[0]
+
+
 def test_a_message_to_which_nobody_listens_keeps_the_place_of_those_before_it() -> None:
     """7 is still on its way: 9 may not overtake it because nobody listens to 8."""
     receiver = made()

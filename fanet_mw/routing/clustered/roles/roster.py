@@ -4,7 +4,7 @@
     of a companion       the same, moved by as much as the leader has strayed from straight flight since: a node whose
                          velocity was the leader's. So a formation that turns keeps its shape before its updates have
                          come. One that has sent none although the leader has turned long ago has not turned along
-    in a rigid formation  where it was beside the leader: what errors their velocities have adds up to nothing
+    in a rigid formation  where it was beside the leader, so errors of the velocities that are stated do not accumulate
 
     a node joins              -> it is known until it has given no sign of life for `lost_ns`, in which it should have
                                  sent two position updates
@@ -73,6 +73,14 @@ class OwnFlight:
         return next((own.at_ns for own in self._flown if own.at_ns > then.at_ns and not alike(own, then)), None)
 
 
+class _Joined(NamedTuple):
+    """What the latest join of a node has stated."""
+
+    motion: Motion
+    beside: Motion | None
+    """The leader's own motion at that instant if its velocity was the same; None if not, or if it is not known."""
+
+
 class Roster:
     """The nodes that one leader knows; the leader itself is not among them."""
 
@@ -100,18 +108,16 @@ class Roster:
         self._lost_ns = lost_ns
         self._objection_ns = objection_ns
         self._sure_m = sure_m
-        self._motions: dict[NodeId, Motion] = {}
-        self._beside: dict[NodeId, Motion | None] = {}
-        """The leader's own motion at the instant of each of these; None if it is not known."""
+        self._joined: dict[NodeId, _Joined] = {}
         self._reports: dict[NodeId, _SilentNode] = {}
 
     def __contains__(self, node: NodeId) -> bool:
-        return node in self._motions
+        return node in self._joined
 
     @property
     def nodes(self) -> list[NodeId]:
         """The known nodes, in the order of their first joins."""
-        return list(self._motions)
+        return list(self._joined)
 
     @property
     def stand_ins(self) -> Mapping[NodeId, NodeId]:
@@ -120,20 +126,20 @@ class Roster:
 
     def is_news(self, node: NodeId, born_ns: int) -> bool:
         """True if nothing generated at this instant or later is known of a node."""
-        known = self._motions.get(node)
-        return known is None or known.at_ns < born_ns
+        known = self._joined.get(node)
+        return known is None or known.motion.at_ns < born_ns
 
     def on_join(self, node: NodeId, motion: Motion) -> None:
         """A node was at a position with a velocity at an instant (`motion`)."""
-        self._motions[node] = motion
-        self._beside[node] = self.own.at(motion.at_ns)
+        beside = self.own.at(motion.at_ns)
+        self._joined[node] = _Joined(motion, beside if beside is not None and alike(motion, beside) else None)
 
     def on_report(self, silent: NodeId, by: NodeId, there: Motion, *, now_ns: int) -> int | None:
         """The node `by`, which flies at `there`, reports that a node is silent.
 
         Returns the instant until which that node may object; None if the report does not count.
         """
-        if silent not in self._motions or not self._was_near(silent, there):
+        if silent not in self._joined or not self._was_near(silent, there):
             return None
         known = self._reports.get(silent, _SilentNode(by, now_ns, there.at_ns))
         self._reports[silent] = known._replace(by=by)
@@ -145,7 +151,7 @@ class Roster:
         """
         if self._sure_m is None:
             return True
-        known = self._motions[node]
+        known = self._joined[node].motion
         instants = (there.at_ns - _MISSED_NS, there.at_ns)
         return max(known.position_at(t_ns).minus(there.position_at(t_ns)).norm() for t_ns in instants) <= self._sure_m
 
@@ -153,8 +159,8 @@ class Roster:
         """Forget nodes that have given no sign of life for too long, or that were reported and have not objected in
         time.
         """
-        for node in sorted(self._motions):
-            last_ns = max(self._liveness.last_ns(node) or 0, self._motions[node].at_ns)
+        for node in sorted(self._joined):
+            last_ns = max(self._liveness.last_ns(node) or 0, self._joined[node].motion.at_ns)
             report = self._reports.get(node)
             if report is not None and last_ns > report.reported_ns:
                 del self._reports[node]  # the node has objected
@@ -162,18 +168,18 @@ class Roster:
             if now_ns - last_ns > self._lost_ns or (
                 report is not None and now_ns >= report.since_ns + self._objection_ns
             ):
-                del self._motions[node], self._beside[node]
+                del self._joined[node]
 
     def forget_reports(self) -> None:
         """Forget reports about nodes that are no longer known, because an assignment without them has been made."""
-        self._reports = {silent: report for silent, report in self._reports.items() if silent in self._motions}
+        self._reports = {silent: report for silent, report in self._reports.items() if silent in self._joined}
 
     def places(self, t_ns: int, *, now_ns: int) -> dict[NodeId, Enu]:
         """The positions of all nodes at an instant, if they fly on straight, or with the leader, by id."""
-        return {node: self._place(node, t_ns, now_ns) for node in sorted(self._motions)}
+        return {node: self._place(node, t_ns, now_ns) for node in sorted(self._joined)}
 
     def _place(self, node: NodeId, t_ns: int, now_ns: int) -> Enu:
-        motion, beside, here = self._motions[node], self._accompanied(node), self.own.at(now_ns)
+        (motion, beside), here = self._joined[node], self.own.at(now_ns)
         straight = motion.position_at(t_ns)
         if beside is None or here is None:
             return straight
@@ -188,18 +194,13 @@ class Roster:
 
     def is_turning(self, now_ns: int) -> bool:
         """True while it is not known which companions have turned with the leader."""
-        companions = (beside for node in self._motions if (beside := self._accompanied(node)) is not None)
+        companions = (beside for _, beside in self._joined.values() if beside is not None)
         turns_ns = (turned_ns for beside in companions if (turned_ns := self.own.turned_ns(beside)) is not None)
         return any(now_ns - turned_ns <= self._settled_ns for turned_ns in turns_ns)
 
-    def _accompanied(self, node: NodeId) -> Motion | None:
-        """The leader's motion when a node with the same velocity joined; None if its velocity was another one."""
-        beside = self._beside[node]
-        return beside if beside is not None and alike(self._motions[node], beside) else None
-
     def velocities(self) -> Mapping[NodeId, Enu]:
         """The velocities of the nodes [m/s], by id."""
-        return {node: self._motions[node].velocity for node in sorted(self._motions)}
+        return {node: self._joined[node].motion.velocity for node in sorted(self._joined)}
 
 
 def sure_m(range_m: float) -> float:

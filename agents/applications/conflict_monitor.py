@@ -8,8 +8,8 @@
 
 No agreement about heights is needed, because the ids decide: of two UAVs the one with the lower id goes one level up
 for the other, the other one level down. So any two part, no two of three that are in conflict with each other share a
-level, and a warning need not state a direction. The height of a level is the distance to be kept; all levels are a
-little higher, by the error of a measured height, so that nobody is truly more than two of them below the mission's.
+level, and a warning need not state a direction. Levels are one distance to be kept apart; all lie higher by the error
+of a measured height, so that nobody is truly more than two of them below the mission's height.
 
 Both UAVs are assumed to keep their horizontal velocity. Not modeled: turns that the other UAV has planned, and
 conflicts that the change of height itself causes, until the next hello shows them. In a planned search, UAVs avoid each
@@ -38,7 +38,7 @@ _STANDS_NS: Final = 6 * S
 """A UAV that has stood still so long while it avoids others, pressed against the geofence, flies back; and so much
 later for each UAV with a lower id that it avoids."""
 _STILL_M_S: Final = 1.5
-"""A UAV at the geofence is not faster than this."""
+"""A UAV slower than this stands."""
 _BACK_NS: Final = 12 * S
 """How long it flies back."""
 _LEAVES_M_S: Final = 5.0
@@ -48,7 +48,7 @@ _CLIMB_M_S: Final = 4.0
 _LEVELS: Final = 2
 """The greatest number of levels up or down, for which `nodes.altitude_m` must leave room."""
 _SURE: Final = 3.0
-"""All levels are higher than that by this multiple of the standard deviation of a measured height."""
+"""All levels lie higher than `nodes.altitude_m` implies, by so many standard deviations of a measured height."""
 _AHEAD_S: Final = 10.0
 """Setpoints lie this far ahead. The farther they are, the less does the error of a fix turn the course."""
 _SOON_S: Final = 2.0
@@ -279,9 +279,9 @@ class ConflictMonitor:
         return _to_the_middle(own.position, velocity)
 
     def _flying_back(self, own: Motion, velocity: Enu) -> Enu | None:
-        """The horizontal velocity of this UAV, which no mission has told where to be, once it has stood still: one that
-        keeps its velocity, as whoever has the lowest id does, would stand at the geofence for ever. Its direction
-        remains, since those who all fly to the middle meet there.
+        """The horizontal velocity of this UAV, which no mission has told where to be, once it has stood still: whoever
+        keeps its velocity, as the one with the lowest id does, would stand at the geofence for ever. The direction is
+        chosen once, because those who all fly to the middle meet there.
         """
         now_ns = own.at_ns
         if now_ns < self._back_until_ns:

@@ -32,7 +32,7 @@ def done_ns(starts_ns: Sequence[int], floods_ns: Sequence[int], *, period_ns: in
 
 @lru_cache(maxsize=1024)
 def _done_ns(starts_ns: tuple[int, ...], floods_ns: tuple[int, ...], period_ns: int) -> tuple[int, ...]:
-    """All nodes of a run ask for the same few, and each takes the square of the number of turns."""
+    """All nodes of a run ask for the same few, and each answer takes time by the square of the number of turns."""
     count = len(starts_ns)
     horizon = [later * period_ns + start for later in range(3) for start in starts_ns]
     return tuple(

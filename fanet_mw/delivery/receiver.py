@@ -57,7 +57,7 @@ class _Incoming:
     pieces: dict[int, bytes] = field(default_factory=dict)
     frame: bytes = b""
     came_ns: int | None = None
-    """When its last new piece came, if no receipt has gone since then; an old piece asks for a receipt."""
+    """When its last new piece came; None after a receipt has gone. A piece that comes twice leaves it as it is."""
 
     @property
     def held(self) -> int:

@@ -17,7 +17,7 @@ class RetransmissionTimeout:
         self._known: dict[NodeId, tuple[int, int]] = {}
 
     def expect(self, target: NodeId, takes_ns: int) -> None:
-        """Take a time for that of a first measurement, unless there is one."""
+        """Use this time as if it had been measured, until one is."""
         self._known.setdefault(target, (takes_ns, takes_ns // 2))
 
     def measured(self, target: NodeId, took_ns: int) -> None:

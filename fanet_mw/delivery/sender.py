@@ -327,7 +327,7 @@ class Sender:
         return {target: rest for target, bits in wanted.items() if (rest := bits & ~together)}, together
 
     def handed_over(self, number: int, seq: int) -> None:
-        """A packet of a message has become the packet of this sequence number."""
+        """The node has given this sequence number to the latest packet of a message."""
         message = self._messages.get(number)
         if message is not None:
             message.last_seq = seq

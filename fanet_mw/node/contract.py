@@ -178,8 +178,8 @@ class RoutingProtocol(ABC):
         return {}
 
     def parted(self, now_ns: int, *, without: Collection[int] = ()) -> Collection[NodeId]:
-        """The nodes to which there was a way, and is none any more past those who are known to be lost (`without`), as
-        far as this node knows.
+        """The nodes to which there was a way, and is none any more that avoids those in `without`, who are known to be
+        lost, as far as this node knows.
         """
         return ()
 

@@ -57,8 +57,8 @@ _GPS_DRAWS: Final = 20
 def judge(
     scenario: Scenario, *, deadline_s: float | None = None, change: bool = True
 ) -> tuple[str, dict[str, Any], bool]:
-    """(text, JSON, feasible) for a scenario at its starting positions; `change`: search the cheapest change if it is
-    not feasible.
+    """(text, JSON, feasible) for a scenario at its starting positions; `change`: look for the cheapest change if it
+    is not feasible.
     """
     if scenario.routing.protocol not in ("clustered", "rounds"):
         raise ConfigError(

@@ -25,6 +25,7 @@ _HASTE: Final = 0.95
 """Whoever is too far away for that is approached at this share of the greatest speed."""
 
 _KEPT_M_S: Final = 1e-6
+"""A velocity keeps to a limit up to this rounding error."""
 _EARLY_TIES: Final = 2
 """With so many of its nearest neighbors a UAV stays connected before the sweep; whoever leaves them before it has the
 plan may never hear it."""

@@ -48,7 +48,7 @@ class SilentNeighbors:
         self._least_ns = _HIDDEN_NS if obstacles.hides else _LEAST_NS
 
     def parted(self, lost: Collection[int], *, now_ns: int) -> Collection[NodeId]:
-        """The UAVs that are in another part of the swarm, or gone: only lost ones lead there."""
+        """The UAVs that are in another part of the swarm, or gone: every way to them leads over a lost one."""
         return self._radio.parted(now_ns, without=lost)
 
     def has(self, node: NodeId, *, now_ns: int) -> bool:

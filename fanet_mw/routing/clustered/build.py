@@ -160,7 +160,8 @@ def _in_slots(ground: _Ground, rule: Rule, *hear_copies: HearsCopies) -> Cluster
 
 def _way_beside_turns(ground: _Ground) -> OneWay:
     """The way of packets for one node where nodes have turns: where turns bound delays, only receipts go there, in the
-    windows between turns, and packets with a bound are flooded; where they do not, all packets go at once.
+    windows between turns, and packets with a bound are flooded; where they do not, all packets go this way, without
+    waiting for a window.
     """
     scenario = ground.port.scenario
     if scenario.mobility.rigid and not scenario.measures_links:

@@ -18,13 +18,13 @@ _LATELY_NS: Final = 2 * S
 _SHARED_NS: Final = 10 * S
 """The sources are those of packets that arrived in this time."""
 _FEWEST: Final = 10
-"""Fewer packets say nothing about delays."""
+"""Delays are judged by at least so many packets."""
 _MOST: Final = 0.9
-"""Most packets are this share of them."""
+"""Delays are judged by that which this share of packets does not exceed."""
 _LESS: Final = 1.25
-"""The interval of a source that slows down, in those of its share."""
+"""A source that slows down gets this multiple of the interval of its fair share."""
 _MORE: Final = 0.95
-"""The interval of a source that speeds up, in those of a second before."""
+"""A source that speeds up gets this multiple of its interval a second before."""
 _LEAST_NS: Final = MS
 """A shorter interval refuses nobody."""
 _STEADY_JUDGED: Final = 6
@@ -47,7 +47,7 @@ class BulkAdmission:
         """The mean delay of each of the last judgements."""
 
     def hear(self, origin: NodeId, delay_ns: int, *, now_ns: int) -> None:
-        """A packet arrived that took so long; 0 for one of this node that was accepted."""
+        """A packet arrived that took so long; `delay_ns` is 0 for one of this node that was accepted."""
         self._arrived.append((now_ns, origin, delay_ns))
         if now_ns >= self._judged_ns + _EACH_NS:
             self._judged_ns = now_ns

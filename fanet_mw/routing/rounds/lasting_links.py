@@ -2,8 +2,8 @@
 
 Each hello says where its sender is and how fast it flies. Two nodes that fly on straight lose each other when their
 distance exceeds the range (link expiration time; Su, Lee and Gerla, 2001). Nodes that hardly recede from each other are
-taken to stay, and so are one whose position is not known, and those that a UAV keeps in reach: it will not fly straight
-on, however fast it is.
+taken to stay. So is a node whose position is not known, and so are those that a UAV keeps in reach: it will not fly
+straight on, however fast it is.
 """
 
 from collections.abc import Iterator, Mapping

@@ -100,7 +100,7 @@ class RowOfPlaces(NamedTuple):
         if len(left) == 1:
             return {left[0]: self.first + (self.size - 1) / 2}
         step = (self.size - 1) / (len(left) - 1)
-        last = self.places[-1]  # beyond which nothing is rounded
+        last = self.places[-1]  # rounding errors must not lead beyond it
         return {place: min(self.first + rank * step, last) for rank, place in enumerate(left)}
 
 

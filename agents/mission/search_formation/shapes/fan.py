@@ -113,7 +113,7 @@ class Fan(Shape):
         return (RowOfPlaces(0, self._formation.lanes, RowKind.SPAN),)
 
     def drawn_in(self, left: tuple[int, ...], hop_m: float) -> "Fan":
-        """The fan whose front stops where so few still span it with gaps of at most a hop."""
+        """The fan whose front stops where the UAVs that are left still span it with gaps of at most a hop."""
         row = self.rows()[0]
         flown = row.shared(frozenset(row.places[max(1, left[0]) :])).values() or row.places
 

@@ -55,7 +55,7 @@ _CHAIN_HIGHER_M: Final = 6.0
 _BUNCHED_M: Final = 280.0
 """While the lines are near each other, relays due north and south of each other would be too close together. They are
 therefore displaced to the east and the west as well, at first by up to this distance; by half of it between lines that
-begin around the swarm, where it only has to be no long way to their places."""
+begin around the swarm, whose relays must have a short way to their places."""
 _STRAIGHT_M: Final = 300.0
 """Once the lines have flown this far, the relays are no longer displaced: the chain is a straight line to the north."""
 _SIDE_M: Final = 65.0
@@ -74,8 +74,7 @@ _AROUND: Final = 0.6
 """Lines that begin around the swarm do so at this share of the radio's reach from the middle at most: on the way to
 places farther out rows part before they have spread, and whoever goes aside for a survivor tears the swarm."""
 _DENSE: Final = 0.85
-"""UAVs that stand in a square grid at this share of the radio's reach, or nearer to each other, hear all between them.
-"""
+"""UAVs in a square grid at this share of the radio's reach, or nearer to each other, hear all between them."""
 _FREE: Final = 4
 """More than two lines are flown only if they leave so many followers, who are free for survivors."""
 
@@ -234,8 +233,8 @@ def _is_bent(formation: Dimensions) -> bool:
 
 
 def begun_around(made: Dimensions, swarm: Swarm) -> Dimensions:
-    """The lines that begin where the swarm stands, if nobody between them is unheard: it must be dense enough for that,
-    and wide enough for all lanes but the bent ones.
+    """The lines that begin where the swarm stands, if its UAVs hear everybody between them: they must be dense enough
+    for that, and stand wide enough for all lanes but the bent ones.
     """
     east_m, west_m, north_m, south_m = swarm.sides_m
     aside_m, beyond_m = min(east_m, west_m), min(north_m, south_m)

@@ -9,7 +9,7 @@ Random = Callable[[], float]
 _SHARE: Final = 4
 """The data of one node take this part of a window at most: what is more would be sent beyond it, into turns."""
 _WINDOWS: Final = 256
-"""More windows than lie ahead of a full queue."""
+"""So many windows are remembered."""
 
 
 class ContentionTiming:

@@ -2,10 +2,10 @@
 
     the receiver is a neighbor           -> to it
     a flood of the receiver was heard    -> to the neighbor from which it came first
-    neither, or no acknowledgment        -> the packet goes the way of all others, and is flooded
-    the receiver hears its own packets flooded -> it floods a word of itself, so that the next ones find a way
+    neither, or no acknowledgment        -> the packet is flooded from here, in contention
+    the receiver hears packets for it flooded -> it floods a word of itself, so that the next ones find a way
 
-A flood with a later birth replaces the way of an earlier one, so each hop leads to a node that knows a way at least as
+A packet with a later birth replaces the way of an earlier one, so each hop leads to a node that knows a way at least as
 new, and a shorter one if it is of the same flood: no way goes in circles (as in DSDV).
 """
 
@@ -33,7 +33,7 @@ def is_receipt(packet: Packet) -> bool:
 
 
 class Way(NamedTuple):
-    """The way to a node: a flood of it came over this neighbor."""
+    """The way to a node: the first copy of a packet of that node came over this neighbor."""
 
     born_us: int
     hops: int
@@ -56,8 +56,8 @@ class OneWay:
         takes: Callable[[Packet], bool] = lambda _: True,
         not_before: Callable[[int], int] = lambda start_ns: start_ns,
     ) -> None:
-        """`takes`: which packets may go so, of those for one node; the same at all nodes. `not_before`: the earliest
-        start of a frame that is due.
+        """`takes`: which packets for one node go hop by hop, the same at all nodes; others are flooded.
+        `not_before`: the earliest start of a frame that is due.
         """
         self._port = port
         self._neighbors = neighbors
@@ -79,7 +79,7 @@ class OneWay:
             self._ways[origin] = Way(header.origin_us, header.hops, neighbor)
 
     def takes(self, packet: Packet) -> bool:
-        """True if a packet goes to one node without turns."""
+        """True if a packet goes hop by hop."""
         header = packet.header
         return header.destination != BROADCAST and header.kind == Kind.DATA and self._takes(packet)
 

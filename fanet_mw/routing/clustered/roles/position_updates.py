@@ -15,7 +15,7 @@ from fanet_mw.units import MS, Enu, S, seconds_to_ns
 STRAYED: Final = 0.1
 """The share of the radio range by which the extrapolated position may be wrong."""
 UNLIKE: Final = 0.02
-"""The same for the place of a node in a rigid formation, which the leader knows from where that node was beside it."""
+"""The share of the radio range by which the leader may be wrong about the place of a node in a rigid formation."""
 _LEAST_NS: Final = 5 * S
 """The shortest time between two updates, because each is a flood."""
 _QUIET_NS: Final = 20 * S

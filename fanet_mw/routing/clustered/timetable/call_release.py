@@ -1,4 +1,4 @@
-"""Releases in a node's calls what only its neighbors need, so no node relays it.
+"""Releases in a node's calls or spare turns what only its neighbors need, so no node relays it.
 
 A timetable for lossy links gives each node *calls* (`redundant_scheduling.py`): missed packets wait for one in a queue
 of this file, a hello reserves the next one when it is due (`reserve`). Another timetable gives each node *spare
@@ -17,7 +17,7 @@ class CallRelease(TurnRelease):
     """One queue of packets for neighbors, and the node's next call or spare turn."""
 
     _in_force: Sequence[TurnsInForce] = ()
-    """The node's calls by each timetable that is in force or announced."""
+    """The node's calls, or spare turns, by each timetable that is in force or announced."""
 
     def follow(self, in_force: Sequence[TurnsInForce], *, now_ns: int) -> None:
         """Take over the calls of new timetables, in the order in which they come into force."""

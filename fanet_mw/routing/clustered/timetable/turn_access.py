@@ -251,7 +251,8 @@ class TurnAccess:
 
     def hello_due_ns(self, start_ns: int) -> int:
         """The instant at which a hello may be sent, so that it is not made long before: its digest would lack what has
-        come meanwhile, and neighbors would send it again. Hellos come as often as without windows, but one a window.
+        come meanwhile, and neighbors would send it again. One a window goes; after one that waited, the next is due
+        sooner, so that they come as often as without windows.
         """
         due_ns = start_ns - min(self._hello_waits_ns, (start_ns - self._hello_sent_ns) // 2)
         timetable = self._timetables.at(start_ns)

@@ -3,7 +3,7 @@
 These uses are tried one after the other until a timetable is found:
 
     1  Each node gets a few more turns than its load needs, so that queues can drain; if the air is idle all the same,
-       as many in each half, quarter or eighth of the superframe, so that a packet waits less.
+       it gets as many in each half, quarter or eighth of the superframe, so that a packet waits less.
     2  Each node gets as many turns as it needs. Several of its packets share a frame if they fit, which takes fewer
        but longer turns.
     3  Nodes get fewer turns than they need. A node sends what its turns can carry, and has no delay bound.
@@ -150,7 +150,7 @@ def _fit(
 
 
 def _more_often(wish: _Wish, made: Callable[[_Wish], FittedTimetable | None]) -> FittedTimetable | None:
-    """The same turns in each of several parts of the superframe, so that nobody waits long for one, if twice as many
+    """As many turns in each of several parts of the superframe, so that nobody waits long for one, if twice as many
     would fit: half of the air is left for what is for one neighbor.
     """
     parts = 1

@@ -123,3 +123,10 @@ def longest_access_ns(size: int, radio: RadioTiming) -> int:
     timing = Timing.of(radio)
     longest_ns = airtime_ns(size + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
     return longest_ns + timing.difs_ns + radio.cw_min * timing.slot_ns
+
+
+def mean_access_ns(size: int, radio: RadioTiming) -> int:
+    """The time that such a frame takes at an idle medium on average: DIFS, a mean backoff, and its airtime."""
+    timing = Timing.of(radio)
+    mean_ns = airtime_ns(size + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
+    return mean_ns + timing.difs_ns + radio.cw_min * timing.slot_ns // 2

@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 
 from fanet_mw.bounds import Refused
 from fanet_mw.graph.topology import Adjacency
+from fanet_mw.routing.clustered.tdma.hello_room import crowd, hellos_ns, least_ms
 from fanet_mw.routing.clustered.tdma.turn_timing import turn_slack_ns
 from fanet_mw.routing.clustered.timetable.turn_size import distance_error_m, most_together, superframe
 from fanet_mw.scenario import Scenario
@@ -114,7 +115,7 @@ def _hello_options(site: Site) -> list[dict[str, Value]]:
     """Changes that help when the contention window is too short for hellos: a longer one, also for a longer period."""
     if not any(contention_window.too_short(site.scenario, site.adjacency)):
         return [{}]
-    least = contention_window.least_ms(contention_window.hellos_ns(site.scenario, site.adjacency))
+    least = least_ms(hellos_ns(site.scenario, crowd(site.adjacency)))
     return [{"clusters.contention_ms": float(ms)} for ms in (least, 2 * least)]
 
 

@@ -8,8 +8,7 @@ and lead. This is an estimate, because CSMA/CA bounds neither. With a timetable 
 
 from typing import NamedTuple
 
-from fanet_mw.airtime import OVERHEAD_BYTES, airtime_ns
-from fanet_mw.bounds import Dcf
+from fanet_mw.airtime import OVERHEAD_BYTES, airtime_ns, mean_access_ns
 from fanet_mw.graph.topology import Adjacency, levels, two_hop
 from fanet_mw.scenario import Radio, Scenario
 from fanet_mw.units import MS, NodeId
@@ -31,17 +30,11 @@ def frame_ns(radio: Radio, payload_bytes: int) -> int:
     return airtime_ns(payload_bytes + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
 
 
-def contended_ns(radio: Radio, payload_bytes: int) -> int:
-    """The airtime of such a frame, plus DIFS and a mean backoff."""
-    dcf = Dcf.of(radio)
-    return frame_ns(radio, payload_bytes) + dcf.sifs_ns + 2 * dcf.slot_ns + dcf.cw_min * dcf.slot_ns // 2
-
-
 def flood_cost(scenario: Scenario, adjacency: Adjacency, root: NodeId, *, payload_bytes: int) -> FloodCost:
     """The cost of one flood of such a packet, from this head to all nodes that it can reach."""
     clusters, radio = scenario.clusters, scenario.radio
     hops = levels(adjacency, root)
-    per_frame_ns = contended_ns(radio, payload_bytes)
+    per_frame_ns = mean_access_ns(payload_bytes, radio)
     sharing = max(1 + sum(1 for n in near if n in hops) for node, near in two_hop(adjacency).items() if node in hops)
     local_ns = round(sharing * relay_share(scenario, adjacency) * per_frame_ns)
     wait_ns = clusters.assess_ms * MS if clusters.relay == "counter" else 0

@@ -52,9 +52,9 @@ def judge_rounds(
     ]
     offered = sum(rate * size for rate, size in packets)
     used = sum(rate * law.turns_of(size) for rate, size in packets) * timing.period_ns / S
-    bound_ns = None if law.loses_frames else law.over_ns(hops, used=used)
-    carried = timing.turn_bytes / (timing.period_ns / S)
     longest = max((size for _, size in packets), default=0)
+    bound_ns = None if law.loses_frames else law.over_ns(hops, longest_bytes=longest, used=used)
+    carried = timing.turn_bytes / (timing.period_ns / S)
     bulk = {name: each for name, each in scenario.traffic_classes.items() if name not in urgent}
     flooded = [name for name, each in bulk.items() if each.destination == "all"]
     rates: dict[NodeId, float] = defaultdict(float)

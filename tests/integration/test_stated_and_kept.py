@@ -49,3 +49,16 @@ def test_nobody_promises_while_the_timetable_has_not_reached_everybody(
     )  # fmt: skip
     assert bound["violations"] == 0
     assert bound["stated_share"] > 0.3
+
+
+@pytest.mark.parametrize(("contention_ms", "states"), [(12, False), (20, True)])
+def test_no_bound_is_stated_where_hellos_do_not_fit_their_window(contention_ms: float, *, states: bool) -> None:
+    """Nine hellos of 1.1 ms each: neighbors that are not heard are taken for dead, and the timetable ends."""
+    bound = bound_of(
+        nodes={"count": 9, "layout": "grid", "columns": 3, "spacing_m": 150, "telemetry_hz": 0},
+        traffic={"payload_bytes": 65, "interval_s": 2, "sources": 8},
+        radio={"standard": "b", "rate_mbps": 2, "cw_min": 15},
+        clusters={"count": 3, "flooding_period_s": 1, "contention_ms": contention_ms},
+    )  # fmt: skip
+    assert bool(bound.get("stated_share")) == states
+    assert not bound.get("violations")

@@ -1,17 +1,17 @@
 """The delay bound of packets in turns: rounds x hops, with what surrounds each hop.
 
     hop = period + turn + lead + handover
-    D   = ((h + margin) * hop + (1 + used) * ceil(B / room) * period) / (1 - urgent)
+    D   = ((h + margin) * hop + (1 + used) * ceil(B / room) * period / (1 - hellos)) / (1 - urgent)
 
 A packet that was heard is announced one lead before the next own turn, at most one period later; its frame ends within
 the turn, and is handed over. `h` is the greatest distance that the node knows to another; `margin` is for a topology
 that changes meanwhile. All urgent packets that are under way together, `B` bytes, delay each other once: every node
 serves them at the same rate, `room` bytes of a frame per round, so what waited for one node's turn does not wait
-again for the next one's (tandem of equal servers; Le Boudec and Thiran, Network Calculus, 1.4.3). More urgent packets
-that come later overtake it on its way: `urgent` is the share of turns that was theirs lately. Packets of other origins
-that are not less urgent, and which each node has heard in another order, delay it again in so far as turns are full:
-`used` is the share that they use as a rule (by trial: without it 17 of 3,600 deliveries over a line of 25 nodes came up
-to 8 % too late).
+again for the next one's (tandem of equal servers; Le Boudec and Thiran, Network Calculus, 1.4.3). Of equally urgent
+ones the oldest goes first at every node, so a packet that is made later delays none. More urgent packets overtake it on
+its way: `urgent` is the share of turns that was theirs lately, `hellos` the share that hellos take. Older packets of
+other origins, which have not been heard yet, delay it again in so far as turns are full: `used` is the share that
+packets use as a rule (by trial: without it 17 of 3,600 deliveries over a line of 25 nodes came up to 8 % too late).
 Assumed: no frame is lost; over any channel but `range` a likely delay is stated instead (`LikelyDelay`). None is
 stated while clocks may be further apart than the slack of turns holds, while more waits for turns, everywhere alike,
 than three quarters of `rounds.burst_bytes`, or while no way has been found yet to a node that may only just have
@@ -29,18 +29,26 @@ from fanet_mw.routing.rounds.topology import Topology
 from fanet_mw.scenario import Scenario
 from fanet_mw.timesync.turn_slack import clocks_fit
 from fanet_mw.units import US, NodeId, S, seconds_to_ns
-from fanet_mw.wire import HEADER_BYTES
+from fanet_mw.wire import HEADER_BYTES, PRIORITIES, PRIORITY_BULK
+from fanet_mw.wire.hello.digest import MESSAGE_BYTES
 from fanet_mw.wire.rounds import HEARD_BYTES
 
 MARGIN_HOPS: Final = 2
+PATIENT_TURNS: Final = 2
+"""A hello that found no room in so many turns goes before urgent packets."""
 MOST_HOPS: Final = 32
 """The hops for which a statement about links lives at least."""
 _SILENT_HELLOS: Final = 1.6
 _MOST_USED: Final = 0.75
 _MOST_URGENT: Final = 0.5
 """No bound is stated while more urgent packets use a greater share of turns."""
+_WORSE: Final = 2
+"""A packet may wait so many times longer than those that were heard lately, of which fewer had come before."""
 _WINDOWS: Final = 2
 """The smoothing of the load: each window weighs one part in so many."""
+_HELLO_BYTES: Final = 137 + MESSAGE_BYTES
+"""The length of a hello with one message of a digest."""
+_MOST_HELLOS: Final = 1 / (1 + PATIENT_TURNS)
 _KEPT: Final = 0.997
 """The share of received packets whose ratio is not exceeded; the rest of what may be missing never arrives."""
 _FEWEST: Final = 300
@@ -77,11 +85,15 @@ class DelayLaw:
         """The size of the greatest of the packets that wait."""
         self._counted_ns = 0
         """The instant for which that is known."""
+        self._hello_share = min(timing.period_ns / hello_ns, _MOST_HELLOS) if scenario.routing.hello_interval_s else 0.0
         self._window_ns = max(self._burst_ns, timing.period_ns)
         self._window = 0
         self._came: defaultdict[int, float] = defaultdict(float)
         self._came_before: Mapping[int, float] = {}
         """The turns filled, by priority, by packets that came in the present window and in the one before."""
+        self._waited_ns = self._waited_before_ns = 0
+        """How long a packet has waited for turns on its way that came in the present window, and in the one before."""
+        self._stated = self._stated_turns(scenario)
         self._usually: dict[int, float] = {}
         """The same, smoothed over the windows so far."""
 
@@ -93,9 +105,15 @@ class DelayLaw:
         self._waiting_bytes += size
         self._greatest = max(self._greatest, size)
 
+    def hear(self, delay_ns: int, *, hops: int, now_ns: int) -> None:
+        """A packet of another node took so long over so many hops: what exceeds the way it has waited."""
+        self._turn_window(now_ns)
+        self._waited_ns = max(self._waited_ns, delay_ns - hops * self.hop_ns)
+
     def _serve(self, now_ns: int) -> None:
         """Each round has carried a turn's worth of what waited."""
-        served = self._sure_bytes * (now_ns - self._counted_ns) / self._timing.period_ns
+        left = 1 - self._hellos(self._greatest)
+        served = left * self._sure_bytes * (now_ns - self._counted_ns) / self._timing.period_ns
         self._waiting_bytes -= served
         self._counted_ns = now_ns
         if self._waiting_bytes <= 0:
@@ -106,6 +124,11 @@ class DelayLaw:
         """What a turn carries at least of packets that wait: none is divided, so its end may be empty."""
         return max(1, self._room - self._greatest + 1)
 
+    def _hellos(self, size: int) -> float:
+        """The share of turns that hellos take from packets of a size."""
+        beside = _HELLO_BYTES + size <= self._timing.turn_bytes
+        return self._hello_share * (_HELLO_BYTES / self._timing.turn_bytes if beside else 1)
+
     def _turn_window(self, now_ns: int) -> None:
         window = now_ns // self._window_ns
         if window != self._window:
@@ -115,6 +138,8 @@ class DelayLaw:
                 usual += (self._came[priority] - usual) / _WINDOWS
                 self._usually[priority] = usual * (1 - 1 / _WINDOWS) ** (passed - 1)
             self._came_before = self._came if passed == 1 else {}
+            self._waited_before_ns = self._waited_ns if passed == 1 else 0
+            self._waited_ns = 0
             self._came, self._window = defaultdict(float), window
 
     def _urgent_share(self, priority: int, now_ns: int) -> float:
@@ -128,9 +153,22 @@ class DelayLaw:
         return max(before, (1 - passed) * before + came) / (self._window_ns / self._timing.period_ns)
 
     def _used_share(self, priority: int) -> float:
-        """The share of turns that packets not less urgent than `priority` use as a rule."""
+        """The share of turns that packets not less urgent than `priority` use as a rule, or use if all sources send as
+        the scenario states.
+        """
         used = sum(turns for other, turns in self._usually.items() if other <= priority)
-        return used * self._timing.period_ns / self._window_ns
+        stated = sum(turns for other, turns in self._stated.items() if other <= priority)
+        return max(used * self._timing.period_ns / self._window_ns, stated)
+
+    def _stated_turns(self, scenario: Scenario) -> Mapping[int, float]:
+        """The turns of a round that the traffic of the scenario fills, by priority."""
+        found: defaultdict[int, float] = defaultdict(float)
+        for traffic in scenario.traffic_classes.values():
+            priority = PRIORITIES[traffic.priority]
+            if priority < PRIORITY_BULK or not self._timing.slots:
+                turns = self.turns_of(traffic.longest_bytes) * self._timing.period_ns / S
+                found[priority] += traffic.rate_hz(scenario.node_count) * turns
+        return found
 
     def bound_ns(self, topology: Topology, *, priority: int, clock_error_ns: int, now_ns: int) -> int | None:
         """The bound for a packet that is handed over now, if all clocks are within `clock_error_ns`; None if none can
@@ -146,17 +184,23 @@ class DelayLaw:
         hops, urgent = topology.hops(now_ns), self._urgent_share(priority, now_ns)
         if len(hops) == 1 or urgent > _MOST_URGENT:
             return None
-        return round(self.over_ns(max(hops.values()), used=self._used_share(priority)) / (1 - urgent))
+        farthest, used = max(hops.values()), self._used_share(priority)
+        if used > 1:
+            return None
+        found_ns = self.over_ns(farthest, longest_bytes=self._greatest, used=used)
+        if _WORSE * max(self._waited_ns, self._waited_before_ns) > found_ns - self.way_ns(farthest):
+            return None  # turns are too few
+        return round(found_ns / (1 - urgent))
 
-    def over_ns(self, hops: int, *, used: float = 0.0) -> int:
+    def over_ns(self, hops: int, *, longest_bytes: int, used: float = 0.0) -> int:
         """The bound over so many hops if nothing more urgent comes and no frame is lost; `used` is the share of turns
-        that packets fill.
+        that packets fill, none of them longer than `longest_bytes`.
         """
-        return self.way_ns(hops) + round((1 + used) * self._burst_ns)
+        return self.way_ns(hops) + round((1 + used) * self._burst_ns / (1 - self._hellos(longest_bytes)))
 
     def turns_of(self, size: int) -> float:
-        """The turns that a packet fills, beside others of its size."""
-        return 1 / max(1, self._room // size)
+        """The turns that a packet fills, beside hellos and others of its size."""
+        return 1 / max(1, self._room // size) / (1 - self._hellos(size))
 
     def way_ns(self, hops: int) -> int:
         """The bound over so many hops if nothing else waits."""

@@ -91,7 +91,8 @@ class RoundTiming(NamedTuple):
 class InStep:
     """Which neighbors of a node keep the rounds that it keeps, by when their frames of turns came.
 
-    A node whose time is not that of the swarm yet, or no more, sends in turns of others. No bound can count on it.
+    A node whose time is not that of the swarm yet, or no more, sends in turns of others. No bound can count on it, or
+    on a node that hears it.
     """
 
     def __init__(self, timing: RoundTiming, *, certain: bool) -> None:
@@ -99,6 +100,8 @@ class InStep:
         self._timing = timing
         self._keeping = -1 if certain else 0
         """The nodes in step, bit i for node i + 1."""
+        self._breaking = 0
+        """The nodes that sent in turns of others."""
         self._certain = certain
 
     def hear(self, node: int, end_ns: int) -> None:
@@ -107,7 +110,8 @@ class InStep:
         if keeps is not None:
             own = 1 << (node - 1)
             self._keeping = self._keeping | own if keeps else self._keeping & ~own
+            self._breaking = self._breaking & ~own if keeps else self._breaking | own
 
     def among(self, nodes: int) -> int:
-        """Those of a set of nodes that are in step."""
-        return nodes & self._keeping
+        """Those of a set of neighbors that this node hears for sure: those in step, and none while one is not."""
+        return 0 if nodes & self._breaking else nodes & self._keeping

@@ -28,7 +28,7 @@ from fanet_mw.node.received_motion import motion_in
 from fanet_mw.routing.packet_repair import FLOOD_OVER_NS, Repair
 from fanet_mw.routing.rounds.admission import BulkAdmission
 from fanet_mw.routing.rounds.bulk_slots import BulkSlots
-from fanet_mw.routing.rounds.delay_law import MOST_HOPS, DelayLaw, LikelyDelay
+from fanet_mw.routing.rounds.delay_law import MOST_HOPS, PATIENT_TURNS, DelayLaw, LikelyDelay
 from fanet_mw.routing.rounds.lasting_links import LastingLinks
 from fanet_mw.routing.rounds.one_way import OneWay
 from fanet_mw.routing.rounds.round_timing import InStep, RoundTiming
@@ -71,8 +71,6 @@ _SPREAD_SLOTS: Final = 1.0
 """Neighbors that pass on the same warning start within so many slots."""
 _BEFORE_TURN_NS: Final = 1 * US
 """A hello is made just before the turn in which it goes is filled."""
-_PATIENT_TURNS: Final = 2
-"""A hello that found no room in so many turns goes before urgent packets."""
 
 
 def _keys_held(content: Content) -> list[int]:
@@ -251,11 +249,12 @@ class RoundFlooding(RoutingProtocol):
         """How long a packet of another node took shows how long the own ones may take."""
         origin = NodeId(packet.header.origin)
         delay_ns = now_ns + self._port.scenario.radio.handover_ns - packet.header.origin_us * US
-        likely = self._likely
+        likely, hops = self._likely, self._topology.hops_to(origin, now_ns)
         if not self._in_turns(packet):
             likely = self._bulk_likely
             self._admission.hear(origin, delay_ns, now_ns=now_ns)
-        hops = None if likely is None else self._topology.hops_to(origin, now_ns)
+        elif likely is None and hops is not None and now_ns - delay_ns > self._topology.reached_since_ns(origin):
+            self._law.hear(delay_ns, hops=hops, now_ns=now_ns)
         if likely is not None and hops is not None:
             likely.hear(delay_ns, way_ns=self._law.way_ns(hops))
 
@@ -314,7 +313,7 @@ class RoundFlooding(RoutingProtocol):
         """Announce the frame of a turn: urgent packets, what neighbors are told, then the hello, as they fit."""
         room, together = self._timing.turn_bytes, list[Packet]()
         hello = self._hello
-        if hello is not None and self._hello_waits >= _PATIENT_TURNS:
+        if hello is not None and self._hello_waits >= PATIENT_TURNS:
             room -= self._add_hello(together)
         kept = self._law.kept_bytes if self._topology.has_news else 0
         for packet in self._spreading.wanted(self._neighbors(now_ns), gone=self._gone, start_ns=turn_ns):

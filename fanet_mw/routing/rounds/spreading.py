@@ -62,10 +62,11 @@ class _Spread:
         "taken_ns",
     )
 
-    def __init__(self, packet: Packet, rank: tuple[int, int], src: int | None, from_ns: int, taken_ns: int) -> None:
+    def __init__(self, packet: Packet, src: int | None, from_ns: int, taken_ns: int) -> None:
         self.packet = packet
         self.taken_ns = taken_ns
-        self.rank = rank
+        self.rank = packet.header.priority, packet.header.origin_us, _key(packet)
+        """The order in which packets are served: the oldest first, so that a later one delays none."""
         self.sent = 0
         """How often this node has sent it."""
         self.sent_ns = 0
@@ -98,8 +99,8 @@ class _Spread:
         """Of two packets the greater one is missed less: it is less urgent, or was sent before, or is the older one of
         two that were sent, or the newer one of two that were not.
         """
-        priority, order = self.rank
-        return priority, self.sent > 0, -order if self.sent else order
+        priority, origin_us, _ = self.rank
+        return priority, self.sent > 0, -origin_us if self.sent else origin_us
 
     @property
     def again(self) -> bool:
@@ -132,9 +133,8 @@ class Spreading:
         self._bulk: dict[int, _Spread] = {}
         self._due: list[tuple[int, int]] = []
         """A heap of the instants and keys at which bulk is looked at; outdated entries are skipped."""
-        self._ready: list[tuple[bool, tuple[int, int], int]] = []
+        self._ready: list[tuple[bool, tuple[int, int, int], int]] = []
         """A heap of the bulk whose instant has come: sent before, rank, key."""
-        self._order = 0
         self._done: dict[int, _Spread] = {}
         """The packets that need not be sent any more, the latest last."""
         self._early: dict[int, int] = {}
@@ -183,11 +183,8 @@ class Spreading:
         """A new packet, heard from the neighbor `src`; bulk may be sent from an instant on, `spare` bulk if others have
         not passed it on by then. What is sent `once` is not repeated. Returns a packet that was evicted for it.
         """
-        self._order += 1
         key = _key(packet)
-        entry = self._entries[key] = _Spread(
-            packet, (packet.header.priority, self._order), src, bulk_from_ns or 0, now_ns
-        )
+        entry = self._entries[key] = _Spread(packet, src, bulk_from_ns or 0, now_ns)
         entry.having |= self._early.pop(key, 0)
         if src is not None:
             entry.having |= 1 << (packet.header.origin - 1)

@@ -60,6 +60,8 @@ class Topology:
         """The state of the links for which this node decided whether it is in the dominating set."""
         self._unreached_ns: dict[NodeId, int] = {}
         """The instant since which each node without a way is known to have none."""
+        self._reached_ns: dict[NodeId, int] = {}
+        """The instant at which a way was found to each node that had none before."""
         self._known = 0
         """The nodes to which there has been a way."""
         self._parted: list[NodeId] = []
@@ -164,6 +166,7 @@ class Topology:
         reached = reduce(or_, self._rings)
         since, away = self._unreached_ns, nodes_of(~reached & (1 << self._count) - 1)
         self._unreached_ns = {node: since.get(node, now_ns) for node in away}
+        self._reached_ns.update(dict.fromkeys(since.keys() - self._unreached_ns.keys(), now_ns))
         self._known |= reached
 
     def _rings_from(self, start: int, *, without: int = 0) -> Iterator[int]:
@@ -189,6 +192,10 @@ class Topology:
         self._arrange(now_ns)
         own = 1 << node >> 1
         return next((hops for hops, ring in enumerate(self._rings) if ring & own), None)
+
+    def reached_since_ns(self, node: NodeId) -> int:
+        """The instant since which there is a way to a node that has one; 0 if there always was."""
+        return self._reached_ns.get(node, 0)
 
     def nearer(self, destination: NodeId) -> int:
         """The nodes with links to this one from which a node is fewer hops away than from here; none if no way is

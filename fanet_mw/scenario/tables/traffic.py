@@ -62,6 +62,13 @@ class Traffic(Section):
         """The size of the longest packet."""
         return max((size for _, size in self.packets), default=self.payload_bytes)
 
+    def rate_hz(self, nodes: int) -> float:
+        """The packets a second that all sources in a swarm of so many nodes make on average; 0 if that is not known."""
+        named = self.sources if not isinstance(self.sources, tuple) else len(self.sources)
+        sources = nodes if isinstance(named, str) else named
+        active = {"cbr": 1.0, "poisson": 1.0, "on_off": self.on_s / (self.on_s + self.off_s)}
+        return sources * active.get(self.arrivals, 0.0) / self.interval_s
+
     @model_validator(mode="after")
     def _trace_has_packets(self) -> Self:
         if self.packets_csv:

@@ -3,8 +3,9 @@
 import pytest
 
 from fanet_mw.graph.topology import within_range
+from fanet_mw.routing.clustered.tdma.hello_room import crowd, hellos_ns
 from fanet_mw.units import MS, Enu, NodeId
-from sim.planner.contention_window import hellos_ns, too_short
+from sim.planner.contention_window import too_short
 from sim.scenarios import catalog
 from sim.world.environment.layout import positions
 
@@ -17,7 +18,7 @@ def test_those_within_two_hops_count_with_what_each_says_in_a_superframe() -> No
     """
     for hello_s, each in ((1, 1), (4, 0.5)):
         scenario = catalog.find("clusters", ["clusters.flooding_period_s=2", f"routing.hello_interval_s={hello_s}"])
-        assert hellos_ns(scenario, LINE) == pytest.approx(5 * each * (192 + 147 + 50 + 70) * 1000, rel=0.01)
+        assert hellos_ns(scenario, crowd(LINE)) == pytest.approx(5 * each * (192 + 147 + 50 + 70) * 1000, rel=0.01)
 
 
 @pytest.mark.parametrize(("rate_mbps", "fits"), [(1, False), (11, True)])
@@ -28,7 +29,7 @@ def test_a_window_that_is_too_short_is_told_with_what_it_needs(rate_mbps: float,
     adjacency = within_range(places, range_m=scenario.radio.range_m)
     said = list(too_short(scenario, adjacency))
     assert (not said) == fits
-    assert fits or ("contention window of 20 ms" in said[0] and hellos_ns(scenario, adjacency) > 15 * MS)
+    assert fits or ("contention window of 20 ms" in said[0] and hellos_ns(scenario, crowd(adjacency)) > 15 * MS)
 
 
 @pytest.mark.parametrize(("contention_ms", "fits"), [(5, False), (5.2, False), (6, True)])
@@ -36,7 +37,7 @@ def test_hellos_that_fit_by_their_airtime_need_time_in_which_to_begin(contention
     """They take 0.6 ms. In the last 5 ms of a window none begins, so in the first one all would begin at once."""
     keys = ["clusters.flooding_period_s=0.25", "routing.hello_interval_s=1", f"clusters.contention_ms={contention_ms}"]
     scenario = catalog.find("clusters", keys)
-    assert hellos_ns(scenario, LINE) < 0.6 * MS
+    assert hellos_ns(scenario, crowd(LINE)) < 0.6 * MS
     said = list(too_short(scenario, LINE))
     assert (not said) == fits
     assert fits or "which has to be at least 6" in said[0]

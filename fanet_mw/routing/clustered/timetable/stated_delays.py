@@ -19,6 +19,7 @@ from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.roles.leader import HEARD_NS
 from fanet_mw.routing.clustered.roles.leader_election import Lease
+from fanet_mw.routing.clustered.tdma.hello_room import hellos_ns, room_ns
 from fanet_mw.routing.clustered.tdma.turn_timing import receipt_ns, turn_slack_ns
 from fanet_mw.routing.clustered.timetable.admission import Admission, least_interval_ns
 from fanet_mw.routing.clustered.timetable.followers import Followers
@@ -108,6 +109,8 @@ class StatedDelays:
             return None
         if not timetable.table.sure and scenario.mobility.model != "static":
             return None
+        if hellos_ns(scenario, timetable.table.crowd) > room_ns(timetable.turns.contention_ns):
+            return None  # neighbors will be taken for dead
         return self._own_of(self._port.node, timetable)
 
     def _ends_early(self, timetable: NodeTimetable) -> bool:

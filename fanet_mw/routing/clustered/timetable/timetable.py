@@ -21,6 +21,7 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
 
+from fanet_mw.routing.clustered.tdma.hello_room import crowd
 from fanet_mw.routing.clustered.timetable.delivery_odds import Odds, odds
 from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry, NodeRows, rows
 from fanet_mw.routing.clustered.timetable.interference import InterferenceByDistance, InterferenceByPower
@@ -64,6 +65,8 @@ class Timetable(NamedTuple):
     """For each node, the turns that floods leave it: it can transmit to its neighbors alone, and disturbs nobody."""
     near: Mapping[NodeId, frozenset[NodeId]] = MappingProxyType({})
     """For each node, its neighbors, which all hear it in these turns."""
+    crowd: int = 0
+    """The most nodes within two hops of each other."""
 
     def roots(self) -> list[Turn]:
         """The turns in which roots transmit new packets; repetitions are not among them."""
@@ -118,7 +121,10 @@ def timetable(
         for row, offsets in enumerate(packing.spare(swarm.hears))
     }
     near = {ids[row]: frozenset(swarm.nodes.of(heard)) for row, heard in enumerate(swarm.hears)}
-    return Timetable(turns, _spans(turns), uncovered, used, hops=hops, sure=swarm.sure, spare=spare, near=near)
+    crowded = crowd({node: tuple(others) for node, others in near.items()})
+    return Timetable(
+        turns, _spans(turns), uncovered, used, hops=hops, sure=swarm.sure, spare=spare, near=near, crowd=crowded
+    )
 
 
 @lru_cache(maxsize=16)

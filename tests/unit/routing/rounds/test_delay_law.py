@@ -45,10 +45,10 @@ def test_what_is_long_ago_is_forgotten() -> None:
     assert likely.over_ns(WAY_NS) == 62
 
 
-def of_two() -> tuple[DelayLaw, Topology]:
+def of_two(*keys: str) -> tuple[DelayLaw, Topology]:
     """The law at one of two nodes that hear each other."""
     two = ["routing.protocol=rounds", "nodes.count=2", "clusters.count=1", "traffic.sources=1"]
-    scenario = catalog.find("clusters", two)
+    scenario = catalog.find("clusters", [*two, *keys])
     law = DelayLaw(RoundTiming.of(scenario), scenario)
     topology = Topology(NodeId(1), count=2, epoch_ns=law.epoch_ns, lifetime_ns=10 * S)
     topology.hear([HeardNodes(2, 0, 1, often=False)], now_ns=0)
@@ -88,8 +88,8 @@ def test_packets_alike_make_a_bound_longer_by_the_share_of_turns_that_they_use()
             law.bound_ns(topology, priority=priority, clock_error_ns=0, now_ns=now_ns)
             for priority in (PRIORITY_REPORT, PRIORITY_SAFETY)
         )
-        assert warning_ns == law.over_ns(1), "a warning waits for none of them"
-    assert found_ns[0.7] - found_ns[0.3] == pytest.approx(0.4 * law._burst_ns, rel=0.2)
+        assert warning_ns == law.over_ns(1, longest_bytes=law._greatest), "a warning waits for none of them"
+    assert found_ns[0.7] - found_ns[0.3] == pytest.approx(0.4 * law._burst_ns, rel=0.25)
 
 
 def test_after_a_silence_turns_count_as_empty() -> None:
@@ -100,4 +100,37 @@ def test_after_a_silence_turns_count_as_empty() -> None:
     topology.hear([HeardNodes(2, now_ns // law.epoch_ns % 256, 1, often=False)], now_ns=now_ns)
     topology.state(2, often=False, now_ns=now_ns)
     found_ns = law.bound_ns(topology, priority=PRIORITY_REPORT, clock_error_ns=0, now_ns=now_ns)
-    assert found_ns == pytest.approx(law.over_ns(1), rel=1e-3)
+    assert found_ns == pytest.approx(law.over_ns(1, longest_bytes=0), rel=1e-3)
+
+
+def test_no_bound_is_stated_while_packets_of_others_come_so_late_that_turns_must_be_too_few() -> None:
+    law, topology = of_two()
+
+    def stated(now_ns: int) -> int | None:
+        return law.bound_ns(topology, priority=PRIORITY_REPORT, clock_error_ns=0, now_ns=now_ns)
+
+    law.hear(2 * law.hop_ns, hops=1, now_ns=S)
+    assert stated(S) is not None
+    law.hear(law.hop_ns + law._burst_ns, hops=1, now_ns=S)
+    assert stated(S) is None, "those that are made now wait behind as many again"
+    assert stated(S + 2 * law._window_ns) is not None
+
+
+@pytest.mark.parametrize(("interval_s", "states"), [(1.0, True), (0.005, False)])
+def test_a_scenario_whose_reports_overfill_turns_has_no_bound_from_its_first_packet_on(
+    interval_s: float, *, states: bool
+) -> None:
+    keys = ["traffic.priority=report", f"traffic.interval_s={interval_s}", "rounds.turn_bytes=1600"]
+    law, topology = of_two(*keys)
+    found_ns = law.bound_ns(topology, priority=PRIORITY_REPORT, clock_error_ns=0, now_ns=S)
+    assert (found_ns is not None) == states
+
+
+def test_a_hello_that_does_not_fit_beside_a_long_packet_takes_a_turn_of_its_own() -> None:
+    """One hello a second, and ten rounds: a tenth of the turns, but no more than every third one."""
+    law, _ = of_two("rounds.least_period_ms=100")
+    longest = law._timing.turn_bytes - 100
+    assert law.turns_of(longest) == pytest.approx(1 / 0.9)
+    assert law.over_ns(1, longest_bytes=longest) - law.way_ns(1) == pytest.approx(law._burst_ns / 0.9)
+    rare, _ = of_two("rounds.least_period_ms=900")
+    assert rare.turns_of(longest) == pytest.approx(1.5)

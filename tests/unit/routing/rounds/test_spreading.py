@@ -18,9 +18,9 @@ def nodes(numbers: Iterable[int]) -> int:
     return sum(1 << (number - 1) for number in numbers)
 
 
-def packet(seq: int, *, priority: int = wire.PRIORITY_REPORT) -> Packet:
+def packet(seq: int, *, priority: int = wire.PRIORITY_REPORT, origin_us: int = 0) -> Packet:
     header = Header(
-        origin_us=0, seq=seq, origin=NodeId(7), destination=BROADCAST, prev_hop=NodeId(7), kind=Kind.DATA,
+        origin_us=origin_us, seq=seq, origin=NodeId(7), destination=BROADCAST, prev_hop=NodeId(7), kind=Kind.DATA,
         hop_limit=8, hops=0, priority=priority, flags=wire.FLAG_FLOOD,
     )  # fmt: skip
     return Packet(header, header.encode())
@@ -47,11 +47,11 @@ def test_an_urgent_packet_goes_in_the_next_turn_and_once_if_all_neighbors_pass_i
     assert key_of_packet(packet(1)) not in made
 
 
-def test_the_most_urgent_packet_goes_first_and_else_the_one_that_came_first() -> None:
+def test_the_most_urgent_packet_goes_first_and_else_the_oldest_whichever_came_first() -> None:
     made = spreading()
     for seq, priority in ((1, wire.PRIORITY_REPORT), (2, wire.PRIORITY_SAFETY), (3, wire.PRIORITY_REPORT)):
-        made.take(packet(seq, priority=priority), src=None, now_ns=0)
-    assert sent_in_turn(made, 1) == [2, 1, 3]
+        made.take(packet(seq, priority=priority, origin_us=9 - seq), src=None, now_ns=0)
+    assert sent_in_turn(made, 1) == [2, 3, 1]
 
 
 def test_a_neighbor_that_does_not_pass_it_on_gets_it_again_but_not_for_ever() -> None:

@@ -13,7 +13,7 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.own_bound import BURST, RootTurns
-from fanet_mw.routing.clustered.timetable.root_release import RootRelease, TurnsInForce
+from fanet_mw.routing.clustered.timetable.turn_release import RootRelease, TurnsInForce
 from fanet_mw.units import MS, NodeId
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_CONTROL, PRIORITY_REPORT, PRIORITY_SAFETY, Header, Kind
 

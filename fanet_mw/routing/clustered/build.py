@@ -38,17 +38,16 @@ from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
 from fanet_mw.routing.clustered.slots.slot_access import SlotAccess
 from fanet_mw.routing.clustered.slots.slot_release import SlotRelease
 from fanet_mw.routing.clustered.timetable.admission import Admission
-from fanet_mw.routing.clustered.timetable.call_release import CallRelease
 from fanet_mw.routing.clustered.timetable.followers import Followers
 from fanet_mw.routing.clustered.timetable.reserved_room import reserved
 from fanet_mw.routing.clustered.timetable.resumed_floods import ResumedFloods
-from fanet_mw.routing.clustered.timetable.root_release import RootRelease
 from fanet_mw.routing.clustered.timetable.scheduled_relaying import ScheduledRelaying
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
 from fanet_mw.routing.clustered.timetable.timetabling import FromPlaces
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.routing.clustered.timetable.turn_allocation import leader_load
+from fanet_mw.routing.clustered.timetable.turn_release import CallRelease, RootRelease
 from fanet_mw.routing.clustered.timetable.turn_size import measured_period_ns
 from fanet_mw.routing.missing_packets import MissingPackets
 from fanet_mw.routing.packet_repair import FLOOD_OVER_NS, Repair

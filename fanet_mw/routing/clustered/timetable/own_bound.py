@@ -8,7 +8,7 @@ The first lead is the time by which a frame is announced to the radio before its
 a reception gets from the radio to its node's process (`radio.handover_ms`), and the second lead is the time by which
 that process may wake up too late.
 
-Each class has room of its own in each turn (`root_release.py`), so a class does not wait for another one. There are two
+Each class has room of its own in each turn (`turn_release.py`), so a class does not wait for another one. There are two
 exceptions. A packet that is larger than the room of its class waits as bulk does. A leader's announcements take the
 room of bulk, so a leader's bulk packets have no bound (`stated_delays.py`). Within a class no later packet delays an
 earlier one.

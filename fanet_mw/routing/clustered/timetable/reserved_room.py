@@ -1,7 +1,7 @@
 """The room that each turn of a timetable reserves for packets that are more urgent than bulk.
 
 A turn reserves room for one packet of each urgent class that the scenario uses: a collision warning, a survivor report.
-The lengths of these packets are known before take-off. `root_release.py` fills the room.
+The lengths of these packets are known before take-off. `turn_release.py` fills the room.
 """
 
 from collections.abc import Mapping

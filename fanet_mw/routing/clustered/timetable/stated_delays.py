@@ -26,8 +26,8 @@ from fanet_mw.routing.clustered.timetable.followers import Followers
 from fanet_mw.routing.clustered.timetable.likely_delay import likely_delay_ns
 from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.own_bound import RootTurns
-from fanet_mw.routing.clustered.timetable.root_release import RootRelease
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
+from fanet_mw.routing.clustered.timetable.turn_release import RootRelease
 from fanet_mw.timesync.turn_slack import clocks_fit
 from fanet_mw.trace import LIKELY_SHARE, BoundExcludes, BoundStated, LikelyStated
 from fanet_mw.units import MS, US, NodeId, seconds_to_ns

@@ -2,8 +2,7 @@
 
 from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
-from fanet_mw.routing.clustered.timetable.call_release import CallRelease
-from fanet_mw.routing.clustered.timetable.root_release import TurnsInForce
+from fanet_mw.routing.clustered.timetable.turn_release import CallRelease, TurnsInForce
 from fanet_mw.units import MS
 
 TURNS = Turns(origin_ns=0, period_ns=100 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_superframe=29)

@@ -1,4 +1,7 @@
-"""The transmit queue of a node with turns of its own: which packets go in each turn. Each is announced one lead ahead.
+"""The transmit queues of a node that has turns: one frame in each turn, announced to the radio one lead ahead.
+
+`RootRelease` sends in the turns in which the node is the root of a flood (`tdma/turn_timing.py` explains root, turn and
+span):
 
     a turn:  | one warning | one report | bulk, in order, as many as fit              | the rest, most urgent first |
                                         | or, in its place, a leader's announcements |
@@ -6,15 +9,20 @@
 Each class of packets in use (`reserved_room.reserved`) has room of its own in a turn, so the wait of a bulk packet
 depends on nothing that comes later, such as reports or warnings. Only a leader's announcements delay its bulk. A packet
 that is larger than the room of its class waits like bulk. A turn is used only if its flood is over before the next
-timetable comes into force. `tdma/turn_timing.py` explains root, turn and span.
+timetable comes into force.
+
+`CallRelease` sends what only neighbors need, so no node relays it. A timetable for lossy links gives each node *calls*
+(`redundant_scheduling.py`): missed packets wait for one, and a hello reserves the next one when it is due. Another
+timetable gives each node *spare turns*, which the floods of all leave unused (`list_scheduling.py`), for packets to one
+neighbor.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from fanet_mw.node.packet import Packet
 from fanet_mw.node.queue import TxQueue
-from fanet_mw.routing.clustered.tdma.turn_release import OwnTurn, TurnRelease
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.units import NodeId
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_CONTROL, Kind
@@ -36,6 +44,88 @@ class TurnsInForce(NamedTuple):
     """The duration of a flood, in turns: from one of the node's turns until all nodes have the packet."""
 
 
+class OwnTurn(NamedTuple):
+    """A future turn in which the node may transmit."""
+
+    start_ns: int
+    frame_bytes: int
+    """The number of bytes that the turn can carry; 0 means one packet of any length."""
+
+
+class TurnRelease(ABC):
+    """The queue of one node, and the next turn for which a frame is planned."""
+
+    def __init__(self, queue: TxQueue, *, lead_ns: int) -> None:
+        self._queue = queue
+        self._lead_ns = lead_ns
+        self._free_ns = 0
+        """The first instant after the last turn that was used."""
+        self._next: OwnTurn | None = None
+        self._in_force: Sequence[TurnsInForce] = ()
+        """The node's turns of this kind by each timetable that is in force or announced."""
+
+    def follow(self, in_force: Sequence[TurnsInForce], *, now_ns: int) -> None:
+        """Take over the turns of new timetables, in the order in which they come into force."""
+        self._in_force = in_force
+        self._arm(now_ns)
+
+    @abstractmethod
+    def _turn(self, earliest_ns: int) -> OwnTurn | None:
+        """The first turn of the node from an instant on."""
+
+    def has_turn(self, *, now_ns: int) -> bool:
+        """True if this node has a turn from now on."""
+        return self._turn(max(now_ns + self._lead_ns, self._free_ns)) is not None
+
+    def __len__(self) -> int:
+        return len(self._queue)
+
+    def push(self, packet: Packet, *, now_ns: int) -> Packet | None:
+        """Queue a packet; returns the packet that was evicted for it, if any."""
+        return self._push(packet, packet.header.priority, now_ns)
+
+    def _push(self, packet: Packet, rank: int, now_ns: int) -> Packet | None:
+        evicted = self._queue.push(packet, rank=rank)
+        if self._next is None:
+            self._arm(now_ns)
+        return evicted
+
+    def holds(self, key: int) -> bool:
+        """True if the packet with this key (`duplicates.key_of`) is queued."""
+        return key in self._queue
+
+    def expire(self, *, before_us: int) -> list[Packet]:
+        return self._queue.expire(before_us=before_us)
+
+    def drain(self) -> list[Packet]:
+        """Take out all queued packets, because they will go another way."""
+        self._next = None
+        return self._queue.drain()
+
+    def next_wake_ns(self) -> int | None:
+        return None if self._next is None else self._next.start_ns - self._lead_ns
+
+    def due(self, *, now_ns: int) -> list[tuple[list[Packet], int]]:
+        """Take out the packets to announce now: for each frame its packets, and the instant of the frame."""
+        released = []
+        while self._next is not None and self._next.start_ns - self._lead_ns <= now_ns and len(self._queue):
+            released.append((self._fill(self._next.frame_bytes), self._next.start_ns))
+            self._free_ns = self._next.start_ns + 1
+            self._arm(now_ns)
+        if not len(self._queue):
+            self._next = None
+        return released
+
+    def _fill(self, size: int) -> list[Packet]:
+        """Take out the packets for one turn: the most urgent one, and others that fit into the same frame."""
+        first = self._queue.pop()
+        return [first, *self._queue.pop_fitting(size - len(first.frame))]
+
+    def _arm(self, now_ns: int) -> None:
+        earliest_ns = max(now_ns + self._lead_ns, self._free_ns)
+        self._next = self._turn(earliest_ns) if len(self._queue) else None
+
+
 class RootRelease(TurnRelease):
     """The transmit queue of one node, and the turns in which the node is the root of a flood."""
 
@@ -44,12 +134,6 @@ class RootRelease(TurnRelease):
         self._node = node
         self.reserved: Mapping[int, int] = dict(sorted(reserved.items()))
         """The number of bytes of each turn that bulk must leave free, by priority."""
-        self._in_force: Sequence[TurnsInForce] = ()
-
-    def follow(self, in_force: Sequence[TurnsInForce], *, now_ns: int) -> None:
-        """Take over the turns of new timetables, in the order in which they come into force."""
-        self._in_force = in_force
-        self._arm(now_ns)
 
     def push(self, packet: Packet, *, now_ns: int, last: bool = False) -> Packet | None:
         """Queue a packet; returns the packet that was evicted for it, if any. With `last` it goes behind all others."""
@@ -139,3 +223,48 @@ class RootRelease(TurnRelease):
 
 def _bytes(packets: Sequence[Packet]) -> int:
     return sum(len(packet.frame) for packet in packets)
+
+
+class CallRelease(TurnRelease):
+    """One queue of packets for neighbors, and the node's next call or spare turn."""
+
+    def reserve(self, *, not_before_ns: int, now_ns: int) -> int | None:
+        """Reserve the next call for a frame that is not queued, such as a hello; returns its start, None if the node
+        has no call.
+        """
+        turn = self._turn(max(not_before_ns, self._free_ns))
+        if turn is None:
+            return None
+        self._free_ns = turn.start_ns + 1
+        self._arm(now_ns)
+        return turn.start_ns
+
+    def last_ns(self, *, now_ns: int) -> int | None:
+        """The start of the call in which the packet that was queued last goes at the latest; None if it is unknown."""
+        earliest_ns, start_ns = max(now_ns + self._lead_ns, self._free_ns), None
+        for _ in range(len(self._queue)):
+            turn = self._turn(earliest_ns)
+            if turn is None:
+                return None
+            start_ns = turn.start_ns
+            earliest_ns = start_ns + 1
+        return start_ns
+
+    @property
+    def pending(self) -> TxQueue:
+        """The queued packets; each is removed when another node sends a copy of it (`on_copy`)."""
+        return self._queue
+
+    def on_copy(self, key: int, *, now_ns: int) -> None:
+        """Another node has sent this packet (`duplicates.key_of`), so it is removed from the queue."""
+        self._queue.remove(key)
+
+    def _turn(self, earliest_ns: int) -> OwnTurn | None:
+        """The first call from an instant on, by the timetable that is in force then."""
+        for index, calls in enumerate(self._in_force):
+            if calls.offsets:
+                not_before_ns = max(earliest_ns, calls.valid_ns)
+                start_ns = calls.turns.next_start_ns(calls.offsets, not_before_ns=not_before_ns)
+                if index + 1 == len(self._in_force) or start_ns < self._in_force[index + 1].valid_ns:
+                    return OwnTurn(start_ns, calls.frame_bytes)
+        return None

@@ -9,7 +9,6 @@ floods in a timetable; the bound that a node states from it is in `fanet_mw/rout
 
 from fanet_mw.bounds.arrivals import Arrivals, Periodic, Total
 from fanet_mw.bounds.bounded_or_refused import Bounded, DelayBound, Refused
-from fanet_mw.bounds.guard_time import guard_ns
 from fanet_mw.bounds.network_calculus import backlog, delay_any_order, delay_fifo
 from fanet_mw.bounds.slot_service import Dcf, Server, SlotServer
 from fanet_mw.bounds.turn_service import TurnServer
@@ -28,5 +27,4 @@ __all__ = [
     "backlog",
     "delay_any_order",
     "delay_fifo",
-    "guard_ns",
 ]

@@ -33,9 +33,7 @@ class Port(Protocol):
     def transmit(self, frame: bytes, dst: NodeId, start_ns: int, wants_status: bool = False) -> int:
         """Announce a transmission to the radio; returns the sequence number of the request."""
 
-    def transmit_together(
-        self, packets: Sequence[Packet], *, flags: int, at_ns: Sequence[int], wants_status: bool = False
-    ) -> None:
+    def transmit_together(self, packets: Sequence[Packet], *, flags: int, at_ns: Sequence[int]) -> None:
         """Begin a phase of several packets: broadcast them at each of these instants, in as few frames as possible.
         Copies that come back in that phase count as duplicates.
         """

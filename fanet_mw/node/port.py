@@ -61,14 +61,12 @@ class NodePort:
     def mark(self, packet: Packet, *, flags: int) -> None:
         self._duplicates.mark(hash_of(packet.frame), PHASES[flags])
 
-    def transmit_together(
-        self, packets: Sequence[Packet], *, flags: int, at_ns: Sequence[int], wants_status: bool = False
-    ) -> None:
+    def transmit_together(self, packets: Sequence[Packet], *, flags: int, at_ns: Sequence[int]) -> None:
         for packet in packets:
             self.mark(packet, flags=flags)
         frames = [self._begun(packet, flags) for packet in packets]
         for start_ns in at_ns:
-            self._share([(start_ns, frame) for frame in frames], wanted=wants_status)
+            self._share([(start_ns, frame) for frame in frames])
 
     def transmit_to(self, packet: Packet, dst: NodeId, *, flags: int, start_ns: int) -> int:
         self.mark(packet, flags=flags)
@@ -88,12 +86,12 @@ class NodePort:
         """The bytes of a packet whose phase begins here: an own packet as it is, another node's with one more hop."""
         return wire.rewrite(packet.frame, self.node, flags, hop=0 if packet.header.origin == self.node else 1)
 
-    def _share(self, packets: Sequence[tuple[int, bytes]], *, wanted: bool = False) -> None:
+    def _share(self, packets: Sequence[tuple[int, bytes]]) -> None:
         """Broadcast packets in as few frames as possible."""
         rest = iter(packets)
         for start_ns, frame, count in aggregated(packets, most_bytes=self.scenario.radio.max_frame_bytes):
             seq = self.frames_sent
-            wants_status = wanted
+            wants_status = False
             if self._held:
                 for packet_ns, packet in islice(rest, count):
                     wants_status |= self._let_out(packet, seq, packet_ns)

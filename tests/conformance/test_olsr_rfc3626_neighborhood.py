@@ -20,9 +20,9 @@ from olsr_bench import (
 )
 from rival_bench import Bench
 
-from fanet_mw.graph.multipoint_relays import multipoint_relays
 from fanet_mw.routing.olsr import parameters as p
 from fanet_mw.routing.olsr.messages import HelloNeighbor, LinkType, NeighborType, decode_time, encode_time
+from fanet_mw.routing.olsr.multipoint_relays import multipoint_relays
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, NodeId, S
 
@@ -162,7 +162,7 @@ def relays(neighbors: dict[int, set[int]], **willing: int) -> list[int]:
     willingness = {NodeId(n): willing.get(f"n{n}", p.WILL_DEFAULT) for n in neighbors}
     known = {NodeId(n): tuple(NodeId(far) for far in sorted(reach)) for n, reach in neighbors.items()}
     known[NodeId(1)] = tuple(sorted(known))
-    return [int(n) for n in multipoint_relays(NodeId(1), known, willingness=willingness, drop_redundant=False)]
+    return [int(n) for n in multipoint_relays(NodeId(1), known, willingness=willingness)]
 
 
 def test_8_3_1_the_only_way_to_a_node_is_a_relay_and_what_it_covers_needs_no_other() -> None:

@@ -2,9 +2,6 @@
 
 from typing import Final
 
-from fanet_mw.graph.multipoint_relays import WILL_ALWAYS as WILL_ALWAYS
-from fanet_mw.graph.multipoint_relays import WILL_DEFAULT as WILL_DEFAULT
-from fanet_mw.graph.multipoint_relays import WILL_NEVER as WILL_NEVER
 from fanet_mw.units import S
 
 HELLO_INTERVAL_NS: Final = 2 * S
@@ -14,5 +11,8 @@ NEIGHB_HOLD_TIME_NS: Final = 3 * REFRESH_INTERVAL_NS
 TOP_HOLD_TIME_NS: Final = 3 * TC_INTERVAL_NS
 MAXJITTER_NS: Final = HELLO_INTERVAL_NS // 4
 
+WILL_NEVER: Final = 0
 WILL_LOW: Final = 1
+WILL_DEFAULT: Final = 3
 WILL_HIGH: Final = 6
+WILL_ALWAYS: Final = 7

@@ -16,7 +16,6 @@ from typing import ClassVar, Final
 
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason, MalformedFrameError
-from fanet_mw.graph.multipoint_relays import multipoint_relays
 from fanet_mw.node.contract import Port
 from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.packet import Packet
@@ -36,6 +35,7 @@ from fanet_mw.routing.olsr.messages import (
     TopologyControl,
     encode_time,
 )
+from fanet_mw.routing.olsr.multipoint_relays import multipoint_relays
 from fanet_mw.routing.olsr.routes import OlsrRoute, routing_table
 from fanet_mw.routing.olsr.state import Repositories
 from fanet_mw.routing.rival_control_messages import Family
@@ -128,9 +128,7 @@ class Olsr(HopByHop):
         state, node = self._state, self._port.node
         neighbors = {n: tuple(state.two_hop(n, now_ns=now_ns)) for n in state.symmetric(now_ns=now_ns)}
         willingness = {n: state.willingness(n) for n in neighbors}
-        return multipoint_relays(
-            node, {**neighbors, node: tuple(neighbors)}, willingness=willingness, drop_redundant=False
-        )
+        return multipoint_relays(node, {**neighbors, node: tuple(neighbors)}, willingness=willingness)
 
     def _send_hello(self, now_ns: int) -> None:
         """Send hellos with every link (6.2), in as many messages as that takes."""

@@ -13,8 +13,6 @@ from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
 from fanet_mw.units import earliest
 
-_MOST_TAKEN: Final = 256
-"""More turns than one node has ahead of it."""
 _SUPERFRAMES: Final = 3
 """A packet waits for a free turn for so many superframes."""
 
@@ -35,8 +33,8 @@ class ResumedFloods:
         """Use one of the node's turns to relay what a frame held that ended at an instant; False if the contents of
         another frame were announced for the turn.
         """
-        if len(self._taken) >= _MOST_TAKEN:
-            del self._taken[next(iter(self._taken))]
+        while self._taken and (first_ns := next(iter(self._taken))) < heard_ns:
+            del self._taken[first_ns]  # it is over
         return self._taken.setdefault(start_ns, heard_ns) == heard_ns
 
     def resume(self, packet: Packet, *, now_ns: int) -> bool:

@@ -5,26 +5,18 @@ that its last sender has chosen. Unlike in a connected dominating set, the relay
 """
 
 from collections.abc import Mapping
-from types import MappingProxyType
-from typing import Final
 
 from fanet_mw.graph.topology import Adjacency
+from fanet_mw.routing.olsr.parameters import WILL_ALWAYS, WILL_DEFAULT, WILL_NEVER
 from fanet_mw.units import NodeId
 
-WILL_NEVER: Final = 0  # RFC 3626, 18.8
-WILL_DEFAULT: Final = 3
-WILL_ALWAYS: Final = 7
-_DEFAULT: Final[Mapping[NodeId, int]] = MappingProxyType({})
 
-
-def multipoint_relays(
-    node: NodeId, adjacency: Adjacency, *, willingness: Mapping[NodeId, int] = _DEFAULT, drop_redundant: bool = True
-) -> tuple[NodeId, ...]:
+def multipoint_relays(node: NodeId, adjacency: Adjacency, *, willingness: Mapping[NodeId, int]) -> tuple[NodeId, ...]:
     """The relays of `node`. It suffices that `adjacency` holds the node and its neighbors.
 
     The steps are those of the RFC: first the neighbors that are always willing; then those that alone reach some node;
-    then by willingness, by the number of nodes that they still add, by degree, and by lower id. In the end relays
-    without which every node is still reached are dropped, a step that the RFC leaves optional (`drop_redundant`).
+    then by willingness, by the number of nodes that they still add, by degree, and by lower id. Relays without which
+    every node is still reached are not dropped, a step that the RFC leaves optional.
     """
     will = {n: willingness.get(n, WILL_DEFAULT) for n in adjacency[node]}
     near = frozenset(adjacency[node])
@@ -46,7 +38,7 @@ def multipoint_relays(
         )
         relays.add(best)
         missing -= reach[best]
-    return _without_redundant(relays, reach, will) if drop_redundant else tuple(sorted(relays))
+    return tuple(sorted(relays))
 
 
 def _only_ones(reach: Mapping[NodeId, frozenset[NodeId]]) -> set[NodeId]:
@@ -55,16 +47,3 @@ def _only_ones(reach: Mapping[NodeId, frozenset[NodeId]]) -> set[NodeId]:
         for far in sorted(reach[n]):
             through.setdefault(far, []).append(n)
     return {ways[0] for ways in through.values() if len(ways) == 1}
-
-
-def _without_redundant(
-    relays: set[NodeId], reach: Mapping[NodeId, frozenset[NodeId]], will: Mapping[NodeId, int]
-) -> tuple[NodeId, ...]:
-    kept = set(relays)
-    for n in sorted(relays, key=lambda n: (will[n], n)):
-        if will[n] == WILL_ALWAYS:
-            continue
-        others = frozenset().union(*(reach[m] for m in kept if m != n))
-        if reach[n] <= others:
-            kept.discard(n)
-    return tuple(sorted(kept))

@@ -260,7 +260,7 @@ def judged(flight: Flight, copy: Copy) -> dict[str, Any]:
         summary = flight.summary()
         mission, reached = summary["mission"], summary["reachable"]
         found |= {"found": mission["confirmed"], "of": mission["survivors"], "covered": mission["coverage"]}
-        found |= {"pdr": reached["report"]["pdr"], "contacts": mission["collisions"]}
+        found |= {"pdr": reached.get("report", reached)["pdr"], "contacts": mission["collisions"]}
         found["last_find_s"] = max(mission["time_to_confirm_s"], default=None)
     return found
 

@@ -51,7 +51,7 @@ def _lost(copy: Copy) -> str:
 
 def _healing_row(mission: str, lost: str, copies: Sequence[Copy]) -> list[str]:
     heal_s = [one for copy in copies for one in copy["heal_s"]]
-    judged = [copy for copy in copies if "bounded" in copy]
+    judged = [copy for copy in copies if copy.get("bounded", [None, None])[1]]  # without a loss bounds are stated
     again = sum(copy["bounds_s"] <= copy["heal_s"][-1] + _AGAIN_S for copy in judged)
     broken = [copy["broken"] for copy in judged if "broken" in copy]
     as_good = sum((copy["bounded"][0] or 0) >= (copy["bounded"][1] or 0) for copy in judged)

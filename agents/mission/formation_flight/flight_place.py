@@ -2,7 +2,8 @@
 
     the leader                  the head with the lowest id flies the route
     other heads                 on a circle around the leader (`_APART`)
-    members                     on a circle around their head
+    members                     on a circle around their head; that of the leader and each other one have a UAV each
+                                where they are nearest to each other
     a UAV without a cluster     on a circle around the nearest head that it receives
     a UAV whose head is lost    flies parallel to the leader if it receives the leader, otherwise it hovers
     a UAV that receives nobody  hovers, even if it was the leader: the others fly on without it
@@ -11,7 +12,7 @@ The leader of the formation need not be the leader of the network, which assigns
 received messages: the hellos of neighbors, and the floods of heads. A UAV is lost when its newest message is too old.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import Final
 
 from agents.mission.formation_flight.ring import place_on_ring
@@ -60,9 +61,12 @@ class FlightPlace:
         followed = None if head is None else self._motions.motion(head, now_ns=now_ns)
         if head is None or followed is None:
             return here, STILL if lead is None else lead.velocity
-        others = set(clusters) if is_head else set(self._followers(head, clusters, now_ns))
-        radius_m = _APART * self._radius_m if is_head else self._radius_m
-        return self._around(followed, sorted(others - {head, self._node}), radius_m, here, now_ns)
+        if is_head:
+            beside = self._places(set(clusters) - {head, self._node}, now_ns)
+            return self._around(followed, beside, _APART * self._radius_m, here, now_ns)
+        beside = self._places(set(self._followers(head, clusters, now_ns)) - {self._node}, now_ns)
+        faces = self._places(set(clusters) - {head} if head == leader else {leader}, now_ns)
+        return self._around(followed, beside, self._radius_m, here, now_ns, faces=faces)
 
     def _head_of(self, node: int, place: Enu, clusters: Clusters, now_ns: int) -> int | None:
         """The head of a UAV that is no head itself: that of its cluster, or the nearest known one; None if no head is
@@ -84,11 +88,20 @@ class FlightPlace:
             if node not in clusters and self._head_of(node, motion.position_at(now_ns), clusters, now_ns) == head:
                 yield node
 
+    def _places(self, nodes: Collection[int], now_ns: int) -> list[Enu]:
+        """Where those of these UAVs are now that were received lately."""
+        return [motion.position_at(now_ns) for node, motion in self._motions.by_node(now_ns=now_ns) if node in nodes]
+
     def _around(
-        self, followed: Motion, others: Iterable[int], radius_m: float, here: Enu, now_ns: int
+        self,
+        followed: Motion,
+        others: Iterable[Enu],
+        radius_m: float,
+        here: Enu,
+        now_ns: int,
+        *,
+        faces: Iterable[Enu] = (),
     ) -> tuple[Enu, Enu]:
-        motions = [self._motions.motion(node, now_ns=now_ns) for node in others]
-        places = [motion.position_at(now_ns) for motion in motions if motion is not None]
         middle = followed.position_at(now_ns)
-        place = place_on_ring(middle, here, places, radius_m=radius_m, node=self._node)
+        place = place_on_ring(middle, here, others, radius_m=radius_m, node=self._node, faces=faces)
         return place, followed.velocity._replace(up=0.0)

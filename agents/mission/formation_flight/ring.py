@@ -1,9 +1,11 @@
 """A place on a circle around another UAV, evenly spaced from the neighbors on it. Pure geometry.
 
     a UAV keeps its bearing from the middle, except that it turns towards the wider of the two gaps beside it
+    who is nearest to the bearing of another circle turns there, and joins the two circles
 
 Nobody assigns places: each UAV turns by what it knows of its two neighbors on the circle, and the gaps become equal. A
-UAV that joins divides a gap. When one is lost, its two neighbors turn into the gap. This is the balanced deployment on
+UAV that joins divides a gap. When one is lost, its two neighbors turn into the gap. Circles of few UAVs would be apart
+if these did not turn to each other. This is the balanced deployment on
 a circle of Martinez and Bullo (Optimal sensor placement and motion coordination for target tracking, Automatica 42(4),
 2006).
 """
@@ -14,8 +16,10 @@ from typing import Final
 
 from fanet_mw.units import GOLDEN_ANGLE, Enu
 
-_WIDEST_RAD: Final = math.radians(80.0)
-"""A wider gap counts as this one, because a UAV beyond it may be out of reach, so that its width is not known."""
+_WIDEST_RAD: Final = math.radians(74.0)
+"""A wider gap counts as this one, so that the few UAVs of a small circle stay together: at 200 m from the middle the
+two beside such a gap hear each other at 241 m, and need no head between them. Who is beyond a wider one is not heard,
+so that its width is not known."""
 _TURN: Final = 0.25
 """The turn, as a share of the difference of the two gaps; with a half the UAV would go to the middle at once, and
 oscillate."""
@@ -23,24 +27,42 @@ _MOST_TURN_RAD: Final = math.radians(12.0)
 _NO_BEARING_M: Final = 1.0
 
 
-def place_on_ring(middle: Enu, here: Enu, others: Iterable[Enu], *, radius_m: float, node: int) -> Enu:
-    """The place to fly to, at the height of `here`; `others` are those that fly around the same middle.
+def place_on_ring(
+    middle: Enu, here: Enu, others: Iterable[Enu], *, radius_m: float, node: int, faces: Iterable[Enu] = ()
+) -> Enu:
+    """The place to fly to, at the height of `here`; `others` are those that fly around the same middle, and `faces` the
+    middles of the circles to be joined.
 
     `node` decides the direction of a UAV that is exactly in the middle.
     """
     bearing = _bearing(middle, here)
     if bearing is None:
         bearing = node * GOLDEN_ANGLE
-    ahead = behind = _WIDEST_RAD
-    for other in others:
-        at = _bearing(middle, other)
-        if at is None:
-            continue
-        off = (at - bearing) % (2 * math.pi)
-        ahead, behind = min(ahead, off), min(behind, 2 * math.pi - off)
-    turn = max(-_MOST_TURN_RAD, min(_MOST_TURN_RAD, _TURN * (ahead - behind)))
-    angle = bearing + turn
+    around = [at for other in others if (at := _bearing(middle, other)) is not None]
+    turn = _turn_to_face(bearing, around, [at for face in faces if (at := _bearing(middle, face)) is not None])
+    if turn is None:
+        gaps = [(at - bearing) % (2 * math.pi) for at in around]
+        ahead, behind = min([_WIDEST_RAD, *gaps]), min([_WIDEST_RAD, *(2 * math.pi - gap for gap in gaps)])
+        turn = _TURN * (ahead - behind)
+    angle = bearing + max(-_MOST_TURN_RAD, min(_MOST_TURN_RAD, turn))
     return Enu(middle.east + radius_m * math.sin(angle), middle.north + radius_m * math.cos(angle), here.up)
+
+
+def _turn_to_face(bearing: float, others: Iterable[float], faces: Iterable[float]) -> float | None:
+    """The turn to the nearest of those bearings to which no other UAV of the circle is as near; None if there is
+    none.
+    """
+    turns = [
+        _signed(face - bearing)
+        for face in faces
+        if all(abs(_signed(face - bearing)) < abs(_signed(face - other)) for other in others)
+    ]
+    return min(turns, key=abs, default=None)
+
+
+def _signed(angle: float) -> float:
+    """The angle between -pi and pi."""
+    return math.remainder(angle, 2 * math.pi)
 
 
 def _bearing(middle: Enu, place: Enu) -> float | None:

@@ -184,3 +184,19 @@ def test_a_leader_flies_through_its_way_points_and_brakes_for_the_last() -> None
     assert route.velocity(Enu(100.0, 100.0, 50.0)) == (0.0, 8.0, 0.0)
     assert route.velocity(Enu(100.0, 196.0, 50.0)) == (0.0, 1.0, 0.0)
     assert route.velocity(Enu(100.0, 200.0, 50.0)) == (0.0, 0.0, 0.0)
+
+
+def test_circles_of_few_uavs_are_joined_where_they_are_nearest_to_each_other() -> None:
+    places = [Enu(100.0 * (k % 4), 100.0 * (k // 4), 60.0) for k in range(12)]
+    sizes = {1: (1, 4, 5, 6, 7), 2: (2, 8, 9), 3: (3, 10, 11, 12)}
+    swarm = Swarm(places, {NodeId(head): tuple(NodeId(node) for node in nodes) for head, nodes in sizes.items()})
+    swarm.fly(120)
+    for _ in range(20):
+        swarm.fly(5)
+        for head in (2, 3):
+            across = [away for node in sizes[head][1:] for away in swarm.away_m(node, sizes[1][1:])]
+            assert min(across) < 60, "two of the circles face each other"
+            assert min(away for node in sizes[head][1:] for away in swarm.away_m(node, [1])) <= REACH_M
+            assert min(swarm.away_m(head, sizes[1][1:])) <= REACH_M, "if one of the two is lost, the other joins them"
+            beside = [min(swarm.away_m(node, set(sizes[head][1:]) - {node})) for node in sizes[head][1:]]
+            assert max(beside) <= REACH_M, "if the head is lost, its members still hear each other"

@@ -147,7 +147,7 @@ class Searcher:
             own_motion,
             obstacles,
             most_m_s=speed_m_s,
-            hard=[ReciprocalAvoidance(own_motion, self._radar.avoided, obstacles)],
+            hard=[ReciprocalAvoidance(own_motion, neighbors, obstacles)],
             soft=[connectivity],
         )
         heard = scenario.sensors.voice_hz > 0

@@ -84,11 +84,7 @@ class ConnectivityMaintenance:
 
     def held(self, velocity: Enu) -> list[NodeId]:
         """Those who stay in reach because the velocity that was chosen keeps to their limits."""
-        return [
-            node
-            for node, plane in self._ties
-            if velocity.east * plane.east + velocity.north * plane.north >= plane.least - _KEPT_M_S
-        ]
+        return [node for node, plane in self._ties if plane.allows((velocity.east, velocity.north), but=_KEPT_M_S)]
 
     def beyond_gap(self, now_ns: int) -> Motion | None:
         """The likely motion of a UAV to which this one is tied and that is out of reach because somebody between is

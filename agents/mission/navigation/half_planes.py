@@ -23,6 +23,10 @@ class HalfPlane(NamedTuple):
     north: float
     least: float
 
+    def allows(self, velocity: "Velocity", *, but: float = _EPSILON) -> bool:
+        """True for a velocity within the half-plane, or outside it by no more than `but` [m/s]."""
+        return velocity[0] * self.east + velocity[1] * self.north >= self.least - but
+
 
 Velocity = tuple[float, float]
 
@@ -47,7 +51,7 @@ def _solve(wanted: Velocity, planes: Sequence[HalfPlane], limit: float) -> Veloc
     scale = min(1.0, limit / speed) if speed else 1.0
     v = wanted[0] * scale, wanted[1] * scale
     for i, plane in enumerate(planes):
-        if v[0] * plane.east + v[1] * plane.north >= plane.least - _EPSILON:
+        if plane.allows(v):
             continue
         on_line = _along(wanted, plane, planes[:i], limit)
         if on_line is None:

@@ -41,15 +41,13 @@ class NeighborMotions:
 
 
 class RadarWatch:
-    """The radar of one UAV, and the neighbors that the UAV avoids by their hellos."""
+    """The radar of one UAV, whose echoes of neighbors are known to be theirs."""
 
     def __init__(self, own_motion: OwnMotion, obstacles: KnownObstacles, neighbors: NeighborMotions) -> None:
-        self._own_motion, self._obstacles = own_motion, obstacles
-        self.avoided = neighbors
-        """The neighbors that the UAV avoids by their hellos."""
+        self._own_motion, self._obstacles, self._neighbors = own_motion, obstacles, neighbors
 
     def scan(self, echoes: Sequence[Echo], *, now_ns: int) -> None:
         """A scan of the radar."""
         own = self._own_motion
-        others = [motion.position_at(now_ns) for motion in self.avoided.all(now_ns=now_ns)]
+        others = [motion.position_at(now_ns) for motion in self._neighbors.all(now_ns=now_ns)]
         self._obstacles.radar(echoes, at=own.position, velocity=own.velocity, neighbors=others, now_ns=now_ns)

@@ -9,7 +9,7 @@ from typing import Final, assert_never
 
 from agents.mission.search_formation.shapes import circuit, fan, lines, ring, sectors, spiral
 from agents.mission.search_formation.shapes.circuit import Circuit
-from agents.mission.search_formation.shapes.contract import Demands, Dimensions, Shape, ShapeName, Swarm, swarm_at
+from agents.mission.search_formation.shapes.contract import Demands, Dimensions, Shape, ShapeName, swarm_at
 from agents.mission.search_formation.shapes.fan import Fan
 from agents.mission.search_formation.shapes.lines import Lines
 from agents.mission.search_formation.shapes.ring import Ring
@@ -25,10 +25,6 @@ _SHAPES: Final[Mapping[ShapeName, Callable[[Dimensions], Shape]]] = {
     ShapeName.RING: Ring,
     ShapeName.CIRCUIT: Circuit,
     ShapeName.FAN: Fan,
-}
-_BEGUN_AROUND: Final[Mapping[ShapeName, Callable[[Dimensions, Swarm], Dimensions]]] = {
-    ShapeName.LINES: lines.begun_around,
-    ShapeName.RING: ring.begun_around,
 }
 _STEP_S: Final = 0.05
 """The time step over which the velocity of a place is computed."""
@@ -59,13 +55,9 @@ class Pattern:
         return Pattern(self.dimensions, reach_m=self._reach_m, vacant=vacant)
 
     def begun_around(self, positions: Sequence[Enu]) -> "Pattern":
-        """A ring and lines begin where the swarm stands about the middle of the area, rather than draw together first;
-        other formations begin as they are.
-        """
-        begun = _BEGUN_AROUND.get(self.dimensions.shape)
-        if begun is None:
-            return self
-        return Pattern(begun(self.dimensions, swarm_at(positions, reach_m=self._reach_m)), reach_m=self._reach_m)
+        """The same formation, begun where a swarm stands that is spread about the middle of the area."""
+        begun = self._whole.begun_around(swarm_at(positions, reach_m=self._reach_m))
+        return self if begun is None else Pattern(begun, reach_m=self._reach_m)
 
     def spans(self, vacant: frozenset[int]) -> bool:
         """True if the UAVs of the other places can sweep all that this formation sweeps."""

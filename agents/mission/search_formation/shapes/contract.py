@@ -255,6 +255,12 @@ class Shape(Protocol):
         """The same formation, no larger than so many UAVs of each row can span with hops of `hop_m`."""
         ...
 
+    def begun_around(self, swarm: Swarm) -> Dimensions | None:
+        """The dimensions of the same shape that begins where a swarm stands about the middle of the area, rather than
+        draw together first; None if it begins as it is.
+        """
+        return None
+
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
         """The horizontal distance of a point from a team at an instant of the sweep."""
         ...

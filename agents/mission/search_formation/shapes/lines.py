@@ -191,6 +191,23 @@ class Lines(Shape):
         most_m = (left[lines + self._half - 1] + 1) * hop_m / 2
         return Lines(formation._replace(half_width_m=half_width_m), most_m=most_m, gaps_m=gaps_m)
 
+    def begun_around(self, swarm: Swarm) -> Dimensions | None:
+        """The lines that begin where the swarm stands, if its UAVs hear everybody between them: they must be dense
+        enough for that, and stand wide enough for all lanes but the bent ones.
+        """
+        made = self._formation
+        east_m, west_m, north_m, south_m = swarm.sides_m
+        aside_m, beyond_m = min(east_m, west_m), min(north_m, south_m)
+        if made.teams != 2 or made.lanes <= 2 * _BENT or beyond_m <= FIRST_M:
+            return None
+        lane_m = 2 * made.half_width_m / (made.lanes - 1)
+        is_dense = (east_m + west_m) * (north_m + south_m) <= swarm.uavs * (_DENSE * swarm.reach_m) ** 2
+        if not is_dense or made.half_width_m - _BENT * lane_m > aside_m:
+            return None
+        step_m = math.sqrt(max(0.0, (_BENT_HOP * swarm.reach_m) ** 2 - lane_m**2))
+        first_m = min(beyond_m, made.last_m / 2, FIRST_M + _BENT * step_m, _AROUND * swarm.reach_m)
+        return made._replace(first_m=max(made.first_m, first_m))
+
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
         """The distance of a point from a line to the north or south; a line is taken to be as wide as the area."""
         last = self._formation.lanes - 1
@@ -230,23 +247,6 @@ class Lines(Shape):
 def _is_bent(formation: Dimensions) -> bool:
     """True for lines that begin around the swarm: others begin no farther from the middle than `FIRST_M`."""
     return formation.first_m > FIRST_M
-
-
-def begun_around(made: Dimensions, swarm: Swarm) -> Dimensions:
-    """The lines that begin where the swarm stands, if its UAVs hear everybody between them: they must be dense enough
-    for that, and stand wide enough for all lanes but the bent ones.
-    """
-    east_m, west_m, north_m, south_m = swarm.sides_m
-    aside_m, beyond_m = min(east_m, west_m), min(north_m, south_m)
-    if made.teams != 2 or made.lanes <= 2 * _BENT or beyond_m <= FIRST_M:
-        return made
-    lane_m = 2 * made.half_width_m / (made.lanes - 1)
-    is_dense = (east_m + west_m) * (north_m + south_m) <= swarm.uavs * (_DENSE * swarm.reach_m) ** 2
-    if not is_dense or made.half_width_m - _BENT * lane_m > aside_m:
-        return made
-    step_m = math.sqrt(max(0.0, (_BENT_HOP * swarm.reach_m) ** 2 - lane_m**2))
-    first_m = min(beyond_m, made.last_m / 2, FIRST_M + _BENT * step_m, _AROUND * swarm.reach_m)
-    return made._replace(first_m=max(made.first_m, first_m))
 
 
 def fitted(count: int, demands: Demands) -> Dimensions | None:

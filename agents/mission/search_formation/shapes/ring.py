@@ -107,6 +107,13 @@ class Ring(Shape):
         _, share = self._side(place)
         return abs(share) <= _CATCHES_UP and self._half_m(swept_s) <= left * reach_m / 16
 
+    def begun_around(self, swarm: Swarm) -> Dimensions | None:
+        """The ring that begins as large as the swarm that stands about the middle, rather than draw together first."""
+        made = self._formation
+        if min(swarm.sides_m) <= 0:
+            return None
+        return made._replace(first_m=max(made.first_m, min(made.last_m / 2, math.fsum(swarm.sides_m) / 4)))
+
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
         half_m = self._half_m(swept_s)
         off_e, off_n = abs(east_m) - half_m, abs(north_m) - half_m
@@ -118,13 +125,6 @@ class Ring(Shape):
         formation = self._formation
         slower = formation._replace(speed_m_s=formation.speed_m_s * _SLOWER)
         return min(self._most_m, swept_m(slower, swept_s, faster_back=1.0, turn_s=_TURN_S))
-
-
-def begun_around(made: Dimensions, swarm: Swarm) -> Dimensions:
-    """The ring that begins as large as the swarm that stands about the middle, rather than draw together first."""
-    if min(swarm.sides_m) <= 0:
-        return made
-    return made._replace(first_m=max(made.first_m, min(made.last_m / 2, math.fsum(swarm.sides_m) / 4)))
 
 
 def fitted(count: int, demands: Demands) -> Dimensions | None:

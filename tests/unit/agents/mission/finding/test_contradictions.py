@@ -61,3 +61,24 @@ def test_a_right_confirmation_is_not_contradicted() -> None:
     contradictions.review()
     pass_by(uav, (1, 2), second=10, sees=(Enu(0, 0, 0), Enu(57, 0, 0)))
     assert contradictions.review() == []
+
+
+def test_a_right_confirmation_that_was_taken_back_holds_in_the_end_though_another_place_was_named_meanwhile() -> None:
+    uav, contradictions = mistaken()
+    right, elsewhere = Enu(57, 0, 0), Enu(0, 245, 0)
+    uav.survivors.by_id[1].confirmed = None
+    confirmed = Found(2 * S // US, 1, right.east, right.north, 4.0, 0.0, 4.0, 9, Standing.CONFIRMED)
+    uav.survivors.on_found(confirmed, now_ns=2 * S)
+    uav.survivors.on_found(confirmed._replace(t_us=19 * S // US, standing=Standing.REFUTED), now_ns=19 * S)
+    wrong = confirmed._replace(t_us=20 * S // US, east_m=elsewhere.east, north_m=elsewhere.north)
+    uav.survivors.on_found(wrong, now_ns=20 * S)
+    contradictions.review()
+    for second in range(24, 84, 10):
+        pass_by(uav, (1, 2), second=second, sees=(Enu(0, 0, 0), right))
+        for survivor in contradictions.review():
+            found = uav.survivors.by_id[survivor].confirmed
+            assert found is not None
+            uav.survivors.on_found(found._replace(t_us=second * S // US, standing=Standing.REFUTED), now_ns=second * S)
+    place = uav.survivors.by_id[1].confirmed
+    assert place is not None
+    assert (round(place.east_m), round(place.north_m)) == (right.east, right.north)

@@ -16,7 +16,6 @@ import time
 from collections.abc import Callable
 from ipaddress import ip_address
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Final, Protocol, Self
 
 import zenoh
@@ -188,9 +187,7 @@ class Bus:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

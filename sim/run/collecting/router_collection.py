@@ -3,7 +3,6 @@
 import asyncio
 import time
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from fanet_mw.bus.topics import Topics
@@ -26,9 +25,7 @@ class Collection:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._collector.close()
 
     async def last_words(self, patience_s: float) -> None:

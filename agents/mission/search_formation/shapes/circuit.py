@@ -16,15 +16,7 @@ from bisect import bisect_right
 from itertools import accumulate, pairwise
 from typing import Final
 
-from agents.mission.search_formation.shapes.contract import (
-    Demands,
-    Dimensions,
-    RowKind,
-    RowOfPlaces,
-    Shape,
-    ShapeName,
-    nearest_m,
-)
+from agents.mission.search_formation.shapes.contract import Demands, Dimensions, RowKind, RowOfPlaces, Shape, ShapeName
 from fanet_mw.units import Enu
 
 _LEAST_LANES: Final = 2
@@ -62,12 +54,6 @@ class Circuit(Shape):
 
     def rows(self) -> tuple[RowOfPlaces, ...]:
         return (RowOfPlaces(0, self._formation.lanes, RowKind.AROUND),)
-
-    def drawn_in(self, left: tuple[int, ...], hop_m: float) -> "Circuit":
-        return self
-
-    def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
-        return nearest_m((self.at(place, swept_s) for place in self._formation.line(team)), east_m, north_m)
 
 
 def _corners(half_m: float, lane_m: float) -> list[tuple[float, float]]:

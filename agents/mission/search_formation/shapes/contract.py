@@ -19,7 +19,7 @@ Everything here is geometry, in metres and seconds.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from enum import IntEnum
 from typing import Final, NamedTuple, Protocol
 
@@ -217,6 +217,8 @@ class Shape(Protocol):
     `swept_s` is the time since the first sweep began; before 0, all places are where they are at 0.
     """
 
+    _formation: Dimensions
+
     @property
     def sweep_s(self) -> float:
         """The time from the beginning of a sweep to its turn; for full arms of a spiral, the time in which the arms
@@ -248,12 +250,15 @@ class Shape(Protocol):
         ...
 
     def rows(self) -> tuple[RowOfPlaces, ...]:
-        """The rows in which UAVs close ranks; followers are in none."""
-        ...
+        """The rows in which UAVs close ranks, by default each team; followers are in none."""
+        lanes = self._formation.lanes
+        return tuple(RowOfPlaces(team * lanes, lanes, RowKind.SPAN) for team in range(self._formation.teams))
 
     def drawn_in(self, left: tuple[int, ...], hop_m: float) -> "Shape":
-        """The same formation, no larger than so many UAVs of each row can span with hops of `hop_m`."""
-        ...
+        """The same formation, no larger than so many UAVs of each row can span with hops of `hop_m`, where it can be
+        smaller.
+        """
+        return self
 
     def begun_around(self, swarm: Swarm) -> Dimensions | None:
         """The dimensions of the same shape that begins where a swarm stands about the middle of the area, rather than
@@ -263,7 +268,8 @@ class Shape(Protocol):
 
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
         """The horizontal distance of a point from a team at an instant of the sweep."""
-        ...
+        places = (self.at(place, swept_s) for place in self._formation.line(team))
+        return min(math.hypot(place.east - east_m, place.north - north_m) for place in places)
 
 
 def shifted_m(swept_s: float, sweep_s: float, *, lane_m: float, speed_m_s: float, faster_back: float = BACK) -> float:
@@ -274,11 +280,6 @@ def shifted_m(swept_s: float, sweep_s: float, *, lane_m: float, speed_m_s: float
     share = min(1.0, into_s / TURN_S)
     most_m = min(lane_m / 2, SHIFT * TURN_S * speed_m_s)
     return 0.0 if turn < 0 else most_m * (1 - share if turn % 2 else share)
-
-
-def nearest_m(places: Iterable[Enu], east_m: float, north_m: float) -> float:
-    """The horizontal distance of a point from the nearest of some places."""
-    return min(math.hypot(place.east - east_m, place.north - north_m) for place in places)
 
 
 def swept_m(formation: Dimensions, swept_s: float, *, faster_back: float = BACK, turn_s: float = TURN_S) -> float:

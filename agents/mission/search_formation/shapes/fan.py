@@ -21,11 +21,8 @@ from agents.mission.search_formation.shapes.contract import (
     FOLLOWER_HIGHER_M,
     Demands,
     Dimensions,
-    RowKind,
-    RowOfPlaces,
     Shape,
     ShapeName,
-    nearest_m,
     swept_m,
 )
 from fanet_mw.units import Enu
@@ -109,9 +106,6 @@ class Fan(Shape):
             return ()
         return tuple(other for other in (place - 1, place + 1) if 0 <= other < lanes)
 
-    def rows(self) -> tuple[RowOfPlaces, ...]:
-        return (RowOfPlaces(0, self._formation.lanes, RowKind.SPAN),)
-
     def drawn_in(self, left: tuple[int, ...], hop_m: float) -> "Fan":
         """The fan whose front stops where the UAVs that are left still span it with gaps of at most a hop."""
         row = self.rows()[0]
@@ -129,9 +123,6 @@ class Fan(Shape):
             middle = (least + most) / 2
             least, most = (middle, most) if is_spanned(middle) else (least, middle)
         return Fan(self._formation, most_m=least)
-
-    def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
-        return nearest_m((self.at(place, swept_s) for place in self._formation.line(team)), east_m, north_m)
 
 
 def _far_sides(half_m: float, base: tuple[float, float]) -> Corners:

@@ -23,11 +23,8 @@ from agents.mission.search_formation.shapes.contract import (
     FOLLOWER_HIGHER_M,
     Demands,
     Dimensions,
-    RowKind,
-    RowOfPlaces,
     Shape,
     ShapeName,
-    nearest_m,
     shifted_m,
     swept_m,
 )
@@ -85,18 +82,6 @@ class Sectors(Shape):
         found = [place - 1] if lane > 0 or column > 0 else []
         found += [place + 1] if lane < formation.lanes - 1 or column < self._columns - 1 else []
         return tuple(found)
-
-    def rows(self) -> tuple[RowOfPlaces, ...]:
-        formation = self._formation
-        return tuple(
-            RowOfPlaces(formation.line(team).start, formation.lanes, RowKind.SPAN) for team in range(formation.teams)
-        )
-
-    def drawn_in(self, left: tuple[int, ...], hop_m: float) -> "Sectors":
-        return self
-
-    def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
-        return nearest_m((self.at(place, swept_s) for place in self._formation.line(team)), east_m, north_m)
 
 
 def rows_of(teams: int) -> int:

@@ -21,16 +21,7 @@ slower.
 import math
 from typing import Final
 
-from agents.mission.search_formation.shapes.contract import (
-    FOLLOWER_HIGHER_M,
-    Demands,
-    Dimensions,
-    RowKind,
-    RowOfPlaces,
-    Shape,
-    ShapeName,
-    nearest_m,
-)
+from agents.mission.search_formation.shapes.contract import FOLLOWER_HIGHER_M, Demands, Dimensions, Shape, ShapeName
 from fanet_mw.units import Enu
 
 _BEHIND_S: Final = 15.0
@@ -85,18 +76,6 @@ class Spiral(Shape):
             around = {(team - 1) % formation.teams, (team + 1) % formation.teams}
             found += sorted(other * formation.lanes for other in around)
         return tuple(found)
-
-    def rows(self) -> tuple[RowOfPlaces, ...]:
-        formation = self._formation
-        return tuple(
-            RowOfPlaces(formation.line(team).start, formation.lanes, RowKind.SPAN) for team in range(formation.teams)
-        )
-
-    def drawn_in(self, left: tuple[int, ...], hop_m: float) -> "Spiral":
-        return self
-
-    def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
-        return nearest_m((self.at(place, swept_s) for place in self._formation.line(team)), east_m, north_m)
 
     def _at(self, team: int, lane: float, swept_s: float, up_m: float) -> Enu:
         turned = self._turned(swept_s)

@@ -33,7 +33,7 @@ import fanet_mw
 from fanet_mw.errors import ConfigError
 from fanet_mw.mavlink import Geodetic, to_enu
 from fanet_mw.trace import Detected, Dropped, Posed, RoleChanged
-from fanet_mw.units import S
+from fanet_mw.units import US, S
 from sim.cli.app import app
 from sim.recording import tables
 from sim.recording.mcap_recording import McapRecording
@@ -70,6 +70,7 @@ def test_a_loaded_result_is_what_simulate_returned(folder: Path) -> None:
     assert len(loaded.outcome.records) == len(run.outcome.records)
     assert (loaded.outcome.simulated_ns, loaded.outcome.mode) == (run.outcome.simulated_ns, "virtual")
     assert sum(len(frames) for _, frames in loaded.outcome.taps) == sum(len(frames) for _, frames in run.outcome.taps)
+    assert {t_ns // US for t_ns, _ in loaded.outcome.taps} == {t_ns // US for t_ns, _ in run.outcome.taps}
     with pytest.raises(ConfigError, match=r"summary\.json"):
         fanet_mw.load_result(folder / "tables")
 

@@ -40,6 +40,7 @@ def test_who_foresees_a_conflict_warns_and_the_lower_id_goes_up(monitor) -> None
         assert (other, approach.closest_s) == (OTHER, 10.0)
         assert uav.course is not None
         assert uav.course.position == Enu(100, 0, up)
+        assert uav.course.speed_m_s > 10, "as fast as before, and up or down as well"
 
 
 def test_a_warning_is_repeated_after_its_interval_and_not_when_the_other_has_just_said_it(monitor) -> None:

@@ -62,6 +62,13 @@ def echoes_of(walls: Sequence[Building], at: Enu, velocity: Enu) -> list[Echo]:
     return found
 
 
+@pytest.mark.parametrize("east_m", [0, 4, 48, 100])
+def test_a_straight_way_is_clear_if_nothing_is_on_any_part_of_it(east_m: float) -> None:
+    there = cell_of(east_m, 0.0)
+    assert not is_clear((0.0, 0.0), (100.0, 0.0), lambda cell: cell == there)
+    assert is_clear((0.0, 12.0), (100.0, 12.0), lambda cell: cell == there)
+
+
 def test_a_tower_on_the_map_is_flown_around() -> None:
     places = flown(KnownObstacles(OnboardMap((TOWER,))), Enu(-100, 3, 60), Enu(100, -3, 60), seconds=40)
     assert min(gap_m([TOWER], place) for place in places) > 4.0

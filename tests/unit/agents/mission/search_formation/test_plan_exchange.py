@@ -1,5 +1,6 @@
 """Who is out for a survivor says so, and the others close ranks until it is back."""
 
+import pytest
 from search_board import COUNT, LINE, OPEN, PLAN, REACH_M, TAKEN_UP_NS, lane_of
 
 from agents.mission.navigation.own_motion import OwnMotion
@@ -8,6 +9,7 @@ from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.formation_planner import FormationPlanner
 from agents.mission.search_formation.plan_exchange import PlanExchange
 from agents.mission.search_formation.roll_call import RollCall
+from fanet_mw.errors import MalformedFrameError
 from fanet_mw.motion import Motion
 from fanet_mw.units import Enu, NodeId, S
 from fanet_mw.wire import HEADER_BYTES
@@ -79,3 +81,10 @@ def test_who_finds_a_neighbor_lost_floods_that_once() -> None:
         told.append([Roll.decode_frame(bytes(HEADER_BYTES) + packet.frames).lost for packet in exchange.out.packets])
         exchange.out.packets.clear()
     assert told == [[], [{PLAN.nodes.index(out)}], [], []]
+
+
+def test_a_status_of_more_charge_than_a_battery_holds_is_malformed() -> None:
+    full = SearchStatus(1, Enu(0, 0, 65), 7, 1, 100)
+    assert SearchStatus.decode_frame(bytes(HEADER_BYTES) + full.encode_frame(7)) == full
+    with pytest.raises(MalformedFrameError, match="101 %"):
+        SearchStatus.decode_frame(bytes(HEADER_BYTES) + full._replace(charge=101).encode_frame(7))

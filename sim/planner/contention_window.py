@@ -1,5 +1,5 @@
 """Whether hellos, and packets of members to their heads if only heads have turns, fit the contention window of a
-superframe. This is an estimate (`hello_room.py`).
+superframe. This is an estimate (`fanet_mw/routing/clustered/tdma/hello_room.py`).
 """
 
 from collections.abc import Iterator, Mapping, Sequence

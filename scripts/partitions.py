@@ -4,7 +4,7 @@
 At each drawn instant the process forks, and the copy flies on for 45 s. One JSON line for each:
 
     parts    the sizes of the parts while the air is parted, and how many planners each has 3, 5, 10 and 19 s later
-    merged   how many planners all have 1, 2, 3, 5 and 8 s after the air is whole again
+    merged   the same 1, 2, 3, 5 and 8 s after the air is whole again: who has closed ranks may be out of reach still
     unknown  to how many a find that anybody knew then is unknown: just before, and 1, 2, 3, 5 and 8 s after
     least_m  the least distance of two UAVs from the cut on
 """
@@ -97,7 +97,7 @@ def judged(flight: Parted, at_s: float, angle: float, off_m: float) -> dict[str,
     merged, unknown = {}, {0: sum(known[node] != everything for node in known)}
     for after_s in (1, 2, 3, 5, 8):
         flight.host.run(round((at_s + _FOR_S + after_s) * S))
-        merged[after_s] = sum(count for _, count in flight.planners(cut=False))
+        merged[after_s] = flight.planners(cut=False)
         unknown[after_s] = sum(not everything <= knows for knows in flight.finds().values())
     flight.host.run(round((at_s + 45) * S))
     return {

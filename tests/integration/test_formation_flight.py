@@ -16,6 +16,7 @@ def test_a_cluster_flies_around_its_head_and_closes_the_gap_where_one_fell_silen
     ])  # fmt: skip
     records = simulate(scenario).records
     at = {(r.t_ns // S, r.node): (r.east_m, r.north_m) for r in records if type(r) is Posed}
+    up_m = {(r.t_ns // S, r.node): r.up_m for r in records if type(r) is Posed}
     head = next(r.node for r in records if type(r) is RoleChanged and r.role == "head")
     assert head != 7
 
@@ -30,4 +31,5 @@ def test_a_cluster_flies_around_its_head_and_closes_the_gap_where_one_fell_silen
         assert all(abs(distance - 100) < 5 for distance in away), second
         assert widest_deg(second, flying) < 360 / len(flying) + 10, second
     assert math.dist(at[0, head], at[99, head]) > 200
+    assert up_m[99, 7] > max(up_m[99, node] for node in range(1, 7)) + 8, "nobody flies into one that nobody hears"
     assert not any(type(record) is Collided for record in records)

@@ -22,6 +22,8 @@ from fanet_mw.wire import PRIORITY_REPORT
 
 _TELL_NS: Final = S
 """How often a head floods its position and velocity, for heads that do not receive its hellos."""
+_ALONE_M: Final = 12.0
+"""A UAV that receives nobody hovers this much higher: others may not know any more where it is, and fly below it."""
 
 
 class FormationFlight(Application):
@@ -92,7 +94,8 @@ class FormationFlight(Application):
         if now_ns < self._begins_ns:
             return
         place, moves = self._place.at(self._own_motion.position, now_ns)
-        velocity = self._velocity_choice.velocity(place._replace(up=self._height_m), moves, now_ns)
+        height_m = self._height_m if self._motions.all(now_ns=now_ns) else self._height_m + _ALONE_M
+        velocity = self._velocity_choice.velocity(place._replace(up=height_m), moves, now_ns)
         self.port.fly(course_at(self.port.position, velocity))
 
     def wake(self, now_ns: int) -> None:

@@ -6,7 +6,7 @@
                                 where they are nearest to each other
     a UAV without a cluster     on a circle around the nearest head that it receives
     a UAV whose head is lost    flies parallel to the leader if it receives the leader, otherwise it hovers
-    a UAV that receives nobody  hovers, even if it was the leader: the others fly on without it
+    a UAV that receives nobody  hovers, even if it was the leader: the others fly on without it (and below it)
 
 The leader of the formation need not be the leader of the network, which assigns the clusters. Positions come only from
 received messages: the hellos of neighbors, and the floods of heads. A UAV is lost when its newest message is too old.

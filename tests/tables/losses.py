@@ -14,6 +14,8 @@ _AGAIN_S: Final = 3.0
 _WORDS: Final = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five"}
 _CURVE_FROM: Final = 6
 """So many losses one after the other are a line of the curve."""
+_STEP: Final = 2
+"""So many losses lie between two rows of it."""
 Copy = dict[str, Any]
 
 
@@ -98,15 +100,16 @@ def _mean_and_least(shares: Sequence[float]) -> str:
 def curve() -> Rows:
     """What is left as more and more are lost, one after the other."""
     flown = [copy for copy in _copies() if len(copy["losses"]) >= _CURVE_FROM]
-    head = ["lost", "living in one network since the loss before", "area covered", "found"]
+    head = ["lost", "living in one network since the row before", "area covered", "found"]
     rows = []
-    for rank in range(4, min((len(copy["curve"]) for copy in flown), default=0), 5):
+    for rank in range(_STEP - 1, min((len(copy["curve"]) for copy in flown), default=0), _STEP):
         here = [copy["curve"][rank] for copy in flown]
         rows.append(
             [
                 f"{here[0][0]}",
                 " / ".join(
-                    f"{statistics.fmean(one[1] for one in copy['curve'][rank - 4 : rank + 1]):.2f}" for copy in flown
+                    f"{statistics.fmean(one[1] for one in copy['curve'][rank + 1 - _STEP : rank + 1]):.2f}"
+                    for copy in flown
                 ),
                 " / ".join(f"{one[2]:.2f}" for one in here),
                 " / ".join(f"{one[3]}" for one in here),
@@ -132,8 +135,13 @@ def partitions() -> Rows:
             f"{len(found)} ({len({one['seed'] for one in found})})",
             planned("3"),
             planned("10"),
-            f"{sum(one['merged']['3'] == 1 for one in found)}",
+            f"{sum(_has_one_planner(one['merged']['3']) for one in found)}",
             f"{sum(not one['unknown']['3'] for one in found)}",
             f"{min(one['least_m'] for one in found)}",
         ],
     ]
+
+
+def _has_one_planner(merged: int | list[list[int]]) -> bool:
+    """True if there is one planner for all, or, where the sizes of parts were recorded, one in each part."""
+    return merged == 1 if isinstance(merged, int) else all(planners == 1 for _, planners in merged)

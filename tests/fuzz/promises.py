@@ -22,7 +22,9 @@ from sim.results.files import finish
 from sim.run.outcome import Outcome
 from sim.run.virtual import simulate
 
-_FAULT_S, _BEFORE_S, _AFTER_S, _LONGER_S = 12, 3, 3, 10
+_FAULT_S, _BEFORE_S, _LONGER_S = 12, 3, 10
+_AFTER_S = {"rounds": 3, "clustered": 9}
+"""When a loss is known: with a timetable after the silence of four hellos, a new leader perhaps, and its timetable."""
 _FALL_S = 4
 """A radio works until its UAV has fallen to the ground."""
 _DURATION_S, _WARMUP_S, _DRAIN_S, _LIFETIME_S = 26, 8, 8, 8
@@ -88,7 +90,8 @@ def drawn(numbers: random.Random) -> dict[str, Any]:
 def broken_pairs(outcome: Outcome, tree: dict[str, Any]) -> int:
     """The pairs of a packet with a bound and a node for which it was stated that has it later, or never."""
     lasts_s = max((fault.get("for_s", _FALL_S) for fault in tree.get("faults", [])), default=0)
-    fault_ns = range(round((_FAULT_S - _BEFORE_S) * S), round((_FAULT_S + lasts_s + _AFTER_S) * S))
+    again_s = _FAULT_S + lasts_s + _AFTER_S[tree["routing"]["protocol"]]
+    fault_ns = range(round((_FAULT_S - _BEFORE_S) * S), round(again_s * S))
     bounds = {(one.node, one.seq): one for one in outcome.records if type(one) is BoundStated}
     excluded = {(one.node, one.seq, one.other) for one in outcome.records if type(one) is BoundExcludes}
     in_time = {

@@ -5,7 +5,10 @@ from typing import Any
 import pytest
 
 from fanet_mw.scenario import config
+from fanet_mw.trace import BoundExcludes, BoundStated
+from fanet_mw.units import S
 from sim.results.files import finish
+from sim.run.outcome import Outcome
 from sim.run.virtual import simulate
 
 BASE: dict[str, Any] = {
@@ -16,10 +19,14 @@ BASE: dict[str, Any] = {
 }  # fmt: skip
 
 
-def bound_of(**tables: dict[str, Any]) -> dict[str, Any]:
+def flown(**tables: Any) -> Outcome:
     seed = tables.pop("seed", 1)
     tree = {key: {**value, **tables.pop(key, {})} if isinstance(value, dict) else value for key, value in BASE.items()}
-    found: dict[str, Any] = finish(simulate(config.build({**tree, **tables, "seed": seed})), out=None)["bound"]
+    return simulate(config.build({**tree, **tables, "seed": seed}))
+
+
+def bound_of(**tables: Any) -> dict[str, Any]:
+    found: dict[str, Any] = finish(flown(**tables), out=None)["bound"]
     return found
 
 
@@ -62,3 +69,19 @@ def test_no_bound_is_stated_where_hellos_do_not_fit_their_window(contention_ms: 
     )  # fmt: skip
     assert bool(bound.get("stated_share")) == states
     assert not bound.get("violations")
+
+
+def test_nobody_promises_by_the_timetable_of_a_leader_that_another_one_has_followed() -> None:
+    """Five in a line; the second one falls, and with it the leader is lost. Three of them elect another one later."""
+    outcome = flown(
+        seed=649573, duration_s=36,
+        nodes={"count": 5, "layout": "grid", "columns": 5, "spacing_m": 210.0957427813038, "telemetry_hz": 0},
+        traffic={"payload_bytes": 451, "interval_s": 2.7141770846806974, "sources": 4, "arrivals": "poisson"},
+        radio={"standard": "b", "rate_mbps": 11, "cw_min": 7, "lead_ms": 11, "handover_ms": 11 / 3},
+        clusters={"count": 4, "flooding_period_s": 0.7028440175227947},
+        faults=[{"kind": "crash", "node": 2, "at_s": 12}],
+    )  # fmt: skip
+    late = {(one.node, one.seq) for one in outcome.records if isinstance(one, BoundStated) and one.t_ns > 20 * S}
+    excluded = {(one.node, one.seq) for one in outcome.records if isinstance(one, BoundExcludes) and one.other == 1}
+    assert late
+    assert late <= excluded

@@ -198,7 +198,11 @@ class StatedDelays:
             in_force = [
                 one for one in self._timetables.in_order[self._timetables.superseded(now_ns) :] if one.valid_ns < had_ns
             ]
-            kept = all(self._followers.have(one.version, one.table.spans) for one in in_force)
+            # who has followed another leader may have lost sight of some nodes before this one prevailed
+            kept = all(
+                one.version.authority == newest.version.authority and self._followers.have(one.version, one.table.spans)
+                for one in in_force
+            )
             if kept and had_ns <= min(due_ns, known_ns, expires_ns):
                 self._port.record(BoundStated(now_ns, self._port.node, packet.header.seq, bound_ns))
                 for other in range(1, self._port.scenario.node_count + 1):

@@ -23,8 +23,9 @@ from sim.run.outcome import Outcome
 from sim.run.virtual import simulate
 
 _FAULT_S, _BEFORE_S, _LONGER_S = 12, 3, 10
-_AFTER_S = {"rounds": 3, "clustered": 9}
-"""When a loss is known: with a timetable after the silence of four hellos, a new leader perhaps, and its timetable."""
+_AFTER_S = 3
+_SILENT_HELLOS = 5
+"""With a timetable a loss is known after the silence of so many hellos, one in a superframe at most."""
 _FALL_S = 4
 """A radio works until its UAV has fallen to the ground."""
 _DURATION_S, _WARMUP_S, _DRAIN_S, _LIFETIME_S = 26, 8, 8, 8
@@ -90,7 +91,10 @@ def drawn(numbers: random.Random) -> dict[str, Any]:
 def broken_pairs(outcome: Outcome, tree: dict[str, Any]) -> int:
     """The pairs of a packet with a bound and a node for which it was stated that has it later, or never."""
     lasts_s = max((fault.get("for_s", _FALL_S) for fault in tree.get("faults", [])), default=0)
-    again_s = _FAULT_S + lasts_s + _AFTER_S[tree["routing"]["protocol"]]
+    again_s = _FAULT_S + lasts_s + _AFTER_S
+    if tree["routing"]["protocol"] == "clustered":
+        hello_s = tree["routing"].get("hello_interval_s", 1)
+        again_s += _SILENT_HELLOS * max(hello_s, tree["clusters"]["flooding_period_s"])
     fault_ns = range(round((_FAULT_S - _BEFORE_S) * S), round(again_s * S))
     bounds = {(one.node, one.seq): one for one in outcome.records if type(one) is BoundStated}
     excluded = {(one.node, one.seq, one.other) for one in outcome.records if type(one) is BoundExcludes}

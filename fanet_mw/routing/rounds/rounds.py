@@ -288,11 +288,17 @@ class RoundFlooding(RoutingProtocol):
             self._reach_slot(now_ns, now_ns)
 
     def _send_at_once(self, packet: Packet, now_ns: int) -> None:
-        """A warning contends between the turns, whoever owns the slot, and goes in the turn as well."""
-        start_ns = now_ns + self._lead_ns + int(self._random() * _SPREAD_SLOTS * self._timing.slot_ns)
+        """A warning contends between the turns, whoever owns the slot, and goes in the turn as well.
+
+        Those that wait for the end of the turns are spread, too: bulk starts there, in slots.
+        """
+        spread_ns = int(self._random() * _SPREAD_SLOTS * self._timing.slot_ns)
+        wanted_ns = now_ns + self._lead_ns + spread_ns
+        start_ns = self._timing.between_turns_ns(wanted_ns)
+        start_ns += spread_ns if start_ns > wanted_ns else 0
         if not self._expired(packet, start_ns):
             self._spreading.went_ahead(packet)
-            self._port.transmit_together([packet], flags=FLAG_FLOOD, at_ns=(self._timing.between_turns_ns(start_ns),))
+            self._port.transmit_together([packet], flags=FLAG_FLOOD, at_ns=(start_ns,))
 
     def _reach_turn(self, now_ns: int) -> None:
         """Something waits: the next turn that can still be announced in time is the one to fill.

@@ -146,6 +146,20 @@ def test_a_warning_goes_at_once_and_in_the_turn(make_node: MakeNode) -> None:
     assert timing.turn_start_ns(OURS, from_ns=born_ns) in turns
 
 
+def test_warnings_that_wait_for_the_end_of_the_turns_do_not_all_start_there(make_node: MakeNode) -> None:
+    """Bulk starts at that instant, too: what starts with it is lost at every neighbor that hears both."""
+    node = make_node()
+    timing = RoundTiming.of(node.scenario)
+    run(node, 1 * S)
+    round_ns = timing.turn_start_ns(1, from_ns=1 * S)
+    for seq in range(9, 29):
+        hear(node, seq, src=NEAR, at_ns=round_ns + 1, priority=PRIORITY_SAFETY)
+    slots_ns = round_ns + timing.nodes * timing.turn_ns
+    after_ns = [each.start_ns - slots_ns for each in node.requests]
+    assert len(set(after_ns)) == 20
+    assert 0 < max(after_ns) - min(after_ns) < timing.slot_ns
+
+
 def test_a_packet_that_may_go_one_hop_is_sent_again_by_its_origin_alone(make_node: MakeNode) -> None:
     node = make_node(**{"routing.hop_limit": 1})
     run(node, 1 * S)

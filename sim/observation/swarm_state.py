@@ -143,6 +143,14 @@ class Estimate(NamedTuple):
     standing: str
 
 
+class _CopiesCounted(NamedTuple):
+    """The copies of frames at stations in range, and those that were lost by reason, since the start."""
+
+    t_ns: int
+    on_air: int
+    lost: Mapping[str, int]
+
+
 class Event(NamedTuple):
     """What happened, for people."""
 
@@ -163,6 +171,8 @@ class SwarmState:
         self.emulator: Mapping[str, Any] = {}
         self._air: deque[tuple[int, float]] = deque()
         """Instants, and the time [ns] for which the air was busy until then, of the last seconds."""
+        self._copies: deque[_CopiesCounted] = deque()
+        """What the emulator counted in the last seconds."""
         self.packets: dict[tuple[int, int], PacketNow] = {}
         self.estimates: dict[int, Estimate] = {}
         self.events: deque[Event] = deque(maxlen=_MOST_EVENTS)
@@ -234,6 +244,7 @@ class SwarmState:
         if name == "emulator":
             self.emulator = content
             self._hear_air(content, t_ns)
+            self._hear_copies(content, t_ns)
         elif name.startswith("agent-"):
             node = int(name.removeprefix("agent-"))
             self.reports[node] = content
@@ -368,6 +379,14 @@ class SwarmState:
             "waiting_packets": sum(report.get("waiting", 0) for report in self.reports.values()),
         }
 
+    def losses(self) -> Mapping[str, float]:
+        """The share of the copies at stations in range that was lost lately, by reason; empty if that is not known."""
+        if len(self._copies) < 2:
+            return {}
+        before, now = self._copies[0], self._copies[-1]
+        copies = max(1, now.on_air - before.on_air)
+        return {reason: (count - before.lost.get(reason, 0)) / copies for reason, count in now.lost.items()}
+
     # --- parts ----------------------------------------------------------------------------------------------------
 
     def _moved(self, node: int, position: Enu, velocity: Enu, t_ns: int) -> None:
@@ -486,6 +505,18 @@ class SwarmState:
         self._air.append((t_ns, busy_ns))
         while self._air[0][0] < t_ns - _LINKS_NS - S:
             self._air.popleft()
+
+    def _hear_copies(self, content: Mapping[str, Any], t_ns: int) -> None:
+        """The emulator reports how many copies of frames stations in range were to get, and which were lost."""
+        copies = content.get("copies", {})
+        if "on_air" not in copies:
+            return
+        counted = _CopiesCounted(t_ns, copies["on_air"], copies.get("lost", {}))
+        if self._copies and (counted.on_air < self._copies[-1].on_air or t_ns <= self._copies[-1].t_ns):
+            self._copies.clear()  # the emulator, or the time that is looked at, has begun anew
+        self._copies.append(counted)
+        while self._copies[0].t_ns < t_ns - _LINKS_NS - S:
+            self._copies.popleft()
 
     def _found(self, found: Found, t_ns: int) -> None:
         known = self.estimates.get(found.survivor)

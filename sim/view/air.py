@@ -7,8 +7,9 @@ replayed  the transmissions of the capture in the folder of a run
 import html
 from bisect import bisect_left
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Final, Protocol
 
 from emulator.pcap_file import NAME, captures
@@ -16,6 +17,7 @@ from emulator.pcap_reader import frames_of
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, S
+from fanet_mw.wire import PRIORITIES
 from sim.figures.colors import BLUE, GRAY, GREEN, ORANGE, PINK, RED
 from sim.observation.air_causes import AirCauses, AirTime, Cause, transmissions
 from sim.observation.bus_feed import BusFeed
@@ -113,27 +115,51 @@ def drawn_ns(period_ns: int) -> int:
     return min(rounds * period_ns, _PICTURE_NS) if rounds else _UNKNOWN_NS
 
 
-def air_text(source: AirSource, nodes: Sequence[int], t_ns: int, *, length_ns: int, selected: int = 0) -> str:
-    """The picture of the time before an instant, and the shares of the last seconds, as HTML."""
+def air_text(
+    source: AirSource,
+    nodes: Sequence[int],
+    t_ns: int,
+    *,
+    length_ns: int,
+    losses: Mapping[str, float] = MappingProxyType({}),
+    selected: int = 0,
+) -> str:
+    """The picture of the time before an instant, and the shares of the last seconds, as HTML. `losses`: the share of
+    copies that was lost, by reason.
+    """
     span_ns = min(TAKEN_NS, t_ns)
     sent = source.between(t_ns - span_ns, t_ns)
     if not sent or not span_ns:
         return html.escape(source.nothing)
     shown = [one for one in sent if one.start_ns >= t_ns - length_ns and one.cause is not Cause.ACK]
-    rows = "".join(
-        f"<tr><td><span style='color:{_COLORS[cause]}'>&#9632;</span> {cause}</td><td>{len(own) * S / span_ns:.0f}</td>"
-        f"<td>{100 * sum(one.length_ns for one in own) / span_ns:.2f} %</td></tr>"
+    of_cause = [
+        _row(f"<span style='color:{_COLORS[cause]}'>&#9632;</span> {cause}", own, span_ns)
         for cause in Cause
         if (own := [one for one in sent if one.cause is cause])
+    ]
+    of_priority = [
+        _row(f"packets: {name}", own, span_ns)
+        for name, priority in PRIORITIES.items()
+        if (own := [one for one in sent if one.priority == priority])
+    ]
+    lost = "".join(
+        f"<tr><td>copies lost: {html.escape(reason.replace('_', ' '))}</td><td></td><td>{100 * share:.2f} %</td></tr>"
+        for reason, share in sorted(losses.items(), key=lambda item: -item[1])
     )
-    all_of_it = 100 * sum(one.length_ns for one in sent) / span_ns
     return (
         f"{_picture(shown, nodes, t_ns - length_ns, t_ns, selected)}"
         f"<style>.air td{{padding-right:14px}}.air td+td{{text-align:right}}</style><table class='air'>"
-        f"<tr><td>last {span_ns / S:.0f} s</td><td>frames/s</td><td>airtime</td></tr>{rows}"
-        f"<tr><td>all senders</td><td>{len(sent) * S / span_ns:.0f}</td><td>{all_of_it:.2f} %</td></tr></table>"
-        "Of a frame with several packets the first cause in this order counts; senders far apart may send at once."
+        f"<tr><td>last {span_ns / S:.0f} s</td><td>frames/s</td><td>airtime</td></tr>{''.join(of_cause)}"
+        f"{_row('all senders', sent, span_ns)}{''.join(of_priority)}{lost}</table>"
+        "Of a frame with several packets the first cause in this order and the most urgent priority count; senders far "
+        "apart may send at once. Copies are those at stations in range."
     )
+
+
+def _row(name: str, sent: Sequence[AirTime], span_ns: int) -> str:
+    """How many frames were sent a second, and what they took of the air."""
+    share = sum(one.length_ns for one in sent) / span_ns
+    return f"<tr><td>{name}</td><td>{len(sent) * S / span_ns:.0f}</td><td>{100 * share:.2f} %</td></tr>"
 
 
 def _picture(shown: Sequence[AirTime], nodes: Sequence[int], since_ns: int, until_ns: int, selected: int) -> str:

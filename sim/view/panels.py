@@ -277,7 +277,9 @@ class Panels:
         state = self.state
         length_ns = drawn_ns(0 if state.turns is None else state.turns.period_ns)
         nodes = state.scenario.node_ids
-        text = air_text(self._air, nodes, self._t_ns, length_ns=length_ns, selected=self._scene.selected)
+        text = air_text(
+            self._air, nodes, self._t_ns, length_ns=length_ns, losses=state.losses(), selected=self._scene.selected
+        )
         self._write("_frames", _box(text))
 
     def _write(self, name: str, text: str) -> None:

@@ -12,14 +12,17 @@ from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import TxRequest
 from fanet_mw.bus.topics import Topics
 from fanet_mw.units import BROADCAST, MS, NodeId, S
-from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Header, Kind, filler
+from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, PRIORITY_SAFETY, Header, Kind, filler
 from sim.cli.app import app
 from sim.observation.air_causes import AirCauses, Cause
+from sim.observation.swarm_state import SwarmState
 from sim.view.air import CapturedAir, LiveAir, air_text, drawn_ns
 
 
-def put(sender: int, origin: int, seq: int, at_ns: int, *, kind: Kind = Kind.DATA) -> tuple[str, bytes]:
-    header = Header(0, seq, origin, BROADCAST, sender, kind, 8, 0, PRIORITY_BULK, FLAG_FLOOD)
+def put(
+    sender: int, origin: int, seq: int, at_ns: int, *, kind: Kind = Kind.DATA, priority: int = PRIORITY_BULK
+) -> tuple[str, bytes]:
+    header = Header(0, seq, origin, BROADCAST, sender, kind, 8, 0, priority, FLAG_FLOOD)
     request = TxRequest(0, at_ns, header.encode() + filler(40), NodeId(BROADCAST), wants_status=False)
     return Topics("s").radio_tx(sender), codecs.encode([request])
 
@@ -65,6 +68,38 @@ def test_each_frame_is_drawn_in_the_row_of_its_sender_and_counted_by_its_cause(h
     assert [len(marks) for marks in drawn] == [1, 1, 1]
     assert drawn[0] != drawn[1] == drawn[2]
     assert "<rect" in text
+
+
+def test_priorities_have_their_shares_and_losses_their_reasons(heard: Any) -> None:
+    air = LiveAir(heard)
+    air.between(0, 1)
+    for one in (
+        put(1, 1, 7, 9 * S),
+        put(1, 1, 8, 9 * S + MS, priority=PRIORITY_SAFETY),
+        put(3, 3, 0, 9 * S + 2 * MS, kind=Kind.HELLO),
+    ):
+        heard.say(*one)
+    state = SwarmState(heard.scenario)
+    for t_ns, on_air, lost in (
+        (1 * S, 1000, {"collision": 500}),
+        (9 * S, 2000, {"collision": 600}),
+        (10 * S, 2100, {"collision": 625, "half_duplex": 5}),
+    ):
+        state.take_report("emulator", {"copies": {"on_air": on_air, "lost": lost}}, t_ns=t_ns)
+    assert state.losses() == {"collision": 0.25, "half_duplex": 0.05}
+    text = air_text(air, [1, 2, 3], 10 * S, length_ns=S, losses=state.losses())
+    rows = re.findall(r"<td>(?:packets|copies lost): ([\w ]+)</td><td>(\d*)</td>", text)
+    assert rows == [("safety", "0"), ("bulk", "0"), ("collision", ""), ("half duplex", "")]
+    assert "25.00 %" in text
+
+
+def test_without_reports_of_the_emulator_no_losses_are_known(heard: Any) -> None:
+    state = SwarmState(heard.scenario)
+    state.take_report("emulator", {"copies": {"on_air": 100, "lost": {"collision": 5}}}, t_ns=1 * S)
+    assert state.losses() == {}
+    for t_ns, on_air in ((2 * S, 10), (3 * S, 20)):
+        state.take_report("emulator", {"copies": {"on_air": on_air, "lost": {"collision": on_air}}}, t_ns=t_ns)
+    assert state.losses() == {"collision": 1.0}, "a new emulator counts from the start"
 
 
 def test_packets_of_long_ago_are_forgotten_at_last(make_scenario: MakeScenario) -> None:

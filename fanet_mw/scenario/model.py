@@ -32,7 +32,7 @@ from fanet_mw.scenario.tables.world import World
 from fanet_mw.units import MS, NodeId, seconds_to_ns
 
 _REPAIR_S: Final = 10.0
-"""The time for which packets are repaired that floods over measured links have not delivered."""
+"""The time for which packets are repaired by default where floods lose frames."""
 _LIFETIME_MS: Final = 500.0
 _FOREVER_MS: Final = 1e6
 
@@ -127,8 +127,11 @@ class Scenario(Section):
 
     @property
     def repair_ns(self) -> int:
-        """How long packets are repaired; with measured links they always are, because frames get lost."""
-        return seconds_to_ns(self.clusters.repair_s or (_REPAIR_S if self.measures_links else 0.0))
+        """How long packets are repaired (`clusters.repair_s`)."""
+        chosen = self.clusters.repair_s
+        if chosen == "auto":
+            chosen = _REPAIR_S if self.clusters.relay == "counter" or self.measures_links else 0.0
+        return seconds_to_ns(chosen)
 
     @property
     def saturated(self) -> bool:

@@ -149,7 +149,7 @@ def left_out(scenario: Scenario, adjacency: Adjacency) -> Iterator[str]:
             f"in flight a bound is stated while clocks are known within {max(0, most_ns) / US:g} us "
             f"(clusters.turn_slack_us = {scenario.clusters.turn_slack_us:g}), and not before"
         )
-    if scenario.clusters.repair_s > 0:
+    if scenario.repair_ns > 0:
         bounded = scenario.clusters.relay == "scheduled" and not scenario.measures_links
         yield "repairs of lost packets come later than any bound here, and their load is not counted" + (
             ", and may reach into turns; nodes state no bound in flight" if bounded else ""

@@ -44,7 +44,7 @@ class ScenarioPlan(NamedTuple):
     @property
     def proven(self) -> bool:
         """True if the bounds hold; False if some are estimates of contention, or if repairs may reach into turns."""
-        repaired = self.superframe is not None and self.scenario.clusters.repair_s > 0
+        repaired = self.superframe is not None and self.scenario.repair_ns > 0
         return isinstance(self.access, Bounded) and all(c.flood.proven for c in self.clusters) and not repaired
 
     @property

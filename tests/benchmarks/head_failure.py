@@ -35,7 +35,7 @@ def scenario(seed: int, victim: int | None, *, duration_s: float = 28) -> config
     tree = {
         "name": "head-failure", "seed": seed, "duration_s": duration_s, "warmup_s": 8,
         "nodes": {"count": 45, "telemetry_hz": 0},
-        "clusters": {"count": 4, "flooding_period_s": 1.0, "relay": "counter", "counter": 2},
+        "clusters": {"count": 4, "flooding_period_s": 1.0, "relay": "counter", "counter": 2, "repair_s": 0},
         "traffic": {"payload_bytes": 256}, "radio": {"lead_ms": 0},
     }  # fmt: skip
     if victim is not None:

@@ -41,7 +41,7 @@ def scenario(relay: str, model: str, speed_m_s: float, *, reassign_s: float, see
         "nodes": {"count": COUNT, "spacing_m": 160, "columns": 5, "telemetry_hz": 0},
         "clusters": {
             "count": COUNT - 1 if scheduled else 4, "flooding_period_s": 1.0, "relay": relay, "reassign_s": reassign_s,
-            **({"guard_ms": 1, "link_m": 200} if scheduled else {"counter": 2}),
+            **({"guard_ms": 1, "link_m": 200} if scheduled else {"counter": 2, "repair_s": 0}),
         },
         "traffic": {"payload_bytes": 256, "sources": tuple(range(2, COUNT + 1))},
         "radio": {"lead_ms": 0, **({"cw_min": 7} if scheduled else {})},

@@ -1,7 +1,7 @@
 """Every rule of `clusters.relay` in whole swarms: `python tests/benchmarks/relay_rules.py [SECONDS]`.
 
 44 nodes send 1024 B a second each to everyone, every node a head; seeds 1 to 3. `grid`: 9 x 5, 200 m apart, range
-250 m; `dense`: 45 nodes at random on a disc of 250 m. Flooding period 1 s.
+250 m; `dense`: 45 nodes at random on a disc of 250 m. Flooding period 1 s, no repair.
 """
 
 import statistics
@@ -12,7 +12,7 @@ from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 
-RULES = {"all": [], "counter": ["clusters.counter=2"], "scheduled": []}
+RULES = {"all": [], "counter": ["clusters.counter=2", "clusters.repair_s=0"], "scheduled": []}
 SWARMS = {"grid": [], "dense": ["nodes.layout=disc", "nodes.radius_m=250"]}
 
 

@@ -32,11 +32,12 @@ _LOADED: Final = {
     "scheduled, period 1 s, `cw_min` 1": ("clusters.flooding_period_s=1", "radio.cw_min=1"),
     "scheduled, 0.5 s, `cw_min` 7": ("clusters.flooding_period_s=0.5", "radio.cw_min=7"),
     "clustered, relays `all`, 44 clusters, 0.5 s": ("clusters.relay=all", "clusters.flooding_period_s=0.5"),
-    "clustered, `counter` = 2, 44 clusters, 0.5 s": (
-        "clusters.relay=counter", "clusters.counter=2", "clusters.flooding_period_s=0.5",
+    "clustered, `counter` = 2, 44 clusters, 0.5 s, no repair": (
+        "clusters.relay=counter", "clusters.counter=2", "clusters.flooding_period_s=0.5", "clusters.repair_s=0",
     ),
-    "clustered, `counter` = 2, 4 clusters, 5 s": (
+    "clustered, `counter` = 2, 4 clusters, 5 s, no repair": (
         "clusters.relay=counter", "clusters.counter=2", "clusters.count=4", "clusters.flooding_period_s=5",
+        "clusters.repair_s=0",
     ),
     "plain flooding": ("routing.protocol=flooding", "routing.hello_interval_s=0"),
 }  # fmt: skip

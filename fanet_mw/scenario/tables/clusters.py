@@ -64,9 +64,9 @@ class Clusters(Section):
     reassign_s: Duration = 10.0
     """The shortest time between two divisions of a swarm that has moved; 0: clusters change only
     when nodes come or go."""
-    repair_s: Duration = 0.0
-    """Neighbors send packets again that a node lacks, as its hellos show, if they are newer than this; 0: no repair,
-    except 10 s with measured links."""
+    repair_s: Duration | Literal["auto"] = "auto"
+    """Neighbors send packets again that a node lacks, as its hellos show, if they are newer than this; 0: no repair;
+    `auto`: 10 s with relays `counter` and with measured links, else no repair."""
     resume: bool = True
     """`scheduled`: whether floods that ended early because a frame was lost go on in later superframes, when nodes miss
     the packet; it then comes later than its bound. Without effect where packets are repaired all the time."""

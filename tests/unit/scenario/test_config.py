@@ -12,7 +12,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.mavlink import Encoder
 from fanet_mw.scenario import Scenario, config, grid_columns
 from fanet_mw.scenario.cross_checks import MESSAGE_BYTES
-from fanet_mw.units import Enu, NodeId
+from fanet_mw.units import Enu, NodeId, S
 from sim.cli.app import app
 from sim.scenarios import catalog
 
@@ -256,3 +256,18 @@ def test_a_connection_that_is_none_of_its_kinds_is_told_in_one_sentence(wrong: o
         config.build({"mission": {"connection": wrong}})
     for right in ("always", "none", 20):
         assert config.build({"mission": {"connection": right}}).mission.connection == right
+
+
+@pytest.mark.parametrize(
+    ("keys", "repaired_s"),
+    [
+        ({"relay": "counter"}, 10),
+        ({"relay": "counter", "repair_s": 0}, 0),
+        ({"relay": "counter", "repair_s": 3}, 3),
+        ({"relay": "all"}, 0),
+        ({"relay": "scheduled"}, 0),
+        ({"relay": "scheduled", "links": "measured"}, 10),
+    ],
+)
+def test_packets_are_repaired_by_default_where_floods_lose_frames(keys: dict[str, object], repaired_s: int) -> None:
+    assert config.build({"clusters": keys}).repair_ns == repaired_s * S

@@ -131,7 +131,7 @@ class StatedDelays:
     def class_bounds_ns(self, own: RootTurns | None) -> Mapping[int, int]:
         """The bounds by priority; a class whose losses are repaired has none."""
         scenario = self._port.scenario
-        if own is None or scenario.clusters.repair_s:
+        if own is None or scenario.repair_ns:
             return {}
         found = dict.fromkeys(self._roots.reserved, own.burst_ns(per_turn=1))
         bulk_ns: int | None = own.burst_ns(per_turn=own.together)

@@ -18,7 +18,6 @@ from fanet_mw.routing.rounds.delay_law import DelayLaw
 from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
-from fanet_mw.wire import HEADER_BYTES
 from sim.planner.plan_text import describe_operator, item
 from sim.planner.problems_and_notes import clocks_apart
 
@@ -47,8 +46,7 @@ def judge_rounds(
         name: each for name, each in scenario.traffic_classes.items() if each.priority != "bulk" or not timing.slots
     }
     packets = [  # how many a second, and how long they are
-        (len(sources_of(scenario, name)) / each.interval_s, each.longest_bytes + HEADER_BYTES)
-        for name, each in urgent.items()
+        (len(sources_of(scenario, name)) / each.interval_s, each.longest_bytes) for name, each in urgent.items()
     ]
     offered = sum(rate * size for rate, size in packets)
     used = sum(rate * law.turns_of(size) for rate, size in packets) * timing.period_ns / S
@@ -63,7 +61,7 @@ def judge_rounds(
             rates[NodeId(node)] += 1 / bulk[name].interval_s
     load = None
     if flooded:
-        longest_bulk = max(bulk[name].longest_bytes for name in flooded) + HEADER_BYTES
+        longest_bulk = max(bulk[name].longest_bytes for name in flooded)
         load = greatest_load(near, rates, timing, longest_bytes=longest_bulk)
     problems = list[str]()
     if load is not None and load.needed > _LEFT_OUT * load.carried:

@@ -4,8 +4,8 @@
 
 A line per setting that broke a promise; the exit status is 1 if one did. Drawn are the number of UAVs, their grid,
 rates, loads, leads, protocols with bounds, motion to 20 m/s (none, formation, or random waypoints), clocks that
-rates, loads, leads, protocols with bounds, motion to 20 m/s (none, formation, or random waypoints), clocks that
-that is cut in two. Packets that are made around a fault do not count: it may break any promise.
+drift, long superframes that are nearly full, and one fault: a UAV that crashes, falls mute or is started anew, or an
+air that is cut in two. Packets that are made around a fault do not count: it may break any promise.
 """
 
 import argparse

@@ -188,8 +188,9 @@ def test_a_frame_in_its_senders_turn_shows_that_both_keep_the_same_rounds() -> N
     assert known.among(-1) == seven, "among the slots a frame shows nothing"
     known.hear(7, ends_ns - timing.turn_ns)
     assert not known.among(-1), "its clock is behind by a turn"
-    five_ns = timing.turn_start_ns(5, from_ns=2 * S) + timing.turn_ns // 2
-    known.hear(5, five_ns)
-    assert known.among(1 << 4) == 1 << 4, "it keeps its turns, and the other one is away"
-    assert not known.among(1 << 4 | seven), "what it sends is destroyed here by the other one"
+    for node in (3, 5, 6):
+        known.hear(node, timing.turn_start_ns(node, from_ns=2 * S) + timing.turn_ns // 2)
+    three, five, six = 1 << 2, 1 << 4, 1 << 5
+    assert known.among(three | five | six) == three | five | six, "the other one is away"
+    assert known.among(three | five | six | seven) == three, "it destroys what comes in the turn of 6, or just before"
     assert InStep(timing, certain=True).among(seven) == seven

@@ -2,8 +2,8 @@
 
     the leader                  the head with the lowest id flies the route
     other heads                 on a circle around the leader (`_APART`)
-    members                     on a circle around their head; that of the leader and each other one have a UAV each
-                                where they are nearest to each other
+    members                     on a circle around their head; one of them flies where the circle is nearest to that of
+                                the leader, and one of the leader's circle opposite to it
     a UAV without a cluster     on a circle around the nearest head that it receives
     a UAV whose head is lost    flies parallel to the leader if it receives the leader, otherwise it hovers
     a UAV that receives nobody  hovers, even if it was the leader: the others fly on without it (and below it)

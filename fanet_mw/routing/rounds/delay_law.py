@@ -49,6 +49,7 @@ _WINDOWS: Final = 2
 _HELLO_BYTES: Final = 137 + MESSAGE_BYTES
 """The length of a hello with one message of a digest."""
 _MOST_HELLOS: Final = 1 / (1 + PATIENT_TURNS)
+_MOST_HELLOS_ALONE: Final = 0.9
 _KEPT: Final = 0.997
 """The share of received packets whose ratio is not exceeded; the rest of what may be missing never arrives."""
 _FEWEST: Final = 300
@@ -85,17 +86,23 @@ class DelayLaw:
         """The size of the greatest of the packets that wait."""
         self._counted_ns = 0
         """The instant for which that is known."""
-        self._hello_share = min(timing.period_ns / hello_ns, _MOST_HELLOS) if scenario.routing.hello_interval_s else 0.0
+        self._hellos_alone = scenario.clock.sync == "beacons"
+        """Whether each hello has a turn of its own, because the clock must know its end."""
+        most = _MOST_HELLOS_ALONE if self._hellos_alone else _MOST_HELLOS
+        self._hello_share = min(timing.period_ns / hello_ns, most) if scenario.routing.hello_interval_s else 0.0
         self._window_ns = max(self._burst_ns, timing.period_ns)
         self._window = 0
         self._came: defaultdict[int, float] = defaultdict(float)
         self._came_before: Mapping[int, float] = {}
         """The turns filled, by priority, by packets that came in the present window and in the one before."""
-        self._waited_ns = self._waited_before_ns = 0
-        """How long a packet has waited for turns on its way that came in the present window, and in the one before."""
-        self._stated = self._stated_turns(scenario)
         self._usually: dict[int, float] = {}
         """The same, smoothed over the windows so far."""
+        self._waited_ns: defaultdict[int, int] = defaultdict(int)
+        self._waited_before_ns: Mapping[int, int] = {}
+        """How long a packet has waited for turns on its way, by priority, of those that came in the present window and
+        in the one before."""
+        self._stated = self._stated_turns(scenario)
+        """The turns of a round that packets fill by the scenario, by priority."""
 
     def count(self, size: int, *, priority: int, now_ns: int) -> None:
         """A packet for turns came, own or another node's."""
@@ -105,10 +112,15 @@ class DelayLaw:
         self._waiting_bytes += size
         self._greatest = max(self._greatest, size)
 
-    def hear(self, delay_ns: int, *, hops: int, now_ns: int) -> None:
+    def hear(self, delay_ns: int, *, hops: int, priority: int, now_ns: int) -> None:
         """A packet of another node took so long over so many hops: what exceeds the way it has waited."""
         self._turn_window(now_ns)
-        self._waited_ns = max(self._waited_ns, delay_ns - hops * self.hop_ns)
+        self._waited_ns[priority] = max(self._waited_ns[priority], delay_ns - hops * self.hop_ns)
+
+    def _waited(self, priority: int) -> int:
+        """The longest that a packet not less urgent than `priority` has waited that came lately."""
+        waits = (*self._waited_before_ns.items(), *self._waited_ns.items())
+        return max((waited_ns for other, waited_ns in waits if other <= priority), default=0)
 
     def _serve(self, now_ns: int) -> None:
         """Each round has carried a turn's worth of what waited."""
@@ -126,20 +138,20 @@ class DelayLaw:
 
     def _hellos(self, size: int) -> float:
         """The share of turns that hellos take from packets of a size."""
-        beside = _HELLO_BYTES + size <= self._timing.turn_bytes
+        beside = not self._hellos_alone and _HELLO_BYTES + size <= self._timing.turn_bytes
         return self._hello_share * (_HELLO_BYTES / self._timing.turn_bytes if beside else 1)
 
     def _turn_window(self, now_ns: int) -> None:
         window = now_ns // self._window_ns
         if window != self._window:
-            passed = window - self._window
+            passed = max(1, window - self._window)  # the swarm's time may step back
             for priority in self._usually.keys() | self._came.keys():
                 usual = self._usually.get(priority, 0.0)
                 usual += (self._came[priority] - usual) / _WINDOWS
                 self._usually[priority] = usual * (1 - 1 / _WINDOWS) ** (passed - 1)
             self._came_before = self._came if passed == 1 else {}
-            self._waited_before_ns = self._waited_ns if passed == 1 else 0
-            self._waited_ns = 0
+            self._waited_before_ns = self._waited_ns if passed == 1 else {}
+            self._waited_ns = defaultdict(int)
             self._came, self._window = defaultdict(float), window
 
     def _urgent_share(self, priority: int, now_ns: int) -> float:
@@ -170,9 +182,11 @@ class DelayLaw:
                 found[priority] += traffic.rate_hz(scenario.node_count) * turns
         return found
 
-    def bound_ns(self, topology: Topology, *, priority: int, clock_error_ns: int, now_ns: int) -> int | None:
-        """The bound for a packet that is handed over now, if all clocks are within `clock_error_ns`; None if none can
-        be stated. Over a channel that loses frames it holds only for packets of which no frame is lost.
+    def bound_ns(
+        self, topology: Topology, *, priority: int, clock_error_ns: int, now_ns: int, size: int = 0
+    ) -> int | None:
+        """The bound for a packet of `size` bytes that is handed over now, if all clocks are within `clock_error_ns`;
+        None if none can be stated. Over a channel that loses frames it holds only for packets that lose no frame.
         """
         if not clocks_fit(self._clock, slack_ns=self._slack_ns, clock_error_ns=clock_error_ns):
             return None
@@ -187,8 +201,8 @@ class DelayLaw:
         farthest, used = max(hops.values()), self._used_share(priority)
         if used > 1:
             return None
-        found_ns = self.over_ns(farthest, longest_bytes=self._greatest, used=used)
-        if _WORSE * max(self._waited_ns, self._waited_before_ns) > found_ns - self.way_ns(farthest):
+        found_ns = self.over_ns(farthest, longest_bytes=max(size, self._greatest), used=used)
+        if _WORSE * self._waited(priority) > found_ns - self.way_ns(farthest):
             return None  # turns are too few
         return round(found_ns / (1 - urgent))
 

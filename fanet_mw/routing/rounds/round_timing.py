@@ -9,6 +9,8 @@ so a node knows its turn from the number of nodes alone. The slots after the tur
 have numbers that go on from round to round.
 """
 
+from functools import reduce
+from operator import or_
 from typing import Final, NamedTuple
 
 from fanet_mw import airtime
@@ -62,14 +64,10 @@ class RoundTiming(NamedTuple):
         offset_ns = (node - 1) * self.turn_ns
         return -((offset_ns - from_ns) // self.period_ns) * self.period_ns + offset_ns
 
-    def keeps(self, node: int, end_ns: int) -> bool | None:
-        """True if a frame of a node that ended at an instant was in that node's turn, False if it was in another one;
-        None among the slots.
-        """
+    def owner(self, end_ns: int) -> int | None:
+        """The node in whose turn a frame ended at an instant; None among the slots."""
         within_ns = (end_ns - 1) % self.period_ns
-        if within_ns >= self.nodes * self.turn_ns:
-            return None
-        return within_ns // self.turn_ns == node - 1
+        return None if within_ns >= self.nodes * self.turn_ns else within_ns // self.turn_ns + 1
 
     def slot_start_ns(self, number: int) -> int:
         """The start of a bulk slot."""
@@ -91,8 +89,8 @@ class RoundTiming(NamedTuple):
 class InStep:
     """Which neighbors of a node keep the rounds that it keeps, by when their frames of turns came.
 
-    A node whose time is not that of the swarm yet, or no more, sends in turns of others. No bound can count on it, or
-    on a node that hears it.
+    A node whose time is not that of the swarm yet, or no more, sends in turns of others. No bound can count on it, and
+    where it is heard none on those in whose turns it sends.
     """
 
     def __init__(self, timing: RoundTiming, *, certain: bool) -> None:
@@ -100,18 +98,24 @@ class InStep:
         self._timing = timing
         self._keeping = -1 if certain else 0
         """The nodes in step, bit i for node i + 1."""
-        self._breaking = 0
-        """The nodes that sent in turns of others."""
+        self._drowned: dict[int, int] = {}
+        """For each node out of step, those whose frames it destroys, as a set of bits."""
         self._certain = certain
 
     def hear(self, node: int, end_ns: int) -> None:
         """A frame that belongs into a node's turn has ended."""
-        keeps = None if self._certain else self._timing.keeps(node, end_ns)
-        if keeps is not None:
-            own = 1 << (node - 1)
-            self._keeping = self._keeping | own if keeps else self._keeping & ~own
-            self._breaking = self._breaking & ~own if keeps else self._breaking | own
+        owner = None if self._certain else self._timing.owner(end_ns)
+        if owner is None:
+            return
+        own = 1 << (node - 1)
+        if owner == node:
+            self._keeping |= own
+            self._drowned.pop(node, None)
+        else:
+            self._keeping &= ~own
+            self._drowned[node] = 0b11 << owner >> 2  # it may have begun in the turn before
 
     def among(self, nodes: int) -> int:
-        """Those of a set of neighbors that this node hears for sure: those in step, and none while one is not."""
-        return 0 if nodes & self._breaking else nodes & self._keeping
+        """Those of a set of neighbors that are in step, and that none of the others drowns."""
+        drowned = reduce(or_, (those for node, those in self._drowned.items() if nodes >> (node - 1) & 1), 0)
+        return nodes & self._keeping & ~drowned

@@ -222,7 +222,7 @@ class RoundFlooding(RoutingProtocol):
         header = packet.header
         law_ns = self._law.bound_ns(
             self._topology,
-            priority=header.priority, clock_error_ns=self._port.clock_error_ns, now_ns=now_ns,
+            priority=header.priority, clock_error_ns=self._port.clock_error_ns, now_ns=now_ns, size=len(packet.frame),
         )  # fmt: skip
         if law_ns is None:
             return
@@ -254,7 +254,7 @@ class RoundFlooding(RoutingProtocol):
             likely = self._bulk_likely
             self._admission.hear(origin, delay_ns, now_ns=now_ns)
         elif likely is None and hops is not None and now_ns - delay_ns > self._topology.reached_since_ns(origin):
-            self._law.hear(delay_ns, hops=hops, now_ns=now_ns)
+            self._law.hear(delay_ns, hops=hops, priority=packet.header.priority, now_ns=now_ns)
         if likely is not None and hops is not None:
             likely.hear(delay_ns, way_ns=self._law.way_ns(hops))
 

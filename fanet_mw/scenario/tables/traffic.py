@@ -1,5 +1,6 @@
 """The `[traffic]` table: the application load."""
 
+import math
 from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
@@ -63,11 +64,13 @@ class Traffic(Section):
         return max((size for _, size in self.packets), default=self.payload_bytes)
 
     def rate_hz(self, nodes: int) -> float:
-        """The packets a second that all sources in a swarm of so many nodes make on average; 0 if that is not known."""
+        """The packets a second that all sources in a swarm of so many nodes make on average."""
         named = self.sources if not isinstance(self.sources, tuple) else len(self.sources)
         sources = nodes if isinstance(named, str) else named
-        active = {"cbr": 1.0, "poisson": 1.0, "on_off": self.on_s / (self.on_s + self.off_s)}
-        return sources * active.get(self.arrivals, 0.0) / self.interval_s
+        if self.arrivals == "trace":
+            return sources * len(self.packets) / max(max(at_s for at_s, _ in self.packets), self.interval_s)
+        active = {"on_off": self.on_s / (self.on_s + self.off_s), "saturated": math.inf, "none": 0.0}
+        return sources * active.get(self.arrivals, 1.0) / self.interval_s if sources else 0.0
 
     @model_validator(mode="after")
     def _trace_has_packets(self) -> Self:

@@ -32,7 +32,7 @@ def room_ns(window_ns: int) -> int:
 
 
 def crowd(adjacency: Adjacency) -> int:
-    """The most nodes within two hops of each other."""
+    """The most nodes within two hops of one node, itself included."""
     return max((1 + len(near) for near in two_hop(adjacency).values()), default=0)
 
 

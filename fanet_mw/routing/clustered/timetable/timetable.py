@@ -66,7 +66,7 @@ class Timetable(NamedTuple):
     near: Mapping[NodeId, frozenset[NodeId]] = MappingProxyType({})
     """For each node, its neighbors, which all hear it in these turns."""
     crowd: int = 0
-    """The most nodes within two hops of each other."""
+    """The most nodes within two hops of one node, itself included."""
 
     def roots(self) -> list[Turn]:
         """The turns in which roots transmit new packets; repetitions are not among them."""

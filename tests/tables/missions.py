@@ -71,7 +71,7 @@ COUNTRY_IN_SMALL: Final[Mapping[str, Case]] = {
 _NO_LEADS: Final = ("radio.lead_ms=0", "radio.handover_ms=0", "duration_s=300")
 _FIVE: Final = tuple(range(1, 6))
 _AS_SHIPPED: Final = {
-    "hills": (1,), "night": (1,), "rescue-base": (1,), "convoy": _FIVE, "crossing": _FIVE, "town": _FIVE,
+    "hills": (1, 2), "night": (1, 2), "rescue-base": (1,), "convoy": _FIVE, "crossing": _FIVE, "town": _FIVE,
 }  # fmt: skip
 WHOLE: Final[Mapping[str, Case]] = {
     "`rescue`, no leads": Case("rescue", _NO_LEADS, tuple(range(12, 21))),

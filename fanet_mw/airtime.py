@@ -120,13 +120,15 @@ def longest_access_ns(size: int, radio: RadioTiming) -> int:
     """The longest time that a frame of this project, of `size` bytes, takes at an idle medium: DIFS, the longest
     backoff that an earlier frame may have left behind, and its airtime.
     """
-    timing = Timing.of(radio)
-    longest_ns = airtime_ns(size + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
-    return longest_ns + timing.difs_ns + radio.cw_min * timing.slot_ns
+    return _access_ns(size, radio, backoff_slots=radio.cw_min)
 
 
 def mean_access_ns(size: int, radio: RadioTiming) -> int:
     """The time that such a frame takes at an idle medium on average: DIFS, a mean backoff, and its airtime."""
+    return _access_ns(size, radio, backoff_slots=radio.cw_min / 2)
+
+
+def _access_ns(size: int, radio: RadioTiming, *, backoff_slots: float) -> int:
     timing = Timing.of(radio)
-    mean_ns = airtime_ns(size + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
-    return mean_ns + timing.difs_ns + radio.cw_min * timing.slot_ns // 2
+    air_ns = airtime_ns(size + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
+    return air_ns + timing.difs_ns + int(backoff_slots * timing.slot_ns)

@@ -21,8 +21,8 @@ PLANNED_ERROR_NS: Final = 50 * US
 def slot_guard_ns(scenario: Scenario, *, clock_error_ns: int) -> int:
     """The guard time of a slot; with `auto` it suffices for clocks that are at most `clock_error_ns` off at any time.
 
-    `auto` allows for two clocks that are off in opposite directions, the flight over `radio.range_m`, and one data
-    frame that starts at the slot's last instant. Relays that go on behind that frame are not allowed for.
+    `auto` covers two opposite clock errors, the propagation over `radio.range_m`, and one data frame that starts just
+    before the guard. It leaves no time for relays that follow that frame.
     """
     given_ms, radio = scenario.clusters.guard_ms, scenario.radio
     if given_ms != "auto":

@@ -144,7 +144,7 @@ class Estimate(NamedTuple):
 
 
 class _CopiesCounted(NamedTuple):
-    """The copies of frames at stations in range, and those that were lost by reason, since the start."""
+    """The copies of frames at stations in range since the start, and, by reason, how many of them were lost."""
 
     t_ns: int
     on_air: int
@@ -172,7 +172,7 @@ class SwarmState:
         self._air: deque[tuple[int, float]] = deque()
         """Instants, and the time [ns] for which the air was busy until then, of the last seconds."""
         self._copies: deque[_CopiesCounted] = deque()
-        """What the emulator counted in the last seconds."""
+        """The reports of the emulator of the last seconds; each counts since the start."""
         self.packets: dict[tuple[int, int], PacketNow] = {}
         self.estimates: dict[int, Estimate] = {}
         self.events: deque[Event] = deque(maxlen=_MOST_EVENTS)

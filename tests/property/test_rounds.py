@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from fanet_mw import wire
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.routing.rounds.bulk_slots import BulkSlots
-from fanet_mw.routing.rounds.round_timing import InStep, RoundTiming
+from fanet_mw.routing.rounds.counted_links import InStep
+from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.routing.rounds.topology import Topology
 from fanet_mw.scenario import config
 from fanet_mw.units import BROADCAST, MS, NodeId, S

@@ -7,15 +7,17 @@ A packet that was heard is announced one lead before the next own turn, at most 
 the turn, and is handed over. `h` is the greatest distance that the node knows to another; `margin` is for a topology
 that changes meanwhile. All urgent packets that are under way together, `B` bytes, delay each other once: every node
 serves them at the same rate, `room` bytes of a frame per round, so what waited for one node's turn does not wait
-again for the next one's (tandem of equal servers; Le Boudec and Thiran, Network Calculus, 1.4.3). Of equally urgent
-ones the oldest goes first at every node, so a packet that is made later delays none. More urgent packets overtake it on
-its way: `urgent` is the share of turns that was theirs lately, `hellos` the share that hellos take. Older packets of
-other origins, which have not been heard yet, delay it again in so far as turns are full: `used` is the share that
-packets use as a rule (by trial: without it 17 of 3,600 deliveries over a line of 25 nodes came up to 8 % too late).
+again for the next one's (tandem of equal servers; Le Boudec and Thiran, Network Calculus, 1.4.3). Of new ones
+that are equally urgent the oldest goes first at every node, so none is delayed by a later one. More urgent packets
+overtake it on its way: `urgent` is the share of turns that was theirs lately, `hellos` the share that hellos take.
+Older packets of other origins, which have not been heard yet, delay it again in so far as turns are full: `used` is the
+share that packets not less urgent use as a rule, or by the traffic of the scenario if that is more (by trial: without
+it 17 of 3,600 deliveries over a line of 25 nodes came up to 8 % too late).
 Assumed: no frame is lost; over any channel but `range` a likely delay is stated instead (`LikelyDelay`). None is
 stated while clocks may be further apart than the slack of turns holds, while more waits for turns, everywhere alike,
-than three quarters of `rounds.burst_bytes`, or while no way has been found yet to a node that may only just have
-started. A bound does not apply to nodes without a way, and counts only on links that will last (`lasting_links.py`).
+than three quarters of `rounds.burst_bytes`, while turns are overfilled or packets come so late that they must be, while
+more urgent packets use over half of the turns, or while no way has been found yet to a node that may only just have
+started. A bound does not apply to nodes without a way, and counts only on links that will last (`counted_links.py`).
 What waits follows from what was heard, because all nodes hear the same packets and serve them at the same rate (a leaky
 bucket).
 """
@@ -30,6 +32,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.timesync.turn_slack import clocks_fit
 from fanet_mw.units import US, NodeId, S, seconds_to_ns
 from fanet_mw.wire import HEADER_BYTES, PRIORITIES, PRIORITY_BULK
+from fanet_mw.wire.hello import PLAIN_BYTES
 from fanet_mw.wire.hello.digest import MESSAGE_BYTES
 from fanet_mw.wire.rounds import HEARD_BYTES
 
@@ -43,10 +46,10 @@ _MOST_USED: Final = 0.75
 _MOST_URGENT: Final = 0.5
 """No bound is stated while more urgent packets use a greater share of turns."""
 _WORSE: Final = 2
-"""A packet may wait so many times longer than those that were heard lately, of which fewer had come before."""
+"""When the load grows, a packet waits up to so many times as long as those that were heard lately."""
 _WINDOWS: Final = 2
 """The smoothing of the load: each window weighs one part in so many."""
-_HELLO_BYTES: Final = 137 + MESSAGE_BYTES
+_HELLO_BYTES: Final = PLAIN_BYTES + MESSAGE_BYTES
 """The length of a hello with one message of a digest."""
 _MOST_HELLOS: Final = 1 / (1 + PATIENT_TURNS)
 _MOST_HELLOS_ALONE: Final = 0.9
@@ -113,12 +116,12 @@ class DelayLaw:
         self._greatest = max(self._greatest, size)
 
     def hear(self, delay_ns: int, *, hops: int, priority: int, now_ns: int) -> None:
-        """A packet of another node took so long over so many hops: what exceeds the way it has waited."""
+        """A packet of another node took so long over so many hops; what exceeds the time of the hops is waiting."""
         self._turn_window(now_ns)
         self._waited_ns[priority] = max(self._waited_ns[priority], delay_ns - hops * self.hop_ns)
 
     def _waited(self, priority: int) -> int:
-        """The longest that a packet not less urgent than `priority` has waited that came lately."""
+        """The longest wait of the packets heard lately that are at least as urgent as `priority`."""
         waits = (*self._waited_before_ns.items(), *self._waited_ns.items())
         return max((waited_ns for other, waited_ns in waits if other <= priority), default=0)
 
@@ -203,7 +206,7 @@ class DelayLaw:
             return None
         found_ns = self.over_ns(farthest, longest_bytes=max(size, self._greatest), used=used)
         if _WORSE * self._waited(priority) > found_ns - self.way_ns(farthest):
-            return None  # turns are too few
+            return None  # more waits elsewhere than this node has heard
         return round(found_ns / (1 - urgent))
 
     def over_ns(self, hops: int, *, longest_bytes: int, used: float = 0.0) -> int:

@@ -9,8 +9,6 @@ so a node knows its turn from the number of nodes alone. The slots after the tur
 have numbers that go on from round to round.
 """
 
-from functools import reduce
-from operator import or_
 from typing import Final, NamedTuple
 
 from fanet_mw import airtime
@@ -84,38 +82,3 @@ class RoundTiming(NamedTuple):
         within_ns = (from_ns - self.nodes * self.turn_ns) % self.period_ns
         usable_ns = max(1, self.slots - 2) * self.slot_ns
         return from_ns if within_ns < usable_ns else from_ns + self.period_ns - within_ns
-
-
-class InStep:
-    """Which neighbors of a node keep the rounds that it keeps, by when their frames of turns came.
-
-    A node whose time is not that of the swarm yet, or no more, sends in turns of others. No bound can count on it, and
-    where it is heard none on those in whose turns it sends.
-    """
-
-    def __init__(self, timing: RoundTiming, *, certain: bool) -> None:
-        """`certain`: all clocks are exact."""
-        self._timing = timing
-        self._keeping = -1 if certain else 0
-        """The nodes in step, bit i for node i + 1."""
-        self._drowned: dict[int, int] = {}
-        """For each node out of step, those whose frames it destroys, as a set of bits."""
-        self._certain = certain
-
-    def hear(self, node: int, end_ns: int) -> None:
-        """A frame that belongs into a node's turn has ended."""
-        owner = None if self._certain else self._timing.owner(end_ns)
-        if owner is None:
-            return
-        own = 1 << (node - 1)
-        if owner == node:
-            self._keeping |= own
-            self._drowned.pop(node, None)
-        else:
-            self._keeping &= ~own
-            self._drowned[node] = 0b11 << owner >> 2  # it may have begun in the turn before
-
-    def among(self, nodes: int) -> int:
-        """Those of a set of neighbors that are in step, and that none of the others drowns."""
-        drowned = reduce(or_, (those for node, those in self._drowned.items() if nodes >> (node - 1) & 1), 0)
-        return nodes & self._keeping & ~drowned

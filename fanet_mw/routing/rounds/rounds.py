@@ -1,6 +1,7 @@
 """Rounds: a protocol whose delays do not depend on the topology. Each node has one turn in every round, by its number.
 
-    urgent packet   waits for the own turn; whoever hears it first sends it in the own next turn
+    urgent packet   waits for the own turn; whoever hears it first sends it in the own next turn (`spreading.py`: which
+                    packet goes first, and who passes it on)
     bulk for all    goes in slots of the rest of the round, as long as a neighbor is not known to have it
     bulk for one    goes hop by hop between the turns, acknowledged (`one_way.py`)
     topology        each node states its neighbors when they change, and all pass that on in turns (`topology.py`)
@@ -28,10 +29,10 @@ from fanet_mw.node.received_motion import motion_in
 from fanet_mw.routing.packet_repair import FLOOD_OVER_NS, Repair
 from fanet_mw.routing.rounds.admission import BulkAdmission
 from fanet_mw.routing.rounds.bulk_slots import BulkSlots
+from fanet_mw.routing.rounds.counted_links import InStep, LastingLinks
 from fanet_mw.routing.rounds.delay_law import MOST_HOPS, PATIENT_TURNS, DelayLaw, LikelyDelay
-from fanet_mw.routing.rounds.lasting_links import LastingLinks
 from fanet_mw.routing.rounds.one_way import OneWay
-from fanet_mw.routing.rounds.round_timing import InStep, RoundTiming
+from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.routing.rounds.spreading import Spreading
 from fanet_mw.routing.rounds.topology import Topology
 from fanet_mw.trace import LIKELY_SHARE, BoundExcludes, BoundStated, LikelyStated
@@ -290,7 +291,8 @@ class RoundFlooding(RoutingProtocol):
     def _send_at_once(self, packet: Packet, now_ns: int) -> None:
         """A warning contends between the turns, whoever owns the slot, and goes in the turn as well.
 
-        Those that wait for the end of the turns are spread, too: bulk starts there, in slots.
+        One that is made during the turns begins at a random instant after their end, because all that wait would begin
+        there at once, with bulk.
         """
         spread_ns = int(self._random() * _SPREAD_SLOTS * self._timing.slot_ns)
         wanted_ns = now_ns + self._lead_ns + spread_ns

@@ -66,7 +66,7 @@ class _Spread:
         self.packet = packet
         self.taken_ns = taken_ns
         self.rank = packet.header.priority, packet.header.origin_us, _key(packet)
-        """The order in which packets are served: the oldest first, so that a later one delays none."""
+        """Priority, birth, key: of new packets the most urgent go first, and of these the oldest."""
         self.sent = 0
         """How often this node has sent it."""
         self.sent_ns = 0
@@ -133,8 +133,8 @@ class Spreading:
         self._bulk: dict[int, _Spread] = {}
         self._due: list[tuple[int, int]] = []
         """A heap of the instants and keys at which bulk is looked at; outdated entries are skipped."""
-        self._ready: list[tuple[bool, tuple[int, int, int], int]] = []
-        """A heap of the bulk whose instant has come: sent before, rank, key."""
+        self._ready: list[tuple[bool, tuple[int, int, int]]] = []
+        """A heap of the bulk whose instant has come: sent before, rank."""
         self._done: dict[int, _Spread] = {}
         """The packets that need not be sent any more, the latest last."""
         self._early: dict[int, int] = {}
@@ -165,7 +165,7 @@ class Spreading:
         """The number of bulk packets, about, that wait for a slot and that this node is to send before others, or has
         sent and sends again.
         """
-        ready = (self._bulk[key] for _, _, key in self._ready if key in self._bulk)
+        ready = (self._bulk[key] for _, (_, _, key) in self._ready if key in self._bulk)
         return sum(1 for entry in ready if entry.sent or not (entry.again or entry.spare))
 
     # --- what is heard --------------------------------------------------------------------------------------------
@@ -348,9 +348,9 @@ class Spreading:
             from_ns, key = heappop(self._due)
             entry = self._bulk.get(key)
             if entry is not None and entry.from_ns == from_ns:
-                heappush(self._ready, (entry.again, entry.rank, key))
+                heappush(self._ready, (entry.again, entry.rank))
         while self._ready:
-            _, _, key = heappop(self._ready)
+            _, (_, _, key) = heappop(self._ready)
             entry = self._bulk.get(key)
             if entry is None:
                 continue
@@ -398,7 +398,7 @@ class Spreading:
         """The instant before which no bulk need be looked at; None if there is none. What nobody lacks is forgotten."""
         if self._hasty:
             return 0
-        while self._ready and not self._lacking(self._ready[0][2], neighbors):
+        while self._ready and not self._lacking(self._ready[0][1][2], neighbors):
             heappop(self._ready)
         if self._ready:
             return 0

@@ -66,7 +66,7 @@ class Clusters(Section):
     when nodes come or go."""
     repair_s: Duration | Literal["auto"] = "auto"
     """Neighbors send packets again that a node lacks, as its hellos show, if they are newer than this; 0: no repair;
-    `auto`: 10 s with relays `counter` and with measured links, else no repair."""
+    `auto`: 10 s with relays `counter` or with measured links, else no repair."""
     resume: bool = True
     """`scheduled`: whether floods that ended early because a frame was lost go on in later superframes, when nodes miss
     the packet; it then comes later than its bound. Without effect where packets are repaired all the time."""

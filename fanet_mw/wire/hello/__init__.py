@@ -9,3 +9,8 @@
 `fanet_mw/node/node.py` (`say_hello`) puts a hello together. `fanet_mw/node/reader.py` (`decoded`) decodes a hello that
 was heard, once for the clock, the protocol and the applications.
 """
+
+from typing import Final
+
+PLAIN_BYTES: Final = 137
+"""The length of a hello with its routing header, HEARTBEAT, GLOBAL_POSITION_INT and FANET_BEACON."""

@@ -4,6 +4,7 @@ computed     `timetabling` (when), `turn_size` and `turn_allocation` (how many t
              `redundant_scheduling` (who sends in which), `interference` (who disturbs whom), `flood_geometry`;
              the result is a `timetable`
 followed     `node_timetable`, `timetables_in_force`; `turn_access` sends in the turns: own packets and frames to
-             neighbors alone by `turn_release`, where each class has its `reserved_room`, relays by `scheduled_relaying`
+             neighbors alone from the queues of `turn_release`, where each class has its `reserved_room`, relays by
+             `scheduled_relaying`
 promised     `stated_delays` by `own_bound` or `likely_delay` (from `delivery_odds`), `admission`
 """

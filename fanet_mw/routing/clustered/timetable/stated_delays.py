@@ -129,7 +129,7 @@ class StatedDelays:
         return RootTurns(timetable.turns, offsets, timetable.table.spans[node], timetable.together, around_ns, load)
 
     def class_bounds_ns(self, own: RootTurns | None) -> Mapping[int, int]:
-        """The bounds by priority; a class whose losses are repaired has none."""
+        """The bounds by priority; none for any class where lost packets are repaired."""
         scenario = self._port.scenario
         if own is None or scenario.repair_ns:
             return {}

@@ -59,7 +59,7 @@ class TurnRelease(ABC):
         self._queue = queue
         self._lead_ns = lead_ns
         self._free_ns = 0
-        """The first instant after the last turn that was used."""
+        """The first instant after the start of the last turn that was used or reserved."""
         self._next: OwnTurn | None = None
         self._in_force: Sequence[TurnsInForce] = ()
         """The node's turns of this kind by each timetable that is in force or announced."""
@@ -240,7 +240,7 @@ class CallRelease(TurnRelease):
         return turn.start_ns
 
     def last_ns(self, *, now_ns: int) -> int | None:
-        """The start of the call in which the packet that was queued last goes at the latest; None if it is unknown."""
+        """The latest start of the turn that carries the packet queued last; None if it is unknown."""
         earliest_ns, start_ns = max(now_ns + self._lead_ns, self._free_ns), None
         for _ in range(len(self._queue)):
             turn = self._turn(earliest_ns)

@@ -1,4 +1,4 @@
-"""Which neighbors will stay within range long enough for a bound to count on them.
+"""Which links a bound counts on: those to neighbors that keep the same rounds, and that will stay within range.
 
 Each hello says where its sender is and how fast it flies. Two nodes that fly on straight lose each other when their
 distance exceeds the range (link expiration time; Su, Lee and Gerla, 2001). Nodes that hardly recede from each other are
@@ -7,9 +7,12 @@ straight on, however fast it is.
 """
 
 from collections.abc import Iterator, Mapping
+from functools import reduce
+from operator import or_
 from typing import Final
 
 from fanet_mw.motion import Motion
+from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.units import Enu, NodeId, S
 
 _RECEDING_M_S: Final = 1.0
@@ -72,3 +75,38 @@ class LastingLinks:
         seconds = self._horizon_ns / S * (_AGAIN if again else 1.0)
         later = Enu(here.east + drift.east * seconds, here.north + drift.north * seconds, here.up + drift.up * seconds)
         return later.norm() <= range_m or (distance_m <= range_m and receding_m_s < _RECEDING_M_S)
+
+
+class InStep:
+    """Which neighbors of a node keep the rounds that it keeps, by when their frames of turns came.
+
+    A node whose time is not that of the swarm yet, or no more, sends in turns of others. No bound counts on such a
+    node. Where it is heard no bound counts on the owners of those turns either, because their frames are destroyed.
+    """
+
+    def __init__(self, timing: RoundTiming, *, certain: bool) -> None:
+        """`certain`: all clocks are exact."""
+        self._timing = timing
+        self._keeping = -1 if certain else 0
+        """The nodes in step, bit i for node i + 1."""
+        self._destroyed: dict[int, int] = {}
+        """For each node out of step, those whose frames it destroys, as a set of bits."""
+        self._certain = certain
+
+    def hear(self, node: int, end_ns: int) -> None:
+        """A frame that belongs into a node's turn has ended."""
+        owner = None if self._certain else self._timing.owner(end_ns)
+        if owner is None:
+            return
+        own = 1 << (node - 1)
+        if owner == node:
+            self._keeping |= own
+            self._destroyed.pop(node, None)
+        else:
+            self._keeping &= ~own
+            self._destroyed[node] = 0b11 << owner >> 2  # it may have begun in the turn before
+
+    def among(self, nodes: int) -> int:
+        """Those of a set of neighbors that are in step, and whose frames none of the others destroys."""
+        destroyed = reduce(or_, (those for node, those in self._destroyed.items() if nodes >> (node - 1) & 1), 0)
+        return nodes & self._keeping & ~destroyed

@@ -3,7 +3,7 @@
 import pytest
 
 from fanet_mw.motion import Motion
-from fanet_mw.routing.rounds.lasting_links import LastingLinks
+from fanet_mw.routing.rounds.counted_links import LastingLinks
 from fanet_mw.units import STILL, Enu, NodeId, S
 
 OTHER = NodeId(3)

@@ -1,10 +1,13 @@
 """Bounds are stated only where they hold: per packet, with reports between, for random arrivals, across timetables."""
 
+import math
 from typing import Any
 
 import pytest
 from kit import slow
 
+from fanet_mw.trace import BoundExcludes, BoundStated, Delivered
+from fanet_mw.units import S
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
@@ -72,3 +75,21 @@ def test_reports_that_are_sent_as_bulk_and_longer_than_the_traffic_are_carried()
     reports = summary_of("mission.survivors=30", "mission.report_interval_s=2", *keys)["reports"]
     assert reports["generated"] >= 20
     assert reports["pdr"] > 0.9
+
+
+def test_a_relay_that_falls_mute_ends_promises_to_those_behind_it_and_its_own() -> None:
+    """With leads longer than the window in which reports contend, the leader of a long line is told late."""
+    mute_s, known_s = 12, 5 * 1.4
+    line = ("nodes.columns=1", "nodes.spacing_m=200", "radio.lead_ms=41", "clusters.flooding_period_s=1.4")
+    mute = f'faults=[{{kind="mute", node=12, at_s={mute_s}}}]'
+    outcome = simulate(catalog.find("clusters", [*GRID, *line, mute, "traffic.interval_s=3", "duration_s=50"]))
+    given = {(r.origin, r.seq, r.node): r.t_ns for r in outcome.records if type(r) is Delivered}
+    gone = {(r.node, r.seq, r.other) for r in outcome.records if type(r) is BoundExcludes}
+    stated = [r for r in outcome.records if type(r) is BoundStated if r.t_ns > (mute_s + known_s) * S]
+    broken = [
+        (r.node, r.seq, node) for r in stated for node in range(1, 16)
+        if node != r.node and (r.node, r.seq, node) not in gone
+        and given.get((r.node, r.seq, node), math.inf) > r.t_ns + r.bound_ns
+    ]  # fmt: skip
+    assert broken == []
+    assert {r.node for r in stated} >= set(range(2, 12)), "the others promise again, without those behind it"

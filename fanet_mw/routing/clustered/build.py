@@ -195,7 +195,7 @@ def _by_timetable(ground: _Ground) -> Clustered:
     resumed = None if ground.missing is None else ResumedFloods(port, timetables, ground.floods)
     access = TurnAccess(
         port, timetables=timetables, roots=roots, calls=calls, spare=spare, slots=_slots(ground, parts.membership),
-        delays=delays, floods=ground.floods, contention=ground.contention, resumed=resumed, followers=followers,
+        delays=delays, floods=ground.floods, contention=ground.contention, resumed=resumed,
     )  # fmt: skip
     timetabling = FromPlaces(
         port,

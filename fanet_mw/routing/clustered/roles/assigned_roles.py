@@ -131,6 +131,8 @@ class AssignedRoles:
         if join.instead_of:
             if parts.detector is not None:
                 parts.detector.on_report(NodeId(join.instead_of), now_ns=now_ns)
+            if join.instead_of == self._port.node != join.node:
+                self._timetabling.on_called_silent(now_ns)
             self._do(parts.failover.on_stand_in(join, born_ns=born_ns, now_ns=now_ns), now_ns)
         if join.node == parts.membership.head:
             self._gradient.on_flood_of_head(NodeId(join.node), parent=src, hops=header.hops + 1, now_ns=now_ns)
@@ -234,7 +236,7 @@ class AssignedRoles:
         """Flood a join: it states the node's position to all, and asks the leader for a place if the node has none."""
         again = not self.parts.failover.placed and self._leader is None
         inner = self.parts.joining.join(instead_of=instead_of, again=again, now_ns=now_ns)
-        urgent, patient = instead_of == self._port.node, not instead_of and not again
+        urgent, patient = instead_of == self._port.node, not again
         self._access.flood_control(Kind.JOIN, inner, now_ns=now_ns, urgent=urgent, patient=patient)
 
     def _announce(self, part: Schedule, leader: Leader, *, now_ns: int) -> None:
@@ -254,7 +256,7 @@ class AssignedRoles:
             parts.joining.update_if_outdated(listed=parts.membership.nodes_listed, now_ns=now_ns)
         elif parts.links is not None and parts.links.outdated(now_ns=now_ns):
             leader.on_links(self._port.node, parts.links.tell(now_ns=now_ns))
-        if parts.detector is not None and parts.joining.may_update(now_ns):
+        if parts.detector is not None:
             self._report_silent_neighbor(parts.detector, now_ns)
 
     def _report_silent_neighbor(self, detector: NeighborFailureDetector, now_ns: int) -> None:
@@ -307,8 +309,9 @@ class AssignedRoles:
             self._join(now_ns)
         leader = self._leader
         if leader is not None:
-            notice_ns = self._timetabling.notice_ns(now_ns)
-            for part in leader.wake(parts.joining.motion(now_ns), notice_ns=notice_ns, now_ns=now_ns):
+            notice_ns, lost_ns = self._timetabling.notice_ns(now_ns), self._timetabling.lost_ns(now_ns)
+            motion = parts.joining.motion(now_ns)
+            for part in leader.wake(motion, notice_ns=notice_ns, lost_ns=lost_ns, now_ns=now_ns):
                 self._announce(part, leader, now_ns=now_ns)
         if (due_ns := parts.refresh.due_ns) is not None:
             for packet in parts.refresh.due(now_ns=now_ns):

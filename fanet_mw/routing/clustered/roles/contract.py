@@ -40,8 +40,14 @@ class Timetabling(Protocol):
     def must_show(self, now_ns: int) -> bool:
         """True if a flood of this node in its turn is to show the others that it keeps the timetable."""
 
+    def on_called_silent(self, now_ns: int) -> None:
+        """Another node has told all that it does not hear this one."""
+
     def notice_ns(self, now_ns: int) -> int:
         """How long ahead the leader must announce another schedule."""
+
+    def lost_ns(self, now_ns: int) -> int | None:
+        """The silence after which a node is lost, because each begins floods in its turns; None if not all do."""
 
 
 class NoTimetable:
@@ -67,5 +73,11 @@ class NoTimetable:
     def must_show(self, now_ns: int) -> bool:
         return False
 
+    def on_called_silent(self, now_ns: int) -> None:
+        """Nothing is done: without a timetable nothing is promised."""
+
     def notice_ns(self, now_ns: int) -> int:
         return 0
+
+    def lost_ns(self, now_ns: int) -> int | None:
+        return None

@@ -67,10 +67,6 @@ class Joining:
         """A packet of this node will be flooded to all, which is a sign of life."""
         self._updates.on_flooding(due_ns)
 
-    def may_update(self, now_ns: int) -> bool:
-        """True if the last join was long enough ago for another one."""
-        return self._updates.may_update(now_ns)
-
     def update_if_outdated(self, *, listed: int, now_ns: int) -> None:
         """Plan a join if the leader must be told something new; `listed` nodes may all have to do so at the
         same time.

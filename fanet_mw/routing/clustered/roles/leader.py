@@ -186,16 +186,16 @@ class Leader:
     def next_wake_ns(self) -> int:
         return self._due_ns
 
-    def wake(self, here: Motion, *, notice_ns: int = 0, now_ns: int) -> Sequence[Schedule]:
+    def wake(self, here: Motion, *, notice_ns: int = 0, lost_ns: int | None = None, now_ns: int) -> Sequence[Schedule]:
         """The parts of the schedule to announce now; `here` is the leader's own motion.
 
         A new schedule comes into force `notice_ns` later at the earliest, and only when all nodes should have received
-        it.
+        it. Nodes are lost after a silence of `lost_ns`, if that is known.
         """
         if now_ns < self._due_ns:
             return []
         self._roster.own.add(here)
-        self._roster.forget(now_ns)
+        self._roster.forget(now_ns, lost_ns=lost_ns)
         if self._roster.nodes and now_ns >= self._not_before_ns:
             self._renew(here, notice_ns, now_ns)
         self._due_ns = now_ns + (self._measured_ns if self._assigned.measured else self._period_ns)

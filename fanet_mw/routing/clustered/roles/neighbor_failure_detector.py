@@ -6,8 +6,7 @@
 
 A neighbor that has flown away looks silent to this node, too. It will object, and is then not reported again until this
 node has heard a hello of it. If no objection arrives, the neighbor is reported again every 10 s for a minute, but not
-while packets of it still arrive. A node floods at most one join in 5 s, so at most one report. The memory is bounded by
-the number of nodes.
+while packets of it still arrive. A node floods at most one report in 5 s. The memory is bounded by the number of nodes.
 """
 
 from collections.abc import Callable
@@ -19,6 +18,8 @@ from fanet_mw.units import NodeId, S
 
 _AGAIN_NS: Final = 10 * S
 """A neighbor that is still in the schedule after this time is reported again, because the report may have been lost."""
+_LEAST_NS: Final = 5 * S
+"""The shortest time between two reports of a node, because each is a flood."""
 _FORGOTTEN_NS: Final = 60 * S
 
 
@@ -30,6 +31,8 @@ class NeighborFailureDetector:
         self._silent_ns = int(SILENT_HELLOS * hello_ns)
         self._heard_ns: dict[NodeId, int] = {}
         self._reported_ns: dict[NodeId, int] = {}
+        self._next_ns = 0
+        """The instant from which the node may report again."""
 
     def on_hello(self, node: NodeId, *, now_ns: int) -> None:
         """A hello of a neighbor was received."""
@@ -42,7 +45,7 @@ class NeighborFailureDetector:
             self._reported_ns[node] = now_ns
 
     def find_suspect(self, lists: Callable[[NodeId], bool], *, now_ns: int) -> NodeId | None:
-        """A neighbor that should be reported now, or None. `lists` tells whether the schedule names a node.
+        """A neighbor that this node reports now, or None. `lists` tells whether the schedule names a node.
 
         Neighbors that no longer count are forgotten.
         """
@@ -56,5 +59,8 @@ class NeighborFailureDetector:
                 del self._heard_ns[node]
                 self._reported_ns.pop(node, None)
             elif now_ns - sign_ns >= self._silent_ns and (reported_ns is None or now_ns - reported_ns >= _AGAIN_NS):
+                if now_ns < self._next_ns:
+                    return None
+                self._next_ns = now_ns + _LEAST_NS
                 return node
         return None

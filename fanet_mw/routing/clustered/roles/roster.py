@@ -155,19 +155,18 @@ class Roster:
         instants = (there.at_ns - _MISSED_NS, there.at_ns)
         return max(known.position_at(t_ns).minus(there.position_at(t_ns)).norm() for t_ns in instants) <= self._sure_m
 
-    def forget(self, now_ns: int) -> None:
+    def forget(self, now_ns: int, *, lost_ns: int | None = None) -> None:
         """Forget nodes that have given no sign of life for too long, or that were reported and have not objected in
-        time.
+        time. Without `lost_ns` too long is what two position updates take.
         """
+        lost_ns = self._lost_ns if lost_ns is None else min(lost_ns, self._lost_ns)
         for node in sorted(self._joined):
             last_ns = max(self._liveness.last_ns(node) or 0, self._joined[node].motion.at_ns)
             report = self._reports.get(node)
             if report is not None and last_ns > report.reported_ns:
                 del self._reports[node]  # the node has objected
                 report = None
-            if now_ns - last_ns > self._lost_ns or (
-                report is not None and now_ns >= report.since_ns + self._objection_ns
-            ):
+            if now_ns - last_ns > lost_ns or (report is not None and now_ns >= report.since_ns + self._objection_ns):
                 del self._joined[node]
 
     def forget_reports(self) -> None:

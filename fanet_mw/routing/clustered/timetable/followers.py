@@ -1,17 +1,21 @@
-"""Who keeps a timetable: a bound holds only if all nodes keep the same one.
+"""Who keeps a timetable: a bound holds only while all nodes keep the same one, and are heard.
 
 A node that floods a packet in its turn shows that it has the timetable; who has nothing to send floods a join in its
-turn once. So a timetable that came late somewhere is noticed everywhere within a superframe, by what is missing.
+turn instead. So everybody notices by what is missing that a timetable came late somewhere, that a node fell silent, or
+that a relay on the way from it did. Reports of its neighbors, which contend for the medium, may need longer to travel.
+A node whose neighbors report it silent cannot tell by what it hears; it trusts them for a while.
 """
 
 from collections.abc import Iterable
 from typing import Final
 
 from fanet_mw.routing.clustered.roles.membership import Version
-from fanet_mw.units import NodeId
+from fanet_mw.units import NodeId, S
 
 _KEPT: Final = 4
 """The versions that a node remembers: that in force, and newer ones."""
+_DOUBTED_NS: Final = 15 * S
+"""A node that its neighbors do not hear is reported again within this time, as long as the schedule names it."""
 
 
 class Followers:
@@ -19,19 +23,35 @@ class Followers:
 
     def __init__(self, node: NodeId) -> None:
         self._node = node
-        self._known: dict[Version, set[NodeId]] = {}
+        self._known: dict[Version, dict[NodeId, int]] = {}
+        """The instant at which each node was last heard in its turn."""
+        self._doubted_ns: int | None = None
 
     def follow(self, version: Version) -> None:
         """The node itself has the timetable of another version now."""
-        self._known.setdefault(version, {self._node})
+        self._known.setdefault(version, {})
+        self._doubted_ns = None
         while len(self._known) > _KEPT:
             del self._known[next(iter(self._known))]
 
-    def hear(self, version: Version, root: NodeId) -> None:
+    def hear(self, version: Version, root: NodeId, *, now_ns: int) -> None:
         """A flood of a node was heard in its turn of a timetable."""
         if version in self._known:
-            self._known[version].add(root)
+            self._known[version][root] = now_ns
 
-    def have(self, version: Version, nodes: Iterable[NodeId]) -> bool:
-        """True if all these nodes have shown that they keep the timetable of a version."""
-        return self._known.get(version, set()).issuperset(nodes)
+    def doubt(self, now_ns: int) -> None:
+        """A neighbor has told all that it does not hear this node."""
+        self._doubted_ns = now_ns
+
+    def have(self, version: Version, nodes: Iterable[NodeId], *, silent_ns: int, now_ns: int) -> bool:
+        """True if all these nodes have shown within `silent_ns` that they keep the timetable of a version.
+
+        Of the leader its announcements are required, which have a law of their own (`stated_delays.py`).
+        """
+        if version not in self._known or (self._doubted_ns is not None and now_ns < self._doubted_ns + _DOUBTED_NS):
+            return False
+        known, leader = self._known[version], version.authority.leader
+        since_ns = now_ns - silent_ns
+        return all(
+            node == self._node or (node in known and (node == leader or known[node] >= since_ns)) for node in nodes
+        )

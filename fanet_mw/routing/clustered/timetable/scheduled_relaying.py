@@ -118,7 +118,7 @@ class ScheduledRelaying:
         """
         offset, root, instance = heard
         if packet.header.origin == root:
-            self._followers.hear(timetable.version, root)
+            self._followers.hear(timetable.version, root, now_ns=now_ns)
         own = timetable.mine.get((root, instance), ())
         if not own:
             return ()

@@ -37,6 +37,10 @@ from fanet_mw.wire.loads import AS_EXPECTED, interval_ns_of
 _SAME: Final = 0.95
 """A node whose packets come at less than this share of the interval of its scenario sends others as well, about whose
 intervals nothing is known."""
+_SILENT: Final = 5
+"""After so many superframes, or hello intervals if these are longer, a node that no flood was heard from is silent."""
+_LOST: Final = 10
+"""After so many the leader plans without it."""
 _CLASSES: Final = {PRIORITY_SAFETY: "warning", PRIORITY_REPORT: "report", PRIORITY_BULK: "bulk"}
 
 
@@ -61,6 +65,9 @@ class StatedDelays:
         self._followers = followers
         self._lead_ns = port.scenario.radio.lead_ns
         self._interval_ns = seconds_to_ns(port.scenario.traffic.interval_s)
+        self._hello_ns = seconds_to_ns(port.scenario.routing.hello_interval_s)
+        self._now_ns = 0
+        """The instant at which the node last did anything."""
         self._bounds_ns: list[tuple[NodeTimetable, Mapping[int, int]]] = []
         """The bound of each priority class of the node's packets by each timetable; classes without a bound are
         missing."""
@@ -172,6 +179,28 @@ class StatedDelays:
         policed = self._admission if packet.header.priority == PRIORITY_BULK else None
         return policed is None or policed.admit(due_ns)
 
+    def all_keep(self, timetable: NodeTimetable, *, now_ns: int) -> bool:
+        """True if all nodes of a timetable have shown that they keep it, not long ago."""
+        silent_ns = _SILENT * self._shown_ns(timetable)
+        return self._followers.have(timetable.version, timetable.table.spans, silent_ns=silent_ns, now_ns=now_ns)
+
+    def lost_ns(self, now_ns: int) -> int | None:
+        """The silence after which a node of the timetable is lost; None as long as not all need have shown that they
+        keep it.
+        """
+        timetable = self._timetables.at(now_ns)
+        if timetable is None or not timetable.whole or timetable.odds is not None:
+            return None
+        lost_ns = _LOST * self._shown_ns(timetable)
+        return lost_ns if now_ns >= timetable.valid_ns + lost_ns else None
+
+    def _shown_ns(self, timetable: NodeTimetable) -> int:
+        return max(self._hello_ns, timetable.turns.period_ns)
+
+    def on_called_silent(self, now_ns: int) -> None:
+        """A neighbor has told all that it does not hear this node."""
+        self._followers.doubt(now_ns)
+
     def greatest_bound_ns(self, packet: Packet, *, now_ns: int) -> int | None:
         """The greatest bound of this packet's class by the timetables in force; None if one of them
         gives it no bound.
@@ -200,7 +229,7 @@ class StatedDelays:
             ]
             # who has followed another leader may have lost sight of some nodes before this one prevailed
             kept = all(
-                one.version.authority == newest.version.authority and self._followers.have(one.version, one.table.spans)
+                one.version.authority == newest.version.authority and self.all_keep(one, now_ns=now_ns)
                 for one in in_force
             )
             if kept and had_ns <= min(due_ns, known_ns, expires_ns):
@@ -242,6 +271,7 @@ class StatedDelays:
         return self._admission.next_wake_ns() if self._admission else None
 
     def wake(self, now_ns: int) -> None:
+        self._now_ns = now_ns
         lost = self._admission.wake(now_ns) if self._admission else None
         if lost is not None:
             self._port.record(lost)
@@ -253,7 +283,7 @@ class StatedDelays:
         if self._lease.leads or not self._in_step():
             return None
         for timetable, bounds_ns in reversed(self._bounds_ns):
-            if self._followers.have(timetable.version, timetable.table.spans):
+            if self.all_keep(timetable, now_ns=self._now_ns):
                 return bounds_ns.get(PRIORITY_BULK)
         return None
 
@@ -283,7 +313,7 @@ class StatedDelays:
             self._port.node,
             waiting=len(self._roots),
             interval_ns=interval_ns_of(load, expected_ns=self._interval_ns),
-            hello_ns=seconds_to_ns(self._port.scenario.routing.hello_interval_s),
+            hello_ns=self._hello_ns,
         )
         if found_ns is None:
             return None

@@ -90,8 +90,14 @@ class FromPlaces:
     def must_show(self, now_ns: int) -> bool:
         return self._access.must_show(now_ns)
 
+    def on_called_silent(self, now_ns: int) -> None:
+        self._delays.on_called_silent(now_ns)
+
     def notice_ns(self, now_ns: int) -> int:
         return self._delays.notice_ns(now_ns)
+
+    def lost_ns(self, now_ns: int) -> int | None:
+        return self._delays.lost_ns(now_ns)
 
     # --- at every node --------------------------------------------------------------------------------------------
 

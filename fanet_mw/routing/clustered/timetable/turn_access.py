@@ -20,7 +20,6 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTiming
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.slots.slot_access import SlotAccess
-from fanet_mw.routing.clustered.timetable.followers import Followers
 from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.resumed_floods import ResumedFloods
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
@@ -35,6 +34,9 @@ _MOST_ANSWERS: Final = 2
 
 _SHOWN_NS: Final = 1 * S
 """Packets of applications show soonest that a node keeps a timetable; if none comes in this time, a join does."""
+_SHOWN: Final = 1.5
+"""A join shows again that the node keeps it when nothing else has for so many superframes, or hello intervals if these
+are longer."""
 
 
 class TurnAccess:
@@ -53,7 +55,6 @@ class TurnAccess:
         floods: Floods,
         contention: ContentionTiming,
         resumed: ResumedFloods | None,
-        followers: Followers,
     ) -> None:
         self._port = port
         self._timetables = timetables
@@ -65,10 +66,12 @@ class TurnAccess:
         self._floods = floods
         self._contention = contention
         self._resumed = resumed
-        self._followers = followers
         self._lead_ns = port.scenario.radio.lead_ns
         self._has_shown: NodeTimetable | None = None
         """The timetable in whose turns the node has last begun a flood."""
+        self._shown_ns = 0
+        """The instant of that turn."""
+        self._hello_ns = seconds_to_ns(port.scenario.routing.hello_interval_s)
         self._lifetime_ns = seconds_to_ns(port.scenario.routing.lifetime_s)
         self._hello_sent_ns = self._hello_waits_ns = 0
         """The instant of the node's latest hello, and the time by which that was put off until a window."""
@@ -141,13 +144,15 @@ class TurnAccess:
         self._slots.renew_slot()
 
     def must_show(self, now_ns: int) -> bool:
-        """True if the others cannot know that this node keeps the timetable, because it has begun no flood by it for a
-        second, and nothing waits for its turns.
+        """True if the others cannot know that this node still keeps the timetable, because it has begun no flood by it
+        for some time, and nothing waits for its turns.
         """
         timetable = self._timetables.at(now_ns)
-        if timetable is None or timetable is self._has_shown or timetable.odds is not None:
+        if timetable is None or timetable.odds is not None or not timetable.roots or len(self._roots):
             return False
-        return bool(timetable.roots) and now_ns > timetable.valid_ns + _SHOWN_NS and not len(self._roots)
+        if timetable is self._has_shown:
+            return now_ns > self._shown_ns + _SHOWN * max(self._hello_ns, timetable.turns.period_ns)
+        return now_ns > timetable.valid_ns + _SHOWN_NS
 
     # --- letting out ----------------------------------------------------------------------------------------------
 
@@ -211,7 +216,7 @@ class TurnAccess:
             and header.priority == PRIORITY_BULK
             and len(packet.frame) <= timetable.frame_bytes
             and self._spare.has_turn(now_ns=now_ns)
-            and self._followers.have(timetable.version, timetable.table.spans)
+            and self._delays.all_keep(timetable, now_ns=now_ns)
         )
 
     def flood_control(
@@ -290,7 +295,7 @@ class TurnAccess:
         for packets, start_ns in self._roots.due(now_ns=now_ns):
             kept = self._kept(packets, through_ns=self._through_ns(start_ns), now_ns=now_ns)
             if kept:
-                self._has_shown = self._timetables.at(start_ns)
+                self._has_shown, self._shown_ns = self._timetables.at(start_ns), start_ns
                 self._floods.begin(kept, start_ns=start_ns, again_ns=self._repetitions(start_ns))
         if len(self._roots) and not self._roots.has_turn(now_ns=now_ns):
             for packet in self._stranded(now_ns):  # that was the node's last turn: the next timetable gives it none

@@ -22,7 +22,7 @@ from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import BoundStated, Dropped
-from fanet_mw.units import BROADCAST, MS, Enu, NodeId, earliest
+from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S, earliest
 from fanet_mw.wire import (
     FLAG_FLOOD,
     FLAG_TO_HEAD,
@@ -69,7 +69,7 @@ def node(make_scenario: MakeScenario) -> Node:
     access_of(made)._has_shown = access_of(made)._timetables.newest
     followers = access_of(made)._delays._followers
     followers.follow(UNANNOUNCED)
-    followers.hear(UNANNOUNCED, ROOT)
+    followers.hear(UNANNOUNCED, ROOT, now_ns=10 * S)
     return made
 
 

@@ -25,10 +25,8 @@ def dominates(node: NodeId, adjacency: Adjacency) -> bool:
         return False
     ours = _strength(node)
     known = frozenset().union(*near.values()) - {node}
-    stronger = {n for n in known if _strength(n) > ours}
-    links = {
-        n: tuple(m for m in sorted(stronger) if m in near.get(n, ()) or n in near.get(m, ())) for n in sorted(stronger)
-    }
+    stronger = sorted(n for n in known if _strength(n) > ours)
+    links = {n: tuple(m for m in stronger if m in near.get(n, ()) or n in near.get(m, ())) for n in stronger}
     ways = [frozenset(part) for part in components(links)]
     over = {n: frozenset(i for i, way in enumerate(ways) if n in way or near[n] & way) for n in adjacency[node]}
     return not all(

@@ -269,14 +269,17 @@ class Node:
             self.port.dropped[DropReason.MALFORMED] += 1
             return
         relays: list[Sequence[Relay]] = []
+        handled, on_copy = self._duplicates, self._on_copy
         for part in parts:
-            known = self._duplicates.bits(part.hash)
+            known = handled.young.get(part.hash)  # as handled.bits(part.hash), without a call for each packet
+            if known is None:
+                known = handled.old.get(part.hash, 0)
             if not known & part.phase:
                 relays.append(self._first_copy(part, reception, known, now_ns))
                 continue
             self.port.dropped[DropReason.DUPLICATE] += 1
-            if self._on_copy is not None and part.fields[_PREV_HOP] == reception.src:
-                self._on_copy(part.key, reception.src, now_ns=now_ns)
+            if on_copy is not None and part.fields[_PREV_HOP] == reception.src:
+                on_copy(part.key, reception.src, now_ns=now_ns)
         if any(relays):
             for together in zip_longest(*relays):
                 self.port.relay_together([relay for relay in together if relay is not None])
@@ -287,44 +290,41 @@ class Node:
         `reception`: that of its frame, which may hold further packets. `before`: the bits of the phases in which the
         packet was handled before.
         """
-        try:
-            return self._handle(seen, seen.packet or seen.read(), reception, before, now_ns)
-        except MalformedFrameError:
-            self.port.dropped[DropReason.MALFORMED] += 1
-            return _NONE
-
-    def _handle(self, seen: Looked, packet: Packet, reception: Reception, before: int, now_ns: int) -> Sequence[Relay]:
         packet_hash, bits = seen.hash, before | seen.phase
         _, _, origin_us, seq, origin, destination, _, kind, _, hops, priority, _, _, _ = seen.fields
         end_ns = reception.end_ns
         age_ns = end_ns - origin_us * US
-        why = self._header_check.why_not(seen.fields, before, reception.src, age_ns)
-        if why is not None:
-            self._disbelieve(why, packet, now_ns)
-            return _NONE
-        if kind == _HELLO:
-            self._duplicates.put(packet_hash, bits)
-            if age_ns > self._header_check.oldest_hello_ns:
+        try:
+            packet = seen.packet or seen.read()
+            why = self._header_check.why_not(seen.fields, before, reception.src, age_ns)
+            if why is not None:
+                self._disbelieve(why, packet, now_ns)
+                return _NONE
+            if kind == _HELLO:
+                self._duplicates.put(packet_hash, bits)
+                if age_ns > self._header_check.oldest_hello_ns:
+                    self.port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+                    return _NONE
+                self._protocol.on_hello(packet, reception, now_ns=now_ns)
+                self.hellos.append(packet)
+                return _NONE
+            if age_ns > self._lifetimes_ns[priority]:
+                self._duplicates.put(packet_hash, bits)
                 self.port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
                 return _NONE
-            self._protocol.on_hello(packet, reception, now_ns=now_ns)
-            self.hellos.append(packet)
-            return _NONE
-        if age_ns > self._lifetimes_ns[priority]:
+            if kind == _DATA and not before & DELIVERED and (destination == BROADCAST or destination == self.node):
+                bits |= DELIVERED
+                if self.listened is None or packet.frame[wire.INNER_ID] in self.listened:
+                    self.deliveries.append(packet)
+                late_ns = now_ns - end_ns
+                self.port.records.append(
+                    _new(Delivered, (now_ns, self.node, origin, seq, age_ns + late_ns, hops + 1, late_ns))
+                )
             self._duplicates.put(packet_hash, bits)
-            self.port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+            return self._protocol.receive(packet, reception, now_ns=now_ns) or _NONE
+        except MalformedFrameError:
+            self.port.dropped[DropReason.MALFORMED] += 1
             return _NONE
-        to_us = destination == BROADCAST or destination == self.node
-        if kind == _DATA and to_us and not before & DELIVERED:
-            bits |= DELIVERED
-            if self.listened is None or packet.frame[wire.INNER_ID] in self.listened:
-                self.deliveries.append(packet)
-            late_ns = now_ns - end_ns
-            self.port.records.append(
-                _new(Delivered, (now_ns, self.node, origin, seq, age_ns + late_ns, hops + 1, late_ns))
-            )
-        self._duplicates.put(packet_hash, bits)
-        return self._protocol.receive(packet, reception, now_ns=now_ns) or _NONE
 
     def _disbelieve(self, why: DropReason, packet: Packet, now_ns: int) -> None:
         """Count a packet whose header states the impossible; it is neither delivered nor relayed."""

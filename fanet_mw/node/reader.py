@@ -30,10 +30,14 @@ from fanet_mw.wire import (
 
 _new: Final = tuple.__new__  # faster than the constructor, for objects that are made once per frame
 _HELLO: Final = int(Kind.HELLO)
+_SEQ: Final = 3
+"""The index of the packet's sequence number among the fields of a header (`wire.Fields`)."""
+_ORIGIN: Final = 4
+"""The index of its origin among them."""
 _KIND: Final = 7
-"""The index of the packet's kind among the fields of a header (`wire.Fields`)."""
+"""The index of its kind among them."""
 _FLAGS: Final = 11
-"""The index of the packet's flags among them."""
+"""The index of its flags among them."""
 BUNDLE: Final = 1 << 30
 """Stands for the phase of a frame that holds several packets. No duplicate set ever has this bit, so each such frame is
 opened, and its packets are looked up one by one."""
@@ -76,8 +80,7 @@ class Looked:
         """The packet's origin and sequence number as one number (`duplicates.key_of`), by which queues find a packet
         that was heard again; 0 if the frame holds no packet, or several. Most protocols do not ask for it.
         """
-        _, _, _, seq, origin, *_ = self.fields
-        return 0 if self.phase == BUNDLE else key_of(origin, seq)
+        return 0 if self.phase == BUNDLE else key_of(self.fields[_ORIGIN], self.fields[_SEQ])
 
     def read(self, cached: bool = True) -> Packet:
         """Check the header and return the packet in the frame; raises MalformedFrameError if the check fails.

@@ -23,12 +23,11 @@ class Silences:
 
     def on_frame(self, src: int, now_ns: int) -> None:
         """A frame came from this node."""
-        if src < len(self._heard_ns):
-            heard_ns, longest_ns = self._heard_ns[src], self._longest_ns[src] * _FORGETS
-            self._heard_ns[src] = now_ns
-            if now_ns - heard_ns > longest_ns:
-                longest_ns = min(now_ns - heard_ns, _MOST_NS)
-            self._longest_ns[src] = longest_ns
+        heard_ns = self._heard_ns
+        if src < len(heard_ns):
+            silence_ns, longest_ns = now_ns - heard_ns[src], self._longest_ns[src] * _FORGETS
+            heard_ns[src] = now_ns
+            self._longest_ns[src] = min(silence_ns, _MOST_NS) if silence_ns > longest_ns else longest_ns
 
     def is_unusual(self, node: NodeId, *, least_ns: int, now_ns: int) -> bool:
         """True if a node that was heard before has been silent for an unusually long time, `least_ns` at least."""

@@ -16,7 +16,7 @@ _EACH_NS: Final = S
 _LATELY_NS: Final = 2 * S
 """Delays are those of packets that arrived in this time."""
 _SHARED_NS: Final = 10 * S
-"""The sources are those of packets that arrived in this time."""
+"""The sources are those of packets that arrived in this time; nobody asks for them without a deadline."""
 _FEWEST: Final = 10
 """Delays are judged by at least so many packets."""
 _MOST: Final = 0.9
@@ -62,7 +62,8 @@ class BulkAdmission:
         return True
 
     def _judge(self, now_ns: int) -> None:
-        while self._arrived[0][0] < now_ns - _SHARED_NS:
+        kept_ns = _LATELY_NS if self._deadline_ns is None else _SHARED_NS
+        while self._arrived[0][0] < now_ns - kept_ns:
             self._arrived.popleft()
         delays_ns = sorted(delay_ns for t_ns, _, delay_ns in self._arrived if delay_ns and t_ns >= now_ns - _LATELY_NS)
         most_ns = delays_ns[int(_MOST * len(delays_ns))] if len(delays_ns) >= _FEWEST else 0

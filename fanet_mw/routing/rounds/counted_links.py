@@ -91,11 +91,12 @@ class InStep:
         """The nodes in step, bit i for node i + 1."""
         self._destroyed: dict[int, int] = {}
         """For each node out of step, those whose frames it destroys, as a set of bits."""
-        self._certain = certain
+        self.certain = certain
+        """True if nobody can be out of step."""
 
     def hear(self, node: int, end_ns: int) -> None:
         """A frame that belongs into a node's turn has ended."""
-        owner = None if self._certain else self._timing.owner(end_ns)
+        owner = None if self.certain else self._timing.owner(end_ns)
         if owner is None:
             return
         own = 1 << (node - 1)

@@ -240,17 +240,20 @@ class LikelyDelay:
 
     def __init__(self) -> None:
         self._counts = [0.0] * (_STEPS * _GREATEST)
+        self._total = 0.0
 
     def hear(self, delay_ns: int, *, way_ns: int) -> None:
         """A packet took so long over a way that takes `way_ns` if nothing is lost and nothing waits."""
         step = max(0, delay_ns) * _STEPS // way_ns
         self._counts[min(step, len(self._counts) - 1)] += 1
-        if sum(self._counts) > _MOST:
+        self._total += 1
+        if self._total > _MOST:
             self._counts = [count / 2 for count in self._counts]
+            self._total = sum(self._counts)
 
     def over_ns(self, way_ns: int) -> int | None:
         """The delay that is likely over such a way; None if too little is known."""
-        rest = total = sum(self._counts)
+        rest = total = self._total
         if total < _FEWEST:
             return None
         for step, count in enumerate(self._counts[:-1]):

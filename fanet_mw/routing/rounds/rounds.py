@@ -13,8 +13,8 @@ IPSN 2011; LWB, SenSys 2012), without their synchronous transmissions, which 802
 nodes that use the same turn far apart.
 """
 
-from collections.abc import Collection, Mapping
-from typing import ClassVar, Final
+from collections.abc import Collection, Mapping, Sequence
+from typing import ClassVar, Final, NamedTuple
 
 from fanet_mw.bus.messages import Reception, TxStatus
 from fanet_mw.errors import DropReason
@@ -43,6 +43,7 @@ from fanet_mw.wire.rounds import (
     CAPACITY,
     HEARD_BYTES,
     HELD_BYTES,
+    HeardNodes,
     HeldPacket,
     decode_heard,
     decode_held,
@@ -52,6 +53,7 @@ from fanet_mw.wire.rounds import (
 )
 
 _DATA: Final = int(Kind.DATA)
+_ROUND: Final = int(Kind.ROUND)
 _STORE_PACKETS: Final = 4096
 """The most packets that a node keeps for repair."""
 _MOST_HELD: Final = 512
@@ -74,9 +76,16 @@ _BEFORE_TURN_NS: Final = 1 * US
 """A hello is made just before the turn in which it goes is filled."""
 
 
-def _keys_held(content: Content) -> list[int]:
-    """The packets that a neighbor says to hold, by their keys."""
-    return [key_of(origin, seq) for seq, origin in decode_held(content)]
+class _Told(NamedTuple):
+    """What a neighbor tells in its turn."""
+
+    held: Sequence[int]
+    """The packets that it holds, by their keys."""
+    heard: Sequence[HeardNodes]
+
+
+def _told_in(content: Content) -> _Told:
+    return _Told([key_of(origin, seq) for seq, origin in decode_held(content)], decode_heard(content))
 
 
 class RoundFlooding(RoutingProtocol):
@@ -142,9 +151,9 @@ class RoundFlooding(RoutingProtocol):
         """The neighbors that have left, though they were heard lately."""
         self._clock_hellos: set[int] = set()
         """The requests of hellos of which the clock wants to know when they ended."""
-        self._held: dict[HeldPacket, None] = {}
-        """Packets of which a neighbor should be told that this node holds them."""
-        self._told_ns: dict[HeldPacket, int] = {}
+        self._held: dict[int, None] = {}
+        """Packets of which a neighbor should be told that this node holds them, by key."""
+        self._told_ns: dict[int, int] = {}
         """When neighbors were last told of each packet, the latest last."""
         self._hello: Packet | None = None
         self._hello_waits = 0
@@ -183,17 +192,21 @@ class RoundFlooding(RoutingProtocol):
 
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         src, header = reception.src, packet.header
+        kind = header.kind
         young = now_ns - header.origin_us * US <= self._young_ns
         if young:
-            self._hears(src, now_ns)
-        if header.kind == Kind.ROUND:
+            self._heard_ns[src] = now_ns
+            if not self._near >> (src - 1) & 1:
+                self._meets(src, now_ns)
+        if kind == _ROUND:
             if not young:
                 self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
                 return
-            self._in_step.hear(src, reception.end_ns)
+            if not self._in_step.certain:
+                self._in_step.hear(src, reception.end_ns)
             self._on_round(packet, src, now_ns)
             return
-        if header.kind == _DATA:
+        if kind == _DATA:
             self._hold(packet, now_ns)
             if header.destination == BROADCAST:
                 self._compare(packet, now_ns)
@@ -206,17 +219,19 @@ class RoundFlooding(RoutingProtocol):
         elif not header.flags & FLAG_FLOOD:
             self._send_bulk(packet, from_ns=now_ns + self._lead_ns, now_ns=now_ns)
         else:
-            self._tell_held(packet.header.seq, packet.header.origin, now_ns)
+            self._tell_held(key_of(header.origin, header.seq), now_ns)
             self._take_bulk(packet, src=src, from_ns=now_ns + self._lead_ns, now_ns=now_ns)
 
     def on_copy(self, key: int, src: NodeId, *, now_ns: int) -> None:
-        if self._spreading.made_ns(key) >= now_ns - self._young_ns:
-            self._hears(src, now_ns)
+        spreading = self._spreading
+        if spreading.made_ns(key) >= now_ns - self._young_ns:
+            self._heard_ns[src] = now_ns
+            if not self._near >> (src - 1) & 1:
+                self._meets(src, now_ns)
         if self._repair is not None and key in self._repair.pending:
             self._repair.on_copy(key, now_ns=now_ns)
-        if self._spreading.on_copy(key, src, neighbors=self._near, now_ns=now_ns):
-            origin, seq = origin_and_seq(key)
-            self._tell_held(seq, origin, now_ns)
+        if spreading.on_copy(key, src, neighbors=self._near, now_ns=now_ns):
+            self._tell_held(key, now_ns)
 
     def _state_bound(self, packet: Packet, now_ns: int) -> None:
         """State by when all nodes have an own packet, if that is known."""
@@ -267,12 +282,12 @@ class RoundFlooding(RoutingProtocol):
         if self._repair is not None and packet.header.destination == BROADCAST and self._in_turns(packet):
             self._repair.hold(packet, flooded=True, expect_ns=now_ns, now_ns=now_ns)
 
-    def _tell_held(self, seq: int, origin: int, now_ns: int) -> None:
+    def _tell_held(self, key: int, now_ns: int) -> None:
         """Tell the neighbors in the next turns that this node has a packet."""
-        held = HeldPacket(seq, origin)
-        if len(self._held) >= _MOST_HELD or now_ns - self._told_ns.get(held, -self._law.hop_ns) < self._law.hop_ns:
+        hop_ns = self._law.hop_ns
+        if len(self._held) >= _MOST_HELD or now_ns - self._told_ns.get(key, -hop_ns) < hop_ns:
             return  # who sent this copy could not know yet what was told lately
-        self._held[held] = None
+        self._held[key] = None
 
     # --- turns ----------------------------------------------------------------------------------------------------
 
@@ -315,7 +330,7 @@ class RoundFlooding(RoutingProtocol):
     @property
     def _needs_turn(self) -> bool:
         """True if something waits for an own turn."""
-        return bool(self._spreading.has_urgent or self._hello is not None or self._held or self._topology.has_news)
+        return bool(self._spreading.urgent or self._hello is not None or self._held or self._topology.news)
 
     def _fill(self, turn_ns: int, now_ns: int) -> None:
         """Announce the frame of a turn: urgent packets, what neighbors are told, then the hello, as they fit."""
@@ -323,7 +338,7 @@ class RoundFlooding(RoutingProtocol):
         hello = self._hello
         if hello is not None and self._hello_waits >= PATIENT_TURNS:
             room -= self._add_hello(together)
-        kept = self._law.kept_bytes if self._topology.has_news else 0
+        kept = self._law.kept_bytes if self._topology.news else 0
         for packet in self._spreading.wanted(self._neighbors(now_ns), gone=self._gone, start_ns=turn_ns):
             if self._expired(packet, turn_ns):
                 continue
@@ -375,9 +390,10 @@ class RoundFlooding(RoutingProtocol):
                 self._told_ns[each] = now_ns
             while len(self._told_ns) > _MOST_TOLD:
                 del self._told_ns[next(iter(self._told_ns))]
-            inner += encode_held(told, self._port.node)
+            packets = [HeldPacket(seq, origin) for origin, seq in map(origin_and_seq, told)]
+            inner += encode_held(packets, self._port.node)
             room -= HELD_BYTES * -(-len(told) // CAPACITY)
-        if self._topology.has_news and room >= HEARD_BYTES:
+        if self._topology.news and room >= HEARD_BYTES:
             count = self._port.scenario.node_count
             most = room // HEARD_BYTES * heard_capacity(count)
             inner += encode_heard(self._topology.take_news(most), self._port.node, count=count)
@@ -389,9 +405,11 @@ class RoundFlooding(RoutingProtocol):
         """A neighbor tells of links and of packets that it holds."""
         if packet.header.origin != src:
             return
-        self._spreading.on_held(decoded(packet.frame, _keys_held), src)
-        self._topology.hear(decoded(packet.frame, decode_heard), now_ns=now_ns)
-        if self._topology.has_news:
+        held, heard = decoded(packet.frame, _told_in)
+        if held:
+            self._spreading.on_held(held, src)
+        self._topology.hear(heard, now_ns=now_ns)
+        if self._topology.news:
             self._reach_turn(now_ns)
             if self._timing.slots and self._topology.is_partial:
                 self._reach_slot(now_ns, now_ns)
@@ -477,17 +495,14 @@ class RoundFlooding(RoutingProtocol):
         else:
             self._send_bulk(attempt.packet, from_ns=now_ns, now_ns=now_ns, tried=attempt.tried)
 
-    def _hears(self, src: NodeId, now_ns: int) -> None:
-        """A frame came from a node. One that was not near before cannot know what this node has told lately."""
-        self._heard_ns[src] = now_ns
-        if not self._near >> (src - 1) & 1:
-            self._near |= 1 << (src - 1)
-            old_ns = now_ns - self._flood_ns
-            if self._topology.reaches(src, now_ns):
-                self._spreading.assume(src, until_ns=old_ns)
-            for key in self._spreading.recent(old_ns):
-                origin, seq = origin_and_seq(key)
-                self._held[HeldPacket(seq, origin)] = None
+    def _meets(self, src: NodeId, now_ns: int) -> None:
+        """A frame came from a node that was not near before: it cannot know what this node has told lately."""
+        self._near |= 1 << (src - 1)
+        old_ns = now_ns - self._flood_ns
+        if self._topology.reaches(src, now_ns):
+            self._spreading.assume(src, until_ns=old_ns)
+        for key in self._spreading.recent(old_ns):
+            self._held[key] = None
 
     def _neighbors(self, now_ns: int) -> int:
         """The nodes that were heard lately."""
@@ -537,8 +552,11 @@ class RoundFlooding(RoutingProtocol):
         return request
 
     def on_hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
-        self._hears(reception.src, now_ns)
-        self._in_step.hear(reception.src, reception.end_ns)
+        src = reception.src
+        self._heard_ns[src] = now_ns
+        if not self._near >> (src - 1) & 1:
+            self._meets(src, now_ns)
+        self._in_step.hear(src, reception.end_ns)
         if self._lasting is not None:
             told = motion_in(packet.frame, own=self._port.node, now_ns=now_ns, place=self._place)
             if told is not None:
@@ -550,19 +568,23 @@ class RoundFlooding(RoutingProtocol):
     # --- time -----------------------------------------------------------------------------------------------------
 
     def next_wake_ns(self) -> int | None:
-        first_ns = self._topology.next_epoch_ns()
-        if self._needs_turn:
-            first_ns = min(first_ns, self._turn_ns - self._lead_ns)
-        if self._slot_ns is not None and self._slot_ns - self._lead_ns < first_ns:
-            first_ns = self._slot_ns - self._lead_ns
-        due_ns = None if self._repair is None else self._repair.next_wake_ns()
-        if due_ns is not None and due_ns < first_ns:
-            first_ns = due_ns
+        first_ns = self._topology.epoch_end_ns
+        turn_ns, slot_ns, repair = self._turn_ns - self._lead_ns, self._slot_ns, self._repair
+        if turn_ns < first_ns and (
+            self._held or self._hello is not None or self._spreading.urgent or self._topology.news
+        ):
+            first_ns = turn_ns
+        if slot_ns is not None and slot_ns - self._lead_ns < first_ns:
+            first_ns = slot_ns - self._lead_ns
+        if repair is not None and repair.pending:
+            due_ns = repair.next_wake_ns()
+            if due_ns is not None and due_ns < first_ns:
+                first_ns = due_ns
         return first_ns
 
     def wake(self, now_ns: int) -> None:
         self._now_ns = now_ns
-        if now_ns >= self._topology.next_epoch_ns():
+        if now_ns >= self._topology.epoch_end_ns:
             waiting = self._spreading.due_bulk()  # what others are to send must not take the relays' slots
             self._often = self._topology.dominates() or waiting >= (1 if self._often else _MUCH_BULK)
             self._topology.state(self._stayers(now_ns), often=self._often, now_ns=now_ns)

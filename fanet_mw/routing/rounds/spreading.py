@@ -51,6 +51,7 @@ class _Spread:
         "in_reach",
         "in_reach_twice",
         "left",
+        "made_ns",
         "measured",
         "packet",
         "rank",
@@ -65,6 +66,7 @@ class _Spread:
     def __init__(self, packet: Packet, src: int | None, from_ns: int, taken_ns: int) -> None:
         self.packet = packet
         self.taken_ns = taken_ns
+        self.made_ns = packet.header.origin_us * US
         self.rank = packet.header.priority, packet.header.origin_us, _key(packet)
         """Priority, birth, key: of new packets the most urgent go first, and of these the oldest."""
         self.sent = 0
@@ -124,7 +126,7 @@ class Spreading:
         self._patience_ns = patience_ns
         self._links = links
         self._entries: dict[int, _Spread] = {}
-        self._urgent: dict[int, _Spread] = {}
+        self.urgent: dict[int, _Spread] = {}
         """The urgent ones among them."""
         self._waiting: set[int] = set()
         """The urgent ones that wait for a turn."""
@@ -148,10 +150,6 @@ class Spreading:
 
     def __contains__(self, key: object) -> bool:
         return key in self._entries
-
-    @property
-    def has_urgent(self) -> bool:
-        return bool(self._urgent)
 
     def waiting(self) -> int:
         """The number of packets that have not been sent yet."""
@@ -192,13 +190,14 @@ class Spreading:
             entry.reach(self._links[src])
         entry.sent = self._repeats if once else 0
         if bulk_from_ns is None:
-            self._urgent[key] = self._hasty[key] = entry
+            self.urgent[key] = self._hasty[key] = entry
             self._waiting.add(key)
         else:
             self._bulk[key] = entry
             entry.spare = spare
             heappush(self._due, (bulk_from_ns, key))
-            self._reach(entry, src)
+            if src is not None and not entry.again:
+                entry.reached |= entry.senders | self._links[src]
         if len(self._entries) <= self._capacity:
             return None
         last, evicted = max(self._entries.items(), key=lambda item: item[1].dispensable())
@@ -207,7 +206,7 @@ class Spreading:
 
     def _remove(self, key: int) -> None:
         del self._entries[key]
-        self._urgent.pop(key, None)
+        self.urgent.pop(key, None)
         self._hasty.pop(key, None)
         self._bulk.pop(key, None)
         self._waiting.discard(key)
@@ -223,29 +222,26 @@ class Spreading:
             again = bool(done.senders & own)
             done.senders |= own
             return again
-        if neighbors & self._links[src] & ~entry.having:
+        links = self._links[src]
+        if neighbors & links & ~entry.having:
             entry.copy_ns = now_ns  # who lacks it may have heard that copy
-        self._reach(entry, src)
+        if not (entry.left or entry.sent):
+            entry.reached |= own | links  # those that hear the neighbor have it, too
         again = bool(entry.senders & own)
         if not again and self._lossy:
-            entry.reach(self._links[src])
+            entry.reach(links)
         entry.senders |= own
         entry.having |= own
         return again
 
-    def _reach(self, entry: _Spread, src: int | None) -> None:
-        """A neighbor was heard to send a bulk packet, which those that hear the neighbor have, too."""
-        if src is not None and not entry.again:
-            entry.reached |= 1 << (src - 1) | self._links[src]
-
     def on_held(self, keys: Iterable[int], src: int) -> None:
         """A neighbor says that it holds packets."""
-        theirs, early = 1 << (src - 1), self._early
+        theirs, early, entries, done = 1 << (src - 1), self._early, self._entries, self._done
         for key in keys:
-            entry = self._entries.get(key)
+            entry = entries.get(key)
             if entry is not None:
                 entry.having |= theirs
-            elif key not in self._done:
+            elif key not in done:
                 early[key] = early.pop(key, 0) | theirs
         while len(early) > _MOST_EARLY:
             del early[next(iter(early))]
@@ -259,7 +255,7 @@ class Spreading:
     def made_ns(self, key: int) -> float:
         """The instant at which a packet was made; long ago if this node does not remember it."""
         entry = self._entries.get(key) or self._done.get(key)
-        return -math.inf if entry is None else entry.packet.header.origin_us * US
+        return -math.inf if entry is None else entry.made_ns
 
     def recent(self, from_ns: int) -> list[int]:
         """The keys of the packets that this node got after an instant."""
@@ -276,7 +272,7 @@ class Spreading:
         patient_ns = start_ns - self._patience_ns
         served = neighbors & ~self._weak
         done = []
-        for key, entry in self._urgent.items():
+        for key, entry in self.urgent.items():
             if self._lossy and not entry.measured and entry.sent and entry.sent_ns <= patient_ns - self._patience_ns:
                 entry.measured = True
                 self._measure(neighbors, entry.senders)

@@ -6,7 +6,7 @@ per second in any case. A link counts if both its ends state it.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from functools import reduce
+from functools import lru_cache, reduce
 from operator import or_
 from typing import Final, NamedTuple
 
@@ -15,16 +15,19 @@ from fanet_mw.units import NodeId, S
 from fanet_mw.wire.rounds import HeardNodes
 
 _MODULUS: Final = 256
+_REMEMBERED: Final = 4096
+"""The sets of nodes whose members a process remembers; most are the neighbors of somebody, and asked for again."""
 
 
-def nodes_of(bits: int) -> list[NodeId]:
+@lru_cache(maxsize=_REMEMBERED)
+def nodes_of(bits: int) -> tuple[NodeId, ...]:
     """The nodes of a set, in order: bit i stands for node i + 1."""
     nodes = []
     while bits:
         last = bits & -bits
         nodes.append(NodeId(last.bit_length()))
         bits ^= last
-    return nodes
+    return tuple(nodes)
 
 
 def _seldom(rival: tuple[NodeId, bool]) -> bool:
@@ -50,21 +53,27 @@ class Topology:
         self._stated: dict[NodeId, _Stated] = {}
         self.links = [0] * (count + 1)
         """The nodes with which each node has links, by its id; the first entry is of no node."""
-        self._news: dict[NodeId, None] = {}
+        self.news: dict[NodeId, None] = {}
         """The nodes of which something is to be passed on, in the order in which it was heard."""
         self._own_epoch = -1
-        self._rings: list[int] = [1 << (node - 1)]
+        self.epoch_end_ns = 0
+        """The instant at which the next epoch begins."""
+        self._rings: list[int] = []
         """The nodes that are so many hops away."""
+        self._hops: dict[NodeId, int] = {}
+        """The hops to each node to which a way is known; empty until somebody asks."""
         self._dominates = True
-        self._dominates_for = -1
-        """The state of the links for which this node decided whether it is in the dominating set."""
+        self._dominates_for: Sequence[int] = ()
+        """The links of this node and its neighbors for which it decided whether it is in the dominating set."""
+        self._dominates_at = -1
+        """The state of the links at which it last looked whether these have changed."""
         self._unreached_ns: dict[NodeId, int] = {}
         """The instant since which each node without a way is known to have none."""
         self._reached_ns: dict[NodeId, int] = {}
         """The instant at which a way was found to each node that had none before."""
         self._known = 0
         """The nodes to which there has been a way."""
-        self._parted: list[NodeId] = []
+        self._parted: Sequence[NodeId] = ()
         self._parted_for = (-1, 0)
         """The state of the links, and the nodes left out, for which the parted nodes were found."""
         self._rivals: list[tuple[NodeId, bool]] = []
@@ -76,18 +85,17 @@ class Topology:
         """The state of the links for which they were found."""
         self.changes = 0
         """How often links, or who takes part in bulk slots often, have changed."""
+        self._link_changes = 0
+        """How often links have changed."""
         self._arranged_for = -1
         """The state of the links for which the rings were computed."""
 
     # --- what is stated -------------------------------------------------------------------------------------------
 
-    def next_epoch_ns(self) -> int:
-        """The instant at which the next epoch begins."""
-        return (self._own_epoch + 1) * self._epoch_ns
-
     def state(self, heard: int, *, often: bool, now_ns: int) -> None:
         """An epoch has begun in which this node hears these neighbors, and takes part in bulk slots often or not."""
         self._own_epoch = epoch = now_ns // self._epoch_ns
+        self.epoch_end_ns = (epoch + 1) * self._epoch_ns
         for node in [n for n, one in self._stated.items() if one.epoch < epoch - self._lifetime]:
             self._forget(node)
         self._arrange(now_ns)
@@ -118,7 +126,7 @@ class Topology:
     def _note(self, node: NodeId, stated: _Stated) -> None:
         known = self._stated.get(node)
         self._stated[node] = stated
-        self._news[node] = None
+        self.news[node] = None
         changed = stated.heard if known is None else stated.heard ^ known.heard
         self.changes += changed != 0 or known is None or known.often != stated.often
         if changed or known is None:
@@ -127,6 +135,7 @@ class Topology:
     def _relink(self, node: NodeId, heard: int, changed: int) -> None:
         """A node hears some others now, or no longer."""
         own, links = 1 << (node - 1), self.links
+        before = links[node]
         for other in nodes_of(changed):
             stated = self._stated.get(other)
             if stated is not None and stated.heard & own and heard >> (other - 1) & 1:
@@ -135,23 +144,20 @@ class Topology:
             else:
                 links[node] &= ~(1 << (other - 1))
                 links[other] &= ~own
+        self._link_changes += links[node] != before
 
     def _forget(self, node: NodeId) -> None:
         """What a node has stated is too old."""
         self.changes += 1
         heard = self._stated.pop(node).heard
-        self._news.pop(node, None)
+        self.news.pop(node, None)
         self._relink(node, 0, heard)
-
-    @property
-    def has_news(self) -> bool:
-        return bool(self._news)
 
     def take_news(self, most: int) -> list[HeardNodes]:
         """What is to be passed on next, at most so many entries."""
-        nodes = list(self._news)[:most]
+        nodes = list(self.news)[:most]
         for node in nodes:
-            del self._news[node]
+            del self.news[node]
         stated = ((node, self._stated[node]) for node in nodes)
         return [HeardNodes(node, one.epoch % _MODULUS, one.heard, one.often) for node, one in stated]
 
@@ -159,10 +165,13 @@ class Topology:
 
     def _arrange(self, now_ns: int) -> None:
         """Compute the rings anew if something has changed."""
-        if self._arranged_for == self.changes:
+        if self._arranged_for == self._link_changes:
             return
-        self._arranged_for = self.changes
-        self._rings = list(self._rings_from(self._node))
+        self._arranged_for = self._link_changes
+        rings = list(self._rings_from(self._node))
+        if rings == self._rings:
+            return
+        self._rings, self._hops = rings, {}
         reached = reduce(or_, self._rings)
         since, away = self._unreached_ns, nodes_of(~reached & (1 << self._count) - 1)
         self._unreached_ns = {node: since.get(node, now_ns) for node in away}
@@ -180,7 +189,9 @@ class Topology:
     def hops(self, now_ns: int) -> Mapping[NodeId, int]:
         """The hops to each node to which a way is known, this node included."""
         self._arrange(now_ns)
-        return {node: hops for hops, ring in enumerate(self._rings) for node in nodes_of(ring)}
+        if not self._hops:
+            self._hops = {node: hops for hops, ring in enumerate(self._rings) for node in nodes_of(ring)}
+        return self._hops
 
     def farthest(self, now_ns: int) -> int:
         """The most hops to any node to which a way is known."""
@@ -189,9 +200,7 @@ class Topology:
 
     def hops_to(self, node: NodeId, now_ns: int) -> int | None:
         """The hops to one node; None if no way is known."""
-        self._arrange(now_ns)
-        own = 1 << node >> 1
-        return next((hops for hops, ring in enumerate(self._rings) if ring & own), None)
+        return self.hops(now_ns).get(node)
 
     def reached_since_ns(self, node: NodeId) -> int:
         """The instant since which there is a way to a node that has one; 0 if there always was."""
@@ -201,8 +210,8 @@ class Topology:
         """The nodes with links to this one from which a node is fewer hops away than from here; none if no way is
         known.
         """
-        if self._nearer_for != self.changes:
-            self._nearer_for, self._nearer = self.changes, {}
+        if self._nearer_for != self._link_changes:
+            self._nearer_for, self._nearer = self._link_changes, {}
         found = self._nearer.get(destination)
         if found is None:
             found = self._nearer[destination] = self._toward(destination)
@@ -230,8 +239,8 @@ class Topology:
         """
         self._arrange(now_ns)
         passed = sum(1 << (node - 1) for node in without)
-        if self._parted_for != (self.changes, passed):
-            self._parted_for = self.changes, passed
+        if self._parted_for != (self._link_changes, passed):
+            self._parted_for = self._link_changes, passed
             reached = reduce(or_, self._rings_from(self._node, without=passed))
             self._parted = nodes_of(self._known & ~reached)
         return self._parted
@@ -254,10 +263,13 @@ class Topology:
 
     def dominates(self) -> bool:
         """True if this node is one of the connected dominating set whose transmissions reach all nodes."""
-        if self._dominates_for != self.changes:
-            self._dominates_for = self.changes
-            near = [self._node, *nodes_of(self.links[self._node])]
-            self._dominates = dominates(self._node, {n: tuple(nodes_of(self.links[n])) for n in near})
+        if self._dominates_at != self._link_changes:
+            self._dominates_at = self._link_changes
+            near = (self._node, *nodes_of(self.links[self._node]))
+            links = [self.links[node] for node in near]
+            if links != self._dominates_for:
+                self._dominates_for = links
+                self._dominates = dominates(self._node, dict(zip(near, map(nodes_of, links), strict=True)))
         return self._dominates
 
     def absent(self, now_ns: int, *, doubt_ns: int) -> Sequence[NodeId] | None:

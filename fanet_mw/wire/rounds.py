@@ -23,6 +23,9 @@ CAPACITY: Final = 16
 """Entries of one FANET_HELD."""
 
 
+_new: Final = tuple.__new__  # for what is made once per entry
+
+
 class HeardNodes(NamedTuple):
     """Whom a node hears."""
 
@@ -73,7 +76,7 @@ def decode_heard(packed: Packed) -> list[HeardNodes]:
         for at in range(0, count * length, length):
             heard = int.from_bytes(entries[at + _ENTRY.size : at + length], "little")
             node, epoch = _ENTRY.unpack_from(entries, at)
-            found.append(HeardNodes(node & ~_OFTEN, epoch, heard, bool(node & _OFTEN)))
+            found.append(_new(HeardNodes, (node & ~_OFTEN, epoch, heard, node >= _OFTEN)))
     refuse_unless(all(0 < each.node <= MOST_NODES for each in found), "what a node hears that cannot exist")
     return found
 

@@ -82,19 +82,21 @@ class RollCall:
         self.parted = () if self._silent is None else self._silent.parted(self.lost, now_ns=now_ns)
         self.has_news |= falls and not self._falls
         self._falls = falls
+        heard, neighbor_ns, begun = self._heard, self._neighbor_ns, since_ns // ROLL_NS
         for node in plan.nodes:
             if node in (0, self._node) or node in self.lost:
                 continue
-            silent_ns = now_ns - self._heard.get(node, since_ns // ROLL_NS) * ROLL_NS
-            near, gone = now_ns - self._neighbor_ns.get(node, -_NEIGHBOR_NS) < _NEIGHBOR_NS, False
-            # who was heard since the last roll is not silent
-            if near and self._silent is not None and silent_ns > ROLL_NS:
+            silent_ns = now_ns - heard.get(node, begun) * ROLL_NS
+            if silent_ns <= ROLL_NS:
+                continue  # it was heard since the last roll
+            near, gone = now_ns - neighbor_ns.get(node, -_NEIGHBOR_NS) < _NEIGHBOR_NS, False
+            if near and self._silent is not None:
                 near = self._silent.might_be_heard(NodeId(node), now_ns=now_ns)
                 gone = near and self._silent.has(NodeId(node), now_ns=now_ns)
             if gone or silent_ns > (self._silent_ns if near else _AWAY_NS):
                 self.lost[node] = now_ns
                 self.has_news |= near
-                self._heard.setdefault(node, since_ns // ROLL_NS)
+                heard.setdefault(node, begun)
 
     def roll(self, plan: Search, *, now_ns: int) -> Roll:
         """What this UAV tells its neighbors in its next hello."""

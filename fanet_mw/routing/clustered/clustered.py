@@ -100,7 +100,8 @@ class Clustered(RoutingProtocol):
 
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> Sequence[Relay]:
         parts, header = self.parts, packet.header
-        origin_us, seq, origin, _, _, kind, _, _, _, flags = header
+        origin_us, seq, origin, destination, _, kind, _, _, _, flags = header
+        one_way = destination != BROADCAST and parts.one_way.takes(packet)
         parts.roles.on_sign_of_life(origin, born_ns=origin_us * US, now_ns=now_ns)
         if kind == _DATA:
             if parts.loads is not None:
@@ -110,12 +111,12 @@ class Clustered(RoutingProtocol):
         parts.floods.keep(packet, flooded=bool(flags & FLAG_FLOOD), now_ns=now_ns)
         parts.one_way.learn(header, reception.src)
         if flags & FLAG_FLOOD:
-            if parts.one_way.must_show(packet, now_ns=now_ns):
+            if one_way and parts.one_way.must_show(header, now_ns=now_ns):
                 parts.roles.show(now_ns)
             at_once = kind != _DATA and parts.roles.on_control(packet, reception.src, now_ns=now_ns)
-            relaying = parts.contending if parts.one_way.takes(packet) else parts.relaying
+            relaying = parts.contending if one_way else parts.relaying
             return relaying.on_flood(packet, reception, at_once=at_once, now_ns=now_ns)
-        if flags & FLAG_TO_HEAD or parts.one_way.takes(packet):
+        if flags & FLAG_TO_HEAD or one_way:
             self._pass_on(packet, now_ns)
         return ()
 

@@ -384,10 +384,10 @@ class RoundFlooding(RoutingProtocol):
         inner = b""
         if self._held and room >= HELD_BYTES:
             told = list(self._held)[: room // HELD_BYTES * CAPACITY]
-            for each in told:
-                del self._held[each]
-                self._told_ns.pop(each, None)
-                self._told_ns[each] = now_ns
+            for key in told:
+                del self._held[key]
+                self._told_ns.pop(key, None)
+                self._told_ns[key] = now_ns
             while len(self._told_ns) > _MOST_TOLD:
                 del self._told_ns[next(iter(self._told_ns))]
             packets = [HeldPacket(seq, origin) for origin, seq in map(origin_and_seq, told)]

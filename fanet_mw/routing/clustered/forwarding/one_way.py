@@ -73,23 +73,22 @@ class OneWay:
 
     def learn(self, header: Header, neighbor: NodeId) -> None:
         """The first copy of a packet has come over this neighbor."""
-        origin = NodeId(header.origin)
+        origin, born_us = NodeId(header.origin), header.origin_us
         known = self._ways.get(origin)
-        if known is None or (header.origin_us, -header.hops) > (known.born_us, -known.hops):
-            self._ways[origin] = Way(header.origin_us, header.hops, neighbor)
+        if known is None or born_us > known.born_us or (born_us == known.born_us and header.hops < known.hops):
+            self._ways[origin] = Way(born_us, header.hops, neighbor)
 
     def takes(self, packet: Packet) -> bool:
         """True if a packet goes hop by hop."""
         header = packet.header
         return header.destination != BROADCAST and header.kind == Kind.DATA and self._takes(packet)
 
-    def must_show(self, packet: Packet, *, now_ns: int) -> bool:
-        """True if the node has to flood a word of itself, because a packet for it alone was flooded over other
-        nodes.
+    def must_show(self, header: Header, *, now_ns: int) -> bool:
+        """True if the node has to flood a word of itself, because a packet that should have gone hop by hop, for it
+        alone, was flooded over other nodes.
         """
-        header = packet.header
         ours = header.destination == self._port.node and header.hops > 0
-        if not ours or not self.takes(packet) or now_ns < self._shown_ns + _SHOW_NS:
+        if not ours or now_ns < self._shown_ns + _SHOW_NS:
             return False
         self._shown_ns = now_ns
         return True

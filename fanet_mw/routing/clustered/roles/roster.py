@@ -13,6 +13,7 @@
 Any packet that the node has generated after the report counts as its objection.
 """
 
+import math
 from collections import deque
 from collections.abc import Mapping
 from typing import Final, NamedTuple
@@ -45,7 +46,8 @@ class _SilentNode(NamedTuple):
 
 def alike(one: Motion, other: Motion) -> bool:
     """True if two velocities are those of one formation."""
-    return one.velocity.minus(other.velocity).norm() <= _ALONG_M_S
+    (east, north, up), (their_east, their_north, their_up) = one.velocity, other.velocity
+    return math.hypot(east - their_east, north - their_north, up - their_up) <= _ALONG_M_S
 
 
 class OwnFlight:
@@ -175,10 +177,12 @@ class Roster:
 
     def places(self, t_ns: int, *, now_ns: int) -> dict[NodeId, Enu]:
         """The positions of all nodes at an instant, if they fly on straight, or with the leader, by id."""
-        return {node: self._place(node, t_ns, now_ns) for node in sorted(self._joined)}
+        here = self.own.at(now_ns)
+        return {node: self._place(node, here, t_ns, now_ns) for node in sorted(self._joined)}
 
-    def _place(self, node: NodeId, t_ns: int, now_ns: int) -> Enu:
-        (motion, beside), here = self._joined[node], self.own.at(now_ns)
+    def _place(self, node: NodeId, here: Motion | None, t_ns: int, now_ns: int) -> Enu:
+        """`here`: the leader's own motion now."""
+        motion, beside = self._joined[node]
         straight = motion.position_at(t_ns)
         if beside is None or here is None:
             return straight

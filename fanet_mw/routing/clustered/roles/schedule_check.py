@@ -41,8 +41,9 @@ class ScheduleCheck:
             raise MalformedFrameError(f"slots of {schedule.slot_us} in {schedule.period_us} us, not {period_us} us")
         if schedule.start_us * US > now_ns + _START_PERIODS * period_ns + _START_NS:
             raise MalformedFrameError(f"a schedule from {schedule.start_us} us on")
-        if any(member.node > scenario.node_count for member in schedule.members):
-            raise MalformedFrameError(f"a schedule of nodes beyond {scenario.node_count}")
+        count = scenario.node_count
+        if any(member.node > count for member in schedule.members):
+            raise MalformedFrameError(f"a schedule of nodes beyond {count}")
         known = self._membership.version
         if known is None or known.authority != Authority(schedule.term, schedule.leader):
             return

@@ -66,6 +66,8 @@ class TurnAccess:
         self._floods = floods
         self._contention = contention
         self._resumed = resumed
+        timed = (slots, delays, resumed)
+        self._asks = tuple(part.next_wake_ns for part in timed if part is not None)
         self._lead_ns = port.scenario.radio.lead_ns
         self._has_shown: NodeTimetable | None = None
         """The timetable in whose turns the node has last begun a flood."""
@@ -275,14 +277,15 @@ class TurnAccess:
     # --- time -----------------------------------------------------------------------------------------------------
 
     def next_wake_ns(self) -> int | None:
-        return earliest(
-            self._slots.next_wake_ns(),
-            self._roots.next_wake_ns(),
-            self._calls.next_wake_ns(),
-            self._spare.next_wake_ns(),
-            self._delays.next_wake_ns(),
-            None if self._resumed is None else self._resumed.next_wake_ns(),
-        )
+        first_ns = None
+        for release in (self._roots, self._calls, self._spare):
+            if release.planned is not None:
+                first_ns = earliest(first_ns, release.next_wake_ns())
+        for ask in self._asks:
+            wake_ns = ask()
+            if wake_ns is not None and (first_ns is None or wake_ns < first_ns):
+                first_ns = wake_ns
+        return first_ns
 
     def wake(self, now_ns: int) -> None:
         self._slots.wake(now_ns)

@@ -60,7 +60,8 @@ class TurnRelease(ABC):
         self._lead_ns = lead_ns
         self._free_ns = 0
         """The first instant after the start of the last turn that was used or reserved."""
-        self._next: OwnTurn | None = None
+        self.planned: OwnTurn | None = None
+        """The turn for which a frame is planned, if any; public, because it is looked at after every reception."""
         self._in_force: Sequence[TurnsInForce] = ()
         """The node's turns of this kind by each timetable that is in force or announced."""
 
@@ -86,7 +87,7 @@ class TurnRelease(ABC):
 
     def _push(self, packet: Packet, rank: int, now_ns: int) -> Packet | None:
         evicted = self._queue.push(packet, rank=rank)
-        if self._next is None:
+        if self.planned is None:
             self._arm(now_ns)
         return evicted
 
@@ -99,21 +100,21 @@ class TurnRelease(ABC):
 
     def drain(self) -> list[Packet]:
         """Take out all queued packets, because they will go another way."""
-        self._next = None
+        self.planned = None
         return self._queue.drain()
 
     def next_wake_ns(self) -> int | None:
-        return None if self._next is None else self._next.start_ns - self._lead_ns
+        return None if self.planned is None else self.planned.start_ns - self._lead_ns
 
     def due(self, *, now_ns: int) -> list[tuple[list[Packet], int]]:
         """Take out the packets to announce now: for each frame its packets, and the instant of the frame."""
         released = []
-        while self._next is not None and self._next.start_ns - self._lead_ns <= now_ns and len(self._queue):
-            released.append((self._fill(self._next.frame_bytes), self._next.start_ns))
-            self._free_ns = self._next.start_ns + 1
+        while self.planned is not None and self.planned.start_ns - self._lead_ns <= now_ns and len(self._queue):
+            released.append((self._fill(self.planned.frame_bytes), self.planned.start_ns))
+            self._free_ns = self.planned.start_ns + 1
             self._arm(now_ns)
         if not len(self._queue):
-            self._next = None
+            self.planned = None
         return released
 
     def _fill(self, size: int) -> list[Packet]:
@@ -123,7 +124,7 @@ class TurnRelease(ABC):
 
     def _arm(self, now_ns: int) -> None:
         earliest_ns = max(now_ns + self._lead_ns, self._free_ns)
-        self._next = self._turn(earliest_ns) if len(self._queue) else None
+        self.planned = self._turn(earliest_ns) if len(self._queue) else None
 
 
 class RootRelease(TurnRelease):

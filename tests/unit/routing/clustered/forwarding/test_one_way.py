@@ -101,9 +101,8 @@ def test_a_hop_that_does_not_answer_is_none_until_it_is_heard_again(station: Sta
 
 
 def test_who_hears_its_own_packets_flooded_over_others_shows_the_way_once_a_second(station: Station) -> None:
-    def heard(hops: int, receiver: NodeId = OURS) -> Packet:
-        packet = station.packet(receiver)
-        return packet._replace(header=packet.header._replace(origin=int(FAR), hops=hops))
+    def heard(hops: int, receiver: NodeId = OURS) -> Header:
+        return station.packet(receiver).header._replace(origin=int(FAR), hops=hops)
 
     shows = station.one_way.must_show
     assert not shows(heard(0), now_ns=2 * S), "a neighbor knows the way"

@@ -66,3 +66,15 @@ def test_who_has_been_silent_for_a_minute_is_forgotten_though_nothing_was_said()
     detector.on_hello(NodeId(4), now_ns=0)
     assert detector.find_suspect(lambda _: True, now_ns=60 * S) == 4
     assert detector.find_suspect(lambda _: True, now_ns=60 * S + 1) is None
+
+
+def test_of_two_that_fell_silent_the_second_is_reported_five_seconds_later(
+    detector: NeighborFailureDetector, liveness: Liveness
+) -> None:
+    second = NodeId(8)
+    detector.on_hello(second, now_ns=10 * S)
+    liveness.on_sign_of_life(second, born_ns=10 * S)
+    assert detector.find_suspect(everyone, now_ns=14 * S) == OTHER
+    detector.on_report(OTHER, now_ns=14 * S)
+    assert detector.find_suspect(everyone, now_ns=19 * S - 1) is None
+    assert detector.find_suspect(everyone, now_ns=19 * S) == second

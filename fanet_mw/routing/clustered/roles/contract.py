@@ -1,9 +1,11 @@
 """What the roles ask of a timetable: what the leader adds to its schedule, and who reads it."""
 
+from collections.abc import Mapping
 from typing import NamedTuple, Protocol
 
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.roles.leader import Leader
+from fanet_mw.units import NodeId
 from fanet_mw.wire.loads import Loads
 from fanet_mw.wire.places import Places
 from fanet_mw.wire.schedule import Schedule
@@ -46,8 +48,8 @@ class Timetabling(Protocol):
     def notice_ns(self, now_ns: int) -> int:
         """How long ahead the leader must announce another schedule."""
 
-    def lost_ns(self, now_ns: int) -> int | None:
-        """The silence after which a node is lost, because each begins floods in its turns; None if not all do."""
+    def lost_ns(self, now_ns: int) -> Mapping[NodeId, int]:
+        """The silence after which those nodes are lost that were not heard in their turns for so long."""
 
 
 class NoTimetable:
@@ -79,5 +81,5 @@ class NoTimetable:
     def notice_ns(self, now_ns: int) -> int:
         return 0
 
-    def lost_ns(self, now_ns: int) -> int | None:
-        return None
+    def lost_ns(self, now_ns: int) -> Mapping[NodeId, int]:
+        return {}

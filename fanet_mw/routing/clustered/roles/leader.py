@@ -30,7 +30,7 @@ from fanet_mw.routing.clustered.roles.leader_election import Authority, silence_
 from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import EPOCH_BITS
 from fanet_mw.routing.clustered.roles.position_updates import lost_ns, settled_ns
-from fanet_mw.routing.clustered.roles.roster import Roster, sure_m
+from fanet_mw.routing.clustered.roles.roster import NO_SILENCE, Roster, sure_m
 from fanet_mw.scenario import Scenario
 from fanet_mw.serial_number import following, newer
 from fanet_mw.units import MS, US, Enu, NodeId, S, seconds_to_ns
@@ -186,11 +186,13 @@ class Leader:
     def next_wake_ns(self) -> int:
         return self._due_ns
 
-    def wake(self, here: Motion, *, notice_ns: int = 0, lost_ns: int | None = None, now_ns: int) -> Sequence[Schedule]:
+    def wake(
+        self, here: Motion, *, notice_ns: int = 0, lost_ns: Mapping[NodeId, int] = NO_SILENCE, now_ns: int
+    ) -> Sequence[Schedule]:
         """The parts of the schedule to announce now; `here` is the leader's own motion.
 
         A new schedule comes into force `notice_ns` later at the earliest, and only when all nodes should have received
-        it. Nodes are lost after a silence of `lost_ns`, if that is known.
+        it. The nodes in `lost_ns` are lost after such a silence.
         """
         if now_ns < self._due_ns:
             return []

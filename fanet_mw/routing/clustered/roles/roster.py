@@ -16,12 +16,14 @@ Any packet that the node has generated after the report counts as its objection.
 import math
 from collections import deque
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from fanet_mw.motion import Motion
 from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.units import MS, Enu, NodeId, S
 
+NO_SILENCE: Final[Mapping[NodeId, int]] = MappingProxyType({})
 _MISSED_NS: Final = 4 * S
 """About the time for which a node has been silent when it is reported."""
 _ALONG_M_S: Final = 2.0
@@ -157,18 +159,19 @@ class Roster:
         instants = (there.at_ns - _MISSED_NS, there.at_ns)
         return max(known.position_at(t_ns).minus(there.position_at(t_ns)).norm() for t_ns in instants) <= self._sure_m
 
-    def forget(self, now_ns: int, *, lost_ns: int | None = None) -> None:
+    def forget(self, now_ns: int, *, lost_ns: Mapping[NodeId, int] = NO_SILENCE) -> None:
         """Forget nodes that have given no sign of life for too long, or that were reported and have not objected in
-        time. Without `lost_ns` too long is what two position updates take.
+        time. Too long is what two position updates take, or less for the nodes in `lost_ns`.
         """
-        lost_ns = self._lost_ns if lost_ns is None else min(lost_ns, self._lost_ns)
         for node in sorted(self._joined):
             last_ns = max(self._liveness.last_ns(node) or 0, self._joined[node].motion.at_ns)
             report = self._reports.get(node)
             if report is not None and last_ns > report.reported_ns:
                 del self._reports[node]  # the node has objected
                 report = None
-            if now_ns - last_ns > lost_ns or (report is not None and now_ns >= report.since_ns + self._objection_ns):
+            if now_ns - last_ns > min(self._lost_ns, lost_ns.get(node, self._lost_ns)) or (
+                report is not None and now_ns >= report.since_ns + self._objection_ns
+            ):
                 del self._joined[node]
 
     def forget_reports(self) -> None:

@@ -39,6 +39,11 @@ class Followers:
         if version in self._known:
             self._known[version][root] = now_ns
 
+    def unheard(self, version: Version, nodes: Iterable[NodeId], *, since_ns: int) -> list[NodeId]:
+        """Those of these nodes that were not heard in their turns of a version since an instant."""
+        known = self._known.get(version, {})
+        return [node for node in nodes if node != self._node and known.get(node, -1) < since_ns]
+
     def doubt(self, now_ns: int) -> None:
         """A neighbor has told all that it does not hear this node."""
         self._doubted_ns = now_ns

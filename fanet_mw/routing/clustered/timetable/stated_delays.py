@@ -184,15 +184,18 @@ class StatedDelays:
         silent_ns = _SILENT * self._shown_ns(timetable)
         return self._followers.have(timetable.version, timetable.table.spans, silent_ns=silent_ns, now_ns=now_ns)
 
-    def lost_ns(self, now_ns: int) -> int | None:
-        """The silence after which a node of the timetable is lost; None as long as not all need have shown that they
-        keep it.
+    def lost_ns(self, now_ns: int) -> Mapping[NodeId, int]:
+        """The silence after which each node is lost that was not heard in its turns for so long; empty as long as not
+        all need have shown that they keep the timetable.
         """
         timetable = self._timetables.at(now_ns)
         if timetable is None or not timetable.whole or timetable.odds is not None:
-            return None
+            return {}
         lost_ns = _LOST * self._shown_ns(timetable)
-        return lost_ns if now_ns >= timetable.valid_ns + lost_ns else None
+        if now_ns < timetable.valid_ns + lost_ns:
+            return {}
+        unheard = self._followers.unheard(timetable.version, timetable.table.spans, since_ns=now_ns - lost_ns)
+        return dict.fromkeys(unheard, lost_ns)
 
     def _shown_ns(self, timetable: NodeTimetable) -> int:
         return max(self._hello_ns, timetable.turns.period_ns)

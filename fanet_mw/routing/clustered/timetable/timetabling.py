@@ -97,7 +97,7 @@ class FromPlaces:
     def notice_ns(self, now_ns: int) -> int:
         return self._delays.notice_ns(now_ns)
 
-    def lost_ns(self, now_ns: int) -> int | None:
+    def lost_ns(self, now_ns: int) -> Mapping[NodeId, int]:
         return self._delays.lost_ns(now_ns)
 
     # --- at every node --------------------------------------------------------------------------------------------

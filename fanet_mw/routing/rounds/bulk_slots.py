@@ -7,7 +7,6 @@ do not know of each other yet, carrier sensing and repetitions remain.
 """
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Final
 
 from fanet_mw.routing.rounds.round_timing import RoundTiming
@@ -16,13 +15,10 @@ SELDOM: Final = 8
 """A node with little to send takes part in one of so many slots."""
 _MOST_SEARCHED: Final = 4096
 _MASK: Final = 0xFFFFFFFF
-_REMEMBERED: Final = 16_384
-"""The bids that a process remembers: those of the nodes around for the slots of some rounds."""
 
 
-@lru_cache(maxsize=_REMEMBERED)
 def _bid(node: int, slot: int) -> int:
-    """What a node bids for a slot: the highest bid wins it. Most are asked for again, by this node or by others."""
+    """What a node bids for a slot: the highest bid wins it."""
     mixed = (node * 0x9E3779B1 + slot * 0x85EBCA77) & _MASK
     mixed = (mixed ^ mixed >> 15) * 0x2C1B3C6D & _MASK
     mixed = (mixed ^ mixed >> 12) * 0x297A2D39 & _MASK

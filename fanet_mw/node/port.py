@@ -63,7 +63,7 @@ class NodePort:
 
     def transmit_together(self, packets: Sequence[Packet], *, flags: int, at_ns: Sequence[int]) -> None:
         for packet in packets:
-            self.mark(packet, flags=flags)
+            self.mark(packet, flags=flags & wire.PHASE_MASK)
         frames = [self._begun(packet, flags) for packet in packets]
         for start_ns in at_ns:
             self._share([(start_ns, frame) for frame in frames])
@@ -74,13 +74,16 @@ class NodePort:
 
     def relay(self, relay: Relay) -> None:
         packet, start_ns = relay
-        self.transmit(wire.rewrite(packet.frame, self.node, wire.FLAG_FLOOD), BROADCAST, start_ns)
+        self.transmit(self._relayed(packet), BROADCAST, start_ns)
 
     def relay_together(self, relays: Sequence[Relay]) -> None:
-        self._share([(start_ns, self.forwarded(packet, flags=wire.FLAG_FLOOD)) for packet, start_ns in relays])
+        self._share([(start_ns, self._relayed(packet)) for packet, start_ns in relays])
 
     def forwarded(self, packet: Packet, *, flags: int) -> bytes:
         return wire.rewrite(packet.frame, self.node, flags)
+
+    def _relayed(self, packet: Packet) -> bytes:
+        return self.forwarded(packet, flags=wire.FLAG_FLOOD | (packet.header.flags & wire.FLAG_TURN))
 
     def _begun(self, packet: Packet, flags: int) -> bytes:
         """The bytes of a packet whose phase begins here: an own packet as it is, another node's with one more hop."""

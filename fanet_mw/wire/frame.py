@@ -33,6 +33,8 @@ FLAG_TO_HEAD: Final = 2
 PHASE_MASK: Final = FLAG_FLOOD | FLAG_TO_HEAD
 FLAG_MORE: Final = 4
 """Another packet with its own header follows in the same radio frame."""
+FLAG_TURN: Final = 8
+"""The packet's flood began in a turn that its origin has by a timetable."""
 
 PRIORITY_CONTROL: Final = 0
 PRIORITY_SAFETY: Final = 1

@@ -69,13 +69,15 @@ class Floods:
     def _access_ns(self, packet: Packet) -> int:
         return longest_access_ns(len(packet.frame), self._port.scenario.radio)
 
-    def begin(self, packets: Sequence[Packet], *, start_ns: int, again_ns: Sequence[int] = ()) -> None:
+    def begin(
+        self, packets: Sequence[Packet], *, start_ns: int, again_ns: Sequence[int] = (), flags: int = FLAG_FLOOD
+    ) -> None:
         """Begin the floods of several packets in one frame, which is transmitted at `start_ns` and repeated at later
         instants.
         """
         for packet in packets:
             self.keep(packet, flooded=True, now_ns=start_ns)
-        self._port.transmit_together(packets, flags=FLAG_FLOOD, at_ns=(start_ns, *again_ns))
+        self._port.transmit_together(packets, flags=flags, at_ns=(start_ns, *again_ns))
 
     def answer(self, packets: Sequence[Packet], *, start_ns: int) -> None:
         """Transmit packets that neighbors have missed, in one frame."""

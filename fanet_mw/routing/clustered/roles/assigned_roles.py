@@ -308,7 +308,7 @@ class AssignedRoles:
         if parts.joining.due_ns is not None and now_ns >= parts.joining.due_ns:
             self._join(now_ns)
         leader = self._leader
-        if leader is not None:
+        if leader is not None and now_ns >= leader.next_wake_ns():
             notice_ns, lost_ns = self._timetabling.notice_ns(now_ns), self._timetabling.lost_ns(now_ns)
             motion = parts.joining.motion(now_ns)
             for part in leader.wake(motion, notice_ns=notice_ns, lost_ns=lost_ns, now_ns=now_ns):

@@ -1,9 +1,9 @@
 """Who keeps a timetable: a bound holds only while all nodes keep the same one, and are heard.
 
-A node that floods a packet in its turn shows that it has the timetable; who has nothing to send floods a join in its
-turn instead. So everybody notices by what is missing that a timetable came late somewhere, that a node fell silent, or
-that a relay on the way from it did. Reports of its neighbors, which contend for the medium, may need longer to travel.
-A node whose neighbors report it silent cannot tell by what it hears; it trusts them for a while.
+A node that begins a flood in a turn of its own marks the packet (`FLAG_TURN`), and so shows that it has the timetable;
+a node that has nothing to send floods a join in its turn instead. By what is missing, every node notices that the
+timetable came late somewhere, that a node fell silent, or that a relay on the way from that node did. A node whose
+neighbors report it silent cannot notice this by itself, so it promises nothing for a while.
 """
 
 from collections.abc import Iterable
@@ -41,8 +41,8 @@ class Followers:
 
     def unheard(self, version: Version, nodes: Iterable[NodeId], *, since_ns: int) -> list[NodeId]:
         """Those of these nodes that were not heard in their turns of a version since an instant."""
-        known = self._known.get(version, {})
-        return [node for node in nodes if node != self._node and known.get(node, -1) < since_ns]
+        known = {self._node: since_ns} | self._known.get(version, {})
+        return [node for node in nodes if node not in known or known[node] < since_ns]
 
     def doubt(self, now_ns: int) -> None:
         """A neighbor has told all that it does not hear this node."""
@@ -56,7 +56,6 @@ class Followers:
         if version not in self._known or (self._doubted_ns is not None and now_ns < self._doubted_ns + _DOUBTED_NS):
             return False
         known, leader = self._known[version], version.authority.leader
-        since_ns = now_ns - silent_ns
         return all(
-            node == self._node or (node in known and (node == leader or known[node] >= since_ns)) for node in nodes
+            node == leader and leader in known for node in self.unheard(version, nodes, since_ns=now_ns - silent_ns)
         )

@@ -27,7 +27,7 @@ from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesI
 from fanet_mw.routing.clustered.timetable.turn_release import CallRelease, RootRelease, TurnsInForce
 from fanet_mw.routing.clustered.timetable.turn_size import most_packet_bytes
 from fanet_mw.units import BROADCAST, US, S, earliest, seconds_to_ns
-from fanet_mw.wire import PRIORITY_BULK, Kind
+from fanet_mw.wire import FLAG_FLOOD, FLAG_TURN, PRIORITY_BULK, Kind
 
 _MOST_ANSWERS: Final = 2
 """The greatest number of missed packets that wait for calls; any further ones contend."""
@@ -277,15 +277,8 @@ class TurnAccess:
     # --- time -----------------------------------------------------------------------------------------------------
 
     def next_wake_ns(self) -> int | None:
-        first_ns = None
-        for release in (self._roots, self._calls, self._spare):
-            if release.planned is not None:
-                first_ns = earliest(first_ns, release.next_wake_ns())
-        for ask in self._asks:
-            wake_ns = ask()
-            if wake_ns is not None and (first_ns is None or wake_ns < first_ns):
-                first_ns = wake_ns
-        return first_ns
+        turns = (release.next_wake_ns() for release in (self._roots, self._calls, self._spare))
+        return earliest(*turns, *(ask() for ask in self._asks))
 
     def wake(self, now_ns: int) -> None:
         self._slots.wake(now_ns)
@@ -299,7 +292,8 @@ class TurnAccess:
             kept = self._kept(packets, through_ns=self._through_ns(start_ns), now_ns=now_ns)
             if kept:
                 self._has_shown, self._shown_ns = self._timetables.at(start_ns), start_ns
-                self._floods.begin(kept, start_ns=start_ns, again_ns=self._repetitions(start_ns))
+                flags = FLAG_FLOOD | FLAG_TURN
+                self._floods.begin(kept, start_ns=start_ns, again_ns=self._repetitions(start_ns), flags=flags)
         if len(self._roots) and not self._roots.has_turn(now_ns=now_ns):
             for packet in self._stranded(now_ns):  # that was the node's last turn: the next timetable gives it none
                 self.forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)

@@ -237,7 +237,7 @@ class AnySwarm(RuleBasedStateMachine):
 
     @initialize(started=st.sets(nodes, min_size=2), relay=st.sampled_from(["all", "counter", "scheduled"]))
     def begin(self, started: set[int], relay: str) -> None:
-        self.swarm = Swarm(scenario(relay=relay, assess_ms=50, resume=False), line())
+        self.swarm = Swarm(scenario(relay=relay, assess_ms=50, resume=False, repair_s=0), line())
         for node in sorted(started):
             self.swarm.start(node)
 

@@ -98,7 +98,7 @@ def _parameters(scenario: Scenario, *, capture: bool) -> s.Ints:
     p[:] = (
         timing.slot_ns, timing.sifs_ns, timing.difs_ns, timing.eifs_extra_ns, timing.ack_ns,
         timing.ack_timeout_ns, timing.header_ns, DETECT_NS, radio.cw_min, radio.cw_max, radio.max_attempts,
-        radio.queue_frames, scenario.mac_lifetime_ns,
+        radio.queue_frames,
         "difs" in as_ns3, "eifs" in as_ns3, sinr and energy_mw(radio) < math.inf, sinr and "onset" in as_ns3,
         "window" in as_ns3, sinr, capture, timing.extension_ns, radio.capture, fading,
         airtime_ns(SHORT_BYTES - 1, radio, rate_mbps=radio.rate_mbps),

@@ -21,9 +21,9 @@ from fanet_mw.airtime import OVERHEAD_BYTES, airtime_ns
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.scenario import Scenario
 
-_ROW: Final = struct.Struct("=6q")
-"""The layout of one row of `asked` and of `out`."""
-_pack, _unpack, _ROW_BYTES = _ROW.pack_into, _ROW.iter_unpack, _ROW.size
+_ASKED_ROW: Final = struct.Struct(f"={s.ASKED_COLUMNS}q")
+_OUT_ROW: Final = struct.Struct(f"={s.OUT_COLUMNS}q")
+_pack, _unpack = _ASKED_ROW.pack_into, _OUT_ROW.iter_unpack
 _ASKED_N, _OUT_N = s.ASKED_N, s.OUT_N
 Rows = list[tuple[int, ...]]
 
@@ -82,6 +82,7 @@ class KernelInterface:
 
     def __init__(self, scenario: Scenario, *, stations: int, faults: Faults, capture: bool = False) -> None:
         self._radio = scenario.radio
+        self._lifetime_ns = scenario.mac_lifetime_ns
         self.faults = faults
         self.link_counters = LinkCounters(stations, has_powers=scenario.radio.channel != "range")
         self._placement = Placement(scenario, stations=stations)
@@ -91,7 +92,7 @@ class KernelInterface:
         self._counts = self.arrays.g.data
         self._asked_bytes = self.arrays.asked.data.cast("B")
         out_bytes = self.arrays.out.data.cast("B")
-        self._out_rows = [out_bytes[: count * _ROW_BYTES] for count in range(len(self.arrays.out) + 1)]
+        self._out_rows = [out_bytes[: count * _OUT_ROW.size] for count in range(len(self.arrays.out) + 1)]
         """The first n rows of `out` as bytes, at index n."""
         self._airtime: dict[int, int] = {}
         self.next_output_ns = s.NEVER
@@ -169,8 +170,11 @@ class KernelInterface:
         self.arrays.fr = np.concatenate([self.arrays.fr, np.zeros_like(self.arrays.fr)], axis=1)
         self._more_starts(2 * more)
 
-    def submit(self, slot: int, src: int, dst: int, size: int, start_ns: int, wants_status: bool) -> None:
-        """Announce a frame of `size` bytes (UDP payload) that will enter its station's queue at `start_ns`.
+    def submit(
+        self, slot: int, src: int, dst: int, size: int, start_ns: int, wants_status: bool, until_ns: int
+    ) -> None:
+        """Announce a frame of `size` bytes (UDP payload) that will enter its station's queue at `start_ns`, and is
+        dropped if it has not begun by `until_ns`, if that is not 0, or within its lifetime.
 
         The kernel learns of it at the next `advance`, or at once if this frame might be the next one to end.
         """
@@ -180,7 +184,11 @@ class KernelInterface:
             airtime = self._airtime[size] = airtime_ns(size + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
         counts = self._counts
         asked = counts[_ASKED_N]
-        _pack(self._asked_bytes, asked * _ROW_BYTES, slot, src, dst, airtime, start_ns, wants_status)
+        ends_ns = start_ns + self._lifetime_ns
+        ends_ns = min(ends_ns, until_ns) if until_ns else ends_ns
+        _pack(
+            self._asked_bytes, asked * _ASKED_ROW.size, slot, src, dst, airtime, start_ns, wants_status, ends_ns
+        )  # fmt: skip
         counts[_ASKED_N] = asked + 1
         if start_ns + airtime < self.next_output_ns or asked + 1 == MOST_ASKED:
             self._take_in()

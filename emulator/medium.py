@@ -143,7 +143,7 @@ class Medium(Actor):
 
     def _request(self, station: int, request: TxRequest, now_ns: int) -> None:
         """Handle one request; whatever is wrong with it is counted and not raised."""
-        seq, start_ns, frame, dst, wants_status = request
+        seq, start_ns, frame, dst, wants_status, until_ns = request
         numbers, slots = self._numbers, self._slots
         if seq != numbers.expected[station] and (lost := numbers.lost_before(station, seq)):
             self._counters.dropped[DropReason.BUS] += lost
@@ -169,7 +169,8 @@ class Medium(Actor):
         slots.held[station] += 1
         if start_ns < self._now_ns:
             start_ns = self._now_ns
-        self._kernel.submit(slot, station, s.EVERYONE if dst == BROADCAST else dst - 1, size, start_ns, wants_status)
+        to = s.EVERYONE if dst == BROADCAST else dst - 1
+        self._kernel.submit(slot, station, to, size, start_ns, wants_status, until_ns)
         if self._kernel.link_counters.next_ns is None:
             self._kernel.link_counters.plan(self._now_ns)
             self._due_ns = self._next_due_ns()

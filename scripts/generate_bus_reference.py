@@ -44,7 +44,7 @@ class Field(NamedTuple):
 _VECTOR: Final = "east_m north_m up_m"
 _MOVES: Final = "east_m_s north_m_s up_m_s"
 NAMED: Final[dict[type[Any], Names]] = {
-    m.TxRequest: Names("radio/<id>/tx", "seq start_ns dst wants_status", "the frame, MAVLink, to the end"),
+    m.TxRequest: Names("radio/<id>/tx", "seq start_ns dst wants_status until_ns", "the frame, MAVLink, to the end"),
     m.Reception: Names("radio/<id>/rx", "src end_ns rssi_dbm", "the frame, MAVLink, to the end"),
     m.TxStatus: Names("radio/<id>/rx", "seq outcome end_ns attempts"),
     m.Poses: Names(

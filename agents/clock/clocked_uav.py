@@ -251,7 +251,8 @@ class ClockedUav(Actor):
         start_ns = self._true_ns(request.start_ns)
         if 0 < now_ns - start_ns <= _ROUNDING_NS:
             start_ns = now_ns
-        return request._replace(start_ns=start_ns)
+        until_ns = self._true_ns(request.until_ns) if request.until_ns else 0
+        return request._replace(start_ns=start_ns, until_ns=until_ns)
 
     def _sample(self, at_ns: int) -> None:
         """Record the true error of the node's swarm time, and give the protocol the greatest error that any clock in

@@ -39,7 +39,6 @@ from emulator.kernel.state import (
     BASE,
     BEGINS,
     BO,
-    BORN,
     CAPTURE,
     CARRIER_SENSE_MW,
     COPY,
@@ -57,6 +56,7 @@ from emulator.kernel.state import (
     DST,
     ENDS,
     EVERYONE,
+    EXPIRES,
     FADING,
     FAILED_BY,
     FATE,
@@ -69,7 +69,6 @@ from emulator.kernel.state import (
     HS_N,
     KEEPS_WINDOW,
     LAST_END,
-    LIFETIME_NS,
     LINK_DST,
     LINK_FRAME,
     LINK_KIND,
@@ -118,7 +117,7 @@ def take_head(st: Ints, fr: Ints, s: int) -> None:
 
 
 @jit
-def expire(g: Ints, p: Ints, st: Ints, fr: Ints, out: Ints, s: int, t: int) -> None:
+def expire(g: Ints, st: Ints, fr: Ints, out: Ints, s: int, t: int) -> None:
     """Drop the frames that have waited in the queue beyond their lifetime; the contention window stays as it is.
 
     The first frame is kept while it is on the air or its ACK is awaited.
@@ -126,7 +125,7 @@ def expire(g: Ints, p: Ints, st: Ints, fr: Ints, out: Ints, s: int, t: int) -> N
     kept = st[HEAD, s] if st[TX_KIND, s] == DATA or st[WAITING, s] >= 0 else -1
     if kept >= 0:
         take_head(st, fr, s)
-    while st[HEAD, s] >= 0 and t - fr[BORN, st[HEAD, s]] >= p[LIFETIME_NS]:
+    while st[HEAD, s] >= 0 and t >= fr[EXPIRES, st[HEAD, s]]:
         f = st[HEAD, s]
         take_head(st, fr, s)
         done(g, fr, out, f, DONE_EXPIRED, t)
@@ -143,7 +142,7 @@ def arrive(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, out: Ints, f: int, t:
     """Put a frame into the MAC queue of its station; it is dropped when the queue is full."""
     s = fr[SRC, f]
     if st[QLEN, s] >= p[QUEUE_LIMIT]:
-        expire(g, p, st, fr, out, s, t)
+        expire(g, st, fr, out, s, t)
     if st[QLEN, s] >= p[QUEUE_LIMIT]:
         done(g, fr, out, f, DONE_FULL, t)
         return
@@ -215,7 +214,7 @@ def access(
     st[BO, s] = 0
     st[FRESH, s] = 0
     st[BASE, s] = t
-    expire(g, p, st, fr, out, s, t)
+    expire(g, st, fr, out, s, t)
     f = st[HEAD, s]
     if f < 0:
         return

@@ -20,19 +20,18 @@ from emulator.kernel.state import (
     ARRIVE,
     ASKED_N,
     BEGINS,
-    BORN,
     DETECT_NS,
     DIFS_FIRST,
     DIFS_NS,
     DST,
     ENDS,
+    EXPIRES,
     FRAME_ROWS,
     HEAD,
     HEADER_NS,
     HR_N,
     HS_N,
     LAST_END,
-    LIFETIME_NS,
     LINK_ROWS,
     NEVER,
     NEXT,
@@ -82,7 +81,7 @@ def take_in(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, asked: Ints, bound: 
         fr[SRC, f] = src
         fr[DST, f] = asked[i, 2]
         fr[AIRTIME, f] = airtime
-        fr[BORN, f] = t
+        fr[EXPIRES, f] = asked[i, 6]
         fr[NEXT, f] = -1
         fr[OPEN, f] = 1
         fr[WANTS_STATUS, f] = asked[i, 5]
@@ -159,7 +158,7 @@ def earliest_end(g: Ints, p: Ints, st: Ints, fr: Ints, t: int, kind: int, a: int
     if st[SCHEDULED, a] != t or st[HEAD, a] < 0:
         return NEVER
     f = st[HEAD, a]
-    return int(t) if t - fr[BORN, f] >= p[LIFETIME_NS] else int(t + fr[AIRTIME, f] + g[REACH_NS])
+    return int(t) if t >= fr[EXPIRES, f] else int(t + fr[AIRTIME, f] + g[REACH_NS])
 
 
 @jit

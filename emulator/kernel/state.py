@@ -76,7 +76,7 @@ interference that does not count against the locked frame [mW]."""
     SRC,
     DST,  # station, or EVERYONE
     AIRTIME,
-    BORN,  # instant at which the frame enters the MAC queue
+    EXPIRES,  # instant from which the frame may no longer begin
     NEXT,  # next frame in the queue, -1 none
     ATTEMPTS,  # transmissions so far
     RECEIVED,  # copies received; duplicates of a unicast are not counted
@@ -133,8 +133,8 @@ NEVER: Final = 1 << 62
 ARRIVE, ACCESS, SEND_ACK, ACK_TIMEOUT, TX_DONE, RX_START, RX_DETECT, RX_END, ALL_START, ALL_DETECT, ALL_END = range(11)
 """Each ALL_* stands for RX_* on the links a .. b - 1 of one transmitter, handled in order, nearest receiver first."""
 
-# --- requests (asked): frame, source, destination, airtime, start, wants status ---------------------------------------
-ASKED_COLUMNS: Final = 6
+# --- requests (asked): frame, source, destination, airtime, start, wants status, expiry -------------------------------
+ASKED_COLUMNS: Final = 7
 
 # --- outputs (out): kind, frame, station, t_ns, rssi in 1/1000 dBm, attempts ------------------------------------------
 OUT_RECEPTION, OUT_DONE, OUT_FREE, OUT_START, OUT_COLUMNS = 0, 1, 2, 3, 6
@@ -192,7 +192,6 @@ ATTEMPT_ROWS: Final = 16
     CW_MAX,
     MAX_ATTEMPTS,
     QUEUE_LIMIT,
-    LIFETIME_NS,
     DIFS_FIRST,  # 1, as ns-3: a frame waits one DIFS after it is queued, and draws nothing if it is interrupted
     EIFS_FROM_FRAME,  # 1, as ns-3: EIFS begins at the end of a bad frame, not when the medium is idle after it
     SENSES_SUMS,  # 1: energy above ENERGY_MW is sensed, whatever it consists of
@@ -205,7 +204,7 @@ ATTEMPT_ROWS: Final = 16
     FADING,  # 0 none, else the number of the law (fading.py)
     SHORT_NS,  # airtime up to which a frame of data has the error rates of short frames
     PARAMETERS,
-) = range(25)
+) = range(24)
 (
     DETECT_RATIO,
     HEADER_BITS_PER_NS,

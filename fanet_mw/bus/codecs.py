@@ -49,7 +49,7 @@ from fanet_mw.units import Enu, NodeId
 
 # --- bodies: one encoder and one decoder per message type, beside each other -------------------------------------
 
-_TX = struct.Struct("<IqHB")
+_TX = struct.Struct("<IqHBq")
 _RX = struct.Struct("<Hqf")
 _STATUS = struct.Struct("<IBqB")
 _SETPOINT = struct.Struct("<q4dB3d")
@@ -68,12 +68,12 @@ _LINKS = struct.Struct("<qqI")
 
 
 def _encode_tx(m: TxRequest) -> bytes:
-    return _TX.pack(m.seq & 0xFFFF_FFFF, m.start_ns, m.dst, m.wants_status) + m.frame
+    return _TX.pack(m.seq & 0xFFFF_FFFF, m.start_ns, m.dst, m.wants_status, m.until_ns) + m.frame
 
 
 def _decode_tx(body: bytes) -> TxRequest:
-    seq, start_ns, dst, wants_status = _TX.unpack_from(body)
-    return TxRequest(seq, start_ns, body[_TX.size :], NodeId(dst), bool(wants_status))
+    seq, start_ns, dst, wants_status, until_ns = _TX.unpack_from(body)
+    return TxRequest(seq, start_ns, body[_TX.size :], NodeId(dst), bool(wants_status), until_ns)
 
 
 def _encode_rx(m: Reception) -> bytes:

@@ -31,6 +31,8 @@ class TxRequest(NamedTuple):
     """A neighbor (unicast, acknowledged) or BROADCAST."""
     wants_status: bool
     """True if a `TxStatus` is wanted, as it is for unicasts, and usually not for broadcasts."""
+    until_ns: int = 0
+    """Swarm instant from which the MAC may no longer begin to transmit the frame, and drops it; 0: none is given."""
 
 
 class Reception(NamedTuple):

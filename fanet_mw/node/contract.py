@@ -30,12 +30,17 @@ class Port(Protocol):
     velocity: Enu
     """The node's last known velocity [m/s]."""
 
-    def transmit(self, frame: bytes, dst: NodeId, start_ns: int, wants_status: bool = False) -> int:
-        """Announce a transmission to the radio; returns the sequence number of the request."""
+    def transmit(self, frame: bytes, dst: NodeId, start_ns: int, wants_status: bool = False, until_ns: int = 0) -> int:
+        """Announce a transmission to the radio; returns the sequence number of the request.
 
-    def transmit_together(self, packets: Sequence[Packet], *, flags: int, at_ns: Sequence[int]) -> None:
-        """Begin a phase of several packets: broadcast them at each of these instants, in as few frames as possible.
-        Copies that come back in that phase count as duplicates.
+        The radio drops the frame if it cannot begin it before `until_ns`; 0 leaves that to the radio.
+        """
+
+    def transmit_together(
+        self, packets: Sequence[Packet], *, flags: int, at_ns: Sequence[int], until_ns: int = 0
+    ) -> None:
+        """Begin a phase of several packets: broadcast them at each of these instants, in as few frames as possible, and
+        before `until_ns` as in `transmit`. Copies that come back in that phase count as duplicates.
         """
 
     def transmit_to(self, packet: Packet, dst: NodeId, *, flags: int, start_ns: int) -> int:

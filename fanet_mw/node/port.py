@@ -50,23 +50,25 @@ class NodePort:
 
     # --- frames ---------------------------------------------------------------------------------------------------
 
-    def transmit(self, frame: bytes, dst: NodeId, start_ns: int, wants_status: bool = False) -> int:
+    def transmit(self, frame: bytes, dst: NodeId, start_ns: int, wants_status: bool = False, until_ns: int = 0) -> int:
         seq = self.frames_sent
         if self._held and self._let_out(frame, seq, start_ns):
             wants_status = True
         self.frames_sent = seq + 1
-        self.requests.append(_new(TxRequest, (seq, start_ns, frame, dst, wants_status)))
+        self.requests.append(_new(TxRequest, (seq, start_ns, frame, dst, wants_status, until_ns)))
         return seq
 
     def mark(self, packet: Packet, *, flags: int) -> None:
         self._duplicates.mark(hash_of(packet.frame), PHASES[flags])
 
-    def transmit_together(self, packets: Sequence[Packet], *, flags: int, at_ns: Sequence[int]) -> None:
+    def transmit_together(
+        self, packets: Sequence[Packet], *, flags: int, at_ns: Sequence[int], until_ns: int = 0
+    ) -> None:
         for packet in packets:
             self.mark(packet, flags=flags & wire.PHASE_MASK)
         frames = [self._begun(packet, flags) for packet in packets]
         for start_ns in at_ns:
-            self._share([(start_ns, frame) for frame in frames])
+            self._share([(start_ns, frame) for frame in frames], until_ns=until_ns)
 
     def transmit_to(self, packet: Packet, dst: NodeId, *, flags: int, start_ns: int) -> int:
         self.mark(packet, flags=flags)
@@ -89,7 +91,7 @@ class NodePort:
         """The bytes of a packet whose phase begins here: an own packet as it is, another node's with one more hop."""
         return wire.rewrite(packet.frame, self.node, flags, hop=0 if packet.header.origin == self.node else 1)
 
-    def _share(self, packets: Sequence[tuple[int, bytes]]) -> None:
+    def _share(self, packets: Sequence[tuple[int, bytes]], *, until_ns: int = 0) -> None:
         """Broadcast packets in as few frames as possible."""
         rest = iter(packets)
         for start_ns, frame, count in aggregated(packets, most_bytes=self.scenario.radio.max_frame_bytes):
@@ -99,7 +101,7 @@ class NodePort:
                 for packet_ns, packet in islice(rest, count):
                     wants_status |= self._let_out(packet, seq, packet_ns)
             self.frames_sent = seq + 1
-            self.requests.append(_new(TxRequest, (seq, start_ns, frame, BROADCAST, wants_status)))
+            self.requests.append(_new(TxRequest, (seq, start_ns, frame, BROADCAST, wants_status, until_ns)))
 
     def _let_out(self, frame: bytes, request: int, start_ns: int) -> bool:
         """Record when the first frame of an own application's packet is announced; True if its status is wanted."""

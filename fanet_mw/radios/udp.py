@@ -179,7 +179,8 @@ class UdpRadio:
             self._on_message(TxStatus(request.seq, outcome, self._now_ns(), 0))
 
     def _transmit(self, request: TxRequest) -> None:
-        if self._now_ns() - request.start_ns > TOO_LATE_NS:
+        now_ns = self._now_ns()
+        if now_ns - request.start_ns > TOO_LATE_NS or 0 < request.until_ns <= now_ns:
             self.counts["too_late"] += 1
             self._not_sent(request, TxOutcome.LATE)
             return

@@ -117,6 +117,12 @@ def request_of(seq: int, *, at_ms: int, dst: NodeId = BROADCAST, size: int = 200
     return TxRequest(seq, at_ms * MS, bytes([seq % 256]) * size, dst, status)
 
 
+def test_a_frame_is_not_begun_from_its_end_on(run: Callable[[Requests], Heard]) -> None:
+    heard = run([(1, request_of(0, at_ms=100, status=True)._replace(until_ns=100 * MS)), (1, request_of(1, at_ms=150))])
+    assert [reception.frame[0] for reception in receptions(heard, 2)] == [1]
+    assert [status.outcome in (TxOutcome.LIFETIME, TxOutcome.LATE) for status in statuses(heard, 1)] == [True]
+
+
 def receptions(heard: Heard, node: int) -> list[Reception]:
     return [message for message in heard[node] if isinstance(message, Reception)]
 

@@ -184,6 +184,10 @@ class Clustered(RoutingProtocol):
     def hello_start_ns(self, start_ns: int) -> int:
         return self.parts.access.hello_start_ns(start_ns)
 
+    def send_hello(self, packet: Packet, *, start_ns: int, wants_status: bool, now_ns: int) -> int:
+        until_ns = self.parts.access.hello_until_ns(start_ns, len(packet.frame))
+        return self._port.transmit(packet.frame, BROADCAST, start_ns, wants_status, until_ns)
+
     def hello_share(self, *, now_ns: int) -> float:
         return self.parts.roles.hello_share(now_ns)
 

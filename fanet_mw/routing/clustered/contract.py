@@ -56,6 +56,9 @@ class Access(Protocol):
     def hello_start_ns(self, start_ns: int) -> int:
         """The earliest instant at which a hello, due at `start_ns`, may be transmitted."""
 
+    def hello_until_ns(self, start_ns: int, size: int) -> int:
+        """The instant from which a hello of `size` bytes may no longer begin that may at `start_ns`; 0: none."""
+
     def next_wake_ns(self) -> int | None: ...
 
     def wake(self, now_ns: int) -> None: ...

@@ -34,8 +34,11 @@ class Air:
         states = array("d", [value for east in places_m for value in (east, 0.0, 50.0, 0.0, 0.0, 0.0)])
         self.medium.receive(NAMES.pose, Poses(t_ns, ids, states), t_ns)
 
-    def send(self, src: int, at_ns: int, *, dst: int = BROADCAST, now_ns: int = 0, payload: bytes = PAYLOAD) -> None:
-        request = TxRequest(self._seq[src], at_ns, payload, NodeId(dst), wants_status=True)
+    def send(
+        self, src: int, at_ns: int, *, dst: int = BROADCAST, now_ns: int = 0, payload: bytes = PAYLOAD,
+        until_ns: int = 0,
+    ) -> None:  # fmt: skip
+        request = TxRequest(self._seq[src], at_ns, payload, NodeId(dst), wants_status=True, until_ns=until_ns)
         self._seq[src] += 1
         self.medium.receive(NAMES.radio_tx(src), request, now_ns)
 

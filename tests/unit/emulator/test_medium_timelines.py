@@ -172,6 +172,16 @@ def test_the_queue_limit_and_the_lifetime_drop_with_their_reasons(make_scenario:
     assert dropped["mac_lifetime"] >= 2
 
 
+def test_a_frame_that_waits_beyond_its_own_end_is_dropped_and_the_next_one_goes(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 3}), [0, 100, 50])
+    air.send(3, 1 * MS)
+    air.send(1, 1 * MS + 100 * US, until_ns=1 * MS + FRAME_NS)
+    air.send(1, 1 * MS + 200 * US, until_ns=9 * MS)
+    heard = air.run()
+    assert [outcome for node, outcome, _, _ in statuses(heard) if node == 1] == [TxOutcome.LIFETIME, TxOutcome.SENT]
+    assert air.medium.report()["frames"]["dropped"] == {"mac_lifetime": 1}
+
+
 def test_late_requests_are_counted_and_very_late_ones_dropped(make_scenario: MakeScenario) -> None:
     air = Air(make_scenario(**{"nodes.count": 2}), [0, 100])
     air.send(1, 8 * MS, now_ns=10 * MS)

@@ -44,6 +44,16 @@ class ContentionTiming:
         turns = None if self.turns_at is None else self.turns_at(start_ns)
         return start_ns if turns is None else turns.contending_ns(start_ns, self._window)
 
+    def ends_ns(self, start_ns: int, access_ns: int) -> int:
+        """The instant from which a frame that may start at `start_ns`, and takes `access_ns` at an idle medium, can no
+        longer end within its contention window; 0 if that instant lies in no window.
+        """
+        turns = None if self.turns_at is None else self.turns_at(start_ns)
+        if turns is None:
+            return 0
+        ends_ns = turns.superframe_start_ns(start_ns) + turns.contention_ns
+        return ends_ns - access_ns if start_ns < ends_ns else 0
+
     def announced_ns(self, from_ns: int) -> int:
         """A random instant from `from_ns` on, at which a frame is to be announced that then contends at once."""
         jitter_ns = 0 if self.most_jitter_ns is None else int(self._jitter() * self.most_jitter_ns)

@@ -55,9 +55,10 @@ class Floods:
         """
         if not self._goes_on(packet):  # a packet that goes no farther needs no instant
             return
-        start_ns = self._contention.start_ns(due_ns=due_ns, now_ns=now_ns)
-        if self._contention.has_room(start_ns, self._access_ns(packet)):
-            self._port.transmit_together([packet], flags=FLAG_FLOOD, at_ns=(start_ns,))
+        start_ns, access_ns = self._contention.start_ns(due_ns=due_ns, now_ns=now_ns), self._access_ns(packet)
+        if self._contention.has_room(start_ns, access_ns):
+            until_ns = self._contention.ends_ns(start_ns, access_ns)
+            self._port.transmit_together([packet], flags=FLAG_FLOOD, at_ns=(start_ns,), until_ns=until_ns)
 
     def contend(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         """Flood a packet that was due at `due_ns` from here, in the first window with room: nobody will ask for it."""

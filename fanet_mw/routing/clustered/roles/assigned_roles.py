@@ -231,6 +231,7 @@ class AssignedRoles:
         assert authority is not None, "a node that leads has taken office"
         self.parts.joining.rest()
         self._leader = self._make_leader(authority, epoch=self.parts.membership.epoch, elected=elected, now_ns=now_ns)
+        self._leader.fly(self.parts.joining.motion(now_ns))
 
     def _join(self, now_ns: int, *, instead_of: int = 0) -> None:
         """Flood a join: it states the node's position to all, and asks the leader for a place if the node has none."""
@@ -250,6 +251,8 @@ class AssignedRoles:
 
     def before_hello(self, now_ns: int) -> None:
         parts, leader = self.parts, self._leader
+        if leader is not None:
+            leader.fly(parts.joining.motion(now_ns))
         if leader is None and self._timetabling.must_show(now_ns):
             self._join(now_ns)
         elif leader is None:

@@ -141,11 +141,15 @@ class Leader:
         self._not_before_ns = now_ns + ANSWER_NS if elected else now_ns
         """No assignment is made before this instant, at which all nodes have had time to answer the call."""
 
+    def fly(self, here: Motion) -> None:
+        """The leader itself flies as `here` states; a join tells where a node was beside it."""
+        self._roster.own.add(here)
+
     def on_join(self, join: Join, here: Motion, *, born_ns: int, now_ns: int) -> None:
         """A node has joined, or stands in for a head. The leader itself is in no cluster (paper, 4.1), and flies as
         `here` states.
         """
-        self._roster.own.add(here)
+        self.fly(here)
         node, silent = NodeId(join.node), NodeId(join.instead_of)
         if node == self._authority.leader:
             return
@@ -196,7 +200,7 @@ class Leader:
         """
         if now_ns < self._due_ns:
             return []
-        self._roster.own.add(here)
+        self.fly(here)
         self._roster.forget(now_ns, lost_ns=lost_ns)
         if self._roster.nodes and now_ns >= self._not_before_ns:
             self._renew(here, notice_ns, now_ns)

@@ -4,7 +4,8 @@
     of a companion       the same, moved by as much as the leader has strayed from straight flight since: a node whose
                          velocity was the leader's. So a formation that turns keeps its shape before its updates have
                          come. One that has sent none although the leader has turned long ago has not turned along
-    in a rigid formation  where it was beside the leader, so errors of the velocities that are stated do not accumulate
+    in a rigid formation  where it was beside the leader, whatever velocities are stated: they have errors, and are 0
+                          until GPS has first told them
 
     a node joins              -> it is known until it has given no sign of life for `lost_ns`, in which it should have
                                  sent two position updates
@@ -82,7 +83,8 @@ class _Joined(NamedTuple):
 
     motion: Motion
     beside: Motion | None
-    """The leader's own motion at that instant if its velocity was the same; None if not, or if it is not known."""
+    """The leader's own motion at that instant if its velocity was the same, or in a rigid formation; None if not, or if
+    it is not known."""
 
 
 class Roster:
@@ -136,7 +138,8 @@ class Roster:
     def on_join(self, node: NodeId, motion: Motion) -> None:
         """A node was at a position with a velocity at an instant (`motion`)."""
         beside = self.own.at(motion.at_ns)
-        self._joined[node] = _Joined(motion, beside if beside is not None and alike(motion, beside) else None)
+        along = beside is not None and (self._rigid or alike(motion, beside))
+        self._joined[node] = _Joined(motion, beside if along else None)
 
     def on_report(self, silent: NodeId, by: NodeId, there: Motion, *, now_ns: int) -> int | None:
         """The node `by`, which flies at `there`, reports that a node is silent.
@@ -189,11 +192,11 @@ class Roster:
         straight = motion.position_at(t_ns)
         if beside is None or here is None:
             return straight
+        if self._rigid:
+            return here.position_at(t_ns).minus(beside.position.minus(motion.position))
         turned_ns = self.own.turned_ns(beside)
         if turned_ns is not None and now_ns - turned_ns > self._settled_ns:
             return straight
-        if self._rigid:
-            return here.position_at(t_ns).minus(beside.position.minus(motion.position))
         if turned_ns is None and now_ns - motion.at_ns > self._settled_ns:
             return straight
         return straight.minus(beside.position_at(t_ns).minus(here.position_at(t_ns)))

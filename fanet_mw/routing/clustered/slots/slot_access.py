@@ -77,6 +77,9 @@ class SlotAccess:
     def hello_start_ns(self, start_ns: int) -> int:
         return start_ns
 
+    def hello_until_ns(self, start_ns: int, size: int) -> int:
+        return 0
+
     # --- when the schedule changes the node's role ----------------------------------------------------------------
 
     def serve(self, now_ns: int) -> None:

@@ -274,6 +274,9 @@ class TurnAccess:
                 return called_ns
         return self._contention.not_before(start_ns)
 
+    def hello_until_ns(self, start_ns: int, size: int) -> int:
+        return self._contention.ends_ns(start_ns, longest_access_ns(size, self._port.scenario.radio))
+
     # --- time -----------------------------------------------------------------------------------------------------
 
     def next_wake_ns(self) -> int | None:

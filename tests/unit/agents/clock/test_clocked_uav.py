@@ -73,6 +73,15 @@ def test_what_it_announces_leaves_in_true_time(make_scenario: MakeScenario) -> N
     assert all(abs(lead_ns - 20 * MS) <= 3 * US for lead_ns in leads), "whatever its own clock shows"
 
 
+def test_the_end_of_a_frame_is_told_in_true_time_too(make_scenario: MakeScenario) -> None:
+    made = clocked(make_scenario, **{"clock.offset_ms": 40, "clock.sync": "none"})
+    shown_ns = made._time.line.swarm_ns(made._clock.local_ns(5 * S))
+    asked = TxRequest(0, shown_ns, b"x", BROADCAST, wants_status=False, until_ns=shown_ns + 7 * MS)
+    told = made._request(asked, 5 * S - 20 * MS)
+    assert told.until_ns - told.start_ns == pytest.approx(7 * MS, abs=US)
+    assert made._request(asked._replace(until_ns=0), 5 * S).until_ns == 0
+
+
 @pytest.mark.parametrize("ahead_ms", [0, 5000])
 def test_the_time_from_the_frame_to_the_application_is_true_time_while_swarm_time_stands_still(
     make_scenario: MakeScenario, ahead_ms: int

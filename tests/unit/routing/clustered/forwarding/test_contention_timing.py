@@ -45,6 +45,14 @@ def test_what_a_neighbor_will_ask_for_again_is_left_out_of_a_full_window() -> No
     assert contention.has_room(1001 * MS, 2 * MS)
 
 
+def test_a_frame_in_a_window_must_end_within_it_and_no_other_has_an_end() -> None:
+    contention = in_windows()
+    assert contention.ends_ns(519 * MS, 2 * MS) == 518 * MS
+    assert contention.ends_ns(520 * MS, 2 * MS) == 0, "a call, for example"
+    contention.turns_at = None
+    assert contention.ends_ns(519 * MS, 2 * MS) == 0
+
+
 def test_a_frame_that_is_longer_than_the_share_has_a_window_for_itself() -> None:
     contention = in_windows()
     assert [contention.with_room(400 * MS, 9 * MS) // MS for _ in range(3)] == [500, 1000, 1500]

@@ -54,6 +54,22 @@ def scenario(make_scenario: MakeScenario) -> Scenario:
     return make_scenario(**{"nodes.count": 6, "clusters.count": 1, "clusters.flooding_period_s": 1})
 
 
+def test_who_joined_before_a_formation_set_out_is_beside_the_leader_though_it_hears_of_that_later(
+    make_scenario: MakeScenario,
+) -> None:
+    keys = {"nodes.count": 2, "clusters.count": 1, "clusters.relay": "scheduled", "mobility.model": "formation"}
+    desk = Desk(make_scenario(**keys))
+    flown = [
+        Motion(Enu(0.0, 10.0 * max(0, now_s - 1), 50.0), Enu(0.0, 10.0 * (now_s > 0), 0.0), now_s * S)
+        for now_s in range(8)
+    ]
+    for here in flown[:3]:
+        desk.leader.fly(here)
+    desk.leader.on_join(Join(2, Enu(100.0, 0.0, 50.0), STILL), flown[3], born_ns=100 * MS, now_ns=3 * S)
+    desk.leader.wake(flown[7], now_ns=7 * S)
+    assert desk.leader.place(2).minus(desk.leader.place(1)).norm() == pytest.approx(100, abs=3)
+
+
 def test_clusters_are_made_when_no_join_has_come_for_a_moment(scenario: Scenario) -> None:
     desk = Desk(scenario)
     desk.join(2, 100, born_ns=1000 * MS)

@@ -84,7 +84,10 @@ def test_in_a_rigid_formation_an_error_of_a_velocity_moves_nobody(until_s: int) 
     assert beside(formation.offset(), -200, 0)
 
 
-def test_in_a_rigid_formation_too_a_node_that_has_not_turned_along_flies_on() -> None:
-    formation = Formation(rigid=True)
-    formation.fly(TURN_S + SETTLED_S + 2)
-    assert not beside(formation.offset(), -200, 0)
+@pytest.mark.parametrize("until_s", [6, TURN_S, TURN_S + SETTLED_S + 5])
+def test_in_a_rigid_formation_a_node_that_joined_before_its_first_velocity_stays_beside_the_leader(
+    until_s: int,
+) -> None:
+    formation = Formation(velocity=Enu(0.0, 0.0, 0.0), rigid=True)
+    formation.fly(until_s)
+    assert beside(formation.offset(), -200, 0)

@@ -17,8 +17,10 @@ other, 15 s apart, and `8!` flies to the end; these may stand together. One JSON
     curve      of losses one after the other, at the next one: lost, connected since the one before, covered, found
 
 and, of copies that fly to the end, who was found, the share of reports delivered of what an ideal flood could have
-delivered, and contacts. `--scenario NAME` and `--set KEY=VALUE` fly others. The tables of `docs/explanation/search.md`
-are made of these lines, in `docs/results/data/losses.jsonl` (`scripts/tables losses flown-on losses-in-a-row`).
+delivered, contacts, all stretches in which the others were apart, and when the broken bounds were stated. With
+`--without` the flight itself, in which nobody is lost, has a line, too. `--scenario NAME` and `--set KEY=VALUE` fly
+others. The tables of `docs/explanation/search.md` are made of these lines, in `docs/results/data/losses.jsonl`
+(`scripts/tables losses flown-on losses-in-a-row`).
 """
 
 import argparse
@@ -175,13 +177,15 @@ class Flight:
                 (with_bound if name in stated and name not in short else without).append(one.t_ns)
         return with_bound, without
 
-    def broken(self, lost: set[int], from_ns: int) -> int:
-        """The bounds stated since an instant that were not kept."""
+    def broken(self, lost: set[int], from_ns: int) -> list[float]:
+        """When the bounds that were not kept were stated, from an instant on [s]."""
         until: dict[tuple[int, int], tuple[int, set[int]]] = {}
+        stated_s: dict[tuple[int, int], float] = {}
         lives = set(self.scenario.uav_ids) - lost
         for stated in records_of(self._records, BoundStated):
             if stated.t_ns >= from_ns and stated.t_ns + stated.bound_ns < self.host.now_ns and stated.node in lives:
                 until[stated.node, stated.seq] = stated.bound_ns, lives - {stated.node}
+                stated_s[stated.node, stated.seq] = round(stated.t_ns / S, 1)
         for one in records_of(self._records, BoundExcludes):
             if (one.node, one.seq) in until:
                 until[one.node, one.seq][1].discard(one.other)
@@ -189,7 +193,7 @@ class Flight:
             due_ns, missing = until.get((came.origin, came.seq), (-1, set[int]()))
             if came.delay_ns <= due_ns:
                 missing.discard(came.node)
-        return sum(bool(missing) for _, missing in until.values())
+        return sorted(stated_s[name] for name, (_, missing) in until.items() if missing)
 
     def curve(self, losses: Sequence[Loss], every_s: float, torn: Sequence[tuple[int, bool]]) -> list[list[float]]:
         """What is left so long after each loss: lost, connected since the one before, covered, found."""
@@ -248,29 +252,59 @@ def judged(flight: Flight, copy: Copy) -> dict[str, Any]:
     _, without = flight.bounds(lost, from_ns=last_ns, to_ns=window_ns)
     again_ns = last_ns + round((heal_s[-1] + _AGAIN_S) * S)
     held, late = flight.bounds(lost, from_ns=again_ns, to_ns=window_ns)
+    broken_s = flight.broken(lost, last_ns + round(max(_NOTICED_S, heal_s[-1]) * S))
     found: dict[str, Any] = {
         "scenario": flight.scenario.name, "seed": flight.scenario.seed, "losses": losses, "heal_s": heal_s,
         "connected": round(1 - statistics.fmean(is_torn for _, is_torn in torn), 3) if torn else None,
         "bounds_s": round((max(without, default=last_ns) - last_ns) / S, 1), "bounded": [_share(held, late)],
-        "broken": flight.broken(lost, last_ns + round(max(_NOTICED_S, heal_s[-1]) * S)),
+        "broken": len(broken_s),
     }  # fmt: skip
     if every_s:
         found["curve"] = flight.curve(losses, every_s, torn)
     if to_end:
-        summary = flight.summary()
-        mission, reached = summary["mission"], summary["reachable"]
-        found |= {"found": mission["confirmed"], "of": mission["survivors"], "covered": mission["coverage"]}
-        found |= {"pdr": reached.get("report", reached)["pdr"], "contacts": mission["collisions"]}
-        found["last_find_s"] = max(mission["time_to_confirm_s"], default=None)
+        found |= outcome(flight) | {"apart": stretches(torn), "broken_s": broken_s}
     return found
+
+
+def stretches(torn: Sequence[tuple[int, bool]]) -> list[list[float]]:
+    """From when until when it was torn [s]."""
+    found: list[list[float]] = []
+    for t_ns, is_torn in torn:
+        t_s = round(t_ns / S, 1)
+        if is_torn and found and t_s - found[-1][1] <= _APART_S:
+            found[-1][1] = t_s
+        elif is_torn:
+            found.append([t_s, t_s])
+    return found
+
+
+def outcome(flight: Flight) -> dict[str, Any]:
+    """What a flight that has come to its end has achieved."""
+    summary = flight.summary()
+    mission, reached = summary["mission"], summary["reachable"]
+    return {
+        "found": mission["confirmed"], "of": mission["survivors"], "covered": mission["coverage"],
+        "pdr": reached.get("report", reached)["pdr"], "contacts": mission["collisions"],
+        "last_find_s": max(mission["time_to_confirm_s"], default=None),
+    }  # fmt: skip
+
+
+def without_a_loss(flight: Flight) -> dict[str, Any]:
+    """The line of the flight in which nobody is lost."""
+    torn = flight.torn([], from_ns=0)
+    return {
+        "scenario": flight.scenario.name, "seed": flight.scenario.seed, "losses": [], "heal_s": [],
+        "connected": round(1 - statistics.fmean(is_torn for _, is_torn in torn), 3),
+        "broken": len(flight.broken(set(), 0)),
+    } | outcome(flight)  # fmt: skip
 
 
 def _share(yes: Sequence[int], no: Sequence[int]) -> float | None:
     return round(len(yes) / (len(yes) + len(no)), 3) if yes or no else None
 
 
-def fly(scenario: Scenario, copies: Sequence[Copy]) -> None:
-    """Fly, and print a line for each copy, which are in the order of their losses."""
+def fly(scenario: Scenario, copies: Sequence[Copy], *, without: bool = False) -> None:
+    """Fly, and print a line for each copy, which are in the order of their losses; `without`: for the flight, too."""
     with GARBAGE.not_collected():
         flight, waiting = Flight(scenario), list[tuple[int, dict[str, Any]]]()
         end_ns = scenario.duration_ns
@@ -300,6 +334,9 @@ def fly(scenario: Scenario, copies: Sequence[Copy]) -> None:
         if waiting:
             flight.host.run(max(t_ns for t_ns, _ in waiting))
         _say(flight, waiting)
+        if without:
+            flight.host.run(end_ns)
+            print(json.dumps(without_a_loss(flight)), flush=True)
 
 
 def _first(copy: Copy) -> int:
@@ -327,11 +364,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("seed", type=int)
     parser.add_argument("copies", nargs="+", type=Copies.of)
+    parser.add_argument("--without", action="store_true", help="fly the flight without a loss to its end, too")
     parser.add_argument("--scenario", default="rescue")
     parser.add_argument("--set", action="append", default=[], dest="settings")
     asked = parser.parse_args(arguments)
     scenario = find(asked.scenario, ["traffic.interval_s=100000", *asked.settings, f"seed={asked.seed}"])
-    fly(scenario, sorted((copy for each in asked.copies for copy in drawn(scenario, each)), key=_first))
+    copies = sorted((copy for each in asked.copies for copy in drawn(scenario, each)), key=_first)
+    fly(scenario, copies, without=asked.without)
 
 
 if __name__ == "__main__":

@@ -165,8 +165,9 @@ class Searcher:
             beside=beside,
         ) if nodes.on_ground else None  # fmt: skip
         self._flight = Flight(
-            own_motion, place, goal, velocity_choice, connectivity, take_off=take_off, return_home=self._return_home
-        )
+            own_motion, place, goal, velocity_choice, connectivity,
+            roll_call=roll_call, take_off=take_off, return_home=self._return_home,
+        )  # fmt: skip
         self._mode = ModeRecord(node, place, self._flight, self._return_home, orders, outbox)
         self._node, self._post = node, scenario.post
         self._outbox = outbox

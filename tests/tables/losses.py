@@ -11,7 +11,7 @@ from tests.tables.markdown import Rows
 _DATA: Final = Path(__file__).parents[2] / "docs" / "results" / "data"
 _ASKED_S: Final = 15.0
 _AGAIN_S: Final = 3.0
-_WORDS: Final = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five"}
+_WORDS: Final = {0: "none", 1: "one", 2: "two", 3: "three", 4: "four", 5: "five"}
 _CURVE_FROM: Final = 6
 """So many losses one after the other are a line of the curve."""
 _STEP: Final = 2
@@ -38,14 +38,14 @@ def healing() -> Rows:
         (copy["scenario"], copy["seed"], str(copy["losses"])): copy for copy in _copies()
     }  # some were flown on, too
     for copy in once.values():
-        if len(copy["losses"]) < _CURVE_FROM:
+        if 0 < len(copy["losses"]) < _CURVE_FROM:
             groups.setdefault((copy["scenario"], _lost(copy)), []).append(copy)
     return [head, *(_healing_row(*name, copies) for name, copies in groups.items())]
 
 
 def _lost(copy: Copy) -> str:
     number = _WORDS[len(copy["losses"])]
-    if number == "one":
+    if number in ("none", "one"):
         return number
     every_s = copy["losses"][1][0] - copy["losses"][0][0]
     return f"{number}, every {every_s:.0f} s" if every_s else f"{number} at once"

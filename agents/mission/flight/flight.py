@@ -1,6 +1,7 @@
 """The flight of a searching UAV from one position fix to the next: to its goal or home, within its constraints."""
 
 from collections.abc import Collection
+from typing import Final
 
 from agents.mission.flight.connectivity_maintenance import ConnectivityMaintenance
 from agents.mission.flight.goal import Goal
@@ -9,7 +10,13 @@ from agents.mission.flight.take_off import TakeOff
 from agents.mission.flight.velocity_choice import VelocityChoice
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.search_formation.formation_place import FormationPlace
+from agents.mission.search_formation.roll_call import RollCall
 from fanet_mw.units import STILL, Enu, NodeId
+
+_MUTE_M: Final = 18.0
+_MUTE_LEVEL_M: Final = 8.0
+"""A mute UAV keeps its place so far above it, and its level times this: others fly where it should be, because they
+take it for lost. So it is above those who fly home, and two levels are not in each other's way."""
 
 
 class Flight:
@@ -23,13 +30,14 @@ class Flight:
         velocity_choice: VelocityChoice,
         connectivity: ConnectivityMaintenance,
         *,
+        roll_call: RollCall,
         take_off: TakeOff | None,
         return_home: ReturnHome,
     ) -> None:
         """`take_off`: None for a UAV that is in the air from the start."""
         self._own_motion, self._place, self._goal = own_motion, place, goal
         self._velocity_choice, self._connectivity = velocity_choice, connectivity
-        self._take_off, self._return_home = take_off, return_home
+        self._roll_call, self._take_off, self._return_home = roll_call, take_off, return_home
         self.velocity: Enu | None = None
         """A new velocity to fly, until the application takes it; None if there is no new one."""
         self.held: Collection[NodeId] = ()
@@ -51,6 +59,9 @@ class Flight:
             beyond = self._connectivity.beyond_gap(now_ns)
             if beyond is not None:
                 goal, feed = beyond.position._replace(up=goal.up), beyond.velocity
+            level = self._roll_call.mute_level(now_ns)
+            if level:
+                goal = goal._replace(up=goal.up + _MUTE_M + level * _MUTE_LEVEL_M)
             self.velocity = self._velocity_choice.velocity(goal, feed, now_ns, hastily=hastily)
             self.held = self._connectivity.held(self.velocity)
         elif self._return_home.land_if_there(now_ns):

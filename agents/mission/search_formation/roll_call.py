@@ -7,6 +7,7 @@
     silent    a neighbor whose radio sends nothing for unusually long is lost as well, before a hello is overdue
     away      a UAV that this one has not heard itself for long, or that may be out of its reach, is lost only after
               much longer, because news take a second a hop: then it is cut off with a part of the swarm
+    mute      a UAV that hears for some seconds that it is lost itself, and never that it is not, is not heard
 
 Whoever finds by its own receiver that a UAV is lost, or back, floods its roll at once. So all UAVs of a part agree soon
 on who is lost, within a second a hop if that flood is lost, without a leader.
@@ -28,6 +29,11 @@ _NEIGHBOR_NS: Final = 15 * S
 """A UAV was a neighbor until lately if it was heard within this time."""
 _AWAY_NS: Final = 40 * S
 """A UAV that was not a neighbor is lost after this time; news from the far end of a swarm are fresher."""
+_MUTE_NS: Final = 5 * S
+"""So long a UAV must hear that it is lost until it takes its own radio for mute; news that were wrong are taken back by
+its next hello."""
+_LEVELS: Final = 7
+"""Places that are closer than this in the plan have different levels; more levels would be too high to hear others."""
 _AHEAD: Final = 2
 """An instant this many units ahead of the own clock is not believed."""
 
@@ -45,6 +51,9 @@ class RollCall:
         self.lost: dict[int, int] = {}
         """The UAVs that are lost, each with the instant at which this UAV has learned it."""
         self._falls = False
+        self._called_lost_ns: int | None = None
+        """The instant since which every roll that names this UAV has called it lost; None: the last one has not."""
+        self._mute_level = 0
         self.parted: Collection[int] = ()
         """The UAVs to which no way leads any more, by the radio: they are lost, or in another part of the swarm."""
         self.has_news = False
@@ -63,8 +72,24 @@ class RollCall:
         if roll.at > now_ns // ROLL_NS + _AHEAD:
             return
         for place, node in enumerate(plan.nodes):
-            if node not in (0, self._node) and roll.ages[place] < LONG_AGO:
+            if node == self._node:
+                self._on_called(place, lost=place in roll.lost, now_ns=now_ns)
+            elif node and roll.ages[place] < LONG_AGO:
                 self._take(node, roll.at - roll.ages[place], lost=place in roll.lost, now_ns=now_ns)
+
+    def _on_called(self, place: int, *, lost: bool, now_ns: int) -> None:
+        if not lost:
+            self._called_lost_ns = None
+        elif self._called_lost_ns is None:
+            self._called_lost_ns, self._mute_level = now_ns, 1 + place % _LEVELS
+
+    def mute_level(self, now_ns: int) -> int:
+        """0 while others hear this UAV; otherwise a level from 1 on, by its place in the plan.
+
+        Two mute UAVs do not know of each other; those that would close the same gap have places near each other.
+        """
+        called_ns = self._called_lost_ns
+        return 0 if called_ns is None or now_ns - called_ns < _MUTE_NS else self._mute_level
 
     def _take(self, node: int, heard: int, *, lost: bool, now_ns: int) -> None:
         known = self._heard.get(node)

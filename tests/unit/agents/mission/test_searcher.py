@@ -17,6 +17,7 @@ from fanet_mw.trace import Confirmed, MissionModeChanged, Sighted
 from fanet_mw.units import MS, US, Enu, NodeId, S
 from fanet_mw.wire import HEADER_BYTES
 from fanet_mw.wire.bids import Bid, Bids
+from fanet_mw.wire.roll import ROLL_NS, Roll
 from fanet_mw.wire.search_messages import Told, told_in
 from fanet_mw.wire.search_plan import SearchStatus
 from fanet_mw.wire.survivors import Found, Standing, Survivor
@@ -245,6 +246,25 @@ def oncoming(flight: Flight) -> tuple[Motion, Echo]:
     back = Enu(-8 * ahead.east, -8 * ahead.north, 0.0)
     echo = Echo(50.0, math.atan2(ahead.east, ahead.north) % (2 * math.pi), 0.0, speed + 8, 15.0)
     return Motion(other, back, flight.now_ns), echo
+
+
+def test_a_uav_that_hears_that_it_is_lost_keeps_its_place_far_above_those_who_close_ranks(
+    make_scenario: Callable[..., Scenario],
+) -> None:
+    flight = Flight(make_scenario)
+    flight.fly(30)
+    here, plan = flight.at, flight.plan
+    lost = frozenset({plan.nodes.index(7)})
+    for _ in range(20):
+        at = flight.now_ns // ROLL_NS
+        told = Roll(at, plan.planner, plan.revision, (0,) * len(plan.nodes), lost)
+        flight.searcher.on_message(told, now_ns=flight.now_ns)
+        flight.fly(1)
+    assert flight.at.up > here.up + 20
+    told = Roll(flight.now_ns // ROLL_NS, plan.planner, plan.revision, (0,) * len(plan.nodes), frozenset())
+    flight.searcher.on_message(told, now_ns=flight.now_ns)
+    flight.fly(20)
+    assert flight.at.up < here.up + 3, "it is heard again"
 
 
 @pytest.mark.parametrize("by", ["hellos", "radar"])

@@ -218,3 +218,16 @@ def test_a_neighbor_that_has_flown_out_of_reach_is_not_lost_for_want_of_news_whi
     assert set(call.lost) == {3}
     call.review(plan, since_ns=10 * S, now_ns=52 * S)
     assert set(call.lost) == set(range(2, COUNT + 1))
+
+
+def test_who_hears_for_some_seconds_that_it_is_lost_is_mute_and_has_another_level_than_those_beside_it() -> None:
+    plan, mute = ring_plan(), {node: RollCall(NodeId(node), hello_interval_s=1.0) for node in (20, 21, 40)}
+    lost = frozenset(node - 1 for node in mute)  # their places
+    for second in range(10, 15):
+        for call in mute.values():
+            assert call.mute_level(second * S) == 0, "it may be a mistake that its next hello takes back"
+            call.on_roll(Roll(2 * second, 1, 1, (5,) * COUNT, lost), plan, now_ns=second * S)
+    levels = {node: call.mute_level(15 * S) for node, call in mute.items()}
+    assert levels == {20: 6, 21: 7, 40: 5}, "two in one gap know nothing of each other"
+    mute[21].on_roll(Roll(32, 1, 1, (0,) * COUNT, frozenset()), plan, now_ns=16 * S)
+    assert mute[21].mute_level(30 * S) == 0, "it is heard again"

@@ -24,6 +24,11 @@ def clocks_fit(clock: Clock, *, slack_ns: int, clock_error_ns: int) -> bool:
     return least_slack_ns(clock_error_ns) <= slack_ns
 
 
+def has_time(clock: Clock, *, clock_error_ns: int) -> bool:
+    """True unless the node waits for beacons to tell it the swarm's time."""
+    return clock.sync != "beacons" or not clock.modelled or bool(clock_error_ns)
+
+
 def least_slack_ns(clock_error_ns: int) -> int:
     """The slack that keeps turns of different nodes apart if each clock is within this error of swarm time."""
     return 2 * clock_error_ns + _FLIGHT_NS

@@ -117,3 +117,10 @@ def test_nodes_that_beacons_have_not_reached_yet_end_no_promise_of_others() -> N
     bound = summary_of(*clock, *long_way, *rest, *load, "duration_s=40")["bound"]
     assert bound["deliveries"] > 100
     assert bound["violations"] == 0
+
+
+def test_nodes_that_have_not_the_time_yet_stay_out_of_the_turns_of_others() -> None:
+    """With clocks up to 60 ms apart, nodes at the end of a line would send in turns of others for some 30 s."""
+    clock = ("clock.sync=beacons", "clock.offset_ms=30", "clock.drift_ppm=15", "clusters.turn_slack_us=400")
+    line = ("nodes.columns=1", "nodes.spacing_m=200", "warmup_s=0", "duration_s=40", "seed=3")
+    assert summary_of(*clock, *line)["pdr"] > 0.88, ".94; they would leave .76"

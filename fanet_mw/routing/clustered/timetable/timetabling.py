@@ -25,6 +25,7 @@ from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.routing.clustered.timetable.turn_allocation import fit, fit_measured
+from fanet_mw.timesync.turn_slack import has_time
 from fanet_mw.units import US, Enu, NodeId
 from fanet_mw.wire.links import Link, Links, frames_of
 from fanet_mw.wire.loads import AS_EXPECTED, Loads
@@ -143,9 +144,12 @@ class FromPlaces:
         self._compute_if_complete(now_ns)
 
     def _compute_if_complete(self, now_ns: int) -> None:
-        """Compute the timetable once, when all parts of this version and of its links have arrived."""
+        """Compute the timetable once, when all parts of this version and of its links have arrived, and when the node
+        has the swarm's time: without it, it would send in the turns of others.
+        """
         version = self._version
         due = version is not None and version == self._membership.version and version != self._planned
+        due = due and has_time(self._port.scenario.clock, clock_error_ns=self._port.clock_error_ns)
         if due and self._is_complete():
             self._planned = version
             self._compute(now_ns)

@@ -47,9 +47,10 @@ class NeighborFailureDetector:
     def find_suspect(self, lists: Callable[[NodeId], bool], *, now_ns: int) -> NodeId | None:
         """A neighbor that this node reports now, or None. `lists` tells whether the schedule names a node.
 
-        Neighbors that no longer count are forgotten.
+        Of several, the one that was not reported for the longest time goes first. Neighbors that no longer count are
+        forgotten.
         """
-        for node in sorted(self._heard_ns):
+        for node in sorted(self._heard_ns, key=lambda node: (self._reported_ns.get(node, 0), node)):
             quiet_ns = now_ns - self._heard_ns[node]
             if quiet_ns < self._silent_ns:
                 continue

@@ -68,13 +68,14 @@ def test_who_has_been_silent_for_a_minute_is_forgotten_though_nothing_was_said()
         assert detector.find_suspect(everyone, now_ns=now_ns) == found
 
 
-def test_of_two_that_fell_silent_the_second_is_reported_five_seconds_later(
+def test_of_several_that_fell_silent_each_is_reported_five_seconds_after_the_one_before(
     detector: NeighborFailureDetector, liveness: Liveness
 ) -> None:
-    second = NodeId(8)
-    detector.on_hello(second, now_ns=10 * S)
-    liveness.on_sign_of_life(second, born_ns=10 * S)
-    assert detector.find_suspect(everyone, now_ns=14 * S) == OTHER
-    detector.on_report(OTHER, now_ns=14 * S)
-    assert detector.find_suspect(everyone, now_ns=19 * S - 1) is None
-    assert detector.find_suspect(everyone, now_ns=19 * S) == second
+    silent = (OTHER, NodeId(8), NodeId(9))
+    for node in silent[1:]:
+        detector.on_hello(node, now_ns=10 * S)
+        liveness.on_sign_of_life(node, born_ns=10 * S)
+    for at_s, node in zip((14, 19, 24, 29), (*silent, OTHER), strict=True):
+        assert detector.find_suspect(everyone, now_ns=at_s * S - 1) is None
+        assert detector.find_suspect(everyone, now_ns=at_s * S) == node
+        detector.on_report(node, now_ns=at_s * S)

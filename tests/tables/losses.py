@@ -56,12 +56,16 @@ def _healing_row(mission: str, lost: str, copies: Sequence[Copy]) -> list[str]:
     judged = [copy for copy in copies if copy.get("bounded", [None, None])[1]]  # without a loss bounds are stated
     again = sum(copy["bounds_s"] <= copy["heal_s"][-1] + _AGAIN_S for copy in judged)
     broken = [copy["broken"] for copy in judged if "broken" in copy]
+    within = f"{sum(one <= _ASKED_S for one in heal_s)} of {len(heal_s)}"
+    if len(heal_s) > len(copies):
+        whole = sum(max(copy["heal_s"]) <= _ASKED_S for copy in copies)
+        within += f"; all of them in {whole} of {len(copies)}"
     as_good = sum((copy["bounded"][0] or 0) >= (copy["bounded"][1] or 0) for copy in judged)
     return [
         mission,
         lost,
         f"{len(copies)} ({len({copy['seed'] for copy in copies})})",
-        f"{sum(one <= _ASKED_S for one in heal_s)} of {len(heal_s)}",
+        within,
         f"{sum(not one for one in heal_s)}",
         f"{statistics.median(heal_s):.1f} / {max(heal_s):.1f}",
         f"{again} of {len(judged)}" if judged else "-",

@@ -52,8 +52,8 @@ def test_data_that_fall_into_turns_of_others_cost_no_packets(attack: Attack) -> 
     assert seen.apart_ns < 100 * US
     assert seen.summary["pdr"] >= replays.LEAST_SHARE
     bound = seen.summary["bound"]
-    assert bound["violations"] > 0
-    assert not seen.summary["valid"], "what came after its bound is a broken promise all the same"
+    assert bound["within_share"] == bound["stated_share"] > 0.2, "nothing is promised while turns are disturbed"
+    assert bound["violations"] == 0
 
 
 def test_without_resuming_the_same_station_takes_a_third() -> None:

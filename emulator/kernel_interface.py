@@ -184,10 +184,9 @@ class KernelInterface:
             airtime = self._airtime[size] = airtime_ns(size + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
         counts = self._counts
         asked = counts[_ASKED_N]
-        ends_ns = start_ns + self._lifetime_ns
-        ends_ns = min(ends_ns, until_ns) if until_ns else ends_ns
+        expires_ns = min(start_ns + self._lifetime_ns, until_ns or s.NEVER)
         _pack(
-            self._asked_bytes, asked * _ASKED_ROW.size, slot, src, dst, airtime, start_ns, wants_status, ends_ns
+            self._asked_bytes, asked * _ASKED_ROW.size, slot, src, dst, airtime, start_ns, wants_status, expires_ns
         )  # fmt: skip
         counts[_ASKED_N] = asked + 1
         if start_ns + airtime < self.next_output_ns or asked + 1 == MOST_ASKED:

@@ -42,18 +42,17 @@ def test_clocks_and_deliveries_are_those_without_the_station(attack: Attack, ref
 
 @pytest.mark.parametrize(
     "attack",
-    [attack(Kind.DATA, 1.0, spoofed=True, place="corner", seed=2), *slow((attack(Kind.DATA, 1.0, spoofed=False),))],
+    [attack(Kind.DATA, 1.0, spoofed=True, place="corner"), *slow((attack(Kind.DATA, 1.0, spoofed=False),))],
     ids=str,
 )
 def test_data_that_fall_into_turns_of_others_cost_no_packets(attack: Attack) -> None:
-    """Without `clusters.resume` a third of the packets of the first run is lost, and the swarm does not know of it."""
     seen = replays.run(attack, "duration_s=40", "drain_s=4")
     assert seen.sent > 100
     assert seen.apart_ns < 100 * US
     assert seen.summary["pdr"] >= replays.LEAST_SHARE
     bound = seen.summary["bound"]
-    assert bound["within_share"] == bound["stated_share"] > 0.2, "nothing is promised while turns are disturbed"
-    assert bound["violations"] == 0
+    assert bound["violations"] > 0
+    assert not seen.summary["valid"], "what came after its bound is a broken promise all the same"
 
 
 def test_without_resuming_the_same_station_takes_a_third() -> None:

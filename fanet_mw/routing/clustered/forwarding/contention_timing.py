@@ -37,18 +37,18 @@ class ContentionTiming:
         if self.most_jitter_ns is not None:
             jitter_ns = min(jitter_ns, self.most_jitter_ns)
         start_ns = max(due_ns + self._lead_ns + int(self._jitter() * jitter_ns), now_ns)
-        return start_ns if self.turns_at is None else self.not_before(start_ns)
+        return self.not_before(start_ns)
 
     def not_before(self, start_ns: int) -> int:
         """The earliest start of a frame that is due: at once, or in a window if turns are in force."""
-        turns = None if self.turns_at is None else self.turns_at(start_ns)
+        turns = self._turns(start_ns)
         return start_ns if turns is None else turns.contending_ns(start_ns, self._window)
 
     def ends_ns(self, start_ns: int, access_ns: int) -> int:
         """The instant from which a frame that may start at `start_ns`, and takes `access_ns` at an idle medium, can no
         longer end within its contention window; 0 if that instant lies in no window.
         """
-        turns = None if self.turns_at is None else self.turns_at(start_ns)
+        turns = self._turns(start_ns)
         if turns is None:
             return 0
         ends_ns = turns.superframe_start_ns(start_ns) + turns.contention_ns
@@ -61,7 +61,7 @@ class ContentionTiming:
 
     def has_room(self, start_ns: int, airtime_ns: int) -> bool:
         """Count a frame of data to the window in which it starts; False if this node has filled its share of that."""
-        turns = None if self.turns_at is None else self.turns_at(start_ns)
+        turns = self._turns(start_ns)
         if turns is None:
             return True
         window_ns = turns.superframe_start_ns(start_ns)
@@ -77,7 +77,10 @@ class ContentionTiming:
         """The earliest start of a frame of data that is due, in the first window in which it has room."""
         start_ns = self.not_before(start_ns)
         while not self.has_room(start_ns, airtime_ns):
-            turns = None if self.turns_at is None else self.turns_at(start_ns)
+            turns = self._turns(start_ns)
             assert turns is not None, "only windows can be full"
             start_ns = turns.contending_ns(turns.superframe_start_ns(start_ns) + turns.contention_ns, self._window)
         return start_ns
+
+    def _turns(self, t_ns: int) -> Turns | None:
+        return None if self.turns_at is None else self.turns_at(t_ns)

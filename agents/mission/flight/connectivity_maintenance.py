@@ -88,8 +88,8 @@ class ConnectivityMaintenance:
 
     def beyond_gap(self, now_ns: int) -> Motion | None:
         """The likely motion of a UAV to which this one is tied and that is out of reach because somebody between is
-        lost: from its place in the whole formation it hurries here as this UAV hurries there. None if there is nobody,
-        or if they should have met.
+        lost: from its place before the loss it hurries here as this UAV hurries there. None if there is nobody, or once
+        this UAV is so near that it would hear it there: then that one is lost, too.
         """
         plan, pattern, place = self._formation.plan, self._formation.pattern, self._formation.place
         closing_s, swept_s = self._formation.closing_s(now_ns), self._formation.swept_s(now_ns)
@@ -101,11 +101,10 @@ class ConnectivityMaintenance:
         for other in pattern.tethers(place, swept_s):
             if self._neighbors.motion(plan.nodes[other], now_ns=now_ns) is not None:
                 continue
-            at = pattern.whole_at(other, swept_s)
-            way = here.minus(at)
-            left_m = way.horizontal() - self._haste_m_s * closing_s
+            at, velocity = self._formation.known_at(other, swept_s)
+            left_m = here.minus(at).horizontal()
             if left_m > _CLOSING * self._reach_m and (found is None or left_m < found[0]):
-                found = left_m, Motion(at, pattern.velocity(other, swept_s), now_ns)
+                found = left_m, Motion(at, velocity, now_ns)
         return None if found is None else found[1]
 
     def _nearest_motions(self, now_ns: int) -> list[tuple[NodeId, Motion]]:

@@ -57,6 +57,8 @@ class FormationPlace:
         """The places of those who are lost."""
         self._closing_ns = 0
         """The instant at which the last of them was lost."""
+        self._before: Pattern | None = None
+        """The formation until then, in which all know each other's places."""
 
     def adopt(self, plan: Search, now_ns: int) -> None:
         made, before = pattern_of(plan, reach_m=self._reach_m), self.pattern
@@ -83,7 +85,7 @@ class FormationPlace:
             place for place in vacant if self.plan.nodes[place] in lost and self.plan.nodes[place] not in away
         )
         if not gaps <= self._gaps:
-            self._closing_ns = now_ns
+            self._closing_ns, self._before = now_ns, self.pattern
         self._gaps = gaps
         if vacant != self.pattern.vacant:
             self.pattern = self.pattern.closed(vacant)
@@ -96,6 +98,14 @@ class FormationPlace:
         if self.pattern is None or self.place is None or not self._gaps or since_s > _CLOSES_S:
             return None
         return since_s if self.pattern.has_beside(self.place, self._gaps) else None
+
+    def known_at(self, place: int, swept_s: float) -> tuple[Enu, Enu]:
+        """Where the UAV of a place would fly if the last one were not lost, and how: there it is sought when ranks are
+        closed.
+        """
+        pattern = self._before or self.pattern
+        assert pattern is not None, "who seeks others has a plan"
+        return pattern.at(place, swept_s), pattern.velocity(place, swept_s)
 
     def depart(self, now_ns: int) -> None:
         """Fly to the place from here, and not before the plan begins."""

@@ -9,7 +9,7 @@ from typing import Final, assert_never
 
 from agents.mission.search_formation.shapes import circuit, fan, lines, ring, sectors, spiral
 from agents.mission.search_formation.shapes.circuit import Circuit
-from agents.mission.search_formation.shapes.contract import Demands, Dimensions, Shape, ShapeName, swarm_at
+from agents.mission.search_formation.shapes.contract import Demands, Dimensions, RowOfPlaces, Shape, ShapeName, swarm_at
 from agents.mission.search_formation.shapes.fan import Fan
 from agents.mission.search_formation.shapes.lines import Lines
 from agents.mission.search_formation.shapes.ring import Ring
@@ -30,8 +30,11 @@ _STEP_S: Final = 0.05
 """The time step over which the velocity of a place is computed."""
 
 
-_HOP: Final = 0.93
-"""Neighbors in a row that has closed ranks are at most this share of the radio's reach apart."""
+_HOP: Final = 0.91
+"""Neighbors in a row that has closed ranks are at most this share of the radio's reach apart: with .93 a chain at its
+longest came apart for seconds, because its relays follow each other."""
+_LEAVES: Final = 0.93
+"""Every second UAV of a row may leave while those beside it are at most this share of the reach apart."""
 
 
 class Pattern:
@@ -48,7 +51,9 @@ class Pattern:
         self._left = tuple(len(row.places) - len(vacant.intersection(row.places)) for row in whole.rows())
         self._flown = {place: at for row in whole.rows() for place, at in row.shared(vacant).items()}
         """Where on its row each UAV flies whose row has closed ranks."""
-        self.shape: Shape = whole.drawn_in(self._left, self._hop_m) if vacant else whole
+        self.shape: Shape = whole.drawn_in(vacant, self._hop_m) if vacant else whole
+        self._ties: dict[int, list[int]] = {}
+        """The places to which those places are tied that were asked for."""
 
     def closed(self, vacant: frozenset[int]) -> "Pattern":
         """The same formation without the UAVs of these places."""
@@ -105,9 +110,27 @@ class Pattern:
             if place in row.places or set(self._whole.tethers(place)).intersection(row.places)
         )
 
-    def whole_at(self, place: int, swept_s: float) -> Enu:
-        """The position of a place if nobody were lost."""
-        return self._whole.flown_at(place, swept_s)
+    def _tied_to(self, place: int) -> list[int]:
+        """The places to which a place is tied, vacant ones, too. Where two rows meet, whoever flies nearest to there is
+        tied, now that the rows have closed ranks.
+        """
+        whole = self._whole
+        row = self._row(place)
+        if row is None or not self.vacant:
+            return list(whole.tethers(place))
+        found = [other for other in whole.tethers(place) if other in row.places]
+        for end in row.places:
+            if row.nearest(end, self.vacant)[0] == place:
+                found += [self._nearest(other) for other in whole.tethers(end) if other not in row.places]
+        return found
+
+    def _row(self, place: int) -> RowOfPlaces | None:
+        return next((row for row in self._whole.rows() if place in row.places), None)
+
+    def _nearest(self, place: int) -> int:
+        """The place whose UAV flies nearest to a place of its row, now that the row has closed ranks."""
+        row = self._row(place)
+        return place if row is None else row.nearest(place, self.vacant)[0]
 
     def tethers(self, place: int, swept_s: float) -> tuple[int, ...]:
         """The places that must stay within radio reach of this one to keep the swarm connected, past those that are
@@ -116,7 +139,10 @@ class Pattern:
         found: set[int] = set()
         passed, waiting = {place}, [place]
         while waiting:
-            for other in self.shape.tethers(waiting.pop()):
+            tied = waiting.pop()
+            if tied not in self._ties:
+                self._ties[tied] = self._tied_to(tied)
+            for other in self._ties[tied]:
                 if other not in passed:
                     passed.add(other)
                     passes = other in self.vacant or self.may_leave(other, swept_s)
@@ -131,7 +157,7 @@ class Pattern:
             return True
         rank = place - sum(other < place for other in self.vacant)
         at = self._flown.get(place, place)
-        return rank % 2 == 1 and self.shape.may_leave(at, swept_s, reach_m=self._hop_m, left=self._left[0])
+        return rank % 2 == 1 and self.shape.may_leave(at, swept_s, reach_m=_LEAVES * self._reach_m, left=self._left[0])
 
     def velocity(self, place: int, swept_s: float) -> Enu:
         """The velocity of a place after this time of sweeping, without that at which lines shift to their other lanes:

@@ -103,6 +103,14 @@ class RowOfPlaces(NamedTuple):
         last = self.places[-1]  # rounding errors must not lead beyond it
         return {place: min(self.first + rank * step, last) for rank, place in enumerate(left)}
 
+    def nearest(self, place: int, vacant: frozenset[int]) -> tuple[int, float]:
+        """Of those who are left, the place whose UAV flies nearest to a place of the row, and where on the row it
+        flies; the place itself if nobody is left.
+        """
+        shared = self.shared(vacant)
+        flown = [(other, shared.get(other, float(other))) for other in self.places if other not in vacant]
+        return min(flown, key=lambda one: (round(abs(one[1] - place), 6), one[0]), default=(place, float(place)))
+
 
 class Demands(NamedTuple):
     """The requirements that a formation is fitted to: the square area that it sweeps, and the reach of receivers."""
@@ -254,9 +262,9 @@ class Shape(Protocol):
         lanes = self._formation.lanes
         return tuple(RowOfPlaces(team * lanes, lanes, RowKind.SPAN) for team in range(self._formation.teams))
 
-    def drawn_in(self, left: tuple[int, ...], hop_m: float) -> "Shape":
-        """The same formation, no larger than so many UAVs of each row can span with hops of `hop_m`, where it can be
-        smaller.
+    def drawn_in(self, vacant: frozenset[int], hop_m: float) -> "Shape":
+        """The same formation, no larger than the UAVs that are left of each row can span with hops of `hop_m`, where it
+        can be smaller.
         """
         return self
 

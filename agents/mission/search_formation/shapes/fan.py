@@ -106,10 +106,11 @@ class Fan(Shape):
             return ()
         return tuple(other for other in (place - 1, place + 1) if 0 <= other < lanes)
 
-    def drawn_in(self, left: tuple[int, ...], hop_m: float) -> "Fan":
+    def drawn_in(self, vacant: frozenset[int], hop_m: float) -> "Fan":
         """The fan whose front stops where the UAVs that are left still span it with gaps of at most a hop."""
         row = self.rows()[0]
-        flown = row.shared(frozenset(row.places[max(1, left[0]) :])).values() or row.places
+        left = row.size - len(vacant.intersection(row.places))
+        flown = row.shared(frozenset(row.places[max(1, left) :])).values() or row.places
 
         def is_spanned(most_m: float) -> bool:
             fan = Fan(self._formation, most_m=most_m)

@@ -82,11 +82,20 @@ _FREE: Final = 4
 class Lines(Shape):
     """The positions of the places of all lines, their chains and their followers."""
 
-    def __init__(self, formation: Dimensions, *, most_m: float = math.inf, gaps_m: tuple[float, ...] = ()) -> None:
+    def __init__(
+        self,
+        formation: Dimensions,
+        *,
+        most_m: float = math.inf,
+        gaps_m: tuple[float, ...] = (),
+        joints: tuple[float, ...] = (),
+    ) -> None:
         """`most_m`: how far from the middle the innermost lines may be for the relays that are left; `gaps_m`: the
-        distances of neighboring lines, from north to south, that those relays can span.
+        distances of neighboring lines, from north to south, that those relays can span; `joints`: the lane of each line
+        at which chains end, by default the middle one.
         """
         self._formation = formation
+        self._joints = joints or (formation.lanes // 2,) * formation.teams
         self._most_m = most_m
         self._half = half = formation.teams // 2
         """The number of lines to the north of the middle, and to the south."""
@@ -130,7 +139,8 @@ class Lines(Shape):
             inner_m = self._inner_m(swept_s, lanes // 2)
             chain, row = next((c, row) for c, row in enumerate(self._chains) if place < row.first + row.size)
             share = 1 - 2 * (place - row.first + 1) / (row.size + 1)
-            up_m, middle = formation.height_m + _CHAIN_HIGHER_M, self._lane(lanes // 2)
+            north, south = self._lane(self._joints[chain]), self._lane(self._joints[chain + 1])
+            up_m, middle = formation.height_m + _CHAIN_HIGHER_M, (north + south + share * (north - south)) / 2
             if chain != self._half - 1:
                 ends = self._north_m(chain, inner_m), self._north_m(chain + 1, inner_m)
                 return Enu(middle, (sum(ends) + share * (ends[0] - ends[1])) / 2, up_m)
@@ -184,12 +194,21 @@ class Lines(Shape):
         lines = tuple(RowOfPlaces(line * lanes, lanes, RowKind.SPAN) for line in range(self._formation.teams))
         return lines + self._chains
 
-    def drawn_in(self, left: tuple[int, ...], hop_m: float) -> "Lines":
-        formation, lines = self._formation, self._formation.teams
-        half_width_m = min(formation.half_width_m, max(1, min(left[:lines]) - 1) * hop_m / 2)
-        gaps_m = tuple(min(self._apart_m, (relays + 1) * hop_m) for relays in left[lines:])
-        most_m = (left[lines + self._half - 1] + 1) * hop_m / 2
-        return Lines(formation._replace(half_width_m=half_width_m), most_m=most_m, gaps_m=gaps_m)
+    def drawn_in(self, vacant: frozenset[int], hop_m: float) -> "Lines":
+        formation, rows = self._formation, self.rows()
+        left = [row.size - len(vacant.intersection(row.places)) for row in rows]
+        lines, relays = rows[: formation.teams], left[formation.teams :]
+        half_width_m = min(formation.half_width_m, max(1, min(left[: formation.teams]) - 1) * hop_m / 2)
+        joints = tuple(row.nearest(row.first + row.size // 2, vacant)[1] - row.first for row in lines)
+        lane_m = 2 * half_width_m / (formation.lanes - 1)
+        aside_m = [lane_m * (a - b) for a, b in itertools.pairwise(joints)]
+        spans_m = [
+            math.sqrt(max(0.0, ((count + 1) * hop_m) ** 2 - off_m**2))
+            for count, off_m in zip(relays, aside_m, strict=True)
+        ]
+        gaps_m = tuple(min(self._apart_m, span_m) for span_m in spans_m)
+        narrow = formation._replace(half_width_m=half_width_m)
+        return Lines(narrow, most_m=spans_m[self._half - 1] / 2, gaps_m=gaps_m, joints=joints)
 
     def begun_around(self, swarm: Swarm) -> Dimensions | None:
         """The lines that begin where the swarm stands, if its UAVs hear everybody between them: they must be dense

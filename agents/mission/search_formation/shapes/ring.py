@@ -100,8 +100,9 @@ class Ring(Shape):
     def rows(self) -> tuple[RowOfPlaces, ...]:
         return (RowOfPlaces(0, self._formation.lanes, RowKind.AROUND),)
 
-    def drawn_in(self, left: tuple[int, ...], hop_m: float) -> "Ring":
-        return Ring(self._formation, most_m=left[0] * hop_m / 8)
+    def drawn_in(self, vacant: frozenset[int], hop_m: float) -> "Ring":
+        left = self._formation.lanes - len(vacant.intersection(range(self._formation.lanes)))
+        return Ring(self._formation, most_m=left * hop_m / 8)
 
     def may_leave(self, place: float, swept_s: float, *, reach_m: float, left: int) -> bool:
         _, share = self._side(place)

@@ -68,14 +68,14 @@ def test_who_is_too_far_away_is_approached_as_fast_as_a_uav_flies() -> None:
     assert nearest((0.0, 7.5), [plane], limit=10, hard=0)[0] == pytest.approx(9.0)
 
 
-def test_the_two_beside_a_gap_fly_towards_each_other_until_they_should_have_met() -> None:
+def test_the_two_beside_a_gap_fly_to_where_the_other_one_was_until_they_would_hear_it_there() -> None:
     for node, way in ((LINE, 1), (NodeId(LINE + 2), -1)):
         behind, beyond = NodeId(node - way), []
         board = Board(node, lane_of(node, TAKEN_UP_NS))
         tied = ConnectivityMaintenance(
             board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
         )
-        for since_s in (0, 3, 8):
+        for since_s in (0, 8, 12):
             now_ns = TAKEN_UP_NS + (60 + since_s) * S
             board.own_motion.position = lane_of(node, now_ns).minus(Enu(-9.0 * since_s * way, 0, 0))
             board.neighbors.on_hello(behind, Motion(lane_of(behind, now_ns), Enu(0, 7.5, 0), now_ns))
@@ -85,7 +85,27 @@ def test_the_two_beside_a_gap_fly_towards_each_other_until_they_should_have_met(
             mate = tied.beyond_gap(now_ns)
             beyond.append(None if mate is None else mate.position)
         there = NodeId(node + 2 * way)
-        assert beyond == [lane_of(there, TAKEN_UP_NS + 60 * S), lane_of(there, TAKEN_UP_NS + 63 * S), None]
+        assert beyond == [lane_of(there, TAKEN_UP_NS + 60 * S), lane_of(there, TAKEN_UP_NS + 68 * S), None]
+
+
+def test_who_is_beyond_a_gap_is_sought_where_it_flew_after_earlier_losses() -> None:
+    now_ns, beyond = TAKEN_UP_NS + 60 * S, NodeId(LINE + 2)
+    at = {}
+    for earlier in ([], [1, 2, 3]):
+        board = Board(LINE, lane_of(LINE, now_ns))
+        tied = ConnectivityMaintenance(
+            board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
+        )
+        board.place.close_ranks(earlier, now_ns - 20 * S)
+        assert board.place.pattern is not None
+        at[len(earlier)] = there = board.place.pattern.at(beyond - 1, 60.0)
+        board.own_motion.position = board.place.lane(now_ns)[0]
+        board.place.close_ranks([*earlier, LINE + 1], now_ns)
+        mate = tied.beyond_gap(now_ns)
+        assert mate is not None
+        assert mate.position == there
+    assert at[0] == lane_of(beyond, now_ns)
+    assert at[3].minus(at[0]).norm() > 100
 
 
 def test_who_flies_within_its_limits_keeps_those_to_whom_it_is_tied_and_are_in_reach() -> None:

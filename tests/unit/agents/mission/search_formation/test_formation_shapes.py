@@ -399,7 +399,7 @@ def test_the_front_of_a_fan_goes_as_far_as_those_who_are_left_span_it() -> None:
         assert isinstance(shape, Fan)
         lanes = shape.rows()[0].size
         for left in range(2, lanes):
-            few = shape.drawn_in((left,), 150.0)
+            few = shape.drawn_in(frozenset(range(left, lanes)), 150.0)
             flown = list(shape.rows()[0].shared(frozenset(range(left, lanes))).values())
             front = [few.at(place, few.sweep_s) for place in flown]
             most_m = max(a.minus(b).horizontal() for a, b in itertools.pairwise(front))
@@ -434,6 +434,44 @@ def test_a_swarm_without_some_of_its_uavs_is_one_piece_that_turns_back_before_it
     left = [place for place in range(45) if place not in lost]
     for second in range(45, 2 * round(whole.shape.sweep_s) + 20, 5):
         assert pieces([pattern.at(place, second) for place in left]) == 1, second
+
+
+@given(lost_ones)
+def test_when_ranks_are_closed_who_is_tied_to_another_has_that_one_tied_to_it(
+    case: tuple[Pattern, frozenset[int]],
+) -> None:
+    pattern, vacant = case
+    closed = pattern.closed(vacant)
+    ties = {place: set(closed.tethers(place, 1e6)) for place in range(pattern.places) if place not in vacant}
+    assert all(place in ties[other] for place, others in ties.items() for other in others)
+
+
+@pytest.mark.parametrize("count", [45, 73])
+def test_tied_uavs_of_lines_that_have_closed_ranks_are_in_reach_of_each_other(count: int) -> None:
+    """Where a chain ends nobody may fly in the middle of the line any more."""
+    whole, draw = formed(ShapeName.LINES, count), random.Random(1)
+    for _ in range(12):
+        vacant = frozenset(draw.sample(range(count), draw.randint(1, 8)))
+        closed = whole.closed(vacant)
+        for second in range(45, 2 * round(whole.shape.sweep_s) + 20, 10):
+            at = {place: closed.at(place, second) for place in range(count) if place not in vacant}
+            for place, here in at.items():
+                assert all(at[o].minus(here).norm() <= REACH_M for o in closed.tethers(place, second)), (vacant, second)
+
+
+def test_a_chain_ends_at_whoever_flies_nearest_once_its_line_has_closed_ranks() -> None:
+    whole, middle = formed(ShapeName.LINES), 7
+    first, last = 30, 39
+    assert first in whole.tethers(middle, 60.0)
+    for lost, ends in (([middle], 6), ([0, 1, 2, 3], 9), ([11, 12, 13, 14], 5)):
+        closed = whole.closed(frozenset(lost))
+        left = [place for place in whole.line(0) if place not in lost]
+        assert [place for place in left if first in closed.tethers(place, 60.0)] == [ends]
+        assert closed.tethers(first, 60.0) == (ends, first + 1)
+        assert abs(closed.at(ends, 60.0).east - closed.at(first, 60.0).east) < 20
+        assert closed.tethers(last, 60.0) == (22, last - 1), "that of the other line is the same"
+    chainless = whole.closed(frozenset([3, *range(first, last + 1)]))
+    assert 22 in chainless.tethers(middle, 0.0), "without relays the lines are tied to each other"
 
 
 @pytest.mark.parametrize(

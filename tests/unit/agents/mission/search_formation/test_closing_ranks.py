@@ -1,0 +1,23 @@
+"""A swarm from which UAVs are lost, one after the other, is one network again within 15 s each time."""
+
+import pytest
+from closing_swarm import ClosingSwarm
+
+NORTHERN, SOUTHERN = 8, 23
+"""The UAVs of the two lines at which the chain ends."""
+
+
+@pytest.mark.parametrize(
+    ("from_s", "lost", "why"),
+    [
+        (12.7, [1, 39, 3, 7, 14], "four of one line: who is beyond a gap has moved before"),
+        (153.3, [16, 26, 38, 28], "three of a line that turns back"),
+        (115.5, [SOUTHERN, 14, 25, 6], "where the chain ends, and others of both lines"),
+        (139.6, [32], "the second relay: the first one cannot come nearer, and may not go away again"),
+    ],
+)
+def test_who_is_left_is_one_network_again_within_15_s_of_each_loss(from_s: float, lost: list[int], why: str) -> None:
+    swarm = ClosingSwarm(from_s)
+    heal_s = [swarm.heal_s(node, within_s=15.0) for node in lost[:-1]] + [swarm.heal_s(lost[-1], within_s=20.0)]
+    assert max(heal_s) <= 15.0, (heal_s, why)
+    assert max(heal_s) > 4.0, "gaps that have to be closed"

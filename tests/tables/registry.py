@@ -71,7 +71,7 @@ TABLES: Final[Mapping[str, Table]] = {
     ),
     "together": Table("explanation/protocol.md", clusters.together, Tolerance(absolute=0.02, relative=0.1)),
     "relay-rules": Table("explanation/protocol.md", clusters.rules, Tolerance(absolute=0.02, relative=0.1)),
-    "plans-of-relays": Table("results/plans.md", plans.contending, Tolerance(absolute=0.02, relative=0.1)),
+    "plans-of-relays": Table("explanation/planning.md", plans.contending, Tolerance(absolute=0.02, relative=0.1)),
     "wrong-places": Table("explanation/lossy-links.md", plans.wrong_places, Tolerance(absolute=0.02)),
     "goodput": Table("explanation/planning.md", protocol.goodput, Tolerance(absolute=0.02, relative=0.1)),
     "rivals": Table("results/rivals.md", protocol.rivals, Tolerance(absolute=0.02, relative=0.1)),

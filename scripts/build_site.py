@@ -142,7 +142,7 @@ def _moved(link: str, source: str, staged: str, pages: dict[str, str], folder: P
 
 
 def _nav() -> str:
-    """The navigation, as TOML: the front page, the gallery, the sections, and what is about the project."""
+    """The navigation, as TOML: the front page, the sections, and what is about the project."""
     pages = _pages()
 
     def entry(source: str) -> str:
@@ -150,7 +150,7 @@ def _nav() -> str:
         title = found.group(1) if found else source
         return f"{{ {_quoted(title)} = {_quoted(pages[source])} }}"
 
-    groups = [f'{{ "Home" = [{{ "fanet-mw" = "index.md" }}, {entry("docs/README.md")}, {entry("docs/gallery.md")}] }}']
+    groups = [f'{{ "Home" = [{{ "fanet-mw" = "index.md" }}, {entry("docs/README.md")}] }}']
     for title, folder in SECTIONS:
         inside = [entry(source) for source in pages if source.startswith(f"docs/{folder}/")]
         groups.append(f"{{ {_quoted(title)} = [{', '.join(inside)}] }}")

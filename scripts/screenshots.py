@@ -27,7 +27,7 @@ ROOT: Final = Path(__file__).parents[1]
 SCREENS: Final = {"": (1440, 860), "-phone": (390, 844)}
 SOFTWARE: Final = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
 PATIENCE_MS: Final = 120_000
-SITE_PAGES: Final = ("index", "how-to/see-a-swarm", "reference/api", "gallery")
+SITE_PAGES: Final = ("index", "how-to/see-a-swarm", "reference/api")
 Look = Callable[[Any, str], None]
 """Looks at a page; the second argument is the ending of the screen's name."""
 

@@ -16,11 +16,11 @@ other, 15 s apart, and `8!` flies to the end; these may stand together. One JSON
     broken     bounds stated later than 4 s after the last loss, once healed, and not kept at somebody who lives
     curve      of losses one after the other, at the next one: lost, connected since the one before, covered, found
 
-and, of copies that fly to the end, who was found, the share of reports delivered of what an ideal flood could have
-delivered, contacts, all stretches in which the others were apart, and when the broken bounds were stated. With
-`--without` the flight itself, in which nobody is lost, has a line, too. `--scenario NAME` and `--set KEY=VALUE` fly
-others. The tables of `docs/explanation/search.md` are made of these lines, in `docs/results/data/losses.jsonl`
-(`scripts/tables losses flown-on losses-in-a-row`).
+and, of copies that fly to the end, who was found, when 95 % of the area were covered, the least distance of two UAVs,
+the share of reports delivered of what an ideal flood could have delivered, contacts, all stretches in which the others
+were apart, and when the broken bounds were stated. With `--without` the flight itself, in which nobody is lost, has a
+line, too. `--scenario NAME` and `--set KEY=VALUE` fly others. The tables of `docs/explanation/search.md` are made of
+these lines, in `docs/results/data/losses.jsonl` (`scripts/tables losses flown-on losses-in-a-row`).
 """
 
 import argparse
@@ -285,7 +285,8 @@ def outcome(flight: Flight) -> dict[str, Any]:
     return {
         "found": mission["confirmed"], "of": mission["survivors"], "covered": mission["coverage"],
         "pdr": reached.get("report", reached)["pdr"], "contacts": mission["collisions"],
-        "last_find_s": max(mission["time_to_confirm_s"], default=None),
+        "last_find_s": max(mission["time_to_confirm_s"], default=None), "covered_95_s": mission["covered_95_s"],
+        "nearest_m": mission["nearest_m"]["least"],
     }  # fmt: skip
 
 

@@ -4,6 +4,7 @@
 At each drawn instant the process forks, and the copy flies on for 45 s. One JSON line for each:
 
     parts    the sizes of the parts while the air is parted, and how many planners each has 3, 5, 10 and 19 s later
+    crossed  how many have flown over the line within the 3 s before that: their new part hardly knows them yet
     merged   the same 1, 2, 3, 5 and 8 s after the air is whole again: who has closed ranks may be out of reach still
     unknown  to how many a find that anybody knew then is unknown: just before, and 1, 2, 3, 5 and 8 s after
     least_m  the least distance of two UAVs from the cut on
@@ -72,6 +73,14 @@ class Parted(Flight):
         members = [set(ids[part == one].tolist()) for one in set(part.tolist())]
         return sorted(((len(each), len(leads & each)) for each in members), reverse=True)
 
+    def crossed(self) -> int:
+        """How many UAVs are on the other side of the line than 3 s ago."""
+        now = self._instants[-1]
+        before = next(one for one in reversed(self._instants) if one.t_ns <= now.t_ns - 3 * S)
+        there = dict(zip(before.ids.tolist(), before.at[:, :2] @ self._normal > self._off_m, strict=True))
+        here = zip(now.ids.tolist(), now.at[:, :2] @ self._normal > self._off_m, strict=True)
+        return sum(there[node] != is_beyond for node, is_beyond in here if node in there)
+
     def finds(self) -> dict[int, set[int]]:
         """Whom each UAV knows to be confirmed."""
         return {
@@ -87,10 +96,10 @@ class Parted(Flight):
 def judged(flight: Parted, at_s: float, angle: float, off_m: float) -> dict[str, Any]:
     """Fly on with the air parted, and what became of the swarm."""
     flight.part(angle, off_m)
-    planners = {}
+    planners, crossed = {}, {}
     for after_s in (3, 5, 10, 19):
         flight.host.run(round((at_s + after_s) * S))
-        planners[after_s] = flight.planners(cut=True)
+        planners[after_s], crossed[after_s] = flight.planners(cut=True), flight.crossed()
     flight.host.run(round((at_s + _FOR_S) * S))
     known = flight.finds()
     everything = set[int]().union(*known.values())
@@ -102,7 +111,7 @@ def judged(flight: Parted, at_s: float, angle: float, off_m: float) -> dict[str,
     flight.host.run(round((at_s + 45) * S))
     return {
         "scenario": flight.scenario.name, "seed": flight.scenario.seed, "at_s": at_s, "angle": round(angle, 2),
-        "off_m": round(off_m), "parts": planners, "merged": merged, "unknown": unknown,
+        "off_m": round(off_m), "parts": planners, "crossed": crossed, "merged": merged, "unknown": unknown,
         "least_m": flight.least_m(round(at_s * S)),
     }  # fmt: skip
 

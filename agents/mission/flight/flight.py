@@ -17,6 +17,8 @@ _MUTE_M: Final = 18.0
 _MUTE_LEVEL_M: Final = 8.0
 """A mute UAV keeps its place so far above it, and its level times this: others fly where it should be, because they
 take it for lost. So it is above those who fly home, and two levels are not in each other's way."""
+_PASS_M: Final = 18.0
+"""UAVs that give way to another part of the swarm fly so much higher: between the places of others and who is mute."""
 
 
 class Flight:
@@ -62,6 +64,8 @@ class Flight:
             level = self._roll_call.mute_level(now_ns)
             if level:
                 goal = goal._replace(up=goal.up + _MUTE_M + level * _MUTE_LEVEL_M)
+            elif self._place.passes_above:
+                goal = goal._replace(up=goal.up + _PASS_M)
             self.velocity = self._velocity_choice.velocity(goal, feed, now_ns, hastily=hastily)
             self.held = self._connectivity.held(self.velocity)
         elif self._return_home.land_if_there(now_ns):

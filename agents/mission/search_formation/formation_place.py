@@ -55,6 +55,8 @@ class FormationPlace:
         """The instant at which it leaves that position."""
         self._gaps: frozenset[int] = frozenset()
         """The places of those who are lost."""
+        self._apart = False
+        """True while a part of the swarm that is not lost is out of reach."""
         self._closing_ns = 0
         """The instant at which the last of them was lost."""
         self._before: Pattern | None = None
@@ -68,9 +70,11 @@ class FormationPlace:
         if first:
             self.depart(now_ns)
 
-    def close_ranks(self, lost: Collection[int], now_ns: int, *, away: Collection[int] = ()) -> None:
+    def close_ranks(
+        self, lost: Collection[int], now_ns: int, *, away: Collection[int] = (), apart: bool = False
+    ) -> None:
         """Fly on without these UAVs: the others of a row share its length. `away`: those that left by themselves, so
-        that nothing is urgent.
+        that nothing is urgent. `apart`: others, who are not lost, are in another part of the swarm.
         """
         if self.plan is None or self.pattern is None:
             return
@@ -84,6 +88,7 @@ class FormationPlace:
         gaps = frozenset(
             place for place in vacant if self.plan.nodes[place] in lost and self.plan.nodes[place] not in away
         )
+        self._apart = apart
         if not gaps <= self._gaps:
             self._closing_ns, self._before = now_ns, self.pattern
         self._gaps = gaps
@@ -98,6 +103,17 @@ class FormationPlace:
         if self.pattern is None or self.place is None or not self._gaps or since_s > _CLOSES_S:
             return None
         return since_s if self.pattern.has_beside(self.place, self._gaps) else None
+
+    @property
+    def passes_above(self) -> bool:
+        """True for a UAV that must fly higher than its place, because it may meet others of its row who do not hear it:
+        those beyond a gap may be a part of the swarm that takes this one for lost, and fly here to close the same gap.
+        Those on one side of it give way.
+        """
+        if self.pattern is None or self.place is None or not self._gaps:
+            return False
+        size, is_above = self.pattern.gap_beside(self.place, self._gaps)
+        return is_above and size > (0 if self._apart else 1)
 
     def known_at(self, place: int, swept_s: float) -> tuple[Enu, Enu]:
         """Where the UAV of a place would fly if the last one were not lost, and how: there it is sought when ranks are

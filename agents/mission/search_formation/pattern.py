@@ -110,6 +110,19 @@ class Pattern:
             if place in row.places or set(self._whole.tethers(place)).intersection(row.places)
         )
 
+    def gap_beside(self, place: int, lost: frozenset[int]) -> tuple[int, bool]:
+        """How many next to each other are lost where the gap in its row is that is nearest to a place, and whether that
+        is at higher places; 0 if there is none.
+        """
+        row = self._row(place)
+        gap = min((other for other in lost if row and other in row.places), key=lambda o: abs(o - place), default=None)
+        if gap is None:
+            return 0, False
+        way, size = (1 if gap > place else -1), 1
+        while gap + way * size in lost:
+            size += 1
+        return size, gap > place
+
     def _tied_to(self, place: int) -> list[int]:
         """The places to which a place is tied, vacant ones, too. Where two rows meet, whoever flies nearest to there is
         tied, now that the rows have closed ranks.

@@ -79,7 +79,8 @@ class PlanExchange:
                 self._roll_call.has_news, self._next_alarm_ns = False, now_ns + _ALARM_NS
                 self._outbox.packets.append(OutgoingPacket(self.hello_frames(now_ns)))
             away = {*self._planner.leavers, *self._planner.absent}
-            self._place.close_ranks(self._roll_call.lost, now_ns, away=away)
+            apart = not self._roll_call.lost.keys() >= set(self._roll_call.parted)
+            self._place.close_ranks(self._roll_call.lost, now_ns, away=away, apart=apart)
 
     def say_status(self, percent: int, now_ns: int) -> None:
         """Send this UAV's status: its position, its plan, and the percentage of its battery that it may still spend."""

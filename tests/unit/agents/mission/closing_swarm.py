@@ -1,8 +1,10 @@
-"""A whole swarm of `search_board.py` in flight, of which UAVs are lost: its UAVs decide as in a mission, and hear each
-other within reach once a second. What they know of losses comes by itself, as soon as in a mission; there is no radio.
+"""A whole swarm of `search_board.py` in flight, of which UAVs are lost, or between whose parts no frame gets through.
+
+Its UAVs decide as in a mission, and hear each other within reach: hellos once a second, and that somebody is silent at
+once. Whom one UAV misses all of its part miss at the next step; there is no radio.
 """
 
-from collections.abc import Sequence
+import math
 from typing import Final
 
 import numpy as np
@@ -23,12 +25,11 @@ from sim.results.connectivity import parts
 _STEP_NS: Final = S // 5
 _SPEED_M_S: Final = 10.0
 _M_S2: Final = 5.0
-_NOTICED_NS: Final = 900_000_000
-"""Those beside a UAV know so long after its loss that it is lost."""
-_TOLD_NS: Final = 500_000_000
-"""So long after that all of their part know it."""
-
-
+_SILENT_NS: Final = 1_200_000_000
+"""So long nobody hears a UAV until it is missed: those beside it notice, and tell their part."""
+_KNOWN_NS: Final = 15 * S
+_NEAR_M: Final = 0.96 * REACH_M
+"""Missed is only who was heard so lately, and would be so near had it flown on."""
 _ACQUAINTED_NS: Final = 2 * S
 """So long before anybody is lost all fly at their places, and hear each other."""
 
@@ -40,6 +41,8 @@ class _Uav:
         self.board = board = Board(node, at)
         own, neighbors = board.own_motion, board.neighbors
         self.lost: set[int] = set()
+        self.apart = False
+        """True while it knows of others, who are not lost, in another part."""
         tied = ConnectivityMaintenance(own, neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=_SPEED_M_S)
         choice = VelocityChoice(
             own, OPEN, most_m_s=_SPEED_M_S, hard=[ReciprocalAvoidance(own, neighbors, OPEN)], soft=[tied]
@@ -54,7 +57,7 @@ class _Uav:
         )  # fmt: skip
 
     def fly(self, at: Enu, velocity: Enu, now_ns: int) -> Enu:
-        self.board.place.close_ranks(self.lost, now_ns)
+        self.board.place.close_ranks(self.lost, now_ns, apart=self.apart)
         self._flight.fix(at, velocity, None, now_ns=now_ns)
         assert self._flight.velocity is not None
         return self._flight.velocity
@@ -69,34 +72,47 @@ class ClosingSwarm:
         self._at = np.array([at for at, _ in places], dtype=float)
         self._flown = np.array([velocity for _, velocity in places], dtype=float)
         self._uavs = [_Uav(NodeId(node), at) for node, (at, _) in enumerate(places, 1)]
-        self._lost_ns: dict[int, int] = {}
+        self._lost = np.zeros(COUNT, dtype=bool)
+        self._line: tuple[npt.NDArray[np.float64], float] | None = None
+        """No frame gets across this line: its normal, and how far from the middle it is."""
+        self._heard_ns = np.full((COUNT, COUNT), self._now_ns - 2 * _KNOWN_NS)
         for _ in range(_ACQUAINTED_NS // _STEP_NS):
             self.step()
 
-    @property
-    def _lives(self) -> npt.NDArray[np.bool_]:
-        return ~np.isin(np.arange(1, COUNT + 1), list(self._lost_ns))
-
-    def _parts(self) -> npt.NDArray[np.int64]:
-        """The part of each UAV; those who are lost are a part each."""
+    def _hears(self) -> npt.NDArray[np.bool_]:
+        """Who hears whom; those who are lost hear nobody, and nobody hears them."""
         near = np.linalg.norm(self._at[:, None] - self._at[None], axis=2) <= REACH_M
-        return np.asarray(parts(near & self._lives[:, None] & self._lives[None]))
+        near &= ~self._lost[:, None] & ~self._lost[None]
+        if self._line is not None:
+            normal, off_m = self._line
+            side = self._at[:, :2] @ normal > off_m
+            near &= side[:, None] == side[None]
+        return np.asarray(near)
 
     def heal_s(self, node: int, *, within_s: float) -> float:
         """Lose a UAV, fly on for so long, and say when the others were apart for the last time."""
         begin_ns = end_ns = self._now_ns
-        self._lost_ns[node] = begin_ns
+        self._lost[node - 1] = True
         while self._now_ns < begin_ns + round(within_s * S):
-            if len(set(self._parts()[self._lives])) > 1:
+            if len(set(parts(self._hears())[~self._lost])) > 1:
                 end_ns = self._now_ns + _STEP_NS
             self.step()
         return (end_ns - begin_ns) / S
 
+    def nearest_m(self, *, along: float, off_m: float, for_s: float) -> float:
+        """Part the air along a line whose normal has this angle, and say how near any two UAVs come to each other."""
+        self._line, end_ns, found = (np.array([math.cos(along), math.sin(along)]), off_m), self._now_ns + for_s * S, []
+        while self._now_ns < end_ns:
+            apart_m = np.linalg.norm(self._at[:, None] - self._at[None], axis=2)
+            found.append(float(apart_m[~np.eye(COUNT, dtype=bool)].min()))
+            self.step()
+        self._line = None
+        return min(found)
+
     def step(self) -> None:
-        part = self._parts()
-        self._hear(part)
+        self._hear()
         wanted = self._flown.copy()
-        for index in np.flatnonzero(self._lives):
+        for index in np.flatnonzero(~self._lost):
             uav = self._uavs[index]
             wanted[index] = uav.fly(Enu(*self._at[index]), Enu(*self._flown[index]), self._now_ns)
         change = wanted - self._flown
@@ -106,23 +122,26 @@ class ClosingSwarm:
         self._flown = after
         self._now_ns += _STEP_NS
 
-    def _hear(self, part: Sequence[int] | npt.NDArray[np.int64]) -> None:
-        """Hellos, each UAV's at an instant of its own within a second, and news of losses."""
-        for index in np.flatnonzero(self._lives):
-            if (self._now_ns // _STEP_NS + index * 3) % 5 == 0:
-                motion = Motion(Enu(*self._at[index]), Enu(*self._flown[index]), self._now_ns)
-                apart_m = np.linalg.norm(self._at - self._at[index], axis=1)
-                for other in np.flatnonzero(self._lives & (apart_m <= REACH_M)):
+    def _hear(self) -> None:
+        """Hellos, each UAV's at an instant of its own within a second, and whom each UAV misses."""
+        hears, now_ns = self._hears(), self._now_ns
+        self._heard_ns[hears] = now_ns
+        for index, uav in enumerate(self._uavs):
+            if (now_ns // _STEP_NS + index * 3) % 5 == 0:
+                motion = Motion(Enu(*self._at[index]), Enu(*self._flown[index]), now_ns)
+                for other in np.flatnonzero(hears[index]):
                     if other != index:
                         self._uavs[other].board.neighbors.on_hello(index + 1, motion)
-        for node, lost_ns in self._lost_ns.items():
-            if self._now_ns >= lost_ns + _NOTICED_NS + _TOLD_NS:
-                told = {part[index] for index in np.flatnonzero(self._lives) if node in self._uavs[index].lost}
-                for index in np.flatnonzero(self._lives):
-                    if part[index] in told:
-                        self._uavs[index].lost.add(node)
-            elif self._now_ns >= lost_ns + _NOTICED_NS:
-                for index in np.flatnonzero(self._lives):
-                    uav = self._uavs[index]
-                    if uav.board.neighbors.motion(node, now_ns=self._now_ns) is not None:
-                        uav.lost.add(node)
+            silent_ns = now_ns - self._heard_ns[index]
+            for other in np.flatnonzero((silent_ns >= _SILENT_NS) & (silent_ns < _KNOWN_NS)):
+                known = uav.board.neighbors.motion(other + 1, now_ns=now_ns)
+                if known is not None and known.offset_from(uav.board.own_motion.position, now_ns).norm() <= _NEAR_M:
+                    uav.lost.add(int(other) + 1)
+        part = parts(hears)
+        for one in set(part[~self._lost].tolist()):
+            members = np.flatnonzero((part == one) & ~self._lost)
+            here = {int(member) + 1 for member in members}
+            missed = set[int]().union(*(self._uavs[member].lost for member in members)) - here
+            for member in members:
+                self._uavs[member].lost = missed
+                self._uavs[member].apart = len(here) + len(missed) < COUNT

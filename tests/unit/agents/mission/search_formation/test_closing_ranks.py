@@ -1,4 +1,6 @@
-"""A swarm from which UAVs are lost, one after the other, is one network again within 15 s each time."""
+"""A swarm from which UAVs are lost, one after the other, is one network again within 15 s each time; parts of a swarm
+that do not hear each other keep clear of each other.
+"""
 
 import pytest
 from closing_swarm import ClosingSwarm
@@ -21,3 +23,10 @@ def test_who_is_left_is_one_network_again_within_15_s_of_each_loss(from_s: float
     heal_s = [swarm.heal_s(node, within_s=15.0) for node in lost[:-1]] + [swarm.heal_s(lost[-1], within_s=20.0)]
     assert max(heal_s) <= 15.0, (heal_s, why)
     assert max(heal_s) > 4.0, "gaps that have to be closed"
+
+
+@pytest.mark.parametrize(("from_s", "along", "off_m"), [(60.2, 1.71, -187.0), (77.3, 2.12, 226.0), (184.0, 1.52, -3.0)])
+def test_parts_that_take_each_other_for_lost_and_close_the_same_gap_keep_clear(
+    from_s: float, along: float, off_m: float
+) -> None:
+    assert ClosingSwarm(from_s).nearest_m(along=along, off_m=off_m, for_s=20.0) > 5.0

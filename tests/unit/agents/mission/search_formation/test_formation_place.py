@@ -1,5 +1,7 @@
 """The place of a UAV in the formation: taking it up, staying near it."""
 
+from collections.abc import Collection
+
 import pytest
 from search_board import FOLLOWER, LINE, PLAN, TAKEN_UP_NS, UP_M, Board
 
@@ -71,3 +73,20 @@ def test_who_has_left_a_ring_for_somebody_strays_until_it_is_back_and_nobody_of_
             board.own_motion.fix(lane._replace(east=lane.east + off_m, north=lane.north + off_m), STILL, now_ns=now_ns)
             assert board.place.strays(now_ns) == (strays and far), (node, off_m)
             assert not board.place.strays(TAKEN_UP_NS - 1)
+
+
+def test_of_two_parts_of_a_row_that_take_each_other_for_lost_one_passes_above_the_other() -> None:
+    chain, below, beyond = range(31, 41), NodeId(35), NodeId(36)
+
+    def above(node: NodeId, lost: Collection[int], *, apart: bool = True) -> bool:
+        place = Board(node, Enu(0, 0, UP_M)).place
+        place.close_ranks(lost, TAKEN_UP_NS, apart=apart)
+        return place.passes_above
+
+    assert above(below, {36, 37})
+    assert not above(beyond, {35, 34})
+    assert all(above(NodeId(node), {36, 37}) for node in chain if node < 36), "those behind follow"
+    assert not above(below, {36}, apart=False), "one UAV is lost, and nobody else is missed"
+    assert above(below, {36, 37}, apart=False), "two beside each other may be another part for long"
+    assert not above(LINE, {36, 37}), "another row"
+    assert not above(below, set())

@@ -34,6 +34,8 @@ _LAG_M: Final = 140.0
 
 _CLOSES_S: Final = 15.0
 """The time within which ranks are closed."""
+_FLOWN_NS: Final = 8 * S
+"""So long after they began to close ranks most UAVs are at their new places."""
 
 
 class FormationPlace:
@@ -60,7 +62,9 @@ class FormationPlace:
         self._closing_ns = 0
         """The instant at which the last of them was lost."""
         self._before: Pattern | None = None
-        """The formation until then, in which all know each other's places."""
+        """The formation until then, if all had time to take it up."""
+        self._changed_ns = -_FLOWN_NS
+        """The instant at which the others began to close ranks the last time, or to open them."""
 
     def adopt(self, plan: Search, now_ns: int) -> None:
         made, before = pattern_of(plan, reach_m=self._reach_m), self.pattern
@@ -68,6 +72,7 @@ class FormationPlace:
         self.plan, self.pattern = plan, made
         self.place = plan.nodes.index(self._node) if self._node in plan.nodes else None
         if first:
+            self._before = None
             self.depart(now_ns)
 
     def close_ranks(
@@ -90,10 +95,12 @@ class FormationPlace:
         )
         self._apart = apart
         if not gaps <= self._gaps:
-            self._closing_ns, self._before = now_ns, self.pattern
+            self._closing_ns = now_ns
+            if now_ns - self._changed_ns >= _FLOWN_NS:
+                self._before = self.pattern
         self._gaps = gaps
         if vacant != self.pattern.vacant:
-            self.pattern = self.pattern.closed(vacant)
+            self.pattern, self._changed_ns = self.pattern.closed(vacant), now_ns
 
     def closing_s(self, now_ns: int) -> float | None:
         """How long this UAV's row has been closing ranks over the last one who was lost; None if it is not, or has

@@ -25,8 +25,8 @@ from sim.results.connectivity import parts
 _STEP_NS: Final = S // 5
 _SPEED_M_S: Final = 10.0
 _M_S2: Final = 5.0
-_SILENT_NS: Final = 1_200_000_000
-"""So long nobody hears a UAV until it is missed: those beside it notice, and tell their part."""
+_SILENT_NS: Final = (1_200_000_000, 2_000_000_000, 2_800_000_000)
+"""So long nobody hears a UAV until those beside it miss it, and tell their part: not of all as long."""
 _KNOWN_NS: Final = 15 * S
 _NEAR_M: Final = 0.96 * REACH_M
 """Missed is only who was heard so lately, and would be so near had it flown on."""
@@ -73,6 +73,7 @@ class ClosingSwarm:
         self._flown = np.array([velocity for _, velocity in places], dtype=float)
         self._uavs = [_Uav(NodeId(node), at) for node, (at, _) in enumerate(places, 1)]
         self._lost = np.zeros(COUNT, dtype=bool)
+        self._noticed_ns = np.resize(_SILENT_NS, COUNT)
         self._line: tuple[npt.NDArray[np.float64], float] | None = None
         """No frame gets across this line: its normal, and how far from the middle it is."""
         self._heard_ns = np.full((COUNT, COUNT), self._now_ns - 2 * _KNOWN_NS)
@@ -89,10 +90,10 @@ class ClosingSwarm:
             near &= side[:, None] == side[None]
         return np.asarray(near)
 
-    def heal_s(self, node: int, *, within_s: float) -> float:
-        """Lose a UAV, fly on for so long, and say when the others were apart for the last time."""
+    def heal_s(self, *nodes: int, within_s: float) -> float:
+        """Lose UAVs at once, fly on for so long, and say when the others were apart for the last time."""
         begin_ns = end_ns = self._now_ns
-        self._lost[node - 1] = True
+        self._lost[[node - 1 for node in nodes]] = True
         while self._now_ns < begin_ns + round(within_s * S):
             if len(set(parts(self._hears())[~self._lost])) > 1:
                 end_ns = self._now_ns + _STEP_NS
@@ -133,7 +134,7 @@ class ClosingSwarm:
                     if other != index:
                         self._uavs[other].board.neighbors.on_hello(index + 1, motion)
             silent_ns = now_ns - self._heard_ns[index]
-            for other in np.flatnonzero((silent_ns >= _SILENT_NS) & (silent_ns < _KNOWN_NS)):
+            for other in np.flatnonzero((silent_ns >= self._noticed_ns) & (silent_ns < _KNOWN_NS)):
                 known = uav.board.neighbors.motion(other + 1, now_ns=now_ns)
                 if known is not None and known.offset_from(uav.board.own_motion.position, now_ns).norm() <= _NEAR_M:
                     uav.lost.add(int(other) + 1)

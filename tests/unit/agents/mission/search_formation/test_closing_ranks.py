@@ -25,6 +25,11 @@ def test_who_is_left_is_one_network_again_within_15_s_of_each_loss(from_s: float
     assert max(heal_s) > 4.0, "gaps that have to be closed"
 
 
+def test_of_two_lost_at_once_the_second_one_that_is_noticed_makes_nobody_seek_others_where_they_are_not_yet() -> None:
+    first, second = 45, 32  # a follower, and a relay, which is missed later
+    assert 4.0 < ClosingSwarm(102.5).heal_s(first, second, within_s=15.0) < 7.0
+
+
 @pytest.mark.parametrize(("from_s", "along", "off_m"), [(60.2, 1.71, -187.0), (77.3, 2.12, 226.0), (184.0, 1.52, -3.0)])
 def test_parts_that_take_each_other_for_lost_and_close_the_same_gap_keep_clear(
     from_s: float, along: float, off_m: float

@@ -84,6 +84,7 @@ def test_of_two_parts_of_a_row_that_take_each_other_for_lost_one_passes_above_th
         return place.passes_above
 
     assert above(below, {36, 37})
+    assert above(below, {36}), "those behind it are out of reach, and not lost"
     assert not above(beyond, {35, 34})
     assert all(above(NodeId(node), {36, 37}) for node in chain if node < 36), "those behind follow"
     assert not above(below, {36}, apart=False), "one UAV is lost, and nobody else is missed"

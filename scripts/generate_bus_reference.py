@@ -142,7 +142,7 @@ clock.
 
 1. Connect to the router as a Zenoh client, scouting off.
 2. Ask (`get`) `scenario`: the answer is the resolved scenario as JSON. An answer that is not what you run is a reason
-   to leave.
+   to leave; so is another `bus` in it, which stands for the layout of the messages below (`codecs.LAYOUT`).
 3. Subscribe to what you hear, then declare the liveliness token `alive/<name>`. Processes of fanet-mw declare
    `alive/<name>/<fingerprint>/<instance>` instead: the router names those that are missing, there twice, or of
    another scenario.

@@ -5,6 +5,7 @@ One put on the bus carries a batch of messages. Each is one byte for its kind, a
 endian. Any bytes decode either to messages or to MalformedFrameError, and to no other exception.
 """
 
+import hashlib
 import struct
 from array import array
 from collections.abc import Callable, Iterable
@@ -312,6 +313,10 @@ HEADS: Final[dict[type[Any], tuple[struct.Struct, ...]]] = {
 }  # fmt: skip
 """The structs of each kind: that of its head, and that of each row for kinds with rows."""
 CODES: Final = {kind: code for code, (kind, _, _) in _CODECS.items()}
+LAYOUT: Final = hashlib.sha256(
+    repr([(c, k.__name__, list(k.__annotations__), [s.format for s in HEADS[k]]) for k, c in CODES.items()]).encode()
+).hexdigest()[:8]
+"""Stands for the layout of all messages: processes with another one read nonsense in what these put."""
 _CODE_OF: Final = {kind: (code, encode) for code, (kind, encode, _) in _CODECS.items()}
 _ITEM: Final = struct.Struct("<BI")
 _new: Final = tuple.__new__  # for what is made once per message

@@ -1,7 +1,6 @@
 """The gateway's process: the taps of a swarm on one side, connections to ground stations on the other."""
 
 import asyncio
-import json
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Sequence
@@ -20,6 +19,7 @@ from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import START_PATIENCE_S, ClockListener, SwarmClock
 from fanet_mw.hosts.timebase import THIS_MACHINE
 from fanet_mw.mavlink import GATEWAY_COMPONENT, common
+from fanet_mw.scenario.fingerprint import told_by
 from fanet_mw.units import NodeId, seconds_to_ns
 from fanet_mw.wire import frames, system_id
 
@@ -98,7 +98,7 @@ def facts_of(bus: Bus, names: Topics) -> SwarmFacts:
         if time.monotonic() > until_s:
             raise BusError(f"swarm {names.swarm} does not say what it is within {_ANSWER_S:g} s: is there one?")
     try:
-        scenario = json.loads(answers[0])
+        scenario = told_by(names.swarm, answers[0])
         count, until_ns = int(scenario["nodes"]["count"]), seconds_to_ns(float(scenario["duration_s"]))
         post = NodeId(count + 1) if scenario["ground"]["at_m"] else None
     except (ValueError, KeyError, TypeError, RecursionError) as error:

@@ -30,7 +30,7 @@ from fanet_mw.hosts.presence import few
 from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
 from fanet_mw.hosts.wake_lateness import ProcessCost, WakeLateness
 from fanet_mw.scenario import Scenario
-from fanet_mw.scenario.fingerprint import as_json, differences, fingerprint
+from fanet_mw.scenario.fingerprint import as_json, differences, fingerprint, told_by
 from fanet_mw.trace import Record
 from fanet_mw.units import S
 
@@ -123,12 +123,10 @@ class RealtimeHost:
 
         self._bus.ask(self._names.scenario, on_answer)
         try:
-            theirs = json.loads(await asyncio.wait_for(answer, _SCENARIO_S))
+            theirs = told_by(self._names.swarm, await asyncio.wait_for(answer, _SCENARIO_S))
         except (TimeoutError, ValueError, RecursionError):
             return
-        if not isinstance(theirs, dict):
-            return
-        found = list(differences(json.loads(as_json(scenario)), theirs))
+        found = list(differences(told_by(self._names.swarm, as_json(scenario).encode()), theirs))
         if found:
             keys = few(f"{key} = {ours!r} here, {other!r} there" for key, ours, other in found)
             raise ConfigError(f"{self._actor.name} runs another scenario than swarm {self._names.swarm}: {keys}")

@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from fanet_mw.bus.codecs import LAYOUT
+from fanet_mw.errors import BusError
 from fanet_mw.extensions import digest, module_of
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.scenario.tables.clusters import METHODS
@@ -51,8 +53,26 @@ def modules_of(scenario: Scenario) -> dict[str, str]:
 
 
 def as_json(scenario: Scenario) -> str:
-    """The identity of a scenario as text, the same text for the same scenario."""
-    return json.dumps(identity(scenario), sort_keys=True, separators=(",", ":"))
+    """The identity of a scenario and the layout of the bus as text, the same text for the same scenario."""
+    return json.dumps({**identity(scenario), "bus": LAYOUT}, sort_keys=True, separators=(",", ":"))
+
+
+def told_by(swarm: str, answer: bytes) -> dict[str, Any]:
+    """The identity of the scenario that a swarm's keeper has told as text.
+
+    Raises BusError if the keeper lays bus messages out in another way, ValueError or RecursionError if this is no
+    such text.
+    """
+    tree = json.loads(answer)
+    if not isinstance(tree, dict):
+        raise ValueError("no table of keys")  # noqa: TRY004  (like all other texts that are none)
+    theirs = tree.pop("bus", LAYOUT)
+    if theirs != LAYOUT:
+        raise BusError(
+            f"swarm {swarm} lays bus messages out as {theirs!r}, this fanet-mw as {LAYOUT!r}: "
+            "both must be of the same version"
+        )
+    return tree
 
 
 def fingerprint(scenario: Scenario) -> str:

@@ -4,7 +4,6 @@ A change is one message on `fanet/<swarm>/radio/control`. The emulator's trace s
 that it was refused (the emulator's report counts why), or that no emulator serves that swarm.
 """
 
-import json
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -17,6 +16,7 @@ from fanet_mw.bus.radio_control import Control, Restore, nodes_of
 from fanet_mw.bus.topics import ROOT, Topics
 from fanet_mw.errors import FanetError, MalformedFrameError
 from fanet_mw.hosts.bus import Bus, config_of
+from fanet_mw.scenario.fingerprint import told_by
 from fanet_mw.trace import RadioFault
 
 OPERATOR: Final = "operator"
@@ -87,11 +87,10 @@ def scenario_of_swarm(bus: Bus, names: Topics) -> Mapping[str, Any]:
     bus.ask(names.scenario, on_answer)
     came.wait(_DISCOVER_S)
     try:
-        tree = json.loads(answers[0]) if answers else {}
+        tree = told_by(names.swarm, answers[0]) if answers else {}
     except (ValueError, RecursionError):
         return {}
-    tables = tree.items() if isinstance(tree, dict) else ()
-    return {name: table for name, table in tables if isinstance(table, dict)}
+    return {name: table for name, table in tree.items() if isinstance(table, dict)}
 
 
 def _watch(control: Control, done: list[RadioFault], confirmed: threading.Event) -> Callable[[str, bytes], None]:

@@ -7,7 +7,6 @@ It asks the keeper of the clock for the scenario and the clock, so it may come a
 on. What roles UAVs took before it came it learns from their reports.
 """
 
-import json
 import threading
 import time
 from collections import deque
@@ -23,6 +22,7 @@ from fanet_mw.errors import ConfigError, FanetError, MalformedFrameError
 from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.hosts.clock import SwarmClock
 from fanet_mw.scenario import Scenario, config
+from fanet_mw.scenario.fingerprint import told_by
 from fanet_mw.trace import Record
 from sim.bus.air_control import OPERATOR, find_swarm
 from sim.observation.observer import Observer
@@ -228,7 +228,7 @@ class BusFeed:
         if not came.wait(_ANSWER_S):
             raise FanetError(f"swarm {self.names.swarm}: nobody says within {_ANSWER_S:g} s which scenario it runs")
         try:
-            tree = json.loads(answers[0])
+            tree = told_by(self.names.swarm, answers[0])
             del tree["modules"]
             return config.build(tree, source=f"swarm {self.names.swarm}", imports=False)
         except (ValueError, TypeError, KeyError, RecursionError) as error:

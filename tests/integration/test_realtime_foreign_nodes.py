@@ -24,6 +24,16 @@ SMALL = [
 ]  # fmt: skip
 
 
+OLDER = """
+import sys
+from fanet_mw.bus import codecs
+codecs.LAYOUT = "older"
+from fanet_mw.__main__ import main
+sys.exit(main())
+"""
+"""A program whose bus messages have another layout."""
+
+
 class Processes:
     """What a test has started; whatever still runs in the end is ended."""
 
@@ -86,6 +96,11 @@ def test_a_router_names_who_is_wrong_and_writes_what_the_right_ones_did(processe
         _, said = stranger.communicate(timeout=60)
         assert stranger.returncode == 2
         assert "agent-1 runs another scenario than swarm quick: traffic.payload_bytes = 300 here, 256 there" in said
+
+        older = processes.start("-c", OLDER, "agent", "quick", "--id", "1", *join, *SMALL)
+        _, said = older.communicate(timeout=60)
+        assert older.returncode == 2
+        assert "swarm quick lays bus messages out as" in said
 
         services = [processes.fanet("emulator", *join), processes.fanet("agent", "--id", "1", *join)]
         bus.announce(Topics("quick").alive("agent-1"))

@@ -1,8 +1,13 @@
 """Who of a swarm is there, twice, missing, or with another scenario."""
 
+import json
+
+import pytest
+
 from fanet_mw.bus.topics import Topics
+from fanet_mw.errors import BusError
 from fanet_mw.hosts.presence import Presence
-from fanet_mw.scenario.fingerprint import differences, fingerprint
+from fanet_mw.scenario.fingerprint import as_json, differences, fingerprint, told_by
 from sim.scenarios import catalog
 
 NAMES = Topics("s")
@@ -60,3 +65,12 @@ def test_the_fingerprint_is_of_every_value_and_differences_are_named() -> None:
     assert fingerprint(one) != fingerprint(other)
     found = list(differences(one.model_dump(mode="json"), other.model_dump(mode="json")))
     assert found == [("nodes.count", 9, 12), ("routing.protocol", "clustered", "flooding")]
+
+
+def test_who_lays_bus_messages_out_otherwise_is_no_keeper_for_this_process() -> None:
+    told = json.loads(as_json(catalog.find("quick")))
+    assert told_by("s", json.dumps(told).encode()) == {key: told[key] for key in told.keys() - {"bus"}}
+    with pytest.raises(BusError, match="swarm s lays bus messages out as 'older', this fanet-mw as "):
+        told_by("s", json.dumps({**told, "bus": "older"}).encode())
+    del told["bus"]
+    assert told_by("s", json.dumps(told).encode()) == told, "a keeper of somebody else need not say it"

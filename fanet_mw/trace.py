@@ -43,7 +43,9 @@ class BoundStated(NamedTuple):
 
 
 class BoundExcludes(NamedTuple):
-    """The bound that the origin promised for a packet does not hold for this node, which it takes to be gone."""
+    """The bound or likely delay that the origin stated for a packet is not meant for this node, which it takes to be
+    gone.
+    """
 
     t_ns: int
     node: int

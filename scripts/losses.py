@@ -284,7 +284,7 @@ def outcome(flight: Flight) -> dict[str, Any]:
     mission, reached = summary["mission"], summary["reachable"]
     return {
         "found": mission["confirmed"], "of": mission["survivors"], "covered": mission["coverage"],
-        "pdr": reached.get("report", reached)["pdr"], "contacts": mission["collisions"],
+        "pdr": reached.get("report", next(iter(reached.values())))["pdr"], "contacts": mission["collisions"],
         "last_find_s": max(mission["time_to_confirm_s"], default=None), "covered_95_s": mission["covered_95_s"],
         "nearest_m": mission["nearest_m"]["least"],
     }  # fmt: skip

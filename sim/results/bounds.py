@@ -37,8 +37,8 @@ def likely(applications: Mapping[str, AppPackets]) -> dict[str, Any]:
 
         within_share = deliveries within the delay stated for their packet / (packets with a statement x their targets)
 
-    A statement holds if `within_share` is at least the stated `share`. The result is empty if no origin has stated any
-    delay.
+    Nodes that an origin took to be gone are no targets. A statement holds if `within_share` is at least the stated
+    `share`. The result is empty if no origin has stated any delay.
     """
     stated = [
         (app, name, sent.likely) for app in applications.values() for name, sent in app.sent.items() if sent.likely
@@ -49,8 +49,8 @@ def likely(applications: Mapping[str, AppPackets]) -> dict[str, Any]:
     within = 0
     for app in applications.values():
         delays_ns, limits_ns = _beside(app, [sent.likely[0] if sent.likely else -1 for sent in app.sent.values()])
-        within += int((delays_ns <= limits_ns).sum()) if app.wanted else 0
-    wanted = sum(app.wanted / len(app.sent) for app, _, _ in stated)
+        within += int((delays_ns <= limits_ns)[_not_excluded(app)].sum()) if app.wanted else 0
+    wanted = sum(app.sent[name].targets for app, name, _ in stated if app.wanted)
     packets = sum(len(app.sent) for app in applications.values())
     return {
         "share": min(share for _, _, (_, share) in stated),

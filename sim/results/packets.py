@@ -36,9 +36,11 @@ class SentPacket(NamedTuple):
     likely: tuple[int, float] | None = None
     """The likely delay, and the share of copies that the origin stated to arrive within it; None if it stated none."""
     targets: int = 0
-    """The number of nodes for which it was meant, less those that its bound excludes; 0 if the trace does not tell."""
+    """The number of nodes for which it was meant, less those that its bound or likely delay excludes; 0 if the trace
+    does not tell.
+    """
     excluded: frozenset[int] = frozenset()
-    """The nodes for which its bound does not hold."""
+    """The nodes for which what its origin stated is not meant."""
 
 
 class Deliveries(NamedTuple):
@@ -97,7 +99,7 @@ def packets_of(outcome: Outcome) -> Mapping[str, AppPackets]:
         row = row_of.get((app_name, name[0]), _EVERYONE)
         packets[name] = _Known(app_name, len(app.sent), sent.born_ns, row)
         copies = len(targets[row]) if row != _EVERYONE else len(everyone) - 1 if app_name in OTHER_APPS else 0
-        without = frozenset(excluded.get(name, ()))
+        without = targets[row].intersection(excluded.get(name, ()))
         app.sent[name] = sent._replace(targets=max(0, copies - len(without)), excluded=without)
         app.wanted += copies
     counting = _DeliveryCount(packets, list(found), targets, exact=not outcome.scenario.clock.modelled)

@@ -10,7 +10,7 @@ from kit import slow
 from agents.uav import Uav
 from fanet_mw.bus.messages import Message
 from fanet_mw.scenario import config
-from fanet_mw.trace import BoundExcludes, BoundStated, Delivered
+from fanet_mw.trace import BoundExcludes, BoundStated, Delivered, Generated, LikelyStated
 from fanet_mw.units import S
 from sim.results.files import finish
 from sim.run.virtual import simulate
@@ -252,6 +252,21 @@ def test_bounds_of_reports_hold_though_warnings_overtake_them_at_each_hop() -> N
     ]
     assert len(kept) > 100
     assert all(kept)
+
+
+def test_over_lossy_links_a_likely_delay_is_stated_again_soon_after_a_uav_is_lost() -> None:
+    """Since one was lost, nobody stated any: the likely delay was meant for all or for nobody."""
+    tree = {
+        **BASE, "duration_s": 24, "drain_s": 2,
+        "radio": {**BASE["radio"], "channel": "log_distance", "shadowing_db": 4, "fading": "rician"},
+        "traffic": {**BASE["traffic"], "interval_s": 0.25},
+        "faults": [{"kind": "mute", "at_s": 14, "node": 8}],
+    }  # fmt: skip
+    outcome = simulate(config.build(tree))
+    born = [one for one in outcome.records if isinstance(one, Generated) and one.t_ns > 18 * S and one.node != 8]
+    stated = {(one.node, one.seq) for one in outcome.records if isinstance(one, LikelyStated)}
+    assert sum((one.node, one.seq) in stated for one in born) > 0.9 * len(born)
+    assert finish(outcome, out=None)["likely"]["within_share"] > 0.98
 
 
 def test_over_shadowed_and_fading_links_a_likely_delay_is_stated_and_kept_in_motion() -> None:

@@ -13,7 +13,7 @@ IPSN 2011; LWB, SenSys 2012), without their synchronous transmissions, which 802
 nodes that use the same turn far apart.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import ClassVar, Final, NamedTuple
 
 from fanet_mw.bus.messages import Reception, TxStatus
@@ -247,19 +247,25 @@ class RoundFlooding(RoutingProtocol):
             self._state_likely(packet, likely_ns, now_ns=now_ns)
         elif law_ns <= self._port.scenario.routing.lifetime_ns(header.priority):
             self._stated += 1
-            stated = header.origin_us * US, self._port.node, header.seq
-            self._port.record(BoundStated(*stated, law_ns))
-            for other in self._law.absent(self._topology, now_ns=now_ns) or ():
-                self._port.record(BoundExcludes(*stated, other))
+            self._port.record(BoundStated(header.origin_us * US, self._port.node, header.seq, law_ns))
+            self._exclude(self._law.absent(self._topology, now_ns=now_ns) or (), packet)
 
     def _state_likely(self, packet: Packet, likely_ns: int | None, *, now_ns: int) -> None:
-        """State by when nearly all nodes have an own packet, if that is known and a way leads to each."""
+        """State by when nearly all nodes to which a way leads have an own packet, if that is known."""
         header = packet.header
         if likely_ns is None or likely_ns > self._port.scenario.routing.lifetime_ns(header.priority):
             return
-        if self._law.absent(self._topology, now_ns=now_ns) == ():
+        absent = self._law.absent(self._topology, now_ns=now_ns)
+        if absent is not None:
             origin_ns = header.origin_us * US
             self._port.record(LikelyStated(origin_ns, self._port.node, header.seq, likely_ns, LIKELY_SHARE))
+            self._exclude(absent, packet)
+
+    def _exclude(self, nodes: Iterable[NodeId], packet: Packet) -> None:
+        """What was stated of an own packet is not meant for these nodes."""
+        header = packet.header
+        for node in nodes:
+            self._port.record(BoundExcludes(header.origin_us * US, self._port.node, header.seq, node))
 
     def _compare(self, packet: Packet, now_ns: int) -> None:
         """How long a packet of another node took shows how long the own ones may take."""

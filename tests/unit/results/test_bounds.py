@@ -123,6 +123,22 @@ def test_a_stated_share_is_held_against_the_copies_of_the_packets_it_is_about(sc
     assert summary["likely"] == {"share": 0.95, "within_share": 0.5, "stated_share": 0.666667, "worst_ms": 100}
 
 
+def test_a_likely_delay_is_not_held_against_nodes_that_are_gone(scenario: Scenario) -> None:
+    records = [
+        *packet(1, bound_ms=None, delays_ms={2: 100, 3: 1}),
+        LikelyStated(1 * S, 1, 1, 100 * MS, 0.99),
+        BoundExcludes(1 * S, 1, 1, 3),
+    ]
+    summary = summarize(Outcome(scenario, "virtual", 1.0, records, {}), trace_sha256="")
+    assert summary["likely"]["within_share"] == 1.0
+
+
+def test_that_others_are_gone_excuses_no_packet_for_one_receiver(make_scenario: Any) -> None:
+    chosen = make_scenario(**{"nodes.count": 3, "traffic.sources": "all", "traffic.targets": [2]})
+    bound = bound_of(chosen, packet(1, bound_ms=100, delays_ms={}), [BoundExcludes(1 * S, 1, 1, 3)])
+    assert (bound["never"], bound["violations"]) == (1, 1)
+
+
 def test_without_a_statement_there_is_nothing_to_hold(scenario: Scenario) -> None:
     outcome = Outcome(scenario, "virtual", 1.0, packet(1, bound_ms=100, delays_ms={2: 1}), {})
     assert summarize(outcome, trace_sha256="")["likely"] == {}

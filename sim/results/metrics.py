@@ -1,4 +1,4 @@
-"""Computes the summary of a run from its outcome. docs/reference/results.md defines each figure.
+"""Computes the summary of a run from its outcome. `summary_figures.py` defines each figure.
 
 pdr      = unique deliveries of application packets at their targets / (packets generated x targets), at most 1
 repeated = further deliveries of a packet at a target whose process was restarted, and so has forgotten the first

@@ -28,7 +28,7 @@ def test_the_site_has_every_page_its_pictures_and_a_search(site: Path) -> None:
     assert "guard time" in (site / "search.json").read_text("utf-8")
     front = (site / "index.html").read_text("utf-8")
     assert 'href="how-to/see-a-swarm.html' in front
-    assert (site / "source" / "fanet_mw" / "bus" / "codecs.py.txt").exists(), "a page links it"
+    assert (site / "source" / "fanet_mw" / "mavlink.py.txt").exists(), "a page links it"
 
 
 def test_links_that_lead_nowhere_are_found(tmp_path: Path) -> None:

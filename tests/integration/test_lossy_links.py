@@ -6,7 +6,7 @@ import pytest
 from kit import slow
 
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import BoundStated, Delivered, Dropped, Generated, LikelyStated
+from fanet_mw.trace import BoundExcludes, BoundStated, Delivered, Dropped, Generated, LikelyStated
 from fanet_mw.units import S
 from sim.run.virtual import simulate
 from sim.scenarios.catalog import find
@@ -41,6 +41,15 @@ def test_each_packet_over_lossy_links_arrives_within_what_was_stated_for_it(loss
     assert in_time / (11 * len(born)) >= 0.99
     assert max(record.delay_ns for record in stated.values()) < 10 * S
     assert not any(isinstance(record, BoundStated) for record in outcome.records)
+
+
+def test_once_the_leader_plans_without_a_lost_node_likely_delays_are_stated_again() -> None:
+    lost = 'faults=[{kind="mute", node=12, at_s=24}]'
+    outcome = simulate(scenario(*LOSSY, lost, "duration_s=70"))
+    born = [(r.node, r.seq) for r in outcome.records if isinstance(r, Generated) and r.t_ns > 58 * S and r.node != 12]
+    stated = {(r.node, r.seq) for r in outcome.records if isinstance(r, LikelyStated)}
+    without = {(r.node, r.seq) for r in outcome.records if isinstance(r, BoundExcludes) and r.other == 12}
+    assert sum(packet in stated and packet in without for packet in born) >= 0.9 * len(born) > 20
 
 
 def test_the_same_swarm_with_places_leaves_out_a_part() -> None:

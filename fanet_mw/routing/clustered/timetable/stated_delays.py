@@ -12,7 +12,7 @@ When two separated parts of a swarm meet, one leader prevails without such notic
 it has promised to send. A packet that would break its stated bound nevertheless is dropped.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from fanet_mw.node.contract import Port
@@ -237,17 +237,22 @@ class StatedDelays:
             )
             if kept and had_ns <= min(due_ns, known_ns, expires_ns):
                 self._port.record(BoundStated(now_ns, self._port.node, packet.header.seq, bound_ns))
-                for other in range(1, self._port.scenario.node_count + 1):
-                    # one that has not joined, or is gone: no turn reaches it for sure
-                    if any(other not in one.table.spans for one in in_force):
-                        excluded = NodeId(other)
-                        self._port.record(BoundExcludes(now_ns, self._port.node, packet.header.seq, excluded))
+                self._exclude(in_force, packet, now_ns)
                 self._promised[packet.header.seq] = through_ns, due_ns - receipt_ns(self._port.scenario)
                 self._forget_overdue(now_ns)
         likely_ns = self.likely_ns() if packet.header.priority == PRIORITY_BULK else None
         if likely_ns is not None and newest is not None and newest.valid_ns <= now_ns:
             record = LikelyStated(now_ns, self._port.node, packet.header.seq, likely_ns, LIKELY_SHARE)
             self._port.record(record)
+            self._exclude([newest], packet, now_ns)
+
+    def _exclude(self, timetables: Sequence[NodeTimetable], packet: Packet, now_ns: int) -> None:
+        """What was stated of a packet is not meant for nodes that one of these timetables lacks: no turn is sure to
+        reach who has not joined, or is gone.
+        """
+        for other in self._port.scenario.node_ids:
+            if any(other not in one.table.spans for one in timetables):
+                self._port.record(BoundExcludes(now_ns, self._port.node, packet.header.seq, other))
 
     def kept_until_ns(self, now_ns: int) -> int:
         """The instant until which the node keeps its turns, because promised packets wait for them; 0 if none do."""
@@ -298,8 +303,8 @@ class StatedDelays:
         return None if own is None or self.bound_ns() is None else least_interval_ns(own, deadline_ns=deadline_ns)
 
     def likely_ns(self) -> int | None:
-        """The time within which `LIKELY_SHARE` of the nodes have this node's newest packet over lossy links; None if it
-        is not known.
+        """The time within which `LIKELY_SHARE` of the nodes in the timetable have this node's newest packet over lossy
+        links; None if it is not known.
         """
         timetable = self._timetables.newest
         if timetable is None or timetable.odds is None or not timetable.roots:
@@ -308,8 +313,6 @@ class StatedDelays:
             return None  # schedules go before the leader's own packets
         if self._ends_early(timetable):
             return None
-        if len(timetable.table.spans) < self._port.scenario.node_count:
-            return None  # the swarm is separated or not complete: some node is in no turn of this timetable
         load = timetable.loads.get(self._port.node, AS_EXPECTED)
         found_ns = likely_delay_ns(
             timetable,

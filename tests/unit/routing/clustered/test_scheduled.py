@@ -550,13 +550,11 @@ def test_a_join_does_not_take_the_place_of_an_announcement_that_waits(node: Node
     assert access.waiting() == 2, "a newer one does"
 
 
-@pytest.mark.parametrize(("nodes", "states"), [(5, True), (4, False)])
-def test_a_likely_delay_is_stated_only_when_all_of_the_swarm_are_in_the_timetable(
-    node: Node, nodes: int, states: bool
-) -> None:
+@pytest.mark.parametrize("nodes", [5, 4])
+def test_a_likely_delay_is_stated_for_those_who_are_in_the_timetable(node: Node, nodes: int) -> None:
     """The swarm has five nodes; after a split a part of it makes a timetable of its own."""
     plan = planned(FLOODS)
     table = plan.table._replace(spans={NodeId(n): 3 for n in range(1, nodes + 1)})
     odds = Odds({US: (0.0,)})
     access_of(node)._timetables.in_order = [plan._replace(table=table, odds=odds, calls=(20,))]
-    assert (access_of(node).report()["likely_ms"] is not None) == states
+    assert access_of(node).report()["likely_ms"] is not None

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
@@ -77,9 +78,12 @@ class Parted(Flight):
         """How many UAVs are on the other side of the line than 3 s ago."""
         now = self._instants[-1]
         before = next(one for one in reversed(self._instants) if one.t_ns <= now.t_ns - 3 * S)
-        there = dict(zip(before.ids.tolist(), before.at[:, :2] @ self._normal > self._off_m, strict=True))
-        here = zip(now.ids.tolist(), now.at[:, :2] @ self._normal > self._off_m, strict=True)
+        there = dict(zip(before.ids.tolist(), self._is_beyond(before.at), strict=True))
+        here = zip(now.ids.tolist(), self._is_beyond(now.at), strict=True)
         return sum(there[node] != is_beyond for node, is_beyond in here if node in there)
+
+    def _is_beyond(self, at: npt.NDArray[np.float64]) -> list[bool]:
+        return [bool(beyond) for beyond in at[:, :2] @ self._normal > self._off_m]
 
     def finds(self) -> dict[int, set[int]]:
         """Whom each UAV knows to be confirmed."""

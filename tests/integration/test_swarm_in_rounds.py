@@ -199,6 +199,17 @@ def test_bulk_for_one_of_whom_nothing_is_known_yet_is_flooded() -> None:
     assert summary["pdr"] == 1.0
 
 
+def test_a_uav_that_hears_nothing_does_not_delay_the_bulk_of_others() -> None:
+    """All its neighbors sent each packet sixteen times for it."""
+    bulk = {"payload_bytes": 1024, "interval_s": 0.4, "priority": "bulk", "sources": 15}
+    deaf = [{"kind": "deaf", "at_s": 5, "node": 8}]
+    heard = flown(traffic=bulk)
+    summary = flown(traffic=bulk, faults=deaf)
+    assert summary["pdr"] > 1 - 1 / 15, "the deaf one is the only one that lacks anything"
+    assert summary["delay_ms"]["p95"] < 1.3 * heard["delay_ms"]["p95"]
+    assert summary["frames"]["sent"] < 1.2 * heard["frames"]["sent"]
+
+
 class WokenLate(Uav):
     """A UAV that is woken as late as its process may be, or together with a message that comes first."""
 

@@ -119,7 +119,7 @@ class RoundFlooding(RoutingProtocol):
                 reaches=scenario.reaches,
             )
         self._spreading = Spreading(
-            capacity=scenario.routing.queue_frames, repeats=rounds.repeats, patience_ns=self._law.hop_ns,
+            port.node, capacity=scenario.routing.queue_frames, repeats=rounds.repeats, patience_ns=self._law.hop_ns,
             links=self._topology.links, lossy=self._law.loses_frames,
         )  # fmt: skip
         self._repair = None

@@ -10,8 +10,9 @@ that it holds it (FANET_HELD). Urgent packets are sent by every node, so hearing
 at random it is enough, too, that two were heard that have links to the neighbor; what is missing is sent again at
 growing intervals, and neighbors that are seldom heard are left to others. Bulk is sent only where a neighbor is out of
 reach of all that were heard to send it (scalable broadcast; Peng and Lu, MobiHoc 2000), so every node tells in turns
-which bulk it has received. Before a packet is repeated a whole round must have passed in which nobody else sent it, so
-that mostly one node repeats. Sets of nodes are integers: bit i stands for node i + 1.
+which bulk it has received. For a neighbor that is heard but hears nothing, nothing is sent again. Before a packet is
+repeated a whole round must have passed in which nobody else sent it, so that mostly one node repeats. Sets of nodes are
+integers: bit i stands for node i + 1.
 """
 
 import math
@@ -19,7 +20,7 @@ from collections.abc import Iterable, Sequence
 from heapq import heappop, heappush
 from typing import Final
 
-from fanet_mw.node.duplicates import key_of
+from fanet_mw.node.duplicates import key_of, origin_and_seq
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.rounds.topology import nodes_of
 from fanet_mw.units import US
@@ -33,6 +34,8 @@ _REMEMBERED: Final = 32
 _WEAK_SHARE: Final = 0.5
 _OTHER_LINKS: Final = 2
 """A neighbor that is heard of fewer packets than that share is left to others, if it has so many links."""
+_MOST_VAIN: Final = 16
+"""So often something is sent again for a neighbor that never shows to have heard anything."""
 _WAY_ROUND: Final = 2
 """The hops that a flood may need to reach a neighbor by relays that this node does not hear."""
 
@@ -114,13 +117,14 @@ class Spreading:
     """The packets that one node passes on."""
 
     def __init__(
-        self, *, capacity: int, repeats: int, patience_ns: int, links: Sequence[int], lossy: bool = False
+        self, node: int, *, capacity: int, repeats: int, patience_ns: int, links: Sequence[int], lossy: bool = False
     ) -> None:
-        """`capacity`: the most packets that are kept.
+        """`node`: this node. `capacity`: the most packets that are kept.
         `patience_ns`: the time after which a neighbor that has received a packet was heard to say so.
         `links`: the nodes with which each node has links, by its id; they change.
         `lossy`: the channel loses frames at random, so that not to hear a neighbor shows little.
         """
+        self._node = node
         self._capacity = capacity
         self._repeats = repeats
         self._patience_ns = patience_ns
@@ -147,6 +151,8 @@ class Spreading:
         """The share of urgent packets that each neighbor was lately heard to send."""
         self._weak = 0
         """The neighbors that are heard so seldom that others are left to serve them."""
+        self._vain: dict[int, int] = {}
+        """How often something was sent again for each neighbor since it last showed to have heard anything."""
 
     def __contains__(self, key: object) -> bool:
         return key in self._entries
@@ -181,6 +187,8 @@ class Spreading:
         """A new packet, heard from the neighbor `src`; bulk may be sent from an instant on, `spare` bulk if others have
         not passed it on by then. What is sent `once` is not repeated. Returns a packet that was evicted for it.
         """
+        if src != packet.header.origin:
+            self._vain.pop(src or 0, None)
         key = _key(packet)
         entry = self._entries[key] = _Spread(packet, src, bulk_from_ns or 0, now_ns)
         entry.having |= self._early.pop(key, 0)
@@ -215,6 +223,8 @@ class Spreading:
         """A copy was heard from a neighbor; True if the neighbor does not know that this node has the packet."""
         entry = self._entries.get(key)
         own = 1 << (src - 1)
+        if src in self._vain and origin_and_seq(key)[0] != src:
+            del self._vain[src]
         if entry is None:
             done = self._done.get(key)
             if done is None:
@@ -237,6 +247,7 @@ class Spreading:
     def on_held(self, keys: Iterable[int], src: int) -> None:
         """A neighbor says that it holds packets."""
         theirs, early, entries, done = 1 << (src - 1), self._early, self._entries, self._done
+        self._vain.pop(src, None)
         for key in keys:
             entry = entries.get(key)
             if entry is not None:
@@ -270,7 +281,7 @@ class Spreading:
         that are `gone` nothing is sent again.
         """
         patient_ns = start_ns - self._patience_ns
-        served = neighbors & ~self._weak
+        served = neighbors & ~self._weak & ~self._deaf()
         done = []
         for key, entry in self.urgent.items():
             if self._lossy and not entry.measured and entry.sent and entry.sent_ns <= patient_ns - self._patience_ns:
@@ -284,11 +295,24 @@ class Spreading:
                 continue
             elif entry.sent_ns <= start_ns - self._patient_ns(entry) and entry.copy_ns <= patient_ns:
                 self._waiting.add(key)
+                self._again_for(served & ~gone & ~entry.having)
         for key, entry in done:
             self._settle(key, entry)
         chosen = [self._entries[key] for key in self._waiting]
         chosen.sort(key=lambda entry: (entry.rank[0], entry.again, entry.rank))
         return [entry.packet for entry in chosen]
+
+    def _again_for(self, nodes: int) -> None:
+        """Something is sent again because these neighbors are not known to have it."""
+        for node in nodes_of(nodes & ~self._links[self._node]):
+            self._vain[node] = self._vain.get(node, 0) + 1
+
+    def _deaf(self) -> int:
+        """The neighbors that show by nothing that they hear: not by what they send or hold, nor by a link."""
+        if not self._vain:
+            return 0
+        deaf = sum(1 << (node - 1) for node, times in self._vain.items() if times >= _MOST_VAIN)
+        return deaf & ~self._links[self._node]
 
     def _patient_ns(self, entry: _Spread) -> int:
         """The time after which an urgent packet is sent again; ever longer where frames are lost at random."""
@@ -345,6 +369,7 @@ class Spreading:
             entry = self._bulk.get(key)
             if entry is not None and entry.from_ns == from_ns:
                 heappush(self._ready, (entry.again, entry.rank))
+        gone |= self._deaf()
         while self._ready:
             _, (_, _, key) = heappop(self._ready)
             entry = self._bulk.get(key)
@@ -357,12 +382,16 @@ class Spreading:
             if entry.again and not neighbors & ~gone & ~entry.having:
                 next_ns = start_ns + self._patience_ns
             if next_ns <= start_ns:
+                if entry.sent:
+                    self._again_for(neighbors & ~gone & ~entry.having)
                 return entry.packet
             self._look(entry, key, next_ns)
         return None
 
     def _is_done(self, entry: _Spread, neighbors: int) -> bool:
         """Bulk: True if nobody lacks it, or it was sent often enough."""
+        if entry.again:
+            neighbors &= ~self._deaf()
         return entry.sent > self._repeats or (entry.having != 0 and not neighbors & ~entry.having)
 
     def _settle(self, key: int, entry: _Spread) -> None:

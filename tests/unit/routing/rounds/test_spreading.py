@@ -3,10 +3,10 @@
 from collections.abc import Iterable, Mapping
 
 from fanet_mw import wire
-from fanet_mw.node.duplicates import key_of_packet
+from fanet_mw.node.duplicates import key_of, key_of_packet
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.rounds.spreading import Spreading
-from fanet_mw.units import BROADCAST, MS, NodeId
+from fanet_mw.units import BROADCAST, MS, NodeId, S
 from fanet_mw.wire import Header, Kind
 
 ROUND = 100 * MS
@@ -27,8 +27,8 @@ def packet(seq: int, *, priority: int = wire.PRIORITY_REPORT, origin_us: int = 0
 
 
 def spreading(*, repeats: int = 3, lossy: bool = False, near: Mapping[int, Iterable[int]] = NEAR) -> Spreading:
-    links = [nodes(near.get(node, ())) for node in range(9)]
-    return Spreading(capacity=8, repeats=repeats, patience_ns=ROUND, links=links, lossy=lossy)
+    links = [nodes({1: near.keys() - {1}, **near}.get(node, ())) for node in range(9)]
+    return Spreading(NodeId(1), capacity=8, repeats=repeats, patience_ns=ROUND, links=links, lossy=lossy)
 
 
 def sent_in_turn(made: Spreading, turn: int, *, neighbors: tuple[int, ...] = (2, 3)) -> list[int]:
@@ -58,6 +58,33 @@ def test_a_neighbor_that_does_not_pass_it_on_gets_it_again_but_not_for_ever() ->
     made = spreading(repeats=2)
     made.take(packet(1), src=2, now_ns=0)
     assert [sent_in_turn(made, turn) for turn in range(1, 8)] == [[1], [1], [1], [], [], [], []]
+
+
+def vainly(made: Spreading, *, neighbors: tuple[int, ...] = (3,)) -> int:
+    """How often of 40 times a packet that node 2 has passed on is sent again for the neighbors."""
+    again = 0
+    for seq in range(40):
+        made.take(packet(100 + seq, priority=wire.PRIORITY_BULK), src=2, now_ns=seq * S, bulk_from_ns=seq * S)
+        for turn in range(6):
+            found = made.next_bulk(nodes(neighbors), start_ns=seq * S + turn * ROUND)
+            if found is not None:
+                again += made.sent(found, start_ns=seq * S + turn * ROUND) > 1
+                made.look_again(found, from_ns=seq * S + (turn + 1) * ROUND)
+    return again
+
+
+def test_a_neighbor_that_shows_by_nothing_that_it_hears_is_sent_nothing_again() -> None:
+    assert vainly(spreading(near={})) < 20
+    assert vainly(spreading(near={1: (3,), 3: (1,)})) > 60, "it has a link, so it hears"
+
+
+def test_a_deaf_neighbor_that_holds_what_others_sent_hears_again() -> None:
+    made = spreading(near={})
+    vainly(made)
+    made.on_copy(key_of(3, 5), 3, neighbors=nodes((3,)), now_ns=40 * S)
+    assert vainly(made) == 0, "what it makes itself it need not have heard"
+    made.on_held([key_of_packet(packet(100))], 3)
+    assert vainly(made) > 10
 
 
 def test_nobody_repeats_what_another_node_has_just_sent() -> None:

@@ -106,6 +106,17 @@ def test_a_relay_that_falls_mute_ends_promises_to_those_behind_it_and_its_own() 
     assert {r.node for r in stated} >= set(range(2, 12)), "the others promise again, without those behind it"
 
 
+def test_a_node_that_hears_nothing_ends_promises_to_it() -> None:
+    """It flooded in its turns on and on, and was taken for one that has what others flood."""
+    deaf_s, known_s = 17, 5 + 5 + 2
+    deaf = f'faults=[{{kind="deaf", node=8, at_s={deaf_s}}}]'
+    outcome = simulate(catalog.find("clusters", [deaf, "duration_s=35", "drain_s=3"]))
+    stated = [r for r in outcome.records if type(r) is BoundStated]
+    gone = {(r.node, r.seq) for r in outcome.records if type(r) is BoundExcludes and r.other == 8}
+    assert any(r.t_ns < deaf_s * S for r in stated)
+    assert [r for r in stated if r.t_ns > (deaf_s + known_s) * S and (r.node, r.seq) not in gone] == []
+
+
 def test_nodes_that_beacons_have_not_reached_yet_end_no_promise_of_others() -> None:
     """Drawn by the fuzz (seed 108): two nodes at the end of the way of the time have no timetable for long. What they
     send in contention is heard in their turns at times, and shows nothing.

@@ -251,6 +251,7 @@ class AssignedRoles:
 
     def before_hello(self, now_ns: int) -> None:
         parts, leader = self.parts, self._leader
+        self._timetabling.review(now_ns)
         if leader is not None:
             leader.fly(parts.joining.motion(now_ns))
         if leader is None and self._timetabling.must_show(now_ns):

@@ -39,6 +39,9 @@ class Timetabling(Protocol):
     def on_links(self, packet: Packet, *, now_ns: int) -> None:
         """A packet of links was received that belongs to a schedule; raises MalformedFrameError."""
 
+    def review(self, now_ns: int) -> None:
+        """A hello is due: give the timetable up if this node hears nobody keep it."""
+
     def must_show(self, now_ns: int) -> bool:
         """True if a flood of this node in its turn is to show the others that it keeps the timetable."""
 
@@ -71,6 +74,9 @@ class NoTimetable:
 
     def on_links(self, packet: Packet, *, now_ns: int) -> None:
         """Nothing is done: links are of no use without a timetable."""
+
+    def review(self, now_ns: int) -> None:
+        """Nothing is done: there is no timetable to give up."""
 
     def must_show(self, now_ns: int) -> bool:
         return False

@@ -184,6 +184,16 @@ class StatedDelays:
         silent_ns = _SILENT * self._shown_ns(timetable)
         return self._followers.have(timetable.version, timetable.table.spans, silent_ns=silent_ns, now_ns=now_ns)
 
+    def hears_nobody(self, now_ns: int) -> bool:
+        """True if no other node was heard in its turns for so long that each counts as silent."""
+        timetable = self._timetables.at(now_ns)
+        if timetable is None or not timetable.whole or timetable.odds is not None:
+            return False
+        since_ns = now_ns - _SILENT * self._shown_ns(timetable)
+        others = timetable.table.spans.keys() - {self._port.node}
+        unheard = self._followers.unheard(timetable.version, others, since_ns=since_ns)
+        return timetable.valid_ns <= since_ns and len(unheard) == len(others) > 0
+
     def lost_ns(self, now_ns: int) -> Mapping[NodeId, int]:
         """The silence after which each node is lost that was not heard in its turns for so long; empty as long as not
         all need have shown that they keep the timetable.

@@ -88,6 +88,12 @@ class FromPlaces:
             for index, links in enumerate(frames)
         ]
 
+    def review(self, now_ns: int) -> None:
+        """Who hears nobody in turns keeps no timetable: it would be taken for one that has what others flood."""
+        if self._planned is not None and self._delays.hears_nobody(now_ns):
+            self._planned = None  # the next announcement that is heard makes it anew
+            self._access.follow(None, now_ns=now_ns)
+
     def must_show(self, now_ns: int) -> bool:
         return self._access.must_show(now_ns)
 

@@ -4,8 +4,8 @@
 
 A line per setting that broke a promise; the exit status is 1 if one did. Drawn are the number of UAVs, their grid,
 rates, loads, leads, protocols with bounds, motion to 20 m/s (none, formation, or random waypoints), clocks that
-drift, long superframes that are nearly full, and one fault: a UAV that crashes, falls mute or is started anew, or an
-air that is cut in two. Packets that are made around a fault do not count: it may break any promise.
+drift, long superframes that are nearly full, and one fault: a UAV that crashes, falls mute or deaf, or is started
+anew, or an air that is cut in two. Packets that are made around a fault do not count: it may break any promise.
 """
 
 import argparse
@@ -81,7 +81,7 @@ def drawn(numbers: random.Random) -> dict[str, Any]:
         tree["duration_s"] += _LONGER_S
         node = numbers.randint(1, count)
         tree["faults"] = [numbers.choice([
-            {"kind": "crash", "node": node}, {"kind": "mute", "node": node},
+            {"kind": "crash", "node": node}, {"kind": "mute", "node": node}, {"kind": "deaf", "node": node},
             {"kind": "stop", "node": node, "for_s": 3},
             {"kind": "partition", "nodes": numbers.sample(range(1, count + 1), count // 2), "for_s": 4},
         ]) | {"at_s": _FAULT_S}]  # fmt: skip
@@ -94,7 +94,10 @@ def broken_pairs(outcome: Outcome, tree: dict[str, Any]) -> int:
     again_s = _FAULT_S + lasts_s + _AFTER_S
     if tree["routing"]["protocol"] == "clustered":
         hello_s = tree["routing"].get("hello_interval_s", 1)
-        again_s += _SILENT_HELLOS * max(hello_s, tree["clusters"]["flooding_period_s"])
+        silent_s = _SILENT_HELLOS * max(hello_s, tree["clusters"]["flooding_period_s"])
+        again_s += silent_s
+        if any(fault["kind"] == "deaf" for fault in tree.get("faults", [])):
+            again_s += silent_s  # it notices first, and stops using its turns; that is what others notice
     fault_ns = range(round((_FAULT_S - _BEFORE_S) * S), round(again_s * S))
     bounds = {(one.node, one.seq): one for one in outcome.records if type(one) is BoundStated}
     excluded = {(one.node, one.seq, one.other) for one in outcome.records if type(one) is BoundExcludes}

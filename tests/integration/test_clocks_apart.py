@@ -32,7 +32,7 @@ def line(seed: int, **clock: object) -> Scenario:
 def test_nothing_is_promised_while_a_relay_refuses_the_swarms_time(clock: dict[str, object], seeds: tuple[int]) -> None:
     for seed in seeds:
         summary = finish(simulate(line(seed, **clock)), out=None)
-        assert summary["pdr"] < 0.5, "a node is out of step"
+        assert summary["pdr"] < 0.75, "a node is out of step; it hears nobody in turns, so it contends"
         assert summary["bound"].get("violations", 0) == 0
         assert summary["bound"].get("stated_share", 0) == 0
 

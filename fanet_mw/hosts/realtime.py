@@ -30,7 +30,7 @@ from fanet_mw.hosts.presence import few
 from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
 from fanet_mw.hosts.wake_lateness import ProcessCost, WakeLateness
 from fanet_mw.scenario import Scenario
-from fanet_mw.scenario.fingerprint import as_json, differences, fingerprint, told_by
+from fanet_mw.scenario.fingerprint import differences, fingerprint, identity, told_by
 from fanet_mw.trace import Record
 from fanet_mw.units import S
 
@@ -126,7 +126,7 @@ class RealtimeHost:
             theirs = told_by(self._names.swarm, await asyncio.wait_for(answer, _SCENARIO_S))
         except (TimeoutError, ValueError, RecursionError):
             return
-        found = list(differences(told_by(self._names.swarm, as_json(scenario).encode()), theirs))
+        found = list(differences(identity(scenario), theirs))
         if found:
             keys = few(f"{key} = {ours!r} here, {other!r} there" for key, ours, other in found)
             raise ConfigError(f"{self._actor.name} runs another scenario than swarm {self._names.swarm}: {keys}")

@@ -48,7 +48,6 @@ class Pattern:
         self.vacant = vacant
         whole = self._whole = _SHAPES[dimensions.shape](dimensions)
         self._reach_m, self._hop_m = reach_m, _HOP * reach_m
-        self._left = tuple(len(row.places) - len(vacant.intersection(row.places)) for row in whole.rows())
         self._flown = {place: at for row in whole.rows() for place, at in row.shared(vacant).items()}
         """Where on its row each UAV flies whose row has closed ranks."""
         self.shape: Shape = whole.drawn_in(vacant, self._hop_m) if vacant else whole
@@ -169,8 +168,8 @@ class Pattern:
         if self.kind(place) == "follower":
             return True
         rank = place - sum(other < place for other in self.vacant)
-        at = self._flown.get(place, place)
-        return rank % 2 == 1 and self.shape.may_leave(at, swept_s, reach_m=_LEAVES * self._reach_m, left=self._left[0])
+        at, left = self._flown.get(place, place), self._whole.rows()[0].left(self.vacant)
+        return rank % 2 == 1 and self.shape.may_leave(at, swept_s, reach_m=_LEAVES * self._reach_m, left=left)
 
     def velocity(self, place: int, swept_s: float) -> Enu:
         """The velocity of a place after this time of sweeping, without that at which lines shift to their other lanes:

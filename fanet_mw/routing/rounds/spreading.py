@@ -187,13 +187,13 @@ class Spreading:
         """A new packet, heard from the neighbor `src`; bulk may be sent from an instant on, `spare` bulk if others have
         not passed it on by then. What is sent `once` is not repeated. Returns a packet that was evicted for it.
         """
-        if src != packet.header.origin:
-            self._vain.pop(src or 0, None)
         key = _key(packet)
         entry = self._entries[key] = _Spread(packet, src, bulk_from_ns or 0, now_ns)
         entry.having |= self._early.pop(key, 0)
         if src is not None:
             entry.having |= 1 << (packet.header.origin - 1)
+            if src != packet.header.origin:
+                self._vain.pop(src, None)
         if src is not None and self._lossy:
             entry.reach(self._links[src])
         entry.sent = self._repeats if once else 0

@@ -103,6 +103,10 @@ class RowOfPlaces(NamedTuple):
         last = self.places[-1]  # rounding errors must not lead beyond it
         return {place: min(self.first + rank * step, last) for rank, place in enumerate(left)}
 
+    def left(self, vacant: frozenset[int]) -> int:
+        """The number of UAVs of the row that are left."""
+        return self.size - len(vacant.intersection(self.places))
+
     def nearest(self, place: int, vacant: frozenset[int]) -> tuple[int, float]:
         """Of those who are left, the place whose UAV flies nearest to a place of the row, and where on the row it
         flies; the place itself if nobody is left.

@@ -109,8 +109,7 @@ class Fan(Shape):
     def drawn_in(self, vacant: frozenset[int], hop_m: float) -> "Fan":
         """The fan whose front stops where the UAVs that are left still span it with gaps of at most a hop."""
         row = self.rows()[0]
-        left = row.size - len(vacant.intersection(row.places))
-        flown = row.shared(frozenset(row.places[max(1, left) :])).values() or row.places
+        flown = row.shared(frozenset(row.places[max(1, row.left(vacant)) :])).values() or row.places
 
         def is_spanned(most_m: float) -> bool:
             fan = Fan(self._formation, most_m=most_m)

@@ -196,7 +196,7 @@ class Lines(Shape):
 
     def drawn_in(self, vacant: frozenset[int], hop_m: float) -> "Lines":
         formation, rows = self._formation, self.rows()
-        left = [row.size - len(vacant.intersection(row.places)) for row in rows]
+        left = [row.left(vacant) for row in rows]
         lines, relays = rows[: formation.teams], left[formation.teams :]
         half_width_m = min(formation.half_width_m, max(1, min(left[: formation.teams]) - 1) * hop_m / 2)
         joints = tuple(row.nearest(row.first + row.size // 2, vacant)[1] - row.first for row in lines)

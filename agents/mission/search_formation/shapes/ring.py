@@ -101,8 +101,7 @@ class Ring(Shape):
         return (RowOfPlaces(0, self._formation.lanes, RowKind.AROUND),)
 
     def drawn_in(self, vacant: frozenset[int], hop_m: float) -> "Ring":
-        left = self._formation.lanes - len(vacant.intersection(range(self._formation.lanes)))
-        return Ring(self._formation, most_m=left * hop_m / 8)
+        return Ring(self._formation, most_m=self.rows()[0].left(vacant) * hop_m / 8)
 
     def may_leave(self, place: float, swept_s: float, *, reach_m: float, left: int) -> bool:
         _, share = self._side(place)

@@ -186,26 +186,29 @@ class StatedDelays:
 
     def hears_nobody(self, now_ns: int) -> bool:
         """True if no other node was heard in its turns for so long that each counts as silent."""
-        timetable = self._timetables.at(now_ns)
-        if timetable is None or not timetable.whole or timetable.odds is not None:
-            return False
-        since_ns = now_ns - _SILENT * self._shown_ns(timetable)
-        others = timetable.table.spans.keys() - {self._port.node}
-        unheard = self._followers.unheard(timetable.version, others, since_ns=since_ns)
-        return timetable.valid_ns <= since_ns and len(unheard) == len(others) > 0
+        silent, timetable = self._silences(_SILENT, now_ns), self._timetables.at(now_ns)
+        return (
+            timetable is not None and bool(silent) and silent.keys() == timetable.table.spans.keys() - {self._port.node}
+        )
 
     def lost_ns(self, now_ns: int) -> Mapping[NodeId, int]:
         """The silence after which each node is lost that was not heard in its turns for so long; empty as long as not
         all need have shown that they keep the timetable.
         """
+        return self._silences(_LOST, now_ns)
+
+    def _silences(self, times: int, now_ns: int) -> Mapping[NodeId, int]:
+        """The nodes that were not heard in their turns for so many superframes or hello intervals, and that time; empty
+        until the timetable has been in force for as long, and over links that lose frames.
+        """
         timetable = self._timetables.at(now_ns)
         if timetable is None or not timetable.whole or timetable.odds is not None:
             return {}
-        lost_ns = _LOST * self._shown_ns(timetable)
-        if now_ns < timetable.valid_ns + lost_ns:
+        silent_ns = times * self._shown_ns(timetable)
+        if now_ns < timetable.valid_ns + silent_ns:
             return {}
-        unheard = self._followers.unheard(timetable.version, timetable.table.spans, since_ns=now_ns - lost_ns)
-        return dict.fromkeys(unheard, lost_ns)
+        unheard = self._followers.unheard(timetable.version, timetable.table.spans, since_ns=now_ns - silent_ns)
+        return dict.fromkeys(unheard, silent_ns)
 
     def _shown_ns(self, timetable: NodeTimetable) -> int:
         return max(self._hello_ns, timetable.turns.period_ns)

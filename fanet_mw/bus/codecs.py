@@ -313,9 +313,15 @@ HEADS: Final[dict[type[Any], tuple[struct.Struct, ...]]] = {
 }  # fmt: skip
 """The structs of each kind: that of its head, and that of each row for kinds with rows."""
 CODES: Final = {kind: code for code, (kind, _, _) in _CODECS.items()}
-LAYOUT: Final = hashlib.sha256(
-    repr([(c, k.__name__, list(k.__annotations__), [s.format for s in HEADS[k]]) for k, c in CODES.items()]).encode()
-).hexdigest()[:8]
+
+
+def layout_of(kinds: Iterable[type[Any]]) -> str:
+    """A digest of the codes, names, fields and structs of these kinds of messages."""
+    said = [(CODES[k], k.__name__, list(k.__annotations__), [s.format for s in HEADS[k]]) for k in kinds]
+    return hashlib.sha256(repr(said).encode()).hexdigest()[:8]
+
+
+LAYOUT: Final = layout_of(CODES)
 """Stands for the layout of all messages: processes with another one read nonsense in what these put."""
 _CODE_OF: Final = {kind: (code, encode) for code, (kind, encode, _) in _CODECS.items()}
 _ITEM: Final = struct.Struct("<BI")

@@ -50,7 +50,7 @@ def likely(applications: Mapping[str, AppPackets]) -> dict[str, Any]:
     for app in applications.values():
         delays_ns, limits_ns = _beside(app, [sent.likely[0] if sent.likely else -1 for sent in app.sent.values()])
         within += int((delays_ns <= limits_ns)[_not_excluded(app)].sum()) if app.wanted else 0
-    wanted = sum(app.sent[name].targets for app, name, _ in stated if app.wanted)
+    wanted = sum(app.sent[name].targets for app, name, _ in stated)
     packets = sum(len(app.sent) for app in applications.values())
     return {
         "share": min(share for _, _, (_, share) in stated),

@@ -117,6 +117,15 @@ def test_a_node_that_hears_nothing_ends_promises_to_it() -> None:
     assert [r for r in stated if r.t_ns > (deaf_s + known_s) * S and (r.node, r.seq) not in gone] == []
 
 
+def test_a_node_that_hears_again_keeps_the_timetable_again() -> None:
+    """It gives the timetable up after 5 s; after 10 s the leader would make another one without it."""
+    deaf = 'faults=[{kind="deaf", node=8, at_s=17, for_s=7}]'
+    outcome = simulate(catalog.find("clusters", [*GRID, deaf, "duration_s=34", "drain_s=3"]))
+    late = [r for r in outcome.records if type(r) is BoundStated and r.t_ns > 29 * S]
+    assert {7, 8, 9} <= {r.node for r in late}
+    assert outcome.reports["agent-8"]["epoch"] == outcome.reports["agent-3"]["epoch"]
+
+
 def test_nodes_that_beacons_have_not_reached_yet_end_no_promise_of_others() -> None:
     """Drawn by the fuzz (seed 108): two nodes at the end of the way of the time have no timetable for long. What they
     send in contention is heard in their turns at times, and shows nothing.

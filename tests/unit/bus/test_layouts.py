@@ -66,6 +66,15 @@ def test_a_struct_that_was_changed_without_its_names_is_refused(monkeypatch: pyt
         layouts.head(m.Gps)
 
 
+def test_another_order_of_fields_or_another_struct_is_another_layout(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert codecs.layout_of(codecs.CODES) == codecs.LAYOUT
+    with monkeypatch.context() as patch:
+        patch.setattr(m.TxStatus, "__annotations__", dict(reversed(m.TxStatus.__annotations__.items())))
+        assert codecs.layout_of(codecs.CODES) != codecs.LAYOUT
+    monkeypatch.setitem(codecs.HEADS, m.Gps, (struct.Struct("<q7d"),))
+    assert codecs.layout_of(codecs.CODES) != codecs.LAYOUT
+
+
 def test_the_page_is_checked_against_the_codecs(tmp_path: Path) -> None:
     page = tmp_path / "bus.md"
     assert layouts.main([], document=page) == 0

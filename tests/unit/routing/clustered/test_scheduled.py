@@ -391,6 +391,14 @@ def informed(node: Node, *, told_ms: int) -> TurnAccess:
     return access
 
 
+def test_who_hears_nobody_in_turns_is_told_so_once_the_timetable_was_in_force_for_long(node: Node) -> None:
+    access = access_of(node)
+    access._timetables.in_order = [planned(FLOODS)._replace(valid_ns=20 * S)]
+    assert [access._delays.hears_nobody(t_s * S) for t_s in (19, 21, 24, 25)] == [False, False, False, True]
+    access._delays._followers.hear(UNANNOUNCED, ROOT, now_ns=24 * S)
+    assert [access._delays.hears_nobody(t_s * S) for t_s in (25, 28, 30)] == [False, False, True]
+
+
 def promised(node: Node, *, at_ms: int, size: int = 40) -> list[BoundStated]:
     node.send(
         filler(size), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=at_ms * MS, now_ns=at_ms * MS

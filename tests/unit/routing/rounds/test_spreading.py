@@ -85,6 +85,27 @@ def test_a_deaf_neighbor_that_holds_what_others_sent_hears_again() -> None:
     assert vainly(made) == 0, "what it makes itself it need not have heard"
     made.on_held([key_of_packet(packet(100))], 3)
     assert vainly(made) > 10
+    made.take(packet(300), src=3, now_ns=80 * S)
+    assert vainly(made) > 10, "it has passed on what somebody else made"
+
+
+def test_urgent_packets_are_not_sent_again_for_a_deaf_neighbor_either() -> None:
+    made = spreading(near={})
+    vainly(made)
+    made.take(packet(1), src=2, now_ns=50 * S)
+    assert [len(made.wanted(nodes((3,)), start_ns=50 * S + turn * ROUND)) for turn in range(1, 2)] == [1]
+    made.sent(packet(1), start_ns=50 * S + ROUND)
+    assert [made.wanted(nodes((3,)), start_ns=50 * S + turn * ROUND) for turn in range(2, 6)] == [[]] * 4
+
+
+def test_what_was_sent_again_while_a_neighbor_had_a_link_does_not_make_it_deaf() -> None:
+    """It hears, and flies away."""
+    links = [0] * 9
+    links[1], links[3] = nodes((3,)), nodes((1,))
+    made = Spreading(NodeId(1), capacity=8, repeats=3, patience_ns=ROUND, links=links)
+    vainly(made)
+    links[1] = links[3] = 0
+    assert vainly(made) > 10
 
 
 def test_nobody_repeats_what_another_node_has_just_sent() -> None:

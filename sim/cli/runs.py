@@ -193,7 +193,7 @@ def plan(
     deadline: float | None = None,
     json: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
-    """Say before take-off whether a clustered scenario is feasible and what it guarantees, or else what to change.
+    """Say before take-off whether a scenario is feasible and what it guarantees, or else what to change.
 
     Exit code 0: feasible; 1: not feasible; 2: the scenario or a flag is wrong.
 

@@ -338,8 +338,8 @@ class Spreading:
         return entry.sent
 
     def take_hasty(self, room: int) -> list[Packet]:
-        """The urgent packets that go in a bulk slot now, the most urgent first, as they fit; and in the turn as well
-        unless all neighbors are known to have them by then.
+        """The urgent packets that go in a bulk slot now, the most urgent first, as they fit. They go in the turn as
+        well.
         """
         taken = []
         for entry in sorted(self._hasty.values(), key=lambda entry: entry.rank):

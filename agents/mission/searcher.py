@@ -115,6 +115,7 @@ class Searcher:
         planner = FormationPlanner(
             node, roll_call, expected=nodes.count, deploy_speed_m_s=_DEPLOY * least_m_s,
             take_off_ns=take_off_ns(nodes.altitude_m) if nodes.on_ground else 0, turns_ns=turns_ns,
+            random=stream(scenario.seed, "plan", node).random,
             of_few=lambda count, now_ns: None if self._is_swept(now_ns) else _of_few(scenario, count),
         )  # fmt: skip
         self._plans = PlanExchange(

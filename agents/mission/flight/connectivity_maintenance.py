@@ -9,10 +9,12 @@ from agents.mission.navigation.half_planes import HalfPlane, Velocity
 from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.search_formation.formation_place import FormationPlace
+from agents.mission.search_formation.lasting_links import LASTING
 from agents.mission.search_formation.pattern import Pattern
 from agents.mission.tasking.bidding import Bidding
 from fanet_mw.motion import Motion
-from fanet_mw.units import Enu, NodeId
+from fanet_mw.units import Enu, NodeId, S
+from fanet_mw.wire.search_plan import Search
 
 _TETHER: Final = 0.95
 """The greatest distance of two UAVs that must stay connected, as a share of the radio's reach."""
@@ -27,14 +29,21 @@ _HASTE: Final = 0.95
 _KEPT_M_S: Final = 1e-6
 """A velocity keeps to a limit up to this rounding error."""
 _EARLY_TIES: Final = 2
-"""With so many of its nearest neighbors a UAV stays connected before the sweep; whoever leaves them before it has the
-plan may never hear it."""
+"""With so many of its nearest neighbors a UAV stays connected that hears nobody to whom it is tied: without a plan, or
+because those beside it come late."""
+_SETTLED_NS: Final = 20 * S
+"""So long after the sweep has begun everybody is at its place: until then who comes late hangs by links that last."""
+
+
+_STRONG: Final = 0.75
+"""A link is strong if it is, and will be, shorter than this share of the radio's reach."""
 
 
 class ConnectivityMaintenance:
     """Constraints that keep a UAV of a team, or a relay, within radio reach of the places to which it is tied
-    (`Shape.tethers`), and a follower within reach of the nearest UAV of its team; before the sweep, also without a
-    plan, everyone within reach of the nearest neighbors.
+    (`Shape.tethers`), and a follower within reach of the nearest UAV of its team; on the way to the places everyone
+    within reach of those by links to whom the plan holds together (`search_formation/lasting_links.py`). Who hears none
+    of these, or has no plan, stays within reach of its nearest neighbors.
     """
 
     def __init__(
@@ -55,19 +64,12 @@ class ConnectivityMaintenance:
         """The UAVs in reach to which this one is tied, and the limits that keep it there."""
 
     def planes(self, now_ns: int) -> list[HalfPlane]:
-        plan, pattern, place = self._formation.plan, self._formation.pattern, self._formation.place
         self._ties = []
-        if (plan is not None and place is None) or self._bidding.is_absent(now_ns):
+        formation = self._formation
+        if (formation.plan is not None and formation.place is None) or self._bidding.is_absent(now_ns):
             return []
-        ties: list[tuple[NodeId, Motion]]
-        if plan is not None and pattern is not None and place is not None and self._formation.is_taken_up(now_ns):
-            nodes = (NodeId(plan.nodes[other]) for other in self._tied_to(pattern, place, now_ns))
-            motions = ((node, self._neighbors.motion(node, now_ns=now_ns)) for node in nodes)
-            ties = [(node, motion) for node, motion in motions if motion is not None]
-        else:
-            ties = self._nearest_motions(now_ns)
-        planes, closes = [], self._formation.closing_s(now_ns) is not None
-        for node, motion in ties:
+        planes, closes = [], formation.closing_s(now_ns) is not None
+        for node, motion in self._tied(now_ns).items():
             offset = motion.offset_from(self._own_motion.position, now_ns)
             plane = tether_plane(
                 offset,
@@ -81,6 +83,23 @@ class ConnectivityMaintenance:
                 if offset.norm() <= _CLOSING * self._reach_m:
                     self._ties.append((node, plane))
         return planes
+
+    def _tied(self, now_ns: int) -> dict[NodeId, Motion]:
+        """Those within whose reach this UAV stays."""
+        plan, pattern, place = self._formation.plan, self._formation.pattern, self._formation.place
+        ties: dict[NodeId, Motion] = {}
+        if plan is not None and pattern is not None and place is not None:
+            if not self._formation.is_taken_up(now_ns - _SETTLED_NS):
+                ties = self._lasting(plan, pattern, place, now_ns)
+            if self._formation.is_taken_up(now_ns):
+                places = self._tied_to(pattern, place, now_ns)
+                motions = {
+                    NodeId(plan.nodes[at]): self._neighbors.motion(plan.nodes[at], now_ns=now_ns) for at in places
+                }
+                ties |= {node: motion for node, motion in motions.items() if motion is not None}
+                if not places:
+                    return ties
+        return ties or self._nearest_motions(now_ns)
 
     def held(self, velocity: Enu) -> list[NodeId]:
         """Those who stay in reach because the velocity that was chosen keeps to their limits."""
@@ -107,14 +126,35 @@ class ConnectivityMaintenance:
                 found = left_m, Motion(at, velocity, now_ns)
         return None if found is None else found[1]
 
-    def _nearest_motions(self, now_ns: int) -> list[tuple[NodeId, Motion]]:
-        """The nearest neighbors of a UAV on the way to its place, within whose reach it stays when it responds."""
-        here = self._own_motion.position
+    def _lasting(self, plan: Search, pattern: Pattern, place: int, now_ns: int) -> dict[NodeId, Motion]:
+        """The neighbors in reach whose places are in reach of this UAV's place, too, without those to whom a third one
+        has strong links from both: each of these keeps its own.
+        """
+        swept_s, place_of = self._formation.swept_s(now_ns) or 0.0, {node: at for at, node in enumerate(plan.nodes)}
+        present = {node: motion for node, motion in self._present(now_ns).items() if node in place_of}
+        here = (self._own_motion.position, pattern.at(place, swept_s))
+        ends = {
+            node: (motion.position_at(now_ns), pattern.at(place_of[node], swept_s)) for node, motion in present.items()
+        }
+        links_m = {node: _longest_m(here, there) for node, there in ends.items()}
+        lasting = [node for node, link_m in links_m.items() if link_m <= LASTING * self._reach_m]
+
+        def is_spared(node: NodeId) -> bool:
+            most_m = min(links_m[node], _STRONG * self._reach_m)
+            return any(max(links_m[third], _longest_m(ends[third], ends[node])) < most_m for third in lasting)
+
+        return {node: present[node] for node in lasting if not is_spared(node)}
+
+    def _nearest_motions(self, now_ns: int) -> dict[NodeId, Motion]:
+        """The nearest neighbors of a UAV that is tied to nobody in reach."""
+        here, present = self._own_motion.position, self._present(now_ns)
+        nearest = sorted(present, key=lambda node: present[node].offset_from(here, now_ns).norm())
+        return {node: present[node] for node in nearest[:_EARLY_TIES]}
+
+    def _present(self, now_ns: int) -> dict[NodeId, Motion]:
+        """The neighbors but those that have left the others for a survivor."""
         absent = self._bidding.responders(now_ns) if self._bidding.may_be_absent else ()
-        heard = [
-            (NodeId(node), motion) for node, motion in self._neighbors.by_node(now_ns=now_ns) if node not in absent
-        ]
-        return sorted(heard, key=lambda one: one[1].offset_from(here, now_ns).norm())[:_EARLY_TIES]
+        return {NodeId(node): motion for node, motion in self._neighbors.by_node(now_ns=now_ns) if node not in absent}
 
     def _tied_to(self, pattern: Pattern, place: int, now_ns: int) -> tuple[int, ...]:
         """The places within whose reach this UAV stays: those to which its place is tied, past a UAV that may leave its
@@ -135,6 +175,11 @@ class ConnectivityMaintenance:
             if (motion := self._neighbors.motion(plan.nodes[other], now_ns=now_ns)) is not None
         ]
         return (min(near)[1],) if near else ()
+
+
+def _longest_m(a: tuple[Enu, Enu], b: tuple[Enu, Enu]) -> float:
+    """The distance of two UAVs, each given by its position and its place, or of their places if that is greater."""
+    return max(one.minus(other).horizontal() for one, other in zip(a, b, strict=True))
 
 
 def tether_plane(

@@ -14,16 +14,15 @@
     restarts:   a node without a plan that hears of others' waits to be told it, even if it has the lowest id; of those
                 that follow the newest plan, the one with the lowest id stands in as the planner until then
 
-The first assignment minimizes the sum of the squared distances flown. If all UAVs leave and arrive at the same
-instants, their ways then do not cross, and UAVs that were near each other remain so. UAVs that are out for survivors
-become followers, on whom nothing depends. The words place, team, relay and
-follower are explained in `shapes/contract.py`; how the area is split into lanes is in `shapes/`.
+The first assignment nearly minimizes the sum of the squared distances flown, and keeps the swarm in one piece on the
+way (`lasting_links.py`). UAVs that are out for survivors become followers, on whom nothing depends. The words place,
+team, relay and follower are explained in `shapes/contract.py`; how the area is split into lanes is in `shapes/`.
 """
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Final, NamedTuple
 
-from agents.mission.hungarian import assign
+from agents.mission.search_formation.lasting_links import keep_together
 from agents.mission.search_formation.pattern import Pattern
 from agents.mission.search_formation.roll_call import RollCall
 from agents.mission.search_formation.shapes.contract import Dimensions, ShapeName
@@ -83,6 +82,7 @@ class FormationPlanner:
         of_few: Callable[[int, int], Pattern | None],
         take_off_ns: int = 0,
         turns_ns: Callable[[Mapping[int, Enu]], int] = lambda _: 0,
+        random: Callable[[], float],
     ) -> None:
         """`of_few`: the formation for so many UAVs at an instant, when others have flown home; None if the search is
         over. `take_off_ns`: the time that UAVs need
@@ -94,6 +94,7 @@ class FormationPlanner:
         self._take_off_ns, self._turns_ns, self._of_few = take_off_ns, turns_ns, of_few
         self._expected = expected
         self._deploy_speed = deploy_speed_m_s
+        self._random = random
         self._members: dict[int, _HeardUav] = {}
         self._left_ns: dict[int, int] = {}
         """The instant at which each UAV first said that it flies home."""
@@ -229,31 +230,20 @@ class FormationPlanner:
         """The first plan of a formation, for all UAVs that were received and stay, `but` these."""
         staying = (node for node, member in self._members.items() if not member.leaves and node not in but)
         nodes = sorted(staying)[: pattern.places]
-        pattern = pattern.begun_around([self._members[node].position for node in nodes])
-        alone = len(nodes) == 1
-        places = [(nodes[0] - 1) % pattern.places] if alone else list(range(pattern.places))
-        goals = [pattern.at(place, 0.0) for place in places]
-        costs = [[_distance2(self._members[node].position, goal) for goal in goals] for node in nodes]
-        absent = self.absent
-        chosen = assign(
-            [
-                [
-                    cost + _BUSY_M2 * (node in absent and place not in pattern.followers)
-                    for place, cost in zip(places, row, strict=True)
-                ]
-                for node, row in zip(nodes, costs, strict=True)
-            ]
+        starts = [self._members[node].position for node in nodes]
+        pattern, chosen = self._shared_out(pattern, nodes, starts)
+        farthest_m = max(
+            pattern.at(place, 0.0).minus(start).horizontal() for place, start in zip(chosen, starts, strict=True)
         )
         holders = [0] * pattern.places
-        for node, column in zip(nodes, chosen, strict=True):
-            holders[places[column]] = node
+        for node, place in zip(nodes, chosen, strict=True):
+            holders[place] = node
         _fill(holders, pattern)
         assert self._began_ns is not None, "a plan is made in a review"
         off_ns = self._began_ns + self._take_off_ns
         if self._take_off_ns:
             off_ns += self._turns_ns({node: self._members[node].position for node in nodes})
         start_ns = max(now_ns + _NOTICE_NS, off_ns)
-        farthest_m = max(costs[row][column] for row, column in enumerate(chosen)) ** 0.5
         return plan_of(
             pattern,
             tuple(holders),
@@ -261,6 +251,25 @@ class FormationPlanner:
             start_us=start_ns // US,
             deploy_ds=round(10 * max(1.0, farthest_m / self._deploy_speed)),
         )._replace(revision=_next(self._newest_revision()))
+
+    def _shared_out(
+        self, pattern: Pattern, nodes: Sequence[int], starts: Sequence[Enu]
+    ) -> tuple[Pattern, Sequence[int]]:
+        """The largest formation that the swarm reaches in one piece, begun around it, and the place of each node."""
+        if len(nodes) == 1:
+            return pattern, [(nodes[0] - 1) % pattern.places]
+        absent, followers = self.absent, pattern.followers
+        for begun in pattern.begun_around(starts):
+            chosen, is_one = keep_together(
+                starts,
+                [begun.at(place, 0.0) for place in range(begun.places)],
+                lambda uav, place: _BUSY_M2 * (nodes[uav] in absent and place not in followers),
+                reach_m=begun.reach_m,
+                random=self._random,
+            )
+            if is_one:
+                break
+        return begun, chosen
 
     def _mended(self, plan: Search, now_ns: int) -> Search | None:
         """The plan without those who fly home, with followers in their places and with new UAVs; None if nothing has

@@ -47,7 +47,7 @@ class Pattern:
         self.dimensions = dimensions
         self.vacant = vacant
         whole = self._whole = _SHAPES[dimensions.shape](dimensions)
-        self._reach_m, self._hop_m = reach_m, _HOP * reach_m
+        self.reach_m, self._hop_m = reach_m, _HOP * reach_m
         self._flown = {place: at for row in whole.rows() for place, at in row.shared(vacant).items()}
         """Where on its row each UAV flies whose row has closed ranks."""
         self.shape: Shape = whole.drawn_in(vacant, self._hop_m) if vacant else whole
@@ -56,12 +56,14 @@ class Pattern:
 
     def closed(self, vacant: frozenset[int]) -> "Pattern":
         """The same formation without the UAVs of these places."""
-        return Pattern(self.dimensions, reach_m=self._reach_m, vacant=vacant)
+        return Pattern(self.dimensions, reach_m=self.reach_m, vacant=vacant)
 
-    def begun_around(self, positions: Sequence[Enu]) -> "Pattern":
-        """The same formation, begun where a swarm stands that is spread about the middle of the area."""
-        begun = self._whole.begun_around(swarm_at(positions, reach_m=self._reach_m))
-        return self if begun is None else Pattern(begun, reach_m=self._reach_m)
+    def begun_around(self, positions: Sequence[Enu]) -> "list[Pattern]":
+        """The same formation, begun where a swarm stands that is spread about the middle of the area: the largest one
+        first, at least one.
+        """
+        begun = self._whole.begun_around(swarm_at(positions, reach_m=self.reach_m))
+        return [Pattern(dimensions, reach_m=self.reach_m) for dimensions in begun] or [self]
 
     def spans(self, vacant: frozenset[int]) -> bool:
         """True if the UAVs of the other places can sweep all that this formation sweeps."""
@@ -169,7 +171,7 @@ class Pattern:
             return True
         rank = place - sum(other < place for other in self.vacant)
         at, left = self._flown.get(place, place), self._whole.rows()[0].left(self.vacant)
-        return rank % 2 == 1 and self.shape.may_leave(at, swept_s, reach_m=_LEAVES * self._reach_m, left=left)
+        return rank % 2 == 1 and self.shape.may_leave(at, swept_s, reach_m=_LEAVES * self.reach_m, left=left)
 
     def velocity(self, place: int, swept_s: float) -> Enu:
         """The velocity of a place after this time of sweeping, without that at which lines shift to their other lanes:

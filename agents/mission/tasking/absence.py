@@ -1,6 +1,7 @@
 """How far a UAV may go from its place for a survivor, out of the others' reach, as `mission.connection` says.
 
-always    not at all: it stays on the leash of its place (`search_formation/formation_place.py`)
+always    not at all: it stays on the leash of its place (`search_formation/formation_place.py`); before the sweep it
+          stays in reach of others, and so near to its place that it is there in time
 t         so far that it can be within reach of its team again t seconds later, and tell what it has found; before the
           sweep, so far that it is at its place at most t seconds after the sweep begins
 none      as far as it likes
@@ -11,7 +12,7 @@ from typing import Final, Literal
 
 from agents.mission.finding.phone_localization import Estimate
 from agents.mission.search_formation.formation_place import FormationPlace
-from fanet_mw.units import S
+from fanet_mw.units import Enu, S
 
 Connection = Literal["always", "none"] | float
 
@@ -33,15 +34,15 @@ class Absence:
         """True if a UAV may be out of reach at all."""
         return self._most_s > 0
 
-    def late_s(self, place: Estimate, now_ns: int, *, after_s: float) -> float:
-        """How much later than the beginning of the sweep a UAV of a team is at its place that leaves a survivor's place
-        after some time.
+    def late_s(self, at: Enu, now_ns: int, *, after_s: float) -> float:
+        """How much later than the beginning of the sweep this UAV is at its place if it leaves a position after some
+        time; where UAVs may be out of reach nobody waits for a follower.
         """
         begins_ns = self._formation.sweep_starts_ns()
-        if begins_ns is None or now_ns >= begins_ns or self._formation.is_free(now_ns):
+        if begins_ns is None or now_ns >= begins_ns or (self.is_permitted and self._formation.is_free(now_ns)):
             return 0.0
         first, _ = self._formation.lane(begins_ns)
-        return max(0.0, place.distance_m(first) / self._speed_m_s + after_s - (begins_ns - now_ns) / S)
+        return max(0.0, first.minus(at).horizontal() / self._speed_m_s + after_s - (begins_ns - now_ns) / S)
 
     def permits(self, place: Estimate, now_ns: int, *, after_s: float = 0.0) -> bool:
         """True if a UAV that leaves a survivor's place after some time is within reach of its team soon enough."""
@@ -49,6 +50,6 @@ class Absence:
             return self.is_permitted
         begins_ns = self._formation.sweep_starts_ns()
         if begins_ns is not None and now_ns < begins_ns:
-            return self.late_s(place, now_ns, after_s=after_s) <= self._most_s
+            return self.late_s(place.at, now_ns, after_s=after_s) <= self._most_s
         at_ns = now_ns + round((after_s + self._most_s) * S)
         return self._formation.beyond_reception_m(place.east_m, place.north_m, at_ns) <= self._most_s * self._speed_m_s

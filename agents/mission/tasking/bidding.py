@@ -3,7 +3,7 @@
 the survivor is heard                    an auction for one responder, the nearest UAV that may leave
 enough UAVs have reported the survivor   an auction for as many responders as the scenario wants
 too few have, after a while              an auction for one more UAV that has not, to get another bearing
-before the sweep                         any UAV may respond, a little aside of the way to its place
+before the sweep                         any UAV may respond that is at its place nearly in time
 a responder does not find the survivor   it withdraws its bid after a while
 a responder does not come to the place   it withdraws its bid, a while after it should have been there
 """
@@ -23,7 +23,7 @@ from agents.mission.tasking.auction import Auction
 from agents.mission.tasking.voice_descent import descent_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Approaching, Located
-from fanet_mw.units import NodeId, S
+from fanet_mw.units import Enu, NodeId, S
 from fanet_mw.wire.bids import Bid
 
 FAR_M: Final = 450.0
@@ -32,6 +32,9 @@ _SCOUT_AFTER_NS: Final = 4 * S
 """How long a survivor may have too few reporters before another UAV is sent to report it."""
 _RETURN_AFTER_NS: Final = 45 * S
 """How long a responder searches for a survivor in vain before it withdraws its bid, without the time of a descent."""
+_OVERDUE_NS: Final = 15 * S
+"""How long after it should have been there a responder withdraws its bid that is held back before the sweep: soon all
+leave."""
 _MEASURES_NS: Final = 30 * S
 """How long a responder is assumed to go round until a vague estimate has become a place."""
 _AGAIN_NS: Final = 20 * S
@@ -40,9 +43,12 @@ _LONG_AGO_NS: Final = -(10**18)
 _HANDOVER_S: Final = 15.0
 """The time that a responder is assumed to need at its present survivor."""
 _ASTRAY_M: Final = 100.0
-"""Before the sweep a responder stays within this distance of where it would be on the way to its place, so that it is
-there in time and the swarm does not fall apart.
-"""
+"""Before the sweep a UAV may be this far from where it would be on the way to its place, or farther if it is there in
+time."""
+_LATE_S: Final = 6.0
+"""It is in time if it is at its place at most so long after the sweep has begun: it catches up then."""
+_GLANCE_S: Final = 8.0
+"""How long it is assumed to look at the place of a survivor on the way."""
 _LOOKS_S: Final = 15.0
 """How long a UAV that leaves the formation for a survivor is assumed to look there."""
 _PASSED_M: Final = 30.0
@@ -168,8 +174,11 @@ class Bidding:
         """
         known = self._survivors.by_id[survivor]
         lost = not self._wins(survivor, known, now_ns)
-        there_ns = self._approach.arrived_ns.get(survivor, self._due_ns)
-        late = now_ns - there_ns > self._patience_ns or not self._may_stay(survivor, now_ns)
+        arrived_ns, patience_ns = self._approach.arrived_ns.get(survivor), self._patience_ns
+        if arrived_ns is None and self._formation.plan is not None and not self._formation.is_taken_up(now_ns):
+            patience_ns = _OVERDUE_NS
+        there_ns = self._due_ns if arrived_ns is None else arrived_ns
+        late = now_ns - there_ns > patience_ns or not self._may_stay(survivor, now_ns)
         if late:
             self._auction.withdraw(survivor, now_ns=now_ns)
             self._taken_back_ns[survivor] = now_ns
@@ -188,10 +197,16 @@ class Bidding:
         """True while this UAV may be at a survivor's place without leaving the formation."""
         formation, here = self._formation, self._own_motion.position
         if not formation.is_taken_up(now_ns):
-            return formation.lane(now_ns)[0].minus(here).horizontal() <= _ASTRAY_M
+            near = formation.lane(now_ns)[0].minus(here).horizontal() <= _ASTRAY_M
+            return near or self._is_in_time(here, now_ns)
         if formation.is_free(now_ns):
             return formation.holds_together(place, now_ns, within_s=-5.0)
         return formation.leads_by(place, *formation.lane(now_ns))
+
+    def _is_in_time(self, at: Enu, now_ns: int, *, after_s: float = 0.0) -> bool:
+        """True for a UAV with a plan that is at its place nearly in time if it leaves a position after some time."""
+        has_plan = self._formation.plan is not None
+        return has_plan and self._absence.late_s(at, now_ns, after_s=after_s) <= _LATE_S
 
     @property
     def may_be_absent(self) -> bool:
@@ -266,9 +281,9 @@ class Bidding:
         )
         if not formation.is_taken_up(now_ns):
             lane, _ = formation.lane(now_ns + round(eta_s * S))
-            if place.distance_m(lane) <= _ASTRAY_M:
+            if place.distance_m(lane) <= _ASTRAY_M or self._is_in_time(place.at, now_ns, after_s=eta_s + _GLANCE_S):
                 return eta_s
-            return eta_s + self._absence.late_s(place, now_ns, after_s=eta_s + _LOOKS_S) if leaves else None
+            return eta_s + self._absence.late_s(place.at, now_ns, after_s=eta_s + _LOOKS_S) if leaves else None
         if formation.is_free(now_ns):
             return eta_s if leaves or formation.holds_together(place, now_ns, within_s=eta_s) else None
         lane, moves = formation.lane(now_ns)

@@ -272,11 +272,11 @@ class Shape(Protocol):
         """
         return self
 
-    def begun_around(self, swarm: Swarm) -> Dimensions | None:
+    def begun_around(self, swarm: Swarm) -> tuple[Dimensions, ...]:
         """The dimensions of the same shape that begins where a swarm stands about the middle of the area, rather than
-        draw together first; None if it begins as it is.
+        draw together first, the largest one first; none if it begins as it is.
         """
-        return None
+        return ()
 
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
         """The horizontal distance of a point from a team at an instant of the sweep."""

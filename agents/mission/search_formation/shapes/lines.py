@@ -67,12 +67,14 @@ _LEAST_APART_M: Final = 60.0
 """The least distance of two lines on the same side of the middle."""
 _BENT: Final = 3
 """Of lines that begin around the swarm, so many lanes at each end are bent back to the middle."""
-_BENT_HOP: Final = 0.86
+_BENT_HOP: Final = 0.91
 """Neighbors in the bent part are at most this share of the radio's reach apart: less than elsewhere, because the
 outermost are the fastest, and have the farthest way to their places."""
-_AROUND: Final = 0.6
-"""Lines that begin around the swarm do so at this share of the radio's reach from the middle at most: on the way to
-places farther out rows part before they have spread, and whoever goes aside for a survivor tears the swarm."""
+_AROUND: Final = 1.2
+"""Lines that begin around the swarm do so at this share of the radio's reach from the middle at most: whoever is nearer
+and was not found on the way out is found on the way back only."""
+_STEPS: Final = 8
+"""If the swarm would not stay together on the way there, they begin nearer, by so many steps."""
 _DENSE: Final = 0.85
 """UAVs in a square grid at this share of the radio's reach, or nearer to each other, hear all between them."""
 _FREE: Final = 4
@@ -210,22 +212,23 @@ class Lines(Shape):
         narrow = formation._replace(half_width_m=half_width_m)
         return Lines(narrow, most_m=spans_m[self._half - 1] / 2, gaps_m=gaps_m, joints=joints)
 
-    def begun_around(self, swarm: Swarm) -> Dimensions | None:
-        """The lines that begin where the swarm stands, if its UAVs hear everybody between them: they must be dense
-        enough for that, and stand wide enough for all lanes but the bent ones.
+    def begun_around(self, swarm: Swarm) -> tuple[Dimensions, ...]:
+        """The lines that begin where the swarm stands or nearer, if its UAVs hear everybody between them: they must be
+        dense enough for that, and stand wide enough for all lanes but the bent ones.
         """
         made = self._formation
         east_m, west_m, north_m, south_m = swarm.sides_m
         aside_m, beyond_m = min(east_m, west_m), min(north_m, south_m)
         if made.teams != 2 or made.lanes <= 2 * _BENT or beyond_m <= FIRST_M:
-            return None
+            return ()
         lane_m = 2 * made.half_width_m / (made.lanes - 1)
         is_dense = (east_m + west_m) * (north_m + south_m) <= swarm.uavs * (_DENSE * swarm.reach_m) ** 2
         if not is_dense or made.half_width_m - _BENT * lane_m > aside_m:
-            return None
+            return ()
         step_m = math.sqrt(max(0.0, (_BENT_HOP * swarm.reach_m) ** 2 - lane_m**2))
-        first_m = min(beyond_m, made.last_m / 2, FIRST_M + _BENT * step_m, _AROUND * swarm.reach_m)
-        return made._replace(first_m=max(made.first_m, first_m))
+        most_m = max(made.first_m, min(beyond_m, made.last_m / 2, FIRST_M + _BENT * step_m, _AROUND * swarm.reach_m))
+        shares = (step / _STEPS for step in range(_STEPS, 0, -1))
+        return tuple(made._replace(first_m=made.first_m + share * (most_m - made.first_m)) for share in shares)
 
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
         """The distance of a point from a line to the north or south; a line is taken to be as wide as the area."""

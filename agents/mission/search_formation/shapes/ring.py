@@ -107,12 +107,12 @@ class Ring(Shape):
         _, share = self._side(place)
         return abs(share) <= _CATCHES_UP and self._half_m(swept_s) <= left * reach_m / 16
 
-    def begun_around(self, swarm: Swarm) -> Dimensions | None:
+    def begun_around(self, swarm: Swarm) -> tuple[Dimensions, ...]:
         """The ring that begins as large as the swarm that stands about the middle, rather than draw together first."""
         made = self._formation
         if min(swarm.sides_m) <= 0:
-            return None
-        return made._replace(first_m=max(made.first_m, min(made.last_m / 2, math.fsum(swarm.sides_m) / 4)))
+            return ()
+        return (made._replace(first_m=max(made.first_m, min(made.last_m / 2, math.fsum(swarm.sides_m) / 4))),)
 
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
         half_m = self._half_m(swept_s)

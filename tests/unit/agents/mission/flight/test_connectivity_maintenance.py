@@ -1,12 +1,12 @@
 """A UAV stays within radio reach of those it is tied to."""
 
 import pytest
-from search_board import COUNT, FOLLOWER, LINE, REACH_M, TAKEN_UP_NS, Board, lane_of
+from search_board import COUNT, FOLLOWER, LINE, REACH_M, TAKEN_UP_NS, UP_M, Board, lane_of
 
 from agents.mission.flight.connectivity_maintenance import ConnectivityMaintenance, tether_plane
 from agents.mission.navigation.half_planes import nearest
 from fanet_mw.motion import Motion
-from fanet_mw.units import Enu, NodeId, S
+from fanet_mw.units import STILL, Enu, NodeId, S
 
 
 def test_who_is_tied_does_not_fly_out_of_reach() -> None:
@@ -31,9 +31,9 @@ def test_a_uav_of_a_line_is_tied_to_those_beside_it_and_a_follower_to_the_neares
         assert len(tied.planes(now_ns)) == ties
 
 
-def test_who_is_on_the_way_to_its_place_stays_within_reach_of_the_two_nearest() -> None:
+def test_who_waits_for_a_plan_stays_within_reach_of_the_two_nearest() -> None:
     now_ns = 20 * S
-    board = Board(LINE, Enu(0.0, 0.0, 65.0))
+    board = Board(LINE, Enu(0.0, 0.0, 65.0), planned=False)
     tied = ConnectivityMaintenance(
         board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
     )
@@ -42,6 +42,57 @@ def test_who_is_on_the_way_to_its_place_stays_within_reach_of_the_two_nearest() 
         board.neighbors.on_hello(other, Motion(Enu(east, 0.0, 65.0), Enu(0, 0, 0), now_ns))
     assert sorted(plane.east for plane in tied.planes(now_ns)) == [-1.0, 1.0]
     assert not board.place.is_taken_up(now_ns)
+
+
+@pytest.mark.parametrize(
+    ("now_ns", "tied_to_follower"), [(30 * S, True), (TAKEN_UP_NS + 10 * S, True), (TAKEN_UP_NS + 30 * S, False)]
+)
+def test_until_all_are_at_their_places_a_uav_keeps_every_link_that_lasts(now_ns: int, tied_to_follower: bool) -> None:
+    """The follower's place is in reach of the UAV's, and that of the other line's end is not; one beside it is, too."""
+    here = lane_of(LINE, now_ns)
+    near, far = Motion(here.minus(Enu(120.0, 0, 0)), STILL, now_ns), Motion(here.minus(Enu(0, 150.0, 0)), STILL, now_ns)
+    follower = next(
+        node
+        for node in range(41, COUNT + 1)
+        if lane_of(node, TAKEN_UP_NS).minus(lane_of(LINE, TAKEN_UP_NS)).norm() < 200
+    )
+    board = Board(LINE, here)
+    board.neighbors.on_hello(follower, near)
+    board.neighbors.on_hello(30, far)
+    board.neighbors.on_hello(LINE + 1, Motion(here.minus(Enu(-170.0, 0, 0)), STILL, now_ns))
+    tied = ConnectivityMaintenance(
+        board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
+    )
+    ties = sorted(plane.east for plane in tied.planes(now_ns))
+    assert ties == ([-1.0, 1.0] if tied_to_follower else [1.0])
+
+
+@pytest.mark.parametrize(("aside_m", "ties"), [(100.0, 1), (163.0, 2)])
+def test_on_the_way_a_uav_needs_no_tie_to_whom_a_third_one_has_strong_links(aside_m: float, ties: int) -> None:
+    """The places of all three are near each other; two UAVs are 200 m apart, and the third 141 or 191 m from both."""
+    now_ns, (node, far, third) = 30 * S, (NodeId(34), NodeId(35), NodeId(36))
+    places = [lane_of(one, TAKEN_UP_NS) for one in (node, far, third)]
+    assert max(a.minus(b).horizontal() for a in places for b in places) < 0.75 * REACH_M
+    board = Board(node, Enu(0, 0, UP_M))
+    board.neighbors.on_hello(far, Motion(Enu(-200, 0, UP_M), STILL, now_ns))
+    board.neighbors.on_hello(third, Motion(Enu(-100, aside_m, UP_M), STILL, now_ns))
+    tied = ConnectivityMaintenance(
+        board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
+    )
+    assert len(tied.planes(now_ns)) == ties
+
+
+def test_who_hears_nobody_to_whom_it_is_tied_stays_with_the_nearest() -> None:
+    now_ns = TAKEN_UP_NS + 40 * S
+    here = lane_of(LINE, now_ns)
+    board = Board(LINE, here)
+    board.neighbors.on_hello(30, Motion(here.minus(Enu(0, 150.0, 0)), STILL, now_ns))
+    tied = ConnectivityMaintenance(
+        board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
+    )
+    assert [plane.north for plane in tied.planes(now_ns)] == [-1.0]
+    board.neighbors.on_hello(LINE + 1, Motion(here.minus(Enu(-170.0, 0, 0)), STILL, now_ns))
+    assert [plane.east for plane in tied.planes(now_ns)] == [1.0]
 
 
 def test_who_closes_ranks_over_a_lost_uav_may_use_up_a_little_more_of_its_reach_in_a_quarter_of_the_time() -> None:

@@ -3,6 +3,7 @@
 import itertools
 import math
 from collections.abc import Collection, Sequence
+from random import Random
 
 import pytest
 
@@ -76,6 +77,7 @@ def planner_of(
     roll_call.lost.update(dict.fromkeys(lost, 0))
     return FormationPlanner(
         NodeId(node), roll_call, expected=expected, deploy_speed_m_s=9, take_off_ns=take_off_ns, turns_ns=turns_ns,
+        random=Random(1).random,
         of_few=lambda count, now_ns: of_few(count, DEMANDS) if now_ns < 300 * S else None,
     )  # fmt: skip
 

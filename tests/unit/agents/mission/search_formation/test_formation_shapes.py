@@ -264,12 +264,12 @@ AROUND = [Enu(200.0 * (i % 9) - 800, 200.0 * (i // 9) - 400, 65) for i in range(
 
 def test_a_ring_begins_as_large_as_the_swarm_that_stands_around_the_middle_and_waits_at_the_edge() -> None:
     ring, fan = formed(ShapeName.RING), formed(ShapeName.FAN)
-    begun = ring.begun_around(AROUND)
+    (begun,) = ring.begun_around(AROUND)
     assert begun.dimensions == ring.dimensions._replace(first_m=595.0), "half of where it ends, 600 m at most"
-    assert ring.begun_around([at._replace(north=at.north / 4) for at in AROUND]).dimensions.first_m == 450.0
+    assert ring.begun_around([at._replace(north=at.north / 4) for at in AROUND])[0].dimensions.first_m == 450.0
     beside = [at._replace(north=at.north - 1350) for at in AROUND]
-    assert ring.begun_around(beside).dimensions == ring.dimensions, "from a base it draws together in the middle"
-    assert fan.begun_around(AROUND) is fan
+    assert ring.begun_around(beside)[0].dimensions == ring.dimensions, "from a base it draws together in the middle"
+    assert fan.begun_around(AROUND) == [fan]
     end_s = begun.shape.sweep_s
     for since_s, waits in ((0.1, True), (29, True), (31, False)):
         at = begun.at(3, end_s + since_s)
@@ -278,8 +278,9 @@ def test_a_ring_begins_as_large_as_the_swarm_that_stands_around_the_middle_and_w
 
 def test_lines_begin_where_the_swarm_stands_and_leave_out_only_what_it_has_heard() -> None:
     lines = formed(ShapeName.LINES)
-    begun = lines.begun_around(AROUND)
-    assert begun.dimensions == lines.dimensions._replace(first_m=150.0), "0.6 of the reach at most"
+    begun, *nearer = lines.begun_around(AROUND)
+    assert begun.dimensions == lines.dimensions._replace(first_m=300.0), "1.2 of the reach at most"
+    assert [other.dimensions.first_m for other in nearer] == [pytest.approx(16 + 284 * k / 8) for k in range(7, 0, -1)]
     assert begun.shape.sweep_s < lines.shape.sweep_s - 15
     flown = [begun.at(place, second) for second in range(round(begun.shape.sweep_s) + 1) for place in range(45)]
     unheard = [
@@ -292,7 +293,7 @@ def test_lines_begin_where_the_swarm_stands_and_leave_out_only_what_it_has_heard
 
 
 def test_lines_that_begin_around_the_swarm_hang_together_all_the_way_and_come_back_to_the_middle() -> None:
-    begun = formed(ShapeName.LINES).begun_around(AROUND)
+    begun = formed(ShapeName.LINES).begun_around(AROUND)[0]
     end_s = begun.shape.sweep_s
     for second in range(0, 4 * round(end_s), 3):
         places = [begun.at(place, second) for place in range(45)]
@@ -316,7 +317,7 @@ def test_lines_that_begin_around_the_swarm_hang_together_all_the_way_and_come_ba
 )
 def test_lines_of_another_swarm_begin_in_the_middle(swarm: list[Enu], why: str) -> None:
     lines = formed(ShapeName.LINES)
-    assert lines.begun_around(swarm).dimensions == lines.dimensions, why
+    assert [begun.dimensions for begun in lines.begun_around(swarm)] == [lines.dimensions], why
 
 
 def test_where_uavs_are_too_few_for_a_ring_they_fly_in_lines() -> None:

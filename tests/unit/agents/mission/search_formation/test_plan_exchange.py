@@ -28,7 +28,7 @@ class Exchange:
         roll_call = RollCall(node, hello_interval_s=1.0)
         planner = FormationPlanner(
             node, roll_call, expected=COUNT, deploy_speed_m_s=9.0,
-            of_few=lambda *_: None,
+            of_few=lambda *_: None, random=lambda: 0.5,
         )  # fmt: skip
         self.plans = PlanExchange(
             node, planner, roll_call, self.place, self.motion, self.out, pattern=None, random=lambda: 0.5

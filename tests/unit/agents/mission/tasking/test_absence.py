@@ -76,8 +76,8 @@ def test_before_the_sweep_a_uav_may_be_as_late_at_its_place_as_the_scenario_says
     for metres, may in ((400, True), (460, False)):  # 20 s are left, and 30 s; it flies at 9 m/s
         place = Estimate(first.east, first.north - metres, 1.0, 0.0, 1.0)
         assert absence.permits(place, now_ns) == may
-        assert absence.late_s(place, now_ns, after_s=0.0) == pytest.approx(metres / 9 - 20)
-    assert Absence(Board(FOLLOWER, first).place, 30, speed_m_s=10.0).late_s(place, now_ns, after_s=0.0) == 0.0
+        assert absence.late_s(place.at, now_ns, after_s=0.0) == pytest.approx(metres / 9 - 20)
+    assert Absence(Board(FOLLOWER, first).place, 30, speed_m_s=10.0).late_s(place.at, now_ns, after_s=0.0) == 0.0
 
 
 def test_a_line_can_do_without_as_many_as_its_others_can_close_up_for_and_a_late_chain_without_nobody() -> None:

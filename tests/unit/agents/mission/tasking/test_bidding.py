@@ -73,9 +73,29 @@ def test_before_the_sweep_a_uav_responds_that_is_not_led_away_from_the_survivor_
     board.tasks.choose(S)
     assert board.tasks.survivor == 1
     assert board.goal.at(1, S)[0].minus(truth).horizontal() < 30, "no lane limits it yet"
-    for share, task in ((0.3, 1), (0.4, None)):
-        board.tasks.choose(10 * S + round(share * 50 * S))
-        assert board.tasks.survivor == task, "it may be 100 m behind"
+    board.approach.arrived_ns[1] = 20 * S
+    for left_s, task in ((30, 1), (28, 1), (27, None)):
+        board.tasks.choose(TAKEN_UP_NS - left_s * S)
+        assert board.tasks.survivor == task, "300 m at 9 m/s, and at most 6 s late"
+
+
+def test_before_the_sweep_a_responder_that_is_held_back_soon_takes_its_bid_back() -> None:
+    first = lane_of(LINE, TAKEN_UP_NS)
+    board = Board(LINE, first)
+    board.hear(1, Enu(first.east, first.north + 75, 0), range(1, 5), now_ns=S)
+    board.tasks.bid(S)
+    for after_s, task in ((0, 1), (24, 1), (27, None)):
+        board.tasks.choose((1 + after_s) * S)
+        assert board.tasks.survivor == task, "75 m at 7.5 m/s, and 15 s"
+
+
+def test_before_the_sweep_a_uav_goes_as_far_aside_of_its_way_as_it_is_back_in_time() -> None:
+    first = lane_of(LINE, TAKEN_UP_NS)
+    for left_s, bids in ((50, True), (40, False)):  # 20 s there, 22 s back, and 8 s to look
+        board = Board(LINE, first)
+        board.hear(1, Enu(first.east, first.north + 200, 0), range(1, 5), now_ns=S)
+        board.tasks.bid(TAKEN_UP_NS - left_s * S)
+        assert bool(board.tasks.bids_to_tell(now_ns=S)) == bids
 
 
 def test_who_still_takes_off_comes_later_than_who_is_in_the_air() -> None:

@@ -1,0 +1,110 @@
+"""Who flies to which place of a formation, so that the swarm is one network all the way.
+
+    All leave at one instant and arrive at one instant, each flies straight at constant speed. So the distance of two
+    UAVs is a convex function of time, and a link between them lasts if it exists at both ends of the way. The
+    assignment with the least sum of squared distances keeps most links; then pairs exchange their places, at first
+    also if that is for the worse (simulated annealing; Kirkpatrick, Gelatt and Vecchi, Science 220, 1983), until links
+    that last join all UAVs.
+
+Links are bit masks, one for each UAV: thousands of exchanges are tried within hundredths of a second.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from agents.mission.hungarian import assign
+from fanet_mw.units import Enu
+
+LASTING: Final = 0.97
+"""A link is relied on that is at most this share of the radio's reach long."""
+_TRIES: Final = 20_000
+"""So many exchanges are tried at most."""
+_PART_M2: Final = 300.0**2
+"""Squared ways may be longer by so much in sum if the UAVs fall into one part less."""
+_HEAT: Final = 0.6
+"""The first temperature of the annealing, as a multiple of `_PART_M2`; it falls to 0 linearly."""
+_LONGEST: Final = 1.08
+"""No way becomes longer than this multiple of the longest one of the first assignment."""
+
+
+def keep_together(
+    starts: Sequence[Enu],
+    goals: Sequence[Enu],
+    dearer_m2: Callable[[int, int], float],
+    *,
+    reach_m: float,
+    random: Callable[[], float],
+) -> tuple[list[int], bool]:
+    """The goal of each UAV, and whether links that last join all of them. There must be at least as many goals as
+    UAVs. `dearer_m2`: how much more a UAV at one goal costs than its squared distance from there [m2].
+    """
+    ways = [[start.minus(goal).horizontal() for goal in goals] for start in starts]
+    costs = [[way * way + dearer_m2(uav, goal) for goal, way in enumerate(row)] for uav, row in enumerate(ways)]
+    chosen = assign(costs)
+    longest_m = _LONGEST * max((ways[uav][goal] for uav, goal in enumerate(chosen)), default=0.0)
+    least, links = list(chosen), _Links(starts, goals, chosen, LASTING * reach_m)
+    parts = links.parts()
+    for tried in range(_TRIES):
+        if parts <= 1:
+            return chosen, True
+        a, b = int(random() * len(chosen)), int(random() * len(chosen))
+        if a == b or max(ways[a][chosen[b]], ways[b][chosen[a]]) > longest_m:
+            continue
+        longer_m2 = costs[a][chosen[b]] + costs[b][chosen[a]] - costs[a][chosen[a]] - costs[b][chosen[b]]
+        links.exchange(a, b)
+        after = links.parts()
+        worse_m2 = (after - parts) * _PART_M2 + longer_m2
+        if worse_m2 <= 0 or random() < math.exp(-worse_m2 / (_HEAT * _PART_M2 * (1 - tried / _TRIES))):
+            parts = after
+        else:
+            links.exchange(a, b)
+    return (chosen, True) if parts <= 1 else (least, False)
+
+
+class _Links:
+    """The links that last while each UAV flies to the goal that is `chosen` for it."""
+
+    def __init__(self, starts: Sequence[Enu], goals: Sequence[Enu], chosen: list[int], reach_m: float) -> None:
+        self._chosen = chosen
+        self._near = _near(starts, reach_m)
+        self._goals_near = [set(row) for row in _near(goals, reach_m)]
+        self._masks = [self._mask(uav) for uav in range(len(chosen))]
+
+    def _mask(self, uav: int) -> int:
+        near = self._goals_near[self._chosen[uav]]
+        return sum(1 << other for other in self._near[uav] if self._chosen[other] in near)
+
+    def exchange(self, a: int, b: int) -> None:
+        """Two UAVs exchange their goals."""
+        chosen, masks = self._chosen, self._masks
+        chosen[a], chosen[b] = chosen[b], chosen[a]
+        for uav in (a, b):
+            after = self._mask(uav)
+            changed, masks[uav] = masks[uav] ^ after, after
+            while changed:
+                low = changed & -changed
+                masks[low.bit_length() - 1] ^= 1 << uav
+                changed ^= low
+
+    def parts(self) -> int:
+        """The number of parts into which the UAVs fall that are joined by links that last."""
+        masks, left, parts = self._masks, (1 << len(self._masks)) - 1, 0
+        while left:
+            parts += 1
+            reached = left & -left
+            left ^= reached
+            while reached:
+                low = reached & -reached
+                new = masks[low.bit_length() - 1] & left
+                left ^= new
+                reached ^= low | new
+        return parts
+
+
+def _near(points: Sequence[Enu], reach_m: float) -> list[list[int]]:
+    """For each point, those of the others within reach."""
+    return [
+        [b for b, other in enumerate(points) if b != a and point.minus(other).horizontal() <= reach_m]
+        for a, point in enumerate(points)
+    ]

@@ -4,8 +4,9 @@ from typing import Final
 
 from fanet_mw.units import NodeId, S
 
-_FORGETS: Final = 0.97
-"""The share of the longest silence that remains with each further frame."""
+_HALF_NS: Final = 3 * S
+"""Of the longest silence half remains after so long, however many frames come: after a burst a node says nothing but
+hellos again."""
 _MOST_NS: Final = 4 * S
 """A longer silence counts as this one."""
 _UNUSUAL: Final = 2.5
@@ -25,9 +26,10 @@ class Silences:
         """A frame came from this node."""
         heard_ns = self._heard_ns
         if src < len(heard_ns):
-            silence_ns, longest_ns = now_ns - heard_ns[src], self._longest_ns[src] * _FORGETS
+            silence_ns = min(now_ns - heard_ns[src], _MOST_NS) if heard_ns[src] else _MOST_NS
+            longest_ns = self._longest_ns[src] * 0.5 ** (silence_ns / _HALF_NS)
             heard_ns[src] = now_ns
-            self._longest_ns[src] = min(silence_ns, _MOST_NS) if silence_ns > longest_ns else longest_ns
+            self._longest_ns[src] = max(silence_ns, longest_ns)
 
     def is_unusual(self, node: NodeId, *, least_ns: int, now_ns: int) -> bool:
         """True if a node that was heard before has been silent for an unusually long time, `least_ns` at least."""

@@ -13,7 +13,7 @@ from fanet_mw.motion import Motion
 from fanet_mw.node.silences import Silences
 from fanet_mw.units import MS, Enu, NodeId, S
 
-OTHER, LAST_NS = NodeId(2), 10 * S
+OTHER, LAST_NS = NodeId(2), 30 * S
 HILLS = OnboardMap((), heights_m=((0.0, 0.0), (0.0, 50.0)))
 
 
@@ -44,7 +44,7 @@ def test_who_must_be_in_reach_is_missed(
     east_m: float, east_m_s: float, onboard_map: OnboardMap, after_ms: int | None
 ) -> None:
     radio, neighbors, obstacles = Radio(), NeighborMotions(), KnownObstacles(onboard_map)
-    for past in range(200, -1, -1):
+    for past in range(400, -1, -1):
         radio.silences.on_frame(OTHER, LAST_NS - past * 50 * MS)
     neighbors.on_hello(OTHER, Motion(Enu(east_m, 0.0, 65.0), Enu(east_m_s, 0.0, 0.0), LAST_NS))
     watch = SilentNeighbors(radio, neighbors, OwnMotion(Enu(0, 0, 65), obstacles), obstacles, reach_m=250.0)

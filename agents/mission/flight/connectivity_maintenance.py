@@ -33,8 +33,6 @@ _EARLY_TIES: Final = 2
 because those beside it come late."""
 _SETTLED_NS: Final = 20 * S
 """So long after the sweep has begun everybody is at its place: until then who comes late hangs by links that last."""
-
-
 _STRONG: Final = 0.75
 """A link is strong if it is, and will be, shorter than this share of the radio's reach."""
 

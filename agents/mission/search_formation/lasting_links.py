@@ -44,6 +44,8 @@ def keep_together(
     chosen = assign(costs)
     longest_m = _LONGEST * max((ways[uav][goal] for uav, goal in enumerate(chosen)), default=0.0)
     least, links = list(chosen), _Links(starts, goals, chosen, LASTING * reach_m)
+    if not links.may_join:
+        return least, False
     parts = links.parts()
     for tried in range(_TRIES):
         if parts <= 1:
@@ -87,19 +89,29 @@ class _Links:
                 masks[low.bit_length() - 1] ^= 1 << uav
                 changed ^= low
 
+    @property
+    def may_join(self) -> bool:
+        """False if the UAVs are in several parts at the start, so that no exchange joins them."""
+        return _parts([sum(1 << other for other in near) for near in self._near]) <= 1
+
     def parts(self) -> int:
         """The number of parts into which the UAVs fall that are joined by links that last."""
-        masks, left, parts = self._masks, (1 << len(self._masks)) - 1, 0
-        while left:
-            parts += 1
-            reached = left & -left
-            left ^= reached
-            while reached:
-                low = reached & -reached
-                new = masks[low.bit_length() - 1] & left
-                left ^= new
-                reached ^= low | new
-        return parts
+        return _parts(self._masks)
+
+
+def _parts(masks: Sequence[int]) -> int:
+    """The number of parts of a graph, given the bits of the neighbors of each vertex."""
+    left, parts = (1 << len(masks)) - 1, 0
+    while left:
+        parts += 1
+        reached = left & -left
+        left ^= reached
+        while reached:
+            low = reached & -reached
+            new = masks[low.bit_length() - 1] & left
+            left ^= new
+            reached ^= low | new
+    return parts
 
 
 def _near(points: Sequence[Enu], reach_m: float) -> list[list[int]]:

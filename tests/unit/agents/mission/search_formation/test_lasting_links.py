@@ -84,6 +84,16 @@ def test_a_goal_that_is_dear_for_a_uav_goes_to_another() -> None:
     assert (cheap, dear) == (([0, 1], True), ([1, 0], True))
 
 
+def test_whom_links_do_not_join_at_the_start_nothing_is_tried_for() -> None:
+    starts = [Enu(300.0 * i, 0, 65) for i in range(40)]
+    goals = [Enu(10.0 * i, 0, 65) for i in range(40)]
+    drawn: list[None] = []
+    chosen, is_one = keep_together(
+        starts, goals, lambda *_: 0.0, reach_m=REACH_M, random=lambda: drawn.append(None) or 0.5
+    )
+    assert (chosen, is_one, drawn) == (list(range(40)), False, [])
+
+
 def test_where_no_link_can_last_everybody_has_the_shortest_way() -> None:
     starts = [Enu(0, 0, 65), Enu(100, 0, 65)]
     goals = [Enu(1000, 0, 65), Enu(-1000, 0, 65)]

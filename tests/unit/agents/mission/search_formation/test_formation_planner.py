@@ -92,18 +92,25 @@ def planner_with(
     return made
 
 
-def test_a_plan_gives_everyone_a_place_and_the_swarm_stays_in_one_piece_on_the_way() -> None:
-    planner, pattern = planner_with(45), formation()
+@pytest.mark.parametrize("seed", range(1, 4))
+def test_a_plan_gives_everyone_a_place_and_the_swarm_stays_in_one_piece_on_the_way_to_these(seed: int) -> None:
+    planner, pattern, random = planner_of(1, expected=45), formation(), Random(seed)
+    starts = {}
+    for node in range(1, 46):
+        east, north = 200 * ((node - 1) % 9 - 4), 200 * ((node - 1) // 9 - 2)
+        starts[node] = Enu(east + random.uniform(-30, 30), north + random.uniform(-30, 30), 50)
+        planner.status(SearchStatus(0, starts[node], node, 0, 100), now_ns=0)
     assert planner.review(pattern, now_ns=S)
     plan = planner.plan
     assert plan is not None
     assert sorted(plan.nodes) == list(range(1, 46))
-    for share in (0.0, 0.25, 0.5, 0.75, 1.0):
+    begun = pattern_of(plan, reach_m=REACH_M)
+    assert begun.dimensions.first_m == 300.0, "the lines begin around the swarm"
+    for share in (step / 40 for step in range(41)):
         places = []
         for place, node in enumerate(plan.nodes):
-            start = Enu(200.0 * ((node - 1) % 9 - 4), 200.0 * ((node - 1) // 9 - 2), 50)
-            way = pattern.at(place, 0.0).minus(start)
-            places.append(Enu(start.east + share * way.east, start.north + share * way.north, 50))
+            way = begun.at(place, 0.0).minus(starts[node])
+            places.append(Enu(starts[node].east + share * way.east, starts[node].north + share * way.north, 50))
         assert is_one(places), share
 
 

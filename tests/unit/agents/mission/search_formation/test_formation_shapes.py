@@ -312,6 +312,7 @@ def test_lines_that_begin_around_the_swarm_hang_together_all_the_way_and_come_ba
         ([at._replace(north=at.north - 1350) for at in AROUND], "it comes from a base"),
         ([at._replace(east=at.east * 1.4, north=at.north * 1.4) for at in AROUND], "it does not hear all between it"),
         ([at._replace(east=at.east / 2) for at in AROUND], "it is not wide enough"),
+        ([at._replace(east=at.east + 400) for at in AROUND], "it is not wide enough to the west"),
         ([at._replace(north=at.north / 40) for at in AROUND], "it stands in the middle anyway"),
     ],
 )

@@ -60,7 +60,9 @@ def test_who_is_said_to_stay_together_does_so_all_the_way_and_nobody_flies_much_
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_45_uavs_that_stand_in_a_grid_reach_lines_far_from_the_middle_in_one_piece(seed: int) -> None:
+def test_45_uavs_that_stand_in_a_grid_reach_lines_far_out_in_one_piece_and_no_way_is_much_longer_for_it(
+    seed: int,
+) -> None:
     pattern = fitted(45, Demands(2500, 131, REACH_M, 65, 7.5))
     assert pattern is not None
     random = Random(seed)
@@ -73,6 +75,7 @@ def test_45_uavs_that_stand_in_a_grid_reach_lines_far_from_the_middle_in_one_pie
     assert is_one
     assert begun.dimensions.first_m >= 260
     assert not torn(starts, goals, chosen)
+    assert max(ways_m(starts, goals, chosen)) <= 1.08 * max(ways_m(starts, goals, nearest(starts, goals))) + 1e-6
 
 
 def test_a_goal_that_is_dear_for_a_uav_goes_to_another() -> None:

@@ -80,6 +80,14 @@ def test_before_the_sweep_a_uav_may_be_as_late_at_its_place_as_the_scenario_says
     assert Absence(Board(FOLLOWER, first).place, 30, speed_m_s=10.0).late_s(place.at, now_ns, after_s=0.0) == 0.0
 
 
+def test_a_follower_is_waited_for_where_nobody_may_be_out_of_reach() -> None:
+    now_ns, first = TAKEN_UP_NS - 20 * S, lane_of(FOLLOWER, TAKEN_UP_NS)
+    far = Enu(first.east, first.north - 270, 0.0)  # 30 s at 9 m/s
+    for connection, late_s in (("always", 10), (30, 0), ("none", 0)):
+        absence = Absence(Board(FOLLOWER, first).place, connection, speed_m_s=10.0)  # type: ignore[arg-type]
+        assert absence.late_s(far, now_ns, after_s=0.0) == pytest.approx(late_s), connection
+
+
 def test_a_line_can_do_without_as_many_as_its_others_can_close_up_for_and_a_late_chain_without_nobody() -> None:
     late_ns = TAKEN_UP_NS + 160 * S
     for lost, spared in ((0, True), (2, True), (3, False)):  # 14 hops of 169 m may become 11 of 215 m

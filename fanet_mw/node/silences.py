@@ -5,10 +5,10 @@ from typing import Final
 from fanet_mw.units import NodeId, S
 
 _HALF_NS: Final = 3 * S
-"""Of the longest silence half remains after so long, however many frames come: after a burst a node says nothing but
-hellos again."""
+"""Half of the longest silence is forgotten after so long, however many frames come: after a burst a node says nothing
+but hellos again."""
 _MOST_NS: Final = 4 * S
-"""A longer silence counts as this one."""
+"""A longer silence counts as this one, and so does the time before the first frame."""
 _UNUSUAL: Final = 2.5
 """A silence is unusual if it is this many times as long as the longest one of late."""
 

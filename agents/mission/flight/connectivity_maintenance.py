@@ -29,19 +29,19 @@ _HASTE: Final = 0.95
 _KEPT_M_S: Final = 1e-6
 """A velocity keeps to a limit up to this rounding error."""
 _EARLY_TIES: Final = 2
-"""With so many of its nearest neighbors a UAV stays connected that hears nobody to whom it is tied: without a plan, or
-because those beside it come late."""
+"""A UAV that hears nobody to whom it is tied, because it has no plan or those beside it come late, stays connected with
+so many of its nearest neighbors."""
 _SETTLED_NS: Final = 20 * S
 """So long after the sweep has begun everybody is at its place: until then who comes late hangs by links that last."""
 _STRONG: Final = 0.75
-"""A link is strong if it is, and will be, shorter than this share of the radio's reach."""
+"""A link is strong if it is now, and will be at the places, shorter than this share of the radio's reach."""
 
 
 class ConnectivityMaintenance:
     """Constraints that keep a UAV of a team, or a relay, within radio reach of the places to which it is tied
-    (`Shape.tethers`), and a follower within reach of the nearest UAV of its team; on the way to the places everyone
-    within reach of those by links to whom the plan holds together (`search_formation/lasting_links.py`). Who hears none
-    of these, or has no plan, stays within reach of its nearest neighbors.
+    (`Shape.tethers`), and a follower within reach of the nearest UAV of its team. On the way to the places everyone
+    stays within reach of those to whom it has links that last (`search_formation/lasting_links.py`). Who hears none of
+    these, or has no plan, stays within reach of its nearest neighbors, but for a follower during the sweep.
     """
 
     def __init__(
@@ -125,8 +125,8 @@ class ConnectivityMaintenance:
         return None if found is None else found[1]
 
     def _lasting(self, plan: Search, pattern: Pattern, place: int, now_ns: int) -> dict[NodeId, Motion]:
-        """The neighbors in reach whose places are in reach of this UAV's place, too, without those to whom a third one
-        has strong links from both: each of these keeps its own.
+        """The neighbors whose links to this UAV last. One of these is left out if a third one has strong links to both,
+        each shorter than the link that is left out.
         """
         swept_s, place_of = self._formation.swept_s(now_ns) or 0.0, {node: at for at, node in enumerate(plan.nodes)}
         present = {node: motion for node, motion in self._present(now_ns).items() if node in place_of}
@@ -150,7 +150,7 @@ class ConnectivityMaintenance:
         return {node: present[node] for node in nearest[:_EARLY_TIES]}
 
     def _present(self, now_ns: int) -> dict[NodeId, Motion]:
-        """The neighbors but those that have left the others for a survivor."""
+        """The neighbors but those that may have left the others for a survivor."""
         absent = self._bidding.responders(now_ns) if self._bidding.may_be_absent else ()
         return {NodeId(node): motion for node, motion in self._neighbors.by_node(now_ns=now_ns) if node not in absent}
 

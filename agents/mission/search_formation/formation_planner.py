@@ -15,8 +15,9 @@
                 that follow the newest plan, the one with the lowest id stands in as the planner until then
 
 The first assignment nearly minimizes the sum of the squared distances flown, and keeps the swarm in one piece on the
-way (`lasting_links.py`). UAVs that are out for survivors become followers, on whom nothing depends. The words place,
-team, relay and follower are explained in `shapes/contract.py`; how the area is split into lanes is in `shapes/`.
+way where it can (`lasting_links.py`). UAVs that are out for survivors become followers, on whom nothing depends. The
+words place, team, relay and follower are explained in `shapes/contract.py`; how the area is split into lanes is in
+`shapes/`.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -85,9 +86,8 @@ class FormationPlanner:
         random: Callable[[], float],
     ) -> None:
         """`of_few`: the formation for so many UAVs at an instant, when others have flown home; None if the search is
-        over. `take_off_ns`: the time that UAVs need
-        for their take-off, before which the first plan does not begin; `turns_ns`: how much longer that lasts where
-        those who stand at these places take off in turns.
+        over. `take_off_ns`: the time that UAVs need for their take-off, before which the first plan does not begin;
+        `turns_ns`: how much longer that lasts where those who stand at these places take off in turns.
         """
         self._node = node
         self._roll_call = roll_call
@@ -255,7 +255,9 @@ class FormationPlanner:
     def _shared_out(
         self, pattern: Pattern, nodes: Sequence[int], starts: Sequence[Enu]
     ) -> tuple[Pattern, Sequence[int]]:
-        """The largest formation that the swarm reaches in one piece, begun around it, and the place of each node."""
+        """The largest formation begun around the swarm that it reaches in one piece, or the smallest if there is none,
+        and the place of each node. A UAV that is alone takes the place with its own number.
+        """
         if len(nodes) == 1:
             return pattern, [(nodes[0] - 1) % pattern.places]
         absent, followers = self.absent, pattern.followers

@@ -2,11 +2,11 @@
 
     All leave at one instant and arrive at one instant, each flies straight at constant speed. So the distance of two
     UAVs is a convex function of time, and a link between them lasts if it exists at both ends of the way. The
-    assignment with the least sum of squared distances keeps most links; then pairs exchange their places, at first
+    assignment with the least sum of squared distances keeps many links; then pairs exchange their places, at first
     also if that is for the worse (simulated annealing; Kirkpatrick, Gelatt and Vecchi, Science 220, 1983), until links
-    that last join all UAVs.
+    that last join all UAVs. If none of so many tries joins them, the first assignment remains.
 
-Links are bit masks, one for each UAV: thousands of exchanges are tried within hundredths of a second.
+Links are bit masks, one for each UAV: a thousand exchanges are tried within 50 ms.
 """
 
 import math
@@ -36,8 +36,9 @@ def keep_together(
     reach_m: float,
     random: Callable[[], float],
 ) -> tuple[list[int], bool]:
-    """The goal of each UAV, and whether links that last join all of them. There must be at least as many goals as
-    UAVs. `dearer_m2`: how much more a UAV at one goal costs than its squared distance from there [m2].
+    """The goal of each UAV, and whether links that last join all UAVs; if not, the goals are those of the least sum.
+    There must be at least as many goals as UAVs. `dearer_m2`: what it costs that a UAV flies to a goal, beside the
+    square of its way there [m2].
     """
     ways = [[start.minus(goal).horizontal() for goal in goals] for start in starts]
     costs = [[way * way + dearer_m2(uav, goal) for goal, way in enumerate(row)] for uav, row in enumerate(ways)]

@@ -1,7 +1,7 @@
 """How far a UAV may go from its place for a survivor, out of the others' reach, as `mission.connection` says.
 
 always    not at all: it stays on the leash of its place (`search_formation/formation_place.py`); before the sweep it
-          stays in reach of others, and so near to its place that it is there in time
+          stays in reach of others, and near its way or so near to its place that it is there in time (`bidding.py`)
 t         so far that it can be within reach of its team again t seconds later, and tell what it has found; before the
           sweep, so far that it is at its place at most t seconds after the sweep begins
 none      as far as it likes
@@ -36,7 +36,7 @@ class Absence:
 
     def late_s(self, at: Enu, now_ns: int, *, after_s: float) -> float:
         """How much later than the beginning of the sweep this UAV is at its place if it leaves a position after some
-        time; where UAVs may be out of reach nobody waits for a follower.
+        time; 0 once the sweep has begun, and for a follower where UAVs may be out of reach: nobody waits for it.
         """
         begins_ns = self._formation.sweep_starts_ns()
         if begins_ns is None or now_ns >= begins_ns or (self.is_permitted and self._formation.is_free(now_ns)):

@@ -33,7 +33,7 @@ _SCOUT_AFTER_NS: Final = 4 * S
 _RETURN_AFTER_NS: Final = 45 * S
 """How long a responder searches for a survivor in vain before it withdraws its bid, without the time of a descent."""
 _OVERDUE_NS: Final = 15 * S
-"""How long after it should have been there a responder withdraws its bid that is held back before the sweep: soon all
+"""How long after it should have been there a responder that is held back before the sweep withdraws its bid: soon all
 leave."""
 _MEASURES_NS: Final = 30 * S
 """How long a responder is assumed to go round until a vague estimate has become a place."""
@@ -43,12 +43,12 @@ _LONG_AGO_NS: Final = -(10**18)
 _HANDOVER_S: Final = 15.0
 """The time that a responder is assumed to need at its present survivor."""
 _ASTRAY_M: Final = 100.0
-"""Before the sweep a UAV may be this far from where it would be on the way to its place, or farther if it is there in
-time."""
+"""Before the sweep a UAV may be this far from where it would be on the way to its place, or farther if it will be at
+its place in time."""
 _LATE_S: Final = 6.0
-"""It is in time if it is at its place at most so long after the sweep has begun: it catches up then."""
+"""A UAV is in time if it is at its place at most so long after the sweep has begun: it catches up then."""
 _GLANCE_S: Final = 8.0
-"""How long it is assumed to look at the place of a survivor on the way."""
+"""How long a UAV is assumed to look at the place of a survivor on the way to its own."""
 _LOOKS_S: Final = 15.0
 """How long a UAV that leaves the formation for a survivor is assumed to look there."""
 _PASSED_M: Final = 30.0
@@ -204,7 +204,7 @@ class Bidding:
         return formation.leads_by(place, *formation.lane(now_ns))
 
     def _is_in_time(self, at: Enu, now_ns: int, *, after_s: float = 0.0) -> bool:
-        """True for a UAV with a plan that is at its place nearly in time if it leaves a position after some time."""
+        """True if this UAV has a plan, and is at its place in time (`_LATE_S`) when it leaves a position after a time."""
         has_plan = self._formation.plan is not None
         return has_plan and self._absence.late_s(at, now_ns, after_s=after_s) <= _LATE_S
 

@@ -74,7 +74,8 @@ _AROUND: Final = 1.2
 """Lines that begin around the swarm do so at this share of the radio's reach from the middle at most: whoever is nearer
 and was not found on the way out is found on the way back only."""
 _STEPS: Final = 8
-"""If the swarm would not stay together on the way there, they begin nearer, by so many steps."""
+"""If the swarm would not stay together on the way to the lines, these begin nearer, by one of so many steps each
+time."""
 _DENSE: Final = 0.85
 """UAVs in a square grid at this share of the radio's reach, or nearer to each other, hear all between them."""
 _FREE: Final = 4
@@ -213,8 +214,8 @@ class Lines(Shape):
         return Lines(narrow, most_m=spans_m[self._half - 1] / 2, gaps_m=gaps_m, joints=joints)
 
     def begun_around(self, swarm: Swarm) -> tuple[Dimensions, ...]:
-        """The lines that begin where the swarm stands or nearer, if its UAVs hear everybody between them: they must be
-        dense enough for that, and stand wide enough for all lanes but the bent ones.
+        """Two lines that begin at most as far out as the swarm stands, the farthest first; none unless the UAVs hear
+        everybody between them. For that UAVs must stand densely, and widely enough for all lanes but the bent ones.
         """
         made = self._formation
         east_m, west_m, north_m, south_m = swarm.sides_m

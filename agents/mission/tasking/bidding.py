@@ -204,7 +204,7 @@ class Bidding:
         return formation.leads_by(place, *formation.lane(now_ns))
 
     def _is_in_time(self, at: Enu, now_ns: int, *, after_s: float = 0.0) -> bool:
-        """True if this UAV has a plan, and is at its place in time (`_LATE_S`) when it leaves a position after a time."""
+        """True if this UAV has a plan, and is at its place in time (`_LATE_S`) if it leaves a position then."""
         has_plan = self._formation.plan is not None
         return has_plan and self._absence.late_s(at, now_ns, after_s=after_s) <= _LATE_S
 

@@ -51,10 +51,7 @@ def run(
     scenario: Scenario, address: SwarmAddress, *, node: NodeId, position: Enu, onboard_map: OnboardMap = NO_MAP,
     controller: FlightController | None = None,
 ) -> int:  # fmt: skip
-    """Run one UAV, with a map on board, against a router until the scenario is over; raises BusError.
-
-    `controller`: what flies it and says where it is; None: the world of the swarm.
-    """
+    """Run one UAV until the scenario is over; `controller` None: the world flies it. Raises BusError."""
     uav = make_uav(scenario, node, address.swarm, position=position, onboard_map=onboard_map)
     if controller is None:
         service.live(uav, scenario, address)
@@ -79,7 +76,6 @@ async def _run(
 async def _beside(
     bus: AutopilotBus | None, controller: FlightController | None, host: RealtimeHost, scenario: Scenario, node: NodeId
 ) -> AsyncIterator[Mapping[str, int]]:
-    """Serve the flight controller while the host runs; yields its counters."""
     if bus is None or controller is None:
         yield {}
         return
@@ -173,7 +169,6 @@ def start(
 
 
 def main() -> int:
-    """Parse the command line and run; returns the exit code."""
     flags = service.parser("agents", "Run one UAV against a router.")
     flags.add_argument("--id", type=int, required=True, help="node id, from 1 to the number of nodes")
     flags.add_argument(

@@ -64,7 +64,6 @@ class HelloSchedule:
         self._next_ns = self._node.hello_due_ns(max(self._next_ns + step_ns, now_ns))
 
     def on_hello(self, sender: NodeId, now_ns: int) -> None:
-        """A neighbor's hello was received."""
         self._heard_ns[sender] = now_ns
 
     def neighbors(self, now_ns: int) -> tuple[NodeId, ...]:

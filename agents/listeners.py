@@ -47,10 +47,7 @@ class Listeners:
                 self._to_port.setdefault(port, []).append(application)
 
     def of_message(self, message_id: int) -> Sequence[Application]:
-        """The applications that listen to a MAVLink message. FANET_CHUNK is an exception: most of these messages are
-        filler of generated traffic, so they only go to applications that name the id, not to those that listen to all
-        messages.
-        """
+        """The applications that listen to a message; FANET_CHUNK, mostly filler, goes only to those that name it."""
         named = self._to_message.get(message_id, [])
         return named if message_id == CHUNK.msgid else [*named, *self._to_every_message]
 
@@ -59,9 +56,7 @@ class Listeners:
         return [*self._to_port.get(port, ()), *self._to_every_port]
 
     def wanted(self, also: Iterable[int]) -> frozenset[bytes] | None:
-        """The ids of the messages that any application listens to, and those in `also`, each as the three bytes that it
-        has in a MAVLink frame; None if an application listens to all messages.
-        """
+        """Ids to which any application listens, and those in `also`, as three bytes of a frame; None: all."""
         if self._to_every_message:
             return None
         return frozenset(message_id.to_bytes(3, "little") for message_id in (*self._to_message, *also))

@@ -64,7 +64,6 @@ class Statuses:
             self.waiting.append((application, status))
 
     def own(self, handle: int, application: Application) -> None:
-        """Remember which application has sent a confirmed message."""
         self._owners[handle] = application
 
     def owner(self, handle: int) -> Application | None:
@@ -101,7 +100,6 @@ class Statuses:
         return found
 
     def _packet_fate(self, news: PacketNews) -> None:
-        """The radio has come further with a packet, or the node has dropped it."""
         seq, t_ns, reason = news
         watched = self._watched.get(seq)
         if watched is None:

@@ -105,7 +105,6 @@ class Messenger:
         return handle
 
     def _room(self, priority: int) -> int:
-        """The room for inner frames in one packet of a priority."""
         return self._node.most_packet_bytes(priority) - wire.HEADER_BYTES
 
     def _most_bytes(self, submission: Submission) -> int:
@@ -117,11 +116,7 @@ class Messenger:
         )  # fmt: skip
 
     def _admission(self, deadline_ns: int, born_ns: int, priority: int) -> tuple[bool, int | None]:
-        """Whether a message can arrive in time, and the least interval between such messages if that is known.
-
-        If the network states no bound for this priority, every message is accepted. Accepted messages are at least the
-        interval apart, as the bound assumes.
-        """
+        """Whether a message can arrive in time, and the least interval between such; without a bound all can."""
         if self._node.bound_ns() is None or not self._node.bounds(priority):
             return True, None
         interval_ns = self._node.least_interval_ns(deadline_ns)
@@ -232,7 +227,6 @@ class Messenger:
         return send_ns if receive_ns is None or (send_ns is not None and send_ns < receive_ns) else receive_ns
 
     def report(self) -> Mapping[str, Any]:
-        """The counters of messages; empty if no application has sent or received any."""
         counts = self._counts + self._statuses.counts
         if not counts:
             return {}

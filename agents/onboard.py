@@ -115,7 +115,6 @@ class Onboard:
             self._guard(application.on_message, message, now_ns)
 
     def on_hello(self, frame: bytes, now_ns: int) -> None:
-        """Pass a neighbor's hello to the applications that listen to hellos."""
         self._call(now_ns)
         for application in self._callbacks.on_hello:
             self._guard(application.on_hello, frame, now_ns)
@@ -127,7 +126,6 @@ class Onboard:
             self.node.dropped[DropReason.MALFORMED] += 1
 
     def operator(self, frames: bytes, now_ns: int) -> None:
-        """Pass on what a ground station says to this UAV."""
         self._call(now_ns)
         for application in self._callbacks.on_operator:
             self._guard(application.on_operator, frames, now_ns)

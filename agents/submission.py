@@ -75,7 +75,6 @@ class Sending(NamedTuple):
 
 @lru_cache(maxsize=64)
 def _as_frames(content: bytes) -> bytes:
-    """Bytes without a port, checked to be whole MAVLink 2 frames; once for a load that sends the same bytes again."""
     try:
         whole = sum(1 for _ in wire.frames(content))
     except MalformedFrameError as error:

@@ -50,9 +50,7 @@ _REPEATS: Final = 3
 
 
 class Setpoints:
-    """Makes the setpoints of one UAV, and repeats the last one, so that the flight controller knows that the computer
-    is alive. A velocity is never repeated; the application that chose it has to choose one again.
-    """
+    """Makes and repeats setpoints, so that the flight controller knows the computer alive; but no velocity."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._repeat_ns = seconds_to_ns(scenario.mobility.return_after_s) // _REPEATS
@@ -60,7 +58,6 @@ class Setpoints:
         self._last: Setpoint | None = None
 
     def of(self, course: Course, now_ns: int) -> Setpoint:
-        """The setpoint for a course."""
         setpoint = Setpoint(now_ns, course.position, course.speed_m_s)
         if course.velocity is not None:
             setpoint = setpoint._replace(kind=SetpointKind.VELOCITY, velocity=course.velocity)
@@ -118,9 +115,8 @@ class Uav(Actor):
         hello_time: HelloTime | None = None,
         reader: Reader | None = None,
     ) -> None:
-        """`applications`: the user's applications, in addition to those of the scenario. `onboard_map`: the map that
-        the UAV carries. `hello_time`: adds time beacons to hellos. `reader`: the reader of frames that all nodes of a
-        run share.
+        """`applications`: the user's, beside the scenario's. `hello_time`: adds time beacons to hellos. `reader`:
+        shared by all nodes of a run.
         """
         topics = Topics(swarm)
         self._post = Post(scenario) if node == scenario.post else None
@@ -219,7 +215,6 @@ class Uav(Actor):
         return False
 
     def _fix(self, fix: Gps, now_ns: int) -> None:
-        """A position of this UAV, from GPS or from dead reckoning."""
         self._streams.fix(fix)
         self._node.moved(self._fixes.position(fix), fix.velocity)
         self._onboard.fix(fix, now_ns)
@@ -243,7 +238,6 @@ class Uav(Actor):
         return own_ns if node_ns is None or (own_ns is not None and own_ns < node_ns) else node_ns
 
     def state(self, now_ns: int) -> NodeState:
-        """The state of the network, as the node knows it."""
         owing = self._onboard.owes_receipts or self._node.holds_own
         return NodeState(self._hellos.neighbors(now_ns), self._node.bound_ns(), self._node.clusters(), owing)
 
@@ -285,7 +279,6 @@ class Uav(Actor):
     # --- after every input ----------------------------------------------------------------------------------------
 
     def _settle(self, now_ns: int) -> bool:
-        """Pass on the output of the node and the applications; returns True if an application was called."""
         node, onboard = self._node, self._onboard
         if node.deliveries:
             deliveries, node.deliveries = node.deliveries, []

@@ -12,10 +12,7 @@ from fanet_mw.scenario import Scenario
 
 
 def run(scenario: Scenario, address: SwarmAddress, *, pcap: Path | None = None, receptions: bool = False) -> int:
-    """Run the emulator against a router until the scenario is over, with a capture if a file is named.
-
-    Raises BusError, and ConfigError when the file cannot be opened.
-    """
+    """Run the emulator against a router until the scenario is over. Raises BusError; ConfigError for the capture."""
     warm_up()
     if pcap is None:
         service.live(Medium(scenario, address.swarm), scenario, address)

@@ -40,15 +40,12 @@ def warm_up() -> bool:
 
 
 def _marker() -> Path | None:
-    """The file whose existence says that everything has been compiled by this numba for this Python; None where
-    machine code cannot be kept.
-    """
+    """The file that says that all is compiled by this numba and Python; None where machine code cannot be kept."""
     folder = cache_folder()
     return None if folder is None else folder / f"whole-{version('numba')}-{sys.implementation.cache_tag}"
 
 
 def _run(radio: Mapping[str, object]) -> None:
-    """Let two stations send a few frames, with new poses so often that some arrive while a frame is on the air."""
     scenario = config.build({"nodes": {"count": 2}, "clusters": {"count": 1}, "radio": radio})
     topics = Topics("warm-up")
     medium = Medium(scenario, "warm-up")

@@ -123,9 +123,7 @@ class Faults:
     # --- the effect on links and noise ----------------------------------------------------------------------------
 
     def apply(self, links: LinkTable, at: Reals) -> tuple[Reals, Reals]:
-        """Apply the faults to the links of stations at `at` [m, n x 3]; returns the noise at each station [mW], and the
-        energy of jammers there, which is infinite where nothing can be received.
-        """
+        """Change links of stations at `at` [m, n x 3]; returns noise [mW] (inf: deaf) and jammers' energy at each."""
         noise, energy = np.full(self._stations, noise_mw(self._radio)), np.zeros(self._stations)
         faults = [item.fault for item in self._standing.values()]
         for fault in faults:
@@ -155,7 +153,6 @@ class Faults:
         self._degrade_those(links, first + np.flatnonzero(links.ints[s.LINK_DST, first:end] == dst), fault)
 
     def _degrade_those(self, links: LinkTable, chosen: npt.NDArray[np.intp], fault: Degrade) -> None:
-        """Degrade these links of the table."""
         power_mw = links.reals[s.LINK_POWER, chosen] * milliwatt(-fault.loss_db)
         heard = links.ints[s.AUDIBLE, chosen] != 0
         audible = heard & ((fault.loss_db == 0) | (power_mw >= audible_mw(self._radio)))

@@ -56,11 +56,9 @@ class Arrays:
         )  # fmt: skip
 
     def use(self, links: LinkTable) -> None:
-        """Replace the links."""
         self.lk, self.lp, self.ptr = links.ints, links.reals, links.ptr
 
     def busy_ns(self, now_ns: int) -> int:
-        """The time for which the PHY was not idle, summed over all stations."""
         since = self.st[s.BUSY_SINCE]
         return int(self.st[s.BUSY_NS].sum() + np.where(since >= 0, now_ns - since, 0).sum())
 

@@ -105,13 +105,10 @@ class KernelInterface:
         losses_db: npt.NDArray[np.float64],
         ground_m: npt.NDArray[np.float64] | float = 0.0,
     ) -> None:
-        """Tell what stands between stations, and on what ground they do (`Placement.obstruct`)."""
         self._placement.obstruct(pairs, losses_db, ground_m)
 
     def place(self, at: npt.NDArray[np.float64], velocity: npt.NDArray[np.float64], t_ns: int) -> None:
-        """Take over positions [m] and velocities [m/s] of an instant, one row per station; frames in flight are carried
-        over to the new links.
-        """
+        """Take over positions [m] and velocities [m/s] of an instant; frames in flight go over to the new links."""
         if self._waves is not None:
             self.arrays.wv[:] = self._waves.of(at, velocity, t_ns)
             self.arrays.g[s.WAVES_FROM_NS] = t_ns
@@ -124,7 +121,6 @@ class KernelInterface:
         return self._placement.at
 
     def relink(self) -> None:
-        """Compute the links anew, because stations have moved or faults have changed."""
         a = self.arrays
         self._take_in()
         self.link_counters.take(a.lk, a.lp)
@@ -161,11 +157,9 @@ class KernelInterface:
         return int((copies & addressed).sum())
 
     def slots(self) -> int:
-        """The number of frame slots."""
         return int(self.arrays.fr.shape[1])
 
     def grow(self) -> None:
-        """Double the number of frame slots."""
         more = self.slots()
         self.arrays.fr = np.concatenate([self.arrays.fr, np.zeros_like(self.arrays.fr)], axis=1)
         self._more_starts(2 * more)
@@ -173,10 +167,8 @@ class KernelInterface:
     def submit(
         self, slot: int, src: int, dst: int, size: int, start_ns: int, wants_status: bool, until_ns: int
     ) -> None:
-        """Announce a frame of `size` bytes (UDP payload) that will enter its station's queue at `start_ns`, and is
-        dropped if it has not begun by `until_ns`, if that is not 0, or within its lifetime.
-
-        The kernel learns of it at the next `advance`, or at once if this frame might be the next one to end.
+        """Announce a frame (`size`: UDP payload) that enters its queue at `start_ns`, and is dropped if not begun by
+        `until_ns` (0: none) or within its lifetime. The kernel learns of it at once if it might be the next to end.
         """
         airtime = self._airtime.get(size)
         if airtime is None:
@@ -193,7 +185,6 @@ class KernelInterface:
             self._take_in()
 
     def _take_in(self) -> None:
-        """Pass the requests that wait in `asked` to the kernel."""
         counts, a = self._counts, self.arrays
         if counts[s.HS_N] + counts[_ASKED_N] + 2 * kernel.MARGIN > len(a.hs):
             self._more_starts(len(a.hs))
@@ -213,6 +204,5 @@ class KernelInterface:
                 self._more_starts(len(self.arrays.hs))
 
     def _more_starts(self, rows: int) -> None:
-        """Make room for `rows` more planned starts of frames."""
         self.arrays.hs = np.concatenate([self.arrays.hs, np.zeros((rows, 5), np.int64)])
         self._entry = self.arrays.entry()

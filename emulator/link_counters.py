@@ -32,18 +32,13 @@ class LinkCounters:
         """The instant of the next report; None while nothing is transmitted."""
 
     def begin(self, now_ns: int) -> None:
-        """Begin the time that the first report covers."""
         self._since_ns = now_ns
 
     def plan(self, now_ns: int) -> None:
-        """Plan the next report for the next full second."""
         self.next_ns = (now_ns // S + 1) * S
 
     def take(self, lk: Ints, lp: Reals) -> None:
-        """Move the counts of these links here, and leave zeros there.
-
-        The power is that without fading: fading would raise the mean of those that were received.
-        """
+        """Move counts here, leaving zeros; power without fading, which raises the mean of those received."""
         used = np.flatnonzero(lk[_ROWS].any(axis=0))
         if len(used):
             self._keys.append(lk[s.LINK_SRC, used] * self._stations + lk[s.LINK_DST, used])

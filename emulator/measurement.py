@@ -58,8 +58,8 @@ class Measurement:
         }
 
     def _mean_retries(self, d: list[int]) -> float | None:
-        """How often a unicast is repeated that is not dropped for its age: the estimate of E. L. Kaplan and P. Meier,
-        J. Am. Stat. Assoc. 53, 1958, from all attempts. A frame that expires counts for the attempts that it made.
+        """How often a unicast that does not expire is repeated, by E. L. Kaplan and P. Meier, J. Am. Stat. Assoc. 53,
+        1958; frames that expire count for the attempts that they made.
         """
         if not d[s.MADE_BY]:
             return None

@@ -142,7 +142,6 @@ class Medium(Actor):
     # --- requests -------------------------------------------------------------------------------------------------
 
     def _request(self, station: int, request: TxRequest, now_ns: int) -> None:
-        """Handle one request; whatever is wrong with it is counted and not raised."""
         seq, start_ns, frame, dst, wants_status, until_ns = request
         numbers, slots = self._numbers, self._slots
         if seq != numbers.expected[station] and (lost := numbers.lost_before(station, seq)):
@@ -185,9 +184,7 @@ class Medium(Actor):
         self._refuse(station, request, reason, now_ns)
 
     def _refuse_instant(self, station: int, request: TxRequest, now_ns: int) -> bool:
-        """Refuse a request whose instant is absurd or too long ago; a late one is counted. Returns True if it was
-        refused.
-        """
+        """Refuse a request whose instant is absurd or too long ago (returns True); count a late one."""
         late_ns = now_ns - request.start_ns
         if not -_HORIZON_NS < late_ns < _HORIZON_NS:
             self._refuse(station, request, DropReason.MALFORMED, now_ns)
@@ -231,16 +228,13 @@ class Medium(Actor):
         return Sample(arrays.g.copy(), arrays.busy_ns(now_ns), self._counters.delivered_bytes, now_ns)
 
     def _report_links(self, now_ns: int) -> bool:
-        """Publish the statistics of links; returns False if there was no traffic."""
         stats = self._kernel.links(now_ns)
         if stats is not None:
             self.outbox.append((self._topics.radio_links, stats))
         return stats is not None
 
     def _take_in_faults(self, *refused: str | None) -> None:
-        """Compute links and noise anew after faults have changed, and count each refused change by what was wrong with
-        it.
-        """
+        """Compute links and noise anew after faults have changed; count refused changes by their reasons."""
         for why in refused:
             if why is not None:
                 self._counters.refused[why] += 1
@@ -291,7 +285,6 @@ class Medium(Actor):
     # --- positions ------------------------------------------------------------------------------------------------
 
     def _obstruct(self, obstructions: Obstructions) -> None:
-        """Obstructions have changed; they take effect with the next poses, which are of the same instant."""
         pairs = np.frombuffer(obstructions.pairs, np.uint16).astype(np.int64)
         if len(pairs) % 2 or (len(pairs) and not 1 <= pairs.min() <= pairs.max() <= self._count):
             self._counters.refused["obstructions"] += 1

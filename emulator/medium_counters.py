@@ -44,9 +44,7 @@ class MediumCounters:
         self.dropped[_REASON_OF[verdict]] += 1
 
     def copies(self, g: s.Ints, *, in_flight: int) -> dict[str, Any]:
-        """The ledger at the receivers: the number of copies that were transmitted in range of a receiver, and how each
-        ended. `in_flight` of them have not ended.
-        """
+        """The ledger at the receivers: copies transmitted in range, and how each ended but `in_flight` of them."""
         lost = {
             DropReason.COLLISION: int(g[s.COLLISION_COPIES]),
             DropReason.HALF_DUPLEX: int(g[s.HALF_DUPLEX_COPIES]),

@@ -100,9 +100,7 @@ class Pcap:
         receptions: bool = False,
         flush: Callable[[], str | None] = lambda: None,
     ) -> None:
-        """`flush` returns why no more can be written. It is called once a second of swarm time, between records, so
-        that the file can be read meanwhile.
-        """
+        """`flush` returns why no more can be written; called once a second, so that the file can be read."""
         self.epoch_unix_ns = 0
         self._last: dict[int, int] = {}
         self._numbers: dict[tuple[int, int], int] = {}

@@ -50,7 +50,6 @@ class RequestNumbers:
 
     @property
     def total(self) -> int:
-        """The number of requests of all nodes."""
         return sum(map(self.made, range(len(self.expected))))
 
     def report(self) -> dict[str, Mapping[str, int]]:
@@ -83,7 +82,6 @@ class FrameSlots:
         return len(self.requests) - len(self.free)
 
     def add(self, slots: int) -> None:
-        """Add this many free slots."""
         assert not self.free, "slots are added when all are in use"
         before = len(self.requests)
         self.requests += [None] * slots

@@ -18,7 +18,6 @@ from fanet_mw.installation import damage
 
 
 def main() -> None:
-    """Import the command line, and run it."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:  # nohup ignores it
             signal.signal(number, _leave)

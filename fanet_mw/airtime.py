@@ -37,10 +37,7 @@ def plcp_ns(*, short: bool) -> int:
 
 
 def frame_ns(size: int, *, rate_mbps: float, short: bool) -> int:
-    """Airtime of a MAC frame of `size` bytes, FCS included; payload time is rounded up to whole us (16.3.4).
-
-    At 1 Mb/s there is no short preamble.
-    """
+    """Airtime of `size` bytes, FCS included; payload rounded up to us (16.3.4); no short preamble at 1 Mb/s."""
     return plcp_ns(short=short and rate_mbps > 1) + math.ceil(8 * size / rate_mbps - 1e-9) * US
 
 
@@ -117,9 +114,7 @@ def airtime_ns(size: int, radio: RadioTiming, *, rate_mbps: float) -> int:
 
 
 def longest_access_ns(size: int, radio: RadioTiming) -> int:
-    """The longest time that a frame of this project, of `size` bytes, takes at an idle medium: DIFS, the longest
-    backoff that an earlier frame may have left behind, and its airtime.
-    """
+    """The longest time of such a frame at an idle medium: DIFS, an earlier frame's longest backoff, airtime."""
     return _access_ns(size, radio, backoff_slots=radio.cw_min)
 
 

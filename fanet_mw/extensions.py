@@ -57,9 +57,7 @@ _NOT_EVERYWHERE: Final = ("numpy", "numba")
 
 
 class Options(dict[str, Any]):
-    """The options of a part. They are immutable and hashable, as a whole scenario is, so that they can be the key of a
-    cache.
-    """
+    """The options of a part; immutable and hashable, so that a scenario can be the key of a cache."""
 
     def __hash__(self) -> int:  # type: ignore[override]  # a dict has none, because a dict changes
         return hash(json.dumps(self, sort_keys=True, default=str))
@@ -85,10 +83,7 @@ def module_of(key: str, name: str) -> str:
 
 @lru_cache(maxsize=64)
 def digest(module: str) -> str:
-    """The digest of a top-level module's sources, and of those modules beside it that they import.
-
-    It is computed once, before the module is imported, because a process goes on with what it has imported.
-    """
+    """The digest of a module's sources and of those beside it that they import; once, before it is imported."""
     whole = hashlib.sha256()
     for name, path in sorted(_sources(module)):
         whole.update(f"{name} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
@@ -138,9 +133,8 @@ def _imported(path: Path) -> set[str]:
 
 @lru_cache(maxsize=64)
 def load(key: str, name: str) -> Any:  # noqa: ANN401  (whatever the contract of the key asks for)
-    """The class that a scenario names; raises ValueError with a sentence if there is none.
-
-    Raises ModuleNotFoundError if the part needs modules that only machines with an emulator have.
+    """The class that a scenario names; raises ValueError with a sentence if there is none, and ModuleNotFoundError if
+    it needs modules that only machines with an emulator have.
     """
     entry = installed(key).get(name)
     text = entry.value if entry is not None else name
@@ -216,11 +210,7 @@ class PartName:
 
 
 class OptionsOf:
-    """Annotates the table of options that belongs to such a key.
-
-    The table is checked by the part's own `Options`, and its defaults are written out. This project's own parts have no
-    options.
-    """
+    """Annotates the table of options of such a key, checked by the part's own `Options`, with defaults written out."""
 
     def __init__(self, key: str, ours: Sequence[str]) -> None:
         self._key = key

@@ -22,9 +22,7 @@ _DEEPEST: Final = 16
 
 
 def open_regular(path: Path, *, what: str = "", most_bytes: int | None = None, follow: bool = True) -> BinaryIO:
-    """Open a regular file for reading; raises ConfigError, which calls it `what`, for anything else, and for more than
-    `most_bytes`.
-    """
+    """Open a regular file of at most `most_bytes`; raises ConfigError, which calls it `what`, for anything else."""
     what = what or str(path)
     link = 0 if follow else os.O_NOFOLLOW
     try:

@@ -33,9 +33,7 @@ ORIGIN: Final = Geodetic(*DEFAULT_ORIGIN_DEG, 0.0)
 
 
 class _Plane(NamedTuple):
-    """An origin in the earth-centered frame, with the sines and cosines that turn vectors into
-    east, north, up there.
-    """
+    """An origin in the earth-centered frame, with sines and cosines that turn vectors into east, north, up."""
 
     x: float
     y: float

@@ -156,7 +156,6 @@ class Encoder:
         return bytes(heartbeat.pack(self._mav))
 
     def pack(self, message: Any) -> bytes:  # noqa: ANN401  (pymavlink has no types)
-        """Any message of `common`, numbered after the one before it."""
         data = bytes(message.pack(self._mav))
         self._count()
         return data
@@ -289,10 +288,7 @@ class Encoder:
     def sys_status(
         self, battery: BatteryState | None, *, has_fix: bool = True, fenced: bool = False, beyond: bool = False
     ) -> bytes:
-        """SYS_STATUS: the battery, and the sensors present, enabled and healthy; of those GPS alone may not be healthy.
-
-        None: nothing measures the battery.
-        """
+        """SYS_STATUS: the battery (None: unmeasured), and sensors, of which GPS alone may not be healthy."""
         gps, fence = common.MAV_SYS_STATUS_SENSOR_GPS, common.MAV_SYS_STATUS_GEOFENCE
         enabled = _HEALTHY | gps | (fence if fenced else 0)
         healthy = _HEALTHY | (gps if has_fix else 0) | (0 if beyond else fence)
@@ -332,10 +328,8 @@ class Encoder:
         return self.pack(common.MAVLink_extended_sys_state_message(common.MAV_VTOL_STATE_UNDEFINED, landed))
 
     def collision(self, other: NodeId, *, closest_s: float, altitude_m: float, horizontal_m: float) -> bytes:
-        """COLLISION with another node: both know of it by positions over the air, and avoid it by height.
-
-        The distances are those at the closest point of approach, `closest_s` from now. `id` is the node, which equals
-        its MAVLink system up to 250.
+        """COLLISION with another node, avoided by height; distances are those at the closest approach, `closest_s` from
+        now. `id` is the node, which equals its MAVLink system up to 250.
         """
         return self.pack(
             common.MAVLink_collision_message(
@@ -367,11 +361,9 @@ def _boot_ms(now_ns: int) -> int:
 
 
 def decode(data: bytes, dialect: ModuleType | None = None) -> list[Any]:
-    """Every message in some bytes, native or of this dialect; raises MalformedFrameError unless all frames are whole.
-
-    `dialect`: a module that pymavlink has generated, whose messages are decoded by it. Signatures are not verified:
-    pymavlink's check refuses the reordering that flooding always has. A message that no dialect defines comes as
-    UNKNOWN_<id>, with its CRC unchecked.
+    """Every message in some bytes; raises MalformedFrameError unless all frames are whole. `dialect`: decodes its own
+    messages; one that none defines comes as UNKNOWN_<id>, its CRC unchecked. Signatures are not verified: pymavlink's
+    check refuses the reordering that flooding has.
     """
     parser = common.MAVLink(None)
     errors: tuple[type[Exception], ...] = (common.MAVError, ValueError, TypeError)
@@ -410,7 +402,6 @@ class Kinematics(NamedTuple):
 
 
 def kinematics(message: Any, origin: Geodetic = ORIGIN) -> Kinematics:  # noqa: ANN401  (pymavlink has no types)
-    """Read a decoded GLOBAL_POSITION_INT."""
     place = Geodetic(message.lat / 1e7, message.lon / 1e7, message.alt / 1000)
     velocity = from_ned(Ned(message.vx / 100, message.vy / 100, message.vz / 100))
     yaw = None if message.hdg == _UNKNOWN_U16 else math.radians(message.hdg / 100)

@@ -5,10 +5,7 @@ from typing import Final
 
 
 def stream(seed: int, *names: str | int) -> Random:
-    """Return the generator for one named use, for example `stream(7, "backoff", node)`.
-
-    `Random(str)` seeds by SHA-512 of the text, independently of PYTHONHASHSEED and of every other stream.
-    """
+    """The generator of a named use: `stream(7, "backoff", node)`; by SHA-512 of the text, independent of others."""
     return Random("/".join(str(part) for part in (seed, *names)))
 
 

@@ -43,9 +43,7 @@ class BoundStated(NamedTuple):
 
 
 class BoundExcludes(NamedTuple):
-    """The bound or likely delay that the origin stated for a packet is not meant for this node, which it takes to be
-    gone.
-    """
+    """A stated bound or likely delay is not meant for this node, which the origin takes to be gone."""
 
     t_ns: int
     node: int
@@ -312,9 +310,7 @@ class ClockSampled(NamedTuple):
 
 
 class RadioFault(NamedTuple):
-    """A fault on the air began (`active`) or ended. `node` is the node that is cut off, or `node` and `other` are the
-    ends of a link; both are 0 for a fault that lies on an area or on all links.
-    """
+    """A fault began (`active`) or ended: of `node`, or of the link to `other`; both 0 for an area, or all links."""
 
     t_ns: int
     node: int
@@ -450,12 +446,10 @@ def _in_bounds(value: object) -> bool:
 
 
 def kind_of(record: Record) -> str:
-    """The name of a record's kind, as in the trace file."""
     return _NAMES[type(record)]
 
 
 def name_of(kind: type[Record]) -> str:
-    """The name of a kind, as in the trace file."""
     return _NAMES[kind]
 
 

@@ -29,10 +29,7 @@ class Written:
 
 
 def write_items(path: Path, items: Iterable[bytes], held: Written | None = None) -> None:
-    """Write items one after another; `held` takes in what the file then holds.
-
-    Raises OSError when the file cannot be opened or written; it then holds as many whole items as fit.
-    """
+    """Write items one after another; `held` takes in what the file holds: as many as fit. Raises OSError."""
     held = held or Written()
     with path.open("wb", buffering=0) as file:
         for batch in batches(items, least_bytes=_BATCH_BYTES):
@@ -52,9 +49,8 @@ def write_items(path: Path, items: Iterable[bytes], held: Written | None = None)
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """A new file, which takes the place of a file, or of a link, of this name if nothing is raised; raises OSError.
-
-    The old one stays until the new one is whole, and nothing is ever written through a link.
+    """A new file in the place of a file or link of this name, once it is whole and nothing is raised; raises OSError.
+    Nothing is ever written through a link.
     """
     if path.exists() and not (path.is_file() or path.is_symlink()):
         raise OSError(errno.EINVAL, "not a regular file")

@@ -34,13 +34,11 @@ class CollisionAvoidance(Application):
         """The number of hellos without a credible position, or with one that is too old."""
 
     def on_hello(self, frame: bytes, now_ns: int) -> None:
-        """A neighbor's hello was received, which states how the neighbor flies."""
         heard = motion_in(frame, own=self.port.node, now_ns=now_ns, place=self._origin)
         if heard is None or not self._monitor.on_hello(*heard, now_ns=now_ns):
             self._bad_positions += 1
 
     def on_message(self, message: Received, now_ns: int) -> None:
-        """A warning of another UAV was received, which may concern this one."""
         warning = mavlink.collision_of(message.frame)
         self._monitor.on_warning(message.origin, warning, self._motion(now_ns), born_ns=message.born_ns, now_ns=now_ns)
         self.port.tap(message.frame)
@@ -61,7 +59,6 @@ class CollisionAvoidance(Application):
         return Motion(self.port.position, self.port.velocity, now_ns)
 
     def _hand_over(self, now_ns: int) -> None:
-        """Pass on the output of the monitor: records, warnings, and a course."""
         monitor, port = self._monitor, self.port
         _record(monitor, port)
         warnings, monitor.warnings = monitor.warnings, []

@@ -38,9 +38,7 @@ _STANDS_NS: Final = 6 * S
 """A UAV that has stood still so long while it avoids others, pressed against the geofence, flies back; and so much
 later for each UAV with a lower id that it avoids."""
 _STILL_M_S: Final = 1.5
-"""A UAV slower than this stands."""
 _BACK_NS: Final = 12 * S
-"""How long it flies back."""
 _LEAVES_M_S: Final = 5.0
 """The least speed with which one of them then leaves the other."""
 _CLIMB_M_S: Final = 4.0
@@ -183,7 +181,6 @@ class ConflictMonitor:
         self._fly(own)
 
     def on_course(self, course: Course) -> None:
-        """The mission has chosen a course, which the UAV flies when it avoids no other UAV any more."""
         self._wanted = None if course.speed_m_s == HOME else course
 
     @property
@@ -214,9 +211,7 @@ class ConflictMonitor:
         return closest(apart, other.velocity.minus(own.velocity), within_s=self._horizon_s)
 
     def _courses(self, own: Motion) -> list[Motion]:
-        """The courses to examine: the present one; while the UAV avoids others, level flight at the present and the
-        former height.
-        """
+        """The courses to examine: the present one; while avoiding, level flight at the present and former height."""
         if self._avoidance is None:
             return [own]
         level = own._replace(velocity=_level(own.velocity))
@@ -269,9 +264,7 @@ class ConflictMonitor:
         self.course = Course(ahead, max(_LEAST_M_S, velocity.norm()))
 
     def _leaving(self, own: Motion, velocity: Enu) -> Enu | None:
-        """The horizontal velocity towards the middle of the area, if this UAV has long been in conflict with one that
-        has a lower id; that one keeps its velocity, so that the two part.
-        """
+        """Towards the middle, if long in conflict with one of lower id, which keeps its velocity; otherwise None."""
         if not any(
             node < self._node and own.at_ns - threat.since_ns > _LONG_NS for node, threat in self._threats.items()
         ):
@@ -279,10 +272,7 @@ class ConflictMonitor:
         return _to_the_middle(own.position, velocity)
 
     def _flying_back(self, own: Motion, velocity: Enu) -> Enu | None:
-        """The horizontal velocity of this UAV, which no mission has told where to be, once it has stood still: whoever
-        keeps its velocity, as the one with the lowest id does, would stand at the geofence for ever. The direction is
-        chosen once, because those who all fly to the middle meet there.
-        """
+        """Once it stands still without a mission: a direction to the middle, chosen once, since all meet there."""
         now_ns = own.at_ns
         if now_ns < self._back_until_ns:
             return self._back
@@ -309,7 +299,6 @@ class ConflictMonitor:
 
 
 def _vertical_sigma_m(scenario: Scenario) -> float:
-    """The standard deviation of a height by GPS."""
     sensors = scenario.sensors
     return sensors.gps_vertical * math.hypot(sensors.gps_common_m, sensors.gps_bias_m, scenario.world.gps_sigma_m)
 
@@ -319,7 +308,6 @@ def _level(vector: Enu) -> Enu:
 
 
 def _to_the_middle(here: Enu, velocity: Enu) -> Enu:
-    """The horizontal velocity towards the middle of the area, with the speed of this one, and not slowly."""
     way = _level(here)
     scale = -max(_LEAVES_M_S, velocity.norm()) / max(way.norm(), 1e-9)
     return Enu(way.east * scale, way.north * scale, 0.0)

@@ -231,7 +231,6 @@ class TelemetryStreams:
         return int(landed.get(flown.mode, common.MAV_LANDED_STATE_IN_AIR))
 
     def start(self, now_ns: int) -> None:
-        """Begin telemetry now, in this node's phase."""
         for stream in self._streams.values():
             stream.due_ns += max(0, -((stream.due_ns - now_ns) // stream.interval_ns)) * stream.interval_ns
         self._due_ns = self._first_ns()
@@ -239,9 +238,7 @@ class TelemetryStreams:
     # --- in -------------------------------------------------------------------------------------------------------
 
     def fix(self, gps: Gps) -> None:
-        """The receiver has given a fix; the acceleration is the change of velocity since the last one. An older fix is
-        ignored.
-        """
+        """A fix; acceleration is the change of velocity since the last one. An older fix is ignored."""
         if self._fix_ns is not None:
             if gps.t_ns <= self._fix_ns:
                 return
@@ -265,14 +262,12 @@ class TelemetryStreams:
             self._yaw = math.remainder(yaw, math.tau)
 
     def on_flight(self, reading: FlightState) -> None:
-        """A real flight controller has told its attitude."""
         angles = (reading.roll_rad, reading.pitch_rad, reading.yaw_rad)
         roll, pitch, yaw = (math.remainder(angle, math.tau) for angle in angles)
         self._flight = reading._replace(roll_rad=roll, pitch_rad=pitch, yaw_rad=yaw)
         self._yaw = yaw
 
     def on_wind(self, reading: WindEstimate) -> None:
-        """The flight controller has estimated the wind."""
         self._wind = reading.velocity
 
     def on_battery(self, reading: Battery) -> None:
@@ -287,9 +282,7 @@ class TelemetryStreams:
 
     @property
     def attitude(self) -> Attitude:
-        """That of the flight controller, or the tilt that the present acceleration and drag need, facing the direction
-        of flight.
-        """
+        """That of the flight controller, or the tilt that acceleration and drag need, facing the flight."""
         if self._flight is not None:
             return Attitude(self._flight.roll_rad, self._flight.pitch_rad, self._flight.yaw_rad)
         air = self._airflow
@@ -308,11 +301,9 @@ class TelemetryStreams:
 
     @property
     def _airflow(self) -> Enu:
-        """The velocity through the air."""
         return self.velocity.minus(self._wind)
 
     def next_due_ns(self) -> int | None:
-        """The instant at which the next telemetry is due; None if there is no telemetry."""
         return self._due_ns
 
     def telemetry(self, now_ns: int) -> bytes:
@@ -326,7 +317,6 @@ class TelemetryStreams:
         return b"".join(stream.encode(now_ns) for stream in due)
 
     def beacon_frames(self, now_ns: int) -> bytes:
-        """The inner frames of a position beacon."""
         return self._beacons.heartbeat() + self._position(self._beacons, now_ns)
 
     def _global_position(self, encoder: Encoder, now_ns: int) -> bytes:

@@ -119,14 +119,11 @@ class TrafficGenerator:
 
     @property
     def next_bytes(self) -> int:
-        """The length of the packet that is generated at `next_ns`."""
         return self._packets[0][1] if self._packets else self._bytes
 
     @property
     def depth(self) -> int:
-        """The number of packets that a saturated source keeps queued: one in service, and those that are sent within
-        two leads.
-        """
+        """Packets that a saturated source keeps queued: one in service, and those sent within two leads."""
         return 1 + 2 * self._lead_ms
 
     def _first_gap_ns(self, start_ns: int) -> int:
@@ -149,7 +146,6 @@ class TrafficGenerator:
         return round(self._random.expovariate(1 / mean_ns)) // US * US if mean_ns else 0
 
     def _following_ns(self, born_ns: int) -> int | None:
-        """The instant of the packet after the one that is generated at an instant."""
         if self._kind == "trace":
             del self._packets[0]
             return self._packets[0][0] if self._packets else None
@@ -180,7 +176,6 @@ class TrafficGenerator:
         return self._next_ns
 
     def advance(self) -> None:
-        """The packet of `next_ns` was sent: go on to the next one."""
         assert self._next_ns is not None, "only a source that has a next packet can send it"
         if self.saturated:
             self._next_ns, self.owed = None, 0  # from now on, one packet for each one that ends
@@ -188,10 +183,7 @@ class TrafficGenerator:
             self._next_ns = self._following_ns(self._next_ns)
 
     def on_ended(self, *, refused: bool, now_ns: int) -> bool:
-        """A packet of a saturated source was transmitted or given up; returns True if the next one follows at once.
-
-        If it was not transmitted, the next one follows a moment later, at `next_ns`.
-        """
+        """A saturated source's packet has ended; True if the next one follows at once, otherwise at `next_ns`."""
         if now_ns >= self._end_ns:
             return False
         if refused:
@@ -235,7 +227,6 @@ class Load(Application):
         return self._traffic.next_ns()
 
     def on_status(self, status: Status, now_ns: int) -> None:
-        """A packet of a saturated source was transmitted or given up; what comes of it later does not count again."""
         if status.handle not in self._queued:
             return
         self._queued.discard(status.handle)

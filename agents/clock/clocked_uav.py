@@ -139,7 +139,6 @@ class ClockedUav(Actor):
         self._hand_over(now_ns)
 
     def state(self, now_ns: int) -> NodeState:
-        """The state of the network, as the node knows it."""
         return self._uav.state(self._advance_to(now_ns))
 
     def next_wake_ns(self) -> int | None:
@@ -170,12 +169,10 @@ class ClockedUav(Actor):
     # --- instants -------------------------------------------------------------------------------------------------
 
     def _begin(self, now_ns: int) -> None:
-        """Begin to handle an input at this true instant."""
         self._input_ns = now_ns
         self._clock.pass_time(now_ns, until_ns=self._until_ns)
 
     def _local_now_ns(self) -> int:
-        """The instant of the present input on the node's own clock."""
         return self._clock.local_ns(self._input_ns)
 
     def _advance_to(self, now_ns: int) -> int:
@@ -222,9 +219,7 @@ class ClockedUav(Actor):
     # --- out ------------------------------------------------------------------------------------------------------
 
     def _hand_over(self, now_ns: int, *, known: Mapping[int, int] = MappingProxyType({}), ended_ns: int = 0) -> None:
-        """Pass on the output of the UAV. `known` maps instants given to the UAV to their true instants; `ended_ns` is
-        the true end of the frame that it was given, if any.
-        """
+        """Pass on the UAV's output; `known`: true instants of those given to it, `ended_ns`: true end of the frame."""
         uav = self._uav
         for topic, message in uav.outbox:
             if type(message) is TxRequest:
@@ -255,9 +250,7 @@ class ClockedUav(Actor):
         return request._replace(start_ns=start_ns, until_ns=until_ns)
 
     def _sample(self, at_ns: int) -> None:
-        """Record the true error of the node's swarm time, and give the protocol the greatest error that any clock in
-        the swarm may have, as far as this node knows.
-        """
+        """Record the true error of swarm time; give the protocol the greatest error of any clock that is known here."""
         local_ns = self._clock.local_ns(at_ns)
         bound_ns = self._time.error_ns(local_ns)
         reference, hops = self._time.reference_and_hops(local_ns)
@@ -278,10 +271,7 @@ def make_uav(
     onboard_map: OnboardMap = NO_MAP,
     reader: Reader | None = None,
 ) -> Uav | ClockedUav:
-    """Make a UAV by its scenario: with the host's clock or one of its own, a user's applications, and a map.
-
-    `reader`: the reader of frames that all nodes of a run share.
-    """
+    """Make a UAV by its scenario, with the host's clock or its own; `reader` is shared by all nodes of a run."""
     kind = ClockedUav if scenario.clock.modelled else Uav
     return kind(
         scenario, node, swarm, position=position, applications=applications, onboard_map=onboard_map, reader=reader

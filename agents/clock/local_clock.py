@@ -57,9 +57,7 @@ class LocalClock:
         return self.counter_ns(true_ns) + by_ns
 
     def true_ns(self, local_ns: int) -> int:
-        """The true instant at which the clock shows `local_ns`. If it does so twice, that is the first one that is not
-        past; if a jump has left it out, the instant of the jump.
-        """
+        """The true instant of `local_ns`: of two, the first that is not past; of none, that of the jump."""
         shown = None
         for index, (at_ns, by_ns) in enumerate(self._jumps):
             until_ns = self._jumps[index + 1][0] if index + 1 < len(self._jumps) else None

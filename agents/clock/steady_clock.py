@@ -28,7 +28,6 @@ class SteadyClock:
         self.jumps = 0
 
     def pass_time(self, true_ns: int, *, until_ns: int) -> None:
-        """An input arrives at this true instant."""
         self._clock.pass_time(true_ns, until_ns=until_ns)
         ahead_ns = self._clock.local_ns(true_ns) - self._clock.counter_ns(true_ns)
         if not self._ahead_ns:
@@ -41,7 +40,6 @@ class SteadyClock:
         self._ahead_ns[0], self._input_ns = ahead_ns, true_ns
 
     def local_ns(self, true_ns: int) -> int:
-        """The instant that the clock shows at a true instant, without jumps."""
         shown_ns = self._clock.local_ns(true_ns)
         if not self.jumps:
             return shown_ns

@@ -60,16 +60,11 @@ class SwarmTime(ABC):
         """The greatest error that this node's swarm time may have now; None if the node knows no bound of it."""
 
     def worst_ns(self, local_ns: int) -> int:
-        """The greatest error of any node's swarm time, as far as this node knows.
-
-        A node that learns nothing about others gives the bound of its own error, or 0 if it knows none.
-        """
+        """The greatest error of any node's swarm time that is known here; its own bound, or 0, without news."""
         return self.error_ns(local_ns) or 0
 
     def reference_and_hops(self, local_ns: int) -> tuple[int, int]:
-        """The reference node, whose clock this node follows, and the number of hops to it; 0 and 0 if this node follows
-        no node.
-        """
+        """The node whose clock this one follows, and the hops to it; 0 and 0 if it follows none."""
         return 0, 0
 
     def start(self, local_ns: int) -> None:  # noqa: B027
@@ -93,9 +88,7 @@ class SwarmTime(ABC):
         """A hello of this node was handed to the radio."""
 
     def on_status(self, status: TxStatus, *, ended_ns: int) -> bool:
-        """The radio reports that a transmission has ended; returns True if that was a hello announced before
-        (`announced`).
-        """
+        """A transmission has ended; True if that was a hello announced before (`announced`)."""
         return False
 
     def report(self) -> Mapping[str, object]:
@@ -104,11 +97,7 @@ class SwarmTime(ABC):
 
 
 class OwnTime(SwarmTime):
-    """`clock.sync = "none"`: each node uses its own clock, and states no error of it.
-
-    How far any two clocks may differ by the end of the run is known from the scenario: from the accuracy with which
-    they were set, and from the drift in their data sheet.
-    """
+    """`clock.sync = "none"`: each node's own clock; the greatest error follows from setting and data sheet."""
 
     line = EXACT
     synced = True
@@ -124,12 +113,9 @@ class OwnTime(SwarmTime):
 
 
 class GpsTime(SwarmTime):
-    """`clock.sync = "gps"`: the line is fitted to the latest fixes. It also gives swarm time between fixes and during
-    an outage, with an error bound that grows.
-
-    Hellos carry no time, but the instant at which they were made. A neighbor whose hellos are from another time has
-    refused that of GPS; who hears such a neighbor tells the swarm that some clock has a greater error than any that
-    hellos state, and so do all who are told.
+    """`clock.sync = "gps"`: the line is fitted to the latest fixes; between them and in an outage its error bound
+    grows. Hellos state the instant at which they were made: who hears a neighbor from another time, which has refused
+    that of GPS, tells the swarm that some clock has a greater error than stated.
     """
 
     in_hellos = True
@@ -208,9 +194,7 @@ class GpsTime(SwarmTime):
 
 
 class BeaconTime(SwarmTime):
-    """`clock.sync = "beacons"`: `TimeSync` estimates the line; this class passes it the time beacons in neighbors'
-    hellos, and puts its beacons into the hellos of this node.
-    """
+    """`clock.sync = "beacons"`: passes neighbors' time beacons to `TimeSync`, and puts its beacons into hellos."""
 
     in_hellos = True
 
@@ -274,9 +258,7 @@ class BeaconTime(SwarmTime):
         return hello is not None
 
     def on_hello(self, frame: bytes, src: NodeId, *, ended_ns: int, local_ns: int) -> bool:
-        """A hello was received, which ended at `ended_ns`; the first copy of one that its own transmitter has made, and
-        just now, tells the time. Returns False for one that was recorded and sent again later.
-        """
+        """The first copy of a timely hello from its transmitter tells the time; False for one sent again later."""
         try:
             header = packet_of(frame).header
             beacon = decoded(frame, TimeBeacon.in_hello)
@@ -302,9 +284,7 @@ class BeaconTime(SwarmTime):
         return True
 
     def _apart_ns(self, local_ns: int) -> float:
-        """How far this node's time may be from a neighbor's: not at all if others support it, otherwise as far as two
-        clocks may be from each other that were set before take-off; any distance once its own clock has jumped.
-        """
+        """Greatest difference to a neighbor's time: 0 if others support ours, infinite once our clock has jumped."""
         if self.synced and self._sync.supported(local_ns):
             return 0
         if self._sync.counts["lost"]:
@@ -316,9 +296,7 @@ class BeaconTime(SwarmTime):
 
 
 def oscillator(clock: Clock, *, others: int) -> Oscillator:
-    """The bounds of the clocks' data sheet for one clock against true time (`others=0`), or for two drifting clocks
-    against each other (`others=1`).
-    """
+    """Bounds of the data sheet: one clock against true time (`others=0`), or two drifting ones (`others=1`)."""
     rate = (1 + others) * clock.drift_ppm * _PPM
     return Oscillator(rate=rate, wander=clock.wander_ppm * _PPM, stamp_ns=clock.stamp_ns)
 

@@ -92,9 +92,7 @@ class OperatorRelay(Application):
             self._send(together, target, priority, now_ns)
 
     def _is_under_way(self, frame: Frame, now_ns: int) -> bool:
-        """True if the same was asked lately: ground stations ask again before an answer over several hops can be there,
-        and some take the second answer for that to their next question.
-        """
+        """True if the same was asked lately: ground stations ask again before an answer over several hops can come."""
         asked = frame.system, frame.component, frame.message_id, frame.data[10:-2]
         last_ns = self._asked.get(asked)
         if last_ns is not None and now_ns - last_ns < _UNDER_WAY_NS:
@@ -123,7 +121,6 @@ class OperatorRelay(Application):
         self.port.send(together, destination=to, priority=priority)
 
     def on_message(self, message: Received, now_ns: int) -> None:
-        """What a UAV answers."""
         node = self._nodes.get(system_id(message.origin))
         passed = []
         for frame in frames(message.data):

@@ -148,7 +148,6 @@ class Post(Application):
         return min([*planned, *(due_ns for due_ns, _, _ in self._tellings)], default=None)
 
     def _tell(self, now_ns: int) -> None:
-        """Flood the orders that are due."""
         due = [telling for telling in self._tellings if telling[0] <= now_ns]
         self._tellings = [telling for telling in self._tellings if telling[0] > now_ns]
         for _, left, told in due:

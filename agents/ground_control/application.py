@@ -79,10 +79,7 @@ _FIXES: Final = 10
 
 
 class HeightReference:
-    """By how much GPS is wrong in height, as a flight controller finds out where it starts: its height there is known.
-
-    The error is metres, and nearly the same for half an hour.
-    """
+    """GPS's error in height, learned where the UAV starts: the height is known there, and the error lasts."""
 
     def __init__(self, start_m: float) -> None:
         self._start_m = start_m
@@ -169,7 +166,6 @@ class GroundControl(Application):
     # --- in -------------------------------------------------------------------------------------------------------
 
     def on_operator(self, frames_: bytes, now_ns: int) -> None:
-        """MAVLink frames of a ground station, from a gateway on the bus."""
         self._over_air = self._commands.paced = False
         self._take(frames_, now_ns)
 
@@ -297,7 +293,6 @@ class GroundControl(Application):
         self.port.send(b"".join(told), destination=post, priority=PRIORITY_BULK, deadline_ns=self._deadline_ns)
 
     def _look(self, now_ns: int) -> None:
-        """See whether the operator has fallen silent, and whether neighbors are still heard."""
         if self._link.rssi_dbm is not None and now_ns - self._link_ns > _LINK_LASTS_NS:
             self._link = Link(None, self._link.lost)
             self._say(4, "Radio: no neighbor is heard")
@@ -463,12 +458,10 @@ class GroundControl(Application):
     # --- plans ----------------------------------------------------------------------------------------------------
 
     def _check(self, kind: Kind, item: Item) -> None:
-        """Raise RefusedError for an item of a mission that cannot be flown."""
         if kind is Kind.MISSION:
             step_of(item, self._ground)
 
     def _accept(self, kind: Kind, items: list[Item]) -> None:
-        """Take a whole plan into force; raises RefusedError."""
         pilot = self._pilot
         if kind is Kind.MISSION:
             steps = [step_of(item, self._ground) for item in items]
@@ -507,7 +500,6 @@ class GroundControl(Application):
         return self._streams.one(message_id, now_ns, over_air=self._over_air)
 
     def _settle(self, now_ns: int) -> None:
-        """Command the course of the pilot, and hand answers over."""
         course = self._pilot.take_course()
         if course is not None:
             self.port.fly(course)

@@ -69,14 +69,12 @@ class Commands:
         """True while telemetry crosses the air, at a pace of its own that no ground station changes."""
 
     def on_command(self, message: Any, peer: Peer, now_ns: int) -> None:  # noqa: ANN401
-        """Carry a command out, and answer it."""
         command = command_of(message)
         does = self._DOES.get(command.number)
         result = _UNSUPPORTED if does is None else does(self, command, now_ns)
         self._reply(common.MAVLink_command_ack_message(command.number, result, 0, 0, *peer))
 
     def set_mode(self, number: int, now_ns: int) -> int:
-        """Change to the mode with this number of PX4's."""
         pilot, mode = self._pilot, mode_of(number)
         does: Mapping[Mode, Callable[[], bool]] = {
             Mode.HOLD: pilot.hold,

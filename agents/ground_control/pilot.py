@@ -49,9 +49,7 @@ class Pilot:
     def __init__(
         self, *, home: Enu, on_ground: bool, has_task: bool, area_m: Enu | None, settings: Settings, say: Say
     ) -> None:
-        """`has_task`: the swarm has a task of its own for this UAV. `area_m`: half the size of the area beyond which no
-        operator sends it; None: anywhere.
-        """
+        """`has_task`: the swarm has a task for it. `area_m`: half of the area that none leaves; None: anywhere."""
         self.home = home
         self.position = home
         self.velocity = Enu(0.0, 0.0, 0.0)
@@ -87,7 +85,6 @@ class Pilot:
         return self.settings[names.SPEED] if self.speed_m_s is None else self.speed_m_s
 
     def take_course(self) -> Course | None:
-        """The course to command now, if there is a new one."""
         course, self._fly = self._fly, None
         return course
 
@@ -205,7 +202,6 @@ class Pilot:
     # --- what happens ---------------------------------------------------------------------------------------------
 
     def on_fix(self, position: Enu, velocity: Enu, now_ns: int) -> None:
-        """A position fix: see whether something was reached."""
         self.position, self.velocity = position, velocity
         if self.on_ground and position.up > self._ground_m + _UP_M:
             self.on_ground, self.armed = False, True  # the swarm's own task may have taken off
@@ -228,7 +224,6 @@ class Pilot:
         self._watch_fence()
 
     def silent(self) -> None:
-        """The operator has not been heard for too long."""
         if not self.commands or self.on_ground:
             return
         action = round(self.settings[names.SILENCE_ACTION])
@@ -284,7 +279,6 @@ class Pilot:
         return here if course is None or course.land else course.position
 
     def _fly_step(self, now_ns: int) -> None:
-        """Go on with the uploaded mission."""
         mission = self.mission
         reached = self.settings[names.ACCEPTANCE]
         wanted = mission.fly(self.position, now_ns, reached_m=reached, on_ground=self.on_ground)

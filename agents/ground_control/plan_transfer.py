@@ -58,7 +58,6 @@ class PlanTransfer:
         return earliest(*(upload.due_ns for upload in self._uploads.values()))
 
     def wake(self, now_ns: int) -> None:
-        """Ask again for items that have not come."""
         for kind, upload in [*self._uploads.items()]:
             if upload.due_ns > now_ns:
                 continue

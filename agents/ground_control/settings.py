@@ -81,9 +81,7 @@ class Settings:
         return next((at for at, setting in enumerate(self.known) if setting.name == name), None)
 
     def change(self, name: str, value: float) -> bool:
-        """Set a parameter; False, and nothing changes, if the value is beyond its bounds or there is no such
-        parameter.
-        """
+        """Set a parameter; False, and nothing changes, if none has that name or the value is out of bounds."""
         at = self.index(name)
         if at is None or not math.isfinite(value) or not self.known[at].least <= value <= self.known[at].most:
             return False

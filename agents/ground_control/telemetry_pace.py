@@ -32,7 +32,6 @@ class Pace(NamedTuple):
 
 
 def pace_of(scenario: Scenario) -> Pace:
-    """The pace of a scenario's telemetry."""
     count = scenario.nodes.count
     carried = math.ceil(math.sqrt(count)) if scenario.routing.protocol in _ROUTED else count + 1
     carried = 1 if scenario.routing.protocol == "direct" else carried

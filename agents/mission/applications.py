@@ -93,8 +93,8 @@ class PlannedSearch(Application):
         limits: SearchLimits | None = None,
         radio: HeardByRadio | None = None,
     ) -> None:
-        """`onboard_map`: the map that the UAV carries. `limits`: what an operator may change in flight. `radio`: what
-        the node knows of others beside their messages.
+        """`onboard_map`: the map it carries. `limits`: what an operator may change. `radio`: what its node knows of
+        others.
         """
         self._outbox = Outbox()
         self._searcher = Searcher(
@@ -121,7 +121,6 @@ class PlannedSearch(Application):
         self._settle()
 
     def on_hello(self, frame: bytes, now_ns: int) -> None:
-        """A neighbor's hello states how it flies, and passes on what it knows."""
         messages, heard = (
             decoded(frame, told_in),
             motion_in(frame, own=self.port.node, now_ns=now_ns, place=self._origin),
@@ -173,7 +172,6 @@ class PlannedSearch(Application):
         return {"bad_positions": self._bad_positions}
 
     def _settle(self) -> None:
-        """Pass on what the searcher has decided: the velocity to fly, packets to send, and trace records."""
         velocity = self._searcher.take_velocity()
         if velocity is not None:
             self._outbox.course = course_at(self.port.position, velocity)
@@ -181,9 +179,7 @@ class PlannedSearch(Application):
 
 
 def _sole_origin(told: Told) -> int | None:
-    """The only node from which a flood of this message may come. None for confirmations, refutations, bids and maps of
-    what has been searched: any node may repeat them.
-    """
+    """The only node that may flood this message; None for what any node may repeat."""
     if isinstance(told, Survivor):
         return told.reporter
     if isinstance(told, Search):

@@ -8,9 +8,7 @@ from collections.abc import Sequence
 
 
 def assign(costs: Sequence[Sequence[float]]) -> list[int]:
-    """The column of each row. There must be at least as many columns as rows. Of equal assignments the one with lower
-    columns.
-    """
+    """The column of each row, of no more rows than columns; of equal assignments the one with lower columns."""
     rows = len(costs)
     columns = len(costs[0]) if rows else 0
     assert columns >= rows, "every row needs a column"

@@ -46,7 +46,6 @@ class KnownOrders:
         return True
 
     def is_to_obey(self, told: ToldOrder) -> bool:
-        """True for an order that this UAV has to carry out."""
         return told is self._latest or told.order.kind is OrderKind.NO_FLY
 
     @property

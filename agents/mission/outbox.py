@@ -32,7 +32,6 @@ class Outbox:
     """A new course to fly; None if the old one holds."""
 
     def empty(self, port: AppPort) -> None:
-        """Pass the records, the packets and the course to the port."""
         for record in self.records:
             port.record(record)
         self.records.clear()

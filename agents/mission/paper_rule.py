@@ -78,7 +78,6 @@ class PaperRule:
                 self._outbox.packets.append(self._format.packet(measured))
 
     def reported(self, report: Survivor, *, position: Enu, now_ns: int) -> None:
-        """Another node has reported a survivor."""
         readings = self._readings.setdefault(report.survivor, {})
         known = readings.get(report.reporter)
         if known is not None and report.rssi_dbm <= known.rssi_dbm:

@@ -81,9 +81,7 @@ _DEPLOY: Final = 0.9
 
 
 class Searcher:
-    """The parts of one UAV's search, and the order in which they get its inputs: its attributes are these parts, so
-    there are as many as the search has.
-    """
+    """The parts of one UAV's search (its attributes), and the order in which they get its inputs."""
 
     def __init__(
         self,
@@ -227,7 +225,6 @@ class Searcher:
     # --- what its own sensors say ---------------------------------------------------------------------------------
 
     def fix(self, position: Enu, velocity: Enu, *, now_ns: int) -> None:
-        """A position and a velocity from the receiver: the UAV chooses its next velocity."""
         if now_ns >= self._next_roll_ns:
             self._next_roll_ns = now_ns + _ROLL_NS
             self._plans.close_ranks(now_ns)
@@ -269,27 +266,21 @@ class Searcher:
         self._reception.scan(heard, now_ns=now_ns)
 
     def altimeter(self, above_ground_m: float | None, *, now_ns: int) -> None:
-        """The rangefinder has measured the height over whatever is below; None if nothing is within its range."""
         self._flight.altimeter(above_ground_m, now_ns=now_ns)
 
     def radar(self, echoes: Sequence[Echo], *, now_ns: int) -> None:
-        """The radar shows these echoes."""
         self._radar.scan(echoes, now_ns=now_ns)
 
     def camera(self, people: Sequence[tuple[float, float]], *, now_ns: int) -> None:
-        """The camera shows people at these bearings and elevations [rad]."""
         self._sightings.camera(people, now_ns=now_ns)
         self._identify(now_ns)
 
     def voice(self, calls: Sequence[tuple[float, float, float]], *, now_ns: int) -> None:
-        """The microphones detect calls at these bearings and elevations [rad], with these
-        signal-to-noise ratios [dB].
-        """
+        """Calls at these bearings and elevations [rad], with these signal-to-noise ratios [dB]."""
         self._sightings.voice(calls, now_ns=now_ns)
         self._identify(now_ns)
 
     def _identify(self, now_ns: int) -> None:
-        """Confirm the survivors for whom it is certain which person carries the phone."""
         for survivor in self._sightings.review(now_ns):
             self._announcing.confirm(survivor, now_ns)
             self._bidding.close(survivor, now_ns=now_ns)
@@ -407,7 +398,6 @@ class Searcher:
 
 
 def phone_model(scenario: Scenario) -> PhoneModel:
-    """The model of phones and receivers by which this scenario's survivors are located."""
     mission = scenario.mission
     half_db = mission.rubble_db / 2
     return PhoneModel(
@@ -421,9 +411,7 @@ def phone_model(scenario: Scenario) -> PhoneModel:
 
 
 def _view_m(scenario: Scenario) -> tuple[float, float]:
-    """How far to the east and west, and to the north and south, a camera shows the ground from the height of the
-    search; infinite for a UAV without a camera.
-    """
+    """How far east and north a camera shows the ground from the search's height; infinite without a camera."""
     sensors = scenario.sensors
     if not sensors.camera_hz:
         return math.inf, math.inf
@@ -443,12 +431,10 @@ def formation(scenario: Scenario, count: int) -> Pattern | None:
 
 
 def _of_few(scenario: Scenario, count: int) -> Pattern:
-    """The formation in which so few UAVs search, when others have flown home."""
     return of_few(count, demands_of(scenario), connected=scenario.mission.connection == "always")
 
 
 def demands_of(scenario: Scenario) -> Demands:
-    """The requirements of a scenario that a formation is fitted to."""
     return Demands(
         area_m=scenario.world.area_m,
         seen_m=_ground_range_m(scenario),
@@ -485,9 +471,7 @@ def least_nodes(scenario: Scenario) -> int | None:
 
 
 def _ground_range_m(scenario: Scenario) -> float:
-    """The greatest horizontal distance at which a phone on the ground is received from the height of the search,
-    through the rubble that the plan allows for, without shadowing.
-    """
+    """The greatest ground distance at which a phone is received from the search's height, through rubble."""
     mission, height_m = scenario.mission, scenario.nodes.altitude_m
     budget_db = mission.phone_power_dbm - mission.rubble_db - REFERENCE_LOSS_DB - mission.detection_dbm
     slant = math.pow(10.0, min(_MOST_DECADES, budget_db / (10 * mission.phone_exponent)))

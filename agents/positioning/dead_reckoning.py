@@ -25,7 +25,6 @@ class DeadReckoning:
         self._fix_ns: int | None = None
 
     def fix(self, fix: Gps) -> None:
-        """A position fix of GPS."""
         if self._at is None:
             self._at = fix.position
         else:
@@ -35,9 +34,7 @@ class DeadReckoning:
         self._t_ns = self._fix_ns = fix.t_ns
 
     def velocity(self, reading: Inertial) -> Gps | None:
-        """A velocity measured without GPS; returns a fix that takes the place of GPS's while GPS is out, otherwise
-        None.
-        """
+        """A velocity measured without GPS; returns a fix that takes the place of GPS's while that is out."""
         if self._at is None or self._fix_ns is None or reading.t_ns - self._fix_ns <= _OUT_NS:
             return None
         self._at, self._t_ns = self._moved(reading.velocity, reading.t_ns), reading.t_ns

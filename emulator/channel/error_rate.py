@@ -29,11 +29,7 @@ __all__ = ["SHORT_BYTES", "header_rates", "log_success_per_bit"]
 
 @cache
 def log_success_per_bit(rate_mbps: float, ofdm_errors: str = "nist", *, short: bool = False) -> Reals:
-    """ln(1 - bit error rate) at each step of the SINR axis; read-only. It is kept, because it takes a third of a second
-    for CCK.
-
-    `ofdm_errors` is `radio.ofdm_errors`; its tables differ for frames shorter than SHORT_BYTES.
-    """
+    """ln(1 - bit error rate) by SINR; read-only and kept, as CCK takes .3 s. `short`: frames below SHORT_BYTES."""
     found = _log_success_per_bit(rate_mbps, tabled=ofdm_errors == "tables" and is_ofdm(rate_mbps), short=short)
     found.setflags(write=False)
     return found
@@ -57,10 +53,7 @@ def _log_success_per_bit(rate_mbps: float, *, tabled: bool, short: bool) -> Real
 
 
 def header_rates(rate_mbps: float) -> tuple[float, float]:
-    """The rate [Mb/s] of the modulation of a frame's header, and its mean number of bits per ns.
-
-    DSSS: preamble and header are sent at 1 Mb/s. OFDM: 24 bits of SIGNAL at 6 Mb/s follow 16 us of training.
-    """
+    """Rate [Mb/s] and mean bits per ns of a header: DSSS at 1 Mb/s; OFDM 24 bits at 6 Mb/s after 16 us of training."""
     return (6.0, 24 / 20_000) if is_ofdm(rate_mbps) else (1.0, 1e-3)
 
 
@@ -77,11 +70,7 @@ def _dqpsk(per_bit: Reals) -> Reals:
 
 
 def _cck_symbol_success(symbol_snr: float, bits: int) -> float:
-    """Probability that a symbol is decoded: at 11 Mb/s it takes two independent decisions, at 5.5 Mb/s one.
-
-    Each decision is among the signals of a biorthogonal set. Es/N0 counts both quadratures; a decision has the energy
-    of one quadrature, and at 11 Mb/s of half a symbol.
-    """
+    """P(a symbol is decoded): at 11 Mb/s by two decisions, each with half of one quadrature's energy, at 5.5 by one."""
     if bits == 8:
         return _biorthogonal_success(symbol_snr / 4, 16) ** 2
     return _biorthogonal_success(symbol_snr / 2, 16)

@@ -78,9 +78,8 @@ def reach_with_gain_m(radio: Radio, gain_dbi: float) -> float:
 
 
 def heard_m(radio: Radio) -> float:
-    """The distance up to which frames are received without shadowing and fading, by the most favorable path loss.
-
-    It is for pages about a run: a channel from another package is not loaded for them, and has `range_m`.
+    """The distance up to which frames are received without shadowing and fading, by the most favorable path loss; of a
+    channel from another package, which is not loaded for pages, `range_m`.
     """
     if radio.channel == "range" or radio.channel not in CHANNELS:
         return radio.range_m
@@ -104,9 +103,7 @@ def _distance_m(radio: Radio, budget_db: float) -> float:
 
 
 def received_dbm(distance_m: Reals, from_m: Reals, to_m: Reals, radio: Radio) -> Reals:
-    """The mean power of each link without shadowing; `from_m` and `to_m` [n, 3] are its ends, with heights above
-    ground.
-    """
+    """The mean power of each link without shadowing; its ends [n, 3] have heights above ground."""
     if radio.channel == "range":
         return np.full_like(distance_m, radio.tx_power_dbm)
     return np.asarray(radio.tx_power_dbm - _loss_db(distance_m, from_m, to_m, radio), dtype=np.float64)
@@ -139,10 +136,7 @@ def _loss_db(distance_m: Reals, from_m: Reals, to_m: Reals, radio: Radio) -> Rea
 
 
 class Channel(Protocol):
-    """The path loss of a channel from another package (`fanet_mw.extensions`): a class that takes `Radio`.
-
-    It is made anew whenever links are computed, and has no state: the same places always give the same losses.
-    """
+    """The path loss of a channel from another package (`fanet_mw.extensions`); made anew for each computation."""
 
     def loss_db(self, distance_m: Reals, from_m: Reals, to_m: Reals) -> Reals:
         """The loss of each link [n] between its ends [n, 3], whose heights are those above ground."""

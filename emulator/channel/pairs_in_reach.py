@@ -17,11 +17,8 @@ from emulator.kernel.state import Ints, Reals
 def pairs(
     at: Reals, reach: float, column: Ints, keys: Ints, order: Ints, rows: int, found: Ints, distance: Reals
 ) -> int:
-    """Ordered pairs of stations within reach, by source then destination; returns how many there are.
-
-    `order` lists the stations by cell, and `keys` the cells in that order. A neighbor is in the same cell or in one of
-    the eight around it, and three cells of one column are adjacent. The call fills `found` (int64 [n, 2]) and
-    `distance` as far as they have room; if there are more pairs, it must be repeated with more room.
+    """Ordered pairs in reach, into `found` (int64 [n, 2]) and `distance` as far as they have room; returns how many
+    there are. `order` lists the stations by cell, `keys` their cells; three cells of one column are adjacent.
     """
     n = 0
     for a in range(at.shape[0]):
@@ -54,10 +51,7 @@ def pairs(
 
 
 def neighbors(at: npt.NDArray[np.float64], reach: float) -> tuple[Ints, Reals]:
-    """Ordered pairs of stations within reach [n, 2], by source then destination, and their distances [m].
-
-    A station whose position is unknown (not finite) has no neighbors.
-    """
+    """Ordered pairs in reach [n, 2], by source then destination, and distances [m]; none for a place not finite."""
     known = np.flatnonzero(np.isfinite(at).all(axis=1))
     if not len(known):
         return np.zeros((0, 2), np.int64), np.zeros(0, np.float64)

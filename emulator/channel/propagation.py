@@ -56,9 +56,7 @@ def gains_dbi(scenario: Scenario) -> Mapping[int, float]:
 
 
 def pairs_in_reach(at: Reals, radio: Radio, gains: Mapping[int, float]) -> tuple[Ints, Reals]:
-    """Ordered pairs of stations [n, 2] that may interfere, and their distances; `gains`: the gain in dBi of each
-    station whose antenna is not isotropic, which reaches farther.
-    """
+    """Ordered pairs [n, 2] that may interfere, and distances; `gains` [dBi] of antennas that are not isotropic."""
     found, distance = neighbors(at, reach_m(radio))
     for station, gain_dbi in gains.items():
         if not np.isfinite(at[station]).all():
@@ -72,10 +70,9 @@ def pairs_in_reach(at: Reals, radio: Radio, gains: Mapping[int, float]) -> tuple
 
 
 def longest_delay_ns(radio: Radio) -> int:
-    """The greatest delay of a link: less than DIFS, the least time between two frames of a station.
-
-    So a frame has ended at every receiver before its transmitter begins the next one, and a link carries one frame at a
-    time. This is exact up to 8 km (`g` with short slots), 10 km (`a`) or 15 km; 802.11 is not made for more.
+    """The greatest delay of a link: less than DIFS, the least time between two frames of a station, so that a link
+    carries one frame at a time. This is exact up to 8 km (`g` with short slots), 10 km (`a`) or 15 km; 802.11 is not
+    made for more.
     """
     return Timing.of(radio).difs_ns - 1
 
@@ -114,9 +111,7 @@ class LinkTable:
         blocked: Blocked | None = None,
         gains: Mapping[int, float] = {},
     ) -> None:
-        """`ground_m`: the height of the ground below each station. `gains`: the gains in dBi of antennas that are not
-        isotropic, by station.
-        """
+        """`ground_m`: below each station. `gains` [dBi]: of antennas that are not isotropic, by station."""
         found, distance = pairs_in_reach(at, radio, gains)
         above = np.column_stack([at[:, :2], at[:, 2] - ground_m])
         power_dbm = received_dbm(distance, above[found[:, 0]], above[found[:, 1]], radio)
@@ -163,9 +158,7 @@ class LinkTable:
         self.ptr = np.searchsorted(found[:, 0], np.arange(stations + 1)).astype(np.int64)
 
     def sort_dead_last(self) -> None:
-        """Sort the links without power behind the other links of their transmitter; those stay in the order of
-        distance.
-        """
+        """Sort links without power behind their transmitter's others, which stay in the order of distance."""
         used = slice(self.count)
         dead = self.reals[LINK_POWER, used] == 0.0
         if dead.any():

@@ -61,10 +61,8 @@ class Shadowing:
         )
 
     def loss_db(self, at: Reals, found: Ints, distance: Reals) -> Reals:
-        """Loss [dB] of each ordered pair [n, 2] of stations at `at` [m], `distance` [m] apart; zero mean.
-
-        The loss is the sum of the field taken from one end and from the other. If the ends are close to each other,
-        both terms are nearly equal, so the sum is scaled down to keep its variance.
+        """Loss [dB], zero mean, of ordered pairs [n, 2] at `at`, `distance` [m] apart: the field from one end plus from
+        the other, scaled to keep its variance where both are nearly equal.
         """
         if not len(found):
             return np.zeros(0)

@@ -14,7 +14,6 @@ from emulator.kernel.state import CS, ENERGY, ENERGY_MW, JAMMING, NOTHING, NOW, 
 
 @jit
 def busier(p: Ints, st: Ints, r: int, t: int) -> None:
-    """Add one reason to call a station's medium busy."""
     st[CS, r] += 1
     if st[CS, r] == 1 and st[TX_KIND, r] == NOTHING:
         on_busy(p, st, r, t)
@@ -22,7 +21,6 @@ def busier(p: Ints, st: Ints, r: int, t: int) -> None:
 
 @jit
 def quieter(g: Ints, p: Ints, st: Ints, hs: Ints, r: int, t: int) -> None:
-    """Remove one reason to call a station's medium busy."""
     st[CS, r] -= 1
     if st[CS, r] == 0 and st[TX_KIND, r] == NOTHING:
         on_idle(g, p, st, hs, r, t)

@@ -51,7 +51,6 @@ from emulator.kernel.state import (
 
 @jit
 def draw(st: Ints, s: int) -> None:
-    """Draw a new backoff from [0, CW]."""
     st[BO, s] = uniform(st, RANDOM, s) * (st[CW, s] + 1) // MODULUS
 
 

@@ -40,7 +40,6 @@ from emulator.kernel.state import (
 
 @jit
 def put(g: Ints, out: Ints, kind: int, frame: int, station: int, t: int, value: int, attempts: int) -> None:
-    """Append an output row; the kernel's loop keeps room for all rows that one event can make."""
     n = g[OUT_N]
     g[OUT_N] = n + 1
     out[n, 0], out[n, 1], out[n, 2], out[n, 3], out[n, 4], out[n, 5] = kind, frame, station, t, value, attempts
@@ -56,9 +55,7 @@ def release(g: Ints, fr: Ints, out: Ints, f: int, t: int) -> None:
 
 @jit
 def verdict(fr: Ints, f: int) -> int:
-    """How a frame has ended for its receivers; for a broadcast that no station received, the most frequent cause of
-    loss.
-    """
+    """How a frame has ended for its receivers; of a broadcast heard by none, the most frequent cause of loss."""
     outcome = fr[OUTCOME, f]
     most = max(fr[LOST_COLLISION, f], fr[LOST_HALF_DUPLEX, f], fr[LOST_WEAK, f])
     if fr[RECEIVED, f] > 0:

@@ -118,10 +118,7 @@ def take_head(st: Ints, fr: Ints, s: int) -> None:
 
 @jit
 def expire(g: Ints, st: Ints, fr: Ints, out: Ints, s: int, t: int) -> None:
-    """Drop the frames that have waited in the queue beyond their lifetime; the contention window stays as it is.
-
-    The first frame is kept while it is on the air or its ACK is awaited.
-    """
+    """Drop frames that waited beyond their lifetime, but not the first while on the air or its ACK is awaited."""
     kept = st[HEAD, s] if st[TX_KIND, s] == DATA or st[WAITING, s] >= 0 else -1
     if kept >= 0:
         take_head(st, fr, s)
@@ -332,9 +329,8 @@ def acknowledged(g: Ints, p: Ints, st: Ints, fr: Ints, out: Ints, s: int, t: int
 
 @jit
 def ack_timeout(g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, hs: Ints, out: Ints, s: int, f: int, t: int) -> None:
-    """No ACK has come: make another attempt with a doubled window, or give the frame up (802.11-2020, 10.3.4.4).
-
-    If the header of some frame has been received by now, that frame may be the ACK: its end decides (10.3.2.11).
+    """No ACK: try again with a doubled window, or give up (802.11-2020, 10.3.4.4). If some header has been received by
+    now, that frame may be the ACK: its end decides (10.3.2.11).
     """
     if st[WAITING, s] != f:
         return

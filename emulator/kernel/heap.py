@@ -24,7 +24,6 @@ def push(heap: Ints, g: Ints, size_at: int, t: int, kind: int, a: int, b: int) -
 
 @jit
 def pop(heap: Ints, g: Ints, size_at: int) -> None:
-    """Remove the first event, `heap[0]`."""
     n = g[size_at] - 1
     g[size_at] = n
     if n == 0:

@@ -35,10 +35,8 @@ def _fingerprint(folder: Path) -> str:
 
 @cache
 def cache_folder() -> Path | None:
-    """The directory in which the machine code of these sources is cached; None if it cannot be kept.
-
-    It is beside the sources, or else in the user's cache folder, or else in that for temporary files. numba itself
-    would take its own folder of the user instead, where it goes on with the code of older sources.
+    """Where these sources' machine code is cached: beside them, in the user's cache folder, or in that for temporary
+    files; None if nowhere. numba itself would go on with code of older sources in the user's folder.
     """
     import numba
 
@@ -58,7 +56,6 @@ def _of_user() -> Iterator[Path]:
 
 
 def first_writable(folders: Iterable[Path]) -> Path | None:
-    """The first of some folders that can be made and written."""
     for folder in folders:
         with contextlib.suppress(OSError):
             folder.mkdir(parents=True, exist_ok=True)

@@ -70,10 +70,7 @@ _FEW = 128
 
 @jit
 def take_in(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, asked: Ints, bound: int) -> int:
-    """Plan the frames asked for; returns the smaller of `bound` and the first instant at which one of them can end.
-
-    The caller has made sure that the heap of starts has room.
-    """
+    """Plan the frames asked for (there must be room); the smaller of `bound` and the first instant one can end."""
     for i in range(g[ASKED_N]):
         f, src, airtime, t = asked[i, 0], asked[i, 1], asked[i, 3], asked[i, 4]
         for row in range(FRAME_ROWS):
@@ -123,12 +120,9 @@ def purge(g: Ints, st: Ints, hs: Ints) -> None:
 
 @jit
 def next_output(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints) -> int:
-    """A lower bound of the instant of the next reception or ACK; NEVER when nothing is on the way.
-
-    A frame on the air ends when it ends at its last receiver; a planned frame cannot end earlier than its start plus
-    its airtime. Planned starts are examined one by one while they are few: of those whose instant is below the bound,
-    the parents in the heap are below it too. When they are many, the first start plus the airtime of a bare header is
-    taken; then the report of a failure may come late by a header.
+    """A lower bound of the next reception or ACK; NEVER when nothing is on the way. Planned starts are examined one by
+    one while they are few; of many, the first start plus a bare header's airtime is taken, so that the report of a
+    failure may come late by a header.
     """
     bound = NEVER
     for i in range(g[ON_AIR_N]):
@@ -166,10 +160,8 @@ def advance(  # noqa: C901  (one dispatch; splitting it would only move the bran
     g: Ints, p: Ints, pf: Reals, st: Ints, sf: Reals, fr: Ints, lk: Ints, lp: Reals, ptr: Ints, wv: Reals,
     tb: Reals, hs: Ints, hr: Ints, asked: Ints, out: Ints, err: Reals, until: int,
 ) -> int:  # fmt: skip
-    """Take in what was asked for, and process every event up to and including `until`; returns `next_output`.
-
-    `out` is filled from its beginning at every call. A result of -1 means that room ran out: the caller takes the rows
-    in `out`, makes room, and calls again.
+    """Process every event up to `until`; returns `next_output`, or -1 when room ran out: the caller takes the rows in
+    `out`, makes room, and calls again.
     """
     g[OUT_N] = 0
     if g[HS_N] + g[ASKED_N] + MARGIN > hs.shape[0]:
@@ -264,10 +256,8 @@ def scatter(g: Ints, p: Ints, lk: Ints, hr: Ints) -> None:
 def relink(  # noqa: C901  (one pass over what is under way)
     hr: Ints, g: Ints, lk: Ints, lp: Reals, ptr: Ints, lock: Ints, new_lk: Ints, new_lp: Reals, new_ptr: Ints
 ) -> int:  # fmt: skip
-    """Carry the frames on the old links over to the new links; returns how many links are in use.
-
-    `new_lk` has room for every old link behind its own `new_ptr[-1]` links: a frame on a link that no longer exists
-    ends on an orphan there. `lock` is the LOCK row of the stations.
+    """Carry frames on old links over to new ones; returns how many links are in use. `new_lk` has room for every old
+    link behind its own: a frame on a link that is gone ends on an orphan. `lock`: the LOCK row of stations.
     """
     used = new_ptr[new_ptr.shape[0] - 1]
     for old in range(lk.shape[1]):

@@ -137,10 +137,8 @@ def rx_start(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, err: 
 
 @jit
 def seek(p: Ints, st: Ints, sf: Reals, r: int, t: int) -> None:
-    """Open the window in which a signal's preamble is looked for, and note the power that preceded a run of windows.
-
-    ns-3.44 (InterferenceHelper over YansWifiPhy) takes this power as the interference with which the frame that it
-    detects begins: a weaker signal that came less than a window before that frame does no harm until the power changes.
+    """Look for a signal's preamble, and note the power before a run of such windows: as in ns-3.44 (InterferenceHelper
+    over YansWifiPhy) it is the interference with which the frame that is detected begins.
     """
     if t >= st[SEEKING_UNTIL, r]:
         sf[BEFORE_SEEKING, r] = sf[POWER, r]
@@ -201,9 +199,8 @@ def rate_row(p: Ints, fr: Ints, lk: Ints, link: int) -> int:
 
 @jit
 def decoded(p: Ints, pf: Reals, st: Ints, sf: Reals, lp: Reals, err: Reals, r: int, link: int, t: int) -> int:
-    """The fate of the locked frame: FATE_OPEN if it is received without error.
-
-    One draw decides with and without the interference, so a frame that noise alone would have spoiled is no collision.
+    """The locked frame's fate: FATE_OPEN if received. One draw with and without interference: what noise spoils is no
+    collision.
     """
     if p[INTERFERENCE] == 0:
         return FATE_OPEN if st[OVERLAPPED, r] == 0 else FATE_COLLISION

@@ -70,10 +70,7 @@ class Autopilot:
 
 
 class AutopilotBus:
-    """A bus for the host of one UAV, whose sensors and flight controller are at the end of a MAVLink connection.
-
-    Everything else goes to the bus below.
-    """
+    """A bus for one UAV's host, whose sensors and flight controller are at the end of a MAVLink connection."""
 
     def __init__(self, inner: HostBus, names: Topics, node: NodeId) -> None:
         self._inner = inner
@@ -129,10 +126,7 @@ async def serve_world(
     *,
     now_ns: Callable[[], int],
 ) -> None:
-    """Play the world of a swarm whose UAVs are flown by flight controllers: their positions are those of the swarm.
-
-    `standing`: the nodes that are no UAVs, and where they stand.
-    """
+    """Play the world of a swarm flown by flight controllers; `standing`: nodes that are no UAVs, and where they are."""
 
     def on_setpoint(topic: str, payload: bytes) -> None:
         autopilot = autopilots.get(NodeId(node_of(topic)))

@@ -42,10 +42,7 @@ class Arrivals(Protocol):
 
 
 class Periodic(NamedTuple):
-    """One packet per interval, each late by at most `jitter_ns`.
-
-    If the jitter exceeds the interval, packets can come in bursts of up to 1 + jitter / interval.
-    """
+    """One packet per interval, each late by at most `jitter_ns`, so in bursts of up to 1 + jitter / interval."""
 
     interval_ns: int
     jitter_ns: int = 0

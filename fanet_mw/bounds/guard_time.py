@@ -19,10 +19,8 @@ PLANNED_ERROR_NS: Final = 50 * US
 
 
 def slot_guard_ns(scenario: Scenario, *, clock_error_ns: int) -> int:
-    """The guard time of a slot; with `auto` it suffices for clocks that are at most `clock_error_ns` off at any time.
-
-    `auto` covers two opposite clock errors, the propagation over `radio.range_m`, and one data frame that starts just
-    before the guard. It leaves no time for relays that follow that frame.
+    """The guard time of a slot; `auto` covers two opposite clock errors of `clock_error_ns`, the propagation over
+    `radio.range_m`, and one data frame that starts just before the guard, but no relays that follow it.
     """
     given_ms, radio = scenario.clusters.guard_ms, scenario.radio
     if given_ms != "auto":

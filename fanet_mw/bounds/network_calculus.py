@@ -23,9 +23,7 @@ _PACKETS_EXAMINED: Final = 100_000
 
 
 def load(arrivals: Arrivals, server: Server) -> Fraction:
-    """The packets that arrive in one period, divided by those that the slot of a period can hold. The queue is stable
-    up to 1.
-    """
+    """Packets that arrive in one period over those that its slot can hold; the queue is stable up to 1."""
     return arrivals.rate * server.period_ns / server.frames
 
 
@@ -54,9 +52,7 @@ def delay_fifo(arrivals: Arrivals, server: Server) -> DelayBound:
 
 
 def backlog(arrivals: Arrivals, server: Server) -> int | Refused:
-    """The greatest number of packets in the queue, including the one on the air: the length that
-    the queue must have.
-    """
+    """The greatest number of packets in the queue, including the one on the air."""
     refused = refusal(arrivals, server)
     if refused is not None:
         return refused
@@ -67,14 +63,11 @@ def backlog(arrivals: Arrivals, server: Server) -> int | Refused:
 
 
 def delay_any_order(flow: Periodic, cross: Arrivals, server: Server, *, blocking: int = 0) -> DelayBound:
-    """The worst delay of `flow`'s packets when the head may send `cross` first (priorities, or any order).
+    """The worst delay of `flow`'s packets when the head may send `cross` first (priorities: traffic as urgent or more).
 
-    With priorities, `cross` is the traffic that is as urgent or more urgent, and `blocking` the number of frames of the
-    longest less urgent packet: such a packet may have begun just before, and is not interrupted.
-
-    This is blind multiplexing: the slot is a strict service curve, so what the cross traffic leaves is a service curve
-    for the flow (Le Boudec & Thiran, theorem 6.2.1): the q-th packet is completed at the first w with
-    w >= completion(q + cross(w)). Packets of the flow itself stay in order.
+    `blocking`: frames of the longest less urgent packet, which may just have begun. What the cross traffic leaves of
+    the slot, a strict service curve, is one for the flow (Le Boudec & Thiran, theorem 6.2.1): the q-th packet is
+    completed at the first w with w >= completion(q + cross(w)).
     """
     worst_ns = 0
     both = flow.rate + cross.rate

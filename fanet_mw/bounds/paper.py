@@ -37,10 +37,9 @@ def cluster_estimate(
 ) -> DelayBound:
     """WD_c of equation (3); `slot_ns` None stands for the paper's own S.
 
-    The paper's own S serves exactly p_c/p packets a slot. Then Q is the first m p_c / p that is an integer, and the
-    worst q is the one that misses its slot by least: WD_c = p_c + p - gcd(p, p_c), whatever the airtime. For another S
-    all q with the same ceiling share w(q), so only the first of each is examined: the others are smaller by multiples
-    of p. The estimate is refused when no Q exists, or when the busy period is longer than `_SLOTS_EXAMINED` slots.
+    That serves exactly p_c/p packets a slot, so Q is the first m p_c / p that is an integer, and WD_c = p_c + p -
+    gcd(p, p_c), whatever the airtime. For another S all q with the same ceiling share w(q): the first of each is
+    examined. Refused when no Q exists, or beyond `_SLOTS_EXAMINED` slots.
     """
     if min(airtime_ns, period_ns, interval_ns) <= 0 or (slot_ns is not None and slot_ns <= 0):
         raise LocalProtocolError(f"{airtime_ns=} {slot_ns=} {period_ns=} {interval_ns=} must all be > 0")

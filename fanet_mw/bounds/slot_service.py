@@ -73,7 +73,6 @@ class Server(Protocol):
 
     def check(self) -> None:
         """Raise LocalProtocolError when the geometry is impossible."""
-        ...
 
     def completion_ns(self, n: int) -> int:
         """The longest time from the beginning of a busy period until `n` frames are completed."""
@@ -92,7 +91,6 @@ class SlotServer(NamedTuple):
     period_ns: int
 
     def check(self) -> None:
-        """Raise LocalProtocolError unless 0 < C and 0 < S <= P."""
         if self.airtime_ns <= 0 or not 0 < self.slot_ns <= self.period_ns:
             raise LocalProtocolError(
                 f"airtime_ns = {self.airtime_ns} must be > 0 and "
@@ -101,7 +99,6 @@ class SlotServer(NamedTuple):
 
     @property
     def frames(self) -> int:
-        """k, the number of whole frames that fit one slot."""
         return self.slot_ns // self.airtime_ns
 
     @property
@@ -110,12 +107,10 @@ class SlotServer(NamedTuple):
         return self.completion_ns(1) - Fraction(self.period_ns, self.frames)
 
     def completion_ns(self, n: int) -> int:
-        """The longest time from the beginning of a busy period until `n` frames are completed."""
         turns, rest = divmod(n - 1, self.frames)
         return self.period_ns - self.slot_ns + self.airtime_ns * (rest + 2) + turns * self.period_ns
 
     def served(self, window_ns: int) -> int:
-        """The service curve: the frames that are certainly completed after `window_ns` of a busy period."""
         left_ns = window_ns - (self.period_ns - self.slot_ns + self.airtime_ns)
         if left_ns < self.airtime_ns:
             return 0

@@ -24,9 +24,7 @@ from functools import lru_cache
 
 
 def done_ns(starts_ns: Sequence[int], floods_ns: Sequence[int], *, period_ns: int) -> list[int]:
-    """done(n) for n = 1 up to the number of turns; for each turn of a superframe, ascending, its start and the duration
-    of a flood that begins in it.
-    """
+    """done(n) for n up to the number of turns, by each turn's start, ascending, and its flood's duration."""
     return list(_done_ns(tuple(starts_ns), tuple(floods_ns), period_ns))
 
 
@@ -42,9 +40,7 @@ def _done_ns(starts_ns: tuple[int, ...], floods_ns: tuple[int, ...], period_ns: 
 
 
 def worst_ns(completions_ns: Sequence[int], *, period_ns: int, interval_ns: int, together: int = 1) -> int | None:
-    """The bound, from done(1), done(2) ..., for packets that are generated at least `interval_ns` apart, up to
-    `together` of them in each turn. None if more packets are generated than the turns can carry.
-    """
+    """The bound from done(1), done(2) ... for packets `interval_ns` apart, `together` a turn; None if too many."""
     if together * len(completions_ns) * interval_ns < period_ns:
         return None
     return max(done - later * together * interval_ns for later, done in enumerate(completions_ns))

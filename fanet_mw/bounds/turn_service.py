@@ -48,7 +48,6 @@ class TurnServer:
 
     @property
     def frames(self) -> int:
-        """The number of turns per period."""
         return len(self.starts_ns)
 
     @property
@@ -58,12 +57,10 @@ class TurnServer:
         return max(self.completion_ns(n) - n * share for n in range(1, self.frames + 1))
 
     def completion_ns(self, n: int) -> int:
-        """The longest time from the beginning of a busy period until `n` packets are completed."""
         periods, rest = divmod(n, self.frames)
         return self.lead_ns + periods * self.period_ns + self._apart_ns[rest] + self.airtime_ns
 
     def served(self, window_ns: int) -> int:
-        """The number of packets that are certainly completed after `window_ns` of a busy period."""
         n = max(0, (window_ns - self.lead_ns - self.airtime_ns) // self.period_ns) * self.frames
         while self.completion_ns(n + 1) <= window_ns:
             n += 1

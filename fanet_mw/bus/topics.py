@@ -86,9 +86,7 @@ class Topics:
         return f"{self._base}/report/{name}"
 
     def alive(self, name: str, *, fingerprint: str = "", instance: str = "") -> str:
-        """The liveliness token of a process: its name, the scenario that it runs, and which of several processes of
-        that name it is.
-        """
+        """The liveliness token of a process: its name, its scenario, and which of several processes of that name."""
         rest = f"/{fingerprint}/{instance}" if fingerprint else ""
         return f"{self._base}/alive/{name}{rest}"
 

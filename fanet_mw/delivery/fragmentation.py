@@ -29,7 +29,6 @@ class Fragments(NamedTuple):
     pieces: int
 
     def part(self, data: bytes, piece: int) -> bytes:
-        """The bytes of one piece of a message."""
         return data[piece * self.stride : (piece + 1) * self.stride]
 
 

@@ -135,10 +135,7 @@ class Receiver:
                 self._confirm((origin, number), self._done[origin, number], priority, now_ns)
 
     def _take(self, name: tuple[NodeId, int], piece: Piece, frame: bytes, now_ns: int, followers: list[int]) -> int:
-        """Keep a new piece; returns the result to put into the receipt.
-
-        The numbers of waiting messages that are handed over as a consequence are added to `followers`.
-        """
+        """Keep a new piece; returns its receipt's result. Waiting messages handed over by it go to `followers`."""
         head, (origin, number) = piece.head, name
         until_ns = min(head.born_us * US, now_ns) + head.lifetime_ms * MS
         late = head.confirm and number <= self._last.get((origin, head.flow), 0)
@@ -175,10 +172,7 @@ class Receiver:
         return self._done.get(name, MISSING)
 
     def _pass_over(self, name: tuple[NodeId, int], head: Head, until_ns: int, followers: list[int]) -> int:
-        """Answer a message to which nobody listens; those that wait for it in its flow wait only for those before it.
-
-        The numbers of waiting messages that are handed over as a consequence are added to `followers`.
-        """
+        """Answer an unwanted message: those that wait for it wait for those before it. See `_take` on `followers`."""
         self._over(name, NO_LISTENER)
         if head.confirm and self._has_room(name[0]):
             message = _Incoming(head, until_ns, wanted=False)
@@ -288,12 +282,10 @@ class Receiver:
         return found
 
     def _latest(self, origin: NodeId, receipt: Receipt) -> Receipt:
-        """The receipt as it must be sent now, because the message may have been handed over since it was made."""
         outcome = self._done.get((origin, receipt.number))
         return receipt if outcome is None else Receipt(receipt.held, receipt.number, outcome)
 
     def _sweep(self, now_ns: int) -> None:
-        """Forget messages that have expired."""
         for name, message in list(self._incoming.items()):
             if message.until_ns <= now_ns:
                 self._forget(name, message)

@@ -21,7 +21,6 @@ class RetransmissionTimeout:
         self._known.setdefault(target, (takes_ns, takes_ns // 2))
 
     def measured(self, target: NodeId, took_ns: int) -> None:
-        """A target's receipt has taken this long."""
         known = self._known.get(target)
         if known is None:
             self._known[target] = took_ns, took_ns // 2
@@ -31,6 +30,5 @@ class RetransmissionTimeout:
         self._known[target] = smooth_ns + (took_ns - smooth_ns) // 8, varies_ns
 
     def wait_ns(self, target: NodeId) -> int:
-        """How long to wait for a target's receipt."""
         known = self._known.get(target)
         return self._first_wait_ns if known is None else max(_LEAST_WAIT_NS, known[0] + 4 * known[1])

@@ -37,14 +37,9 @@ _LEAST: Final = 2
 
 
 class SendWindow:
-    """Which confirmed messages may be sent now, so that what is under way never fills all queues.
-
-        first transmissions    the most urgent first, then the oldest
-        repetitions            likewise, but those that were repeated least come before all others of their priority
-
-    Either kind may have as many pieces under way as the window says, so a target that is gone holds up no others. The
-    window is halved when something must be sent again, and grows by one whenever a target has all of a message (RFC
-    5681).
+    """Which confirmed messages may be sent now, so that what is under way never fills all queues: the most urgent
+    first, then the oldest (repetitions: those repeated least). First transmissions and repetitions each have a window,
+    halved at a repetition, one more when a target has all of a message (RFC 5681).
     """
 
     def __init__(self) -> None:
@@ -55,7 +50,6 @@ class SendWindow:
         """The number of pieces of first transmissions and of repetitions for which receipts are awaited."""
 
     def wait(self, number: int, *, priority: int, rounds: int) -> None:
-        """A message that was sent `rounds` times waits to be sent."""
         heapq.heappush(self._waiting[rounds > 0], (priority, rounds, number))
 
     def next(self) -> int | None:
@@ -155,9 +149,7 @@ class Sender:
         wait_ns: int,
         holds: Callable[[int], bool] = lambda _: False,
     ) -> None:
-        """`room` tells the room for inner frames in one packet of a priority. `wait_ns`: how long to wait for a target
-        of which no receipt has come. `holds` tells by its number whether a packet still waits in this node.
-        """
+        """`room` for inner frames by priority; `wait_ns` for a first receipt; `holds`: a packet still waits here."""
         self._holds = holds
         self._node = node
         self._nodes = everyone
@@ -271,7 +263,6 @@ class Sender:
     # --- out ------------------------------------------------------------------------------------------------------
 
     def due(self, now_ns: int) -> list[PieceToSend]:
-        """The pieces to send now."""
         while self._timers and self._timers[0][0] <= now_ns:
             _, number = heapq.heappop(self._timers)
             message = self._messages.get(number)
@@ -295,9 +286,7 @@ class Sender:
         return packets
 
     def _round(self, message: _OutgoingMessage, now_ns: int) -> list[PieceToSend]:
-        """Send all pieces of a message the first time, later those that targets have said to lack; a target that has
-        said nothing, or has all of them, is sent the last one again, to ask for its receipt.
-        """
+        """All pieces the first time, later those lacked; a silent target, or one with all, gets the last one again."""
         whole, last = (1 << message.fragments.pieces) - 1, 1 << (message.fragments.pieces - 1)
         unknown = last if message.rounds else whole
         wanted = {target: (whole & ~held or last) if held else unknown for target, held in message.lacking.items()}
@@ -342,9 +331,8 @@ class Sender:
         return most_ns << min(message.rounds - 1, _MOST_DOUBLINGS)
 
     def _previous(self, message: _OutgoingMessage, readers: tuple[NodeId, ...]) -> int:
-        """The youngest open message before this one in its flow that any of the readers lacks; 0 if there is none.
-
-        A reader that has confirmed a message may have started again since, and would wait for it in vain.
+        """The youngest open message of its flow before this that a reader lacks, or 0: one that confirmed a message may
+        have started again since, and would wait for it in vain.
         """
         older = (number for number in reversed(message.flow.open) if number < message.number)
         return next((n for n in older if not self._messages[n].lacking.keys().isdisjoint(readers)), 0)

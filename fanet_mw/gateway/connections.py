@@ -105,7 +105,6 @@ class Connection:
     # --- for the protocols below ----------------------------------------------------------------------------------
 
     def came(self, peer: object, write: Callable[[bytes], bool]) -> None:
-        """A ground station is there, or has spoken again."""
         self._peers.pop(peer, None)
         while len(self._peers) >= _MOST_PEERS:
             self._peers.pop(next(iter(self._peers)))

@@ -78,7 +78,6 @@ class Framing:
     """The bytes of one ground station."""
 
     def __init__(self, counts: Counter[str]) -> None:
-        """`counts`: where what is skipped is counted."""
         self._rest = b""
         self._counts = counts
 

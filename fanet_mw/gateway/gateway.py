@@ -85,9 +85,7 @@ class SwarmFacts(NamedTuple):
 
 
 def facts_of(bus: Bus, names: Topics) -> SwarmFacts:
-    """What the keeper of a swarm's clock says of it; raises BusError when nobody does, ConfigError when there are too
-    many UAVs.
-    """
+    """What the keeper of the clock says of the swarm; raises BusError without one, ConfigError for too many UAVs."""
     answers: deque[bytes] = deque()
     until_s = time.monotonic() + _ANSWER_S
     while not answers:
@@ -179,7 +177,6 @@ class Gateway:
                 self._say_counts()
 
     def _tell_presence(self) -> None:
-        """Let UAVs know that somebody may look at them: many ground stations say nothing before they have heard one."""
         heartbeat = common.MAVLink_heartbeat_message(
             common.MAV_TYPE_ONBOARD_CONTROLLER, _NO_AUTOPILOT, 0, 0, _ACTIVE, 3
         )
@@ -196,7 +193,6 @@ class Gateway:
         }
 
     def _say_counts(self) -> None:
-        """Say what did not pass since the last word about it."""
         now: Counter[str] = Counter()
         for link, _ in self._doors:
             now.update(link.counts)

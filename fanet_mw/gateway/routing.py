@@ -85,10 +85,7 @@ class Link:
     # --- from a ground station ------------------------------------------------------------------------------------
 
     def into(self, peer: object, data: bytes, now_s: float, *, whole: bool) -> tuple[list[ToUav], bytes]:
-        """What a ground station has said: what goes to whom, and what the gateway answers itself.
-
-        `whole`: the bytes are a datagram.
-        """
+        """What goes to whom of what a ground station has said (`whole`: a datagram), and what the gateway answers."""
         framing = self._framings.get(peer)
         if framing is None:
             if len(self._framings) >= _MOST_PEERS:

@@ -12,13 +12,11 @@ from fanet_mw.units import NodeId
 
 
 def dominates(node: NodeId, adjacency: Adjacency) -> bool:
-    """True if `node` belongs to the set, as it decides by itself; `adjacency` needs only the node and its neighbors.
+    """True if `node` decides to belong to the set; `adjacency` needs only the node and its neighbors.
 
-    It does not belong if any two of its neighbors hear each other or are connected over nodes that are all stronger
-    (coverage condition I of Wu & Dai, "A generic distributed broadcast scheme in ad hoc wireless networks", ICDCS
-    2003), as far as its two hops show. This prunes what rule k prunes, and more in sparse swarms, where connections
-    lead around the node. A hash of the id breaks ties: with plain ids, a swarm numbered row by row has no node with
-    stronger ones all around. Where all nodes hear each other none belongs, because each sender reaches all.
+    It does not if any two of its neighbors are connected directly or over stronger nodes within its two hops (coverage
+    condition I of Wu & Dai, "A generic distributed broadcast scheme in ad hoc wireless networks", ICDCS 2003). A hash
+    of the id breaks ties: with plain ids, a swarm numbered row by row has no node with stronger ones all around.
     """
     near = {n: frozenset(adjacency[n]) for n in (node, *adjacency[node])}
     if _complete(adjacency[node], near):

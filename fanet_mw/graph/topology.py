@@ -28,9 +28,7 @@ def symmetric(heard: Mapping[NodeId, Collection[NodeId]]) -> dict[NodeId, tuple[
 def within_range(
     positions: Mapping[NodeId, Enu], *, range_m: float, reaches: Mapping[NodeId, float] = {}
 ) -> dict[NodeId, tuple[NodeId, ...]]:
-    """The neighbors in a disk model: all nodes within `range_m` in three dimensions. `reaches`: of nodes with an
-    antenna of their own, how many times as long their links are.
-    """
+    """All nodes within `range_m` in 3 dimensions; `reaches`: factors of nodes with antennas of their own."""
     cell_m = max(range_m, _MIN_CELL_M)
     cells: dict[tuple[int, int], list[NodeId]] = {}
     place = {node: (int(at.east // cell_m), int(at.north // cell_m)) for node, at in positions.items()}

@@ -149,9 +149,8 @@ class Bus:
 
     @classmethod
     def serve(cls, endpoint: str, config: Path | None = None) -> Self:
-        """Open a session as the router; a Zenoh configuration file adds what is not set here (TLS, access lists).
-
-        Raises BusError when it cannot listen on the endpoint, ConfigError when the file cannot be used.
+        """Open a session as the router; the file adds what is not set here (TLS, access lists). Raises BusError when it
+        cannot listen on the endpoint, ConfigError when the file cannot be used.
         """
         _require_endpoint(endpoint)
         settings = _config(mode="router", listen=endpoint, connect=None, file=config)
@@ -165,10 +164,8 @@ class Bus:
 
     @classmethod
     def join(cls, endpoint: str, config: Path | None = None, *, patience_s: float = JOIN_PATIENCE_S) -> Self:
-        """Open a session as a client of a router, with a Zenoh configuration file; raises BusError when none answers.
-
-        A process of a launched swarm, whose router is known to exist, has more patience: on a busy machine a handshake
-        may take seconds. Raises ConfigError when the file cannot be used.
+        """Open a session as a client of a router; raises BusError when none answers, ConfigError for an unusable file.
+        On a busy machine a handshake may take seconds, so a launched process has more patience.
         """
         _require_endpoint(endpoint)
         os.environ.setdefault(_RUNTIME_VARIABLE, _ONE_RUNTIME)
@@ -222,7 +219,6 @@ class Bus:
         publisher.put(payload)
 
     def announce(self, topic: str) -> None:
-        """Declare a liveliness token, which others see until this session ends for whatever reason."""
         self._tokens.append(self._session.liveliness().declare_token(topic))
 
     def watch(self, expression: str, on_change: Callable[[str, bool], None]) -> None:
@@ -270,10 +266,7 @@ class Bus:
 
 
 def _clock_outside_certificate(config: Path | None) -> str | None:
-    """Why no handshake can succeed at the time that this machine's clock shows; None if its certificates are valid now.
-
-    Zenoh reports a refused certificate like a router that does not answer.
-    """
+    """Why no handshake can succeed at this machine's time (Zenoh reports that like a silent router); or None."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     with contextlib.suppress(OSError, ValueError):
         for base64_, given in _ROOT.findall(config.read_text(encoding="utf-8") if config else ""):

@@ -173,11 +173,8 @@ class ClockKeeper:
 
 
 class ClockListener:
-    """Follows the swarm clock, on the thread of the event loop.
-
-    Any process on the bus can put something on the clock's topic. A put is therefore only a hint to ask the keeper, and
-    only the keeper's answer counts: a forged put cannot stop the run. An attacker that also answers queries in the
-    keeper's place can; an access list prevents that.
+    """Follows the swarm clock, on the event loop's thread. A put on its topic, where any process can put something, is
+    only a hint to ask the keeper; an attacker who answers queries in its place is kept out by an access list.
     """
 
     def __init__(self, bus: HostBus, names: Topics, timebase: Timebase = THIS_MACHINE) -> None:
@@ -233,9 +230,7 @@ class ClockListener:
                     self._running.set_result(SwarmClock(message, self._timebase))
 
     async def running(self, *, timeout_s: float) -> SwarmClock:
-        """The clock, once it has started; it follows the keeper's announcements. Raises BusError if it does not start
-        in time, or if the router goes away.
-        """
+        """The clock, once it has started. Raises BusError if it does not start in time, or the router goes away."""
         waited_s = 0.0
         while waited_s < timeout_s:
             self._ask_now()

@@ -39,9 +39,7 @@ _FOR_COLLECTORS: Final = codecs.codes_of(TraceBatch, Report, LinkStats)
 
 
 class _Usage:
-    """The use that a topic makes of the inbox: bytes accepted, written by one thread, and bytes gone, written by the
-    other.
-    """
+    """A topic's use of the inbox: bytes accepted, written by one thread, and bytes gone, written by the other."""
 
     __slots__ = ("bytes_gone", "bytes_in", "puts_gone", "puts_in")
 
@@ -119,9 +117,7 @@ class Inbox:
         return self.waiting
 
     def _hand_over_one(self, put: _Put, receive: Callable[[str, Message], object]) -> int:
-        """Pass on the next message of the open put, and close the put after its last one; returns
-        the message's bytes.
-        """
+        """Pass on the open put's next message, and close the put after its last one; returns the message's bytes."""
         item = put.items.popleft() if put.items else None
         if item is None:
             self._close(put)
@@ -149,7 +145,6 @@ class Inbox:
         return put
 
     def _close(self, put: _Put, *, malformed: bool = False) -> None:
-        """Count a put that is finished, and free its room."""
         self._open = None
         if malformed:
             self.malformed += 1
@@ -170,7 +165,6 @@ class Inbox:
         return self.inbox_full + self.share_full
 
     def figures(self) -> dict[str, int]:
-        """The counters, for a report."""
         return {
             "samples": self.samples,
             "taken": self.taken,

@@ -63,10 +63,7 @@ def installed() -> bool:
 
 @contextmanager
 def handed_to(on_signal: Callable[[int], None]) -> Iterator[None]:
-    """Call `on_signal` with the number of the first signal that comes; any further signal raises KeyboardInterrupt.
-
-    Raises KeyboardInterrupt if one was raised before and got lost.
-    """
+    """Call `on_signal` with the first signal's number; further ones, and one that got lost, raise KeyboardInterrupt."""
 
     def first(number: int, _frame: FrameType | None) -> None:
         install()
@@ -103,12 +100,9 @@ def said(number: int) -> KeyboardInterrupt:
 
 
 def leave(code: int) -> NoReturn:
-    """End the process without a final garbage collection over everything that is imported.
-
-    With numba that collection takes a fifth of a second, and several seconds on a machine whose cores are busy.
-
-    CPython ends `python -m` with SIGINT, whatever the code, once a KeyboardInterrupt has left a text that `exec` runs,
-    as `namedtuple` and `dataclass` do during imports; the next such text makes it forget.
+    """End the process without a final garbage collection, which takes seconds with numba on a busy machine. CPython
+    ends `python -m` with SIGINT, whatever the code, once a KeyboardInterrupt has left a text that `exec` runs, as
+    `namedtuple` does during imports; the next such text makes it forget.
     """
     exec("")  # noqa: S102
     gc.freeze()

@@ -16,10 +16,7 @@ T = TypeVar("T")
 
 
 def run(main: Coroutine[Any, Any, T]) -> T:
-    """Run a coroutine as `asyncio.run` does.
-
-    With `interrupts.install`, a signal cancels `main`, and KeyboardInterrupt has the signal's number.
-    """
+    """As `asyncio.run`. With `interrupts.install`, a signal cancels `main`, and KeyboardInterrupt has its number."""
     with asyncio.Runner(loop_factory=_loop) as runner:
         return runner.run(_cancelled_by_signals(main) if interrupts.installed() else main)
 

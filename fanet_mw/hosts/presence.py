@@ -28,7 +28,6 @@ class Presence:
         """The rest of each token, by the name of its process."""
 
     def on_token(self, topic: str, *, alive: bool) -> None:
-        """A token has appeared (`alive`) or gone."""
         name, _, rest = topic.removeprefix(self._prefix).partition("/")
         tokens = self._tokens.setdefault(name, set())
         if alive:
@@ -67,7 +66,6 @@ class Presence:
         return "; ".join(f"{what}: {few(names)}" for what, names in parts.items() if names)
 
     def _right(self, name: str) -> set[str]:
-        """The tokens of a process that state this scenario, or no scenario."""
         tokens = self._tokens.get(name, set())
         if self._fingerprint is None:
             return tokens

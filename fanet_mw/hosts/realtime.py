@@ -83,10 +83,8 @@ class RealtimeHost:
         scenario: Scenario | None = None,
         on_epoch: Callable[[int], None] = lambda _: None,
     ) -> None:
-        """Declare, announce, wait for the clock, run, report. Raises BusError, and whatever the actor raises.
-
-        With a `scenario`, raises ConfigError when the keeper of the clock has another one for this swarm.
-        `on_epoch` is called with the unix time [ns] of swarm instant 0 before the actor starts.
+        """Declare, announce, wait for the clock, run, report. Raises BusError, what the actor raises, and ConfigError
+        if the clock's keeper has another scenario. `on_epoch`: gets the unix time [ns] of swarm instant 0.
         """
         for expression in self._actor.subscriptions:
             self._bus.subscribe(expression, self._from_thread)
@@ -349,7 +347,6 @@ class SwarmAddress(NamedTuple):
     """The address at which a process finds its swarm."""
 
     swarm: str
-    """The swarm's name on the bus."""
     endpoint: str
     """The Zenoh endpoint of its router."""
     zenoh_config: Path | None = None
@@ -368,10 +365,8 @@ async def run_actor(
     on_epoch: Callable[[int], None] = lambda _: None,
     timebase: Timebase = THIS_MACHINE,
 ) -> None:
-    """Join a router, run one actor, leave.
-
-    Raises BusError, and ConfigError when Zenoh's configuration cannot be used, or the swarm runs another scenario than
-    `scenario`.
+    """Join a router, run one actor, leave. Raises BusError, and ConfigError when Zenoh's configuration cannot be used,
+    or the swarm runs another scenario than `scenario`.
     """
     config = config_of(address.zenoh_config, actor.name)
     with Bus.join(address.endpoint, config, patience_s=address.patience_s) as bus:

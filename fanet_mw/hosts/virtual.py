@@ -82,7 +82,6 @@ class VirtualHost:
         """The number of wake-ups since time last advanced."""
 
     def start(self) -> None:
-        """Start every actor, in order, at instant 0."""
         for index, actor in enumerate(self._actors):
             actor.start(self.now_ns)
             wake_ns = actor.next_wake_ns()
@@ -110,14 +109,12 @@ class VirtualHost:
         self._flush({self._actors.index(actor): None})
 
     def stop(self) -> None:
-        """Stop all actors, in order, and take their last records."""
         for actor in self._actors:
             actor.stop(self.now_ns)
         self._flush({})
         self._hand_over()
 
     def _watch(self, index: int) -> None:
-        """Count wake-ups that do not advance time: a few are normal, an endless series is a bug in an actor."""
         self._stalled += 1
         if self._stalled > max(_STALL_LIMIT, _STALL_SHARE * len(self._actors)):
             raise LocalProtocolError(
@@ -132,11 +129,9 @@ class VirtualHost:
     def _process(  # noqa: C901  (one loop for each frame; a call for each of its parts takes time)
         self, until_ns: int, awake: dict[int, None] | None
     ) -> None:
-        """The loop of the host: wake an actor, deliver all messages of this instant, in order, and plan the wake-ups of
-        the actor and of all receivers; then go on to the next wake-up, if it is not after `until_ns`.
-
-        `awake`: the actors that were called already, so that the loop begins with the delivery; None if it begins with
-        the next wake-up.
+        """The loop of the host: deliver all messages of this instant, in order, plan the wake-ups of actor and
+        receivers, and go on to the next wake-up up to `until_ns`. `awake`: actors called already; None: begin with a
+        wake-up.
         """
         heap, armed, wakes, asks = self._heap, self._armed, self._wakes, self._asks
         queue, routes, now_ns = self._queue, self._routes, self.now_ns

@@ -58,7 +58,6 @@ class WakeLateness:
         self._asked_past_ns = max(self._asked_past_ns, call_ns - wake_ns)
 
     def woken(self, late_ns: int) -> None:
-        """The actor was woken this long after it was due."""
         self._lateness.add(late_ns)
         self.stalled(late_ns)
 
@@ -67,7 +66,6 @@ class WakeLateness:
         self._stall_ns = max(self._stall_ns, for_ns)
 
     def summary(self) -> Mapping[str, object]:
-        """The figures, by their names in a report."""
         return {
             "wake_lateness_ms": self._lateness.summary(),
             "asked_past_ms": round(self._asked_past_ns / MS, 3),
@@ -83,7 +81,6 @@ class ProcessCost:
         """The number of puts on the bus."""
 
     def summary(self, *, final: bool) -> Mapping[str, object]:
-        """The figures, by their names in a report."""
         usage = resource.getrusage(resource.RUSAGE_SELF)
         return {
             "cpu_s": round(usage.ru_utime + usage.ru_stime, 3),

@@ -32,12 +32,9 @@ origins send at about the same time have about the same sequence number."""
 
 
 def hash_of(frame: bytes) -> int:
-    """A hash that identifies the packet in a frame, the same at every hop.
-
-    It covers everything that the packet's origin wrote, and not only origin and sequence number: a forged packet with
-    the number of a genuine one gets another hash, so nodes do not take the genuine one for a duplicate. Python keys
-    its hash anew for each process (SipHash), so nobody can forge a packet with a given hash. The hash is only ever
-    compared for equality, so a run does not depend on the key.
+    """A hash of all that a packet's origin wrote, the same at every hop: a forged packet with a genuine one's number
+    has another. Python keys it anew for each process (SipHash), so nobody can forge it; it is only compared, so that no
+    run depends on the key.
     """
     return hash(frame[wire.END_TO_END] + frame[wire.HEADER_BYTES :])
 
@@ -79,12 +76,10 @@ class DuplicateSet:
         self.young[key] = bits
 
     def forget(self, key: int) -> None:
-        """Treat this packet as one that was never handled."""
         self.young.pop(key, None)
         self.old.pop(key, None)
 
     def mark(self, key: int, bits: int) -> None:
-        """Add bits to those of a packet."""
         if len(self.young) >= self._capacity:
             self.old, self.young = self.young, {}
         self.young[key] = self.bits(key) | bits

@@ -51,9 +51,7 @@ class HeaderCheck:
     """The header check at one node."""
 
     def __init__(self, node: NodeId, scenario: Scenario, *, handed_on: Callable[[int], bool]) -> None:
-        """`handed_on`: True for the sequence number of a data packet of this node that it has handed over, so that it
-        may come back (`PacketNumbering.handed_on`).
-        """
+        """`handed_on`: whether a data packet of this node was handed over, so that it may come back."""
         clock = scenario.clock
         self._handed_on = handed_on
         self._node = node
@@ -71,10 +69,8 @@ class HeaderCheck:
         """The greatest age of a hello, which waits in the queue of the radio and no longer than for the next one."""
 
     def why_not(self, fields: Fields, before: int, src: NodeId, age_ns: int) -> DropReason | None:
-        """The reason why the header of a frame that `src` sent is rejected; None if it is accepted.
-
-        `before`: the bits of the phases in which the packet was handled before. `age_ns`: the time from the stated
-        instant of its generation to the end of the frame.
+        """Why the header of a frame from `src` is rejected, or None. `before`: the phases in which the packet was
+        handled; `age_ns`: from the stated instant of its generation to the frame's end.
         """
         _, _, origin_us, seq, origin, destination, prev_hop, kind, hop_limit, hops, _, _, _, _ = fields
         count = self._count

@@ -35,7 +35,6 @@ class Neighbors:
         self._by_id[neighbor.node] = neighbor
 
     def forget(self, node: NodeId) -> None:
-        """Forget a neighbor before its lifetime is over, because the link to it has failed."""
         self._by_id.pop(node, None)
 
     def has(self, node: NodeId, *, now_ns: int) -> bool:

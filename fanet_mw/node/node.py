@@ -48,10 +48,8 @@ class AnnouncedHello(NamedTuple):
 
 
 class Node:
-    """One protocol instance: it suppresses duplicates, checks headers, delivers, and asks its routing protocol.
-
-    Most receptions are copies, so `hear` must be quick with them. Six of the twenty attributes exist only for speed:
-    they are methods, lists and facts of this node's parts, which `hear` would otherwise reach through two objects.
+    """One protocol instance: it suppresses duplicates, checks headers, delivers, and asks its routing protocol. Most
+    receptions are copies, for which `hear` is quick by keeping methods and lists of its parts as attributes.
     """
 
     def __init__(
@@ -116,17 +114,14 @@ class Node:
 
     @property
     def frames_sent(self) -> int:
-        """The number of transmissions that have been requested, which is the sequence number of the next request."""
         return self.port.frames_sent
 
     @property
     def dropped(self) -> Counter[str]:
-        """The number of packets that have ended in this node, by reason."""
         return self.port.dropped
 
     @property
     def receptions(self) -> int:
-        """The number of frames that were received."""
         return self._copies + self._others
 
     @property
@@ -139,7 +134,6 @@ class Node:
         return self._own.holds(seq)
 
     def moved(self, position: Enu, velocity: Enu) -> None:
-        """Set the node's own position and velocity, as its navigation knows them."""
         self.port.position, self.port.velocity = position, velocity
 
     def know_clock_error(self, error_ns: int) -> None:
@@ -165,13 +159,10 @@ class Node:
         watch: bool = False,
         watch_radio: bool = False,
     ) -> int:
-        """Send an application payload (whole MAVLink frames); returns the packet's sequence number.
-
-        `born_ns` is the instant at which the application meant to send it, at most `now_ns`. Delay counts from there,
-        and the first frame may go `radio.lead_ms` later: a process that was woken late has less time to announce the
-        frame, but the delay is not measured too short. With `watch`, `Node.watch` will say what became of the packet,
-        with `watch_radio` also when the radio has finished with its first frame.
-        Raises LocalProtocolError for a packet that is longer than `most_packet_bytes`.
+        """Send an application payload (whole MAVLink frames); returns the packet's sequence number. Delay counts from
+        `born_ns`, at most `now_ns`; the first frame may go `radio.lead_ms` later. With `watch`, `Node.watch` will tell
+        the packet's fate, with `watch_radio` also when the radio is done. Raises LocalProtocolError beyond
+        `most_packet_bytes`.
         """
         size, most = wire.HEADER_BYTES + len(inner), self.most_packet_bytes(priority)
         if size > most:
@@ -197,10 +188,8 @@ class Node:
         return seq
 
     def say_hello(self, inner: bytes, *, start_ns: int, now_ns: int, time: bytes | None = None) -> AnnouncedHello:
-        """Broadcast a hello to all neighbors: the applications' frames (`inner`), the protocol's, and the time beacon.
-
-        The time beacon `time` is left out if there is no room for it. If it is given, even empty, the radio reports
-        when the hello ended.
+        """Broadcast a hello: the applications' frames (`inner`), the protocol's, and the time beacon if there is room.
+        If `time` is given, even empty, the radio reports when the hello ended.
         """
         start_ns = self._protocol.hello_start_ns(start_ns)
         most = self.scenario.radio.max_frame_bytes - wire.HEADER_BYTES
@@ -220,11 +209,9 @@ class Node:
         return AnnouncedHello(request, packet.header.seq)
 
     def first_hello_ns(self, earliest_ns: int, start_ns: int) -> int:
-        """The instant for which the first hello is to be made; `RoutingProtocol.first_hello_ns`."""
         return self._protocol.first_hello_ns(earliest_ns, start_ns)
 
     def hello_due_ns(self, start_ns: int) -> int:
-        """The instant for which the next hello, due at `start_ns`, is to be made; asked once for each hello."""
         return self._protocol.hello_due_ns(start_ns)
 
     def hello_share(self, now_ns: int) -> float:
@@ -258,10 +245,8 @@ class Node:
         return False
 
     def _hear_bundle(self, seen: Looked, reception: Reception, now_ns: int) -> None:
-        """Handle each packet of a frame as if it had come alone.
-
-        The relays of these packets are transmitted together again: all first transmissions in one frame, all second
-        ones in another, and so on.
+        """Handle each packet of a frame as if it came alone; their relays go together again, all first transmissions in
+        one frame, all second ones in another, and so on.
         """
         try:
             parts = self._reader.parts(seen)
@@ -285,10 +270,8 @@ class Node:
                 self.port.relay_together([relay for relay in together if relay is not None])
 
     def _first_copy(self, seen: Looked, reception: Reception, before: int, now_ns: int) -> Sequence[Relay]:
-        """Handle a packet that is new in its phase; returns its relays.
-
-        `reception`: that of its frame, which may hold further packets. `before`: the bits of the phases in which the
-        packet was handled before.
+        """Handle a packet that is new in its phase; returns its relays. `reception`: of its frame; `before`: the phases
+        in which it was handled.
         """
         packet_hash, bits = seen.hash, before | seen.phase
         _, _, origin_us, seq, origin, destination, _, kind, _, hops, priority, _, _, _ = seen.fields
@@ -348,31 +331,24 @@ class Node:
         return most
 
     def bound_ns(self) -> int | None:
-        """The delay within which all nodes have the next packet of this node; None: the protocol states none."""
         return self._protocol.bound_ns()
 
     def bounds(self, priority: int) -> bool:
-        """True if the bound is of packets of this priority, too."""
         return self._protocol.bounds(priority)
 
     def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
-        """The nodes of each cluster as far as this node knows, by head."""
         return self._protocol.clusters()
 
     def parted(self, now_ns: int, *, without: Collection[int] = ()) -> Collection[NodeId]:
-        """The nodes to which no way leads any more past lost ones; none under a protocol that does not know ways."""
         return self._protocol.parted(now_ns, without=without)
 
     def hold(self, nodes: Collection[NodeId]) -> None:
-        """The UAV flies so that these neighbors stay in reach, until it says otherwise."""
         self._protocol.hold(nodes)
 
     def least_interval_ns(self, deadline_ns: int) -> int | None:
-        """The least interval between packets of this node that meets a deadline; None: unknown, or there is none."""
         return self._protocol.least_interval_ns(deadline_ns)
 
     def report(self) -> Mapping[str, object]:
-        """The counters of the node and the state of its protocol, as JSON values."""
         return {
             "frames_sent": self.port.frames_sent,
             "receptions": self.receptions,

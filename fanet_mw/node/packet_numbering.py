@@ -38,9 +38,7 @@ class PacketNumbering:
     def make(
         self, kind: Kind, inner: bytes, *, destination: NodeId, priority: int, flags: int, hop_limit: int, born_ns: int
     ) -> Packet:
-        """Make the next packet, and mark it as handled; raises LocalProtocolError if it is longer
-        than a frame may be.
-        """
+        """The next packet, marked as handled; raises LocalProtocolError if it is longer than a frame may be."""
         size = wire.HEADER_BYTES + len(inner)
         bound = self._most_bytes
         if size > bound:
@@ -61,7 +59,5 @@ class PacketNumbering:
         return seq.to_bytes(4, "little") + self._node.to_bytes(2, "little") in self.held
 
     def handed_on(self, seq: int) -> bool:
-        """True if this is the number of a data packet that the node has originated since its start and handed over; it
-        may come back.
-        """
+        """True for a data packet originated since the start and handed over: it may come back."""
         return self._first_seq <= seq < self._next_seq[False]

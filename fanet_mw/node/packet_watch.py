@@ -52,7 +52,6 @@ class PacketWatch:
             self._for_radio.add(seq)
 
     def end(self, seq: int) -> None:
-        """Watch a packet no longer."""
         self.watched.discard(seq)
         self._for_radio.discard(seq)
 
@@ -74,6 +73,5 @@ class PacketWatch:
         self.news += [PacketNews(seq, now_ns, stage) for seq in self._on_radio.pop(request, ()) if seq in self.watched]
 
     def dropped(self, seq: int, reason: DropReason, now_ns: int) -> None:
-        """An own packet has ended in this node."""
         if seq in self.watched:
             self.news.append(PacketNews(seq, now_ns, reason))

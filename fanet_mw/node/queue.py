@@ -44,14 +44,10 @@ class TxQueue:
         return bool(self._entries) and any(key_of_packet(entry[2]) == key for entry in self._entries)
 
     def remove(self, key: int) -> None:
-        """Remove a packet if it is queued."""
         self._entries = [entry for entry in self._entries if key_of_packet(entry[2]) != key]
 
     def push(self, packet: Packet, *, rank: int | None = None) -> Packet | None:
-        """Add a packet; returns the packet that was evicted for it, which may be itself, or None.
-
-        `rank` is the priority at which it waits here, by default its own.
-        """
+        """Add a packet; returns that evicted for it, perhaps itself. `rank`: its priority here, by default its own."""
         self._order += 1
         if rank is None:
             rank = packet.header.priority
@@ -101,9 +97,7 @@ class TxQueue:
         return self._entries[bisect_left(self._entries, (rank,)) : bisect_left(self._entries, (rank + 1,))]
 
     def expire(self, *, before_us: int) -> list[Packet]:
-        """Remove all packets that were generated before an instant [swarm us], or before a later one if their class
-        expires sooner.
-        """
+        """Remove all packets generated before an instant [swarm us], or a later one if their class expires sooner."""
         if not self._entries or before_us <= self._fresh_us:
             return []  # otherwise each wake-up would examine the whole queue
         stale: list[tuple[int, int, Packet]] = []

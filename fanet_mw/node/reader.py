@@ -53,10 +53,7 @@ _REMEMBERED: Final = 512
 
 
 class Looked:
-    """What has been read of one packet, or of a frame with several, so far.
-
-    Nothing is checked until `read`, which gives the packet.
-    """
+    """What has been read of a packet, or of a frame with several. Nothing is checked until `read`."""
 
     __slots__ = ("fields", "frame", "hash", "packet", "parts", "phase")
 
@@ -77,15 +74,11 @@ class Looked:
 
     @property
     def key(self) -> int:
-        """The packet's origin and sequence number as one number (`duplicates.key_of`), by which queues find a packet
-        that was heard again; 0 if the frame holds no packet, or several. Most protocols do not ask for it.
-        """
+        """Origin and sequence number as one number (`duplicates.key_of`); 0 if the frame holds none, or several."""
         return 0 if self.phase == BUNDLE else key_of(self.fields[_ORIGIN], self.fields[_SEQ])
 
     def read(self, cached: bool = True) -> Packet:
-        """Check the header and return the packet in the frame; raises MalformedFrameError if the check fails.
-
-        With `cached`, a hello is taken from the cache of `packet_of`, because the node's clock has asked for it
+        """The packet in the frame; raises MalformedFrameError. `cached`: a hello, which the clock has asked for
         already.
         """
         frame, fields = self.frame, self.fields
@@ -113,7 +106,6 @@ class Reader:
         """The inner frames of long packets that were lately cut out of frames with several, likewise."""
 
     def look(self, frame: bytes) -> Looked:
-        """Go on to another frame."""
         fields = fields_of(frame)
         if fields[_FLAGS] & FLAG_MORE:
             self.last = Looked(frame, fields, 0, BUNDLE)
@@ -122,10 +114,7 @@ class Reader:
         return self.last
 
     def parts(self, looked: Looked) -> Sequence[Looked]:
-        """The packets of a frame with several; raises MalformedFrameError.
-
-        The flag that says that more packets follow is ignored in each.
-        """
+        """The packets of a frame with several; raises MalformedFrameError. Each one's flag for more is ignored."""
         if looked.parts is None:
             looked.parts = [self._packet(part, fields_of(part)) for part in unbundle(looked.frame, self._cut_out)]
             for part in looked.parts:
@@ -144,7 +133,6 @@ class Reader:
         return Looked(frame, fields, packet_hash, PHASES.get(fields[_FLAGS] & PHASE_MASK, 0))
 
     def _remember(self, name: bytes, frame: bytes) -> int:
-        """Compute the hash of a packet, and keep it for its further copies."""
         if len(self._hashes) >= _REMEMBERED:
             self._hashes.clear()
         packet_hash = hash_of(frame)
@@ -165,10 +153,8 @@ class _Inside:
 
 
 class Decoded:
-    """A cache of decoded content, for the latest packets.
-
-    The inner frames of a packet are found and checked once, and each of its messages is decoded once, for the
-    clock, the protocol and the applications of a node, and for all nodes that hear the same bytes.
+    """A cache of the latest packets: inner frames are found, and each message decoded, once for clock, protocol and
+    applications of a node, and for all nodes that hear the same bytes.
     """
 
     def __init__(self) -> None:

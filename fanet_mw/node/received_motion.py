@@ -16,11 +16,8 @@ FUTURE_NS: Final = S
 
 
 def motion_in(frame: bytes, *, own: NodeId, now_ns: int, place: mavlink.Geodetic) -> tuple[NodeId, Motion] | None:
-    """The origin of a frame, and the motion of that UAV at the instant that the frame states; `place` is the origin of
-    the swarm's coordinates.
-
-    None if the frame is malformed or has no position, if its instant lies too far in the future, or if this UAV itself
-    (`own`) is the origin.
+    """The origin of a frame, and its motion at the stated instant; `place`: the origin of coordinates. None if
+    malformed, without a position, too far in the future, or from this UAV itself (`own`).
     """
     try:
         origin, heard = packet_of(frame).origin, decoded(frame, mavlink.kinematics_about(place))

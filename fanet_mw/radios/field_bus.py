@@ -41,7 +41,6 @@ class FieldBus:
         self._radio = radio
 
     def on_radio(self, message: Reception | TxStatus) -> None:
-        """Pass a message from the radio to the node."""
         if self._on_rx is not None:
             self._on_rx(self._rx_topic, codecs.encode([message]))
 

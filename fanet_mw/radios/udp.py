@@ -51,10 +51,7 @@ class DatagramKind(IntEnum):
 
 
 class Datagram(NamedTuple):
-    """The payload of one UDP packet: "FN" | version | kind | source | destination | sequence number | frame.
-
-    The sequence number grows by one with each request, from a random number at the start of the radio.
-    """
+    """The payload of a UDP packet: "FN" | version | kind | source | destination | sequence number | frame."""
 
     kind: DatagramKind
     src: NodeId
@@ -148,7 +145,6 @@ class UdpRadio:
         return transport
 
     def close(self) -> None:
-        """Stop sending and receiving."""
         for task in self._tasks:
             task.cancel()
         for transport in self._transports:
@@ -158,9 +154,7 @@ class UdpRadio:
     # --- transmit -------------------------------------------------------------------------------------------------
 
     def request(self, request: TxRequest) -> None:
-        """Send a frame at its instant; if that has passed, send it at once, and count it as late. One that is later
-        than TOO_LATE_NS, because of its sender or because this process was stopped in between, is dropped.
-        """
+        """Send a frame at its instant, or at once and late; later than TOO_LATE_NS it is dropped."""
         self.counts["sent"] += 1
         if not 0 < len(request.frame) <= self._max_frame_bytes:
             self._refuse(DropReason.TOO_LARGE if request.frame else DropReason.MALFORMED, request)
@@ -223,10 +217,7 @@ class UdpRadio:
         return Datagram(DatagramKind.FRAME, self._node, request.dst, seq, request.frame)
 
     def _put(self, datagram: Datagram, to: Address) -> bool:
-        """Send a datagram; False if it is dropped, because an earlier one still waits for room in the socket.
-
-        Asyncio would keep any number of datagrams, and send them whenever the interface takes them.
-        """
+        """Send a datagram; False if dropped, as an earlier one still waits: asyncio would keep any number."""
         if not self._transports:
             return False
         if self._transports[0].get_write_buffer_size():  # type: ignore[attr-defined]  # typeshed lacks it
@@ -263,11 +254,8 @@ class UdpRadio:
         self._on_frame(datagram, address)
 
     def _take_address(self, node: NodeId, address: Address) -> bool:
-        """Accept an address as that of a node; False if the node is known at another address.
-
-        A node gets another address only after it has been silent at the former one, as after a restart, so a single
-        datagram cannot redirect its traffic. Frames are accepted from any address; otherwise whoever sends first under
-        a node's id could lock that node out.
+        """Accept a node's address; False if it was heard lately at another, so that no single datagram redirects its
+        traffic. Frames are accepted from any address: nobody can lock a node out by sending first under its id.
         """
         now_ns, known = self._now_ns(), self._addresses.get(node)
         if known is not None and known.address != address and now_ns - known.heard_ns < MOVED_NS:
@@ -292,9 +280,7 @@ class UdpRadio:
 
 
 class _Endpoint(asyncio.DatagramProtocol):
-    """Passes received datagrams on. It ignores errors that the network reports about sent ones, such as a missing
-    receiver.
-    """
+    """Passes received datagrams on; errors of sent ones, such as a missing receiver, are ignored."""
 
     def __init__(self, take: Callable[[bytes, Address], None]) -> None:
         self._on_datagram = take

@@ -79,9 +79,7 @@ class Resolver:
         return None if now_ns > ends_ns.get(entry.knowledge, now_ns) else entry.knowledge
 
     def hold(self, out: Outgoing, *, start_ns: int, now_ns: int) -> Outgoing | None:
-        """Keep a frame until the address of its next hop is known, and request it; returns the frame that is given up
-        for it, if any.
-        """
+        """Keep a frame until its next hop's address is known, and request that; returns the frame given up for it."""
         entry = self._entries.get(out.next_hop)
         if entry is None or entry.knowledge is not Knowledge.WAITING:
             entry = self._wait(out.next_hop, now_ns=now_ns)
@@ -145,5 +143,4 @@ class Resolver:
         self._due_ns = min(waiting, default=None)
 
     def waiting(self) -> int:
-        """The number of data packets among the frames that wait."""
         return sum(out.is_data for entry in self._entries.values() for out in entry.pending)

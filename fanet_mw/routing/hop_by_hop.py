@@ -68,15 +68,12 @@ class HopByHop(RoutingProtocol):
         """Find a next hop for a unicast data packet of this node."""
 
     @abstractmethod
-    def _route_transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None:
-        """Find a next hop for a unicast data packet of another node."""
+    def _route_transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None: ...
 
     @abstractmethod
-    def _on_control(self, number: int, body: bytes, packet: Packet, reception: Reception, *, now_ns: int) -> None:
-        """Handle a control message of this protocol; a MalformedFrameError is counted by the node."""
+    def _on_control(self, number: int, body: bytes, packet: Packet, reception: Reception, *, now_ns: int) -> None: ...
 
-    def _on_arrival(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
-        """Note a data packet that has reached this node as its destination."""
+    def _on_arrival(self, packet: Packet, reception: Reception, *, now_ns: int) -> None: ...
 
     def _relays(self, packet: Packet, reception: Reception, *, now_ns: int) -> bool:
         """True if this node relays a broadcast of which this is the first copy: in plain flooding always."""
@@ -97,8 +94,7 @@ class HopByHop(RoutingProtocol):
         """The instant at which this protocol wants to be woken, addresses aside."""
         return None
 
-    def _on_wake(self, now_ns: int) -> None:
-        """Do what is due now, addresses aside."""
+    def _on_wake(self, now_ns: int) -> None: ...
 
     def _held(self) -> int:
         """The packets that wait in this protocol for a route."""
@@ -190,7 +186,6 @@ class HopByHop(RoutingProtocol):
             self._on_unresolved(refused, now_ns=now_ns)
 
     def _drop_failed(self, packet: Packet, outcome: TxOutcome, *, now_ns: int) -> None:
-        """Drop a data packet that the MAC has given up."""
         self._port.drop(REASON_OF[outcome], packet, now_ns=now_ns)
 
     def _drop_unresolved(self, out: Outgoing, *, now_ns: int) -> None:
@@ -240,7 +235,6 @@ class HopByHop(RoutingProtocol):
             self._hand_over(out, start_ns=start_ns, now_ns=now_ns)
 
     def _control(self, kind: int, body: bytes, *, now_ns: int, to: NodeId = BROADCAST, ttl: int = 1) -> Packet:
-        """Make a control packet of this node."""
         self.control_sent += 1
         return self._port.announce(
             Kind.ROUTING,

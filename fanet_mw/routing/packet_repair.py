@@ -59,8 +59,8 @@ class Repair:
         flood_over_ns: int = FLOOD_OVER_NS,
         begin_ns: Callable[[int], int] | None = None,
     ) -> None:
-        """`flood_over_ns`: the time after which a received flood is taken to be over everywhere. `begin_ns`: draws the
-        instant of a repair that is due from an instant on; None: within ASSESS_NS.
+        """`flood_over_ns`: when a received flood should be over. `begin_ns`: draws a due repair's instant; None: in
+        ASSESS_NS.
         """
         self._window_ns = window_ns
         self._begin_ns = begin_ns or self._within_assessment_ns

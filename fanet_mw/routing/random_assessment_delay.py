@@ -30,7 +30,6 @@ class Assessment:
         heapq.heappush(self._due, (due_ns, key))
 
     def on_copy(self, key: int, *, now_ns: int) -> None:
-        """Another node has relayed a copy."""
         pending = self.pending.get(key)
         if pending is None:
             return

@@ -25,23 +25,19 @@ class SendBuffer:
         return len(self._held)
 
     def push(self, packet: Packet, *, now_ns: int) -> Packet | None:
-        """Add a packet; returns the oldest one if it had to leave."""
         self._held.append(Held(packet, now_ns + self._hold_ns))
         return self._held.pop(0).packet if len(self._held) > self._capacity else None
 
     def destinations(self) -> list[NodeId]:
-        """The destinations for which packets wait, ascending."""
         return sorted({NodeId(held.packet.header.destination) for held in self._held})
 
     def take(self, destination: NodeId) -> list[Packet]:
-        """Remove and return all packets for one destination, in the order in which they came."""
         taken = [held.packet for held in self._held if held.packet.header.destination == destination]
         if taken:
             self._held = [held for held in self._held if held.packet.header.destination != destination]
         return taken
 
     def expire(self, *, now_ns: int) -> list[Packet]:
-        """Remove and return the packets that have expired."""
         over = [held.packet for held in self._held if held.ends_ns <= now_ns]
         if over:
             self._held = [held for held in self._held if held.ends_ns > now_ns]

@@ -97,7 +97,6 @@ def parse(data: bytes) -> AsciiGrid:
 
 
 def number(text: str, *, line: int) -> float:
-    """A number, with a decimal point or comma."""
     try:
         if "_" not in text:  # which Python would pass over
             return float(text.replace(",", ".", 1))

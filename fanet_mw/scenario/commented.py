@@ -19,10 +19,7 @@ SCHEMA_NAME: Final = "fanet-scenario.schema.json"
 
 
 def commented(tree: Mapping[str, Any], *, every_key: bool = True, schema: bool = False) -> str:
-    """A scenario file that reads back as `tree`; without `every_key` it has only the keys of `tree`.
-
-    With `schema`, its first line names the JSON schema beside it.
-    """
+    """A scenario file that reads back as `tree`, or with `every_key`; `schema`: named in its first line."""
     lines = [f"#:schema ./{SCHEMA_NAME}"] if schema else []
     if every_key:
         lines += ["# A key behind # has its default. `fanet check FILE` says whether the file is right.", ""]

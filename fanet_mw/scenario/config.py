@@ -32,7 +32,6 @@ def load(path: Path, overrides: Iterable[str] = ()) -> Scenario:
 
 
 def _name_of(path: Path) -> str:
-    """The name of a scenario by that of its file, in the letters that a topic may have."""
     letters = unicodedata.normalize("NFKD", path.stem).encode("ascii", "ignore").decode()
     return re.sub(r"[^A-Za-z0-9_-]+", "-", letters).strip("-")[:64] or "unnamed"
 
@@ -45,10 +44,7 @@ def parse(
     overrides: Iterable[str] = (),
     folder: Path | None = None,
 ) -> Scenario:
-    """Build a scenario from TOML text; `source` is what messages call it, `name` its name unless it has its own.
-
-    Paths in the text are taken from `folder`, those in overrides from the current one.
-    """
+    """A scenario from TOML; `source`: in messages. Paths in it are from `folder`, in overrides from here."""
     tree = toml_of(text, source=source)
     tree.setdefault("name", name)
     if folder is not None:
@@ -59,10 +55,7 @@ def parse(
 
 
 def build(tree: Mapping[str, Any], *, source: str = "scenario", imports: bool = True) -> Scenario:
-    """Validate a tree of plain values; a number may be text with a unit, which its key turns into its own.
-
-    Without `imports`, parts of other packages are taken as the names that they are.
-    """
+    """Validate plain values; a number may be text with a unit. Without `imports`, foreign parts stay names."""
     require_plain(tree, source=source)
     problems: list[str] = []
     tree = {key: _plain(key, value, problems, key) for key, value in tree.items()}
@@ -75,11 +68,8 @@ def build(tree: Mapping[str, Any], *, source: str = "scenario", imports: bool = 
 
 
 def departures(scenario: Scenario) -> dict[str, Any]:
-    """The values of a scenario that differ from the defaults, as a tree of plain values from which it can be built
-    again.
-
-    If the default of a key depends on another key that was changed, the value is included: a rate of 11 Mb/s is the
-    default, but not for 802.11g.
+    """What differs from the defaults, as plain values to build from; also a default that depends on a changed key, such
+    as 11 Mb/s, which is not the default of 802.11g.
     """
     whole = scenario.model_dump(mode="json", exclude_none=True)
     tree = scenario.model_dump(mode="json", exclude_none=True, exclude_defaults=True)

@@ -121,7 +121,6 @@ def _too_rare_fixes(scenario: Scenario) -> Iterator[str]:
 
 
 def _too_frequent_readings(scenario: Scenario) -> Iterator[str]:
-    """The world moves once a tick, and a sensor gives one reading of what it is then."""
     most_hz = 1000 / scenario.world.tick_ms
     rates = {f"sensors.{key}": value for key, value in scenario.sensors if key.endswith("_hz")}
     for key, rate_hz in {"world.gps_hz": scenario.world.gps_hz, **rates}.items():
@@ -212,7 +211,6 @@ def _too_small_frames(scenario: Scenario) -> Iterator[str]:
 
 
 def _deaf_search(scenario: Scenario) -> Iterator[str]:
-    """A limit on silence that is no longer than the silence between two hellos."""
     mission, hello_s = scenario.mission, scenario.routing.hello_interval_s
     if mission.lost_link_s and (not hello_s or mission.lost_link_s <= hello_s):
         yield (
@@ -238,7 +236,6 @@ def _impossible_formation(scenario: Scenario) -> Iterator[str]:
 
 
 def _motionless_search(scenario: Scenario) -> Iterator[str]:
-    """A search whose UAVs stay where they are."""
     if scenario.mission.search != "none" and not scenario.mobility.speed_m_s:
         yield f'mission.search = "{scenario.mission.search}" needs mobility.speed_m_s > 0'
 

@@ -29,9 +29,7 @@ DIGITS: Final = 16
 
 
 def identity(scenario: Scenario) -> dict[str, Any]:
-    """Whatever makes this scenario another one than others: its values, the contents of the files that it names,
-    wherever they lie, and the sources of the parts of other packages.
-    """
+    """All that makes this scenario another than others: values, contents of named files, sources of foreign parts."""
     tree: dict[str, Any] = scenario.model_dump(mode="json")
     for key, digest_key in FILE_KEYS.items():
         if tree["world"][digest_key]:
@@ -58,10 +56,8 @@ def as_json(scenario: Scenario) -> str:
 
 
 def told_by(swarm: str, answer: bytes) -> dict[str, Any]:
-    """The identity of the scenario that a swarm's keeper has told as text.
-
-    Raises BusError if the keeper lays bus messages out in another way, ValueError or RecursionError if this is no
-    such text.
+    """The scenario's identity that a swarm's keeper told as text. Raises BusError if bus messages are laid out in
+    another way, ValueError or RecursionError if this is no such text.
     """
     tree = json.loads(answer)
     if not isinstance(tree, dict):

@@ -92,7 +92,6 @@ def _take_area(world: dict[str, Any], said: str, shapes: Shapes) -> None:
 
 
 def _flat(point: _Point, origin: Any) -> tuple[float, float]:  # noqa: ANN401  (of TOML)
-    """East and north of a place [m]."""
     at = to_enu(Geodetic(*point, 0.0), Geodetic(float(origin[0]), float(origin[1]), 0.0))
     return at.east, at.north
 
@@ -148,7 +147,6 @@ def _shapes(polygons: list[list[_Point]], points: list[_Point]) -> Shapes:
 
 
 def _place(lat: Any, lon: Any) -> _Point:  # noqa: ANN401  (of a file)
-    """A latitude and longitude; raises ValueError for what is none."""
     found = float(lat), float(lon)
     if not (abs(found[0]) <= 90 and abs(found[1]) <= 180):
         raise ValueError(f"latitude {lat!r:.20} and longitude {lon!r:.20} must be within 90 and 180 degrees")

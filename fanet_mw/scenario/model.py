@@ -127,7 +127,6 @@ class Scenario(Section):
 
     @property
     def repair_ns(self) -> int:
-        """How long packets are repaired (`clusters.repair_s`)."""
         chosen = self.clusters.repair_s
         if chosen == "auto":
             chosen = _REPAIR_S if self.clusters.relay == "counter" or self.measures_links else 0.0
@@ -135,7 +134,6 @@ class Scenario(Section):
 
     @property
     def saturated(self) -> bool:
-        """True if some traffic class is saturated."""
         return any(traffic.arrivals == "saturated" for traffic in self.traffic_classes.values())
 
     @property

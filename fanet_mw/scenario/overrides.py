@@ -32,7 +32,6 @@ def apply_override(tree: dict[str, Any], override: str) -> None:
 
 
 def _entry(entries: list[Any], part: str, override: str) -> Any:  # noqa: ANN401  (a value of a TOML file)
-    """One entry of an array by its number."""
     if not part.isdecimal() or int(part) >= len(entries):
         raise ConfigError(f"--set {override!r}: {part!r} must be the number of an entry, 0 to {len(entries) - 1}")
     return entries[int(part)]

@@ -59,10 +59,7 @@ def unit_of(key: str) -> str:
 
 
 def in_unit_of(key: str, text: str) -> float | None:
-    """A number with a unit, converted to the unit of the key; None if the text is no number with a unit.
-
-    Raises ValueError with the accepted units if the unit is another one.
-    """
+    """A number with a unit, in that of the key; None if it is none. Raises ValueError with accepted units."""
     match = _QUANTITY.fullmatch(unicodedata.normalize("NFKC", text).replace("\u2212", "-").strip())
     if match is None:
         return None

@@ -43,7 +43,6 @@ class KeyTable(NamedTuple):
 
     @property
     def title(self) -> str:
-        """The title of a table as it stands in a file."""
         brackets = f"[[{self.path}]]" if self.repeated else f"[{self.path}]"
         return f"{brackets} {self.heading}".strip() if self.path else "Top level"
 
@@ -128,7 +127,6 @@ def _references(schema: Schema, *, many: bool = False) -> Iterator[tuple[str, bo
 
 
 def _unit(name: str, schema: Schema) -> str:
-    """The unit of a key with numbers: by the ending of its name, unless the model states another."""
     unit = schema.get("unit", unit_of(name))
     return str(unit) if "number" in (types := set(_types(schema))) or "integer" in types else ""
 

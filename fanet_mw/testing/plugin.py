@@ -32,9 +32,7 @@ LaunchSwarm = Callable[..., contextlib.AbstractAsyncContextManager["Launched"]]
 
 
 def _emulator(module: str) -> Any:  # noqa: ANN401  (a module)
-    """A module that runs swarms; a test that asks for it is skipped where the emulator is not installed, and fails
-    where another package stands in its way.
-    """
+    """A module that runs swarms; skips the test without the emulator, fails if another package stands in its way."""
     try:
         return importlib.import_module(module)
     except (ImportError, AttributeError) as error:

@@ -106,7 +106,6 @@ EXACT: Final = Line(0, 0, 0.0, 0.0, 0.0, 0.0)
 
 
 def fitted(pairs: list[Pair], oscillator: Oscillator) -> Line:
-    """The line through at least one pair; each pair is weighted by the inverse square of its error."""
     at_ns, base_ns = pairs[-1].local_ns, pairs[-1].offset_ns
     count, floor_ns = len(pairs), max(1.0, oscillator.stamp_ns / 2)
     weights = [1 / (pair.error_ns + floor_ns) ** 2 for pair in pairs]
@@ -195,7 +194,6 @@ class ClockFit:
         return apart_ns <= margin_ns + 2 * self._oscillator.stamp_ns
 
     def replace(self, line: Line) -> None:
-        """Replace the line by this one, and forget all pairs."""
         self._pairs.clear()
         self._against.clear()
         self.line = line

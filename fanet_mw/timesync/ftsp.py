@@ -84,9 +84,7 @@ class Settings(NamedTuple):
 
     @property
     def hop_ns(self) -> int:
-        """The error that each hop adds to that of a pair: half the flight time is assumed, and two
-        stamps are rounded.
-        """
+        """The error that each hop adds: half the flight time is assumed, and two stamps are rounded."""
         return self.flight_ns // 2 + self.oscillator.stamp_ns
 
 
@@ -154,7 +152,6 @@ class TimeSync:
 
     @property
     def line(self) -> Line:
-        """The line from the own clock to swarm time; the own clock itself until there is one."""
         return self._fit.line or EXACT
 
     def error_ns(self, local_ns: int) -> int | None:
@@ -200,7 +197,6 @@ class TimeSync:
             self._claim_ns = local_ns + int(_LISTEN_HELLOS * self._own.hello_ns)
 
     def hello_sent(self, hello: int, *, ended_ns: int) -> None:
-        """A hello of this node has left the antenna."""
         self._sent = (hello, ended_ns)
 
     def beacon(self, local_ns: int) -> TimeBeacon | None:
@@ -274,9 +270,7 @@ class TimeSync:
         self._watch_step(self._neighbor(src, local_ns), None, local_ns)
 
     def _watch_step(self, neighbor: _LastBeacon, beacon: TimeBeacon | None, local_ns: int) -> None:
-        """A neighbor without the swarm's time relays nothing in its turns, and disturbs those of others: it counts as a
-        clock with a greater error than any that hellos state, of which the whole swarm learns.
-        """
+        """A neighbor without the swarm's time disturbs turns: a clock with a greater error than hellos state."""
         if self.reference is None or (beacon is not None and beacon.reference == self.reference and neighbor.trusted):
             neighbor.in_step_ns = local_ns
         elif local_ns - neighbor.in_step_ns > _APART_HELLOS * self._own.hello_ns:
@@ -347,8 +341,8 @@ class TimeSync:
             self._consider(beacon.reference, pair, local_ns)
 
     def contradicted(self, src: int, local_ns: int) -> None:
-        """A neighbor has stated another time. If several have that agreed before, and nobody agrees now, this clock has
-        jumped. Nodes that never agreed do not count: a station may repeat what is sent far away.
+        """If several that agreed state another time, and nobody agrees, this clock has jumped; not nodes that never
+        agreed: a station may repeat what is sent far away.
         """
         if src in self._agreed:
             self._contradicting.add(src)
@@ -363,7 +357,6 @@ class TimeSync:
         return len(self._contradicting) >= needed and alone_ns > hellos * self._own.hello_ns
 
     def _lose(self, local_ns: int) -> None:
-        """Give up the time, and all that was noted by the clock before it jumped."""
         self.counts["lost"] += 1
         if self.is_reference:
             self._led_at = self.line.rate
@@ -414,9 +407,7 @@ class TimeSync:
             self._worst = (value_ns, stated_at_ns)
 
     def _consider(self, reference: int, pair: Pair, local_ns: int) -> None:
-        """Collect pairs of another reference, because its id is lower or the own reference is silent; after `_PROVEN`
-        follow it.
-        """
+        """Collect pairs of a reference with a lower id, or while the own one is silent; after `_PROVEN` follow it."""
         rival = self._rival
         if rival is None or reference < rival[0] or self._is_stale(rival[2], local_ns):
             rival = self._rival = (reference, ClockFit(self._own.oscillator), local_ns)

@@ -11,11 +11,8 @@ _FLIGHT_NS: Final = 20 * US
 
 
 def clocks_fit(clock: Clock, *, slack_ns: int, clock_error_ns: int) -> bool:
-    """True if turns of different nodes do not overlap while each clock is within this error of swarm time.
-
-    If the scenario models clocks, an error of 0 means that the node does not know any error yet, so the answer is
-    False. If nodes get the time by beacons, it is also False for the largest error that a beacon can state, because the
-    true one may be larger.
+    """True if turns do not overlap while each clock is within this error; False for an error of 0 of modelled clocks
+    (none known yet), and for the largest that a beacon can state, which may be larger.
     """
     if not clock_error_ns:
         return not clock.modelled
@@ -30,5 +27,4 @@ def has_time(clock: Clock, *, clock_error_ns: int) -> bool:
 
 
 def least_slack_ns(clock_error_ns: int) -> int:
-    """The slack that keeps turns of different nodes apart if each clock is within this error of swarm time."""
     return 2 * clock_error_ns + _FLIGHT_NS

@@ -1,7 +1,8 @@
 """The air format: one radio frame is a run of MAVLink 2 frames, the first of which is this package's routing header.
 
 The header (`frame.py`) and several packets in one frame (`aggregation.py`) are re-exported here. Each inner message has
-a module of its own:
+a module of its own, and is coded by struct. Any bytes decode to a value or to MalformedFrameError; values that no node
+of this project would send are malformed:
 
     `hello/`                            the parts of a hello: beacon, digest, neighbors, time beacon
     `join.py`, `links.py`               a node asks for a place in a cluster, and reports the quality of its links

@@ -16,10 +16,8 @@ _NOTHING: Final[Mapping[bytes, bytes]] = MappingProxyType({})
 
 
 def aggregated(packets: Iterable[tuple[int, bytes]], *, most_bytes: int) -> Iterator[tuple[int, bytes, int]]:
-    """As few radio frames as possible for packets in their order, each at most `most_bytes` long.
-
-    With each packet, and with each frame, comes the instant at which it starts; a frame starts at the earliest instant
-    of the packets in it. With a frame comes the number of the packets in it, too.
+    """As few frames as possible for packets in order, each of at most `most_bytes`, with the earliest instant of its
+    packets, and their number.
     """
     chunk: list[bytes] = []
     first_ns = size = 0
@@ -40,10 +38,8 @@ def bundle(packets: Sequence[bytes]) -> bytes:
 
 
 def unbundle(frame: bytes, known: Mapping[bytes, bytes] = _NOTHING) -> list[bytes]:
-    """The packets in a radio frame, each as if it had come alone except for its flag; raises MalformedFrameError.
-
-    `known`: the inner frames of packets that were cut out before, by what no hop changes in their headers; these are
-    passed over at once.
+    """The packets in a radio frame, as if each came alone but for its flag; raises MalformedFrameError. `known`: inner
+    frames of packets cut out before, by what no hop changes in headers.
     """
     starts, at, size = list[int](), 0, len(frame)
     while at < size:

@@ -1,8 +1,4 @@
-"""FANET_BIDS: the bids of UAVs for survivors, as UAVs pass them on in hellos.
-
-Like all messages of this dialect (`fanet_mw.wire`) it is coded by struct. Any bytes decode to a message or to
-MalformedFrameError; values that no node of this project would send are malformed.
-"""
+"""FANET_BIDS: the bids of UAVs for survivors, as UAVs pass them on in hellos."""
 
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
@@ -30,7 +26,6 @@ class Bid(NamedTuple):
 
 
 def encode_bids(bids: Sequence[Bid], *, node: int) -> bytes:
-    """One FANET_BIDS message."""
     if len(bids) > MOST_BIDS:
         raise LocalProtocolError(f"{len(bids)} bids must be <= {MOST_BIDS} for one message")
     unused = (0,) * (MOST_BIDS - len(bids))
@@ -41,7 +36,6 @@ def encode_bids(bids: Sequence[Bid], *, node: int) -> bytes:
 
 
 def checked_bids(fields: tuple[Any, ...]) -> "Bids":
-    """The bids of the fields of one message; raises MalformedFrameError."""
     count, version = fields[-2:]
     refuse_unless(version == VERSION and count <= MOST_BIDS, f"{count} bids")
     columns = [fields[at : at + count] for at in (0, 12, 24, 36, 49)]

@@ -11,7 +11,6 @@ def refuse_unless(holds: bool, what: str) -> None:
 
 
 def require_sender(version: int, node: int, *, t_us: int = 0) -> None:
-    """Refuse a message of another version, of a node that cannot exist, or of an instant that is too late."""
     if version != VERSION or not 0 < node < ANY_NODE or t_us > LATEST_US:
         raise MalformedFrameError(f"version {version}, node {node}, instant {t_us} us")
 

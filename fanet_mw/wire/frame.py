@@ -164,7 +164,6 @@ class Header(NamedTuple):
     flags: int
 
     def encode(self) -> bytes:
-        """The header's bytes; MAVLink's sender is the transmitter, its sequence the low byte of the packet's number."""
         sender = system_id(self.prev_hop)
         body = _PACKED.pack(_ROUTE_BEFORE, self.seq & 0xFF, sender, _ROUTE_SENDER, *self, VERSION)
         return body + _CRC.pack(mcrf4xx(body[1:] + _EXTRA))
@@ -182,10 +181,7 @@ is."""
 
 
 def fields_of(frame: bytes) -> Fields:
-    """The values at the offsets of a header; NO_FIELDS if these bytes cannot begin with a routing header.
-
-    Origin, sequence number and flags suffice to recognize a duplicate; any further use needs `checked`.
-    """
+    """The values at a header's offsets; NO_FIELDS if there can be none. Enough for duplicates; else see `checked`."""
     if len(frame) < HEADER_BYTES:
         return NO_FIELDS
     fields: Fields = _CHECKED.unpack_from(frame)
@@ -225,10 +221,8 @@ def checked(frame: bytes, fields: Fields) -> Header:
 
 
 def rewrite(frame: bytes, prev_hop: int, flags: int, hop: int = 1) -> bytes:
-    """The frame as the node `prev_hop` transmits it: a new header, the inner frames byte for byte.
-
-    One hop less is left, and one more is made; with `hop=0`, at the packet's origin, both stay. The frame must have
-    been decoded, and its hop limit be at least `hop`.
+    """The frame as `prev_hop` transmits it: a new header, the same inner frames. A hop less is left and one more made,
+    not with `hop=0` at the origin. The frame must have been decoded.
     """
     sender = (prev_hop - 1) % 250 + 1  # system_id, without the call
     hops = frame[_HOPS_AT] + hop
@@ -271,10 +265,8 @@ def frames(data: bytes, *, start: int = 0) -> Iterator[bytes]:
 
 
 def renumbered(frame: bytes, seq: int) -> bytes:
-    """A MAVLink 2 frame with another sequence number; its CRC stays right, or wrong, as it was.
-
-    The effect of the number on the CRC is the CRC of the change alone, started at 0, so the CRC_EXTRA of the message
-    need not be known. A signed frame keeps its number, which its signature covers.
+    """A MAVLink 2 frame with another sequence number; its CRC stays right, or wrong: the change alone, as a CRC from 0,
+    tells the effect. A signed frame keeps its number, which its signature covers.
     """
     change = frame[4] ^ seq
     if not change or frame[2]:
@@ -307,9 +299,7 @@ def inner_frames(packed: Packed) -> Iterable[tuple[int, bytes]]:
 
 
 def _found_in(frame: bytes) -> Iterator[tuple[int, bytes]]:
-    """The inner frames of a packet. The CRC is checked only of messages of this dialect; for others it would need the
-    message's definition.
-    """
+    """The inner frames of a packet; the CRC is checked of this dialect's only, others need their definition."""
     for inner in frames(frame, start=HEADER_BYTES):
         msgid = message_id(inner)
         spec = _OURS.get(msgid)
@@ -392,10 +382,8 @@ _MOST: Final = 255 * _WHOLE_CHUNK
 
 @lru_cache(maxsize=256)
 def filler(size: int, *, node: int = 1) -> bytes:
-    """Inner FANET_CHUNK frames of exactly `size` bytes: application data whose content does not matter.
-
-    `size` is 0 or at least 17, which is one frame with one byte of data. The bytes are fixed, pseudo-random and never
-    zero, so that nothing is truncated and nothing depends on a run. `node` is their MAVLink sender.
+    """Inner FANET_CHUNK frames of exactly `size` bytes, 0 or at least 17, whose content does not matter: fixed, pseudo-
+    random, never zero, so that nothing is truncated.
     """
     if size == 0:
         return b""

@@ -1,8 +1,4 @@
-"""FANET_JOIN: a node asks the leader for a place in a cluster; a join may also report that another node is silent.
-
-Like all messages of this dialect (`fanet_mw.wire`) it is coded by struct. Any bytes decode to a message or to
-MalformedFrameError; values that no node of this project would send are malformed.
-"""
+"""FANET_JOIN: a node asks the leader for a place in a cluster; a join may also report that another node is silent."""
 
 from typing import NamedTuple, Self
 

@@ -23,10 +23,7 @@ MOST_LOAD: Final = 20_000
 
 
 def interval_ns_of(load: int, *, expected_ns: int) -> int:
-    """The mean interval between the packets of a node with this load; `expected_ns` is that of the scenario.
-
-    A load of 0, which only a forged announcement has, counts as the least load.
-    """
+    """The mean interval between packets of such a node; a load of 0, which is forged, counts as the least."""
     return expected_ns if load == AS_EXPECTED else PER_NS // max(LEAST_LOAD, load)
 
 

@@ -29,7 +29,6 @@ class Places(NamedTuple):
     leader: Enu
 
     def encode_frames(self, node: int) -> bytes:
-        """One message per `CAPACITY` members."""
         starts = range(0, len(self.members), CAPACITY)
         return b"".join(
             encode_inner(PLACES, self._payload(at, self.members[at : at + CAPACITY]), node=node) for at in starts

@@ -1,8 +1,4 @@
-"""FANET_ROLL: when each UAV of the plan was last heard by anybody, as far as the sender knows, and who is lost.
-
-Like all messages of this dialect (`fanet_mw.wire`) it is coded by struct. Any bytes decode to a message or to
-MalformedFrameError; values that no node of this project would send are malformed.
-"""
+"""FANET_ROLL: when each UAV of the plan was last heard by anybody, as far as the sender knows, and who is lost."""
 
 from typing import Any, Final, NamedTuple, Self
 
@@ -49,7 +45,6 @@ class Roll(NamedTuple):
 
     @classmethod
     def checked(cls, fields: tuple[Any, ...]) -> Self:
-        """The roll of these fields, with all places that a plan may have; raises MalformedFrameError."""
         at, planner, revision, *entries, version = fields
         refuse_unless(version == VERSION and 0 < planner < ANY_NODE and revision > 0, f"roll of {planner}, {revision}")
         lost = frozenset(place for place, entry in enumerate(entries) if entry & _LOST)

@@ -1,8 +1,4 @@
-"""FANET_HEARD and FANET_HELD: what a node tells its neighbors in its turn of a round, beside the packets in it.
-
-Like all messages of this dialect (`fanet_mw.wire`) they are coded by struct. Any bytes decode to values or to
-MalformedFrameError; values that no node of this project would send are malformed.
-"""
+"""FANET_HEARD and FANET_HELD: what a node tells its neighbors in its turn of a round, beside the packets in it."""
 
 import struct
 from collections.abc import Sequence
@@ -82,7 +78,6 @@ def decode_heard(packed: Packed) -> list[HeardNodes]:
 
 
 def encode_held(packets: Sequence[HeldPacket], node: int) -> bytes:
-    """One message per `CAPACITY` packets."""
     messages = []
     for at in range(0, len(packets), CAPACITY):
         part = packets[at : at + CAPACITY]

@@ -1,8 +1,4 @@
-"""FANET_SCHEDULE: the leader's division of the swarm into clusters, with their heads and slots.
-
-Like all messages of this dialect (`fanet_mw.wire`) it is coded by struct. Any bytes decode to a message or to
-MalformedFrameError; values that no node of this project would send are malformed.
-"""
+"""FANET_SCHEDULE: the leader's division of the swarm into clusters, with their heads and slots."""
 
 from typing import Final, NamedTuple, Self
 

@@ -1,8 +1,4 @@
-"""The messages by which UAVs agree on the plan of a search: their statuses, and the plan.
-
-Like all messages of this dialect (`fanet_mw.wire`) they are coded by struct. Any bytes decode to a message or to
-MalformedFrameError; values that no node of this project would send are malformed.
-"""
+"""The messages by which UAVs agree on the plan of a search: their statuses, and the plan."""
 
 from typing import Any, Final, NamedTuple, Self
 
@@ -56,7 +52,6 @@ class Search(NamedTuple):
 
     @classmethod
     def checked(cls, fields: tuple[Any, ...]) -> Self:
-        """The plan of these fields; raises MalformedFrameError."""
         lanes, relays, followers, shape, teams, version = fields[-6:]
         places = teams * lanes + relays + followers
         in_lines = shape == _LINES and teams >= 2 and teams % 2 == 0 and lanes >= 2
@@ -128,7 +123,6 @@ class SearchStatus(NamedTuple):
 
     @classmethod
     def checked(cls, fields: tuple[Any, ...]) -> Self:
-        """The status of these fields; raises MalformedFrameError."""
         t_us, east, north, up, node, revision, charge, absent, version = fields
         position = Enu(east, north, up)
         refuse_unless(

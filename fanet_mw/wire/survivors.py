@@ -1,8 +1,4 @@
-"""The messages about survivors: a report that a phone was received, and an estimate or a verdict about a place.
-
-Like all messages of this dialect (`fanet_mw.wire`) they are coded by struct. Any bytes decode to a message or to
-MalformedFrameError; values that no node of this project would send are malformed.
-"""
+"""The messages about survivors: a report that a phone was received, and an estimate or a verdict about a place."""
 
 import math
 from enum import IntEnum
@@ -57,7 +53,6 @@ class Survivor(NamedTuple):
 
     @classmethod
     def checked(cls, fields: tuple[Any, ...]) -> Self:
-        """The report of these fields; raises MalformedFrameError."""
         t_us, survivor, east, north, up, rssi_dbm, reporter, version = fields
         require_sender(version, reporter, t_us=t_us)
         if not abs(rssi_dbm) <= MOST_DBM or not 0 < survivor <= MOST_SURVIVORS:  # also true for NaN
@@ -106,7 +101,6 @@ class Found(NamedTuple):
 
     @classmethod
     def checked(cls, fields: tuple[Any, ...]) -> Self:
-        """The estimate of these fields; raises MalformedFrameError."""
         *values, standing, version = fields
         refuse_unless(version == VERSION and standing <= Standing.INSIDE, f"a find of standing {standing}")
         found = cls._make((*values, Standing(standing)))

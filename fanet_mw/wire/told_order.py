@@ -1,8 +1,4 @@
-"""FANET_ORDER: an order of the post on the ground.
-
-Like all messages of this dialect (`fanet_mw.wire`) it is coded by struct. Any bytes decode to a message or to
-MalformedFrameError; values that no node of this project would send are malformed.
-"""
+"""FANET_ORDER: an order of the post on the ground."""
 
 from typing import Any, NamedTuple, Self
 
@@ -35,7 +31,6 @@ class ToldOrder(NamedTuple):
 
     @classmethod
     def checked(cls, fields: tuple[Any, ...]) -> Self:
-        """The order of these fields; raises MalformedFrameError."""
         t_us, east_m, north_m, radius_m, serial, post, node, kind, version = fields
         require_sender(version, post, t_us=t_us)
         refuse_unless(kind in OrderKind.__members__.values() and serial > 0, f"order {kind}, number {serial}")

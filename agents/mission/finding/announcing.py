@@ -81,21 +81,18 @@ class Announcing:
         self._post_ns = now_ns
 
     def confirm(self, survivor: int, now_ns: int) -> None:
-        """The owner of this phone was seen and is certain: flood the confirmation."""
         place = self._survivors.by_id[survivor].filter.estimate()
         assert place is not None, "who was seen has a place"
         found = Found(now_ns // US, survivor, *place, self._node, Standing.CONFIRMED)
         self._decide(found, Confirmed, now_ns)
 
     def refute(self, survivor: int, now_ns: int) -> None:
-        """A confirmed survivor cannot be at the confirmed place: flood the refutation."""
         mistaken = self._survivors.by_id[survivor].confirmed
         assert mistaken is not None, "only a confirmation is refuted"
         refuted = mistaken._replace(t_us=now_ns // US, node=self._node, standing=Standing.REFUTED)
         self._decide(refuted, Refuted, now_ns)
 
     def place_inside(self, survivor: int, place: Estimate, now_ns: int) -> None:
-        """A survivor is inside a building: flood that, and where."""
         self._decide(Found(now_ns // US, survivor, *place, self._node, Standing.INSIDE), PlacedInside, now_ns)
 
     def report_person(self, place: Estimate, now_ns: int) -> None:
@@ -105,9 +102,7 @@ class Announcing:
         self._decide(Found(now_ns // US, person, *place, self._node, Standing.CONFIRMED), Confirmed, now_ns)
 
     def give_up_doubles(self, now_ns: int, *, steady_m2: float) -> None:
-        """Give up the people found by this UAV who were also found by a UAV with a lower id. One find takes the place
-        of one person for good.
-        """
+        """Give up people who were also found by a UAV with a lower id; one find replaces one person for good."""
         people = self._survivors.person_places()
         own = {person: place for person, place in people.items() if self._survivors.persons[person].node == self._node}
         others = {
@@ -133,7 +128,6 @@ class Announcing:
             self.report_person(place, now_ns)
 
     def _decide(self, verdict: Found, record: type[Confirmed | Refuted | PlacedInside], now_ns: int) -> None:
-        """Record a verdict of this UAV, and flood it from now on."""
         survivor, east_m, north_m = verdict.survivor, round(verdict.east_m, 2), round(verdict.north_m, 2)
         self._survivors.on_found(verdict, now_ns=now_ns)
         self._outbox.records.append(record(now_ns, self._node, survivor, east_m, north_m))
@@ -141,7 +135,6 @@ class Announcing:
         self.decided(survivor, now_ns)
 
     def decided(self, survivor: int, now_ns: int) -> None:
-        """A survivor was confirmed or refuted, by this UAV or by another."""
         self._heard_ns[survivor] = now_ns
         self._told_sigma_m.pop(survivor, None)
 
@@ -182,9 +175,7 @@ class Announcing:
             self._flood(verdict)
 
     def hello_frames(self, now_ns: int) -> bytes:
-        """The inner frames with recent verdicts for the next hello; while the post on the ground is in reach, with
-        the others in turn.
-        """
+        """Recent verdicts for the next hello; while the post on the ground is in reach, the others too, in turn."""
         recent = [(t_ns, survivor) for survivor, t_ns in self._heard_ns.items() if now_ns - t_ns < _PASSED_ON_NS]
         chosen = [survivor for _, survivor in sorted(recent, reverse=True)[:_PASSED_ON]]
         if self._post_ns is not None and now_ns - self._post_ns < _POST_NS:

@@ -83,10 +83,7 @@ def likelihood(place: Estimate, readings: Iterable[tuple[Enu, float]], model: Ph
 
 @lru_cache(maxsize=1024)
 def _improbabilities(expected_dbm: float, rssi_dbm: float, threshold_dbm: float, sigma_db: float) -> tuple[float, ...]:
-    """For each offset of one phone, the negative logarithm of the likelihood of a received power.
-
-    A phone's powers are used again whenever further ones have come, by all UAVs of one process.
-    """
+    """Negative log-likelihood of a received power for each offset of one phone; kept, as all UAVs ask again."""
     spread_db = sigma_db * math.sqrt(2)
     found = []
     for offset_db in _SINGLE:
@@ -98,10 +95,7 @@ def _improbabilities(expected_dbm: float, rssi_dbm: float, threshold_dbm: float,
 
 
 def common_offset(phones: Iterable[Sequence[float]]) -> PhoneOffset:
-    """The common offset, estimated from the likelihoods of several phones.
-
-    It is `AS_ASSUMED` until the model with a large offset is more than `_EVIDENCE_RATIO` times as likely as the other.
-    """
+    """The common offset by several phones; `AS_ASSUMED` unless a large one is `_EVIDENCE_RATIO` times as likely."""
     as_assumed, otherwise = _prior(_AS_ASSUMED_DB), _prior(_OTHERWISE_DB)
     for phone in phones:
         as_assumed = [weight * value for weight, value in zip(as_assumed, phone, strict=True)]

@@ -46,9 +46,7 @@ def is_seen_enough(person: PersonTrack) -> bool:
 
 
 def is_confirmable(person: PersonTrack, phone: KnownSurvivor) -> bool:
-    """True if there are enough sightings of a person and enough received powers of the phone assigned to that person;
-    how likely the assignment is, `required_margin` judges.
-    """
+    """True if sightings and received powers suffice; how likely the assignment is, `required_margin` judges."""
     enough = _SAMPLES if len(phone.reporters) >= _REPORTERS else _SAMPLES_ALONE
     return (
         is_seen_enough(person)
@@ -59,8 +57,6 @@ def is_confirmable(person: PersonTrack, phone: KnownSurvivor) -> bool:
 
 
 def required_margin(person: PersonTrack, now_ns: int) -> float:
-    """By how much more the next best assignment of a person must cost; this decreases with the time since the first
-    sighting.
-    """
+    """By how much more the next best assignment must cost; decreases with the time since the first sighting."""
     share = (now_ns - person.first_ns - _PATIENT_NS) / (_IMPATIENT_NS - _PATIENT_NS)
     return GREATEST_MARGIN - (GREATEST_MARGIN - _LEAST_MARGIN) * min(1.0, max(0.0, share))

@@ -78,9 +78,7 @@ class Identities:
     def on_reading(
         self, sightings: Sequence[Sighting], *, here: Enu, evidence: float, now_ns: int
     ) -> list[PersonTrack]:
-        """One reading of a sensor has shown people, from a position of this UAV; `evidence` is that of one sighting.
-        Returns the person of each sighting, known or new.
-        """
+        """A reading shows people; `evidence`: of one sighting. Returns the person of each, known or new."""
         people = self._people
         costs = [
             [person.distance2(sighting.at, sighting.sigma_m**2 + self._steady_m2) for person in people]
@@ -162,9 +160,7 @@ class Identities:
         return not named and (not person.confirmed or person.together >= _TOGETHER)
 
     def _recognize_finds(self) -> None:
-        """Assign the finds to the people seen, each to one person; a survivor's comes before that of a person without a
-        phone.
-        """
+        """Assign finds to people seen, one each; a survivor's comes before that of a person without a phone."""
         for person in self._people:
             person.find = None
         for finds in (self._survivors.confirmed_places(), self._survivors.person_places()):
@@ -176,11 +172,7 @@ class Identities:
                 person.find = None if column is None else list(finds)[column]
 
     def against(self, confirmed: Found) -> float:
-        """How much less likely a confirmed pair is than the best assignment without it.
-
-        The result is 0 or less if the pair belongs to the best assignment. All people near the place of this
-        confirmation are considered, those who were seen and those who are confirmed.
-        """
+        """How much less likely a confirmed pair is than the best assignment nearby without it; <= 0 if part of it."""
         at = estimate_of(confirmed).at
         named = {
             survivor: place
@@ -222,11 +214,7 @@ class Identities:
         column: int,
         person: PersonTrack,
     ) -> float:
-        """The least total cost if neither this person nor anybody beside carries this phone: whoever finds one of them
-        finds the others.
-
-        Carrying none is made more expensive by `GREATEST_MARGIN`.
-        """
+        """The least total cost if neither this person nor anybody beside, who is found together, carries this phone."""
         others = [list(one) for one in costs]
         bound = list(nobody)
         for row, other in enumerate(people):
@@ -250,7 +238,6 @@ class Identities:
         ]
 
     def _cost(self, place: Estimate, survivor: int) -> float:
-        """The cost of one pair by received powers, and by earlier refutations."""
         known, at = self._survivors.by_id[survivor], place.at
         doubt = _REFUTED_COST if known.was_mistaken_at(at, since_ns=self._now_ns - _DOUBTED_NS) else 0.0
         return min(_IMPOSSIBLE, known.filter.deficit(at.east, at.north) + doubt)

@@ -26,9 +26,7 @@ _STEPS: Final = 4
 def place_in_building(
     known: KnownSurvivor, onboard_map: OnboardMap, looked_at: Callable[[float, float], bool]
 ) -> Estimate | None:
-    """The place of a survivor within the most probable building, with its covariance; None if it is not certain enough
-    that the survivor is in one.
-    """
+    """A survivor's place in the most probable building; None if not certain enough to be in one."""
     if not onboard_map.buildings or not known.is_heard_within(_HEARD_M):
         return None
     inside: dict[Building, list[tuple[float, float, float]]] = {}
@@ -54,7 +52,6 @@ def place_in_building(
 
 
 def _moments(points: list[tuple[float, float, float]], total: float) -> Estimate:
-    """The mean and the covariance of weighted points."""
     east = math.fsum(weight * e for weight, e, _ in points) / total
     north = math.fsum(weight * n for weight, _, n in points) / total
     grain_m2 = (CELL_M / _STEPS) ** 2 / 12

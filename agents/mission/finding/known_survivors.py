@@ -76,9 +76,7 @@ class KnownSurvivor:
         return heard is not None and heard.sigma_m <= sigma_m
 
     def place(self) -> Estimate | None:
-        """The confirmed place; before the confirmation, the more exact one of the filter's estimate and the announced
-        one. None if there is neither.
-        """
+        """The confirmed place, otherwise the more exact of the filter's and the announced one; None without any."""
         if self.confirmed is not None:
             return estimate_of(self.confirmed)
         own = self.filter.estimate()
@@ -126,9 +124,7 @@ class KnownSurvivors:
         return known
 
     def on_found(self, found: Found, *, now_ns: int) -> bool:
-        """Take in an announced estimate, confirmation or refutation; True if it confirms a survivor who was not
-        confirmed, or takes the present confirmation back.
-        """
+        """Take in an announcement; True if it confirms an unconfirmed survivor, or takes a confirmation back."""
         if is_person(found.survivor):
             return self._on_person(found)
         known = self.by_id.get(found.survivor)
@@ -194,7 +190,6 @@ class KnownSurvivors:
         }
 
     def person_places(self) -> dict[int, Estimate]:
-        """The places of the people who were found without a phone."""
         return {
             person: estimate_of(found)
             for person, found in sorted(self.persons.items())
@@ -234,9 +229,7 @@ class KnownSurvivors:
         return known
 
     def _calibrate(self) -> None:
-        """Estimate the common offset from the phones of the confirmed survivors, and calibrate the filters of all
-        other phones by it.
-        """
+        """Estimate the common offset from confirmed survivors' phones, and calibrate all other filters by it."""
         before, self._likelihoods = self._likelihoods, {}
         for survivor, known in sorted(self.by_id.items()):
             if known.confirmed is None:
@@ -266,13 +259,10 @@ def _refute(known: KnownSurvivor, refuted: Found) -> bool:
 
 
 def _refutes(refuted: Found, found: Found) -> bool:
-    """True if `refuted`, a refutation, is not older than `found` and concerns the same place. It then takes `found`
-    back if that is a confirmation; if `found` is a refutation itself, it adds nothing to `refuted`.
-    """
+    """True if `refuted` is not older than `found` and of the same place; it then takes `found` back."""
     at = estimate_of(found).at
     return found.t_us <= refuted.t_us and estimate_of(refuted).distance_m(at) <= SAME_PLACE_M
 
 
 def estimate_of(found: Found) -> Estimate:
-    """The place of a survivor, with its covariance, that a message contains."""
     return Estimate(found.east_m, found.north_m, found.east_variance_m2, found.covariance_m2, found.north_variance_m2)

@@ -70,7 +70,6 @@ class PersonTrack:
         return self.place.distance_m(at) ** 2 / (variance_m2 + self.place.east_variance_m2)
 
     def on_neighborhood(self, *, confirmed: int, now_ns: int) -> None:
-        """Note how many survivors are confirmed at this place now."""
         if confirmed and not self.confirmed:
             self.first_ns = now_ns
         self.confirmed = confirmed
@@ -79,7 +78,6 @@ class PersonTrack:
 
     @property
     def is_proven(self) -> bool:
-        """True if this is certainly somebody, not a false alarm."""
         return self.evidence >= _PROVEN and self.sightings >= _SIGHTINGS
 
     def is_remembered(self, now_ns: int) -> bool:

@@ -81,11 +81,9 @@ class Estimate(NamedTuple):
 
     @property
     def at(self) -> Enu:
-        """The estimated position itself, at height 0."""
         return Enu(self.east_m, self.north_m, 0.0)
 
     def distance_m(self, place: Enu) -> float:
-        """The horizontal distance of a place from the estimated position."""
         return math.hypot(self.east_m - place.east, self.north_m - place.north)
 
 
@@ -122,7 +120,6 @@ class PhoneFilter:
     """The posterior of one phone's place, given samples: powers received at places, and places without reception."""
 
     def __init__(self, model: PhoneModel, offset: PhoneOffset = AS_ASSUMED) -> None:
-        """`offset`: the offset common to all phones."""
         self._assumed, self._model = model, _calibrated(model, offset)
         self._middle: Enu | None = None
         """The middle of the grid; before the first estimate, the place at which the phone was first received."""
@@ -157,9 +154,7 @@ class PhoneFilter:
     # --- measurements ---------------------------------------------------------------------------------------------
 
     def on_rssi(self, reporter: int, position: Enu, rssi_dbm: float) -> bool:
-        """Take in a power received at a place; False if it is ignored, because the same node has received the phone
-        near that place before.
-        """
+        """Take in a power received at a place; False if ignored: the same node has received near there before."""
         taken = self._taken.setdefault(reporter, [])
         if _is_sampled(position, taken):
             return False
@@ -170,9 +165,7 @@ class PhoneFilter:
         return True
 
     def on_silence(self, position: Enu) -> None:
-        """Take in that this UAV's receiver did not detect the phone at a place; it is ignored if that place is far from
-        the grid's middle, or near an earlier place without reception.
-        """
+        """The phone was not detected here; ignored far from the grid's middle, or near another such place."""
         if self._middle is None or not self.near(position, within_m=_SILENCE_M):
             return
         if _is_sampled(position, self._silent_at):
@@ -201,20 +194,16 @@ class PhoneFilter:
 
     @property
     def included_powers(self) -> int:
-        """The number of received powers that the cells include."""
         return self._count
 
     @property
     def readings(self) -> list[tuple[Enu, float]]:
-        """All received powers with their places, in the order of their arrival."""
         return [(at, rssi_dbm) for at, rssi_dbm in (*self._samples, *self._pending) if rssi_dbm is not None]
 
     # --- the estimate ---------------------------------------------------------------------------------------------
 
     def estimate(self) -> Estimate | None:
-        """The position of the owner if one has been recognized, otherwise the estimate by power; None before the phone
-        was received.
-        """
+        """The owner's position if recognized, otherwise the estimate by power; None before the phone was received."""
         return self._seen or self.estimate_by_power()
 
     def estimate_by_power(self) -> Estimate | None:
@@ -223,9 +212,7 @@ class PhoneFilter:
         return self._estimate
 
     def _catch_up(self) -> None:
-        """Add the pending samples to the cells; make a new grid if there is none, if the model has changed, or if the
-        strongest power was received far from the middle.
-        """
+        """Add the pending samples, in a new grid if the model or the place of the strongest power has changed."""
         if not self._pending and (self._sums or not self._samples):
             return
         assert self._middle is not None, "a place without reception is a sample only after the first reception"
@@ -246,9 +233,7 @@ class PhoneFilter:
         self._estimate = self._moments()
 
     def deficit(self, east_m: float, north_m: float) -> float:
-        """How much less probable a place is than the most probable cell within the area: twice the difference of the
-        logarithms. It is 0 before the phone was received, and infinite outside the grid.
-        """
+        """Twice the log of the best cell's probability over this place's; 0 before reception, inf off the grid."""
         self._catch_up()
         if self._middle is None or not self._totals:
             return 0.0
@@ -259,9 +244,7 @@ class PhoneFilter:
         return self._best - self._totals[j * _WIDTH + i]
 
     def likely_cells(self, most_deficit: float) -> Iterator[tuple[float, float, float]]:
-        """East and north of each cell whose `deficit` is at most this, and the deficit; none before the phone was
-        received.
-        """
+        """East, north and `deficit` of each cell whose deficit is at most this; none before reception."""
         self._catch_up()
         if self._middle is None:
             return
@@ -272,15 +255,11 @@ class PhoneFilter:
                 yield west + cell % _WIDTH * CELL_M, south + cell // _WIDTH * CELL_M, self._best - total
 
     def near(self, place: Enu, *, within_m: float) -> bool:
-        """True if the middle of the grid is within a distance of a place, or if the phone was not received yet.
-
-        The answer needs no computation of cells, so callers ask this first, and for the estimate only if it is True.
-        """
+        """True if the grid's middle is that near, or without reception; needs no cells, so callers ask it first."""
         middle = self._middle
         return middle is None or _ground_m(middle, place) <= within_m
 
     def _update(self, position: Enu, rssi_dbm: float) -> None:
-        """Add a received power to the sums of all cells."""
         assert self._middle is not None, "the grid has a middle before samples are added"
         middle, model = self._middle, self._model
         compared = sorted((_ground_m(at, position), at, dbm) for at, dbm in self._received)[:_COMPARED]
@@ -308,7 +287,6 @@ class PhoneFilter:
         self._scores = list(map(add, self._scores, map(table.__getitem__, steps)))
 
     def _moments(self) -> Estimate:
-        """Compute the posterior of all cells; returns its mean and covariance within the area."""
         assert self._middle is not None, "the grid has a middle before its cells are used"
         model = self._model
         shrink = 1 / (self._gains + 1 / max(model.offset_db, 0.1) ** 2)
@@ -342,9 +320,7 @@ class PhoneFilter:
 
 @lru_cache(maxsize=64)
 def _inside(middle: Enu, half_m: float) -> Sequence[bool]:
-    """For each cell of the grid around `middle`, True if it lies no farther than `half_m` to the east, west, north and
-    south of the origin; all cells are taken if none does.
-    """
+    """For each cell, True if within `half_m` of the origin along both axes; all cells if none is."""
     if max(abs(middle.east), abs(middle.north)) + _HALF_CELLS * CELL_M <= half_m:
         return _EVERY_CELL
     east = [abs(middle.east + (i - _HALF_CELLS) * CELL_M) <= half_m for i in range(_WIDTH)]
@@ -354,9 +330,7 @@ def _inside(middle: Enu, half_m: float) -> Sequence[bool]:
 
 
 def _expectation(position: Enu, beside: Sequence[Enu], shadowing_db: float) -> tuple[list[float], float]:
-    """The weights with which the residuals at places `beside` another one let expect the residual there, and the
-    standard deviation of what is left.
-    """
+    """Weights of the residuals at places `beside` in the expected one, and the deviation that is left."""
     variance = max(shadowing_db, 1.0) ** 2
     own = variance + _READING_DB * _READING_DB
 
@@ -403,7 +377,6 @@ def _squared_distances_m2(middle: Enu, position: Enu, up2: float) -> list[float]
 
 
 def _calibrated(model: PhoneModel, offset: PhoneOffset) -> PhoneModel:
-    """The model of a phone when the offset common to all phones has this distribution."""
     return model._replace(
         power_dbm=model.power_dbm + offset.mean_db, offset_db=math.hypot(model.offset_db, offset.sigma_db)
     )
@@ -411,10 +384,7 @@ def _calibrated(model: PhoneModel, offset: PhoneOffset) -> PhoneModel:
 
 @lru_cache(maxsize=256)
 def _residuals_db(middle: Enu, position: Enu, rssi_dbm: float, model: PhoneModel) -> Sequence[float]:
-    """For each cell of the grid around `middle`, the received power less the one that is expected from a phone there.
-
-    A report that several UAVs of one process receive is computed once: most of their grids have the same middle.
-    """
+    """Received less expected power for each cell; kept, as grids of UAVs in one process mostly share a middle."""
     residual_at_1_m = rssi_dbm - (model.power_dbm - REFERENCE_LOSS_DB)
     slope = 5 * model.exponent / math.log(10)  # per natural logarithm of the squared distance
     distances2 = _squared_distances_m2(middle, position, max(1.0, position.up * position.up))
@@ -423,9 +393,7 @@ def _residuals_db(middle: Enu, position: Enu, rssi_dbm: float, model: PhoneModel
 
 @lru_cache(maxsize=64)
 def _silence_scores(model: PhoneModel) -> tuple[float, ...]:
-    """Twice the logarithm of the probability that a phone is not received, divided by `CORRELATION_FACTOR`, for
-    distances in steps of `_STEP_M`.
-    """
+    """Twice the log-probability of no reception, over `CORRELATION_FACTOR`, by distance in steps of `_STEP_M`."""
     sigma = math.hypot(max(model.shadowing_db, 1.0), model.offset_db)
     scores = []
     for step in range(200):

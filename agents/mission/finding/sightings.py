@@ -46,10 +46,8 @@ Of 577 simulated pairs of people 35 to 100 m apart who were confirmed rightly, n
 
 
 class Contradictions:
-    """Finds confirmations that later powers contradict: a person was confirmed who does not carry that phone.
-
-    Where two people lie near each other few powers may decide wrongly. Once another assignment of phones to people is
-    far more likely than any with the confirmed pair, the confirmation is taken back.
+    """Finds confirmations of people who, by later powers, do not carry that phone: once another assignment of phones to
+    people is far more likely than any with the confirmed pair, the confirmation is taken back.
     """
 
     def __init__(self, survivors: KnownSurvivors, identities: Identities) -> None:
@@ -80,9 +78,7 @@ class Contradictions:
 
 
 class Sightings:
-    """Turns what the camera and the microphones of one UAV detect into positions of people, which `Identities` matches
-    with phones.
-    """
+    """Turns what camera and microphones detect into positions of people, which `Identities` matches with phones."""
 
     def __init__(
         self, scenario: Scenario, node: NodeId, survivors: KnownSurvivors, own_motion: OwnMotion, outbox: Outbox
@@ -120,9 +116,7 @@ class Sightings:
         self._sighted("voice", directions, _FARTHEST_M, evidence=_CALL_EVIDENCE, now_ns=now_ns)
 
     def review(self, now_ns: int) -> list[int]:
-        """The survivors who may be confirmed now, because each of their phones surely belongs to a person who has been
-        seen.
-        """
+        """The survivors who may be confirmed now: their phones surely belong to people who have been seen."""
         self._empty_images(now_ns - _SETTLED_NS)
         return self._identities.review(now_ns)
 
@@ -160,9 +154,7 @@ class Sightings:
         evidence: float,
         now_ns: int,
     ) -> list[PersonTrack]:
-        """Take in that one reading of a sensor shows people at these bearings and elevations, each with its standard
-        deviation [rad], if their places on the ground are not too far away.
-        """
+        """People at these bearings and elevations, each with its deviation [rad], unless too far away on the ground."""
         here, sightings = self._own_motion.over_ground(now_ns), []
         for bearing_rad, elevation_rad, sigma_rad in directions:
             looked = ground_place(
@@ -188,11 +180,9 @@ def ground_place(
     elevation_rad: float,
     rise_m: Callable[[float, float], float] | None = None,
 ) -> tuple[float, float, float] | None:
-    """East and north of the place where a direction from `at` first meets the ground, and the slant range to it.
-
-    `at.up` is the height above the ground; `rise_m` tells by how much the ground is higher at a place than below `at`,
-    without it the ground is level. None for directions above the horizon, and for those so little below it
-    (`_LEAST_DEPRESSION_RAD`) that a small error of the direction would move the place by far.
+    """East and north of the place where a direction from `at` first meets the ground, and the slant range; None above
+    the horizon, or so little below it (`_LEAST_DEPRESSION_RAD`) that a small error would move the place by far. `at.up`
+    is above ground; `rise_m`: by how much the ground is higher at a place than below `at`.
     """
     if elevation_rad >= -_LEAST_DEPRESSION_RAD:
         return None

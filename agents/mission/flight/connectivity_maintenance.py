@@ -38,10 +38,9 @@ _STRONG: Final = 0.75
 
 
 class ConnectivityMaintenance:
-    """Constraints that keep a UAV of a team, or a relay, within radio reach of the places to which it is tied
-    (`Shape.tethers`), and a follower within reach of the nearest UAV of its team. On the way to the places everyone
-    stays within reach of those to whom it has links that last (`search_formation/lasting_links.py`). Who hears none of
-    these, or has no plan, stays within reach of its nearest neighbors, but for a follower during the sweep.
+    """Keeps a UAV of a team, or a relay, in reach of the places to which it is tied (`Shape.tethers`), a follower in
+    reach of its team's nearest UAV, and all on the way to their places in reach of links that last. Who hears none of
+    these, or has no plan, stays in reach of its nearest neighbors.
     """
 
     def __init__(
@@ -54,7 +53,6 @@ class ConnectivityMaintenance:
         reach_m: float,
         speed_m_s: float,
     ) -> None:
-        """`speed_m_s`: the greatest speed of this UAV."""
         self._own_motion, self._neighbors = own_motion, neighbors
         self._formation, self._bidding = formation, bidding
         self._reach_m, self._haste_m_s = reach_m, _HASTE * speed_m_s
@@ -104,9 +102,8 @@ class ConnectivityMaintenance:
         return [node for node, plane in self._ties if plane.allows((velocity.east, velocity.north), but=_KEPT_M_S)]
 
     def beyond_gap(self, now_ns: int) -> Motion | None:
-        """The likely motion of a UAV to which this one is tied and that is out of reach because somebody between is
-        lost: from its place before the loss it hurries here as this UAV hurries there. None if there is nobody, or once
-        this UAV is so near that it would hear it there: then that one is lost, too.
+        """The likely motion of a UAV beyond a lost one, which hurries here as this UAV hurries there. None if there is
+        nobody, or once this UAV would hear it there: then that one is lost, too.
         """
         plan, pattern, place = self._formation.plan, self._formation.pattern, self._formation.place
         closing_s, swept_s = self._formation.closing_s(now_ns), self._formation.swept_s(now_ns)
@@ -125,9 +122,7 @@ class ConnectivityMaintenance:
         return None if found is None else found[1]
 
     def _lasting(self, plan: Search, pattern: Pattern, place: int, now_ns: int) -> dict[NodeId, Motion]:
-        """The neighbors whose links to this UAV last. One of these is left out if a third one has strong links to both,
-        each shorter than the link that is left out.
-        """
+        """Neighbors whose links to this UAV last; not one with whom a third has strong links to both, each shorter."""
         swept_s, place_of = self._formation.swept_s(now_ns) or 0.0, {node: at for at, node in enumerate(plan.nodes)}
         present = {node: motion for node, motion in self._present(now_ns).items() if node in place_of}
         here = (self._own_motion.position, pattern.at(place, swept_s))
@@ -144,7 +139,6 @@ class ConnectivityMaintenance:
         return {node: present[node] for node in lasting if not is_spared(node)}
 
     def _nearest_motions(self, now_ns: int) -> dict[NodeId, Motion]:
-        """The nearest neighbors of a UAV that is tied to nobody in reach."""
         here, present = self._own_motion.position, self._present(now_ns)
         nearest = sorted(present, key=lambda node: present[node].offset_from(here, now_ns).norm())
         return {node: present[node] for node in nearest[:_EARLY_TIES]}
@@ -155,9 +149,7 @@ class ConnectivityMaintenance:
         return {NodeId(node): motion for node, motion in self._neighbors.by_node(now_ns=now_ns) if node not in absent}
 
     def _tied_to(self, pattern: Pattern, place: int, now_ns: int) -> tuple[int, ...]:
-        """The places within whose reach this UAV stays: those to which its place is tied, past a UAV that may leave its
-        own; for a UAV that may leave its place itself, the nearest UAV of its team.
-        """
+        """Places in whose reach this UAV stays: tied ones, past one that may leave; else its team's nearest UAV."""
         swept_s = self._formation.swept_s(now_ns) or 0.0
         if pattern.may_leave(place, swept_s):
             return self._nearest(pattern.line(place), now_ns)
@@ -183,11 +175,9 @@ def _longest_m(a: tuple[Enu, Enu], b: tuple[Enu, Enu]) -> float:
 def tether_plane(
     offset: Enu, other_velocity: Velocity, *, tether_m: float, within_s: float, haste_m_s: float = math.inf
 ) -> HalfPlane | None:
-    """The half-plane of velocities that keep this UAV within `tether_m` of another for `within_s`; None if the other is
-    so near that no limit is needed.
-
-    Both UAVs may fly apart, so each of them may use half of the distance that is left. If none is left, this UAV alone
-    makes up for what is missing, at `haste_m_s` at most, so that there is such a velocity.
+    """The half-plane of velocities that keep this UAV within `tether_m` of another for `within_s`; None if it needs
+    none. Each may use half of the distance that is left; without any this UAV alone makes up for it, at `haste_m_s` at
+    most.
     """
     distance = offset.horizontal()
     if distance < 0.3 * tether_m:

@@ -58,9 +58,7 @@ class Endurance:
             self._readings.popleft()
 
     def margin(self, here: Enu) -> float:
-        """The share of the capacity that may still be spent before the UAV must fly home; 1 before
-        the first reading.
-        """
+        """The share of the capacity that may be spent before the UAV must fly home; 1 before the first reading."""
         if not self._readings:
             return 1.0
         charge = self._readings[-1].charge

@@ -25,7 +25,6 @@ class Errand:
     def __init__(
         self, orders: KnownOrders, own_motion: OwnMotion, *, height_m: float, speed_m_s: float, look_m: float
     ) -> None:
-        """`look_m`: how far the camera shows people to all sides; infinite for a UAV without a camera."""
         self._orders, self._own_motion = orders, own_motion
         self._height_m, self._speed_m_s = height_m, speed_m_s
         self._pitch_m = _PITCH * (_BLIND_M if math.isinf(look_m) else look_m)

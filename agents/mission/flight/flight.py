@@ -50,7 +50,6 @@ class Flight:
         self._own_motion.altimeter(above_ground_m, now_ns=now_ns)
 
     def fix(self, position: Enu, velocity: Enu, survivor: int | None, *, now_ns: int) -> None:
-        """A position fix: choose a velocity. `survivor` is the one to whom this UAV flies, if any."""
         self._own_motion.fix(position, velocity, now_ns=now_ns)
         self.held = ()
         if self.takes_off and self._climbs(now_ns):

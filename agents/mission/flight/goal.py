@@ -39,7 +39,6 @@ class Goal:
         self._listening = listening
 
     def at(self, task: int | None, now_ns: int) -> tuple[Enu, Enu]:
-        """The place to fly to, and how it moves; `task` is the survivor that this UAV has won, if any."""
         ordered = None if self._errand is None else self._errand.goal(now_ns)
         if ordered is not None:
             return ordered, STILL

@@ -31,9 +31,7 @@ _MOST_ERROR_M: Final = 12.0
 
 
 class ReciprocalAvoidance:
-    """Constraints by neighbors at their received positions, and by flying bodies that the radar shows. The clearance
-    grows with the age of the position.
-    """
+    """Constraints by neighbors and by flying bodies that the radar shows; clearance grows with a position's age."""
 
     def __init__(self, own_motion: OwnMotion, neighbors: NeighborMotions, obstacles: KnownObstacles) -> None:
         self._own_motion, self._neighbors, self._obstacles = own_motion, neighbors, obstacles
@@ -62,17 +60,13 @@ class ReciprocalAvoidance:
 
 
 def position_error_m(age_s: float) -> float:
-    """The greatest distance of another UAV from its extrapolated position, `age_s` after its last message."""
     return min(_MOST_ERROR_M, 0.5 * _TURN_M_S2 * age_s * age_s)
 
 
 def avoidance_plane(
     offset: Enu, velocity: Velocity, other_velocity: Velocity, *, clearance_m: float, horizon_s: float, share: float
 ) -> HalfPlane:
-    """The half-plane of velocities that avoid another body within the horizon.
-
-    `offset` leads from this UAV to the body. `share` is this UAV's share of the change: 0.5 if both avoid, otherwise 1.
-    """
+    """Velocities that avoid a body at `offset` within the horizon; `share` of the change: 0.5 if both avoid, else 1."""
     px, py = offset.east, offset.north
     vx, vy = velocity[0] - other_velocity[0], velocity[1] - other_velocity[1]
     distance2 = px * px + py * py

@@ -70,9 +70,7 @@ class ReturnHome:
         limits: SearchLimits,
         beside: AbstractSet[int] = frozenset(),
     ) -> None:
-        """`airspeed_m_s`: the greatest one. `height_m`: the height of the lanes above ground. `limits`: with which
-        charge it is to land, and how long it may hear nobody. `beside`: the UAVs whose pads are beside its own.
-        """
+        """`height_m`: of the lanes above ground. `beside`: the UAVs whose pads are beside its own."""
         self._node, self._neighbors, self._beside = node, neighbors, beside
         self._home = home._replace(up=height_m + _HIGHER_M)
         self._own_motion, self._outbox = own_motion, outbox
@@ -124,7 +122,6 @@ class ReturnHome:
         self.reason = self.reason or reason
 
     def release(self) -> bool:
-        """End a recall; returns True if the UAV therefore takes part in the mission again."""
         if self.reason is not ReturnReason.RECALLED or self.lands:
             return False
         self.reason = None
@@ -137,9 +134,7 @@ class ReturnHome:
 
     @property
     def percent(self) -> int:
-        """The percentage of the battery that the UAV may still spend, for its status; 0 only for a
-        UAV that flies home.
-        """
+        """Percentage of the battery that may still be spent, for the status; 0 only for a UAV that flies home."""
         if self.leaves:
             return 0
         return max(1, round(100 * self._endurance.margin(self._own_motion.position)))
@@ -173,10 +168,7 @@ class ReturnHome:
         return False
 
     def land_if_there(self, now_ns: int) -> bool:
-        """Command the landing if the UAV has reached its base and it is its turn; returns True once it lands.
-
-        Each call commands it again, because a setpoint may get lost on its way to the flight controller.
-        """
+        """Command the landing at the base in this UAV's turn; again with each call, as a setpoint may get lost."""
         here = self._own_motion.position
         nearly = here.minus(self._home).horizontal() <= _HOME_M
         if nearly and self._own_motion.velocity.horizontal() <= _STANDS_M_S and not self._waits(now_ns):

@@ -14,7 +14,6 @@ class SearchLimits:
         self.sweeps = mission.sweeps
 
     def change(self, key: str, value: float) -> None:
-        """Let a key have another value from now on."""
         match key:
             case "reserve_charge":
                 self.reserve = value

@@ -57,9 +57,7 @@ class TakeOff:
         height_m: float,
         beside: set[int] | None = None,
     ) -> None:
-        """`pad`: the place on which the UAV stands. `height_m`: the height of the lanes above ground. `beside`: gets
-        the UAVs that stand beside this one.
-        """
+        """`pad`: where the UAV stands. `height_m`: of the lanes above ground. `beside`: gets those beside this one."""
         self._beside = set[int]() if beside is None else beside
         self._node, self._pad = node, pad
         self._own_motion, self._neighbors, self._outbox = own_motion, neighbors, outbox
@@ -72,7 +70,6 @@ class TakeOff:
 
     @property
     def stands(self) -> bool:
-        """True while the UAV waits on its pad."""
         return self._told_ns is None
 
     @property

@@ -58,5 +58,4 @@ class TerrainFollowing:
         return max(least, min(most, climb))
 
     def _rises_m(self, velocity: Enu) -> list[float]:
-        """By how much the ground rises in each of the next seconds of a flight; empty over level ground."""
         return self._obstacles.rises_m(self._own_motion.position, velocity, _AHEAD_S)

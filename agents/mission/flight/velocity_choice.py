@@ -72,9 +72,7 @@ class VelocityChoice:
         return flat._replace(up=self._terrain.climb_m_s(goal.up, flat, now_ns))
 
     def _towards(self, corner: Enu, *, speed_m_s: float) -> Velocity:
-        """The velocity to a corner on the way around an obstacle; near the corner it is as slow as the goal itself
-        requires.
-        """
+        """The velocity to a corner on the way; near the corner as slow as the goal itself requires."""
         off = corner.minus(self._own_motion.position)
         distance = off.horizontal()
         speed = min(self._most_m_s, max(speed_m_s, 0.5 * self._most_m_s), max(_LEAST_M_S, distance))

@@ -54,7 +54,6 @@ class FormationFlight(Application):
         self._encoder = mavlink.Encoder(node, origin=self._origin)
         self._next_ns: int | None = None
         self._bad_positions = 0
-        """The number of hellos and floods without a credible position."""
 
     def start(self, port: AppPort, now_ns: int) -> None:
         super().start(port, now_ns)
@@ -63,7 +62,6 @@ class FormationFlight(Application):
     # --- received messages ----------------------------------------------------------------------------------------
 
     def on_message(self, message: Received, now_ns: int) -> None:
-        """A head has flooded its position."""
         self._on_motion(message.frame, now_ns)
         self.port.tap(message.frame)
 
@@ -87,9 +85,7 @@ class FormationFlight(Application):
     # --- flight ---------------------------------------------------------------------------------------------------
 
     def on_fix(self, fix: Gps, now_ns: int) -> None:
-        """Choose a velocity towards the place in the formation, clear of all others; hover until formation flight
-        begins.
-        """
+        """Fly to the place in the formation, clear of all others; hover until formation flight begins."""
         self._own_motion.fix(fix.position, fix.velocity, now_ns=now_ns)
         if now_ns < self._begins_ns:
             return

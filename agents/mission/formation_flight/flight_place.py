@@ -33,7 +33,6 @@ class FlightPlace:
     def __init__(
         self, node: NodeId, motions: NeighborMotions, route: Route, *, radius_m: float, clusters: Callable[[], Clusters]
     ) -> None:
-        """`clusters` gives the clusters as the node knows them, by head."""
         self._node = node
         self._motions = motions
         self._route = route
@@ -69,9 +68,7 @@ class FlightPlace:
         return self._around(followed, beside, self._radius_m, here, now_ns, faces=faces)
 
     def _head_of(self, node: int, place: Enu, clusters: Clusters, now_ns: int) -> int | None:
-        """The head of a UAV that is no head itself: that of its cluster, or the nearest known one; None if no head is
-        known.
-        """
+        """The head of a UAV that is none: that of its cluster, or the nearest known one; None if none is known."""
         own = next((head for head, nodes in clusters.items() if node in nodes), None)
         if own is not None:
             return own
@@ -89,7 +86,6 @@ class FlightPlace:
                 yield node
 
     def _places(self, nodes: Collection[int], now_ns: int) -> list[Enu]:
-        """Where those of these UAVs are now that were received lately."""
         return [motion.position_at(now_ns) for node, motion in self._motions.by_node(now_ns=now_ns) if node in nodes]
 
     def _around(

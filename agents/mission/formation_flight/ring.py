@@ -30,10 +30,8 @@ _NO_BEARING_M: Final = 1.0
 def place_on_ring(
     middle: Enu, here: Enu, others: Iterable[Enu], *, radius_m: float, node: int, faces: Iterable[Enu] = ()
 ) -> Enu:
-    """The place to fly to, at the height of `here`; `others` are those that fly around the same middle, and `faces` the
-    middles of the circles to be joined.
-
-    `node` decides the direction of a UAV that is exactly in the middle.
+    """The place to fly to, at the height of `here`; `others` fly around the same middle, and `faces` are the middles of
+    the circles to be joined. `node` decides the direction of a UAV that is exactly in the middle.
     """
     bearing = _bearing(middle, here)
     if bearing is None:
@@ -49,9 +47,7 @@ def place_on_ring(
 
 
 def _turn_to_face(bearing: float, others: Iterable[float], faces: Iterable[float]) -> float | None:
-    """The turn to the nearest of those bearings to which no other UAV of the circle is as near; None if there is
-    none.
-    """
+    """The turn to the nearest of those bearings to which no other UAV of the circle is as near; or None."""
     turns = [
         _signed(face - bearing)
         for face in faces
@@ -66,6 +62,5 @@ def _signed(angle: float) -> float:
 
 
 def _bearing(middle: Enu, place: Enu) -> float | None:
-    """The bearing, clockwise from north; None exactly in the middle."""
     east, north = place.east - middle.east, place.north - middle.north
     return None if math.hypot(east, north) < _NO_BEARING_M else math.atan2(east, north)

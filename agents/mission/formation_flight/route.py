@@ -13,10 +13,7 @@ _BRAKING_S: Final = 4.0
 
 
 class Route:
-    """The waypoints, and how many of them the leader has passed.
-
-    Every UAV that receives the leader keeps track of that, because any head may have to become leader.
-    """
+    """The waypoints passed; every UAV that receives the leader counts them, as any head may become leader."""
 
     def __init__(self, points: Sequence[tuple[float, float]], *, speed_m_s: float) -> None:
         self._points = points

@@ -32,9 +32,7 @@ Velocity = tuple[float, float]
 
 
 def nearest(wanted: Velocity, planes: Sequence[HalfPlane], *, limit: float, hard: int) -> Velocity:
-    """The best velocity [m/s]. `planes` are in the order of their importance; the first `hard` ones
-    are never dropped.
-    """
+    """The best velocity [m/s]. `planes` by importance; the first `hard` ones are never dropped."""
     kept = list(planes)
     while True:
         found = _solve(wanted, kept, limit)
@@ -85,9 +83,7 @@ def _along(wanted: Velocity, line: HalfPlane, planes: Sequence[HalfPlane], limit
 
 
 def _least_violation(wanted: Velocity, planes: Sequence[HalfPlane], limit: float) -> Velocity:
-    """The velocity for which all constraints hold when relaxed by the same least amount, which is
-    found by bisection.
-    """
+    """The velocity for which all constraints hold when relaxed by the same least amount, by bisection."""
     low, high = 0.0, 4 * limit + max((plane.least for plane in planes), default=0.0)
     best = (0.0, 0.0)
     for _ in range(_BISECTIONS):

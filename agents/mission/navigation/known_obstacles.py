@@ -199,9 +199,7 @@ class KnownObstacles:
         return [HalfPlane(east, north, (_CLEAR_M - distance) / _APPROACH_S) for distance, east, north in near]
 
     def way_to(self, at: Enu, goal: Enu, moves: Enu, *, now_ns: int) -> Enu | None:
-        """The place to fly to now on the way to a goal that moves; None if the straight way to the goal is clear, or if
-        no way around the obstacles was found.
-        """
+        """The place to fly to on the way to a moving goal; None if the straight way is clear, or none was found."""
         if not self._any and not self._taken:
             return None
 

@@ -23,7 +23,6 @@ class NeighborMotions:
         self._motions: dict[int, Motion] = {}
 
     def on_hello(self, node: int, motion: Motion) -> None:
-        """A hello states how its sender flies."""
         self._motions[node] = motion
 
     def motion(self, node: int, *, now_ns: int) -> Motion | None:
@@ -47,7 +46,6 @@ class RadarWatch:
         self._own_motion, self._obstacles, self._neighbors = own_motion, obstacles, neighbors
 
     def scan(self, echoes: Sequence[Echo], *, now_ns: int) -> None:
-        """A scan of the radar."""
         own = self._own_motion
         others = [motion.position_at(now_ns) for motion in self._neighbors.all(now_ns=now_ns)]
         self._obstacles.radar(echoes, at=own.position, velocity=own.velocity, neighbors=others, now_ns=now_ns)

@@ -26,11 +26,7 @@ class Building(NamedTuple):
     yaw_rad: float = 0.0
 
     def outside(self, east_m: float, north_m: float) -> tuple[float, float, float]:
-        """The distance of a place from the nearest wall, and the direction (east, north) that leads away from that
-        wall.
-
-        The distance is negative inside the walls.
-        """
+        """Distance from the nearest wall, negative inside, and the direction (east, north) away from it."""
         cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         off_east, off_north = east_m - self.east_m, north_m - self.north_m
         along, across = cos * off_east + sin * off_north, cos * off_north - sin * off_east
@@ -74,7 +70,6 @@ NO_MAP: Final = OnboardMap()
 
 
 def cell_of(east_m: float, north_m: float, size_m: float = CELL_M) -> Cell:
-    """The cell of a grid in which a place lies."""
     return math.floor(east_m / size_m), math.floor(north_m / size_m)
 
 
@@ -94,7 +89,6 @@ class MapIndex(NamedTuple):
 
 @lru_cache(maxsize=4)
 def indexed(onboard_map: OnboardMap, *, margin_m: float, watch_m: float) -> MapIndex:
-    """The cells that each building covers, with a margin, and the buildings to be watched from each tile."""
     roofs: dict[Cell, float] = {}
     near: dict[Cell, list[Building]] = {}
     for building in onboard_map.buildings:

@@ -25,7 +25,6 @@ class OwnMotion:
         self._above_ground: tuple[float, int] | None = None
 
     def fix(self, position: Enu, velocity: Enu, *, now_ns: int) -> None:
-        """A position and a velocity from the receiver."""
         if self._fix_ns is None:
             self.position = position
         else:

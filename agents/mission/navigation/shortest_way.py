@@ -53,9 +53,7 @@ def nearest_free(goal: Place, taken: Callable[[Cell], bool], *, within: int) -> 
 
 
 def way_around(start: Place, goal: Cell, taken: Callable[[Cell], bool], *, most_cells: int) -> list[Cell]:
-    """The cells of the shortest way, from the cell of the start to the goal; empty if no way is found by examining
-    `most_cells` cells.
-    """
+    """Cells of the shortest way, from the start's; empty if none is found by examining `most_cells`."""
     begin = cell_of(*start)
     costs: dict[Cell, float] = {begin: 0.0}
     came_from: dict[Cell, Cell] = {}

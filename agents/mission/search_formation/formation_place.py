@@ -78,8 +78,8 @@ class FormationPlace:
     def close_ranks(
         self, lost: Collection[int], now_ns: int, *, away: Collection[int] = (), apart: bool = False
     ) -> None:
-        """Fly on without these UAVs: the others of a row share its length. `away`: those that left by themselves, so
-        that nothing is urgent. `apart`: others, who are not lost, are in another part of the swarm.
+        """Fly on without these: the others of a row share its length. `away`: who left by itself, without urgency.
+        `apart`: others, who are not lost, are in another part of the swarm.
         """
         if self.plan is None or self.pattern is None:
             return
@@ -103,9 +103,7 @@ class FormationPlace:
             self.pattern, self._changed_ns = self.pattern.closed(vacant), now_ns
 
     def closing_s(self, now_ns: int) -> float | None:
-        """How long this UAV's row has been closing ranks over the last one who was lost; None if it is not, or has
-        done.
-        """
+        """How long this row has been closing ranks over the last one lost; None if it is not, or has done."""
         since_s = (now_ns - self._closing_ns) / S
         if self.pattern is None or self.place is None or not self._gaps or since_s > _CLOSES_S:
             return None
@@ -113,9 +111,8 @@ class FormationPlace:
 
     @property
     def passes_above(self) -> bool:
-        """True for a UAV that must fly higher than its place, because it may meet others of its row who do not hear it:
-        those beyond a gap may be a part of the swarm that takes this one for lost, and fly here to close the same gap.
-        Those on one side of it give way.
+        """True for a UAV that must fly above its place: those beyond a gap, who do not hear it, may take it for lost
+        and fly here to close the same gap. Those on one side of it give way.
         """
         if self.pattern is None or self.place is None or not self._gaps:
             return False
@@ -123,15 +120,12 @@ class FormationPlace:
         return is_above and size > (0 if self._apart else 1)
 
     def known_at(self, place: int, swept_s: float) -> tuple[Enu, Enu]:
-        """Where the UAV of a place would fly if the last one were not lost, and how: there it is sought when ranks are
-        closed.
-        """
+        """Where the UAV of a place would fly if the last one were not lost, and how: there it is sought."""
         pattern = self._before or self.pattern
         assert pattern is not None, "who seeks others has a plan"
         return pattern.at(place, swept_s), pattern.velocity(place, swept_s)
 
     def depart(self, now_ns: int) -> None:
-        """Fly to the place from here, and not before the plan begins."""
         begins_ns = now_ns if self.plan is None else self.plan.start_us * US
         self._left_from, self._left_ns = self._own_motion.over_ground(now_ns), max(now_ns, begins_ns)
 
@@ -156,9 +150,7 @@ class FormationPlace:
         return self.plan is not None and now_ns >= _taken_up_ns(self.plan)
 
     def lane(self, now_ns: int) -> tuple[Enu, Enu]:
-        """The position that the plan has for the UAV now, with its height above ground, and the velocity of that
-        position. Before the sweep begins, it moves from where the UAV was to the UAV's place.
-        """
+        """Where the plan has the UAV now, above ground, and that velocity; before the sweep on its way there."""
         plan, pattern, place = self.plan, self.pattern, self.place
         if plan is None or pattern is None or place is None:
             return self._left_from or self._own_motion.over_ground(now_ns), STILL
@@ -179,9 +171,7 @@ class FormationPlace:
     # --- how far it may go from there -----------------------------------------------------------------------------
 
     def leads_by(self, estimate: Estimate | None, lane: Enu, moves: Enu) -> bool:
-        """True if a survivor is near enough to be examined without leaving the formation; `lane` and `moves` are what
-        `lane()` returns.
-        """
+        """True if a survivor can be examined without leaving the formation; `lane` and `moves` are of `lane()`."""
         if estimate is None:
             return False
         ahead_m, aside_m = along(moves, estimate.east_m - lane.east, estimate.north_m - lane.north)
@@ -195,9 +185,7 @@ class FormationPlace:
         return abs(aside_m) <= _LEASH_M and abs(ahead_m) <= _LAG_M
 
     def strays(self, now_ns: int) -> bool:
-        """True for a UAV that has left a row for somebody, as others may while they are near each other, or comes late
-        to it: it is too far away to hold the row together.
-        """
+        """True for a UAV too far away to hold its row together: it left for somebody, or comes late."""
         return self.searches and self.is_taken_up(now_ns) and self.is_free(now_ns) and not self.is_near(now_ns)
 
     def can_be_spared(self, now_ns: int) -> bool:
@@ -212,9 +200,7 @@ class FormationPlace:
         )
 
     def misses_m(self, estimate: Estimate, lane: Enu, moves: Enu, now_ns: int) -> float:
-        """How far from an estimated place this UAV has to stay, wherever its moving place takes it; 0 if it can get
-        there, or if its lane turns and may come nearer again.
-        """
+        """How far this UAV must stay from an estimated place; 0 if it gets there, or its lane turns yet."""
         if self.is_free(now_ns) or self.pattern is None or self.pattern.dimensions.turns:
             return 0.0
         ahead_m, aside_m = along(moves, estimate.east_m - lane.east, estimate.north_m - lane.north)
@@ -224,7 +210,6 @@ class FormationPlace:
         return math.hypot(beyond_m, max(0.0, abs(aside_m) - _LEASH_M))
 
     def bounded(self, east: float, north: float, lane: Enu, moves: Enu, now_ns: int) -> tuple[Enu, Enu]:
-        """The permitted position nearest to a wanted one, and its velocity."""
         if self.is_free(now_ns):
             return Enu(east, north, lane.up), STILL
         ahead_m, aside_m = along(moves, east - lane.east, north - lane.north)
@@ -240,9 +225,7 @@ class FormationPlace:
         return estimate is not None and self.keeps_line(estimate.east_m, estimate.north_m, now_ns, within_s=within_s)
 
     def keeps_line(self, east_m: float, north_m: float, now_ns: int, *, within_s: float) -> bool:
-        """True if a UAV at this position would be within reach of this UAV's team `within_s` from now, and 5 s later;
-        False before the sweep begins.
-        """
+        """True if this position is in reach of the team `within_s` from now and 5 s later; False before the sweep."""
         pattern, place, at_s = self.pattern, self.place, self.swept_s(now_ns)
         if pattern is None or place is None or at_s is None:
             return False
@@ -253,9 +236,7 @@ class FormationPlace:
         )
 
     def beyond_reception_m(self, east_m: float, north_m: float, now_ns: int) -> float:
-        """How far a position is from where this UAV's team receives it at an instant of the sweep; without a plan, from
-        where this UAV waits for one.
-        """
+        """How far a position is from where the team receives it; without a plan, from where this UAV waits."""
         pattern, place, at_s = self.pattern, self.place, self.swept_s(now_ns)
         if pattern is None or place is None or at_s is None:
             lane, _ = self.lane(now_ns)
@@ -280,9 +261,7 @@ class FormationPlace:
 
 
 def along(moves: Enu, east_m: float, north_m: float) -> tuple[float, float]:
-    """An offset as metres ahead and metres to the right of a place that moves with velocity `moves`; north is ahead of
-    a place that stands still.
-    """
+    """An offset as metres ahead and right of a place that moves with `moves`; north is ahead of one at rest."""
     east, north = _heading(moves)
     return east_m * east + north_m * north, east_m * north - north_m * east
 
@@ -299,5 +278,4 @@ def _beside(lane: Enu, moves: Enu, ahead_m: float, aside_m: float) -> Enu:
 
 
 def _taken_up_ns(plan: Search) -> int:
-    """The instant at which all UAVs have had time to fly to their places, and the sweep begins."""
     return plan.start_us * US + plan.deploy_ds * 100 * MS

@@ -85,9 +85,9 @@ class FormationPlanner:
         turns_ns: Callable[[Mapping[int, Enu]], int] = lambda _: 0,
         random: Callable[[], float],
     ) -> None:
-        """`of_few`: the formation for so many UAVs at an instant, when others have flown home; None if the search is
-        over. `take_off_ns`: the time that UAVs need for their take-off, before which the first plan does not begin;
-        `turns_ns`: how much longer that lasts where those who stand at these places take off in turns.
+        """`of_few`: the formation for so many UAVs when others have flown home; None: the search is over.
+        `take_off_ns`: the time of a take-off, before which no first plan begins; `turns_ns`: how much longer it takes
+        those who take turns.
         """
         self._node = node
         self._roll_call = roll_call
@@ -113,7 +113,6 @@ class FormationPlanner:
     # --- input ----------------------------------------------------------------------------------------------------
 
     def status(self, status: SearchStatus, *, now_ns: int) -> None:
-        """The status of a UAV, this one or another."""
         before = self._members.get(status.node)
         if before is None or status.t_us * US >= before.heard_ns - S:
             stated_ns = min(now_ns, status.t_us * US)
@@ -131,7 +130,6 @@ class FormationPlanner:
             )
 
     def on_neighbor(self, node: int, position: Enu, *, now_ns: int) -> None:
-        """A neighbor was received, and states its position."""
         before = self._members.get(node)
         self._members[node] = (
             before._replace(position=position, heard_ns=now_ns)
@@ -140,7 +138,6 @@ class FormationPlanner:
         )
 
     def on_plan(self, plan: Search) -> bool:
-        """A plan was received; returns True if it replaces the plan in force."""
         mine = self.plan
         if mine is not None and not _replaces(plan, mine):
             return False
@@ -150,9 +147,7 @@ class FormationPlanner:
     # --- decisions ------------------------------------------------------------------------------------------------
 
     def review(self, pattern: Pattern | None, *, now_ns: int) -> bool:
-        """Make a plan, mend it, or flood it again, to be called about once a second; returns True if there is a new
-        one.
-        """
+        """Make a plan, mend it, or flood it again, about once a second; True if there is a new one."""
         if self._began_ns is None:
             self._began_ns = now_ns
         if self._followed is not self.plan:
@@ -171,9 +166,7 @@ class FormationPlanner:
         return False
 
     def _leads(self, now_ns: int) -> bool:
-        """True if this node is the planner: of the nodes that stay and know the plan, none with a lower id was received
-        recently.
-        """
+        """True for the planner: of those who stay and know the plan, none with a lower id was received recently."""
         me = self._members.get(self._node)
         return not (me is not None and me.leaves) and all(
             node >= self._node
@@ -186,9 +179,7 @@ class FormationPlanner:
         )
 
     def _may_plan(self, waited_ns: int) -> bool:
-        """True if this node knows all that can be known for a first plan. A node that has just started again knows that
-        the others have a plan only once it has received a status.
-        """
+        """True if all is known that can be for a first plan; after a restart a status must tell of others' plans."""
         members = self._members.values()
         if waited_ns < _ASKS_NS and any(member.revision for member in members):
             return False
@@ -227,7 +218,6 @@ class FormationPlanner:
             self.to_tell.append(self.plan)
 
     def _first(self, pattern: Pattern, now_ns: int, *, but: Collection[int] = ()) -> Search:
-        """The first plan of a formation, for all UAVs that were received and stay, `but` these."""
         staying = (node for node, member in self._members.items() if not member.leaves and node not in but)
         nodes = sorted(staying)[: pattern.places]
         starts = [self._members[node].position for node in nodes]
@@ -255,8 +245,8 @@ class FormationPlanner:
     def _shared_out(
         self, pattern: Pattern, nodes: Sequence[int], starts: Sequence[Enu]
     ) -> tuple[Pattern, Sequence[int]]:
-        """The largest formation begun around the swarm that it reaches in one piece, or the smallest if there is none,
-        and the place of each node. A UAV that is alone takes the place with its own number.
+        """The largest formation around the swarm that it reaches in one piece, else the smallest, and each node's
+        place. A UAV that is alone takes the place with its own number.
         """
         if len(nodes) == 1:
             return pattern, [(nodes[0] - 1) % pattern.places]
@@ -274,9 +264,7 @@ class FormationPlanner:
         return begun, chosen
 
     def _mended(self, plan: Search, now_ns: int) -> Search | None:
-        """The plan without those who fly home, with followers in their places and with new UAVs; None if nothing has
-        changed.
-        """
+        """The plan without those who fly home, with followers in their places, and new UAVs; None if unchanged."""
         pattern = pattern_of(plan, reach_m=0.0)
         gone = self.leavers
         holders = [0 if node in gone else node for node in plan.nodes]
@@ -293,8 +281,8 @@ class FormationPlanner:
         return plan._replace(revision=_next(plan.revision), planner=self._node, nodes=tuple(holders))
 
     def _for_those_who_stay(self, pattern: Pattern, holders: list[int], now_ns: int) -> Search | None:
-        """The plan of another formation, if so many have flown home that the others cannot span this one any more; None
-        while they can, while others may be about to leave as well, and if the search is over.
+        """The plan of another formation once too many have flown home to span this one; None while others may be about
+        to leave as well, and if the search is over.
         """
         gone = self.leavers
         if not gone or now_ns - max(self._left_ns[node] for node in gone) < _LEAVE_NS:
@@ -314,16 +302,13 @@ class FormationPlanner:
 
     @property
     def leavers(self) -> set[int]:
-        """The nodes that fly home."""
         return {node for node, member in self._members.items() if member.leaves}
 
     @property
     def absent(self) -> set[int]:
-        """The nodes that are out of their places for survivors."""
         return {node for node, member in self._members.items() if member.absent}
 
     def _newest_revision(self) -> int:
-        """The number of the newest plan that a status has named; 0 if none has named any."""
         newest = 0
         for member in self._members.values():
             if member.revision and (not newest or newer(member.revision, newest, bits=_REVISION_BITS)):
@@ -364,9 +349,7 @@ def pattern_of(plan: Search, *, reach_m: float) -> Pattern:
 
 
 def _fill(holders: list[int], pattern: Pattern) -> None:
-    """Let the nearest follower take each place of a team or of a relay that nobody holds, because those places keep the
-    swarm connected and sweep the area. A UAV that is alone keeps its place.
-    """
+    """The nearest follower takes each vacant place of a team or relay; a UAV that is alone keeps its place."""
     if sum(holder != 0 for holder in holders) <= 1:
         return
     for place in range(pattern.dimensions.fixed):

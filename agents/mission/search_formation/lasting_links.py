@@ -37,8 +37,7 @@ def keep_together(
     random: Callable[[], float],
 ) -> tuple[list[int], bool]:
     """The goal of each UAV, and whether links that last join all UAVs; if not, the goals are those of the least sum.
-    There must be at least as many goals as UAVs. `dearer_m2`: what it costs that a UAV flies to a goal, beside the
-    square of its way there [m2].
+    `dearer_m2`: what it costs that a UAV flies to a goal, beside the square of its way there [m2].
     """
     ways = [[start.minus(goal).horizontal() for goal in goals] for start in starts]
     costs = [[way * way + dearer_m2(uav, goal) for goal, way in enumerate(row)] for uav, row in enumerate(ways)]
@@ -79,7 +78,6 @@ class _Links:
         return sum(1 << other for other in self._near[uav] if self._chosen[other] in near)
 
     def exchange(self, a: int, b: int) -> None:
-        """Two UAVs exchange their goals."""
         chosen, masks = self._chosen, self._masks
         chosen[a], chosen[b] = chosen[b], chosen[a]
         for uav in (a, b):

@@ -41,9 +41,7 @@ class Pattern:
     """A formation, and the position of each of its places over time."""
 
     def __init__(self, dimensions: Dimensions, *, reach_m: float, vacant: frozenset[int] = frozenset()) -> None:
-        """`vacant`: the places whose UAVs are lost; the others of the same row close ranks, and the formation becomes
-        no larger than they can span within the `reach_m` of their radios.
-        """
+        """`vacant`: the places of lost UAVs: the others of a row close ranks, within the `reach_m` of their radios."""
         self.dimensions = dimensions
         self.vacant = vacant
         whole = self._whole = _SHAPES[dimensions.shape](dimensions)
@@ -59,9 +57,7 @@ class Pattern:
         return Pattern(self.dimensions, reach_m=self.reach_m, vacant=vacant)
 
     def begun_around(self, positions: Sequence[Enu]) -> "list[Pattern]":
-        """The same formation, begun where a swarm stands that is spread about the middle of the area: the largest one
-        first, at least one.
-        """
+        """The formation begun where a swarm stands that is spread about the middle; the largest first, at least one."""
         begun = self._whole.begun_around(swarm_at(positions, reach_m=self.reach_m))
         return [Pattern(dimensions, reach_m=self.reach_m) for dimensions in begun] or [self]
 
@@ -112,9 +108,7 @@ class Pattern:
         )
 
     def gap_beside(self, place: int, lost: frozenset[int]) -> tuple[int, bool]:
-        """How many next to each other are lost where the gap in its row is that is nearest to a place, and whether that
-        is at higher places; 0 if there is none.
-        """
+        """How many are lost in the gap in its row nearest to a place, and whether at higher places; 0 without one."""
         row = self._row(place)
         gap = min((other for other in lost if row and other in row.places), key=lambda o: abs(o - place), default=None)
         if gap is None:
@@ -125,9 +119,7 @@ class Pattern:
         return size, gap > place
 
     def _tied_to(self, place: int) -> list[int]:
-        """The places to which a place is tied, vacant ones, too. Where two rows meet, whoever flies nearest to there is
-        tied, now that the rows have closed ranks.
-        """
+        """The places to which a place is tied, vacant ones, too; where rows meet, whoever flies nearest to there."""
         whole = self._whole
         row = self._row(place)
         if row is None or not self.vacant:
@@ -147,9 +139,7 @@ class Pattern:
         return place if row is None else row.nearest(place, self.vacant)[0]
 
     def tethers(self, place: int, swept_s: float) -> tuple[int, ...]:
-        """The places that must stay within radio reach of this one to keep the swarm connected, past those that are
-        vacant or whose UAV may leave; none for a follower.
-        """
+        """Places that must stay in reach of this one, past those vacant or that may be left; none for a follower."""
         found: set[int] = set()
         passed, waiting = {place}, [place]
         while waiting:
@@ -164,9 +154,7 @@ class Pattern:
         return tuple(sorted(found))
 
     def may_leave(self, place: int, swept_s: float) -> bool:
-        """True for a place whose UAV may leave it at this instant, because the swarm stays connected without it: that
-        of a follower, and many of a ring that is small.
-        """
+        """True for a place that may be left now: a follower's, and many of a ring that is small."""
         if self.kind(place) == "follower":
             return True
         rank = place - sum(other < place for other in self.vacant)
@@ -174,9 +162,7 @@ class Pattern:
         return rank % 2 == 1 and self.shape.may_leave(at, swept_s, reach_m=_LEAVES * self.reach_m, left=left)
 
     def velocity(self, place: int, swept_s: float) -> Enu:
-        """The velocity of a place after this time of sweeping, without that at which lines shift to their other lanes:
-        while they do, they wait, and whoever is behind stays there.
-        """
+        """The velocity of a place, without shifts to other lanes: meanwhile all wait, and who is behind stays there."""
         if swept_s < 0:
             return STILL
         early = max(0.0, swept_s - _STEP_S)
@@ -186,9 +172,7 @@ class Pattern:
 
 
 def fastest(count: int, demands: Demands) -> Pattern | None:
-    """The formation of any shape in which this number of UAVs sweeps the area once in the shortest time; None if they
-    are too few for any. More UAVs are never slower: those for whom there is no use become followers.
-    """
+    """The formation of the fastest sweep; None if they are too few for any. Surplus UAVs become followers."""
     count = min(count, MOST_PLACES)
     found = [
         lines.fitted(count, demands),
@@ -201,9 +185,7 @@ def fastest(count: int, demands: Demands) -> Pattern | None:
 
 
 def of_few(count: int, demands: Demands, *, connected: bool = True) -> Pattern:
-    """The formation of any shape in which so many UAVs sweep the area in the shortest time, in one piece all the time
-    if it has to be `connected`: lines, one line abreast, or a spiral.
-    """
+    """The fastest formation of so many, in one piece if it has to be `connected`: lines, one abreast, or a spiral."""
     count = min(count, MOST_PLACES)
     found = [lines.fitted(count, demands), sectors.fitted(count, 1, demands), spiral.fitted(count, demands)]
     found += [] if connected else [circuit.fitted(count, demands)]
@@ -214,9 +196,7 @@ def of_few(count: int, demands: Demands, *, connected: bool = True) -> Pattern:
 def fitted(
     count: int, demands: Demands, *, shape: ShapeName = ShapeName.LINES, sectors_wanted: int = 1
 ) -> Pattern | None:
-    """The formation of a shape for this number of UAVs; None if they are too few. UAVs for whom a plan message has no
-    room get no place.
-    """
+    """The formation of a shape; None if they are too few. UAVs beyond the room of a plan message get no place."""
     count = min(count, MOST_PLACES)
     match shape:
         case ShapeName.LINES:

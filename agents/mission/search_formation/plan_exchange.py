@@ -57,7 +57,6 @@ class PlanExchange:
         """True while this UAV is out of its place for a survivor."""
 
     def start(self, now_ns: int) -> None:
-        """Choose the instant of the first status."""
         self._next_status_ns = now_ns + round(self._random() * _FIRST_STATUS_S * S)
 
     def review(self, percent: int, now_ns: int) -> None:
@@ -130,7 +129,6 @@ class PlanExchange:
         return b"" if plan is None else self._roll_call.roll(plan, now_ns=now_ns).encode_frame(self._node)
 
     def on_status(self, status: SearchStatus, *, now_ns: int) -> None:
-        """The status of another UAV was received."""
         self._planner.status(status, now_ns=now_ns)
 
     def on_plan(self, plan: Search, *, now_ns: int) -> None:

@@ -66,7 +66,6 @@ class RollCall:
         self._take(node, now_ns // ROLL_NS, lost=falls, now_ns=now_ns)
 
     def on_roll(self, roll: Roll, plan: Search | None, *, now_ns: int) -> None:
-        """A neighbor tells on what it knows; of another plan than the own one it is not understood."""
         if plan is None or (roll.planner, roll.revision) != (plan.planner, plan.revision):
             return
         if roll.at > now_ns // ROLL_NS + _AHEAD:
@@ -84,9 +83,8 @@ class RollCall:
             self._called_lost_ns, self._mute_level = now_ns, 1 + place % _LEVELS
 
     def mute_level(self, now_ns: int) -> int:
-        """0 while others hear this UAV; otherwise a level from 1 on, by its place in the plan.
-
-        Two mute UAVs do not know of each other; those that would close the same gap have places near each other.
+        """0 while others hear this UAV, otherwise a level from 1 on by its place: mute UAVs do not know of each other,
+        and those that would close the same gap have places near each other.
         """
         called_ns = self._called_lost_ns
         return 0 if called_ns is None or now_ns - called_ns < _MUTE_NS else self._mute_level
@@ -101,8 +99,8 @@ class RollCall:
             self.lost.setdefault(node, now_ns)
 
     def review(self, plan: Search, *, since_ns: int, falls: bool = False, now_ns: int) -> None:
-        """Find who is lost, to be called several times a second; `since_ns`: the instant at which this UAV began to
-        follow the plan, before which nobody need have been heard. `falls`: this UAV falls itself.
+        """Find who is lost, several times a second. `since_ns`: when this UAV began to follow the plan, before which
+        nobody need have been heard; `falls`: this UAV falls itself.
         """
         self.parted = () if self._silent is None else self._silent.parted(self.lost, now_ns=now_ns)
         self.has_news |= falls and not self._falls

@@ -24,7 +24,6 @@ class Absence:
     """The rule by which one UAV may be out of reach."""
 
     def __init__(self, formation: FormationPlace, connection: Connection, *, speed_m_s: float) -> None:
-        """`speed_m_s`: the greatest speed of this UAV."""
         self._formation = formation
         self._most_s = {"always": 0.0, "none": math.inf}[connection] if isinstance(connection, str) else connection
         self._speed_m_s = _SPEED_SHARE * speed_m_s
@@ -35,8 +34,8 @@ class Absence:
         return self._most_s > 0
 
     def late_s(self, at: Enu, now_ns: int, *, after_s: float) -> float:
-        """How much later than the beginning of the sweep this UAV is at its place if it leaves a position after some
-        time; 0 once the sweep has begun, and for a follower where UAVs may be out of reach: nobody waits for it.
+        """How much later than the sweep this UAV is at its place if it leaves a position after some time; 0 once it has
+        begun, and for a follower where UAVs may be out of reach: nobody waits for it.
         """
         begins_ns = self._formation.sweep_starts_ns()
         if begins_ns is None or now_ns >= begins_ns or (self.is_permitted and self._formation.is_free(now_ns)):

@@ -52,9 +52,7 @@ class Approach:
         speed_m_s: float,
         look_m: float = math.inf,
     ) -> None:
-        """`speed_m_s`: the greatest speed of this UAV. `look_m`: how far its camera surely shows people to all sides;
-        infinite for a UAV without a camera.
-        """
+        """`look_m`: how far its camera surely shows people to all sides; infinite without a camera."""
         self._node = node
         self._survivors, self._own_motion, self._neighbors = survivors, own_motion, neighbors
         self._outbox = outbox
@@ -65,19 +63,13 @@ class Approach:
         """The instant at which this UAV came to the estimated place of each survivor."""
 
     def forget(self, survivor: int) -> None:
-        """Begin the approach to a survivor anew, because the place to which this UAV came has proved wrong, or because
-        it came there in passing or for an earlier task.
-        """
+        """Begin an approach anew: the place has proved wrong, or was reached in passing or for an earlier task."""
         self.arrived_ns.pop(survivor, None)
 
     def next_point(self, survivor: int, place: Estimate, now_ns: int, *, responding: bool) -> tuple[float, float]:
-        """East and north of the point to fly to: the estimated `place`, then another probable one, then a point on the
-        spiral or the circle.
-
-        Each UAV starts at an angle of its own, so that several are spread around one place. The circle around a
-        person lets the UAV receive phones from many sides, and their powers show whose phone the person has.
-
-        `responding`: True if this survivor is the UAV's task; False if the UAV only passes it on its way.
+        """East and north of the point to fly to: the estimated `place`, another probable one, then a point on spiral or
+        circle, which lets the UAV receive phones from many sides. Each UAV starts at an angle of its own; `responding`:
+        the survivor is its task.
         """
         arrived_ns = self.arrived_ns.get(survivor)
         if arrived_ns is None:
@@ -109,10 +101,7 @@ class Approach:
         return self.look_around.next_place(survivor, phone, self._own_motion.position, now_ns, others=others)
 
     def _turned_rad(self, radius: float) -> float:
-        """The angle by which the spiral has turned when it reaches a radius.
-
-        It turns at `_TURN_PER_S` as long as the UAV can keep up, and farther out as fast as the UAV can fly along it.
-        """
+        """The spiral's angle at a radius: at `_TURN_PER_S` while the UAV keeps up, farther out as fast as it flies."""
         widest = max(_FIRST_RADIUS_M, self._along_m_s / _TURN_PER_S)
         if radius <= widest:
             return _TURN_PER_S * (radius - _FIRST_RADIUS_M) / _GROWTH_M_S

@@ -40,7 +40,6 @@ class Auction:
         self._serial = 0
 
     def bid(self, survivor: int, *, eta_s: float, now_ns: int) -> None:
-        """Make a bid of this node, which replaces an earlier one."""
         self._place(survivor, max(0, min(WITHDRAWN - 1, round(10 * eta_s))), now_ns)
 
     def withdraw(self, survivor: int, *, now_ns: int) -> None:
@@ -50,9 +49,7 @@ class Auction:
             self._place(survivor, WITHDRAWN, now_ns)
 
     def merge(self, bids: Iterable[Bid], *, now_ns: int) -> None:
-        """A neighbor has passed on bids. Of its own bids a node only learns their serial numbers, so that its next bid
-        is newer even if the node has restarted since.
-        """
+        """Take in others' bids; of its own only serial numbers, so that the next is newer after a restart."""
         for bid in bids:
             stood_ns = now_ns - bid.age_s * S
             if stood_ns < now_ns - _FORGOTTEN_NS:
@@ -66,7 +63,6 @@ class Auction:
                 of_task[bid.bidder] = _KnownBid(bid.eta_ds, bid.serial, stood_ns)
 
     def close(self, survivor: int) -> None:
-        """Forget the bids for a finished task."""
         self._bids.pop(survivor, None)
 
     def has_bid(self, survivor: int) -> bool:
@@ -92,9 +88,7 @@ class Auction:
         return (round(10 * eta_s), self._node) < (self._bids[survivor][worst].eta_ds, worst)
 
     def bids_to_tell(self, tasks: Iterable[int], *, now_ns: int) -> list[Bid]:
-        """The bids for these tasks to pass on, as many as one message holds: the node's own first, then those of others
-        by their times of arrival.
-        """
+        """Bids for these tasks, as many as a message holds: the node's own first, then by time of arrival."""
         own: list[Bid] = []
         others: list[tuple[int, Bid]] = []
         for survivor in tasks:

@@ -98,12 +98,10 @@ class Bidding:
         """The instant at which this UAV should be at the present survivor."""
 
     def merge(self, bids: Iterable[Bid], *, now_ns: int) -> None:
-        """A neighbor has passed on bids."""
         open_bids = (bid for bid in bids if not self._survivors.is_found(bid.survivor))
         self._auction.merge(open_bids, now_ns=now_ns)
 
     def bids_to_tell(self, *, now_ns: int) -> list[Bid]:
-        """The bids to put into the next hello."""
         return self._auction.bids_to_tell(self._survivors.sought(), now_ns=now_ns)
 
     def close(self, survivor: int, *, now_ns: int) -> None:
@@ -124,10 +122,7 @@ class Bidding:
         self.survivor = None
 
     def bid(self, now_ns: int, *, delay_s: float = 0.0) -> None:
-        """Bid for each survivor for whom this UAV would be among the winners, if its place in the formation permits.
-
-        `delay_s`: the time after which this UAV can leave, because it takes off.
-        """
+        """Bid where this UAV would win, if its place permits; `delay_s`: until it can leave, because it takes off."""
         for survivor in self._survivors.sought():
             known = self._survivors.by_id[survivor]
             if not known.filter.near(self._own_motion.position, within_m=FAR_M):
@@ -144,9 +139,7 @@ class Bidding:
                 self._auction.bid(survivor, eta_s=eta_s, now_ns=now_ns)
 
     def choose(self, now_ns: int) -> None:
-        """Choose the survivor to fly to: the present one if it is not given up, otherwise the nearest one whose auction
-        this UAV has won; None if it has won none.
-        """
+        """Fly to the present survivor unless given up, otherwise to the nearest won; None if none is won."""
         if self.survivor is not None:
             self._reconsider(self.survivor, now_ns)
         if self.survivor is None:
@@ -168,9 +161,8 @@ class Bidding:
             self._announce(self.survivor, now_ns)
 
     def _reconsider(self, survivor: int, now_ns: int) -> None:
-        """Give up the present survivor if this UAV has lost the auction, has searched there in vain for too long,
-        has not come there in time (a building or a closed area may lie between), or if its place in the formation does
-        not permit it any more. In all cases but the first its bid is withdrawn.
+        """Give up the present survivor if the auction is lost; or, withdrawing the bid, if searched in vain for too
+        long, not reached in time (a building or a closed area may lie between), or not permitted any more.
         """
         known = self._survivors.by_id[survivor]
         lost = not self._wins(survivor, known, now_ns)
@@ -230,7 +222,6 @@ class Bidding:
         }
 
     def _announce(self, survivor: int, now_ns: int) -> None:
-        """Record that this UAV approaches a survivor, once a place is known."""
         known = self._survivors.by_id[survivor]
         place = known.place()
         if place is None:
@@ -240,7 +231,6 @@ class Bidding:
         self._outbox.records.append(Approaching(now_ns, self._node, survivor, len(known.reporters), east_m, north_m))
 
     def _note_place(self, survivor: int, known: KnownSurvivor, now_ns: int) -> None:
-        """Record once that this UAV knows where a survivor is."""
         place = None if survivor in self._located else known.place()
         if place is not None and place.sigma_m <= VAGUE_M:
             self._located.add(survivor)
@@ -267,9 +257,7 @@ class Bidding:
         return math.inf if place is None else place.distance_m(self._own_motion.position)
 
     def _eta_s(self, survivor: int, delay_s: float, now_ns: int) -> float | None:
-        """The time in which this UAV could be at a survivor; None if its place in the formation
-        does not permit that.
-        """
+        """The time to a survivor; None if this UAV's place in the formation does not permit that."""
         formation, here = self._formation, self._own_motion.position
         place = self._survivors.by_id[survivor].place()
         if place is None:

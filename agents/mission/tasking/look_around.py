@@ -39,9 +39,7 @@ class LookAround:
     def next_place(
         self, survivor: int, phone: PhoneFilter, here: Enu, now_ns: int, *, others: Sequence[Enu] = ()
     ) -> tuple[float, float] | None:
-        """East and north of the place to look at next; None if all that are probable have been looked at, or for a UAV
-        without a camera. `others`: where other UAVs are, which look likewise.
-        """
+        """East and north of the place to look at next, given where `others` look likewise; None if there is none."""
         if math.isinf(self._look_m):
             return None
         if survivor != self._survivor:

@@ -58,9 +58,7 @@ def hearing_m(scenario: Scenario) -> float:
 
 
 def listening_height_m(scenario: Scenario) -> float | None:
-    """The height above ground at which a UAV listens; None if its microphones reach the ground from the height of the
-    search, or do not reach it from the least height.
-    """
+    """The height above ground to listen at; None if not needed, or the ground is out of reach at the least height."""
     range_m = hearing_m(scenario)
     height_m = max(LEAST_M, _HEIGHT * range_m)
     return height_m if height_m < min(range_m, scenario.nodes.altitude_m) else None
@@ -81,7 +79,6 @@ class VoiceDescent:
     def __init__(
         self, scenario: Scenario, node: NodeId, own_motion: OwnMotion, neighbors: NeighborMotions, *, speed_m_s: float
     ) -> None:
-        """`speed_m_s`: the greatest speed of this UAV."""
         self._node = node
         self._own_motion, self._neighbors = own_motion, neighbors
         self._speed_m_s = speed_m_s
@@ -100,10 +97,9 @@ class VoiceDescent:
         """The instant at which this UAV reached the listening height."""
 
     def goal(self, survivor: int, place: Estimate, goal: Enu, *, seen: bool, misses_m: float, now_ns: int) -> Enu:
-        """The place to fly to, its height above ground, instead of `goal`, which looks around the place from above.
-
-        `seen`: a camera or a call has shown a person who seems to own the survivor's phone. `misses_m`: how far from
-        the estimated place this UAV's place in the formation keeps it; it goes down only if it could hear a call there.
+        """The place to fly to, above ground, instead of `goal`, which looks from above; `seen`: a person seems to own
+        the phone. `misses_m`: how far from the place the formation keeps this UAV, which goes down only if it could
+        hear a call there.
         """
         if self._height_m is None:
             return goal
@@ -126,7 +122,6 @@ class VoiceDescent:
         return Enu(place.east_m + east_m, place.north_m + north_m, self._step_m)
 
     def _step_down(self, place: Estimate, up_m: float, height_m: float, now_ns: int) -> None:
-        """Begin the next step if this one is done and the way down is free."""
         self._step_m = min(self._step_m, up_m)
         if self._own_motion.height_m(now_ns) > self._step_m + _STEP_DONE_M:
             return
@@ -138,9 +133,7 @@ class VoiceDescent:
             self._step_m = below_m
 
     def _is_first(self, place: Estimate, now_ns: int) -> bool:
-        """True if no other UAV in flight near the estimated place is lower than this one, or as low and has a lower
-        id.
-        """
+        """True if no other UAV in flight near the place is lower, or as low and has a lower id."""
         here = self._own_motion.position
         ground_m = here.up - self._own_motion.height_m(now_ns)
         for node, motion in self._neighbors.by_node(now_ns=now_ns):
@@ -163,10 +156,7 @@ class VoiceDescent:
 
 
 def turned_rad(turned: float, radius_m: float, growth_m_s: float, *, widest_m: float) -> float:
-    """The angle by which a spiral has turned at a radius; at its full angular speed it would have turned by `turned`.
-
-    Beyond the radius `widest_m` it turns only as fast as the UAV can fly along it.
-    """
+    """A spiral's angle at a radius, at full angular speed `turned`; beyond `widest_m` no faster than can be flown."""
     if radius_m <= widest_m:
         return turned
     beyond = _TURN_PER_S / growth_m_s * (radius_m - widest_m)

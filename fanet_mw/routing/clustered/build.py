@@ -89,7 +89,6 @@ class _Ground(NamedTuple):
         return neighbor_lifetime_ns(self.port.scenario.routing.hello_interval_s)
 
     def queue(self) -> TxQueue:
-        """A queue for packets that wait for their first transmission, most urgent first."""
         routing = self.port.scenario.routing
         return TxQueue(capacity=routing.queue_frames, sooner_us=sooner_us(routing))
 
@@ -158,9 +157,8 @@ def _in_slots(ground: _Ground, rule: Rule, *hear_copies: HearsCopies) -> Cluster
 
 
 def _way_beside_turns(ground: _Ground) -> OneWay:
-    """The way of packets for one node where nodes have turns: where turns bound delays, only receipts go there, in the
-    windows between turns, and packets with a bound are flooded; where they do not, all packets go this way, without
-    waiting for a window.
+    """The way of packets where nodes have turns: where turns bound delays, only receipts go it, in the windows between
+    turns; elsewhere all packets do, without waiting for a window.
     """
     scenario = ground.port.scenario
     if scenario.mobility.rigid and not scenario.measures_links:
@@ -237,10 +235,8 @@ def _admission(port: Port) -> Admission | None:
 
 
 def _role_parts(ground: _Ground, membership: Membership, *, takes_slot: bool) -> RoleParts:
-    """The parts that make up the roles of a node.
-
-    With `takes_slot`, nodes watch the heads only, and the node that replaces a silent head uses the head's slot.
-    Without it, nodes watch all neighbors, and one that finds a neighbor silent only tells the leader.
+    """The parts of a node's roles. `takes_slot`: nodes watch heads, and who replaces a silent head uses its slot; else
+    nodes watch all neighbors, and only tell the leader of a silent one.
     """
     port, scenario = ground.port, ground.port.scenario
     liveness = Liveness()

@@ -121,7 +121,6 @@ class Clustered(RoutingProtocol):
         return ()
 
     def _pass_on(self, packet: Packet, now_ns: int) -> None:
-        """Send a packet that is on its way to a head, or to its receiver, farther."""
         parts, start_ns = self.parts, now_ns + self._lead_ns
         if packet.header.destination == self._port.node:
             return

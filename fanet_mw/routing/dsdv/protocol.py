@@ -88,7 +88,6 @@ class Dsdv(HopByHop):
                     self._send(packet, next_hop, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
 
     def _plan(self, now_ns: int) -> None:
-        """Choose when to advertise changes, unless an update is planned that will include them."""
         due_ns = self._table.next_news_ns()
         if due_ns is not None and (self._news_ns is None or self._news_ns > due_ns + _GATHER_NS):
             self._news_ns = max(now_ns, due_ns) + int(self._random() * _GATHER_NS)

@@ -54,10 +54,8 @@ class LocationTable:
         return tuple(self._fixes[node] for node in self._used if node in self._fixes)
 
     def next_hop(self, destination: NodeId, *, at: Enu, excluded: NodeId, now_ns: int) -> NodeId | None:
-        """The destination if it is a neighbor, else the neighbor nearest to it, if that is nearer than `at`.
-
-        It is never `excluded`, the node that handed the packet over: two nodes that know different locations would pass
-        the packet back and forth.
+        """The destination if a neighbor, else that nearest to it, if nearer than `at`; never `excluded`, which handed
+        the packet over: with other locations the two would pass it back and forth.
         """
         if destination in self._neighbors and self._neighbors[destination][1] > now_ns:
             return destination

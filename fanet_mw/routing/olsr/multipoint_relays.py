@@ -12,11 +12,9 @@ from fanet_mw.units import NodeId
 
 
 def multipoint_relays(node: NodeId, adjacency: Adjacency, *, willingness: Mapping[NodeId, int]) -> tuple[NodeId, ...]:
-    """The relays of `node`. It suffices that `adjacency` holds the node and its neighbors.
-
-    The steps are those of the RFC: first the neighbors that are always willing; then those that alone reach some node;
-    then by willingness, by the number of nodes that they still add, by degree, and by lower id. Relays without which
-    every node is still reached are not dropped, a step that the RFC leaves optional.
+    """The relays of `node`, of which `adjacency` must hold it and its neighbors. As in the RFC: always willing ones;
+    those that alone reach some node; then by willingness, nodes added, degree, lower id. Redundant ones are not
+    dropped, an optional step.
     """
     will = {n: willingness.get(n, WILL_DEFAULT) for n in adjacency[node]}
     near = frozenset(adjacency[node])

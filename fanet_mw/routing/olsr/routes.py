@@ -20,10 +20,8 @@ def routing_table(
     willingness: Mapping[NodeId, int],
     topology: Sequence[tuple[NodeId, NodeId]],
 ) -> dict[NodeId, OlsrRoute]:
-    """The shortest known routes (10): to neighbors, to 2-hop neighbors, then over the topology set hop by hop.
-
-    `topology` holds pairs (last hop, destination). Of equally short routes the one whose last hop has the lowest id is
-    taken.
+    """The shortest known routes (10): to neighbors, 2-hop neighbors, then over `topology`, pairs (last hop,
+    destination); of equally short ones that with the lowest last hop.
     """
     routes = {neighbor: OlsrRoute(neighbor, 1) for neighbor in sorted(neighbors)}
     for neighbor in sorted(neighbors):

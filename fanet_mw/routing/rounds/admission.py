@@ -81,6 +81,5 @@ class BulkAdmission:
 
     @property
     def steady(self) -> bool:
-        """True if delays have not grown lately."""
         lately_ns, half = list(self._lately_ns), _STEADY_JUDGED // 2
         return len(lately_ns) == _STEADY_JUDGED and sum(lately_ns[half:]) <= _STEADY * sum(lately_ns[:half])

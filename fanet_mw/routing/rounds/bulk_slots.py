@@ -33,8 +33,8 @@ class BulkSlots:
         self._timing = timing
 
     def next_ns(self, from_ns: int, *, in_each_slot: bool, rivals: Sequence[tuple[int, bool]]) -> int:
-        """The start of the first own slot at or after an instant; `rivals`: the other nodes within two hops, and
-        whether each takes part in all slots. The others take part where the last bits of their bids are 0.
+        """The start of the first own slot from an instant on; `rivals`: other nodes within two hops, and whether each
+        takes part in all slots, or where the last bits of its bid are 0.
         """
         first = self._timing.slot_from(from_ns)
         for slot in range(first, first + _MOST_SEARCHED):

@@ -25,9 +25,7 @@ class LastingLinks:
     """The links of one node that will last."""
 
     def __init__(self, *, range_m: float, horizon_ns: int, reaches: Mapping[NodeId, float] = {}) -> None:
-        """`horizon_ns`: how long a link must last to count. `reaches`: of nodes with an antenna of their own, how many
-        times as long their links are.
-        """
+        """`horizon_ns`: how long a link must last; `reaches`: factors of nodes with antennas of their own."""
         self._range_m = range_m
         self._farther_m = {node: times * range_m for node, times in reaches.items()}
         self._horizon_ns = horizon_ns
@@ -58,9 +56,7 @@ class LastingLinks:
         return found
 
     def _known(self, nodes: int, own: Motion) -> Iterator[tuple[int, Motion, float]]:
-        """Those of some nodes whose motion is known, and how far the link with each reaches; where somebody was before
-        it was away says nothing.
-        """
+        """Nodes whose motion is known, and each link's reach; where somebody was before it was away says nothing."""
         for node, motion in self._motions.items():
             bit = 1 << (node - 1)
             if nodes & bit and own.at_ns - motion.at_ns <= self._horizon_ns:
@@ -78,10 +74,8 @@ class LastingLinks:
 
 
 class InStep:
-    """Which neighbors of a node keep the rounds that it keeps, by when their frames of turns came.
-
-    A node whose time is not that of the swarm yet, or no more, sends in turns of others. No bound counts on such a
-    node. Where it is heard no bound counts on the owners of those turns either, because their frames are destroyed.
+    """Which neighbors keep this node's rounds, by when their frames of turns came. One out of step sends in others'
+    turns: no bound counts on it, nor, where it is heard, on the owners of those turns.
     """
 
     def __init__(self, timing: RoundTiming, *, certain: bool) -> None:

@@ -121,7 +121,6 @@ class DelayLaw:
         self._waited_ns[priority] = max(self._waited_ns[priority], delay_ns - hops * self.hop_ns)
 
     def _waited(self, priority: int) -> int:
-        """The longest wait of the packets heard lately that are at least as urgent as `priority`."""
         waits = (*self._waited_before_ns.items(), *self._waited_ns.items())
         return max((waited_ns for other, waited_ns in waits if other <= priority), default=0)
 
@@ -168,9 +167,7 @@ class DelayLaw:
         return max(before, (1 - passed) * before + came) / (self._window_ns / self._timing.period_ns)
 
     def _used_share(self, priority: int) -> float:
-        """The share of turns that packets not less urgent than `priority` use as a rule, or use if all sources send as
-        the scenario states.
-        """
+        """The share of turns of packets not less urgent, as a rule, or by the scenario if that is more."""
         used = sum(turns for other, turns in self._usually.items() if other <= priority)
         stated = sum(turns for other, turns in self._stated.items() if other <= priority)
         return max(used * self._timing.period_ns / self._window_ns, stated)
@@ -188,8 +185,8 @@ class DelayLaw:
     def bound_ns(
         self, topology: Topology, *, priority: int, clock_error_ns: int, now_ns: int, size: int = 0
     ) -> int | None:
-        """The bound for a packet of `size` bytes that is handed over now, if all clocks are within `clock_error_ns`;
-        None if none can be stated. Over a channel that loses frames it holds only for packets that lose no frame.
+        """The bound for a packet of `size` bytes handed over now, clocks within `clock_error_ns`; None if none can be
+        stated. Over a channel that loses frames it holds for packets that lose none.
         """
         if not clocks_fit(self._clock, slack_ns=self._slack_ns, clock_error_ns=clock_error_ns):
             return None
@@ -210,8 +207,8 @@ class DelayLaw:
         return round(found_ns / (1 - urgent))
 
     def over_ns(self, hops: int, *, longest_bytes: int, used: float = 0.0) -> int:
-        """The bound over so many hops if nothing more urgent comes and no frame is lost; `used` is the share of turns
-        that packets fill, none of them longer than `longest_bytes`.
+        """The bound over so many hops if nothing more urgent comes; `used`: share of turns filled, none by over
+        `longest_bytes`.
         """
         return self.way_ns(hops) + round((1 + used) * self._burst_ns / (1 - self._hellos(longest_bytes)))
 
@@ -229,13 +226,9 @@ class DelayLaw:
 
 
 class LikelyDelay:
-    """The delay within which most copies of one node's packets arrive where links lose frames, by how long packets of
-    others took:
-
-        ratio   the delay of a packet that was received, over the hops to its origin, two added, in rounds
-        D       the same hops to the farthest node, in rounds, x the ratio that few packets have exceeded lately
-
-    Links are as lossy one way as the other, so packets take as long to the others as from them.
+    """The delay within which most copies of a node's packets arrive where links lose frames: rounds to the farthest
+    node, two hops added, x the ratio that few packets of others have exceeded lately. Links are as lossy one way as the
+    other, so packets take as long to the others as from them.
     """
 
     def __init__(self) -> None:

@@ -310,10 +310,8 @@ class RoundFlooding(RoutingProtocol):
             self._reach_slot(now_ns, now_ns)
 
     def _send_at_once(self, packet: Packet, now_ns: int) -> None:
-        """A warning contends between the turns, whoever owns the slot, and goes in the turn as well.
-
-        One that is made during the turns begins at a random instant after their end, because all that wait would begin
-        there at once, with bulk.
+        """A warning contends between the turns, whoever owns the slot, and goes in the turn as well. One made during
+        turns begins at random after their end, because all that wait would begin there at once, with bulk.
         """
         spread_ns = int(self._random() * _SPREAD_SLOTS * self._timing.slot_ns)
         wanted_ns = now_ns + self._lead_ns + spread_ns
@@ -324,9 +322,8 @@ class RoundFlooding(RoutingProtocol):
             self._port.transmit_together([packet], flags=FLAG_FLOOD, at_ns=(start_ns,))
 
     def _reach_turn(self, now_ns: int) -> None:
-        """Something waits: the next turn that can still be announced in time is the one to fill.
-
-        A turn for which the node has asked to be woken stays, because a process is woken up to half a lead late.
+        """Something waits: fill the next turn that can be announced in time, or that for which the node asked to be
+        woken, as a process is woken up to half a lead late.
         """
         asked = self._turn_asked and now_ns <= self._turn_ns - self._lead_ns // 2
         if self._turn_ns < now_ns + self._lead_ns and not asked:
@@ -335,7 +332,6 @@ class RoundFlooding(RoutingProtocol):
 
     @property
     def _needs_turn(self) -> bool:
-        """True if something waits for an own turn."""
         return bool(self._spreading.urgent or self._hello is not None or self._held or self._topology.news)
 
     def _fill(self, turn_ns: int, now_ns: int) -> None:
@@ -366,7 +362,6 @@ class RoundFlooding(RoutingProtocol):
             self._port.transmit_together(together, flags=FLAG_FLOOD, at_ns=(turn_ns,))
 
     def _add_hello(self, together: list[Packet]) -> int:
-        """Put the hello into the frame; returns its size."""
         hello, self._hello, self._hello_waits = self._hello, None, 0
         assert hello is not None, "somebody has looked whether there is one"
         together.append(hello)
@@ -423,7 +418,6 @@ class RoundFlooding(RoutingProtocol):
     # --- bulk -----------------------------------------------------------------------------------------------------
 
     def _send_bulk(self, packet: Packet, *, from_ns: int, now_ns: int, tried: int = 0) -> None:
-        """Bulk for one receiver goes one way, if a way is known; all other bulk is flooded from here."""
         one = packet.header.destination != BROADCAST
         if one and self._one_way.send(
             packet, near=self._neighbors(now_ns), from_ns=from_ns, now_ns=now_ns, tried=tried

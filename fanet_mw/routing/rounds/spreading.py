@@ -45,8 +45,6 @@ def _key(packet: Packet) -> int:
 
 
 class _Spread:
-    """A packet, and what is known of it."""
-
     __slots__ = (
         "copy_ns",
         "from_ns",
@@ -101,9 +99,7 @@ class _Spread:
         self.in_reach |= nodes
 
     def dispensable(self) -> tuple[int, bool, int]:
-        """Of two packets the greater one is missed less: it is less urgent, or was sent before, or is the older one of
-        two that were sent, or the newer one of two that were not.
-        """
+        """The greater is missed less: less urgent, or sent, or of sent ones the older, of others the newer."""
         priority, origin_us, _ = self.rank
         return priority, self.sent > 0, -origin_us if self.sent else origin_us
 
@@ -119,10 +115,8 @@ class Spreading:
     def __init__(
         self, node: int, *, capacity: int, repeats: int, patience_ns: int, links: Sequence[int], lossy: bool = False
     ) -> None:
-        """`node`: this node. `capacity`: the most packets that are kept.
-        `patience_ns`: the time after which a neighbor that has received a packet was heard to say so.
-        `links`: the nodes with which each node has links, by its id; they change.
-        `lossy`: the channel loses frames at random, so that not to hear a neighbor shows little.
+        """`patience_ns`: when a neighbor that has a packet was heard to say so. `links`: each node's, which change.
+        `lossy`: frames are lost at random, so that not to hear a neighbor shows little.
         """
         self._node = node
         self._capacity = capacity
@@ -166,9 +160,7 @@ class Spreading:
         return sum(1 for entry in self._bulk.values() if not entry.sent)
 
     def due_bulk(self) -> int:
-        """The number of bulk packets, about, that wait for a slot and that this node is to send before others, or has
-        sent and sends again.
-        """
+        """Bulk packets, about, that wait for a slot, and that this node sends before others, or again."""
         ready = (self._bulk[key] for _, (_, _, key) in self._ready if key in self._bulk)
         return sum(1 for entry in ready if entry.sent or not (entry.again or entry.spare))
 
@@ -184,8 +176,8 @@ class Spreading:
         spare: bool = False,
         once: bool = False,
     ) -> Packet | None:
-        """A new packet, heard from the neighbor `src`; bulk may be sent from an instant on, `spare` bulk if others have
-        not passed it on by then. What is sent `once` is not repeated. Returns a packet that was evicted for it.
+        """A new packet, from the neighbor `src`; bulk from an instant on, `spare` bulk unless others have passed it on
+        by then; `once`: not repeated. Returns a packet that was evicted for it.
         """
         key = _key(packet)
         entry = self._entries[key] = _Spread(packet, src, bulk_from_ns or 0, now_ns)
@@ -245,7 +237,6 @@ class Spreading:
         return again
 
     def on_held(self, keys: Iterable[int], src: int) -> None:
-        """A neighbor says that it holds packets."""
         theirs, early, entries, done = 1 << (src - 1), self._early, self._entries, self._done
         self._vain.pop(src, None)
         for key in keys:
@@ -277,9 +268,7 @@ class Spreading:
     # --- what is sent ---------------------------------------------------------------------------------------------
 
     def wanted(self, neighbors: int, *, start_ns: int, gone: int = 0) -> list[Packet]:
-        """The urgent packets for the turn at `start_ns`, in order; those that nobody lacks are forgotten. For neighbors
-        that are `gone` nothing is sent again.
-        """
+        """The urgent packets for a turn; forgets what nobody lacks, repeats nothing for `gone` ones."""
         patient_ns = start_ns - self._patience_ns
         served = neighbors & ~self._weak & ~self._deaf()
         done = []
@@ -303,7 +292,6 @@ class Spreading:
         return [entry.packet for entry in chosen]
 
     def _again_for(self, nodes: int) -> None:
-        """Something is sent again because these neighbors are not known to have it."""
         for node in nodes_of(nodes & ~self._links[self._node]):
             self._vain[node] = self._vain.get(node, 0) + 1
 
@@ -338,9 +326,7 @@ class Spreading:
         return entry.sent
 
     def take_hasty(self, room: int) -> list[Packet]:
-        """The urgent packets that go in a bulk slot now, the most urgent first, as they fit. They go in the turn as
-        well.
-        """
+        """Urgent packets that go in a bulk slot now, as they fit, most urgent first; they go in the turn as well."""
         taken = []
         for entry in sorted(self._hasty.values(), key=lambda entry: entry.rank):
             if len(entry.packet.frame) <= room:
@@ -361,9 +347,7 @@ class Spreading:
         return fresh
 
     def next_bulk(self, neighbors: int, *, start_ns: int, gone: int = 0) -> Packet | None:
-        """The bulk packet for a frame that starts at `start_ns`, what is new first; what nobody lacks is forgotten. For
-        neighbors that are `gone` nothing is sent again.
-        """
+        """The bulk packet for a frame, new ones first; forgets what nobody lacks, repeats nothing for `gone` ones."""
         while self._due and self._due[0][0] <= start_ns:
             from_ns, key = heappop(self._due)
             entry = self._bulk.get(key)
@@ -395,7 +379,6 @@ class Spreading:
         return entry.sent > self._repeats or (entry.having != 0 and not neighbors & ~entry.having)
 
     def _settle(self, key: int, entry: _Spread) -> None:
-        """A packet need not be sent any more."""
         self._remove(key)
         self._done[key] = entry
         if len(self._done) > _MOST_DONE:

@@ -44,7 +44,6 @@ class Topology:
     """The links of the swarm, as one node knows them. Sets of nodes are integers: bit i stands for node i + 1."""
 
     def __init__(self, node: NodeId, *, count: int, epoch_ns: int, lifetime_ns: int) -> None:
-        """`lifetime_ns`: how long a statement counts."""
         self._node = node
         self._count = count
         self._epoch_ns = epoch_ns
@@ -147,14 +146,12 @@ class Topology:
         self._link_changes += links[node] != before
 
     def _forget(self, node: NodeId) -> None:
-        """What a node has stated is too old."""
         self.changes += 1
         heard = self._stated.pop(node).heard
         self.news.pop(node, None)
         self._relink(node, 0, heard)
 
     def take_news(self, most: int) -> list[HeardNodes]:
-        """What is to be passed on next, at most so many entries."""
         nodes = list(self.news)[:most]
         for node in nodes:
             del self.news[node]
@@ -194,7 +191,6 @@ class Topology:
         return self._hops
 
     def farthest(self, now_ns: int) -> int:
-        """The most hops to any node to which a way is known."""
         self._arrange(now_ns)
         return len(self._rings) - 1
 
@@ -207,9 +203,7 @@ class Topology:
         return self._reached_ns.get(node, 0)
 
     def nearer(self, destination: NodeId) -> int:
-        """The nodes with links to this one from which a node is fewer hops away than from here; none if no way is
-        known.
-        """
+        """Nodes linked to this one that are fewer hops from a node; none if no way is known."""
         if self._nearer_for != self._link_changes:
             self._nearer_for, self._nearer = self._link_changes, {}
         found = self._nearer.get(destination)
@@ -222,21 +216,17 @@ class Topology:
         return next((ring & own for ring in self._rings_from(destination) if ring & own), 0)
 
     def _around(self, nodes: int) -> int:
-        """The nodes with links to some of these."""
         around = 0
         for node in nodes_of(nodes):
             around |= self.links[node]
         return around
 
     def reaches(self, node: NodeId, now_ns: int) -> bool:
-        """True if a way to a node is known."""
         self._arrange(now_ns)
         return node not in self._unreached_ns
 
     def parted(self, now_ns: int, *, without: Collection[int] = ()) -> Sequence[NodeId]:
-        """The nodes to which there was a way, and is none any more. Ways over nodes in `without` do not count, because
-        these are lost and their neighbors have not said so yet.
-        """
+        """Nodes to which there was a way, and is none past those in `without`, lost ones still stated as near."""
         self._arrange(now_ns)
         passed = sum(1 << (node - 1) for node in without)
         if self._parted_for != (self._link_changes, passed):
@@ -273,9 +263,7 @@ class Topology:
         return self._dominates
 
     def absent(self, now_ns: int, *, doubt_ns: int) -> Sequence[NodeId] | None:
-        """The nodes to which there is no way any more, or has been none for longer than `doubt_ns`; None while there is
-        a node to which none has been found yet.
-        """
+        """Nodes without a way, once had or missing for over `doubt_ns`; None while one is yet to be found."""
         self._arrange(now_ns)
         unreached = self._unreached_ns
         if any(since > now_ns - doubt_ns and not self._known >> (node - 1) & 1 for node, since in unreached.items()):

@@ -1,8 +1,4 @@
-"""FANET_BEACON: the part of a hello that states its sender's cluster, role, leader and distance from a head.
-
-Like all messages of this dialect (`fanet_mw.wire`) it is coded by struct. Any bytes decode to a message or to
-MalformedFrameError; values that no node of this project would send are malformed.
-"""
+"""FANET_BEACON: the part of a hello that states its sender's cluster, role, leader and distance from a head."""
 
 from enum import IntEnum
 from typing import NamedTuple, Self

@@ -38,10 +38,7 @@ class Holding(NamedTuple):
     held: int
 
     def beyond(self, other: "Holding | None") -> list[int]:
-        """The packets that this holding has and the other lacks, the newest first.
-
-        Packets before the other's window are included, because it is not known whether the other has them.
-        """
+        """The packets that this has and the other lacks, newest first; those before the other's window, too."""
         mine = self.held << 1 | 1
         if other is not None:
             ahead = (self.newest - other.newest) & _SEQ_MASK
@@ -85,7 +82,6 @@ class Digest:
         return {holding.origin: holding for holding in self.holdings}
 
     def encode_frames(self, node: int) -> bytes:
-        """One message per `CAPACITY` holdings, at least one."""
         chunks = [self.holdings[at : at + CAPACITY] for at in range(0, max(1, len(self.holdings)), CAPACITY)]
         return b"".join(encode_inner(DIGEST, self._payload(chunk), node=node) for chunk in chunks)
 

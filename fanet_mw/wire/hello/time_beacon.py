@@ -1,8 +1,4 @@
-"""FANET_TIME: the swarm time that a node states in its hellos.
-
-Like all messages of this dialect (`fanet_mw.wire`) it is coded by struct. Any bytes decode to a message or to
-MalformedFrameError; values that no node of this project would send are malformed.
-"""
+"""FANET_TIME: the swarm time that a node states in its hellos."""
 
 from typing import NamedTuple, Self
 

@@ -84,9 +84,7 @@ class RowOfPlaces(NamedTuple):
         return range(self.first, self.first + self.size)
 
     def shared(self, vacant: frozenset[int]) -> dict[int, float]:
-        """Where on the row, as a number between those of its places, each UAV that is left flies; none if nobody is
-        lost. The order of places remains.
-        """
+        """Where on the row, between its places' numbers, each UAV left flies, in order; none if nobody is lost."""
         left = [place for place in self.places if place not in vacant]
         if not left or len(left) == self.size:
             return {}
@@ -108,9 +106,7 @@ class RowOfPlaces(NamedTuple):
         return self.size - len(vacant.intersection(self.places))
 
     def nearest(self, place: int, vacant: frozenset[int]) -> tuple[int, float]:
-        """Of those who are left, the place whose UAV flies nearest to a place of the row, and where on the row it
-        flies; the place itself if nobody is left.
-        """
+        """Of those left, the place that flies nearest to a place of the row, and where; itself if none is left."""
         shared = self.shared(vacant)
         flown = [(other, shared.get(other, float(other))) for other in self.places if other not in vacant]
         return min(flown, key=lambda one: (round(abs(one[1] - place), 6), one[0]), default=(place, float(place)))
@@ -196,9 +192,7 @@ class Dimensions(NamedTuple):
         return self.follower(place)[0]
 
     def follower(self, place: int) -> tuple[int, float]:
-        """The team of a follower, and its position along that team, from 0 to 1; the followers of a team are evenly
-        distributed along it, and few of them over many teams.
-        """
+        """The team of a follower, and where along it from 0 to 1: followers are evenly distributed."""
         which = place - self.fixed
         if self.followers <= self.teams > 2:
             return (2 * which + 1) * self.teams // (2 * self.followers), 0.25 + 0.5 * (which % 2)
@@ -224,18 +218,13 @@ def swarm_at(positions: Sequence[Enu], *, reach_m: float) -> Swarm:
 
 
 class Shape(Protocol):
-    """The contract of a shape: the positions of the places of one formation over time.
-
-    `swept_s` is the time since the first sweep began; before 0, all places are where they are at 0.
-    """
+    """The contract of a shape: its places over time. `swept_s`: since the first sweep began; before 0 as at 0."""
 
     _formation: Dimensions
 
     @property
     def sweep_s(self) -> float:
-        """The time from the beginning of a sweep to its turn; for full arms of a spiral, the time in which the arms
-        together fly one turn.
-        """
+        """The time from the beginning of a sweep to its turn; of full arms of a spiral, of one turn together."""
         ...
 
     @property
@@ -252,9 +241,7 @@ class Shape(Protocol):
         return self.at(place, swept_s)
 
     def may_leave(self, place: float, swept_s: float, *, reach_m: float, left: int) -> bool:
-        """True while a UAV of a team at this place may leave it, if those beside it do not, with so many that are left
-        of its row.
-        """
+        """True while a UAV of a team may leave, with so many left of its row, if those beside it do not."""
         return False
 
     def tethers(self, place: int) -> tuple[int, ...]:
@@ -267,15 +254,11 @@ class Shape(Protocol):
         return tuple(RowOfPlaces(team * lanes, lanes, RowKind.SPAN) for team in range(self._formation.teams))
 
     def drawn_in(self, vacant: frozenset[int], hop_m: float) -> "Shape":
-        """The same formation, no larger than the UAVs that are left of each row can span with hops of `hop_m`, where it
-        can be smaller.
-        """
+        """The same formation, where possible no larger than the UAVs left of each row span with hops of `hop_m`."""
         return self
 
     def begun_around(self, swarm: Swarm) -> tuple[Dimensions, ...]:
-        """The dimensions of the same shape that begins where a swarm stands about the middle of the area, rather than
-        draw together first, the largest one first; none if it begins as it is.
-        """
+        """Dimensions of the shape begun where a swarm stands, the largest first; none if it begins as it is."""
         return ()
 
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
@@ -285,9 +268,7 @@ class Shape(Protocol):
 
 
 def shifted_m(swept_s: float, sweep_s: float, *, lane_m: float, speed_m_s: float, faster_back: float = BACK) -> float:
-    """How far to the east of their lanes a team's places are: at each turn at the edge they shift into the middle
-    between lanes, and back at the next one, so that what no camera shows on one sweep is shown on another.
-    """
+    """How far east of their lanes places are: at turns they shift between lanes and back, to show other ground."""
     turn, into_s = divmod(swept_s - sweep_s, sweep_s + TURN_S + sweep_s / faster_back)
     share = min(1.0, into_s / TURN_S)
     most_m = min(lane_m / 2, SHIFT * TURN_S * speed_m_s)
@@ -295,10 +276,7 @@ def shifted_m(swept_s: float, sweep_s: float, *, lane_m: float, speed_m_s: float
 
 
 def swept_m(formation: Dimensions, swept_s: float, *, faster_back: float = BACK, turn_s: float = TURN_S) -> float:
-    """The distance of a line from the middle, or of a sector's team from the side where its sweep begins.
-
-    The team flies out at the speed of the sweep, waits, flies back `faster_back` times as fast, and begins again.
-    """
+    """How far a line has flown from the middle, or a sector's team from its side: out, a wait, `faster_back`, again."""
     if swept_s <= 0:
         return formation.first_m
     out_s = (formation.last_m - formation.first_m) / formation.speed_m_s

@@ -40,7 +40,6 @@ class Fan(Shape):
     """
 
     def __init__(self, formation: Dimensions, *, most_m: float = math.inf) -> None:
-        """`most_m`: the greatest distance from the base that the UAVs that are left can span."""
         self._formation = formation
         self._base = formation.first_m, formation.last_m
         self._corners = _far_sides(formation.half_width_m, self._base)
@@ -73,9 +72,7 @@ class Fan(Shape):
         return Enu(east, north, formation.height_m + FOLLOWER_HIGHER_M)
 
     def _on_front(self, along_m: float, flown_m: float, *, behind_m: float = 0.0) -> tuple[float, float]:
-        """East and north of a UAV on the way from the base to a place that is so far along the far sides, when all have
-        flown so far since the front began to spread.
-        """
+        """East and north of a UAV bound for a place so far along the far sides, so far after the front began."""
         east, north, way_m = self._way(along_m)
         out_m = min(way_m, self._begins * way_m + flown_m, self._most_m)
         share = max(out_m - behind_m, self._begins * way_m / 2) / way_m if behind_m else out_m / way_m
@@ -126,9 +123,7 @@ class Fan(Shape):
 
 
 def _far_sides(half_m: float, base: tuple[float, float]) -> Corners:
-    """The corners of those sides of the square that are turned away from a base outside it, one after the other; none
-    for a base inside, from which all are.
-    """
+    """Corners of the sides of the square turned away from a base outside it, in order; none for one inside."""
     east, north = base
     corners = ((half_m, -half_m), (half_m, half_m), (-half_m, half_m), (-half_m, -half_m))
     away = (east < half_m, north < half_m, east > -half_m, north > -half_m)  # the eastern side first

@@ -93,9 +93,8 @@ class Lines(Shape):
         gaps_m: tuple[float, ...] = (),
         joints: tuple[float, ...] = (),
     ) -> None:
-        """`most_m`: how far from the middle the innermost lines may be for the relays that are left; `gaps_m`: the
-        distances of neighboring lines, from north to south, that those relays can span; `joints`: the lane of each line
-        at which chains end, by default the middle one.
+        """`most_m`: the farthest innermost lines, and `gaps_m`: distances of lines from the north, that the relays left
+        span; `joints`: the lane of each line at which chains end, by default the middle one.
         """
         self._formation = formation
         self._joints = joints or (formation.lanes // 2,) * formation.teams
@@ -187,7 +186,6 @@ class Lines(Shape):
         return tuple(found)
 
     def _joined(self, chain: int) -> tuple[int, ...]:
-        """The places from the middle of a line to that of the next one to the south, over the chain between them."""
         lanes = self._formation.lanes
         middle = chain * lanes + lanes // 2
         return (middle, *self._chains[chain].places, middle + lanes)
@@ -214,8 +212,8 @@ class Lines(Shape):
         return Lines(narrow, most_m=spans_m[self._half - 1] / 2, gaps_m=gaps_m, joints=joints)
 
     def begun_around(self, swarm: Swarm) -> tuple[Dimensions, ...]:
-        """Two lines that begin at most as far out as the swarm stands, the farthest first; none unless the UAVs hear
-        everybody between them. For that UAVs must stand densely, and widely enough for all lanes but the bent ones.
+        """Two lines that begin where the swarm stands or nearer, the farthest first; none unless it stands densely
+        enough to hear everybody between, and widely enough for all lanes but the bent ones.
         """
         made = self._formation
         east_m, west_m, north_m, south_m = swarm.sides_m
@@ -247,11 +245,9 @@ class Lines(Shape):
         return min(self._most_m, swept_m(flown, swept_s, faster_back=self._faster_back))
 
     def _begins_m(self, swept_s: float, lane: float) -> float:
-        """How far from the middle a lane begins this sweep."""
         return self._starts_m(lane) if swept_s <= self.sweep_s else min(FIRST_M, self._formation.first_m)
 
     def _starts_m(self, lane: float) -> float:
-        """How far from the middle a lane begins."""
         first_m = self._formation.first_m
         if not _is_bent(self._formation):
             return first_m
@@ -263,7 +259,6 @@ class Lines(Shape):
         return out_m if line < self._half else -out_m
 
     def _lane(self, lane: float) -> float:
-        """East of a lane [m]."""
         return self._formation.half_width_m * (2 * lane / (self._formation.lanes - 1) - 1)
 
 
@@ -273,9 +268,8 @@ def _is_bent(formation: Dimensions) -> bool:
 
 
 def fitted(count: int, demands: Demands) -> Dimensions | None:
-    """As many lines as this number of UAVs can sweep a square area with in one piece; None if they are too few for two.
-    More lines take less time. Those who are too few to go on to `EDGE_M` turn where all beyond them are heard, and fly
-    so much slower that more UAVs need no more time.
+    """As many lines as can sweep a square area in one piece; None if they are too few for two. Those too few to reach
+    `EDGE_M` turn where all beyond are heard, so much slower that more UAVs need no more time.
     """
     half = demands.area_m / 2
     side = min(_SIDE_M, half / 2)

@@ -50,7 +50,6 @@ class Ring(Shape):
     """The positions of the places of one ring."""
 
     def __init__(self, formation: Dimensions, *, most_m: float = math.inf) -> None:
-        """`most_m`: the greatest half-side that the UAVs that are left can span."""
         self._formation = formation
         self._most_m = most_m
         self._followers = range(formation.fixed, formation.places)
@@ -84,9 +83,7 @@ class Ring(Shape):
         return self.at((place + self._turned(swept_s)) % lanes if place < lanes else place, swept_s)
 
     def _turned(self, swept_s: float) -> float:
-        """By how many places all of the ring have moved along it: at each turn at the edge they move between their
-        ways, as lines do, and back at the next one.
-        """
+        """By how many places all of the ring have moved along it: between their ways at each turn, as lines do."""
         turn, into_s = divmod(swept_s - self.sweep_s, 2 * self.sweep_s + _TURN_S)
         share = min(1.0, into_s / _TURN_S)
         return 0.0 if turn < 0 else (1 - share if turn % 2 else share) / 2

@@ -85,16 +85,12 @@ class Sectors(Shape):
 
 
 def rows_of(teams: int) -> int:
-    """The number of rows for this number of sectors: as many as columns if possible, otherwise the greatest smaller
-    number that divides the number of sectors.
-    """
+    """As many rows as columns if possible, otherwise the greatest smaller divisor."""
     return next(rows for rows in range(math.isqrt(teams), 0, -1) if teams % rows == 0)
 
 
 def fitted(count: int, teams: int, demands: Demands) -> Dimensions | None:
-    """The teams for `teams` sectors of a square area, with all UAVs that are left over as followers; None if the UAVs
-    are too few to span every sector.
-    """
+    """The teams for `teams` sectors, all left over as followers; None if too few to span every sector."""
     rows = rows_of(teams)
     depth_m, width_m = demands.area_m / rows, demands.area_m * rows / teams
     lanes = math.ceil(width_m / demands.apart_m(demands.reach_m))

@@ -87,9 +87,7 @@ class Spiral(Shape):
         return min(max(0.0, turned - 1), self._winds)
 
     def _way_m(self, turned: float) -> float:
-        """An upper bound of the way that the outermost lane has flown after some turns; exact while squares have a
-        constant size.
-        """
+        """An upper bound of the outermost lane's way after some turns; exact while squares have a constant size."""
         wound = self._wound(turned)
         level = turned - wound
         first = min(level, 1.0)
@@ -97,9 +95,7 @@ class Spiral(Shape):
         return 8 * self._outer_m * first + outward + 8 * (self._outer_m + self._pitch_m * wound) * (level - first)
 
     def _turned(self, swept_s: float) -> float:
-        """The turns that have been flown after this time of sweeping. For a winding arm the number grows to the end of
-        its way, falls back to 0 on the way back, and so on.
-        """
+        """Turns flown after this time; of a winding arm they grow to its end, fall to 0 on the way back, and so on."""
         way_m = swept_s * self._formation.speed_m_s
         if not self._winds:
             return way_m / (8 * self._outer_m)
@@ -117,9 +113,7 @@ class Spiral(Shape):
 
 
 def _on_square(turned: float) -> tuple[float, float]:
-    """East and north on the square of half-side 1 after some turns, counterclockwise from the middle of its eastern
-    side.
-    """
+    """East and north on the square of half-side 1 after some turns, counterclockwise from the middle of the east."""
     along = 8 * (turned % 1.0)
     if along < 1:
         return 1.0, along
@@ -131,9 +125,8 @@ def _on_square(turned: float) -> tuple[float, float]:
 
 
 def fitted(count: int, demands: Demands) -> Dimensions:
-    """The spiral for a number of UAVs: as many full arms as there are UAVs for and as have room in the middle, or one
-    winding arm if they are too few for a full one, of as many UAVs as fly it in the shortest time. Those who are left
-    over become followers.
+    """As many full arms as there are UAVs for and as have room in the middle, otherwise one winding arm of as many as
+    fly it in the shortest time. Those who are left over become followers.
     """
     found = (_of(some, demands) for some in range(1, count + 1))
     made = min(found, key=lambda made: Spiral(made).sweep_s)

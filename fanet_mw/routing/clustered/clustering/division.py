@@ -49,18 +49,14 @@ class Division:
         return in_their_slots(fresh, kept, swarm.adjacency)
 
     def _keeps_promise(self, kept: Sequence[Cluster], fresh: int, adjacency: Adjacency) -> bool:
-        """True if the kept clusters are as many as asked for, or, for a method that promises it, all members hear their
-        heads.
-        """
+        """True for as many clusters as asked for, or, if the method promises it, if members hear their heads."""
         if self._count is not None:
             return len(kept) == fresh
         return all(m == cluster.head or m in adjacency[cluster.head] for cluster in kept for m in cluster.members)
 
 
 def cost(clusters: Sequence[Cluster], adjacency: Adjacency, *, fair: int) -> float:
-    """The number of transmissions that bring one packet of each member to its head, plus one per member above the fair
-    share.
-    """
+    """Transmissions that bring each member's packet to its head, plus one per member above the fair share."""
     total = 0
     for cluster in clusters:
         total += _distance(cluster.head, cluster.members, adjacency) + max(0, len(cluster.members) - fair)
@@ -68,9 +64,7 @@ def cost(clusters: Sequence[Cluster], adjacency: Adjacency, *, fair: int) -> flo
 
 
 def _distance(head: NodeId, members: Sequence[NodeId], adjacency: Adjacency) -> int:
-    """The hops from members to their heads, summed; a member that cannot reach its head counts as many as there are
-    nodes.
-    """
+    """Hops from members to their heads, summed; one that cannot reach its head counts as many as there are nodes."""
     hops = levels(adjacency, head)
     return sum(hops.get(member, len(adjacency)) for member in members)
 
@@ -118,10 +112,7 @@ def _nearest_to_all(members: Sequence[NodeId], adjacency: Adjacency) -> NodeId:
 
 
 def in_their_slots(fresh: Sequence[Cluster], kept: Sequence[Cluster], adjacency: Adjacency) -> list[Cluster]:
-    """The new clusters, each in the slot that its head had before.
-
-    A former head is kept if it is nearly as near to the members as the new head would be.
-    """
+    """The new clusters, each in its head's former slot; a former head is kept if nearly as near to the members."""
     slot_of = {cluster.head: slot for slot, cluster in enumerate(kept)}
     slots: dict[int, Cluster] = {}
     rest = []

@@ -5,10 +5,7 @@ from fanet_mw.units import NodeId
 
 
 def succession(cluster: Cluster, swarm: Swarm) -> tuple[NodeId, ...]:
-    """The head, and then the members in the order in which they stand in for it.
-
-    Members that hear the head come first, because they notice when it is gone.
-    """
+    """The head, then its stand-ins in order: members that hear the head first, as they notice when it is gone."""
     near, inside = frozenset(swarm.adjacency[cluster.head]), frozenset(cluster.members)
 
     def rank(node: NodeId) -> tuple[bool, int, NodeId]:

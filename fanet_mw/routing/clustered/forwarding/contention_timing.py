@@ -29,10 +29,8 @@ class ContentionTiming:
         """The airtime of this node's data in windows, by the starts of their superframes."""
 
     def start_ns(self, *, due_ns: int, now_ns: int, jitter_ns: int = 0) -> int:
-        """The earliest start of a frame that was to be announced at `due_ns`, with a jitter of up to `jitter_ns`.
-
-        A process that is woken late loses that much of the lead: the instants that nodes have drawn, so as not to send
-        at the same time, stay apart although the hosts of all of them may wake them together.
+        """The earliest start of a frame that was to be announced at `due_ns`, with a jitter up to `jitter_ns`. A
+        process woken late loses that much of the lead, so that instants drawn apart stay apart.
         """
         if self.most_jitter_ns is not None:
             jitter_ns = min(jitter_ns, self.most_jitter_ns)
@@ -45,9 +43,7 @@ class ContentionTiming:
         return start_ns if turns is None else turns.contending_ns(start_ns, self._window)
 
     def ends_ns(self, start_ns: int, access_ns: int) -> int:
-        """The instant from which a frame that may start at `start_ns`, and takes `access_ns` at an idle medium, can no
-        longer end within its contention window; 0 if that instant lies in no window.
-        """
+        """When a frame of `access_ns` that may start at `start_ns` can no longer end in its window; 0 if in none."""
         turns = self._turns(start_ns)
         if turns is None:
             return 0

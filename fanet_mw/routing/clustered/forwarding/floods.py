@@ -50,8 +50,8 @@ class Floods:
         return packet
 
     def contend_again(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
-        """Transmit a packet that a neighbor has missed, which was due at `due_ns`, as soon as it may contend, unless
-        the window is full: a neighbor that lacks it still will say so again.
+        """Transmit again a packet that was due at `due_ns` as soon as it may contend; with a full window wait to be
+        asked again.
         """
         if not self._goes_on(packet):  # a packet that goes no farther needs no instant
             return
@@ -73,9 +73,7 @@ class Floods:
     def begin(
         self, packets: Sequence[Packet], *, start_ns: int, again_ns: Sequence[int] = (), flags: int = FLAG_FLOOD
     ) -> None:
-        """Begin the floods of several packets in one frame, which is transmitted at `start_ns` and repeated at later
-        instants.
-        """
+        """Begin floods in one frame at `start_ns`, repeated at later instants."""
         for packet in packets:
             self.keep(packet, flooded=True, now_ns=start_ns)
         self._port.transmit_together(packets, flags=flags, at_ns=(start_ns, *again_ns))

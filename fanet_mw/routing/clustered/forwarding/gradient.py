@@ -47,22 +47,18 @@ class Gradient:
         state a dead head changes nothing here."""
 
     def join(self, head: NodeId, *, now_ns: int) -> None:
-        """Follow the head that the schedule gives, which may be this node itself; a route to another head is only
-        second best.
-        """
+        """Follow the head that the schedule gives, perhaps this node; a route to another is only second best."""
         if head == self._own_head:
             return
         self._own_head = head
         self._route = RouteToHead(head, self._seq, 0, self._node, now_ns) if head == self._node else None
 
     def advance(self, now_ns: int) -> None:
-        """Advance the head's own sequence number, once per hello."""
         if self._own_head == self._node:
             self._seq = following(self._seq, bits=_SEQ_BITS)
             self._route = RouteToHead(self._node, self._seq, 0, self._node, now_ns)
 
     def on_hello(self, neighbor: Neighbor, *, now_ns: int) -> None:
-        """A neighbor's hello was received, which may state a better route."""
         beacon = neighbor.beacon
         if self._own_head == self._node:
             return  # this node is a head itself
@@ -79,10 +75,7 @@ class Gradient:
             self._route = offered
 
     def _heard(self, head: int, seq: int, now_ns: int) -> int:
-        """Note that a head's sequence number is at least `seq`; returns the instant since which this is known.
-
-        The same number from another neighbor is not fresher.
-        """
+        """A head's sequence number is `seq` at least, not fresher if it comes again; returns since when it is known."""
         known = self._news.get(head)
         forgotten = known is None or known[1] + _FORGET * self._stale_ns < now_ns
         if known is None or forgotten or newer(seq, known[0], bits=_SEQ_BITS):

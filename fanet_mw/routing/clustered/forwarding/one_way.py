@@ -56,9 +56,7 @@ class OneWay:
         takes: Callable[[Packet], bool] = lambda _: True,
         not_before: Callable[[int], int] = lambda start_ns: start_ns,
     ) -> None:
-        """`takes`: which packets for one node go hop by hop, the same at all nodes; others are flooded.
-        `not_before`: the earliest start of a frame that is due.
-        """
+        """`takes`: which packets go hop by hop, alike at all nodes. `not_before`: the earliest start of a due frame."""
         self._port = port
         self._neighbors = neighbors
         self._not_before = not_before
@@ -72,7 +70,6 @@ class OneWay:
         return len(self._under_way)
 
     def learn(self, header: Header, neighbor: NodeId) -> None:
-        """The first copy of a packet has come over this neighbor."""
         origin, born_us = NodeId(header.origin), header.origin_us
         known = self._ways.get(origin)
         if known is None or born_us > known.born_us or (born_us == known.born_us and header.hops < known.hops):
@@ -84,9 +81,7 @@ class OneWay:
         return header.destination != BROADCAST and header.kind == Kind.DATA and self._takes(packet)
 
     def must_show(self, header: Header, *, now_ns: int) -> bool:
-        """True if the node has to flood a word of itself, because a packet that should have gone hop by hop, for it
-        alone, was flooded over other nodes.
-        """
+        """True if the node must flood a word of itself: a packet for it alone was flooded that should go hop by hop."""
         ours = header.destination == self._port.node and header.hops > 0
         if not ours or now_ns < self._shown_ns + _SHOW_NS:
             return False
@@ -106,9 +101,7 @@ class OneWay:
         return True
 
     def failed(self, status: TxStatus) -> Packet | None:
-        """A transmission has ended; returns the packet, to be sent another way, if it was one of these and has not
-        arrived.
-        """
+        """A transmission has ended; returns the packet, to go another way, if it was one of these and failed."""
         attempt = self._under_way.pop(status.seq, None)
         if attempt is None or status.outcome is TxOutcome.ACKED:
             return None

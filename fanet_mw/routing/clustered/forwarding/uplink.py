@@ -48,7 +48,6 @@ class Uplink:
         return len(self._held) + len(self._under_way)
 
     def send(self, packet: Packet, *, start_ns: int, now_ns: int, tries: int) -> None:
-        """Send a packet to the parent, or hold it until there is a route."""
         route = self._gradient.route(now_ns=now_ns)
         if route is None:
             self._hold(packet, now_ns=now_ns)
@@ -76,7 +75,6 @@ class Uplink:
         return self.drain() if len(self._held) and self._gradient.route(now_ns=now_ns) is not None else []
 
     def expire(self, *, now_ns: int) -> None:
-        """Drop held packets whose lifetime is over."""
         if not len(self._held):
             return  # as at most wake-ups
         for packet in self._held.expire(before_us=(now_ns - self._lifetime_ns) // US):

@@ -95,10 +95,7 @@ class HeardLoads:
     def worth_a_change(
         self, before: Mapping[NodeId, int], now: Mapping[NodeId, int], *, period_ns: int, now_ns: int
     ) -> bool:
-        """True if loads have differed for some time so much that a timetable made for `before` should be replaced.
-
-        `period_ns` is the length of a superframe.
-        """
+        """True if loads have long differed enough from `before` to replace its timetable; `period_ns`: a superframe."""
         if not self._differ(before, now, period_ns):
             self._asked_ns = None
             return False
@@ -118,17 +115,12 @@ class HeardLoads:
 
 
 def packets(load: int, *, within_ns: int, interval_s: float) -> float:
-    """The number of packets that a node with this load sends within a duration.
-
-    `interval_s` is the packet interval of the scenario, which applies if the load is `AS_EXPECTED`.
-    """
+    """Packets of a node with this load within a duration; `interval_s` applies if the load is `AS_EXPECTED`."""
     return within_ns / seconds_to_ns(interval_s) if load == AS_EXPECTED else load * within_ns / PER_NS
 
 
 def stated_loads(scenario: Scenario) -> Mapping[NodeId, int]:
-    """The least load for each node whose traffic the scenario states to be none, because all its classes name their
-    sources and it is not among them.
-    """
+    """The least load for each node without traffic in the scenario, all of whose classes name other sources."""
     named: set[int] = set()
     for traffic in scenario.traffic_classes.values():
         if traffic.arrivals == "none":

@@ -43,14 +43,12 @@ class LinkQuality:
         self._told: dict[NodeId, float] = {}
 
     def hello_share(self, *, now_ns: int) -> float:
-        """The share of the hello interval after which the next hello should be sent."""
         return 1.0 if self.has_estimate(now_ns=now_ns) else 1 / FAST
 
     def start(self, now_ns: int) -> None:
         self._start_ns = now_ns
 
     def on_hello(self, neighbor: NodeId, *, rssi_dbm: float, now_ns: int) -> None:
-        """A neighbor's hello was received."""
         self._heard.setdefault(neighbor, deque()).append((now_ns, rssi_dbm))
 
     def links(self, *, now_ns: int) -> tuple[Link, ...]:
@@ -79,7 +77,6 @@ class LinkQuality:
         return (len(heard) + 0.5) / (max(due, len(heard)) + 1)
 
     def has_estimate(self, *, now_ns: int) -> bool:
-        """True once some hellos of each neighbor should have arrived."""
         return now_ns - self._start_ns >= FIRST * self._hello_ns
 
     def tell(self, *, now_ns: int) -> tuple[Link, ...]:

@@ -24,9 +24,7 @@ class Rule(Protocol):
     """The packets about which it is not decided yet whether they are relayed."""
 
     def relays_now(self, packet: Packet, *, now_ns: int) -> bool:
-        """A new packet was received; returns True if it is relayed now, False if it is not relayed or if that is still
-        open.
-        """
+        """True if a new packet is relayed now; False if it is not, or if that is still open."""
 
 
 class RelayAll:

@@ -102,9 +102,7 @@ class AssignedRoles:
             self._do(actions, now_ns)
 
     def on_control(self, packet: Packet, src: NodeId, *, now_ns: int) -> bool:
-        """A flooded control packet; True if every node must pass it on at once. Raises MalformedFrameError for content
-        that no node of this swarm sends.
-        """
+        """A flooded control packet; True if all must pass it on at once. Raises MalformedFrameError for nonsense."""
         kind, ours = packet.header.kind, packet.header.origin == self._port.node
         if kind == Kind.JOIN:
             join = decoded(packet.frame, Join.decode_frame)
@@ -161,10 +159,7 @@ class AssignedRoles:
         self._timetabling.on_schedule(packet, schedule, details, now_ns=now_ns)
 
     def on_impersonation(self, packet: Packet, *, now_ns: int) -> None:
-        """A schedule was received in the name of this node, which this node has not made: announce a later one.
-
-        OSPF answers forged link states in the same way (RFC 2328, 13.4).
-        """
+        """A schedule in this node's name that it has not made: announce a later one, as OSPF does (RFC 2328, 13.4)."""
         if packet.header.kind == Kind.SCHEDULE and self._leader is not None:
             schedule = decoded(packet.frame, Schedule.decode_frame)
             self.parts.check.check(schedule, now_ns)
@@ -264,9 +259,7 @@ class AssignedRoles:
             self._report_silent_neighbor(parts.detector, now_ns)
 
     def _report_silent_neighbor(self, detector: NeighborFailureDetector, now_ns: int) -> None:
-        """Flood a report that a neighbor has fallen silent; the leader receives it, and so does a neighbor that
-        lives.
-        """
+        """Flood a report of a silent neighbor, for the leader and for that neighbor, if it lives."""
         silent = detector.find_suspect(self.parts.membership.lists, now_ns=now_ns)
         if silent is None:
             return

@@ -69,20 +69,16 @@ class NoTimetable:
     def read(self, packet: Packet, schedule: Schedule) -> PartDetails | None:
         return None
 
-    def on_schedule(self, packet: Packet, schedule: Schedule, details: PartDetails | None, *, now_ns: int) -> None:
-        """Nothing is done: the roles use all that is in the schedule."""
+    def on_schedule(self, packet: Packet, schedule: Schedule, details: PartDetails | None, *, now_ns: int) -> None: ...
 
-    def on_links(self, packet: Packet, *, now_ns: int) -> None:
-        """Nothing is done: links are of no use without a timetable."""
+    def on_links(self, packet: Packet, *, now_ns: int) -> None: ...
 
-    def review(self, now_ns: int) -> None:
-        """Nothing is done: there is no timetable to give up."""
+    def review(self, now_ns: int) -> None: ...
 
     def must_show(self, now_ns: int) -> bool:
         return False
 
-    def on_called_silent(self, now_ns: int) -> None:
-        """Nothing is done: without a timetable nothing is promised."""
+    def on_called_silent(self, now_ns: int) -> None: ...
 
     def notice_ns(self, now_ns: int) -> int:
         return 0

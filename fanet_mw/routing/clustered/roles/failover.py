@@ -141,7 +141,6 @@ class Failover:
         return [self._take(Event.HEAD_BACK, now_ns)] if replaced else []
 
     def on_unreachable(self, node: NodeId, *, now_ns: int) -> None:
-        """The MAC has failed to reach this neighbor."""
         if node == self._membership.head and self.state is State.MEMBER:
             self._detector.on_unreachable(now_ns)
             self._watch_ns = now_ns

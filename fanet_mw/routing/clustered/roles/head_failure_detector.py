@@ -34,13 +34,10 @@ class HeadFailureDetector:
         """The instant at which the MAC last failed to reach the head."""
 
     def on_unreachable(self, now_ns: int) -> None:
-        """The MAC has failed to reach the head."""
         self._unreachable_ns = now_ns
 
     def silent_from_ns(self, head: NodeId, *, since_ns: int, before: int) -> int | None:
-        """The instant from which the head is silent to a member with `before` members between the head and itself in
-        the succession, if nothing is heard until then. None if the member has had no news of the head since `since_ns`.
-        """
+        """When the head is silent to a member with `before` members ahead of it; None without news since `since_ns`."""
         news_ns = self._gradient.news_ns(head)
         if news_ns is None or news_ns < since_ns:
             return None

@@ -56,11 +56,9 @@ class Joining:
             self.due_ns = now_ns + int(self._random() * _WINDOW_NS)
 
     def on_links_announced(self) -> None:
-        """The leader makes timetables from measured links, so it has received the links of most nodes."""
         self._links_are_announced = True
 
     def rest(self) -> None:
-        """The node has a place, or leads, so it does not ask for one any more."""
         self.due_ns = None
 
     def on_flooding(self, due_ns: int) -> None:
@@ -68,9 +66,7 @@ class Joining:
         self._updates.on_flooding(due_ns)
 
     def update_if_outdated(self, *, listed: int, now_ns: int) -> None:
-        """Plan a join if the leader must be told something new; `listed` nodes may all have to do so at the
-        same time.
-        """
+        """Plan a join if the leader must be told something new; `listed` nodes may have to at the same time."""
         if self.due_ns is None and (
             self._updates.outdated(self._port.position, now_ns=now_ns)
             or (self._links is not None and self._must_tell(self._links, now_ns))
@@ -84,9 +80,7 @@ class Joining:
         return self._updates.may_update(now_ns) and (not self._links_are_announced or links.outdated(now_ns=now_ns))
 
     def join(self, *, instead_of: int, again: bool, now_ns: int) -> bytes:
-        """The inner frames of a join that is sent now; with `again`, another one follows if no schedule names
-        the node.
-        """
+        """The inner frames of a join sent now; `again`: another one follows if no schedule names the node."""
         self.due_ns = now_ns + _REJOIN_NS + int(self._random() * _WINDOW_NS) if again else None
         motion = self.motion(now_ns)
         self._updates.on_update(motion)
@@ -97,5 +91,4 @@ class Joining:
         return inner + Links(node, links).encode_frames() if links else inner
 
     def motion(self, now_ns: int) -> Motion:
-        """The node's own motion now."""
         return Motion(self._port.position, self._port.velocity, now_ns)

@@ -105,10 +105,8 @@ class Leader:
         elected: bool,
         now_ns: int,
     ) -> None:
-        """`measured_period_ns`: the interval of announcements with measured links, one superframe;
-        `needs_every_link`: nodes compute a timetable from the assignment, so a new one is also needed when links
-        change; `heard`: the measured loads for which the timetable is made; None if it is made
-        for the loads that the scenario states.
+        """`measured_period_ns`: the interval of announcements with measured links; `needs_every_link`: a change of
+        links needs a new timetable; `heard`: measured loads, None: those that the scenario states.
         """
         clusters = scenario.clusters
         self._authority = authority
@@ -146,9 +144,7 @@ class Leader:
         self._roster.own.add(here)
 
     def on_join(self, join: Join, here: Motion, *, born_ns: int, now_ns: int) -> None:
-        """A node has joined, or stands in for a head. The leader itself is in no cluster (paper, 4.1), and flies as
-        `here` states.
-        """
+        """A node has joined, or stands in for a head; the leader, at `here`, is in no cluster (paper, 4.1)."""
         self.fly(here)
         node, silent = NodeId(join.node), NodeId(join.instead_of)
         if node == self._authority.leader:
@@ -180,9 +176,7 @@ class Leader:
             self._due_ns = min(self._due_ns, now_ns + SETTLE_NS)
 
     def on_suspicion(self, silent: NodeId, by: NodeId, there: Motion, *, now_ns: int) -> None:
-        """The node `by`, which flies at `there`, reports that the node `silent` is silent; that node has some time to
-        object.
-        """
+        """The node `by`, at `there`, reports that `silent` is silent, which has some time to object."""
         until_ns = self._roster.on_report(silent, by, there, now_ns=now_ns)
         if until_ns is not None:
             self._due_ns = min(self._due_ns, max(until_ns, now_ns))
@@ -193,10 +187,8 @@ class Leader:
     def wake(
         self, here: Motion, *, notice_ns: int = 0, lost_ns: Mapping[NodeId, int] = NO_SILENCE, now_ns: int
     ) -> Sequence[Schedule]:
-        """The parts of the schedule to announce now; `here` is the leader's own motion.
-
-        A new schedule comes into force `notice_ns` later at the earliest, and only when all nodes should have received
-        it. The nodes in `lost_ns` are lost after such a silence.
+        """The parts of the schedule to announce now. A new one comes into force in `notice_ns` at the earliest, once
+        all nodes should have it; nodes in `lost_ns` are lost after such a silence. `here`: the leader's motion.
         """
         if now_ns < self._due_ns:
             return []
@@ -249,7 +241,6 @@ class Leader:
         self._assigned = _Assigned(ordered, places, links, start_ns, self._parts(ordered, start_ns), measured, loads)
 
     def _loads(self, now_ns: int) -> Mapping[NodeId, int]:
-        """The loads of the nodes that have joined; empty if loads are not heard."""
         heard = self._estimates.loads
         return {} if heard is None else heard.loads(sorted(self._roster.nodes), now_ns=now_ns)
 
@@ -263,9 +254,7 @@ class Leader:
         return heard.worth_a_change(before.loads, loads, period_ns=period_ns, now_ns=now_ns)
 
     def _measured(self) -> tuple[Link, ...]:
-        """The measured links to plan with, or none until most nodes have reported; the others' links are known from
-        neighbors.
-        """
+        """Measured links to plan with; none until most nodes have reported, the others' being known from neighbors."""
         if self._estimates.links is None:
             return ()
         nodes = [*self._roster.nodes, NodeId(self._authority.leader)]
@@ -310,18 +299,14 @@ class Leader:
 
     @property
     def links(self) -> tuple[Link, ...]:
-        """The measured links of the present assignment."""
         return self._assigned.measured
 
     @property
     def epoch(self) -> int:
-        """The number of the present assignment."""
         return self._epoch
 
     def place(self, node: int) -> Enu:
-        """The position that the present assignment assumes for a member, or for the leader itself."""
         return self._assigned.places[NodeId(node)]
 
     def load(self, node: int) -> int:
-        """The load that the present assignment assumes for a member."""
         return self._assigned.loads.get(NodeId(node), AS_EXPECTED)

@@ -29,7 +29,6 @@ _FOREVER_NS: Final = 1 << 62
 
 
 def silence_ns(period_ns: int) -> int:
-    """The age of the newest announcement at which a leader is given up: four flooding periods, and at least 4 s."""
     return max(_PERIODS * period_ns, _LEAST_NS)
 
 
@@ -54,22 +53,17 @@ class Lease:
         """The instant at which the node next checks whether it must take office."""
 
     def start(self, now_ns: int) -> None:
-        """The node has started, has heard of no leader yet, and waits for one."""
         self._until_ns = self.stand_ns = now_ns + _FIRST_NS + self._silence_ns
 
     @property
     def leads(self) -> bool:
-        """True if this node is the leader."""
         return self.authority is not None and self.authority.leader == self._node
 
     def valid(self, now_ns: int) -> bool:
-        """True while the leader's newest announcement is within the silence limit."""
         return self.authority is not None and now_ns <= self._until_ns
 
     def fresh(self, now_ns: int) -> bool:
-        """True while the newest announcement is within half the silence limit. Otherwise the node asks its neighbors
-        for a newer one, so that a lost announcement does not end the lease.
-        """
+        """True within half the silence limit; otherwise the node asks its neighbors for a newer announcement."""
         return self.authority is not None and now_ns <= self._until_ns - self._silence_ns // 2
 
     def accept(self, authority: Authority, *, born_ns: int, now_ns: int) -> bool:
@@ -85,16 +79,13 @@ class Lease:
         return True
 
     def take_office(self, now_ns: int) -> Authority:
-        """Become the leader."""
         self.authority = Authority(now_ns // S, self._node)
         self._until_ns = _FOREVER_NS
         return self.authority
 
     def review(self, now_ns: int) -> bool:
-        """True if this node must take office now: the leader is silent, and no live node with a lower id has taken
-        office in time.
-
-        Otherwise the next check is set after the turns of those nodes.
+        """True if this node must take office: the leader is silent, and no live node with a lower id has taken it in
+        time. Otherwise the next check is set after the turns of those nodes.
         """
         if now_ns < self.stand_ns:
             return False

@@ -14,7 +14,6 @@ class Liveness:
         self._born_ns: dict[int, int] = {}
 
     def on_sign_of_life(self, node: int, *, born_ns: int) -> None:
-        """A packet was received that a node generated at `born_ns`."""
         if born_ns > self._born_ns.get(node, -1):
             self._born_ns[node] = born_ns
 

@@ -75,7 +75,6 @@ class Membership:
 
     @property
     def head(self) -> NodeId:
-        """The node that serves this node's cluster now: the head that the schedule names, or its stand-in."""
         return self.place.head
 
     @property
@@ -88,7 +87,6 @@ class Membership:
 
     @property
     def slot(self) -> int:
-        """The slot of this node's cluster: cluster k has slot k."""
         return self.cluster
 
     @property
@@ -119,14 +117,10 @@ class Membership:
         return {NodeId(m[0].node): tuple(NodeId(one.node) for one in m) for m in in_order if m[0].is_head}
 
     def rank(self, node: int) -> int | None:
-        """The position of a node in the succession of this node's cluster; None if it is not in this cluster."""
         return self.succession.index(NodeId(node)) if node in self.succession else None
 
     def learn(self, schedule: Schedule, *, guard_ns: int) -> Event | None:
-        """Take in one part of a schedule; returns the event that follows for this node's role, once per version.
-
-        The role changes only with `obey`.
-        """
+        """Take in a part of a schedule; returns this node's event, once per version. The role changes with `obey`."""
         version = Version(Authority(schedule.term, schedule.leader), schedule.epoch)
         if version != self.version:
             if self.version and version.authority == self.version.authority and not newer(version, self.version):

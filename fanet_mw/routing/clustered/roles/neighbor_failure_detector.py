@@ -35,7 +35,6 @@ class NeighborFailureDetector:
         """The instant from which the node may report again."""
 
     def on_hello(self, node: NodeId, *, now_ns: int) -> None:
-        """A hello of a neighbor was received."""
         self._heard_ns[node] = now_ns
         self._reported_ns.pop(node, None)
 
@@ -45,10 +44,8 @@ class NeighborFailureDetector:
             self._reported_ns[node] = now_ns
 
     def find_suspect(self, lists: Callable[[NodeId], bool], *, now_ns: int) -> NodeId | None:
-        """A neighbor that this node reports now, or None. `lists` tells whether the schedule names a node.
-
-        Of several, the one that was not reported for the longest time goes first. Neighbors that no longer count are
-        forgotten.
+        """The neighbor to report now, of several the one not reported for longest, or None. `lists` tells whether the
+        schedule names a node; neighbors that no longer count are forgotten.
         """
         for node in sorted(self._heard_ns, key=lambda node: (self._reported_ns.get(node, 0), node)):
             quiet_ns = now_ns - self._heard_ns[node]

@@ -30,17 +30,13 @@ _A_LITTLE_NS: Final = 2 * S
 
 
 def lost_ns(scenario: Scenario) -> int:
-    """The time without a sign of life after which the leader forgets a node: two updates, each due after 20 s without a
-    flood, and a margin.
-    """
+    """The silence after which the leader forgets a node: two updates, each due after 20 s, and a margin."""
     return 2 * (_QUIET_NS + _update_ns(scenario)) + _A_LITTLE_NS
 
 
 def settled_ns(scenario: Scenario) -> int:
-    """The time after which the leader has been told of a turn that all nodes made together.
-
-    Until then it believes that some have turned and others have not, and so that the swarm falls apart. Each notices
-    when it has strayed, and updates at most once per `_LEAST_NS`.
+    """When the leader has been told of a turn that all made together, each as it strayed, once per `_LEAST_NS`; until
+    then it believes the swarm to fall apart.
     """
     speed_m_s = max(scenario.mobility.speed_m_s, 1.0)
     straying_ns = round(STRAYED * (scenario.clusters.link_m or scenario.radio.range_m) / speed_m_s * S)
@@ -64,12 +60,10 @@ class PositionUpdates:
         """The instant of the node's latest flood."""
 
     def on_update(self, motion: Motion) -> None:
-        """The node has sent a join that states this motion."""
         self._told = motion
         self._flooded_ns = motion.at_ns
 
     def on_flooding(self, now_ns: int) -> None:
-        """A packet of this node will be flooded to all nodes, which is a sign of life."""
         self._flooded_ns = now_ns
 
     def may_update(self, now_ns: int) -> bool:
@@ -77,7 +71,6 @@ class PositionUpdates:
         return self._told is None or now_ns - self._told.at_ns >= _LEAST_NS
 
     def outdated(self, position: Enu, *, now_ns: int) -> bool:
-        """True if the node must and may send an update now; never before its first join."""
         if self._told is None or not self.may_update(now_ns):
             return False
         off_m = position.minus(self._told.position_at(now_ns)).norm()

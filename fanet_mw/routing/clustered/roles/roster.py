@@ -36,9 +36,7 @@ _SURE: Final = 0.9
 
 
 class _SilentNode(NamedTuple):
-    """A report that a node is silent. If the silent node is a head, the reporting node serves its cluster in the
-    meantime.
-    """
+    """A report that a node is silent; if it is a head, the reporting node serves its cluster meanwhile."""
 
     by: NodeId
     since_ns: int
@@ -60,7 +58,6 @@ class OwnFlight:
         self._flown: deque[Motion] = deque()
 
     def add(self, here: Motion) -> None:
-        """The leader's motion now."""
         if not self._flown or here.at_ns >= self._flown[-1].at_ns + _SAMPLE_NS:
             self._flown.append(here)
         while self._flown[0].at_ns < here.at_ns - _FLOWN_NS:
@@ -100,12 +97,9 @@ class Roster:
         settled_ns: int,
         rigid: bool = False,
     ) -> None:
-        """A node is forgotten `lost_ns` after its last sign of life, or `objection_ns` after it was reported silent.
-
-        `sure_m`: a report counts only if the reported node was all the time within this distance of the reporting one,
-        so that they should have heard each other; None means that every report counts.
-        `settled_ns`: the time after which all updates about one turn have come.
-        `rigid`: the nodes fly as one formation, in which no distance changes.
+        """A node is forgotten `lost_ns` after its last sign of life, or `objection_ns` after it was reported silent, if
+        it was always within `sure_m` of the reporting one (None: anyway). `settled_ns`: when all updates about one turn
+        have come; `rigid`: no distance in the formation changes.
         """
         self.own = OwnFlight()
         self._settled_ns = settled_ns
@@ -131,21 +125,16 @@ class Roster:
         return {silent: self._reports[silent].by for silent in sorted(self._reports)}
 
     def is_news(self, node: NodeId, born_ns: int) -> bool:
-        """True if nothing generated at this instant or later is known of a node."""
         known = self._joined.get(node)
         return known is None or known.motion.at_ns < born_ns
 
     def on_join(self, node: NodeId, motion: Motion) -> None:
-        """A node was at a position with a velocity at an instant (`motion`)."""
         beside = self.own.at(motion.at_ns)
         along = beside is not None and (self._rigid or alike(motion, beside))
         self._joined[node] = _Joined(motion, beside if along else None)
 
     def on_report(self, silent: NodeId, by: NodeId, there: Motion, *, now_ns: int) -> int | None:
-        """The node `by`, which flies at `there`, reports that a node is silent.
-
-        Returns the instant until which that node may object; None if the report does not count.
-        """
+        """`by`, at `there`, reports a silent node. Returns until when that may object; None if it does not count."""
         if silent not in self._joined or not self._was_near(silent, there):
             return None
         known = self._reports.get(silent, _SilentNode(by, now_ns, there.at_ns))
@@ -153,9 +142,7 @@ class Roster:
         return known.since_ns + self._objection_ns
 
     def _was_near(self, node: NodeId, there: Motion) -> bool:
-        """True if the reported node was near the reporting one all the time; a node that has flown away is not
-        silent.
-        """
+        """True if the reported node was near all the time: one that has flown away is not silent."""
         if self._sure_m is None:
             return True
         known = self._joined[node].motion
@@ -163,9 +150,7 @@ class Roster:
         return max(known.position_at(t_ns).minus(there.position_at(t_ns)).norm() for t_ns in instants) <= self._sure_m
 
     def forget(self, now_ns: int, *, lost_ns: Mapping[NodeId, int] = NO_SILENCE) -> None:
-        """Forget nodes that have given no sign of life for too long, or that were reported and have not objected in
-        time. Too long is what two position updates take, or less for the nodes in `lost_ns`.
-        """
+        """Forget nodes silent for two position updates, or less (`lost_ns`), and reported ones without an objection."""
         for node in sorted(self._joined):
             last_ns = max(self._liveness.last_ns(node) or 0, self._joined[node].motion.at_ns)
             report = self._reports.get(node)
@@ -178,7 +163,6 @@ class Roster:
                 del self._joined[node]
 
     def forget_reports(self) -> None:
-        """Forget reports about nodes that are no longer known, because an assignment without them has been made."""
         self._reports = {silent: report for silent, report in self._reports.items() if silent in self._joined}
 
     def places(self, t_ns: int, *, now_ns: int) -> dict[NodeId, Enu]:
@@ -187,7 +171,6 @@ class Roster:
         return {node: self._place(node, here, t_ns, now_ns) for node in sorted(self._joined)}
 
     def _place(self, node: NodeId, here: Motion | None, t_ns: int, now_ns: int) -> Enu:
-        """`here`: the leader's own motion now."""
         motion, beside = self._joined[node]
         straight = motion.position_at(t_ns)
         if beside is None or here is None:
@@ -208,10 +191,8 @@ class Roster:
         return any(now_ns - turned_ns <= self._settled_ns for turned_ns in turns_ns)
 
     def velocities(self) -> Mapping[NodeId, Enu]:
-        """The velocities of the nodes [m/s], by id."""
         return {node: self._joined[node].motion.velocity for node in sorted(self._joined)}
 
 
 def sure_m(range_m: float) -> float:
-    """The distance within which two nodes certainly hear each other."""
     return _SURE * range_m

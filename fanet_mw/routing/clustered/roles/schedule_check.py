@@ -29,11 +29,9 @@ class ScheduleCheck:
         """The instant at which this node last began to follow another schedule."""
 
     def on_new_schedule(self, now_ns: int) -> None:
-        """The node has begun to follow another schedule."""
         self._renewed_ns = now_ns
 
     def check(self, schedule: Schedule, now_ns: int) -> None:
-        """Raise MalformedFrameError for a schedule that no leader would announce."""
         scenario, epoch = self._port.scenario, schedule.epoch
         period_ns = scenario.clusters.period_ns
         period_us, slot_us = period_ns // US, period_ns // schedule.clusters // US

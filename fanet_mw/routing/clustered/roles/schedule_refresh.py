@@ -51,7 +51,6 @@ class ScheduleRefresh:
             self._plan(now_ns + int(self._random() * ASSESS_NS))
 
     def _plan(self, due_ns: int | None) -> None:
-        """Plan to flood all packets of the schedule at this instant; None cancels the plan."""
         self.due_ns = due_ns
         self.pending.clear()
         if due_ns is not None:

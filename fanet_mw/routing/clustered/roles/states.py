@@ -97,7 +97,6 @@ TRANSITIONS: Final[Mapping[tuple[State, Event], Row]] = {
 
 
 def step(state: State, event: Event) -> Row:
-    """The row of the table for an event; it exists whatever was received from other nodes."""
     row = TRANSITIONS.get((state, event))
     assert row is not None, f"{state} has no transition for: {event}"
     return row

@@ -38,8 +38,7 @@ class SlotAccess:
         self._tenure: Tenure | None = None
         """The slot of this node, or the one that it had when it last was head; None if it has never been head."""
 
-    def start(self, now_ns: int) -> None:
-        """The node has started, and nothing waits."""
+    def start(self, now_ns: int) -> None: ...
 
     def admit(self, packet: Packet, *, due_ns: int) -> bool:
         return True
@@ -57,7 +56,6 @@ class SlotAccess:
             self._uplink.send(packet, start_ns=start_ns, now_ns=now_ns, tries=tries)
 
     def enqueue(self, packet: Packet, *, now_ns: int) -> None:
-        """Queue a packet for the slot of this head."""
         assert self._tenure is not None, "a node queues packets only once it has become head"
         evicted = self._release.push(packet, self._tenure, now_ns=now_ns)
         if evicted is not None:
@@ -88,7 +86,6 @@ class SlotAccess:
             self.enqueue(packet, now_ns=now_ns)
 
     def arm(self, now_ns: int) -> None:
-        """Plan the release of the queued packets in the slot that the schedule gives to this head."""
         self.renew_slot()
         assert self._tenure is not None, "the slot was renewed just now"
         self._release.arm(self._tenure, now_ns=now_ns)

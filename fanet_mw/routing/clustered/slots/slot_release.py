@@ -66,7 +66,6 @@ class SlotRelease:
         return self._queue.drain()
 
     def arm(self, tenure: Tenure, *, now_ns: int) -> None:
-        """Find the first instant at which a packet may be released."""
         if not len(self._queue):
             self._next_ns = None
             return

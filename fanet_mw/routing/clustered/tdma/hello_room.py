@@ -36,7 +36,7 @@ def crowd(adjacency: Adjacency) -> int:
 
 
 def hellos_ns(scenario: Scenario, nodes: int) -> int:
-    """The airtime of the hellos of one superframe, one a node at most, of so many nodes within two hops."""
+    """The airtime of a superframe's hellos, one a node at most, of so many nodes within two hops."""
     every_ns, period_ns = seconds_to_ns(scenario.routing.hello_interval_s), scenario.clusters.period_ns
     if not every_ns:
         return 0
@@ -44,5 +44,4 @@ def hellos_ns(scenario: Scenario, nodes: int) -> int:
 
 
 def least_ms(needed_ns: int) -> int:
-    """The length of the shortest contention window, in whole milliseconds, that has room for these hellos."""
     return math.ceil(max(needed_ns / _MOST, needed_ns / _BACKLOG + TAIL_NS) / MS)

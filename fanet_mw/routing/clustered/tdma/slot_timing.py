@@ -49,7 +49,6 @@ class Superframe(NamedTuple):
         return Slot(start_ns, start_ns + usable_ns)
 
     def report(self) -> Mapping[str, object]:
-        """The geometry as JSON values; cluster k has slot k."""
         return {
             "start_ms": self.origin_ns / MS,
             "period_ms": self.period_ns / MS,

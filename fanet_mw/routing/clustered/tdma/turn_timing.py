@@ -38,26 +38,20 @@ class Turns(NamedTuple):
     """The number of turns in a superframe."""
 
     def superframe_start_ns(self, t_ns: int) -> int:
-        """The beginning of the superframe in which an instant lies."""
         return t_ns - (t_ns - self.origin_ns) % self.period_ns
 
     def start_ns(self, offset: int, *, superframe_start_ns: int) -> int:
-        """The start of turn number `offset`, counted from the beginning of a superframe; it may lie in a later
-        superframe.
-        """
+        """The start of turn `offset` of a superframe; it may lie in a later one."""
         later, turn = divmod(offset, self.per_superframe)
         return superframe_start_ns + later * self.period_ns + self.contention_ns + turn * self.turn_ns
 
     def turn_at(self, t_ns: int) -> int | None:
-        """The turn in which an instant lies; None in the contention window and in the rest."""
         phase_ns = (t_ns - self.origin_ns) % self.period_ns - self.contention_ns
         turn = phase_ns // self.turn_ns
         return turn if phase_ns >= 0 and turn < self.per_superframe else None
 
     def next_start_ns(self, offsets: Sequence[int], *, not_before_ns: int) -> int:
-        """The first start, at or after an instant, of a turn with one of these offsets (ascending, in every
-        superframe).
-        """
+        """The first start, from an instant on, of a turn with one of these offsets (ascending)."""
         first_ns = self.superframe_start_ns(not_before_ns)
         for superframe_start_ns in (first_ns, first_ns + self.period_ns):
             for offset in offsets:
@@ -67,9 +61,7 @@ class Turns(NamedTuple):
         raise AssertionError("offsets are turns of one superframe, so one of the next lies ahead")
 
     def contending_ns(self, start_ns: int, random: Callable[[], float]) -> int:
-        """The instant from which a frame that is due at `start_ns` may contend: `start_ns` itself if that lies in a
-        contention window, but not in its last part, otherwise a random instant of the next window.
-        """
+        """When a frame due at `start_ns` may contend: then, but not late in a window, or at random in the next."""
         open_ns = max(1, self.contention_ns - TAIL_NS)
         superframe_ns = self.superframe_start_ns(start_ns)
         if start_ns - superframe_ns < open_ns:
@@ -77,20 +69,15 @@ class Turns(NamedTuple):
         return superframe_ns + self.period_ns + int(random() * open_ns)
 
     def worst_ns(self, roots: Sequence[int], *, span: int, interval_ns: int, together: int = 1) -> int | None:
-        """A bound of the delay of one node's packets, from their generation until all nodes have them.
-
-        `roots` are the turns in which the node transmits its own packets, up to `together` of them in each; its packets
-        are generated at least `interval_ns` apart. None if more packets are generated than the turns can carry. The
-        bound and what it assumes are in `fanet_mw/bounds/timetable_flood.py`.
+        """A bound of the delay of packets `interval_ns` apart, from generation until all nodes have them, or None if
+        too many; `together` go in each turn of `roots` (`fanet_mw/bounds/timetable_flood.py`).
         """
         return timetable_flood.worst_ns(
             self.done_ns(roots, span=span), period_ns=self.period_ns, interval_ns=interval_ns, together=together
         )
 
     def done_ns(self, roots: Sequence[int], *, span: int) -> list[int]:
-        """For n = 1 up to the number of `roots`: the longest time from just after any of these turns until all nodes
-        have the packets that the n-th of these turns after it carries.
-        """
+        """For each n: the longest time from just after one of `roots` until all have the n-th one's packets."""
         starts = [self.start_ns(offset, superframe_start_ns=0) for offset in roots]
         floods = [self.flood_ns(offset, span=span) for offset in roots]
         return timetable_flood.done_ns(starts, floods, period_ns=self.period_ns)
@@ -101,7 +88,6 @@ class Turns(NamedTuple):
         return last_ns + self.turn_ns - self.start_ns(offset, superframe_start_ns=0)
 
     def report(self) -> Mapping[str, object]:
-        """The geometry as JSON values."""
         return {
             "start_ms": self.origin_ns / MS,
             "period_ms": self.period_ns / MS,
@@ -111,21 +97,15 @@ class Turns(NamedTuple):
 
 
 def turn_slack_ns(scenario: Scenario) -> int:
-    """The part of a turn that is left after DIFS, the longest backoff and the largest frame; it also limits how far two
-    clocks may be apart.
-    """
+    """What a turn has beyond DIFS, the longest backoff and the largest frame; limits how far clocks may be apart."""
     return round(scenario.clusters.turn_slack_us * US)
 
 
 def turn_ns(scenario: Scenario, *, payload_bytes: int) -> int:
-    """The length of a turn whose largest frame has this size. The slack is for propagation, detection and errors of
-    clocks.
-    """
+    """The length of a turn for such a frame, with slack for propagation, detection and errors of clocks."""
     return longest_access_ns(payload_bytes, scenario.radio) + turn_slack_ns(scenario)
 
 
 def receipt_ns(scenario: Scenario) -> int:
-    """The longest time from the end of a frame until the application has it: the handover of the reception to the
-    process, and one lead, because the process may wake up to one lead late.
-    """
+    """From a frame's end until the application has it: the handover, and one lead, as a process may wake so late."""
     return scenario.radio.handover_ns + scenario.radio.lead_ns

@@ -49,13 +49,10 @@ class Admission:
         self._expected_ns = now_ns + self._expected_after_ns
 
     def next_wake_ns(self) -> int | None:
-        """The instant at which to record that there is still no bound; None if that is recorded, or if there was a
-        bound.
-        """
+        """When to record that there is still no bound; None if that is done, or there was one."""
         return self._expected_ns
 
     def wake(self, now_ns: int) -> DeadlineLost | None:
-        """The record that is due now, if any."""
         if self._expected_ns is None or now_ns < self._expected_ns:
             return None
         self._expected_ns, self._met = None, False
@@ -63,13 +60,10 @@ class Admission:
 
     @property
     def interval_ns(self) -> int:
-        """The least interval between accepted packets."""
         return max(self._interval_ns, self._least_ns)
 
     def follow(self, own: RootTurns | None, *, now_ns: int) -> DeadlineMet | DeadlineLost | None:
-        """Take over the bound of a new timetable; None if it gives this node no bound. Returns a record if the answer
-        has changed.
-        """
+        """Take over a new timetable's bound, or None; returns a record if the answer has changed."""
         least_ns = None if own is None else least_interval_ns(own, deadline_ns=self._deadline_ns - _TOLERANCE_NS)
         self._least_ns = least_ns or (0 if own is None else carried_interval_ns(own))
         bound_ns = own and own.worst_ns(interval_ns=self.interval_ns)
@@ -83,9 +77,7 @@ class Admission:
         return record(now_ns, self._node, bound_ns or 0, self._deadline_ns, self.interval_ns)
 
     def admit(self, born_ns: int) -> bool:
-        """True if a packet generated at this instant is accepted; False if it follows too closely on the last accepted
-        one.
-        """
+        """True if a packet generated now is accepted; False if it follows too closely on the last accepted one."""
         if self._next_ns is not None and born_ns < self._next_ns - _TOLERANCE_NS:
             return False
         start_ns = born_ns if self._next_ns is None else max(born_ns, self._next_ns)
@@ -99,10 +91,8 @@ def carried_interval_ns(own: RootTurns) -> int:
 
 
 def least_interval_ns(own: RootTurns, *, deadline_ns: int) -> int | None:
-    """The shortest interval at which all nodes have each packet within the deadline; None if there is none.
-
-    In a busy period, the packets that the q-th turn lets out came at least (q - 1) `together` intervals after its start
-    (`Turns.worst_ns`).
+    """The shortest interval at which all have each packet in time, or None: in a busy period, the packets of the q-th
+    turn came at least (q - 1) `together` intervals after its start (`Turns.worst_ns`).
     """
     first_ns, *later_ns = (ns + own.around_ns for ns in own.turns.done_ns(own.roots, span=own.span))
     if first_ns > deadline_ns:

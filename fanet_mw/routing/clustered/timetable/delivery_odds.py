@@ -42,9 +42,7 @@ class Odds(NamedTuple):
         return fsum(row[0] for row in self.missed.values()) / len(self.missed)
 
     def rounds(self, root: NodeId, *, missed: float) -> int | None:
-        """The number of rounds of repair after which at most this share is missing; None if no simulated round achieves
-        it.
-        """
+        """Rounds of repair after which at most this share is missing; None if no simulated one achieves it."""
         return next((count for count, share in enumerate(self.missed[root]) if share <= missed), None)
 
 
@@ -127,11 +125,7 @@ class _Draw:
         self._bits = stream(0, "odds", 0).getrandbits
 
     def bits(self, chance: int) -> int:
-        """Draw one bit for each trial.
-
-        The digits of the probability are taken from the last to the first: a 1 combines the result with fresh random
-        bits by OR, a 0 by AND.
-        """
+        """One bit for each trial, from the probability's digits, last to first: a 1 is OR with fresh bits, a 0 AND."""
         found = 0
         for digit in range(_DIGITS):
             drawn = self._bits(_TRIALS)

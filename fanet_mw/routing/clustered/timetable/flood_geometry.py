@@ -68,11 +68,8 @@ AnyFlood = TypeVar("AnyFlood", bound=Placed)
 def turn_by_turn(
     floods: Sequence[AnyFlood], *, turns: int, window: int, pace: float
 ) -> Iterator[tuple[int, int, dict[int, AnyFlood]]]:
-    """Iterate over the turns until all floods are scheduled: the offset, the number of floods that have begun, and
-    those under way.
-
-    The caller fills each turn, and removes completed floods from those under way. Floods begin evenly over the first
-    share `pace` of the `turns`, with at most `window` of them under way.
+    """The turns until all floods are scheduled: offset, how many have begun, and those under way, from which the caller
+    removes completed ones. They begin evenly over the share `pace` of `turns`, at most `window` at once.
     """
     count, begun, offset = len(floods), 0, 0
     under_way: dict[int, AnyFlood] = {}

@@ -49,9 +49,7 @@ class InterferenceByDistance:
         return self._parts[root]
 
     def way(self, node: NodeId, head: NodeId) -> list[int]:
-        """The rows of a shortest way to the head, both ends included, the lowest rows first among equals. It is empty
-        for a head, and for a node without a head.
-        """
+        """Rows of a shortest way to the head, ends included, lowest first among equals; empty for or without a head."""
         start, end = self.nodes.row[node], self.nodes.row.get(head)
         if end is None or start == end:
             return []
@@ -79,8 +77,8 @@ class InterferenceByPower:
     def __init__(
         self, positions: Sequence[tuple[NodeId, Enu]], geometry: Geometry, measured: Sequence[Link], *, margin_db: float
     ) -> None:
-        """`geometry.interference_m` holds for pairs that do not receive each other at all, and for a link that is
-        `margin_db` stronger than the weakest. A greater margin keeps senders of the same turn farther apart.
+        """`interference_m`: for pairs that do not receive each other, and links `margin_db` over the weakest; a greater
+        margin keeps senders of a turn farther apart.
         """
         self.nodes = NodeRows(node for node, _ in positions)
         row = self.nodes.row
@@ -108,9 +106,7 @@ class InterferenceByPower:
         return found
 
     def _connected(self, known: Sequence[Link]) -> tuple[list[int], float]:
-        """The best links that keep the swarm as connected as it is, and the least share of frames that arrives over
-        them.
-        """
+        """The best links that keep the swarm as connected as it is, and the least share of frames over them."""
         choices = [(self._links(known, least=least), least) for least in _CHANCES]
         whole = [reach(choices[-1][0], row)[0] for row in range(len(self.nodes.ids))]
         for hears, least in choices:

@@ -20,13 +20,10 @@ _BUSY: Final = 2
 def likely_delay_ns(
     timetable: NodeTimetable, node: NodeId, *, waiting: int, interval_ns: int, hello_ns: int
 ) -> int | None:
-    """The time within which `LIKELY_SHARE` of the copies of a node's packets arrive; None if fewer than that ever do.
-
-    The wait for a turn is the longest that can occur, or the wait of the last of `waiting` packets if that is longer,
-    as after several joins; one more join may take a turn of the node when a link has changed. After the flood come as
-    many rounds of repair as needed. In each round the hello is as late as it may be and waits for a turn, and the
-    answer may wait for the next turn but one. Since the odds do not include everything, they account for only half of
-    the copies that may be missing.
+    """When `LIKELY_SHARE` of the copies of a node's packets have arrived; None if fewer ever do. The longest wait for a
+    turn (of the last of `waiting`, with one more join), the flood, and rounds of repair, in each of which the hello is
+    as late as it may be, and the answer may wait for the turn after next; the odds account for half of the missing
+    copies.
     """
     turns, span = timetable.turns, timetable.table.spans[node]
     assert timetable.odds is not None, "whoever asks has a timetable for lossy links"

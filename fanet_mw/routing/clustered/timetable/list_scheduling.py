@@ -126,7 +126,6 @@ class Packing:
         self._filled = [_EMPTY] * geometry.turns
 
     def place(self, floods: Sequence[Flood]) -> bool:
-        """Schedule all floods; returns False if there are not enough turns."""
         turns, count = self._turns, len(floods)
         hops = max((flood.hops for flood in floods), default=0)
         # besides the window, the floods that wait for the next hop because relaying takes several turns
@@ -166,9 +165,7 @@ class Packing:
                 del under_way[-number]
 
     def spare(self, hears: Sequence[int]) -> list[list[int]]:
-        """For each row, the turns in which it reaches all its neighbors without disturbing a flood; the row with fewest
-        so far chooses first.
-        """
+        """For each row, turns that reach all neighbors and disturb no flood; who has fewest chooses first."""
         found: list[list[int]] = [[] for _ in hears]
         for turn in range(self._turns):
             wanted = ((-len(turns), -row, row, hears[row]) for row, turns in enumerate(found) if hears[row])
@@ -212,9 +209,7 @@ class Packing:
         return [offers[index] for _, index in sorted(keyed, reverse=True)]
 
     def _choose(self, offers: Sequence[_Offer], there: _FilledTurn, following: int) -> _Choice:
-        """Take transmissions in order, each if it disturbs none taken before; no receiver gets the
-        same packet twice.
-        """
+        """Take transmissions in order, if they disturb none taken; no receiver gets the same packet twice."""
         sending, meant, disturbed, deaf = there
         disturbs = self._disturbs
         chosen: list[_Offer] = []

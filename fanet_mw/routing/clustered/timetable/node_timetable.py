@@ -82,5 +82,4 @@ class NodeTimetable(NamedTuple):
         return node in self.table.spans
 
     def report(self) -> Mapping[str, object]:
-        """The geometry, and the turns in which this node transmits new packets, as JSON values."""
         return {**self.turns.report(), "own": list(self.roots)}

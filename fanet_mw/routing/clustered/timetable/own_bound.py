@@ -50,9 +50,7 @@ class RootTurns(NamedTuple):
         return None if worst_ns is None else worst_ns + self.around_ns
 
     def burst_ns(self, *, per_turn: int) -> int:
-        """The bound of a packet that finds fewer than `BURST` of its class waiting, if each turn transmits `per_turn`
-        of them.
-        """
+        """The bound of a packet that finds fewer than `BURST` of its class, when each turn sends `per_turn` of them."""
         needed = -(-BURST // per_turn)
         done_ns = self.turns.done_ns(self.roots, span=self.span)
         periods, last = divmod(needed - 1, len(done_ns))

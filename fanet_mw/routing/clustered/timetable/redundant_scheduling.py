@@ -88,7 +88,6 @@ class Wave:
         return gain + (ONLY if network.hears[other] & self._has == 1 << row else 0)
 
     def send(self, offset: int, row: int, receivers: Sequence[int], *, hop_turns: int) -> None:
-        """A row transmits in a turn, and these receivers get one more copy."""
         self.sent.append((offset, row))
         for other in receivers:
             missing = self._missing[other] = self._missing.get(other, self._enough) - self._network.dose[row, other]
@@ -99,9 +98,7 @@ class Wave:
 
 
 class _RepeatingTurn(NamedTuple):
-    """The content of a turn as bit sets: the rows that transmit, must not transmit, and may be deaf for a while after
-    it.
-    """
+    """The rows that transmit, must not transmit, and may be deaf for a while after a turn, as bit sets."""
 
     sending: int = 0
     barred: int = 0
@@ -120,7 +117,6 @@ class RedundantPacking:
         self._filled = [_RepeatingTurn()] * geometry.turns
 
     def place(self, waves: Sequence[Wave]) -> bool:
-        """Schedule all waves; returns False if there are not enough turns."""
         turns, count = self._turns, len(waves)
         for offset, begun, under_way in turn_by_turn(waves, turns=turns, window=WINDOW, pace=self._pace):
             unbegun = begun < count or any(not wave.sent for wave in under_way.values())

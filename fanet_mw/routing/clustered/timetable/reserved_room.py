@@ -27,9 +27,7 @@ def bulk_report_bytes(scenario: Scenario) -> int:
 
 
 def reserved(scenario: Scenario) -> Mapping[int, int]:
-    """The number of bytes of each turn that bulk must leave free, by priority: one packet of each urgent class
-    in use.
-    """
+    """Bytes of each turn that bulk must leave free, by priority: one packet of each urgent class in use."""
     mission = scenario.mission
     found = {}
     if mission.collision_horizon_s:

@@ -30,9 +30,7 @@ class ResumedFloods:
         """The packets that are sent again, by the starts of their turns."""
 
     def take(self, start_ns: int, *, heard_ns: int) -> bool:
-        """Use one of the node's turns to relay what a frame held that ended at an instant; False if the contents of
-        another frame were announced for the turn.
-        """
+        """Use a turn for what a frame held that ended then; False if another frame's contents were announced for it."""
         while self._taken and (first_ns := next(iter(self._taken))) < heard_ns:
             del self._taken[first_ns]  # it is over
         return self._taken.setdefault(start_ns, heard_ns) == heard_ns

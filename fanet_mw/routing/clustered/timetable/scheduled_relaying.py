@@ -56,8 +56,7 @@ class ScheduledRelaying:
         self._missed = 0
         """The number of packets that arrived only after the node's turn to relay them had begun."""
 
-    def start(self, now_ns: int) -> None:
-        """The node has started; no packet is known yet."""
+    def start(self, now_ns: int) -> None: ...
 
     def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[Relay]:
         timetable = self._timetables.at(reception.end_ns)
@@ -89,9 +88,8 @@ class ScheduledRelaying:
     def _late(
         self, packet: Packet, timetable: NodeTimetable, reception: Reception
     ) -> tuple[tuple[int, NodeId, int], int] | None:
-        """The flood of a frame that ended after its turn, and an instant in that turn; None if it is of no flood.
-
-        Over lossy links a late frame may as well be an answer to a neighbor.
+        """The flood of a frame that ended after its turn, and an instant in that turn; None if it is of no flood, as
+        over lossy links, where it may be an answer to a neighbor.
         """
         turns = timetable.turns
         for instant_ns in range(
@@ -113,9 +111,7 @@ class ScheduledRelaying:
         end_ns: int,
         now_ns: int,
     ) -> Sequence[Relay]:
-        """The relays of this flood in those turns of the node that are still to come; `heard_ns` lies in the turn of
-        the sender, and the reception ended at `end_ns`.
-        """
+        """The relays of this flood in turns to come; `heard_ns`: in the sender's turn, `end_ns`: of the reception."""
         offset, root, instance = heard
         if packet.header.origin == root and packet.header.flags & FLAG_TURN:
             self._followers.hear(timetable.version, root, now_ns=now_ns)
@@ -152,5 +148,4 @@ class ScheduledRelaying:
 
 
 def _is_of(packet: Packet, heard: tuple[int, NodeId, int], timetable: NodeTimetable) -> bool:
-    """True if a packet may be of a flood that this node hears in some turn."""
     return not timetable.whole or packet.header.origin == heard[1] or not timetable.has_turns(packet.origin)

@@ -80,7 +80,6 @@ class StatedDelays:
         """The instant of the latest known announcement of the timetable that the node follows."""
 
     def start(self, now_ns: int) -> None:
-        """The node has started, and has no bound yet."""
         if self._admission is not None:
             self._admission.start(now_ns)
 
@@ -121,9 +120,7 @@ class StatedDelays:
         return self._own_of(self._port.node, timetable)
 
     def _ends_early(self, timetable: NodeTimetable) -> bool:
-        """True if the hop limit ends the node's floods before they are with all nodes, some of which the leader may not
-        know because their joins end as early.
-        """
+        """True if the hop limit ends floods too early, perhaps for nodes whose joins never reached the leader."""
         scenario, hops = self._port.scenario, timetable.table.hops
         limit = scenario.routing.hop_limit
         incomplete = len(timetable.table.spans) < scenario.node_count
@@ -155,9 +152,8 @@ class StatedDelays:
         return max((self._ahead_ns(timetable) for timetable in in_force), default=0)
 
     def _ahead_ns(self, timetable: NodeTimetable) -> int:
-        """How long before the end of this timetable that end must be announced.
-
-        All nodes know of it after a superframe and a flood; until then they may promise what must be over by that end.
+        """How long before a timetable's end that must be announced: all know of it after a superframe and a flood;
+        until then they may promise what must be over by that end.
         """
         if self._ahead is None or self._ahead[0] is not timetable:
             roots = {turn.root for turn in timetable.table.roots()} if timetable.whole else set()
@@ -173,9 +169,7 @@ class StatedDelays:
     # --- packets --------------------------------------------------------------------------------------------------
 
     def admit(self, packet: Packet, *, due_ns: int) -> bool:
-        """Admission control of an own application's packet: False if it would harm the deadline of
-        packets before it.
-        """
+        """Admission control of an own application's packet: False if it would harm the deadline of others."""
         policed = self._admission if packet.header.priority == PRIORITY_BULK else None
         return policed is None or policed.admit(due_ns)
 
@@ -192,14 +186,12 @@ class StatedDelays:
         )
 
     def lost_ns(self, now_ns: int) -> Mapping[NodeId, int]:
-        """The silence after which each node is lost that was not heard in its turns for so long; empty as long as not
-        all need have shown that they keep the timetable.
-        """
+        """After which silence in its turns each node is lost; empty until all have to keep the timetable."""
         return self._silences(_LOST, now_ns)
 
     def _silences(self, times: int, now_ns: int) -> Mapping[NodeId, int]:
-        """The nodes that were not heard in their turns for so many superframes or hello intervals, and that time; empty
-        until the timetable has been in force for as long, and over links that lose frames.
+        """Nodes not heard in their turns for so many superframes or hello intervals, and that time; none until the
+        timetable has been in force for as long, and over lossy links.
         """
         timetable = self._timetables.at(now_ns)
         if timetable is None or not timetable.whole or timetable.odds is not None:
@@ -218,9 +210,7 @@ class StatedDelays:
         self._followers.doubt(now_ns)
 
     def greatest_bound_ns(self, packet: Packet, *, now_ns: int) -> int | None:
-        """The greatest bound of this packet's class by the timetables in force; None if one of them
-        gives it no bound.
-        """
+        """The greatest bound of this packet's class by the timetables in force; None if one gives none."""
         priority = packet.header.priority
         bounds = [bounds_ns.get(priority) for _, bounds_ns in self._bounds_ns[self._timetables.superseded(now_ns) :]]
         known = [bound_ns for bound_ns in bounds if bound_ns is not None]
@@ -260,9 +250,7 @@ class StatedDelays:
             self._exclude([newest], packet, now_ns)
 
     def _exclude(self, timetables: Sequence[NodeTimetable], packet: Packet, now_ns: int) -> None:
-        """What was stated of a packet is not meant for nodes that one of these timetables lacks: no turn is sure to
-        reach who has not joined, or is gone.
-        """
+        """What was stated is not meant for nodes that one of these timetables lacks: no turn surely reaches them."""
         for other in self._port.scenario.node_ids:
             if any(other not in one.table.spans for one in timetables):
                 self._port.record(BoundExcludes(now_ns, self._port.node, packet.header.seq, other))
@@ -273,14 +261,11 @@ class StatedDelays:
         return max((through_ns for through_ns, _ in self._promised.values()), default=0)
 
     def _forget_overdue(self, now_ns: int) -> None:
-        """Forget the oldest promises, whose packets have expired or were evicted from a full queue."""
         while self._promised and self._promised[oldest := next(iter(self._promised))][1] < now_ns:
             del self._promised[oldest]
 
     def keeps(self, packet: Packet, *, through_ns: int | None) -> bool:
-        """True if no bound is broken by a packet that leaves the queue now, because its flood is over in time or
-        because no bound was stated for it. `through_ns` is the end of the flood; None if it is not known.
-        """
+        """True if letting a packet out breaks no bound: its flood ends (`through_ns`) in time, or none was stated."""
         if packet.header.origin != self._port.node:
             return True
         _, due_ns = self._promised.pop(packet.header.seq, (0, None))
@@ -298,9 +283,7 @@ class StatedDelays:
             self._port.record(lost)
 
     def bound_ns(self) -> int | None:
-        """The bound of the node's bulk packets, from application to application, by the newest timetable that all are
-        known to keep; None if there is none.
-        """
+        """The bound of bulk packets, application to application, by the newest timetable that all keep; or None."""
         if self._lease.leads or not self._in_step():
             return None
         for timetable, bounds_ns in reversed(self._bounds_ns):
@@ -309,16 +292,12 @@ class StatedDelays:
         return None
 
     def least_interval_ns(self, deadline_ns: int) -> int | None:
-        """The least interval between packets of the node that meets a deadline; None if none does, or if there is no
-        bound.
-        """
+        """The least interval between packets that meets a deadline; None if none does, or without a bound."""
         own = self.own()
         return None if own is None or self.bound_ns() is None else least_interval_ns(own, deadline_ns=deadline_ns)
 
     def likely_ns(self) -> int | None:
-        """The time within which `LIKELY_SHARE` of the nodes in the timetable have this node's newest packet over lossy
-        links; None if it is not known.
-        """
+        """When `LIKELY_SHARE` of the nodes have this node's newest packet over lossy links; None if unknown."""
         timetable = self._timetables.newest
         if timetable is None or timetable.odds is None or not timetable.roots:
             return None
@@ -345,7 +324,6 @@ class StatedDelays:
         return clocks_fit(scenario.clock, slack_ns=turn_slack_ns(scenario), clock_error_ns=self._port.clock_error_ns)
 
     def report(self) -> Mapping[str, object]:
-        """The likely delay, and the bounds that this node states, as JSON values."""
         bound_ns, likely_ns = self.bound_ns(), self.likely_ns()
         bounds_ns = self._bounds_ns[-1][1] if self._bounds_ns else {}
         return {

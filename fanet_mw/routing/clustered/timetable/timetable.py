@@ -89,11 +89,9 @@ def timetable(
     effort: Effort = PLAIN,
     blocks: int = 1,
 ) -> Timetable | None:
-    """The timetable; None if there are not enough turns. `roots` has one entry per packet and block, in any order.
-
-    `positions` [m] are in ascending order of ids. `heads` has (node, its head) for nodes that are no heads; the flood
-    of such a node goes to its head first, on a shortest way, and spreads from there. With several `blocks` the
-    superframe is divided into equal parts, of which only one is computed; floods that outlast it continue in the next.
+    """The timetable; None if there are not enough turns. `roots` has one entry per packet and block; `heads`: (node,
+    its head), to which the flood of that node goes first, on a shortest way. Of several `blocks`, equal parts of the
+    superframe, one is computed; floods that outlast it continue in the next.
     """
     whole, geometry = geometry.turns, geometry._replace(turns=geometry.turns // blocks)
     if not geometry.turns:
@@ -139,11 +137,9 @@ def redundant_timetable(
     margin_db: float,
     pace: float = 1.0,
 ) -> tuple[Timetable, Odds] | None:
-    """The timetable for lossy links, and its odds; None if there are not enough turns.
-
-    Each node gets as many copies of each packet as needed so that all of them are lost with a probability of at most
-    `epsilon`, provided that their senders have the packet. Each node has `calls` turns in which all its neighbors can
-    receive it. A greater `margin_db` keeps nodes that transmit in the same turn farther apart.
+    """The timetable for lossy links, and its odds; None if there are not enough turns. Copies of each packet suffice
+    that all are lost with `epsilon` at most; each node has `calls` turns in which all neighbors receive it; a greater
+    `margin_db` keeps senders of a turn farther apart.
     """
     if not geometry.turns:
         return None
@@ -178,16 +174,13 @@ def redundant_timetable(
 def _uncovered(
     nodes: NodeRows, ordered: Sequence[tuple[NodeId, int]], floods: Sequence[Flood | Wave]
 ) -> dict[NodeId, tuple[NodeId, ...]]:
-    """For each root, the nodes that none of its floods can reach."""
     return {root: nodes.of(nodes.everyone & ~flood.goal) for flood, (root, _) in zip(floods, ordered, strict=True)}
 
 
 def _hops(
     nodes: NodeRows, hears: Sequence[int], ordered: Sequence[tuple[NodeId, int]], floods: Sequence[Flood | Wave]
 ) -> dict[NodeId, int]:
-    """The greatest number of hops of the floods of each root. A relay counts on from the first copy that it hears,
-    which need not have come over the fewest hops.
-    """
+    """The most hops of each root's floods; a relay counts on from the first copy that it hears."""
     found: dict[NodeId, int] = {}
     for flood, (root, _) in zip(floods, ordered, strict=True):
         start = nodes.row[root]
@@ -211,10 +204,7 @@ def _interleaved(floods: Sequence[Wave], calls: Sequence[Wave]) -> list[Wave]:
 
 
 def _in_order(roots: Sequence[NodeId], positions: Mapping[NodeId, Enu]) -> list[tuple[NodeId, int]]:
-    """(root, instance) in the order in which the floods begin; the packets of each root are evenly spread.
-
-    Floods that begin far from each other can be under way together, so near and far roots take turns.
-    """
+    """(root, instance) in the order of beginning: each root's packets evenly spread, near and far roots in turns."""
     ordered = sorted(set(roots), key=lambda node: (positions[node].east, positions[node].north, node))
     half = (len(ordered) + 1) // 2
     near, far = ordered[:half], ordered[half:]
@@ -233,9 +223,7 @@ def _in_order(roots: Sequence[NodeId], positions: Mapping[NodeId, Enu]) -> list[
 def _repeated(
     block: Sequence[Turn], count: Mapping[NodeId, int], length: int, blocks: int, whole: int
 ) -> tuple[Turn, ...]:
-    """The superframe of `whole` turns, made of repeated blocks; what outlasts the last block continues in the next
-    superframe.
-    """
+    """The superframe of `whole` turns, of repeated blocks; what outlasts the last continues in the next superframe."""
     rest = whole - length * blocks
     turns = [
         turn._replace(offset=turn.offset + index * length, instance=turn.instance + index * count[turn.root])

@@ -22,7 +22,6 @@ class TimetablesInForce:
         return None
 
     def turns_at(self, t_ns: int) -> Turns | None:
-        """The superframe that is in force at an instant."""
         timetable = self.at(t_ns)
         return None if timetable is None else timetable.turns
 
@@ -31,10 +30,8 @@ class TimetablesInForce:
         return sum(timetable.valid_ns <= now_ns for timetable in self.in_order[1:])
 
     def follow(self, timetable: NodeTimetable | None, *, now_ns: int) -> None:
-        """Follow a newer timetable; None: follow none.
-
-        Timetables are forgotten that are no longer in force, or that would come into force after it: they are those of
-        a leader over which another one prevails.
+        """Follow a newer timetable; None: none. Forgotten are those no longer in force, and those that would come into
+        force after it: of a leader over which another one prevails.
         """
         if timetable is None:
             self.in_order = []

@@ -115,7 +115,6 @@ class FromPlaces:
         return PartDetails(decoded(packet.frame, Places.decode_frames), loads)
 
     def on_schedule(self, packet: Packet, schedule: Schedule, details: PartDetails | None, *, now_ns: int) -> None:
-        """Keep the positions, and compute the timetable when all parts of an epoch have arrived."""
         version = Version(Authority(schedule.term, schedule.leader), schedule.epoch)
         if version != self._membership.version or details is None:
             return
@@ -133,7 +132,6 @@ class FromPlaces:
         self._compute_if_complete(now_ns)
 
     def on_links(self, packet: Packet, *, now_ns: int) -> None:
-        """A part of the links of an assignment was received, which may arrive before its schedule."""
         told = decoded(packet.frame, Links.decode_frames)
         if told is None or told.node != packet.header.origin:
             raise MalformedFrameError(f"links of an assignment by {packet.header.origin}")
@@ -150,9 +148,7 @@ class FromPlaces:
         self._compute_if_complete(now_ns)
 
     def _compute_if_complete(self, now_ns: int) -> None:
-        """Compute the timetable once, when all parts of this version and of its links have arrived, and when the node
-        has the swarm's time: without it, it would send in the turns of others.
-        """
+        """Compute it once, when all parts of schedule and links are there, and the node has the swarm's time."""
         version = self._version
         due = version is not None and version == self._membership.version and version != self._planned
         due = due and has_time(self._port.scenario.clock, clock_error_ns=self._port.clock_error_ns)
@@ -209,9 +205,7 @@ class FromPlaces:
         measured: tuple[Link, ...],
         loads: Mapping[NodeId, int],
     ) -> FittedTimetable | None:
-        """The timetable; it is computed from positions if links are not measured, or if they leave no room for the
-        load.
-        """
+        """The timetable; from positions if links are not measured, or if they leave no room for the load."""
         places, leader = tuple(sorted(at.items())), NodeId(schedule.leader)
         origin_ns, period_ns = schedule.start_us * US, schedule.period_us * US
         found = None

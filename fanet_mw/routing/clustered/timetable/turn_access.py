@@ -84,8 +84,8 @@ class TurnAccess:
     # --- timetables and roles -------------------------------------------------------------------------------------
 
     def follow(self, timetable: NodeTimetable | None, *, now_ns: int) -> None:
-        """Follow a timetable that comes into force later, or that of another leader, which may be in force already. The
-        node changes to the latter only when what it promised under the former one has gone. None: no timetable fits.
+        """Follow a later timetable, or one of another leader, which may be in force: the node changes to it when what
+        it promised under the former has gone. None: no timetable fits.
         """
         if timetable is not None:
             timetable = timetable._replace(valid_ns=max(timetable.valid_ns, self._delays.kept_until_ns(now_ns)))
@@ -101,9 +101,8 @@ class TurnAccess:
             self.forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
 
     def _stranded(self, now_ns: int) -> list[Packet]:
-        """Take out the packets whose turns are gone, which will go another way.
-
-        Packets with a stated bound are dropped instead, because any other way may take longer.
+        """Take out packets whose turns are gone, to go another way; those with a stated bound are dropped, as that may
+        take longer.
         """
         return self._kept(self._roots.drain(), through_ns=None, now_ns=now_ns)
 
@@ -118,7 +117,6 @@ class TurnAccess:
         return kept
 
     def use_turns(self, now_ns: int) -> None:
-        """Use the turns of the timetables that are followed."""
         timetables, node = self._timetables.in_order, self._port.node
         roots = [(one, one.table.spans.get(node, 1)) for one in timetables]
         self._roots.follow(
@@ -146,9 +144,7 @@ class TurnAccess:
         self._slots.renew_slot()
 
     def must_show(self, now_ns: int) -> bool:
-        """True if the others cannot know that this node still keeps the timetable, because it has begun no flood by it
-        for some time, and nothing waits for its turns.
-        """
+        """True if others cannot know that this node keeps the timetable: no flood of it began lately, none waits."""
         timetable = self._timetables.at(now_ns)
         if timetable is None or timetable.odds is not None or not timetable.roots or len(self._roots):
             return False
@@ -208,9 +204,7 @@ class TurnAccess:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
 
     def _is_for_neighbor(self, packet: Packet, now_ns: int) -> bool:
-        """True if a packet is bulk for one neighbor, which will hear it in a turn that floods leave, because all nodes
-        keep the same timetable.
-        """
+        """True for bulk to one neighbor, which hears it in a turn that floods leave, as all keep the same timetable."""
         header, timetable = packet.header, self._timetables.at(now_ns + self._lead_ns)
         return (
             timetable is not None
@@ -238,10 +232,8 @@ class TurnAccess:
         return packet
 
     def answer(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
-        """Transmit a packet that a neighbor has missed in the node's next call, if it has calls and the packet fits.
-
-        A packet that still waits for its own flood is not sent so: nodes that receive it outside of its turns would
-        relay neither this copy nor the flood afterwards.
+        """Transmit a missed packet in the node's next call, if it fits; not while it waits for its own flood: who
+        receives it outside of its turns would relay neither this copy nor the flood afterwards.
         """
         key = key_of_packet(packet)
         if self._roots.holds(key):
@@ -256,9 +248,8 @@ class TurnAccess:
             self._calls.push(packet, now_ns=now_ns)
 
     def hello_due_ns(self, start_ns: int) -> int:
-        """The instant at which a hello may be sent, so that it is not made long before: its digest would lack what has
-        come meanwhile, and neighbors would send it again. One a window goes; after one that waited, the next is due
-        sooner, so that they come as often as without windows.
+        """When a hello may be sent, so that it is not made long before, and its digest up to date. One a window; after
+        one that waited, the next is due sooner, so that they come as often as without windows.
         """
         due_ns = start_ns - min(self._hello_waits_ns, (start_ns - self._hello_sent_ns) // 2)
         timetable = self._timetables.at(start_ns)

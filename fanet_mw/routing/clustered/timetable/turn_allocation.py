@@ -91,10 +91,9 @@ def fit(
     loads: Mapping[NodeId, int] = NO_LOADS,
     quick: bool = False,
 ) -> FittedTimetable | None:
-    """The timetable of a swarm; None if not even one packet of each head fits. `head_of`: the head of each node but the
-    leader; `loads`: of those nodes that do not send as the scenario says. Nodes without traffic get one turn each.
-
-    With `quick` it is None, too, if the load only fits with an effort that may take seconds.
+    """The timetable of a swarm; None if not even one packet of each head fits, or with `quick` if it would take
+    seconds. `head_of`: but for the leader; `loads`: of nodes that do not send as the scenario says. Nodes without
+    traffic get one turn each.
     """
     sent = {**stated_loads(scenario), **loads}
     return _fit(
@@ -150,9 +149,7 @@ def _fit(
 
 
 def _more_often(wish: _Wish, made: Callable[[_Wish], FittedTimetable | None]) -> FittedTimetable | None:
-    """As many turns in each of several parts of the superframe, so that nobody waits long for one, if twice as many
-    would fit: half of the air is left for what is for one neighbor.
-    """
+    """As many turns in several parts, if twice as many fit: half of the air is left for single neighbors."""
     parts = 1
     while wish.blocks == 1 and parts < _MOST_PARTS and made(wish._replace(blocks=4 * parts)) is not None:
         parts *= 2
@@ -160,9 +157,7 @@ def _more_often(wish: _Wish, made: Callable[[_Wish], FittedTimetable | None]) ->
 
 
 def _first_made(wishes: Sequence[_Wish], made: Callable[[_Wish], FittedTimetable | None]) -> FittedTimetable | None:
-    """The timetable of the first wish that fits, of wishes for fewer and fewer turns, by bisection: far too much load
-    would take dozens of tries.
-    """
+    """The first wish that fits, by bisection of wishes for fewer and fewer turns: there may be dozens."""
     best, low, high = None, 0, len(wishes)
     while low < high:
         middle = (low + high) // 2
@@ -184,9 +179,7 @@ def fit_measured(
     link_parts: int,
     loads: Mapping[NodeId, int] = NO_LOADS,
 ) -> FittedTimetable | None:
-    """The timetable of a swarm with measured links: each node transmits its own packets, and frames are repeated as
-    often as turns allow. None if the turns do not suffice for the load.
-    """
+    """A timetable by measured links: nodes send their own packets, repeated as turns allow; None if too few."""
     whole_ns = measured_period_ns(scenario)
     size = max(largest_frame(scenario), hello_bytes(scenario))
     turn = turn_ns(scenario, payload_bytes=size)
@@ -252,9 +245,7 @@ def _table(
     blocks: int,
     hard: bool,
 ) -> Timetable | None:
-    """Of the timetables found with little effort, the one whose floods end soonest. If none is found and `hard` is set,
-    the search is repeated with more effort.
-    """
+    """Of those found with little effort that whose floods end soonest; with `hard` more effort for the first."""
     if not geometry.turns:
         return None
     found = [(effort, timetable(places, roots, geometry, heads, effort, blocks)) for effort in _EASY]
@@ -297,11 +288,9 @@ def _wishes(scenario: Scenario, head_of: Mapping[NodeId, NodeId], leader: NodeId
 def _wishes_by_load(
     scenario: Scenario, head_of: Mapping[NodeId, NodeId], leader: NodeId, period_ns: int, loads: Mapping[NodeId, int]
 ) -> Iterator[_Wish]:
-    """The uses of the turns to try if loads differ between nodes, the best first.
-
-    A node keeps turns that it does not need now as long as all nodes fit. If the turns do not suffice, the nodes that
-    send most get fewer turns first. So a node that sends too much, or is falsely reported to, takes nothing from the
-    others.
+    """Uses to try if loads differ between nodes, the best first. While all fit, nodes keep turns that they do not need
+    now; if not, those that send most get fewer turns first, so that one that sends too much, or is falsely reported to,
+    takes nothing from others.
     """
     control, senders = _control(scenario, leader), _senders(scenario, head_of, leader)
     per_node = _per_node(scenario, senders, period_ns, loads)
@@ -341,10 +330,8 @@ def _per_node(
 
 
 def _blocks(packets: int, senders: int) -> int:
-    """The number of equal blocks into which a superframe is divided.
-
-    If there are several blocks, each holds at least `_BLOCK` packets. Where the packets divide evenly, each sender has
-    as many turns in one block as in any other.
+    """The number of equal blocks of a superframe, of at least `_BLOCK` packets each; where packets divide evenly, a
+    sender has as many turns in one block as in any other.
     """
     each, more = divmod(packets, max(1, senders))
     if more or not senders:
@@ -364,9 +351,7 @@ def _turns_for(packets: float, *, together: int) -> int:
 
 
 def _sharing(needed: Callable[[int], T], most: int) -> Iterator[tuple[int, T]]:
-    """The numbers of packets that may share a turn, up to `most`, each with the turns that are then needed. A number
-    that needs as many turns as the one before it is left out.
-    """
+    """How many packets may share a turn, up to `most`, and the turns then needed; no number that saves none."""
     before: T | None = None
     for together in range(1, most + 1):
         turns = needed(together)
@@ -376,26 +361,20 @@ def _sharing(needed: Callable[[int], T], most: int) -> Iterator[tuple[int, T]]:
 
 
 def _control(scenario: Scenario, leader: NodeId) -> tuple[NodeId, ...]:
-    """The roots of the turns for the leader's schedules."""
     return (leader,) * schedule_parts(scenario)
 
 
 def _senders(scenario: Scenario, head_of: Mapping[NodeId, NodeId], leader: NodeId) -> list[NodeId]:
-    """The nodes with packets of their own."""
     return [*sorted(head_of), *_sending_leader(scenario, leader)]
 
 
 def _sending_leader(scenario: Scenario, leader: NodeId) -> tuple[NodeId, ...]:
-    """The leader if it sends packets of its own, otherwise none. A node that has taken over from the scenario's leader
-    goes on with the load that it had.
-    """
+    """The leader if it sends packets of its own: also one that took over goes on with the load that it had."""
     return (leader,) if leader != scenario.leader or leader_load(scenario) else ()
 
 
 def leader_load(scenario: Scenario) -> int:
-    """The number of packets per period of the leader itself: 1 if its application may send, although it is in no
-    cluster.
-    """
+    """1 if the leader's application may send, although it is in no cluster; otherwise 0."""
     traffic = scenario.traffic
     if traffic.arrivals == "none" or traffic.destination == scenario.leader:
         return 0

@@ -99,7 +99,6 @@ class TurnRelease(ABC):
         return self._queue.expire(before_us=before_us)
 
     def drain(self) -> list[Packet]:
-        """Take out all queued packets, because they will go another way."""
         self.planned = None
         return self._queue.drain()
 
@@ -145,10 +144,7 @@ class RootRelease(TurnRelease):
         return self._queue.take_older(before_us=before_us, rank=PRIORITY_CONTROL)
 
     def through_ns(self, packet: Packet, *, now_ns: int) -> int | None:
-        """The instant at which the flood of a packet that was just queued is over; None if it is not known.
-
-        Packets that come later do not change it, because they use room of their own or wait behind.
-        """
+        """The end of the flood of a packet just queued, or None; later packets have room of their own."""
         rank = self._rank(packet)
         waiting = self._queue.waiting(rank)
         if not waiting or waiting[-1] is not packet:
@@ -172,10 +168,8 @@ class RootRelease(TurnRelease):
         return turn.frame_bytes - sum(self.reserved.values())
 
     def _rank(self, packet: Packet) -> int:
-        """The rank at which a packet waits. A packet whose class has no room of its own waits like bulk, and overtakes
-        nothing.
-
-        Only a leader's announcements go before all others; a leader states no bound.
+        """The rank at which a packet waits: as bulk without room for its class; only a leader's announcements, for
+        which it states no bound, go before all.
         """
         header = packet.header
         if header.kind in (Kind.SCHEDULE, Kind.LINKS) and header.origin == self._node:
@@ -184,9 +178,7 @@ class RootRelease(TurnRelease):
         return header.priority if fits else PRIORITY_BULK
 
     def _fill(self, size: int) -> list[Packet]:
-        """Take out the packets for one turn that can carry `size` bytes, as shown at the top of this file; always at
-        least one packet.
-        """
+        """The packets for one turn of `size` bytes, as shown at the top of this file; at least one."""
         queue = self._queue
         taken = queue.take(size - sum(self.reserved.values()), rank=PRIORITY_CONTROL)
         announces = bool(taken)
@@ -202,10 +194,7 @@ class RootRelease(TurnRelease):
         return None if following is None else following[0]
 
     def _upcoming(self, earliest_ns: int) -> Iterator[tuple[OwnTurn, int]]:
-        """The node's turns from an instant on, each with the instant at which its flood is over.
-
-        Each turn is one of the timetable that is in force then. There is no end of them unless there is no timetable.
-        """
+        """The node's turns from an instant on, by the timetable in force at each, with the end of each one's flood."""
         for index, (valid_ns, turns, offsets, size, span) in enumerate(self._in_force):
             if not offsets:
                 continue
@@ -230,9 +219,7 @@ class CallRelease(TurnRelease):
     """One queue of packets for neighbors, and the node's next call or spare turn."""
 
     def reserve(self, *, not_before_ns: int, now_ns: int) -> int | None:
-        """Reserve the next call for a frame that is not queued, such as a hello; returns its start, None if the node
-        has no call.
-        """
+        """Reserve the next call for an unqueued frame, such as a hello; returns its start, or None."""
         turn = self._turn(max(not_before_ns, self._free_ns))
         if turn is None:
             return None
@@ -253,7 +240,6 @@ class CallRelease(TurnRelease):
 
     @property
     def pending(self) -> TxQueue:
-        """The queued packets; each is removed when another node sends a copy of it (`on_copy`)."""
         return self._queue
 
     def on_copy(self, key: int, *, now_ns: int) -> None:
@@ -261,7 +247,6 @@ class CallRelease(TurnRelease):
         self._queue.remove(key)
 
     def _turn(self, earliest_ns: int) -> OwnTurn | None:
-        """The first call from an instant on, by the timetable that is in force then."""
         for index, calls in enumerate(self._in_force):
             if calls.offsets:
                 not_before_ns = max(earliest_ns, calls.valid_ns)

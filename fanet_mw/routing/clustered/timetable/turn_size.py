@@ -32,10 +32,7 @@ LOAD: Final = 0.9
 
 
 def largest_frame(scenario: Scenario, *, together: int = 1) -> int:
-    """The largest frame of a turn: bulk packets and the reserved room, or a leader's announcement.
-
-    Survivor reports that are sent as bulk may be longer than the packets of the application.
-    """
+    """The largest frame of a turn: bulk (survivor reports may be longer) and reserved room, or an announcement."""
     links_bytes = HEADER_BYTES + MESSAGES * (LINKS.layout.size + OVERHEAD) if scenario.measures_links else 0
     bulk_bytes = max(together * scenario.traffic.payload_bytes, bulk_report_bytes(scenario))
     longest = max(bulk_bytes, schedule_bytes(scenario), links_bytes)
@@ -43,9 +40,7 @@ def largest_frame(scenario: Scenario, *, together: int = 1) -> int:
 
 
 def most_packet_bytes(scenario: Scenario, priority: int) -> int:
-    """The longest packet of an application for which each turn has room, whatever its timetable: in the room of bulk,
-    or in that of its own class.
-    """
+    """The longest packet that each turn has room for, whatever the timetable, in bulk's or its class's room."""
     urgent = reserved(scenario)
     return max(largest_frame(scenario) - sum(urgent.values()), urgent.get(priority, 0))
 
@@ -80,10 +75,8 @@ def links(scenario: Scenario, turns: Turns) -> Geometry:
 
 
 def _disturbed_m(scenario: Scenario) -> float:
-    """The greatest reported distance at which nodes may disturb each other with `radio.channel = "range"`.
-
-    The error of GPS is added to the range, and in a swarm that moves the distance by which both nodes may have strayed
-    from the positions that the leader extrapolates (`STRAYED`, `UNLIKE`).
+    """The greatest reported distance at which nodes may disturb each other with `radio.channel = "range"`: the range,
+    the error of GPS, and how far both may have strayed from extrapolated positions (`STRAYED`, `UNLIKE`).
     """
     range_m, mobility = scenario.radio.range_m, scenario.mobility
     strayed = 0.0 if mobility.model == "static" else UNLIKE if mobility.rigid else STRAYED
@@ -92,26 +85,20 @@ def _disturbed_m(scenario: Scenario) -> float:
 
 
 def distance_error_m(scenario: Scenario) -> float:
-    """By how much the distance of two nodes may differ from that of their reported positions.
-
-    Errors of GPS along the line between both nodes are independent, so four standard deviations of their difference are
-    taken; positions are reported in whole metres. A UAV averages the fixes of a receiver that is less accurate than a
-    small share of the radio range (`agents/positioning/steady_fix.py`).
+    """How far the distance of two nodes may differ from that of their reported positions: four deviations of GPS
+    (averaged, `agents/positioning/steady_fix.py`), and whole metres.
     """
     noise_m = min(scenario.world.gps_sigma_m, _AVERAGED * scenario.radio.range_m)
     return 4 * math.sqrt(2) * math.hypot(noise_m, scenario.sensors.gps_bias_m) + _ROUNDING_M
 
 
 def measured_period_ns(scenario: Scenario) -> int:
-    """The length of a superframe with measured links: a little less than one packet of each source takes, so that there
-    is room for repetitions; at least one flooding period, at most four.
-    """
+    """The superframe with measured links: a little under one packet interval, 1 to 4 flooding periods."""
     one_each_ns = int(LOAD * seconds_to_ns(scenario.traffic.interval_s))
     return max(scenario.clusters.period_ns, min(_MOST_PERIODS * scenario.clusters.period_ns, one_each_ns))
 
 
 def hello_bytes(scenario: Scenario) -> int:
-    """The size of the largest hello with a digest."""
     digests = min(_MOST_DIGESTS, -(-scenario.node_count // DIGEST_CAPACITY))
     return HEADER_BYTES + _HELLO_BYTES + digests * (DIGEST.layout.size + OVERHEAD)
 

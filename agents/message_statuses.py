@@ -3,8 +3,7 @@
     a packet is announced, transmitted or dropped    ->  `Node.watch`, for packets that are watched
     a message is acknowledged, or has expired        ->  `Sender.told`
 
-Each application is told of the fates that it names in `follows`. It is told after the input that caused them was
-handled, so that no application is called while it is calling itself.
+Applications are told after the input was handled, so that none is called while it is calling itself.
 """
 
 from collections import Counter, deque

@@ -1,9 +1,7 @@
 """Carries the messages of a node's applications: what they send goes into packets, and what arrives goes to listeners.
 
-    plain MAVLink frames to one node or all          -> one packet, unchanged
-    bytes to a port, a set of nodes, or confirmed    -> pieces and receipts (`fanet_mw.delivery`)
-
-`message_statuses.py` reports to the applications what becomes of their messages.
+plain MAVLink frames to one node or all          -> one packet, unchanged
+bytes to a port, a set of nodes, or confirmed    -> pieces and receipts (`fanet_mw.delivery`)
 """
 
 from collections import Counter

@@ -7,9 +7,8 @@
     cut        no power to or from the node; if it is only mute or deaf, in one direction
     partition  no power between stations on different sides
 
-A link that would be audible without its faults is marked with the gravest of them, and frames that it loses because
-they are too weak count as lost to that fault. Frames in flight keep the power with which they started. Not modeled:
-jammers that move or react.
+A link that would be audible is marked with the gravest of its faults, to which lost frames count. Frames in flight keep
+the power with which they started. Not modeled: jammers that move or react.
 """
 
 import heapq

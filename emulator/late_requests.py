@@ -1,8 +1,7 @@
 """Late requests: those that come to the medium after the instant at which their frame was to start.
 
-A late request is counted. Its frame starts at once, unless it is more than `TOO_LATE_NS` late: then it is dropped.
-The moments in which late requests came are counted, too: after a pause of the machine all of them come within a few
-moments, in an overload there are some in every moment.
+Above `TOO_LATE_NS` they are dropped. The moments in which they came are counted, too: after a pause of the machine few,
+in an overload all.
 """
 
 from typing import Final

@@ -1,8 +1,6 @@
 """The traffic of each link since the last report: received and lost frames, and the mean power of the received ones.
 
-The kernel counts frames in its array of links. New poses of the stations replace that array, so its counts are moved
-here before (`take`). For a report, `close` adds up all counts that were moved here since the report before. Each of the
-two methods is a few vector operations, whatever the number of frames.
+The kernel counts in its array of links, which new poses replace; `take` moves its counts here before.
 """
 
 from array import array

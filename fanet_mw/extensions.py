@@ -4,10 +4,9 @@
     routing.protocol = "mypackage:Gossip3"    or a module and a name in it
     [routing.options]                         the part's own table, checked by its `Options`, a pydantic model
 
-The names of this project's own parts cannot be redefined. Each named part is looked up when the scenario is read, so
-that no run begins with a part that is missing. A part is a class with the methods of its contract: anything else is
-refused without being called, modules of Python itself without being imported. A scenario that is read with `AS_TEXT`,
-such as that of a result folder, imports nothing.
+This project's own names cannot be redefined. Each named part is looked up when the scenario is read; anything but a
+class with the methods of its contract is refused without being called. A scenario that is read with `AS_TEXT`, such as
+that of a result folder, imports nothing.
 """
 
 import ast

@@ -1,8 +1,7 @@
 """The application that avoids collisions: it floods collision warnings, obeys those of others, and climbs or descends.
 
-`conflict_monitor.py` finds conflicts and decides what to do; this file passes it positions, hellos and warnings. While
-the UAV avoids another one, the application objects to courses of other applications. The UAVs of a planned search avoid
-each other by their velocities instead (`agents/mission/flight/`).
+While the UAV avoids another one, the application objects to courses of other applications. The UAVs of a planned search
+avoid each other by their velocities instead (`agents/mission/flight/`).
 """
 
 from collections.abc import Mapping

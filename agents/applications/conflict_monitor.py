@@ -6,14 +6,10 @@
     still side by side after long -> the one with the higher id flies to the middle of the area
     one stands at the geofence    -> it flies back towards the middle for a while, lower ids first
 
-No agreement about heights is needed, because the ids decide: of two UAVs the one with the lower id goes one level up
-for the other, the other one level down. So any two part, no two of three that are in conflict with each other share a
-level, and a warning need not state a direction. Levels are one distance to be kept apart; all lie higher by the error
-of a measured height, so that nobody is truly more than two of them below the mission's height.
-
-Both UAVs are assumed to keep their horizontal velocity. Not modeled: turns that the other UAV has planned, and
-conflicts that the change of height itself causes, until the next hello shows them. In a planned search, UAVs avoid each
-other by their velocities instead (`agents/mission/flight/reciprocal_avoidance.py`).
+The ids decide about heights: of two UAVs the one with the lower id goes one level up for the other, the other one down,
+so that any two part and a warning need not state a direction. Levels are one distance to be kept apart, and lie higher
+by the error of a measured height. Not modeled: turns that the other UAV has planned, and conflicts that the change of
+height causes.
 """
 
 import math

@@ -3,10 +3,8 @@
 Without an operator the streams are those that a log needs. An operator who is heard gets all that a ground station
 draws, and changes the rate of each by message.
 
-Position and velocity are those of the receiver. Attitude, time and the quality of GPS are those of a real flight
-controller. Without one the attitude is inferred: a multirotor tilts so that thrust, gravity and the drag of an Iris
-add up to its acceleration, and it faces where it flies. The battery is as its sensor reads it; without a sensor nothing
-is known of it. Without an estimate of the wind the air stands still.
+Without a real flight controller the attitude is inferred: a multirotor tilts so that thrust, gravity and the drag of an
+Iris add up to its acceleration, and it faces where it flies.
 """
 
 import math

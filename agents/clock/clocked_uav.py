@@ -2,14 +2,9 @@
 
     host: true time  |  own clock (`local_clock`)  |  swarm time as this node believes it (`swarm_time`)  |  UAV
 
-The UAV acts by this swarm time alone. The stamps of messages from the host (the end of a reception or transmission, the
-instant of a fix or reading) are first read on the node's own clock, to the resolution of its stamps, and then converted
-to swarm time. The UAV's transmit requests and trace records are converted back to true time, so that delays between two
-nodes can be computed from their traces.
-
-The swarm time that the UAV is given never decreases: if the node learns that it was ahead, the UAV is given the same
-instant until the corrected swarm time has reached it. Until a node has learned swarm time, it receives no schedules, so
-it has no slot, and contends for the channel.
+Stamps of the host's messages are read on the node's own clock, to its resolution, and converted to swarm time; requests
+and trace records go back to true time. The swarm time that the UAV is given never decreases. Until a node has learned
+swarm time it receives no schedules, and contends for the channel.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -1,10 +1,8 @@
 """How a node knows swarm time, by the key `clock.sync`: from its own clock alone, from the time beacons of its
 neighbors, or from GPS.
 
-Each of the three classes is given instants that the node has read on its own clock, and computes a line: the linear
-function that converts such an instant to swarm time. The simulated GPS adds independent normal noise to the true time
-of each fix; multipath, and errors that last over several fixes, are not modeled. During an outage of GPS the world
-sends no fixes.
+Each class computes the linear function (line) that converts instants of the node's own clock. The simulated GPS adds
+independent normal noise to each fix; multipath and lasting errors are not modeled.
 """
 
 import math

@@ -3,8 +3,7 @@
     MAVLink of a ground station -> commands, parameters, plans -> the pilot -> courses, by the arbitration on board
     answers, texts, telemetry   -> the tap, or over the air to the post on the ground: where the question came from
 
-It does nothing until a ground station is heard. What it does not understand it counts; what it does not support it
-says.
+It does nothing until a ground station is heard.
 """
 
 import math

@@ -8,10 +8,9 @@
                    into air_to_air as the lower end rises above the roofs
     uma_av         P L_LoS + (1 - P) L_NLoS, P from height and distance (3GPP TR 36.777, annex B)
 
-Distances and heights are in metres, frequencies in MHz, losses in dB between isotropic antennas. Below 1 m the loss is
-that at 1 m. Not modeled: antenna patterns and airframes, weather, the curvature of the earth, and the oscillation of
-two rays before the crossover. The ranges of validity are in docs/explanation/channel.md. Shadowing and fading have
-files of their own, and `propagation.py` puts all three together.
+Distances and heights in metres, frequencies in MHz, losses in dB between isotropic antennas; below 1 m as at 1 m. Not
+modeled: antenna patterns and airframes, weather, the curvature of the earth, and the oscillation of two rays before the
+crossover. Ranges of validity: docs/explanation/channel.md.
 """
 
 import math

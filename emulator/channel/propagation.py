@@ -4,10 +4,9 @@ mW.
     path loss of the channel (`link_budget.py`) -> shadowing (`shadowing.py`) -> obstruction -> links above the floor
 
 The channel `range` is not physics: every frame within `range_m` is received at the transmit power, nothing farther away
-(ns-3's range model), and nothing through an obstruction. Fading is drawn for each frame in the kernel (`fading.py`).
-All antennas are isotropic but that of the post on the ground, whose gain strengthens its links both ways. Not modeled:
-antenna patterns, Doppler shift, interference over links below `interference_floor_dbm`, and delays of DIFS
-or more (`longest_delay_ns`).
+(ns-3's range model), and nothing through an obstruction. Not modeled: antenna patterns but the gain of the post on the
+ground, Doppler shift, interference over links below `interference_floor_dbm`, and delays of DIFS or more
+(`longest_delay_ns`).
 """
 
 import math

@@ -1,14 +1,10 @@
 """Log-normal shadowing as a property of places: the loss of a link follows from the positions of its two ends.
 
-The loss is a Gaussian field over both ends, made of plane waves: S(a, b) = sqrt(2 / N) sum cos(k a + l b + phase),
-symmetrized. The waves are drawn from the spectrum whose correlation is exponential (in 3 dimensions: the Cauchy
-distribution, whose characteristic function is exp(-|d| / d_corr)), for each end separately. So the correlation of a
-link's shadowing is exp(-d / d_corr) when one end moves by d (M. Gudmundson, Electronics Letters 27(23), 1991), and the
-product of both factors when both ends move (Z. Wang, E. Tameh, A. Nix, IEEE Trans. Veh. Technol. 57(2), 2008).
-
-The same poses give the same shadowing, whichever poses preceded them. Not modeled: dependence on the surroundings, on
-angle or height; the correlation is alike in all three directions. With N waves the correlation measured within one seed
-differs from the law by about 1 / sqrt(2 N).
+A Gaussian field over both ends of plane waves, S(a, b) = sqrt(2 / N) sum cos(k a + l b + phase), symmetrized, with
+waves of an exponential correlation (the 3-dimensional Cauchy distribution) for each end: exp(-d / d_corr) when one end
+moves by d (M. Gudmundson, Electronics Letters 27(23), 1991), the product of both when both move (Z. Wang, E. Tameh, A.
+Nix, IEEE Trans. Veh. Technol. 57(2), 2008). Not modeled: dependence on surroundings, angle or height. Within one seed
+the correlation differs from the law by about 1 / sqrt(2 N).
 """
 
 import math

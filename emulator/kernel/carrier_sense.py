@@ -2,9 +2,7 @@
 
 The medium is busy for as many reasons as CS counts: each frame that is sensed, from its detection to its end, and, if
 SENSES_SUMS = 1, the energy of all signals and jammers together while it is above ENERGY_MW (802.11-2020, 17.3.10.6:
--62 dBm with OFDM). What follows from a medium that
-becomes busy or idle is in `channel_access.py`. The virtual carrier sense (NAV) is an instant until which a station has
-no access to the medium there; `phy.py` sets it at the end of a frame for another station.
+-62 dBm with OFDM). NAV is an instant until which a station has no access; `phy.py` sets it.
 """
 
 from emulator.kernel.channel_access import on_busy, on_idle

@@ -1,13 +1,10 @@
 """When a station may transmit: DIFS or EIFS, the contention window and the backoff (IEEE 802.11-2020, 10.3.3), as
 functions over the rows of its state.
 
-Slots are counted from BASE while the medium is idle. When it becomes busy, the slots that have passed are subtracted
-from the backoff. A pending access to the medium is one event, which is stale if SCHEDULED holds another instant.
-
-After a failed reception, EIFS takes the place of DIFS (10.3.2.3.7). EIFS begins when the medium is idle after the bad
-frame, whatever else has kept it busy. If it is interrupted it begins again, until it has passed or until a frame is
-received without error. In ns-3.44 the extension beyond DIFS begins at the end of the bad frame, and passes while the
-medium is busy.
+Slots are counted from BASE while the medium is idle. A pending access is one event, stale if SCHEDULED holds another
+instant. After a failed reception EIFS takes the place of DIFS (10.3.2.3.7), from the instant at which the medium is
+idle; interrupted it begins again, until it has passed or a frame is received. In ns-3.44 the extension beyond DIFS
+begins at the end of the bad frame, and passes while the medium is busy.
 """
 
 from emulator.kernel.heap import push

@@ -1,9 +1,6 @@
 """The exchange of frames of a station: the distributed coordination function (IEEE 802.11-2020, 10.3), over its state.
 
-    queue -> access (DIFS or EIFS, backoff with freezing) -> frame -> ACK or timeout -> next attempt or done
-
-When a station may transmit (DIFS or EIFS, contention window, backoff) is in `channel_access.py`; how frames end is
-counted in `frame_ends.py`.
+queue -> access (DIFS or EIFS, backoff with freezing) -> frame -> ACK or timeout -> next attempt or done
 """
 
 from emulator.kernel.channel_access import (

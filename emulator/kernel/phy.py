@@ -2,11 +2,9 @@
 
     frame begins -> detected after 4 us if it is strong enough -> received, loss by interference -> decoded or lost
 
-A frame is sensed from its detection on. A receiver stays with the frame that it detected first, unless TAKE_OVER = 1
-and a later frame, whose preamble can be detected above everything else, is TAKE_OVER_RATIO times as strong: then the
-first frame is lost. With INTERFERENCE = 0 any overlap destroys a frame; with 1 the loss in each segment follows from
-its SINR. Stations are hidden from each other when neither senses the other's frames: nothing else is said of them, and
-their frames meet at a receiver that hears both.
+A receiver stays with the frame that it detected first, unless TAKE_OVER = 1 and a later frame, whose preamble can be
+detected above everything else, is TAKE_OVER_RATIO times as strong. With INTERFERENCE = 0 any overlap destroys a frame;
+with 1 the loss in each segment follows from its SINR.
 """
 
 import math

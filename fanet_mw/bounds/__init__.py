@@ -1,10 +1,8 @@
 """Worst-case delays: the paper's estimate, and bounds that hold. Pure functions of integer nanoseconds.
 
-`paper` has the paper's equations (2)-(4) exactly as published, for comparison. `slot_service` is the service of one
-slot per superframe, `turn_service` that of single turns. `arrivals` and `network_calculus` have the parts of network
-calculus that bound the delay of a queue into which packets come in bursts. `timetable_flood` bounds the delay of
-floods in a timetable; the bound that a node states from it is in `fanet_mw/routing/clustered/timetable/own_bound.py`.
-`mac` has the constants of the MAC, and `guard_time` the guard time of a slot.
+`paper` has the paper's equations (1)-(4), for comparison; `slot_service` and `turn_service` are services of slots and
+turns, `arrivals` and `network_calculus` bound a queue, `timetable_flood` floods in a timetable; `guard_time` is the
+guard time of a slot.
 """
 
 from fanet_mw.bounds.arrivals import Arrivals, Periodic, Total

@@ -1,10 +1,6 @@
 """The guard time of a slot: set by the scenario, or computed from clock error, propagation and frame length.
 
-It is for slots with contention. Between the turns of a timetable the guard is called slack, as it is part of each turn
-(`fanet_mw/timesync/turn_slack.py`).
-
-The guard time is the silent end of a slot. It is kept where slots are laid out: no frame starts in it (`Superframe` in
-`fanet_mw/routing/clustered/tdma/slot_timing.py`).
+Between the turns of a timetable the guard is called slack (`fanet_mw/timesync/turn_slack.py`).
 """
 
 from math import ceil

@@ -1,13 +1,10 @@
 """Delay and backlog of one head's queue: the horizontal and vertical deviation of its arrival and service curves.
 
-A busy period begins with a packet that finds the queue empty. Its q-th packet arrives at the earliest span(q) after
-that, and is completed at the latest completion(q) after it, so its delay is at most completion(q) - span(q) (Le Boudec
-& Thiran, theorem 1.4.2, for staircases). The period ends with the first Q for which completion(Q) <= span(Q+1), because
-the next packet finds the queue empty. The worst packet may be any of the period, so all q up to Q are examined (Davis
-et al. 2007).
-
-At a load of exactly one, the period may never end. The spans are then examined until they repeat. If it is not known
-when they repeat, or if that takes too long, the result is the affine bound T + burst / R, which is looser but sound.
+A busy period begins with a packet that finds the queue empty. Its q-th packet is delayed by completion(q) - span(q) at
+most (Le Boudec & Thiran, theorem 1.4.2, for staircases), and it ends with the first Q for which completion(Q) <=
+span(Q+1); all q up to Q are examined (Davis et al. 2007). At a load of exactly one spans are examined until they
+repeat; if that is not known, or takes too long, the result is the affine bound T + burst / R, which is looser but
+sound.
 """
 
 from fractions import Fraction

@@ -5,7 +5,6 @@ sender.
     packets     -> Receiver  pieces -> message -> order of its flow -> application; receipts to the sender
     receipts    -> Sender    missing pieces are sent again; the application is told when all is acknowledged, or expired
 
-A flow consists of the confirmed messages from one sender to the same nodes, on one port and of one priority. They are
-handed over in the order in which they were sent; one that the sender has given up is skipped. All other messages are
-handed over as they arrive. Memory is bounded on both sides. Like the rest of the core, this package is sans-IO.
+A flow: the confirmed messages from one sender to the same nodes, on one port and of one priority. They are handed over
+in the order of sending, past those given up; all others as they arrive.
 """

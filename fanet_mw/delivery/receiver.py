@@ -1,8 +1,7 @@
 """The receiving side of delivery: it puts pieces together, hands each message over once, and answers with receipts.
 
-A confirmed message waits for the message before it in its flow, even if nobody listens to that one. The memory for
-incomplete and waiting messages is bounded, per sender and in all. What does not fit is not accepted; its sender gets no
-receipt, and sends it again. The caller counts pieces that contradict each other as malformed.
+The memory for incomplete and waiting messages is bounded, per sender and in all; what does not fit gets no receipt, and
+is sent again.
 """
 
 from collections.abc import Callable

@@ -4,9 +4,8 @@
          -> no receipt in time -> the missing pieces are sent again, and the wait is doubled
          -> its lifetime is over -> expired: the application is told which nodes have not confirmed it
 
-The wait for a receipt follows from earlier round trips (RFC 6298). The pieces under way of all messages together are
-bounded by a window (`SendWindow`), in which repetitions hold up no message that was not sent yet. Memory is
-bounded, too: the caller asks `full` first, and refuses a message that does not fit.
+The wait for a receipt follows from earlier round trips (RFC 6298). The caller asks `full` first, and refuses a message
+that does not fit.
 """
 
 import heapq

@@ -1,14 +1,10 @@
 """The swarm clock of a real-time run: swarm instant = (clock - epoch) x scale, with an epoch that one keeper announces.
 
-The keeper fixes the epoch in unix time and in the monotonic time of its machine. A process of the same machine counts
-from the monotonic epoch, whenever it starts: all of these agree to microseconds, and no step of the system's clock
-moves any of them. A process of another machine reads its unix time once, when it starts, and continues by its own
-monotonic clock: it is as accurate as the agreement of the two machines' unix clocks at the epoch and at its start.
-
-While the swarm runs, the keeper may change the pace: it announces an epoch and another scale that give the same
-instant at that moment. A process that hears later of a slower clock is ahead, and its instant stands still until that
-clock has come so far; one that hears later of a faster clock goes on from the instant of the others. Swarm time never
-goes back. Announcements are numbered, so that an older one changes nothing.
+Processes of the keeper's machine count from its monotonic epoch, so that no step of the system's clock moves them;
+those of another machine read unix time once, when they start, and continue by their own monotonic clock. When the
+keeper changes the pace, it announces an epoch and a scale that give the same instant; who hears of a slower clock late
+stands still until that has come so far: swarm time never goes back. Announcements are numbered, so that an older one
+changes nothing.
 """
 
 import asyncio

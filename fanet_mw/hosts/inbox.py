@@ -2,15 +2,10 @@
 
     samples = taken + malformed + oversized + overflowed + waiting
 
-A put may carry any number of messages. The queue is therefore bounded by puts and by bytes, and a portion by messages
-and by bytes, so a put with many messages is handed over in several portions. A put is dropped if the inbox, or the
-quota of its topic, is full: the waiting puts are older and come first, and a node's next request shows the gap. A quota
-is a quarter of the inbox, so that a sender that floods one topic cannot shut out the others. The inbox holds about what
-an actor can handle in some tens of milliseconds, because what waits longer would be too late for the air. If a put
-turns out to be malformed in the middle, the messages before that place have been handed over already.
-
-`offer` and `deliver` may run on different threads: the two ends of a deque are safe, and each counter is written by
-only one thread. There are no priorities among topics.
+The queue, and a portion, are bounded by messages or puts and by bytes. A put is dropped if the inbox, or the quota of
+its topic (a quarter, so that no sender shuts out others), is full: waiting puts come first, and the next request shows
+the gap. It holds about what an actor handles in some tens of milliseconds; more would be too late for the air. `offer`
+and `deliver` may run on different threads: the ends of a deque are safe, and each counter has one writer.
 """
 
 from collections import deque

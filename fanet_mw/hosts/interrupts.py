@@ -1,13 +1,9 @@
 """How the commands of this project react to SIGINT, SIGTERM and SIGHUP, and how a command exits.
 
-Python handles SIGINT only if it was not ignored when the process started, and a shell script starts `command &` with
-SIGINT ignored. Each entry point therefore calls `install`, after which the signals raise KeyboardInterrupt with the
-signal's number. A SIGHUP that was ignored from the start, as by nohup, stays ignored. While `hosts.loop.run` runs, they
-cancel its coroutine instead, so that nothing is interrupted half-way.
-
-A KeyboardInterrupt during an import can get lost: some libraries try an import, and go on whatever exception it raises.
-The code that runs after the imports therefore calls `raise_again`. Other libraries raise an error of their own in its
-place; the code around the imports is therefore `undisguised`.
+Python handles SIGINT only if it was not ignored at the start, as a shell script has it for `command &`; so each entry
+point calls `install`, after which signals raise KeyboardInterrupt with their number, or cancel the coroutine of
+`hosts.loop.run`. A SIGHUP that was ignored, as by nohup, stays ignored. Some libraries swallow an exception during an
+import, others replace it: `raise_again` and `undisguised` are for these.
 """
 
 import gc

@@ -2,12 +2,10 @@
 
     Zenoh's thread -> inbox -> wake-ups of the loop drain it -> actor -> outbox, one put per topic and wake-up
 
-The host never wakes an actor early. An actor with slack is woken together with the next message that comes after the
-instant it asked for, at the latest when its slack is over, and what need not be handled at once waits for a wake-up
-that is due within the slack: each wake-up of a process costs far more than what the actor does in it. The host measures
-and reports how late beyond that it wakes the actor, and for how long it could do nothing at all; the lateness of frames
-is counted by the medium. A wake-up that is requested for an instant in the past counts as late from the request on; how
-far past the instant was is reported separately. An actor that raises ends its host, and with it the process.
+An actor is never woken early. One with slack is woken with the next message after the instant it asked for, at the
+latest when its slack is over: a wake-up of a process costs far more than what the actor does in it. Later wake-ups are
+counted as late, one asked for in the past from the request on. An actor that raises ends its host, and with it the
+process.
 """
 
 import asyncio

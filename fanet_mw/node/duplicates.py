@@ -1,13 +1,8 @@
 """The duplicate set: which packets a node has handled already, and in which of their phases.
 
-It maps the key of a packet to a set of bits, one for each phase. A node's keys are hashes of all that the packet's
-origin wrote (`hash_of`), so a forged packet with the same origin and sequence number is not taken for the genuine
-one. Queues, and radios for their datagrams, use `key_of` instead, which is origin and sequence number.
-
-The node asks it for each received frame, and drops what it has handled (`Node`, `node.py`).
-
-Memory is bounded: the keys are kept in two generations, and a key is forgotten after at least `capacity` newer ones.
-A packet that comes back later than that would be handled again, but its lifetime has ended long before.
+Keys are hashes of all that a packet's origin wrote (`hash_of`), so a forged packet of the same number is not taken for
+the genuine one; queues, and radios for their datagrams, use origin and number (`key_of`). Keys are kept in two
+generations: one is forgotten after at least `capacity` newer ones, long after its packet's lifetime.
 """
 
 from typing import Final

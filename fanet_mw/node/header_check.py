@@ -8,14 +8,10 @@ any effect.
     instant of generation               not in the future; unless most neighbors say so: then the own clock is behind
     sequence number                     not greater than a node had time to reach since swarm instant 0
 
-Frames that cannot be decoded (`reader.py`) are counted as `malformed` by the node (`node.py`). A packet that was
-recorded and is sent again is a copy (`duplicates.py`), or has outlived its lifetime (`expired`, `node.py`); a hello is
-old after the lifetime of frames in the radio and one hello interval, and with time beacons after 150 ms by a supported
-swarm time (`agents/clock/swarm_time.py`).
-
-Origins are not proved: a relay may still invent a packet in the name of another node. But it cannot keep out that
-node's own packets, because duplicates are found by a hash of the whole packet, and not by origin and sequence number
-(`duplicates.hash_of`).
+A packet that is recorded and sent again is a copy (`duplicates.py`), or has outlived its lifetime; a hello is old after
+the lifetime of frames in the radio and one hello interval, and with time beacons after 150 ms
+(`agents/clock/swarm_time.py`). Origins are not proved, but a packet invented in the name of another node does not keep
+out that node's own (`duplicates.hash_of`).
 """
 
 from collections.abc import Callable

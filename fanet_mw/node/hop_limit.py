@@ -5,8 +5,6 @@
 
 A packet that is heard with a hop limit of 1 has made its last hop: the node may deliver it, but passes it on to no one.
 The part that would have passed it on drops it by the reason `hop_limit`.
-
-Each hop is counted where the next frame of the packet is written (`wire.rewrite`).
 """
 
 from fanet_mw.wire import Header

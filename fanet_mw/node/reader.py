@@ -1,10 +1,8 @@
 """Reads received frames: first only what identifies the packet and its phase, then, if a node asks, the whole packet.
 
-Most receptions are copies of packets that the node has handled already, so a node looks a packet up in its duplicate
-set before it decodes it. In virtual time the nodes that hear a broadcast get the same bytes one after another; they
-share one `Reader`, so that a frame is read once and not by each of them. In real time each process has its own.
-The caches of this module belong to the process. They depend on nothing but the bytes of a frame, so several runs and
-threads may share them.
+Most receptions are copies, so a node looks a packet up before it decodes it. In virtual time nodes that hear a
+broadcast share one `Reader`, so that a frame is read once. Caches depend on nothing but the bytes of a frame, so
+several runs and threads may share them.
 """
 
 from collections.abc import Callable, Sequence

@@ -2,12 +2,10 @@
 
     request -> waits for its instant -> socket -> driver and air -> socket of the other node -> reception
 
-The interface is an ad hoc (IBSS or mesh) Wi-Fi interface with an address of its own, whose driver does CSMA/CA. The
-other radio acknowledges each unicast, and it is sent up to `ATTEMPTS` times, because drivers do not tell whether the
-MAC's own ACK came. A frame that is far behind its instant is dropped, as by the emulated radio, and so is one for which
-the socket has no room: it would go out in the turn of another node. Received datagrams never raise; bad ones are
-counted. The RSSI is not known, so receptions state 0.
-Nor is the true end of a frame: `end_ns` is the instant at which it was read from the socket.
+An ad hoc (IBSS or mesh) Wi-Fi interface whose driver does CSMA/CA. Unicasts are acknowledged by the other radio, and
+sent up to `ATTEMPTS` times: drivers do not tell of the MAC's own ACK. A frame far behind its instant, or without room
+in the socket, is dropped: it would go out in the turn of another node. The RSSI is not known (0), and `end_ns` is the
+instant of reading.
 """
 
 import asyncio

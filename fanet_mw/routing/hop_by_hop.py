@@ -4,9 +4,7 @@
     receive   -> control? its protocol : for this node? done : broadcast? relay once : hop limit? drop : routes
     status    -> acknowledged? done : the protocol learns that the link has failed, and names the reason of the drop
 
-Duplicates never come here: the node suppresses them, so no packet passes the same node twice. With
-`routing.address_resolution` every unicast, control included, first waits for the address of its next hop
-(`resolution`).
+With `routing.address_resolution` every unicast first waits for the address of its next hop (`resolution`).
 """
 
 import struct

@@ -3,10 +3,9 @@
     hello with digest -> packets that its sender lacks -> wait U(0, assessment) -> flood them again, unless another node
                                                                                    has done so in the meantime
 
-Packets are kept in a bounded store, so parts of a swarm that were separated for a while learn each other's packets when
-they meet. A packet is repaired only when its own flood should be over. After epidemic routing (Vahdat and Becker,
-2000), with suppression as in Trickle (RFC 6206). A packet stays lost if it is older than `window_s`, or if its origin
-has sent 32 packets since. A way to the head that broke is found again by hellos (`Gradient`).
+Packets are kept in a bounded store, so separated parts of a swarm learn each other's packets when they meet; one is
+repaired only when its own flood should be over. After epidemic routing (Vahdat and Becker, 2000), with suppression as
+in Trickle (RFC 6206). A packet stays lost if it is older than `window_s`, or if its origin has sent 32 packets since.
 In a timetable over links that lose nothing, hellos state nothing until a node misses a packet (`missing_packets.py`).
 """
 

@@ -1,8 +1,7 @@
 """The control messages of the rival protocols on the air: FANET_ROUTING messages in a packet of kind ROUTING.
 
-A control message has a type and a body. The high half of the type names the protocol, so no protocol decodes messages
-of another. All pieces of a message travel in one radio frame, so `capacity` bounds its length. `BodyReader` reads
-bodies, and raises MalformedFrameError if bytes are missing.
+The high half of a message's type names the protocol, so none decodes messages of another. All pieces travel in one
+radio frame, so `capacity` bounds its length.
 """
 
 import struct

@@ -1,9 +1,4 @@
-"""Reads a scenario: a TOML file and `KEY=VALUE` overrides become a frozen `Scenario`. All mistakes are reported at
-once.
-
-Each message names the file, the key, the value and the bound, because the user may see nothing but that line
-(`validation_errors.py`).
-"""
+"""Reads a scenario: a TOML file and `KEY=VALUE` overrides become a frozen `Scenario`; all mistakes are told at once."""
 
 import re
 import unicodedata

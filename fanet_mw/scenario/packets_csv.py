@@ -1,8 +1,7 @@
 """Reads a file of packets, a line `seconds,bytes` for each, as spreadsheets of several countries write it.
 
-Cells lie between commas, semicolons or tabs, in quotes or not; a decimal comma is read where it cannot be one between
-cells. Lines that begin with `#` are comments, `sep=;` is Excel's word on what lies between cells. A heading may be
-there; one that says that the cells hold something else is refused.
+Cells lie between commas, semicolons or tabs; a decimal comma is read where it cannot be one between cells. Lines that
+begin with `#` are comments, `sep=;` is Excel's word. A heading that says that the cells hold something else is refused.
 """
 
 import csv

@@ -3,11 +3,9 @@ clock.
 
     swarm - own = offset + rate x (own - at)       weighted least squares over the last pairs (FTSP, Maroti et al. 2004)
 
-Each pair states a bound of its error. A pair that lies farther from the line than both errors allow is counted as an
-outlier, and left out. If more pairs in the window agree with each other against the line than support it, the line was
-wrong, and is fitted anew to them. A single neighbor cannot achieve that against others, however many pairs it states.
-The stated error of the line is an estimate and not a proof: four standard deviations of the fit, plus the errors that
-the pairs state.
+A pair farther from the line than both stated errors is an outlier. If more pairs in the window agree against the line
+than support it, it is fitted anew to them, which no single neighbor achieves against others. The stated error is an
+estimate: four standard deviations of the fit, plus the pairs' errors.
 """
 
 import math

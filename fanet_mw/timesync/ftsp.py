@@ -3,17 +3,11 @@
     hello n ends                   its sender and all receivers stamp that instant, each by its own clock
     hello n+1 says "hello n ended at swarm time t"     -> a pair (own stamp, t) -> the fit of `clock_fit`
 
-Because the time stamp of a hello is sent in the next one, it does not matter how long a hello contends for the channel.
-The reference is the node with the lowest id. A node that has had no news of a reference for a while becomes the
-reference, and a node that learns of a reference with a lower id follows that one (root election by time-out, Maroti et
-al. 2004). A node that becomes reference later continues the time that the swarm has. Pairs are taken from the neighbors
-nearest to the reference; other neighbors can only contradict. A beacon is news if the reference's `round` has advanced:
-beyond that of the last news, or, when there has been none for a while, beyond that of the neighbor's last beacon,
-because a reference that starts again counts its rounds anew.
-
-Sans-IO: instants of the own clock and beacons go in; the line to swarm time, its error and the next beacon come out.
-Not provided: secrecy and proof of origin. A plausible forged beacon counts as one neighbor's statement, even as the
-first one; it can be outvoted, but is not recognized.
+The reference is the node with the lowest id; a node without news of one for a while becomes it (root election by time-
+out, Maroti et al. 2004), and continues the swarm's time. Pairs are taken from the neighbors nearest to the reference;
+others can only contradict. A beacon is news if the reference's `round` has advanced beyond the last news or, after a
+while without, beyond that neighbor's last beacon: a restarted reference counts anew. Not provided: secrecy and proof of
+origin. A plausible forged beacon counts as one neighbor's statement; it can be outvoted, but is not recognized.
 """
 
 import math

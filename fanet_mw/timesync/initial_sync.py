@@ -2,10 +2,9 @@
 
     a neighbor states the time -> how many others state the same? -> enough, and more than contradict it -> accepted
 
-The leader's statement of its own time is accepted at once. Any other statement needs a second neighbor that agrees, or
-some time in which no more neighbors contradict it than agree with it. So two honest neighbors outvote a liar that
-speaks first. Not detected: a liar that is the only neighbor, and liars that outnumber the honest neighbors. Both are
-believed until others contradict them (`clock_fit`).
+The leader's statement of its own time is accepted at once. Any other needs a second neighbor that agrees, or some time
+in which no more contradict it than agree. Not detected: a liar that is the only neighbor, and liars that outnumber the
+honest neighbors (`clock_fit`).
 """
 
 from typing import Final

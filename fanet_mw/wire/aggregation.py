@@ -1,8 +1,6 @@
 """Aggregation: several packets share one radio frame, a bundle, each with its own header.
 
-The flag FLAG_MORE in a header says that another packet follows. Which packets are sent together is chosen by the
-protocol's access (in `fanet_mw/routing/clustered/`: `slots/slot_access.py`, `timetable/turn_release.py`) and by the
-order of the queue.
+The flag FLAG_MORE in a header says that another packet follows.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence

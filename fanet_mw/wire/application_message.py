@@ -1,11 +1,8 @@
 """FANET_MESSAGE, FANET_TARGETS and FANET_RECEIPT: messages of applications, in pieces that fit a packet.
 
-    packet of a piece      [FANET_TARGETS ...]  FANET_MESSAGE  FANET_CHUNK ...          bytes on a numbered port
-                           [FANET_TARGETS ...]  FANET_MESSAGE  MAVLink messages         port 0, always one piece
-    packet of receipts     FANET_RECEIPT ...
-
-Any bytes decode either to a value or to MalformedFrameError. No value needs more memory than the packet that brought
-it.
+packet of a piece      [FANET_TARGETS ...]  FANET_MESSAGE  FANET_CHUNK ...          bytes on a numbered port
+                       [FANET_TARGETS ...]  FANET_MESSAGE  MAVLink messages         port 0, always one piece
+packet of receipts     FANET_RECEIPT ...
 """
 
 import struct

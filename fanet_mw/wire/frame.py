@@ -1,9 +1,7 @@
 """The format of a radio frame: MAVLink 2 frames one after another, first FANET_ROUTE, then inner frames.
 
-Each hop rewrites FANET_ROUTE, the routing header, and leaves the inner frames unchanged. The header, and the frame
-around each message of this project's dialect, are coded by struct and a Rust CRC, because every reception passes here;
-tests compare them with pymavlink. Any bytes decode either to a value or to MalformedFrameError. The layouts are in
-docs/reference/air-format.md.
+The header, and the frame around each message of this dialect, are coded by struct and a Rust CRC, because every
+reception passes here; tests compare them with pymavlink. Layouts: docs/reference/air-format.md.
 """
 
 import struct

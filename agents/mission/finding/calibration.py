@@ -8,18 +8,10 @@
     b_j       further offset of phone j alone, ~ N(0, s_b^2) [dB]
     d_ij      distance of phone j from place i [m]
 
-Once survivor j is confirmed, d_ij is known within metres, and the powers of that phone tell the sum B + b_j. All of
-them share one draw of b_j, so they never tell B more exactly than with the standard deviation s_b. A receiver reports
-no power below its threshold, so the powers of a weak phone are those that shadowing has raised: the likelihood is that
-of a normal distribution truncated at the threshold (Cohen, Annals of Mathematical Statistics 21(4), 1950).
-
-One phone may be far off: under rubble, because it was confirmed as another person's, or because its reports are forged.
-The likelihood of each phone therefore has a floor, a share of its maximum, so that no single phone changes the odds
-between two values of B by more than a factor of about 200.
-
-Two models are compared by their evidence: B is small (phones are as assumed), or B may be large. The filters assume
-B = 0 until the second model is `_EVIDENCE_RATIO` times as likely as the first, so that a few powers of phones that are
-as assumed neither shift nor widen their estimates.
+Of a confirmed phone the powers tell B + b_j, never B more exactly than s_b. Powers below the threshold are not
+reported, so the likelihood is truncated there (Cohen, Annals of Mathematical Statistics 21(4), 1950); it has a floor,
+so that no single phone, under rubble or forged, changes the odds by more than a factor of about 200. B = 0 is assumed
+until a model with a large B is `_EVIDENCE_RATIO` times as likely.
 """
 
 import math

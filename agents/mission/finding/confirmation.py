@@ -4,9 +4,7 @@
     received powers      are enough, from enough nodes, to tell roughly where the phone is
     the next best        assignment of phones to people (`identities.py`) is far less likely
 
-If two people lie side by side, many powers are needed to tell their phones apart. A UAV that is not certain therefore
-waits and receives more, and after a while it is content with less certainty. What becomes of a confirmation is decided
-in `sightings.py` and `known_survivors.py`.
+A UAV that is not certain receives more powers, and is content with less certainty after a while.
 """
 
 from typing import Final

@@ -4,10 +4,9 @@
     all people and all phones     are assigned at once, so that all received powers together are most likely
     a person's phone is certain   when every other assignment of this person is far less likely (`confirmation.py`)
 
-A survivor is known by the id of the phone; a person who is certainly there and carries no phone that fits is reported
-without one (`unreported`). The cost of a pair of person and phone tells how much less likely the
-phone's received powers are from the person's place than from the best place. It is twice a difference of
-log-likelihoods, so for the true pair it has a chi-square distribution with 2 degrees of freedom.
+A person who is certainly there without a phone that fits is reported without one (`unreported`). The cost of a pair is
+twice the difference of log-likelihoods of the phone's powers from the person's and from the best place: chi-square with
+2 degrees of freedom for a true pair.
 """
 
 import math

@@ -3,15 +3,9 @@
     a phone is received -> reports by several nodes -> its owner is seen at close range -> confirmed
     a survivor is confirmed, and later powers of that phone contradict the place        -> refuted, searched for again
 
-A confirmation and its refutation may arrive in any order: a refutation takes back the confirmations of the same place
-that are not younger than itself, those that arrive later included. It also removes the best estimate that another node
-has announced, wherever that is, unless it is younger. Two rules depend on the order of arrival. Of two confirmations
-that nothing refutes, the first to arrive stays. Of the announced estimates only the best one is kept, so once a
-refutation has removed that one, a worse but younger one does not come back.
-
-The powers of the phones of confirmed survivors tell by how much all phones are stronger or weaker than assumed
-(`calibration.py`). The filters of the unconfirmed survivors' phones are calibrated by that. When sightings suffice for
-a confirmation is decided in `confirmation.py`, whose phone it was in `identities.py`.
+A refutation takes back confirmations of the same place that are not younger than itself, in whatever order they arrive,
+and the best announced estimate unless that is younger. Of two confirmations that nothing refutes, the first to arrive
+stays. Confirmed phones calibrate the others (`calibration.py`).
 """
 
 from dataclasses import dataclass, field

@@ -7,17 +7,12 @@
     b         offset of this phone's power, by burial, antenna and battery [dB]
     d_i       distance of the phone from place i [m]
 
-Shadowing at places near each other is nearly the same (Gudmundson, 1991), so that ten powers from one side tell little
-more than one. Each power is therefore compared with what those received nearest to its place let expect (Vecchia,
-Journal of the Royal Statistical Society B 50(2), 1988): the residuals are whitened, one after the other. The offset b
-is integrated out in closed form, so that the filter keeps only the sum of the whitened residuals of each cell, the sum
-of their squares, and the likelihood of the places without reception. The filter is a histogram filter (Thrun,
-Burgard, Fox: Probabilistic Robotics, 2005, chapter 4). Unlike least squares it needs no initial estimate. If a UAV
-flies straight, the powers cannot tell on which side of its course the phone is; both places then stay probable until a
-power received elsewhere excludes one of them.
-
-`calibration.py` estimates an offset that is common to all phones. Its mean is added to P, and its variance to that of
-b. Once a person has been recognized as the phone's owner, the position of that person replaces the filter's estimate.
+Shadowing at places near each other is nearly the same (Gudmundson, 1991), so each power is compared with what those
+received nearest to its place let expect (Vecchia, Journal of the Royal Statistical Society B 50(2), 1988): residuals
+are whitened, one after the other, and b is integrated out in closed form. The filter is a histogram filter (Thrun,
+Burgard, Fox: Probabilistic Robotics, 2005, chapter 4): both sides of a straight course stay probable until a power from
+elsewhere excludes one. `calibration.py` estimates an offset common to all phones; a recognized owner's position
+replaces the estimate.
 """
 
 import math

@@ -1,11 +1,9 @@
-"""Chooses the velocity to fly until the next position fix: the wanted velocity, changed as little as the constraints
-allow.
+"""Chooses the velocity until the next position fix: the wanted one, changed as little as the constraints allow.
 
-Constraints are half-planes of velocities. Hard ones keep a UAV clear of obstacles (`navigation/known_obstacles.py`) and
-of other UAVs (`reciprocal_avoidance.py`). Soft ones keep it within radio reach of those UAVs with which it keeps the
-swarm connected (`connectivity_maintenance.py`). If no velocity satisfies all of them, soft constraints are dropped, the
-least important first. If the hard ones alone contradict each other, the velocity with the least violation is flown
-(`navigation/half_planes.py`). The vertical part follows the terrain (`terrain_following.py`).
+Hard half-planes keep a UAV clear of obstacles (`navigation/known_obstacles.py`) and of other UAVs
+(`reciprocal_avoidance.py`), soft ones keep the swarm connected (`connectivity_maintenance.py`). If no velocity
+satisfies all, soft ones are dropped, the least important first; if the hard ones contradict each other, the least
+violation is flown (`navigation/half_planes.py`).
 """
 
 import math

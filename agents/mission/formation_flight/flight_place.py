@@ -8,8 +8,7 @@
     a UAV whose head is lost    flies parallel to the leader if it receives the leader, otherwise it hovers
     a UAV that receives nobody  hovers, even if it was the leader: the others fly on without it (and below it)
 
-The leader of the formation need not be the leader of the network, which assigns the clusters. Positions come only from
-received messages: the hellos of neighbors, and the floods of heads. A UAV is lost when its newest message is too old.
+The leader of the formation need not be that of the network, which assigns the clusters.
 """
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping

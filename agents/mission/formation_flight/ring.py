@@ -3,11 +3,9 @@
     a UAV keeps its bearing from the middle, except that it turns towards the wider of the two gaps beside it
     the UAV of a circle nearest to the bearing of another circle turns to that bearing, and links the two
 
-Nobody assigns places: each UAV turns by what it knows of its two neighbors on the circle. With five UAVs or more the
-gaps become equal, except beside one that faces another circle; fewer leave one gap wider. A UAV that joins divides a
-gap. When one is lost, its two neighbors turn into the gap (balanced deployment on a circle: Martinez and Bullo, Optimal
-sensor placement and motion coordination for target tracking, Automatica 42(4), 2006). Circles of few UAVs would come
-apart if none turned to the other circle.
+Nobody assigns places (balanced deployment on a circle: Martinez and Bullo, Optimal sensor placement and motion
+coordination for target tracking, Automatica 42(4), 2006). With five UAVs or more the gaps become equal, except beside
+one that faces another circle.
 """
 
 import math

@@ -1,8 +1,7 @@
 """A UAV's place in the formation: where the plan wants it at each instant, and how far it may go from there.
 
-The swarm is connected by the UAVs of teams and by relays, so these stay near their places. A follower may fly anywhere
-near its team. A UAV that has no place yet waits where it is. `shapes/contract.py` explains place,
-lane, team, relay and follower.
+Teams and relays connect the swarm, so they stay near their places; a follower may fly anywhere near its team
+(`shapes/contract.py` explains the words).
 """
 
 import math

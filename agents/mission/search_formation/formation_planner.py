@@ -14,10 +14,9 @@
     restarts:   a node without a plan that hears of others' waits to be told it, even if it has the lowest id; of those
                 that follow the newest plan, the one with the lowest id stands in as the planner until then
 
-The first assignment nearly minimizes the sum of the squared distances flown, and keeps the swarm in one piece on the
-way where it can (`lasting_links.py`). UAVs that are out for survivors become followers, on whom nothing depends. The
-words place, team, relay and follower are explained in `shapes/contract.py`; how the area is split into lanes is in
-`shapes/`.
+The first assignment nearly minimizes the sum of squared distances, and keeps the swarm in one piece on the way where it
+can (`lasting_links.py`). UAVs that are out for survivors become followers, on whom nothing depends.
+`shapes/contract.py` explains place, team, relay and follower.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence

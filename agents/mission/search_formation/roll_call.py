@@ -9,8 +9,7 @@
               much longer, because news take a second a hop: then it is cut off with a part of the swarm
     mute      a UAV that hears for some seconds that it is lost itself, and never that it is not, is not heard
 
-Whoever finds by its own receiver that a UAV is lost, or back, floods its roll at once. So all UAVs of a part agree soon
-on who is lost, within a second a hop if that flood is lost, without a leader.
+Whoever finds by its own receiver that a UAV is lost, or back, floods its roll at once.
 """
 
 from collections.abc import Collection

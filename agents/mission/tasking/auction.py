@@ -2,10 +2,9 @@
 
     a task needs n UAVs: of all known bids, the n with the earliest times of arrival win; of equal ones the lower id
 
-Each node keeps the newest bid of each bidder and merges the bids that it receives. Two nodes that have received the
-same bids therefore name the same winners, in whatever order the bids came. This is the consensus of CBBA (Choi, Brunet,
-How, IEEE Transactions on Robotics 25(4), 2009), for tasks that are auctioned one by one. A winner that falls silent is
-forgotten after a while, and its task is open again.
+Nodes that have received the same bids name the same winners, in whatever order they came: the consensus of CBBA (Choi,
+Brunet, How, IEEE Transactions on Robotics 25(4), 2009), for single tasks. A winner that falls silent is forgotten after
+a while, and its task is open again.
 """
 
 from collections.abc import Iterable

@@ -5,9 +5,7 @@
     a call is heard                          a small circle around the caller, until the survivor is confirmed
     confirmed, or given up                   up again, as high as the UAV's place in the formation
 
-Below half of the height of the search there is one UAV at a time near a survivor. The others wait above it, and receive
-the phone from other sides. A UAV whose place in the formation keeps it from getting near stays up, out of their way.
-Roofs, hillsides, walls and other UAVs are kept clear of as everywhere else in the flight.
+Below half of the height of the search there is one UAV at a time near a survivor; others wait above it.
 """
 
 import math

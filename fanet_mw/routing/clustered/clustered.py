@@ -7,8 +7,7 @@
     flooded packet                     roles, if it is a control packet; relaying decides whether and when to pass it on
     hello                              neighbors, roles, gradient, repair; then access, which may have a route now
 
-A packet travels in up to two phases, which the flags of its header tell apart: to a head as acknowledged unicast
-(TO_HEAD), then to all nodes as a flood (FLOOD). `build.py` chooses the class of each part.
+To a head a packet goes as acknowledged unicast (TO_HEAD), then to all nodes as a flood (FLOOD), as its flags say.
 """
 
 from collections.abc import Mapping, Sequence

@@ -4,9 +4,8 @@
     Relaying     whether and when this node passes on a flood that began elsewhere
     HearsCopies  parts that cancel a transmission when another node has made it
 
-`Clustered` calls all of them, and the node's roles (`roles/assigned_roles.py`). These call a `ScheduledAccess`, too, to
-which they give the schedule; no other part knows any of its siblings. No part reads a clock: every instant is an
-argument.
+`Clustered` calls all of them, and the node's roles (`roles/assigned_roles.py`), which give a `ScheduledAccess` the
+schedule; no other part knows any of its siblings.
 """
 
 from collections.abc import Container, Mapping, Sequence

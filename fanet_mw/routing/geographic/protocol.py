@@ -4,10 +4,9 @@
     none                                  -> keep it while flying on; look again twice a second
     handed over                           -> custody has passed on: the same packet may come back later
 
-Location service: a destination that receives data floods its position, at most every 5 s. A node that has a packet for
-a destination of unknown or old location floods a query, which the destination answers at most once a second. Beacons
-(1 s, one hop) pass on the locations in use, so that a node that moves between partitions carries them along. A stale
-location is used until a newer one comes. Broadcast data is flooded.
+Location service: a destination that receives data floods its position, at most every 5 s, or once a second when
+queried; beacons (1 s, one hop) carry the locations in use between partitions. A stale location is used until a newer
+one comes. Broadcast data is flooded.
 
 Not modeled: VADD's delay estimates per road segment, intersections and its L-, D- and H- variants; the motion of
 neighbors between beacons; recovery round voids other than by carrying (perimeter routing).

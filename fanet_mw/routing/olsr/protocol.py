@@ -4,11 +4,10 @@
     TC (5 s, flooded)     -> the links between relays and the nodes that chose them -> shortest paths to all nodes
     data                  -> the next hop of the routing table; without one it is dropped
 
-Broadcast data is flooded by the same rule as TCs: it is relayed by the nodes that the transmitter has chosen as MPRs
-(3.4.1). Not modeled: several interfaces (MID), gateways (HNA), link hysteresis (14), TC redundancy (15), MPR coverage
-(16), link-layer notification (13), which are all optional and off in ns-3 too. The node's duplicate set takes the place
-of OLSR's; it keeps packets by number instead of for DUP_HOLD_TIME, and it stops a data packet that returns to a node,
-which IP would not.
+Broadcast data is relayed by the nodes that the transmitter has chosen as MPRs, as TCs are (3.4.1). Not modeled: several
+interfaces (MID), gateways (HNA), link hysteresis (14), TC redundancy (15), MPR coverage (16), link-layer notification
+(13), all optional and off in ns-3 too. The node's duplicate set, by number instead of for DUP_HOLD_TIME, also stops
+data that returns to a node.
 """
 
 from collections.abc import Mapping

@@ -1,9 +1,8 @@
 """Who sends in a bulk slot: of the nodes within two hops of each other one, by a hash of its id and the slot's number.
 
-Two nodes that could collide at a common neighbor know of each other by what their neighbors state, so both come to the
-same result without a word (NAMA; Bao and Garcia-Luna-Aceves, "A new approach to channel access scheduling for ad hoc
-networks", MobiCom 2001). A node that has little to send takes part in a few of the slots only, and says so. Where nodes
-do not know of each other yet, carrier sensing and repetitions remain.
+Nodes that could collide at a common neighbor know of each other by what neighbors state, so both come to the same
+result without a word (NAMA; Bao and Garcia-Luna-Aceves, "A new approach to channel access scheduling for ad hoc
+networks", MobiCom 2001). A node with little to send takes part in a few slots only, and says so.
 """
 
 from collections.abc import Sequence

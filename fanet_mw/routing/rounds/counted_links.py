@@ -1,9 +1,7 @@
 """Which links a bound counts on: those to neighbors that keep the same rounds, and that will stay within range.
 
-Each hello says where its sender is and how fast it flies. Two nodes that fly on straight lose each other when their
-distance exceeds the range (link expiration time; Su, Lee and Gerla, 2001). Nodes that hardly recede from each other are
-taken to stay. So is a node whose position is not known, and so are those that a UAV keeps in reach: it will not fly
-straight on, however fast it is.
+Two nodes that fly straight on lose each other when their distance exceeds the range (link expiration time; Su, Lee and
+Gerla, 2001). Those that hardly recede, whose position is not known, or that a UAV keeps in reach, are taken to stay.
 """
 
 from collections.abc import Iterator, Mapping

@@ -3,23 +3,17 @@
     hop = period + turn + lead + handover
     D   = ((h + margin) * hop + (1 + used) * ceil(B / room) * period / (1 - hellos)) / (1 - urgent)
 
-A packet that was heard is announced one lead before the next own turn, at most one period later; its frame ends within
-the turn, and is handed over. `h` is the greatest distance that the node knows to another; `margin` is for a topology
-that changes meanwhile. All urgent packets that are under way together, `B` bytes, delay each other once: every node
-serves them at the same rate, `room` bytes of a frame per round, so what waited for one node's turn does not wait
-again for the next one's (tandem of equal servers; Le Boudec and Thiran, Network Calculus, 1.4.3). Of new ones
-that are equally urgent the oldest goes first at every node, so none is delayed by a later one. More urgent packets
-overtake it on its way: `urgent` is the share of turns that was theirs lately, `hellos` the share that hellos take.
-Older packets of other origins, which have not been heard yet, delay it again in so far as turns are full: `used` is the
-share that packets not less urgent use as a rule, or by the traffic of the scenario if that is more (by trial: without
-it 17 of 3,600 deliveries over a line of 25 nodes came up to 8 % too late).
-Assumed: no frame is lost; over any channel but `range` a likely delay is stated instead (`LikelyDelay`). None is
-stated while clocks may be further apart than the slack of turns holds, while more waits for turns, everywhere alike,
-than three quarters of `rounds.burst_bytes`, while turns are overfilled or packets come so late that they must be, while
-more urgent packets use over half of the turns, or while no way has been found yet to a node that may only just have
-started. A bound does not apply to nodes without a way, and counts only on links that will last (`counted_links.py`).
-What waits follows from what was heard, because all nodes hear the same packets and serve them at the same rate (a leaky
-bucket).
+A packet that was heard is announced one lead before the next own turn, at most one period later. `h` is the greatest
+distance that the node knows to another; `margin` is for a topology that changes meanwhile. All urgent packets under
+way, `B` bytes, delay each other once: every node serves them at the same rate, `room` bytes of a frame per round
+(tandem of equal servers; Le Boudec and Thiran, Network Calculus, 1.4.3). Of equally urgent ones the oldest goes first.
+`urgent` is the share of turns that more urgent packets had lately, `hellos` the share of hellos; `used` the share of
+packets not less urgent, as a rule or by the scenario if that is more: older packets not heard yet delay it again
+(without it 17 of 3,600 deliveries over a line of 25 nodes came up to 8 % too late). Assumed: no frame is lost; over any
+channel but `range` a likely delay is stated instead (`LikelyDelay`). None is stated while clocks may be further apart
+than the slack of turns, while more waits than three quarters of `rounds.burst_bytes`, while turns are overfilled, while
+more urgent packets use over half of them, or while no way has been found yet to a node that may only just have started.
+A bound counts only on links that will last (`counted_links.py`).
 """
 
 from collections import defaultdict

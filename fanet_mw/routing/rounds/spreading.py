@@ -5,14 +5,12 @@
     bulk     heard -> an instant in a bulk window -> every neighbor hears one that sent it: not sent; else sent
                    -> a round later -> a neighbor is not known to have it: sent (again)
 
-A neighbor is known to have a packet when it was heard to send it (passive acknowledgment, RFC 4728, 3.4.2), or to say
-that it holds it (FANET_HELD). Urgent packets are sent by every node, so hearing them is enough. Where frames are lost
-at random it is enough, too, that two were heard that have links to the neighbor; what is missing is sent again at
-growing intervals, and neighbors that are seldom heard are left to others. Bulk is sent only where a neighbor is out of
-reach of all that were heard to send it (scalable broadcast; Peng and Lu, MobiHoc 2000), so every node tells in turns
-which bulk it has received. For a neighbor that is heard but hears nothing, nothing is sent again. Before a packet is
-repeated a whole round must have passed in which nobody else sent it, so that mostly one node repeats. Sets of nodes are
-integers: bit i stands for node i + 1.
+A neighbor has a packet when it was heard to send it (passive acknowledgment, RFC 4728, 3.4.2), or to say so
+(FANET_HELD). Every node sends urgent packets; where frames are lost at random it is enough that two were heard that
+have links to the neighbor, and repetitions come at growing intervals. Bulk is sent only where a neighbor is out of
+reach of all that were heard to send it (scalable broadcast; Peng and Lu, MobiHoc 2000). Nothing is repeated for a
+neighbor that hears nothing, nor within a round in which somebody else sent it. Sets of nodes are integers: bit i stands
+for node i + 1.
 """
 
 import math

@@ -1,8 +1,7 @@
 """Who hears whom in the whole swarm: each node states its neighbors, and all pass that on in turns.
 
-A statement bears the number of its epoch, a short interval of swarm time, so a newer one is known whoever passes it on
-and whenever a node was started. A node states at the beginning of an epoch whether its neighbors have changed, and once
-per second in any case. A link counts if both its ends state it.
+A statement bears the number of its epoch, a short interval of swarm time, so a newer one is known whoever passes it on.
+A node states changes at the beginning of an epoch, and all once per second. A link counts if both its ends state it.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence

@@ -1,13 +1,10 @@
 """The parts of a hello, which each node broadcasts to its neighbors. The order is that in the hello.
 
-    MAVLink's position and velocity   `fanet_mw/mavlink.py`; every node says it
-    messages of a search              `fanet_mw/wire/`: survivors, bids, searched cells
-    FANET_BEACON                      `beacon.py`: cluster, role, leader, and the distance from a head
-    FANET_DIGEST                      `digest.py`: which recent packets the sender holds, so that others can repair
-    FANET_TIME                        `time_beacon.py`: when an earlier hello ended, in swarm time
-
-`fanet_mw/node/node.py` (`say_hello`) puts a hello together. `fanet_mw/node/reader.py` (`decoded`) decodes a hello that
-was heard, once for the clock, the protocol and the applications.
+MAVLink's position and velocity   `fanet_mw/mavlink.py`; every node says it
+messages of a search              `fanet_mw/wire/`: survivors, bids, searched cells
+FANET_BEACON                      `beacon.py`: cluster, role, leader, and the distance from a head
+FANET_DIGEST                      `digest.py`: which recent packets the sender holds, so that others can repair
+FANET_TIME                        `time_beacon.py`: when an earlier hello ended, in swarm time
 """
 
 from typing import Final

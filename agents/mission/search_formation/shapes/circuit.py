@@ -7,8 +7,7 @@
     | +-----------+ |     next sweep each flies over what the one ahead has searched, and so on: nobody turns back
     +---------------+
 
-No two UAVs need be within radio reach of each other. If one is lost the others close up all around. The words place,
-team and lane are explained in `contract.py`; all UAVs are one team.
+No two UAVs need be within radio reach of each other. All are one team (`contract.py`).
 """
 
 import math

@@ -6,9 +6,8 @@ r"""The formation `fan`: all UAVs on a front that spreads from the base over the
        `-. \|/ .-'
            base           no time is lost on the way to the places: it is a part of the search
 
-All begin at the same share of their ways, so that they are equally far apart, and fly at the same speed from there. A
-few UAVs left over fly behind the front. The words place, team, lane and follower are explained in
-`contract.py`; a fan is one team, and has no relays.
+All begin at the same share of their ways, and fly at the same speed. A few UAVs left over fly behind the front. A fan
+is one team without relays (`contract.py`).
 """
 
 import math

@@ -9,8 +9,7 @@
 With UAVs enough there are more lines, as many to the north as to the south: each sweeps its share of its half and ends
 where the next one began, and chains join neighboring ones unless these are within reach of each other anyway.
 
-The words place, lane, team, relay and follower are explained in `contract.py`; the teams of this formation are its
-lines, from the northernmost to the southernmost.
+The teams are the lines, from the northernmost to the southernmost (`contract.py`).
 
 Lines of a swarm that stands spread over the middle of the area begin where it stands, bent back at both ends:
 
@@ -22,11 +21,9 @@ Lines of a swarm that stands spread over the middle of the area begin where it s
 
 On its way back each UAV flies between the lanes of its way out.
 
-Between two turns each place of a line moves straight at constant speed. A relay does so, too, but changes its velocity
-once, when the lines have flown `_STRAIGHT_M`. The distance of two such places is therefore a convex function of time
-from a turn to that instant, and from that instant to the next turn: a pair that is within radio reach at these three
-instants is within reach all the time. Followers start later than their line, and need not stay within reach of any
-single place.
+Between two turns a place of a line moves straight at constant speed, a relay but for one change when the lines have
+flown `_STRAIGHT_M`. Distances are convex in between, so a pair within radio reach at these three instants is so all the
+time.
 """
 
 import itertools

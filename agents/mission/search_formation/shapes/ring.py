@@ -8,7 +8,7 @@
     |               |
     o---o---o---o---o     every side has the same number of UAVs; up to three that are left over fly behind the ring
 
-The words place, lane, team, relay and follower are explained in `contract.py`; a ring is one team, and has no relays.
+A ring is one team without relays (`contract.py`).
 """
 
 import math

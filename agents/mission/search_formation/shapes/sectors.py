@@ -8,10 +8,8 @@
     | o-o-o | o-o-o |     there are no relays between the rows, so more UAVs than in other formations are followers,
     +-------+-------+     which are free to fly to survivors
 
-Rows in the south of the area are swept southward, rows in the north northward. Of an odd number of rows the middle one,
-or the only one, is swept northward. So two rows begin beside each other, lose contact as they part, and regain it on
-the way back; of more rows only the pair that begins beside each other does so, all other neighboring rows stay the
-depth of a sector apart. The words place, lane, team and follower are explained in `contract.py`.
+Rows in the south of the area are swept southward, others northward, as is a middle or an only one: two rows begin
+beside each other, part, and meet on the way back. `contract.py` explains the words.
 """
 
 import math

@@ -8,14 +8,10 @@
     | +-------------+ |     sweeps its share of a turn, and their innermost lanes stay within reach of each other
     +-----------------+
 
-UAVs that are too few for one full arm form a shorter one, which winds outward: it flies a first turn around the middle,
-is farther out after each further turn, flies the last turn along the edge, and returns on the same way. This is the
-expanding square search of IAMSAR, volume II, flown by several UAVs abreast. It searches the middle of the area first,
-and needs no least number of UAVs. The words place, lane, team and follower are explained in `contract.py`; the teams of
-a spiral are its arms.
-
-The outermost lane flies at the speed of the sweep, or a little slower while the arm winds outward; inner lanes are
-slower.
+UAVs that are too few for one full arm form a shorter one, which winds outward: the expanding square search of IAMSAR,
+volume II, flown by several UAVs abreast. It turns around the middle first, flies the last turn along the edge, and
+returns on the same way. The teams are the arms (`contract.py`); the outermost lane flies at the speed of the sweep, or
+a little slower while winding.
 """
 
 import math

@@ -1,8 +1,7 @@
 """How the leader divides nodes into clusters, behind one contract (`Clustering`); `clusters.method` names a method.
 
-`bisection` makes balanced clusters; other methods come from extensions. `division` is what a leader uses: it asks a
-method for clusters when they are due. `succession` is the order in which the members of a cluster stand in for their
-head.
+`bisection` makes balanced clusters; `division` is what a leader uses; `succession` is the order in which members stand
+in for their head.
 """
 
 from fanet_mw.routing.clustered.clustering.bisection import Balanced, balanced

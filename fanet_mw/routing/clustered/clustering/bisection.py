@@ -1,9 +1,8 @@
 """Divides nodes into k balanced, connected clusters: recursive bisection along the longer axis, or along the graph.
 
-A cut by position that leaves both sides connected is taken as it is. Where it would tear one, as a line does that lies
-along the axis of another one, the side is grown hop by hop from one end of the graph instead. The head is the node
-nearest to the middle, unless others have fewer members farther than three hops. Sizes differ by at most one where all
-cuts are by position. The paper gives k, but not how it chooses the members.
+A cut by position that leaves both sides connected is taken; where it would tear one, the side is grown hop by hop from
+one end of the graph. The head is the node nearest to the middle, unless others have fewer members farther than three
+hops. The paper gives k, but not how it chooses the members.
 """
 
 from collections.abc import Mapping, Sequence

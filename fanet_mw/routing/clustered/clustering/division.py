@@ -1,9 +1,7 @@
 """The leader's division of the nodes into clusters, and the decision when to divide anew. Pure functions.
 
-The present clusters are first carried on: nodes that are gone are removed, a head that is gone is replaced by its
-stand-in, and new nodes join the nearest head. Then they are compared with a new division by cost: the hops from each
-member to its head, and members above the fair share. The new division is taken only if the present one costs `_WORSE`
-times as much. Heads, and their slots, are then kept if they are nearly as good as the new ones.
+The present clusters, less nodes that are gone and with new ones, are compared with a new division by cost, which is
+taken if they cost `_WORSE` times as much. Heads, and their slots, are kept if they are nearly as good.
 """
 
 import math

@@ -1,10 +1,8 @@
 """Brings packets to a cluster head as acknowledged unicast, from parent to parent along the gradient (phase TO_HEAD).
 
-`slots/slot_access.py` decides that a packet goes to a head, and calls `send`.
-`clustered/clustered.py` passes on the radio's statuses, and sends held packets again.
-A packet is either under way, until the parent acknowledges it, or it is held because there is no route, until it
-expires. If a parent does not acknowledge it, the packet goes to the parent that is known by then, and is dropped after
-`MOST_TRIES` parents. The count starts again for a packet that was held.
+A packet is under way until the parent acknowledges it, or held while there is no route, until it expires. Without
+acknowledgement it goes to the parent known by then, and is dropped after `MOST_TRIES`; a held packet's count starts
+again.
 """
 
 from typing import Final, NamedTuple

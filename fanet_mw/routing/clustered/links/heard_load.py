@@ -1,16 +1,14 @@
 """Estimates how many packets each node of the swarm sends, from the sequence numbers and birth times of those that one
 node receives.
 
-A node numbers its data packets without gaps. So two received packets tell how many the origin has made between them,
-including those that were lost and those that the origin dropped because its turns did not suffice. Some packets of
-each node, at least 1 s apart, are kept as marks, and the load follows from them:
+Two received packets tell how many the origin has made between them, lost and dropped ones included. Some of each node,
+at least 1 s apart, are kept as marks:
 
     enough marks                the mean rate between the marks, plus twice its standard error
     nothing heard for long      at most the mean rate from the first mark until now, with one packet in the silence
     too few marks               the load that the scenario states; the least load if none of its traffic is the node's
 
-The fields of a packet may be forged. A packet that is born in the future, or that implies more than the greatest
-load, is not used but counted.
+A packet born in the future, or that implies more than the greatest load, may be forged: it is counted only.
 """
 
 import math

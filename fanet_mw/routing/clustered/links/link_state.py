@@ -1,11 +1,8 @@
 """The leader's knowledge of all links, put together from what each node has reported about the links to it.
 
-The two directions of a link are taken to be equally good (reciprocity), so the mean of both measurements counts. If one
-end reports that it receives nothing over a link, there is no link, but the sender may still disturb: the entry keeps
-its power, and gets a grade of 0. If one end has reported nothing yet, the report of the other end counts for both.
-
-A single link is known only from few hellos. The share of a usable link is therefore drawn towards the mean of all
-usable links (shrinkage).
+Both directions are taken to be equally good, so the mean of both measurements counts, or the only one there is. If one
+end receives nothing, there is no link, but the sender may still disturb: the entry keeps its power, and gets a grade of
+0. The share of a usable link is drawn towards the mean of all usable links (shrinkage), as it is known from few hellos.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence

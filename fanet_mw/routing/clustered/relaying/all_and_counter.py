@@ -3,9 +3,8 @@
     all      it passes on each packet, at once
     counter  it passes on a packet after a random delay, unless it has heard enough copies by then
 
-`counter` is after Ni et al. (MobiCom 1999, 3.2). It adapts to the density: in a sparse swarm no node hears enough
-copies to stay silent, in a dense one most nodes do. Where a timetable decides: `timetable/scheduled_relaying.py`.
-A copy that was heard before never gets here (`fanet_mw/node/duplicates.py`); the hop limit is checked by the callers.
+`counter` is after Ni et al. (MobiCom 1999, 3.2): in a sparse swarm all relay, in a dense one few do. Where a timetable
+decides: `timetable/scheduled_relaying.py`. Copies and the hop limit are checked by the callers.
 """
 
 from collections.abc import Callable

@@ -3,13 +3,10 @@
     announcements, stand-ins, signs of life, instants -> events -> `states.TRANSITIONS`
                                                                 -> actions for `assigned_roles.py`
 
-`head_failure_detector.py` tells a member from when on its head is silent. Then the first member of the succession (the
-order in which a schedule lists the members of a cluster) stands in for the head, or a later member if none before it
-has.
-
-A stand-in floods a join that names the silent node. Without a timetable it also uses the slot of the head from then on.
-With a timetable there is no slot to take over: the stand-in only informs the leader, and any silent neighbor is
-reported in the same way (`neighbor_failure_detector.py`).
+The first member of the succession, the order in which a schedule lists the members of a cluster, stands in for a silent
+head (`head_failure_detector.py`), or a later one if none before it has. It floods a join that names the silent node.
+Without a timetable it also uses the slot of the head; with one any silent neighbor is reported likewise
+(`neighbor_failure_detector.py`).
 """
 
 from typing import Final

@@ -4,9 +4,8 @@
                             in hellos
     two hello intervals     once the MAC has failed to reach the head
 
-This is so for the first member of the succession (the order in which a schedule lists the members of a cluster). Each
-further member waits half an interval longer for the one before it to stand in. Only members that have had news of the
-head judge it, because others may never have been near it.
+Each further member of the succession waits half an interval longer for the one before it to stand in. Members without
+news of the head do not judge it, because they may never have been near it.
 """
 
 from typing import Final

@@ -3,10 +3,9 @@
     a leader announces itself -> it is silent for `silence_ns` -> of the nodes that are alive the one with the lowest id
     takes office at once, others up to 3 s later if it does not -> the new leader calls all nodes to join
 
-Leaders are ordered: the one with the lower term prevails, which is the second of swarm time in which it took office; of
-equal terms the lower id. When two separated parts of a swarm meet, the leader that has been in office longer stays,
-however large its part is. A node that elected itself while it was cut off therefore never deposes the leader of all
-others, and a restarted leader is the junior one.
+The leader with the lower term prevails, the second of swarm time in which it took office; of equal terms the lower id.
+So a node that elected itself while it was cut off never deposes the leader of all others, and a restarted leader is the
+junior one.
 """
 
 from typing import Final, NamedTuple

@@ -4,9 +4,9 @@
         -> this node floods a join that reports it, unless another node has done so
         -> the neighbor objects and stays, or the leader makes a new timetable without it
 
-A neighbor that has flown away looks silent to this node, too. It will object, and is then not reported again until this
-node has heard a hello of it. If no objection arrives, the neighbor is reported again every 10 s for a minute, but not
-while packets of it still arrive. A node floods at most one report in 5 s. The memory is bounded by the number of nodes.
+A neighbor that has flown away objects, too, and is not reported again until a hello of it is heard. Without an
+objection it is reported again every 10 s for a minute, while no packets of it arrive; a node floods at most one report
+in 5 s.
 """
 
 from collections.abc import Callable

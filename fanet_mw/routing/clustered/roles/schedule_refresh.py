@@ -1,9 +1,8 @@
 """Anti-entropy for schedules: a node whose neighbor follows an older schedule, or none, sends the newest one again.
 
-The leader floods its schedule once per flooding period. The refresh reaches nodes that these floods miss: nodes that
-come back to the swarm and, with a timetable, nodes that still use an older one. Duplicates of a refresh are suppressed
-as in Trickle (RFC 6206). While all nodes follow the same schedule, nothing is sent. A node
-refreshes only while it has heard of its leader recently (`Lease.fresh`).
+It reaches nodes that the leader's floods miss: that come back to the swarm or, with a timetable, still use an older
+one. Duplicates are suppressed as in Trickle (RFC 6206); a node refreshes only while it has heard of its leader recently
+(`Lease.fresh`).
 """
 
 from collections.abc import Callable

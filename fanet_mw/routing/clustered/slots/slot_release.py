@@ -1,10 +1,8 @@
 """The transmit queue of a cluster head: packets are released only in its own slot, each announced one lead ahead.
 
-By `clusters.pacing = "burst"` they follow each other with the least gap (`clusters.release_gap_ms`). By `"spread"` the
-slot is divided evenly among the packets that wait when it begins, so that one flood has moved on before the next one
-starts; the gap is then between the least one and 40 ms. Packets that do not fit wait for the next occurrence of the
-slot. A head that loses its role releases its remaining packets in its old slot, because sending them to the new head
-would cost more than flooding them.
+By `clusters.pacing = "burst"` they follow each other with the least gap (`clusters.release_gap_ms`), by `"spread"` the
+slot is divided evenly among those that wait when it begins, up to 40 ms apart, so that one flood has moved on before
+the next. A head that loses its role uses its old slot for the rest: sending them to the new head would cost more.
 """
 
 from typing import Final, NamedTuple

@@ -6,13 +6,9 @@
     no bound yet            -> nothing is said until there should be one, because the timetables of a swarm that is
                                still joining have gaps, and tell nothing about the final one
 
-Accepted packets are at least that interval apart, as the bound assumes (`Turns.worst_ns`), so a growing load cannot
-break the deadline of earlier packets. If no interval meets the deadline, that is recorded in the trace, and packets are
-accepted at the rate that the turns can carry, because late packets are better than none. Without a timetable all
-packets are accepted. Packets more urgent than bulk are always accepted (`StatedDelays.admit`).
-
-This is about `traffic.deadline_s`, the deadline of the scenario's own traffic. A message for which an application
-states a deadline is accepted or refused earlier, by the messenger (`_admission` in `agents/messenger.py`).
+So a growing load cannot break the deadline of earlier packets. If no interval meets it, packets are accepted at the
+rate that the turns can carry, because late packets are better than none; without a timetable, and more urgent than
+bulk, all are accepted. This is `traffic.deadline_s`; deadlines of messages are for `agents/messenger.py`.
 """
 
 from typing import Final

@@ -1,9 +1,8 @@
 """Who keeps a timetable: a bound holds only while all nodes keep the same one, and are heard.
 
-A node that begins a flood in a turn of its own marks the packet (`FLAG_TURN`), and so shows that it has the timetable;
-a node that has nothing to send floods a join in its turn instead. By what is missing, every node notices that the
-timetable came late somewhere, that a node fell silent, or that a relay on the way from that node did. A node whose
-neighbors report it silent cannot notice this by itself, so it promises nothing for a while.
+A node that begins a flood in its turn marks the packet (`FLAG_TURN`), or floods a join if it has nothing to send. By
+what is missing, every node notices that the timetable came late somewhere, or that a node or a relay on its way fell
+silent. A node that neighbors report silent promises nothing for a while.
 """
 
 from collections.abc import Iterable

@@ -4,14 +4,10 @@
                    packet around its sender; take them in the order of their worth, the oldest flood first among
                    equals, as long as none disturbs one that is already taken (`interference.py`)
 
-The beginnings of floods are spread evenly over the superframe, or over a part of it when turns are scarce. Each node
-sends a packet at most once, to all its neighbors that lack it. A neighbor that only this node can serve counts half
-more, because nobody else could serve it later. With more `tries` each turn is filled several times with a slightly
-random order, and the fullest result is taken. A flood that is not complete at the last turn continues in the first
-turns of the next superframe, around the floods that begin there. Turns that floods leave unused are then given to nodes
-as spare turns (`spare`).
-
-The computation uses integers and one named random stream, so all machines get the same result. It takes about 0.5 ms
+Floods begin evenly over the superframe, or over a part of it when turns are scarce. Each node sends a packet at most
+once; a neighbor that only this node can serve counts half more. With more `tries` the fullest of several slightly
+random orders is taken. A flood that is not complete at the last turn continues in the next superframe; unused turns
+become spare turns (`spare`). Integers and one named random stream give all machines the same result, in about 0.5 ms
 per packet and try for 45 nodes.
 """
 

@@ -4,19 +4,12 @@
                                  |----------- `Turns.done_ns` ---------|
     `around_ns` is the sum of the other three parts: a lead, the handover, and a second lead
 
-The first lead is the time by which a frame is announced to the radio before its turn. The handover is the time in which
-a reception gets from the radio to its node's process (`radio.handover_ms`), and the second lead is the time by which
-that process may wake up too late.
-
-Each class has room of its own in each turn (`turn_release.py`), so a class does not wait for another one. There are two
-exceptions. A packet that is larger than the room of its class waits as bulk does. A leader's announcements take the
-room of bulk, so a leader's bulk packets have no bound (`stated_delays.py`). Within a class no later packet delays an
-earlier one.
-
-There are two kinds of bounds. Bulk that comes at regular intervals has the worst case over its busy period
-(`Turns.worst_ns`). For all other classes the bound holds for a packet that finds fewer than `BURST` packets of its
-class waiting. A source never exceeds that number if it conforms to a token bucket of depth `BURST` that is filled at
-the rate of the turns. A packet that finds more packets waiting has no bound.
+The first lead: a frame is announced before its turn; the handover: from the radio to its node's process
+(`radio.handover_ms`), which may wake up a second lead too late. Each class has room of its own in each turn
+(`turn_release.py`), but a packet larger than that waits as bulk does, and a leader's announcements take the room of
+bulk, so that its bulk has no bound. Bulk at regular intervals has the worst case over its busy period
+(`Turns.worst_ns`); for other classes the bound holds for a packet that finds fewer than `BURST` of its class waiting,
+as of a source that conforms to a token bucket of that depth, filled at the rate of the turns.
 """
 
 from typing import Final, NamedTuple

@@ -6,13 +6,10 @@ arrived.
     holder            the root, and each node with enough: it may relay the packet, several times if others need it
     call              a frame of a node to its neighbors only, in a turn of its own: a hello, or the answer to one
 
-Turns are filled one after the other as in `list_scheduling.py`, with one difference: if another sender in the turn
-disturbs one of a frame's receivers, that receiver is left out and served later, provided that half of the worth of the
-frame remains. All neighbors count for a call. Whether a node disturbs a link depends on the strength of that link
-(`InterferenceByPower`).
-
-In flight, `turn_access.py` repeats a node's own packets, and `scheduled_relaying.py` its relays. Not modeled: that a
-relay may lack the packet although it has had enough copies (`sim/planner/flood_loss.py` includes that).
+Turns are filled as in `list_scheduling.py`, but a receiver that another sender in the turn disturbs
+(`InterferenceByPower`) is served later, if half of the worth of the frame remains. In flight, `turn_access.py` repeats
+own packets, and `scheduled_relaying.py` relays. Not modeled: that a relay may lack the packet although it has had
+enough copies (`sim/planner/flood_loss.py` includes that).
 """
 
 import math

@@ -1,11 +1,9 @@
 """Relaying by a timetable: the turn in which a packet is received tells which flood it is, and when this node relays
 it.
 
-The turn follows from the instant at which the reception ended; the flood follows from the turn and the sender. If this
-node's clock is behind the sender's, a frame may seem to end before its turn begins, by at most the slack of a turn. A
-frame that found the medium busy, because of somebody who keeps no turns, ends some turns later. What was heard too late
-for this node's own turn is counted and passed on in contention, if the node would have relayed it and nobody else does.
-Control packets, and all packets as long as no timetable is in force, are relayed by another rule.
+With a clock behind the sender's a frame may seem to end before its turn begins, by at most the slack; one that found
+the medium busy ends some turns later. What was heard too late for this node's own turn is counted, and passed on in
+contention if nobody else does. Control packets, and all packets without a timetable, are relayed by another rule.
 """
 
 from collections.abc import Mapping, Sequence

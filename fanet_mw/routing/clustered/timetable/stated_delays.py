@@ -1,15 +1,11 @@
 """The delays that a node states for its own packets: bounds, likely delays over lossy links, and admission by a
 deadline.
 
-A bound is stated when a packet is accepted, because only then are its turn and the queue before it known. It is stated
-only if nothing that comes later can break it: no other timetable may come into force before the packet's flood is over.
-Nothing is stated for floods that `routing.hop_limit` ends before all nodes have them, nor for packets that may expire
-before (`routing.lifetime_s`).
-The leader therefore announces each timetable long enough ahead. Each class of packets has room of its own in a turn,
-and so a bound of its own.
-
-When two separated parts of a swarm meet, one leader prevails without such notice. A node then keeps the turns in which
-it has promised to send. A packet that would break its stated bound nevertheless is dropped.
+A bound is stated when a packet is accepted, and only if nothing later can break it: no other timetable may come into
+force before the packet's flood is over, so the leader announces each long enough ahead. Nothing is stated for floods
+that `routing.hop_limit` ends early, nor for packets that may expire before (`routing.lifetime_s`). When two separated
+parts of a swarm meet, a node keeps the turns in which it has promised to send; a packet that would break its stated
+bound nevertheless is dropped.
 """
 
 from collections.abc import Mapping, Sequence

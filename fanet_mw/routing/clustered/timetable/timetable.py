@@ -9,10 +9,9 @@ hear each other, and if none of the nodes that one frame is meant for is within 
 it does not transmit in the next one, because a station waits for EIFS after a frame that it could not decode (IEEE
 802.11-2020, 10.3.7).
 
-The turns are filled one after the other (`list_scheduling.py`), so floods follow each other through the swarm like
-waves. A packet can cross the whole swarm in one superframe because of the order of turns, as in Djukic and Valaee (ToN
-17(3), 2009). All nodes compute the same table from the same positions, and need not agree on anything else. Not
-modeled: links that are blocked by obstacles; a shorter `link_m` leaves a margin.
+Floods follow each other like waves (`list_scheduling.py`), so that a packet can cross the swarm in one superframe, as
+in Djukic and Valaee (ToN 17(3), 2009). All nodes compute the same table from the same positions. Not modeled: links
+that are blocked by obstacles; a shorter `link_m` leaves a margin.
 """
 
 from collections import Counter

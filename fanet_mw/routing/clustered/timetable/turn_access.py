@@ -1,12 +1,9 @@
 """Access by a timetable: a node transmits its own packets in its own turns; its relays are in `scheduled_relaying.py`.
 
-Until a timetable gives the node turns, it sends its packets to a head, as in the protocol with slots. Frames without a
-turn contend in the window at the beginning of each superframe: hellos, joins, unicasts to a head, and packets that
-neighbors have missed. Over lossy links, hellos and missed packets have turns of their own, the calls, and each frame is
-repeated in later turns that `redundant_scheduling.py` has chosen.
-
-A packet for one neighbor is not flooded: it goes in the next turn that floods leave this node. Its receiver needs no
-relay, and a turn for one hop is sooner free than one for a flood.
+Until a timetable gives the node turns, it sends packets to a head, as in slots. Frames without a turn contend in the
+window at the beginning of each superframe. Over lossy links, hellos and missed packets have turns of their own, the
+calls, and each frame is repeated in later turns (`redundant_scheduling.py`). A packet for one neighbor goes in the next
+turn that floods leave this node.
 """
 
 from collections.abc import Mapping, Sequence

@@ -9,9 +9,8 @@ These uses are tried one after the other until a timetable is found:
     3  Nodes get fewer turns than they need. A node sends what its turns can carry, and has no delay bound.
     4  Only heads get turns. Members send their packets to the heads by contention, and have no delay bound either.
 
-In 1 to 3 the packet of a member has turns of its own on a shortest way to its head, and the head relays it in the next
-turn, so the packet never waits there. A *root* is the node at which a flood begins. All nodes compute the same
-timetable from the same schedule and positions. Which turn of the superframe each packet gets: `list_scheduling.py`.
+In 1 to 3 a member's packet has turns on a shortest way to its head, which relays it in the next turn. A *root* is the
+node at which a flood begins. Which turn each packet gets: `list_scheduling.py`.
 """
 
 import math

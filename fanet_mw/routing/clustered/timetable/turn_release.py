@@ -6,15 +6,10 @@ span):
     a turn:  | one warning | one report | bulk, in order, as many as fit              | the rest, most urgent first |
                                         | or, in its place, a leader's announcements |
 
-Each class of packets in use (`reserved_room.reserved`) has room of its own in a turn, so the wait of a bulk packet
-depends on nothing that comes later, such as reports or warnings. Only a leader's announcements delay its bulk. A packet
-that is larger than the room of its class waits like bulk. A turn is used only if its flood is over before the next
-timetable comes into force.
-
-`CallRelease` sends what only neighbors need, so no node relays it. A timetable for lossy links gives each node *calls*
-(`redundant_scheduling.py`): missed packets wait for one, and a hello reserves the next one when it is due. Another
-timetable gives each node *spare turns*, which the floods of all leave unused (`list_scheduling.py`), for packets to one
-neighbor.
+Each class in use (`reserved_room.reserved`) has room of its own in a turn, so bulk waits for nothing that comes later
+but a leader's announcements; a packet larger than its class's room waits like bulk. A turn is used only if its flood is
+over before the next timetable. `CallRelease` sends what only neighbors need: missed packets and hellos in *calls*
+(`redundant_scheduling.py`), packets to one neighbor in *spare turns* (`list_scheduling.py`).
 """
 
 from abc import ABC, abstractmethod

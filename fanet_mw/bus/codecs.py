@@ -1,318 +1,306 @@
-"""The byte format of the messages on the bus; `sensor_codecs.py` has that of sensor readings, and no other file knows
-it.
+"""The byte format of the messages on the bus, which no other file knows.
 
 One put on the bus carries a batch of messages. Each is one byte for its kind, a 32-bit length and its body, all little
 endian. Any bytes decode either to messages or to MalformedFrameError, and to no other exception.
 """
 
 import hashlib
+import math
 import struct
 from array import array
-from collections.abc import Callable, Iterable
-from typing import Any, Final, NamedTuple
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, Final, NamedTuple, get_type_hints
 
 from fanet_mw import trace
-from fanet_mw.bus import sensor_codecs
+from fanet_mw.bus import messages as m
+from fanet_mw.bus import radio_control as air
 from fanet_mw.bus.link_stats import COUNTS, LinkStats
-from fanet_mw.bus.messages import (
-    PACE_BOUNDS,
-    Altimeter,
-    Battery,
-    Camera,
-    CameraImage,
-    ClockEpoch,
-    ClockRequest,
-    ClockState,
-    FlightState,
-    Gps,
-    Inertial,
-    MavlinkTap,
-    Message,
-    Obstructions,
-    Poses,
-    Radar,
-    Reception,
-    Report,
-    Setpoint,
-    SetpointKind,
-    TraceBatch,
-    TxOutcome,
-    TxRequest,
-    TxStatus,
-    Voice,
-    WifiScan,
-    WindEstimate,
-)
-from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Mishap, MishapKind, Partition, Restore
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.orders import Order, OrderKind
+from fanet_mw.orders import Order
 from fanet_mw.units import Enu, NodeId
 
-# --- bodies: one encoder and one decoder per message type, beside each other -------------------------------------
+MAX_HEARD: Final = 10_000
+"""The greatest number of phones in a scan, people in an image, or voices: the most survivors that a
+scenario may have."""
+MAX_ECHOES: Final = 4_096
+"""The greatest number of returns in a radar scan."""
+
+
+class Codec(NamedTuple):
+    """How one kind of message is written."""
+
+    kind: type[Any]
+    encode: Callable[[Any], bytes]
+    decode: Callable[[bytes], m.Message]
+    structs: tuple[struct.Struct, ...] = ()
+    """That of its head, and that of each row for kinds with rows."""
+
+
+# --- kinds whose fields, in order, are those of a struct ---------------------------------------------------------
+
+
+def _flat(values: Iterable[Any]) -> Iterator[Any]:
+    for value in values:
+        if isinstance(value, Enu):
+            yield from value
+        else:
+            yield math.nan if value is None else value
+
+
+def _field(hint: Any, values: Iterator[Any]) -> Any:  # noqa: ANN401  (of the type that it hints at)
+    if hint is Enu:
+        return Enu(next(values), next(values), next(values))
+    value = next(values)
+    if hint == float | None:
+        return None if math.isnan(value) else value
+    return hint(value)
+
+
+def _plain(kind: type[Any], layout: str, check: Callable[[Any], None] = lambda _: None) -> Codec:
+    """Vectors are taken apart, None is NaN, and a label, which comes first, stands behind the struct as text."""
+    head = struct.Struct(layout)
+    labels = int("label" in kind.__annotations__)
+    hints = list(get_type_hints(kind).values())[labels:]
+
+    def encode(message: Any) -> bytes:  # noqa: ANN401  (of this kind)
+        return head.pack(*_flat(message[labels:])) + "".join(message[:labels]).encode()
+
+    def decode(body: bytes) -> Any:  # noqa: ANN401
+        values = iter(head.unpack_from(body) if labels else head.unpack(body))
+        label = [body[head.size :].decode()] if labels else []
+        message = kind(*label, *(_field(hint, values) for hint in hints))
+        check(message)
+        return message
+
+    return Codec(kind, encode, decode, (head,))
+
+
+def _finite(values: Iterable[Any]) -> None:
+    """Raise ValueError for values that no sensor can give: infinite ones and NaN."""
+    for value in values:
+        if isinstance(value, tuple):
+            _finite(value)
+        elif value is not None and not math.isfinite(value):
+            raise ValueError("not finite")
+
+
+def _check_flight(message: m.FlightState) -> None:
+    _finite(message)
+    if message.unix_ns < 0:
+        raise ValueError("time")
+
+
+def _check_clock(message: m.ClockEpoch) -> None:
+    if not 0 < message.time_scale <= 100:
+        raise ValueError("time_scale")
+
+
+def _check_pace(message: m.ClockRequest) -> None:
+    if not m.PACE_BOUNDS[0] <= message.time_scale <= m.PACE_BOUNDS[1]:  # also true for NaN
+        raise ValueError("pace")
+
+
+# --- kinds of an instant and rows --------------------------------------------------------------------------------
+
+_ROWS: Final = struct.Struct("<qH")
+
+
+def _rows(
+    kind: type[Any],
+    make: Callable[[Iterable[Any]], Any],
+    layout: str,
+    *,
+    most: int = MAX_HEARD,
+    check: Callable[[Any], None] = _finite,
+) -> Codec:
+    row = struct.Struct(layout)
+
+    def encode(message: Any) -> bytes:  # noqa: ANN401  (of this kind)
+        t_ns, rows = message
+        return _ROWS.pack(t_ns, len(rows)) + b"".join(row.pack(*item) for item in rows)
+
+    def decode(body: bytes) -> Any:  # noqa: ANN401
+        t_ns, count = _ROWS.unpack_from(body)
+        if len(body) != _ROWS.size + count * row.size or count > most:
+            raise ValueError("length")
+        rows = tuple(map(make, row.iter_unpack(body[_ROWS.size :])))
+        check(rows)
+        return kind(t_ns, rows)
+
+    return Codec(kind, encode, decode, (_ROWS, row))
+
+
+# --- all others: one encoder and one decoder beside each other; those of the radio are called most ---------------
 
 _TX = struct.Struct("<IqHBq")
 _RX = struct.Struct("<Hqf")
 _STATUS = struct.Struct("<IBqB")
-_SETPOINT = struct.Struct("<q4dB3d")
 _POSES = struct.Struct("<qI")
 _OBSTRUCTIONS = struct.Struct("<qHI")
-_CLOCK = struct.Struct("<qdBqQIq")
-_PACE = struct.Struct("<d")
 _INSTANT = struct.Struct("<q")
-_DEGRADE = struct.Struct("<HHBddq")
-_JAM = struct.Struct("<5dq")
-_CUT = struct.Struct("<Hq2B")
+_IMAGE = struct.Struct("<qHH")
 _PARTITION = struct.Struct("<4dqH")
-_MISHAP = struct.Struct("<HB3dq")
-_ORDER = struct.Struct("<BH3d")
 _LINKS = struct.Struct("<qqI")
 
 
-def _encode_tx(m: TxRequest) -> bytes:
-    return _TX.pack(m.seq & 0xFFFF_FFFF, m.start_ns, m.dst, m.wants_status, m.until_ns) + m.frame
+def _encode_tx(request: m.TxRequest) -> bytes:
+    seq, start_ns, frame, dst, wants_status, until_ns = request
+    return _TX.pack(seq & 0xFFFF_FFFF, start_ns, dst, wants_status, until_ns) + frame
 
 
-def _decode_tx(body: bytes) -> TxRequest:
+def _decode_tx(body: bytes) -> m.TxRequest:
     seq, start_ns, dst, wants_status, until_ns = _TX.unpack_from(body)
-    return TxRequest(seq, start_ns, body[_TX.size :], NodeId(dst), bool(wants_status), until_ns)
+    return m.TxRequest(seq, start_ns, body[_TX.size :], NodeId(dst), bool(wants_status), until_ns)
 
 
-def _encode_rx(m: Reception) -> bytes:
-    return _RX.pack(m.src, m.end_ns, m.rssi_dbm) + m.frame
+def _encode_rx(reception: m.Reception) -> bytes:
+    frame, src, end_ns, rssi_dbm = reception
+    return _RX.pack(src, end_ns, rssi_dbm) + frame
 
 
-def _decode_rx(body: bytes) -> Reception:
+def _decode_rx(body: bytes) -> m.Reception:
     src, end_ns, rssi_dbm = _RX.unpack_from(body)
-    return Reception(body[_RX.size :], NodeId(src), end_ns, rssi_dbm)
+    return m.Reception(body[_RX.size :], NodeId(src), end_ns, rssi_dbm)
 
 
-def _encode_status(m: TxStatus) -> bytes:
-    return _STATUS.pack(m.seq & 0xFFFF_FFFF, m.outcome, m.end_ns, m.attempts)
+def _encode_status(status: m.TxStatus) -> bytes:
+    seq, outcome, end_ns, attempts = status
+    return _STATUS.pack(seq & 0xFFFF_FFFF, outcome, end_ns, attempts)
 
 
-def _decode_status(body: bytes) -> TxStatus:
+def _decode_status(body: bytes) -> m.TxStatus:
     seq, outcome, end_ns, attempts = _STATUS.unpack(body)
-    return TxStatus(seq, TxOutcome(outcome), end_ns, attempts)
+    return m.TxStatus(seq, m.TxOutcome(outcome), end_ns, attempts)
 
 
-def _encode_poses(m: Poses) -> bytes:
-    return _POSES.pack(m.t_ns, len(m.ids)) + m.ids.tobytes() + m.states.tobytes()
+def _arrays(body: bytes, at: int, *counts: tuple[str, int]) -> list[Any]:
+    """Arrays of these types and lengths, which are all that is left of a body; raises ValueError."""
+    found = []
+    for code, count in counts:
+        values: array[Any] = array(code)
+        end = at + count * values.itemsize
+        if end > len(body):
+            raise ValueError("length")
+        values.frombytes(body[at:end])
+        found.append(values)
+        at = end
+    if at != len(body):
+        raise ValueError("length")
+    return found
 
 
-def _decode_poses(body: bytes) -> Poses:
+def _encode_poses(poses: m.Poses) -> bytes:
+    return _POSES.pack(poses.t_ns, len(poses.ids)) + poses.ids.tobytes() + poses.states.tobytes()
+
+
+def _decode_poses(body: bytes) -> m.Poses:
     t_ns, count = _POSES.unpack_from(body)
-    ids, states = array("H"), array("d")
-    split = _POSES.size + 2 * count
-    if len(body) != split + 48 * count:
-        raise ValueError("length")
-    ids.frombytes(body[_POSES.size : split])
-    states.frombytes(body[split:])
-    return Poses(t_ns, ids, states)
+    return m.Poses(t_ns, *_arrays(body, _POSES.size, ("H", count), ("d", 6 * count)))
 
 
-def _encode_obstructions(m: Obstructions) -> bytes:
-    head = _OBSTRUCTIONS.pack(m.t_ns, len(m.ground_m), len(m.pairs))
-    return head + m.ground_m.tobytes() + m.pairs.tobytes() + m.losses_ddb.tobytes()
+def _encode_obstructions(found: m.Obstructions) -> bytes:
+    head = _OBSTRUCTIONS.pack(found.t_ns, len(found.ground_m), len(found.pairs))
+    return head + found.ground_m.tobytes() + found.pairs.tobytes() + found.losses_ddb.tobytes()
 
 
-def _decode_obstructions(body: bytes) -> Obstructions:
+def _decode_obstructions(body: bytes) -> m.Obstructions:
     t_ns, grounds, count = _OBSTRUCTIONS.unpack_from(body)
-    ground, pairs, losses = array("f"), array("H"), array("H")
-    start = _OBSTRUCTIONS.size + 4 * grounds
-    split = start + 2 * count
-    if len(body) not in (split, split + count) or count % 2:
+    if count % 2:
         raise ValueError("length")
-    ground.frombytes(body[_OBSTRUCTIONS.size : start])
-    pairs.frombytes(body[start:split])
-    losses.frombytes(body[split:])
-    return Obstructions(t_ns, pairs, losses, ground)
+    losses = 0 if len(body) == _OBSTRUCTIONS.size + 4 * grounds + 2 * count else count // 2
+    ground, pairs, found = _arrays(body, _OBSTRUCTIONS.size, ("f", grounds), ("H", count), ("H", losses))
+    return m.Obstructions(t_ns, pairs, found, ground)
 
 
-def _encode_setpoint(m: Setpoint) -> bytes:
-    return _SETPOINT.pack(m.t_ns, *m.position, m.speed_m_s, m.kind, *m.velocity)
-
-
-def _decode_setpoint(body: bytes) -> Setpoint:
-    t_ns, east, north, up, speed_m_s, kind, *velocity = _SETPOINT.unpack(body)
-    return Setpoint(t_ns, Enu(east, north, up), speed_m_s, SetpointKind(kind), Enu(*velocity))
-
-
-def _encode_tap(m: MavlinkTap) -> bytes:
-    return _INSTANT.pack(m.t_ns) + m.data
-
-
-def _decode_tap(body: bytes) -> MavlinkTap:
-    return MavlinkTap(_INSTANT.unpack_from(body)[0], body[_INSTANT.size :])
-
-
-def _encode_trace(m: TraceBatch) -> bytes:
-    return "\n".join(trace.line(record) for record in m.records).encode()
-
-
-def _decode_trace(body: bytes) -> TraceBatch:
-    return TraceBatch(tuple(trace.parse(text) for text in body.decode().splitlines()))
-
-
-def _encode_clock(m: ClockEpoch) -> bytes:
-    return _CLOCK.pack(m.epoch_unix_ns, m.time_scale, m.state, m.epoch_mono_ns, m.machine, m.number, m.ends_ns)
-
-
-def _decode_clock(body: bytes) -> ClockEpoch:
-    epoch_unix_ns, time_scale, state, epoch_mono_ns, machine, number, ends_ns = _CLOCK.unpack(body)
-    if not 0 < time_scale <= 100:
-        raise ValueError("time_scale")
-    return ClockEpoch(epoch_unix_ns, time_scale, ClockState(state), epoch_mono_ns, machine, number, ends_ns)
-
-
-def _encode_request(m: ClockRequest) -> bytes:
-    return _PACE.pack(m.time_scale)
-
-
-def _decode_request(body: bytes) -> ClockRequest:
-    (time_scale,) = _PACE.unpack(body)
-    if not PACE_BOUNDS[0] <= time_scale <= PACE_BOUNDS[1]:  # also true for NaN
-        raise ValueError("pace")
-    return ClockRequest(time_scale)
-
-
-def _encode_report(m: Report) -> bytes:
-    return _INSTANT.pack(m.t_ns) + f"{m.name}\n{m.json}".encode()
-
-
-def _decode_report(body: bytes) -> Report:
-    name, _, text = body[_INSTANT.size :].decode().partition("\n")
-    return Report(name, _INSTANT.unpack_from(body)[0], text)
-
-
-def _encode_degrade(m: Degrade) -> bytes:
-    return _DEGRADE.pack(m.src, m.dst, m.both, m.loss_db, m.loss_share, m.for_ns) + m.label.encode()
-
-
-def _decode_degrade(body: bytes) -> Degrade:
-    src, dst, both, loss_db, loss_share, for_ns = _DEGRADE.unpack_from(body)
-    label = body[_DEGRADE.size :].decode()
-    return Degrade(label, NodeId(src), NodeId(dst), bool(both), loss_db, loss_share, for_ns)
-
-
-def _encode_jam(m: Jam) -> bytes:
-    return _JAM.pack(*m.center, m.radius_m, m.noise_dbm, m.for_ns) + m.label.encode()
-
-
-def _decode_jam(body: bytes) -> Jam:
-    east, north, up, radius_m, noise_dbm, for_ns = _JAM.unpack_from(body)
-    return Jam(body[_JAM.size :].decode(), Enu(east, north, up), radius_m, noise_dbm, for_ns)
-
-
-def _encode_cut(m: Cut) -> bytes:
-    return _CUT.pack(m.node, m.for_ns, m.sends, m.hears) + m.label.encode()
-
-
-def _decode_cut(body: bytes) -> Cut:
-    node, for_ns, sends, hears = _CUT.unpack_from(body)
-    return Cut(body[_CUT.size :].decode(), NodeId(node), for_ns, bool(sends), bool(hears))
-
-
-def _encode_partition(m: Partition) -> bytes:
-    return _PARTITION.pack(*m.line_m, m.for_ns, len(m.group)) + array("H", m.group).tobytes() + m.label.encode()
-
-
-def _decode_partition(body: bytes) -> Partition:
-    *line_m, for_ns, count = _PARTITION.unpack_from(body)
-    group, end = array("H"), _PARTITION.size + 2 * count
-    if len(body) < end:
-        raise ValueError("length")
-    group.frombytes(body[_PARTITION.size : end])
-    east, north, other_east, other_north = line_m
-    return Partition(body[end:].decode(), tuple(map(NodeId, group)), (east, north, other_east, other_north), for_ns)
-
-
-def _encode_mishap(m: Mishap) -> bytes:
-    return _MISHAP.pack(m.node, m.what, *m.value, m.for_ns) + m.label.encode()
-
-
-def _decode_mishap(body: bytes) -> Mishap:
-    node, what, east, north, up, for_ns = _MISHAP.unpack_from(body)
-    return Mishap(body[_MISHAP.size :].decode(), NodeId(node), MishapKind(what), Enu(east, north, up), for_ns)
-
-
-def _encode_restore(m: Restore) -> bytes:
-    return m.label.encode()
-
-
-def _decode_restore(body: bytes) -> Restore:
-    return Restore(body.decode())
-
-
-def _encode_order(m: Order) -> bytes:
-    return _ORDER.pack(*m)
-
-
-def _decode_order(body: bytes) -> Order:
-    kind, *rest = _ORDER.unpack(body)
-    return Order(OrderKind(kind), *rest)
-
-
-def _encode_links(m: LinkStats) -> bytes:
-    head = _LINKS.pack(m.t_ns, m.span_ns, len(m.rssi_sums_mdbm))
-    return head + m.ends.tobytes() + m.counts.tobytes() + m.rssi_sums_mdbm.tobytes()
+def _encode_links(stats: LinkStats) -> bytes:
+    head = _LINKS.pack(stats.t_ns, stats.span_ns, len(stats.rssi_sums_mdbm))
+    return head + stats.ends.tobytes() + stats.counts.tobytes() + stats.rssi_sums_mdbm.tobytes()
 
 
 def _decode_links(body: bytes) -> LinkStats:
     t_ns, span_ns, links = _LINKS.unpack_from(body)
-    ends, counts, sums = array("H"), array("I"), array("q")
-    a = _LINKS.size
-    b = a + 4 * links
-    c = b + 4 * COUNTS * links
-    if len(body) != c + 8 * links:
+    return LinkStats(t_ns, span_ns, *_arrays(body, _LINKS.size, ("H", 2 * links), ("I", COUNTS * links), ("q", links)))
+
+
+def _encode_partition(fault: air.Partition) -> bytes:
+    head = _PARTITION.pack(*fault.line_m, fault.for_ns, len(fault.group))
+    return head + array("H", fault.group).tobytes() + fault.label.encode()
+
+
+def _decode_partition(body: bytes) -> air.Partition:
+    east, north, other_east, other_north, for_ns, count = _PARTITION.unpack_from(body)
+    end = _PARTITION.size + 2 * count
+    (group,) = _arrays(body[:end], _PARTITION.size, ("H", count))
+    return air.Partition(body[end:].decode(), tuple(group), (east, north, other_east, other_north), for_ns)
+
+
+def _encode_image(image: m.CameraImage) -> bytes:
+    return _IMAGE.pack(image.t_ns, image.width, image.height) + image.rgb
+
+
+def _decode_image(body: bytes) -> m.CameraImage:
+    t_ns, width, height = _IMAGE.unpack_from(body)
+    rgb = body[_IMAGE.size :]
+    if len(rgb) != 3 * width * height:
         raise ValueError("length")
-    ends.frombytes(body[a:b])
-    counts.frombytes(body[b:c])
-    sums.frombytes(body[c:])
-    return LinkStats(t_ns, span_ns, ends, counts, sums)
+    return m.CameraImage(t_ns, width, height, rgb)
 
 
-_CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[bytes], Message]]]] = {
-    1: (TxRequest, _encode_tx, _decode_tx),
-    2: (Reception, _encode_rx, _decode_rx),
-    3: (TxStatus, _encode_status, _decode_status),
-    4: (Poses, _encode_poses, _decode_poses),
-    5: (Setpoint, _encode_setpoint, _decode_setpoint),
-    6: (Gps, sensor_codecs.encode_gps, sensor_codecs.decode_gps),
-    7: (WifiScan, sensor_codecs.encode_scan, sensor_codecs.decode_scan),
-    8: (MavlinkTap, _encode_tap, _decode_tap),
-    9: (TraceBatch, _encode_trace, _decode_trace),
-    10: (ClockEpoch, _encode_clock, _decode_clock),
-    11: (Report, _encode_report, _decode_report),
-    12: (Degrade, _encode_degrade, _decode_degrade),
-    13: (Jam, _encode_jam, _decode_jam),
-    14: (Cut, _encode_cut, _decode_cut),
-    15: (Restore, _encode_restore, _decode_restore),
-    16: (LinkStats, _encode_links, _decode_links),
-    17: (Obstructions, _encode_obstructions, _decode_obstructions),
-    18: (Camera, sensor_codecs.encode_camera, sensor_codecs.decode_camera),
-    19: (Voice, sensor_codecs.encode_voice, sensor_codecs.decode_voice),
-    20: (Radar, sensor_codecs.encode_radar, sensor_codecs.decode_radar),
-    21: (Altimeter, sensor_codecs.encode_altimeter, sensor_codecs.decode_altimeter),
-    22: (Inertial, sensor_codecs.encode_inertial, sensor_codecs.decode_inertial),
-    23: (Battery, sensor_codecs.encode_battery, sensor_codecs.decode_battery),
-    24: (CameraImage, sensor_codecs.encode_image, sensor_codecs.decode_image),
-    25: (Partition, _encode_partition, _decode_partition),
-    26: (Mishap, _encode_mishap, _decode_mishap),
-    27: (Order, _encode_order, _decode_order),
-    28: (ClockRequest, _encode_request, _decode_request),
-    29: (FlightState, sensor_codecs.encode_flight, sensor_codecs.decode_flight),
-    30: (WindEstimate, sensor_codecs.encode_wind, sensor_codecs.decode_wind),
-}
-HEADS: Final[dict[type[Any], tuple[struct.Struct, ...]]] = {
-    TxRequest: (_TX,), Reception: (_RX,), TxStatus: (_STATUS,), Poses: (_POSES,), Setpoint: (_SETPOINT,),
-    MavlinkTap: (_INSTANT,), TraceBatch: (), ClockEpoch: (_CLOCK,), ClockRequest: (_PACE,),
-    Report: (_INSTANT,), Degrade: (_DEGRADE,),
-    Jam: (_JAM,), Cut: (_CUT,), Partition: (_PARTITION,),
-    Mishap: (_MISHAP,), Order: (_ORDER,), Restore: (), LinkStats: (_LINKS,), Obstructions: (_OBSTRUCTIONS,),
-    **sensor_codecs.HEADS,
+def _encode_trace(batch: m.TraceBatch) -> bytes:
+    return "\n".join(trace.line(record) for record in batch.records).encode()
+
+
+def _decode_trace(body: bytes) -> m.TraceBatch:
+    return m.TraceBatch(tuple(trace.parse(text) for text in body.decode().splitlines()))
+
+
+def _encode_report(report: m.Report) -> bytes:
+    return _INSTANT.pack(report.t_ns) + f"{report.name}\n{report.json}".encode()
+
+
+def _decode_report(body: bytes) -> m.Report:
+    name, _, text = body[_INSTANT.size :].decode().partition("\n")
+    return m.Report(name, _INSTANT.unpack_from(body)[0], text)
+
+
+def _decode_tap(body: bytes) -> m.MavlinkTap:
+    return m.MavlinkTap(_INSTANT.unpack_from(body)[0], body[_INSTANT.size :])
+
+
+_CODECS: Final = {
+    1: Codec(m.TxRequest, _encode_tx, _decode_tx, (_TX,)),
+    2: Codec(m.Reception, _encode_rx, _decode_rx, (_RX,)),
+    3: Codec(m.TxStatus, _encode_status, _decode_status, (_STATUS,)),
+    4: Codec(m.Poses, _encode_poses, _decode_poses, (_POSES,)),
+    5: _plain(m.Setpoint, "<q4dB3d"),
+    6: _plain(m.Gps, "<q6d"),
+    7: _rows(m.WifiScan, tuple, "<If", check=lambda _: None),
+    8: Codec(m.MavlinkTap, lambda tap: _INSTANT.pack(tap.t_ns) + tap.data, _decode_tap, (_INSTANT,)),
+    9: Codec(m.TraceBatch, _encode_trace, _decode_trace),
+    10: _plain(m.ClockEpoch, "<qdBqQIq", _check_clock),
+    11: Codec(m.Report, _encode_report, _decode_report, (_INSTANT,)),
+    12: _plain(air.Degrade, "<HHBddq"),
+    13: _plain(air.Jam, "<5dq"),
+    14: _plain(air.Cut, "<Hq2B"),
+    15: Codec(air.Restore, lambda restore: restore.label.encode(), lambda body: air.Restore(body.decode())),
+    16: Codec(LinkStats, _encode_links, _decode_links, (_LINKS,)),
+    17: Codec(m.Obstructions, _encode_obstructions, _decode_obstructions, (_OBSTRUCTIONS,)),
+    18: _rows(m.Camera, m.Person._make, "<3d"),
+    19: _rows(m.Voice, m.Call._make, "<4d"),
+    20: _rows(m.Radar, m.Echo._make, "<5d", most=MAX_ECHOES),
+    21: _plain(m.Altimeter, "<q2d", _finite),
+    22: _plain(m.Inertial, "<q3d", _finite),
+    23: _plain(m.Battery, "<q3d", _finite),
+    24: Codec(m.CameraImage, _encode_image, _decode_image, (_IMAGE,)),
+    25: Codec(air.Partition, _encode_partition, _decode_partition, (_PARTITION,)),
+    26: _plain(air.Mishap, "<HB3dq"),
+    27: _plain(Order, "<BH3d"),
+    28: _plain(m.ClockRequest, "<d", _check_pace),
+    29: _plain(m.FlightState, "<q3dBdq", _check_flight),
+    30: _plain(m.WindEstimate, "<q3d", _finite),
 }  # fmt: skip
-"""The structs of each kind: that of its head, and that of each row for kinds with rows."""
-CODES: Final = {kind: code for code, (kind, _, _) in _CODECS.items()}
+CODES: Final = {codec.kind: code for code, codec in _CODECS.items()}
+HEADS: Final = {codec.kind: codec.structs for codec in _CODECS.values()}
 
 
 def layout_of(kinds: Iterable[type[Any]]) -> str:
@@ -323,19 +311,18 @@ def layout_of(kinds: Iterable[type[Any]]) -> str:
 
 LAYOUT: Final = layout_of(CODES)
 """Stands for the layout of all messages: processes with another one read nonsense in what these put."""
-_CODE_OF: Final = {kind: (code, encode) for code, (kind, encode, _) in _CODECS.items()}
 _ITEM: Final = struct.Struct("<BI")
 _new: Final = tuple.__new__  # for what is made once per message
 MAX_ITEMS: Final = 16_384
 """The greatest number of messages in one put: several times what the busiest medium sends at once."""
 
 
-def encode(messages: Iterable[Message]) -> bytes:
+def encode(messages: Iterable[m.Message]) -> bytes:
     """The bytes of one put that carries these messages, in order."""
     parts = []
     for message in messages:
-        code, encoder = _CODE_OF[type(message)]
-        body = encoder(message)
+        code = CODES[type(message)]
+        body = _CODECS[code].encode(message)
         parts.append(_ITEM.pack(code, len(body)))
         parts.append(body)
     return b"".join(parts)
@@ -351,7 +338,7 @@ class Item(NamedTuple):
 
 def codes_of(*kinds: type[Any]) -> frozenset[int]:
     """The codes of these kinds of messages."""
-    return frozenset(_CODE_OF[kind][0] for kind in kinds)
+    return frozenset(CODES[kind] for kind in kinds)
 
 
 def items(data: bytes) -> list[Item]:
@@ -370,15 +357,15 @@ def items(data: bytes) -> list[Item]:
     return found
 
 
-def decode_item(data: bytes, item: Item) -> Message:
+def decode_item(data: bytes, item: Item) -> m.Message:
     """One message of a put; raises MalformedFrameError for bytes that `encode` could not have made."""
     code, start, end = item
     try:
-        return _CODECS[code][2](data[start:end])
+        return _CODECS[code].decode(data[start:end])
     except (struct.error, ValueError, KeyError, OverflowError, RecursionError) as error:
         raise MalformedFrameError(f"bus message malformed at byte {start}: {error}") from error
 
 
-def decode(data: bytes) -> list[Message]:
+def decode(data: bytes) -> list[m.Message]:
     """The messages of one put; raises MalformedFrameError for bytes that `encode` could not have made."""
     return [decode_item(data, item) for item in items(data)]

@@ -23,7 +23,6 @@ class CourseArbitration:
         self._judges = tuple(judges)
         self._fly = fly
         self._commanded: dict[str, Course] = {}
-        """The courses that were commanded since the last input, by application."""
 
     def command(self, application: Application, course: Course) -> None:
         self._commanded[application.name] = course

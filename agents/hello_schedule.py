@@ -35,9 +35,7 @@ class HelloSchedule:
         self._lifetime_ns = neighbor_lifetime_ns(scenario.routing.hello_interval_s)
         self._random = stream(scenario.seed, "hello", node.node).random
         self._next_ns: int | None = None
-        """The instant of the next hello; None if the UAV sends none."""
         self._heard_ns: dict[NodeId, int] = {}
-        """The instant at which the last hello of each other node was received."""
 
     def start(self, now_ns: int) -> None:
         """Choose the instant of the first hello: at random within the first interval, or as the protocol says."""

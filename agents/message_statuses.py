@@ -37,7 +37,6 @@ class _Watched(NamedTuple):
     application: Application
     handle: int
     first: bool
-    """True for the first packet of its message."""
     confirmed: bool
     """True for a piece of a confirmed message; if such a piece is dropped, it is sent again."""
 
@@ -50,11 +49,8 @@ class Statuses:
         self._owners: dict[int, Application] = {}
         """The application that has sent each unfinished confirmed message, by the message's handle."""
         self._watched: dict[int, _Watched] = {}
-        """The packets whose fate an application wants to know, by sequence number."""
         self.waiting: deque[tuple[Application, Status]] = deque()
-        """The statuses to report."""
         self.counts: Counter[str] = Counter()
-        """The numbers of messages in pieces, by their fates."""
 
     def tell(self, application: Application, status: Status) -> None:
         if status.handle & CONTROL:

@@ -55,7 +55,6 @@ class Messenger:
         """The instant at which the last message with a deadline was accepted."""
         self._statuses = Statuses(node)
         self._counts: Counter[str] = Counter()
-        """The numbers of messages in pieces that were sent, and that were handed over."""
 
     def start(self, now_ns: int) -> None:
         self._sender.start(CONTROL | now_ns // RESTART_STEP_NS % CONTROL)

@@ -54,7 +54,6 @@ class Onboard:
         self.vehicle = vehicle
         self.tap = tap
         self.now_ns = 0
-        """The instant of the input that is being handled."""
         self.called = False
         """True once an application was called, because it may have commanded a course or may want another wake-up."""
         self._applications = tuple(applications)

@@ -31,9 +31,7 @@ class MediumCounters:
         self.refused: Counter[str] = Counter()
         """The number of hostile or misdirected inputs, by kind; none of them became a frame."""
         self.poses = 0
-        """The number of sets of positions that were accepted."""
         self.controls = 0
-        """The number of changes of the air that were made."""
         self.late = LateRequests(time_scale=time_scale)
 
     def drop(self, reason: DropReason) -> None:

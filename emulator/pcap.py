@@ -105,7 +105,6 @@ class Pcap:
         self._last: dict[int, int] = {}
         self._numbers: dict[tuple[int, int], int] = {}
         self._attempts: dict[int, int] = {}
-        """The attempt of the frame that each node sent last."""
         self._flush = flush
         self._flush_ns = S
         self.failure: Callable[[], str | None] = flush

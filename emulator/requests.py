@@ -66,14 +66,10 @@ class FrameSlots:
     def __init__(self, slots: int, nodes: Sequence[NodeId], *, most_held: int) -> None:
         """`most_held`: the greatest number of requests of one node that may be held at the same time."""
         self.nodes = list(nodes)
-        """The node of each station."""
         self.requests: list[TxRequest | None] = [None] * slots
         self.sources = [self.nodes[0]] * slots
-        """The sender of the request in each slot."""
         self.free = list(range(slots - 1, -1, -1))
-        """The slots without a request; the last one is used next."""
         self.held = [0] * len(self.nodes)
-        """The number of unfinished requests of each station."""
         self.most_held = most_held
 
     @property

@@ -91,7 +91,6 @@ class _Threat:
     """Another UAV that this UAV avoids."""
 
     since_ns: int
-    """The instant from which it avoids the other UAV."""
     until_ns: int
     """The instant at which the conflict will be over, if no hello of the other UAV is received any more."""
     warned_ns: int | None = None
@@ -131,7 +130,6 @@ class ConflictMonitor:
         self._still_since_ns: int | None = None
         """The instant from which this UAV has stood still while it avoids others."""
         self._back_until_ns = 0
-        """Until this instant it flies back from the geofence."""
         self._back = Enu(0.0, 0.0, 0.0)
         """Its horizontal velocity meanwhile."""
         self._wanted: Course | None = None

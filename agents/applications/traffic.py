@@ -29,7 +29,6 @@ class _Class(NamedTuple):
     name: str
     traffic: Traffic
     first: bool
-    """True for the first class of the scenario."""
 
     @classmethod
     def of(cls, scenario: Scenario, name: str | None) -> "_Class":
@@ -106,9 +105,7 @@ class TrafficGenerator:
         self._random: Random = stream(scenario.seed, chosen.stream_name("traffic"), node)
         self._on_ns, self._off_ns = seconds_to_ns(traffic.on_s), seconds_to_ns(traffic.off_s)
         self._active_until_ns = 0
-        """The end of the present active period, for arrivals `on_off`."""
         self._packets = sorted((start_ns + seconds_to_ns(at_s) // US * US, size) for at_s, size in traffic.packets)
-        """The packets yet to come, for arrivals `trace`."""
         self._bytes = traffic.payload_bytes
         self._next_ns: int | None = None
         self.owed = 1

@@ -41,7 +41,6 @@ class SwarmTime(ABC):
     """A way in which a node knows swarm time; until the node has learned it, its own clock is taken for swarm time."""
 
     in_hellos: bool = False
-    """True if hellos carry swarm time."""
 
     @property
     @abstractmethod
@@ -121,7 +120,6 @@ class GpsTime(SwarmTime):
     def __init__(self, clock: Clock, *, seed: int, node: NodeId) -> None:
         self._node = node
         self._announced: list[int] = []
-        """The transmit requests of the latest hellos."""
         self._apart_ns: int | None = None
         """The last instant at which a node was known to be out of step."""
         self._sigma_ns = clock.gps_sigma_ns

@@ -121,7 +121,6 @@ class GroundControl(Application):
         self._over_air = False
         """True if the last question of an operator came over the air."""
         self._report_ns: int | None = None
-        """When telemetry goes over the air next."""
         self._turn = 0
         self._last_command: tuple[Any, ...] = ()
         self._last_command_ns = 0

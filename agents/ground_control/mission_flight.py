@@ -29,16 +29,13 @@ class MissionFlight:
         self.at = 0
         """The index of the current item; their number when all were flown."""
         self.idle = True
-        """True while no mission is flown."""
         self.returns = False
         """True if the current item asks for a return."""
         self.speed_m_s: float | None = None
         """A speed that an item has asked for, until the pilot takes it."""
         self.on_reached: Callable[[int], None] = lambda _: None
         self._since_ns: int | None = None
-        """The instant since which the UAV is at the current item."""
         self._jumps: dict[int, int] = {}
-        """How often each jump was made."""
 
     def load(self, steps: Sequence[Step]) -> None:
         """Take another mission, from its beginning; it is not flown before it is started."""

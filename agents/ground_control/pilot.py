@@ -68,7 +68,6 @@ class Pilot:
         self._area_m = area_m
         self._say = say
         self._course: Course | None = None
-        """The course that was commanded last; None: none, or the swarm's own task."""
         self._fly: Course | None = None
         """A course to command now."""
         self._setpoint_ns: int | None = None

@@ -78,7 +78,6 @@ class Ground(NamedTuple):
 
     origin: Geodetic
     home_m: float
-    """The height of home over the origin."""
 
     def height(self, frame: int, z: float) -> float | None:
         """A height over the origin; None for a frame that is not known here."""
@@ -124,7 +123,6 @@ class Area(NamedTuple):
     """A polygon or a circle that the UAV must not leave, or must not enter."""
 
     inside: bool
-    """True: the UAV must stay inside."""
     corners: tuple[tuple[float, float], ...]
     """East and north of each corner; of a circle its center alone."""
     radius_m: float = 0.0

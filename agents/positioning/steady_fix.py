@@ -27,7 +27,6 @@ class SteadyFix:
         self._at: Enu | None = None
         self._t_ns = 0
         self._count = 1
-        """The number of fixes so far; the first ones have equal weights."""
 
     def position(self, fix: Gps) -> Enu:
         """The estimate after another fix."""

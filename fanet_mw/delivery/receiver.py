@@ -91,9 +91,7 @@ class Receiver:
         """The gaps between the pieces of a message, by sender."""
         self._incoming: dict[tuple[NodeId, int], _Incoming] = {}
         self._bytes: dict[NodeId, int] = {}
-        """The number of bytes of pieces that are kept, by sender."""
         self._counts: dict[NodeId, int] = {}
-        """The number of messages in `_incoming`, by sender."""
         self._done: dict[tuple[NodeId, int], int] = {}
         """The last receipt of each message whose sender may not have received it."""
         self._last: dict[tuple[NodeId, int], int] = {}
@@ -106,9 +104,7 @@ class Receiver:
         self.arrived: list[Whole] = []
         """The messages to hand over, in order; the caller empties this list."""
         self.not_taken = 0
-        """The number of pieces for which there was no room."""
         self.expired = 0
-        """The number of messages that expired while they were incomplete or waited."""
 
     @property
     def kept_bytes(self) -> int:

@@ -83,7 +83,6 @@ class PieceToSend(NamedTuple):
     destination: NodeId
     priority: int
     first: bool
-    """True for the first packet of the message."""
 
 
 class Told(NamedTuple):
@@ -165,7 +164,6 @@ class Sender:
         self.told: list[Told] = []
         """The outcomes of messages; the caller empties this list."""
         self.repeated = 0
-        """The number of pieces that were sent again."""
 
     def start(self, first_number: int) -> None:
         """Begin to number messages; a node that starts again must not use the numbers of earlier messages."""

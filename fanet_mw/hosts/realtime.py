@@ -66,9 +66,7 @@ class RealtimeHost:
         self._clock: SwarmClock | None = None
         self._running = False
         self._wake_up: _WakeUp | None = None
-        """The wake-up that the actor has requested; None: it has requested none."""
         self._call_ns = 0
-        """The instant that the actor was given at its last call."""
         self._records: list[Record] = []
         self._lateness = WakeLateness()
         self._cost = ProcessCost()

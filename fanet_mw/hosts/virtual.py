@@ -79,7 +79,6 @@ class VirtualHost:
         """The wake-up that was requested last. It is kept out of the heap, because it is often the
         next one to happen."""
         self._stalled = 0
-        """The number of wake-ups since time last advanced."""
 
     def start(self) -> None:
         for index, actor in enumerate(self._actors):

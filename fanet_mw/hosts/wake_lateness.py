@@ -78,7 +78,6 @@ class ProcessCost:
 
     def __init__(self) -> None:
         self.puts = 0
-        """The number of puts on the bus."""
 
     def summary(self, *, final: bool) -> Mapping[str, object]:
         usage = resource.getrusage(resource.RUSAGE_SELF)

@@ -76,7 +76,6 @@ class Node:
         self._copies = 0
         """The number of frames that were only copies, as most are."""
         self._others = 0
-        """The number of all other frames that were received."""
         self._lifetimes_ns = [scenario.routing.lifetime_ns(wire.PRIORITY_BULK)] * 256
         """The lifetime of a packet by its priority; the air may state any of 256."""
         for priority in wire.PRIORITIES.values():

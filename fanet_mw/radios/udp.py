@@ -108,7 +108,6 @@ class UdpRadio:
         self._hears = hears
         self._loop = asyncio.get_running_loop()
         self._addresses: dict[NodeId, _KnownAddress] = {}
-        """The address of each node that was heard."""
         self._waiting: dict[tuple[NodeId, int], asyncio.Event] = {}
         """The unicasts that wait for their acknowledgement, by destination and sequence number."""
         self._tasks: set[asyncio.Task[None]] = set()

@@ -144,7 +144,6 @@ class ClockFit:
         self._against: deque[Pair] = deque(maxlen=PAIRS + 1)
         self.line: Line | None = None
         self.outliers = 0
-        """The number of pairs that were left out."""
         self.steps = 0
         """The number of times that contradicting pairs have replaced the line."""
 

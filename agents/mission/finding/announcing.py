@@ -48,7 +48,6 @@ class Announcing:
         self._node = node
         self._survivors, self._outbox = survivors, outbox
         self._persons = 0
-        """The number of people whom this UAV has found without a phone."""
         self._took_over: set[int] = set()
         """The finds in whose favor this UAV has given up a person."""
         self._told_sigma_m: dict[int, float] = {}
@@ -60,7 +59,6 @@ class Announcing:
         UAV that did not seem to know it."""
 
         self._post_ns: int | None = None
-        """The instant at which the post on the ground was last heard."""
         self._told_post = 0
         self._flooded_ns: dict[int, int] = {}
         """The instant at which somebody last flooded each verdict that this UAV knew already."""

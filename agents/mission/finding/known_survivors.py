@@ -35,11 +35,8 @@ class KnownSurvivor:
     filter: PhoneFilter
     """Estimates the phone's place, from this UAV's received powers and those in the reports of other nodes."""
     reporters: set[int] = field(default_factory=set)
-    """The nodes that have received the phone's signal."""
     latest: dict[int, Survivor] = field(default_factory=dict)
-    """The newest report of each node."""
     first_ns: int = 0
-    """The instant at which this UAV first heard of the survivor."""
     announced: Found | None = None
     """The most exact estimate that another node has announced."""
     inside: Found | None = None
@@ -84,9 +81,7 @@ class PhoneLikelihood(NamedTuple):
     """The likelihood of each common offset, given the powers of one confirmed survivor's phone."""
 
     found: Found
-    """The confirmation from which the likelihood was computed."""
     readings: int
-    """The number of received powers from which the likelihood was computed."""
     values: tuple[float, ...]
 
 
@@ -99,7 +94,6 @@ class KnownSurvivors:
         self.persons: dict[int, Found] = {}
         """The latest verdict on each person who was found without a phone: found, or given up."""
         self._likelihoods: dict[int, PhoneLikelihood] = {}
-        """The likelihood of the common offset by each confirmed survivor's phone."""
         self.offset: PhoneOffset = AS_ASSUMED
         """The offset common to all phones, as estimated from the phones of all confirmed survivors."""
 

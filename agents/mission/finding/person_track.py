@@ -35,7 +35,6 @@ class PersonTrack:
     evidence: float
     sightings: int = 1
     close_sightings: int = 0
-    """The number of sightings from close by."""
     base_m: float = 0.0
     """The greatest distance of the UAV's positions at a sighting from that at the first one."""
     together: int = 0

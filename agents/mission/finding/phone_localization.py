@@ -144,7 +144,6 @@ class PhoneFilter:
         """For each node, the places at which it received the phone."""
         self._estimate: Estimate | None = None
         self._seen: Estimate | None = None
-        """The position of the person who has been recognized as the phone's owner."""
 
     # --- measurements ---------------------------------------------------------------------------------------------
 

@@ -30,7 +30,6 @@ class Errand:
         self._pitch_m = _PITCH * (_BLIND_M if math.isinf(look_m) else look_m)
         self._order: Order | None = None
         self._there_ns: int | None = None
-        """The instant at which the UAV came to the middle of the spiral."""
 
     def goal(self, now_ns: int) -> Enu | None:
         """The place to fly to now, with its height above ground; None without an order."""

@@ -79,9 +79,7 @@ class ReturnHome:
         self._heard_ns: int | None = None
         """The instant at which another UAV was last heard; None before the first time: there is no link to lose."""
         self.reason: ReturnReason | None = None
-        """Why it flies home; None while it takes part in the mission."""
         self.lands = False
-        """True from the moment at which it has reached its base and lands."""
 
     def on_battery(self, charge: float, *, now_ns: int) -> bool:
         """A reading of the battery; returns True if the UAV must leave now."""

@@ -66,7 +66,6 @@ class TakeOff:
         self._told_ns: int | None = None
         """The instant at which the take-off was last commanded; None while the UAV waits on its pad."""
         self.lasts = True
-        """True until the UAV has taken off."""
 
     @property
     def stands(self) -> bool:

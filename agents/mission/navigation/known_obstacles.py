@@ -76,12 +76,10 @@ class KnownObstacles:
         self._index = indexed(onboard_map, margin_m=_MARGIN_M, watch_m=_WATCH_M)
         self._no_fly = tuple(no_fly_m)
         self._echoes: dict[Cell, _Echoed] = {}
-        """The cells in which the radar has seen something."""
         self._taken: dict[Cell, _Echoed] = {}
         """The cells with echoes, and those within the margin around them."""
         self._movers: list[Mover] = []
         self._corner: Place | None = None
-        """The next corner of the way around the obstacles ahead."""
         self._planned_ns: int | None = None
         self._any = bool(onboard_map.buildings or no_fly_m)
 

@@ -55,7 +55,6 @@ class FormationPlace:
         self._left_ns = 0
         """The instant at which it leaves that position."""
         self._gaps: frozenset[int] = frozenset()
-        """The places of those who are lost."""
         self._apart = False
         """True while a part of the swarm that is not lost is out of reach."""
         self._closing_ns = 0

@@ -96,16 +96,13 @@ class FormationPlanner:
         self._random = random
         self._members: dict[int, _HeardUav] = {}
         self._left_ns: dict[int, int] = {}
-        """The instant at which each UAV first said that it flies home."""
         self._began_ns: int | None = None
         self.plan: Search | None = None
         self.to_tell: list[Search] = []
         """The plans to be flooded, until the caller takes them."""
         self._told_ns: int | None = None
-        """The instant at which this node last flooded a plan; None if it never did."""
         self._tellings_left = 0
         self._followed: Search | None = None
-        """The plan in force at the last review."""
         self._followed_ns = 0
         """The instant of the first review with this plan."""
 

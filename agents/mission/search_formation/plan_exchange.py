@@ -50,7 +50,6 @@ class PlanExchange:
         self._adopted_ns = 0
         """The instant at which this UAV began to follow its plan."""
         self._next_alarm_ns = 0
-        """The earliest instant at which this UAV floods again who is lost."""
         self._flies_home = False
         """True if this UAV takes no place any more, whatever the plan says."""
         self._absent = False

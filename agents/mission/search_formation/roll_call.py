@@ -44,9 +44,7 @@ class RollCall:
         self._node, self._silent = node, silent
         self._silent_ns = max(_SILENT_NS, neighbor_lifetime_ns(hello_interval_s))
         self._heard: dict[int, int] = {}
-        """The latest instant at which each UAV is known to have been heard, in units of `ROLL_NS`."""
         self._neighbor_ns: dict[int, int] = {}
-        """The instant at which this UAV last heard each other one itself."""
         self.lost: dict[int, int] = {}
         """The UAVs that are lost, each with the instant at which this UAV has learned it."""
         self._falls = False

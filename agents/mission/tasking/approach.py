@@ -60,7 +60,6 @@ class Approach:
         self._along_m_s = _SPEED_SHARE * speed_m_s
         self.look_around = LookAround(look_m)
         self.arrived_ns: dict[int, int] = {}
-        """The instant at which this UAV came to the estimated place of each survivor."""
 
     def forget(self, survivor: int) -> None:
         """Begin an approach anew: the place has proved wrong, or was reached in passing or for an earlier task."""

@@ -87,15 +87,11 @@ class Bidding:
         self._patience_ns = _RETURN_AFTER_NS + descent_ns(scenario)
         self._auction = Auction(node)
         self._taken_back_ns: dict[int, int] = {}
-        """The instant at which this UAV last withdrew its bid for each survivor by its own decision."""
         self._located: set[int] = set()
         """The survivors of whom the trace contains that this UAV knows where they are."""
         self._announced = False
-        """True if the trace contains that this UAV approaches the present survivor."""
         self.survivor: int | None = None
-        """The survivor to whom this UAV flies; None if it flies to none."""
         self._due_ns = _LONG_AGO_NS
-        """The instant at which this UAV should be at the present survivor."""
 
     def merge(self, bids: Iterable[Bid], *, now_ns: int) -> None:
         open_bids = (bid for bid in bids if not self._survivors.is_found(bid.survivor))

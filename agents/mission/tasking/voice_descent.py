@@ -88,11 +88,8 @@ class VoiceDescent:
         self._look_ns = _LOOK_NS if scenario.sensors.camera_hz else 0
         self._survivor: int | None = None
         self._near_ns: int | None = None
-        """The instant at which this UAV came near the present survivor."""
         self._step_m = math.inf
-        """The height above ground of the present step."""
         self._low_ns: int | None = None
-        """The instant at which this UAV reached the listening height."""
 
     def goal(self, survivor: int, place: Estimate, goal: Enu, *, seen: bool, misses_m: float, now_ns: int) -> Enu:
         """The place to fly to, above ground, instead of `goal`, which looks from above; `seen`: a person seems to own

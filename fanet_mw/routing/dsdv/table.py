@@ -30,7 +30,6 @@ class DsdvRoute:
     metric: int
     seq: int
     renewed_ns: int
-    """The instant at which the sequence number last grew."""
     settling_ns: float = MAX_SETTLING_NS / 2
     """The weighted average of the settling time."""
     advertised_metric: int = -1

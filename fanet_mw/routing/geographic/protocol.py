@@ -50,7 +50,6 @@ class Geographic(HopByHop):
         self._beacon_ns: int | None = None
         self._retry_ns: int | None = None
         self._located_ns = -LOCATION_INTERVAL_NS
-        """The instant at which this node last flooded its location."""
         self._queried_ns: dict[NodeId, int] = {}
 
     def start(self, now_ns: int) -> None:

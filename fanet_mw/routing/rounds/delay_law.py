@@ -82,7 +82,6 @@ class DelayLaw:
         self._greatest = 0
         """The size of the greatest of the packets that wait."""
         self._counted_ns = 0
-        """The instant for which that is known."""
         self._hellos_alone = scenario.clock.sync == "beacons"
         """Whether each hello has a turn of its own, because the clock must know its end."""
         most = _MOST_HELLOS_ALONE if self._hellos_alone else _MOST_HELLOS

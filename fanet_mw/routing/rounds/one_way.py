@@ -39,9 +39,7 @@ class OneWay:
         self._heard_ns = heard_ns
         self._lead_ns = port.scenario.radio.lead_ns
         self._free_ns = 0
-        """The instant from which the next frame may go."""
         self._attempts: dict[int, _Attempt] = {}
-        """The packets at the radio, by the number of the request."""
 
     def waiting(self) -> int:
         return len(self._attempts)

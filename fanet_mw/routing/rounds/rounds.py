@@ -130,7 +130,6 @@ class RoundFlooding(RoutingProtocol):
         self._slots = BulkSlots(port.node, timing)
         self._random = port.stream("rounds").random
         self._heard_ns: dict[NodeId, int] = {}
-        """The instant at which each neighbor was last heard."""
         self._in_step = InStep(timing, certain=not scenario.clock.modelled)
         self._one_way = OneWay(port, timing, self._topology, self._heard_ns)
         self._blind_ns = self._lead_ns + radio.handover_ns
@@ -141,7 +140,6 @@ class RoundFlooding(RoutingProtocol):
         self._often = False
         """Whether this node takes part in all bulk slots, as it has stated."""
         self._slot_ns: int | None = None
-        """The next own bulk slot; None if there is no bulk."""
         self._slot_from_ns = 0
         """The instant from which that slot was sought."""
         self._slot_by: tuple[int, int, bool] | None = None

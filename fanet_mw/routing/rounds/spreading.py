@@ -69,14 +69,11 @@ class _Spread:
         self.rank = packet.header.priority, packet.header.origin_us, _key(packet)
         """Priority, birth, key: of new packets the most urgent go first, and of these the oldest."""
         self.sent = 0
-        """How often this node has sent it."""
         self.sent_ns = 0
         self.copy_ns = 0
-        """The instant at which a copy was last heard."""
         self.having = 0 if src is None else 1 << (src - 1)
         """The neighbors that are known to have it."""
         self.senders = self.having
-        """The neighbors that were heard to send it."""
         self.reached = 0
         """Bulk: the nodes in reach of those that were heard to send it."""
         self.in_reach = 0
@@ -123,9 +120,7 @@ class Spreading:
         self._links = links
         self._entries: dict[int, _Spread] = {}
         self.urgent: dict[int, _Spread] = {}
-        """The urgent ones among them."""
         self._waiting: set[int] = set()
-        """The urgent ones that wait for a turn."""
         self._hasty: dict[int, _Spread] = {}
         """The urgent ones that may go in a bulk slot if that comes before the turn."""
         self._bulk: dict[int, _Spread] = {}

@@ -55,7 +55,6 @@ class Topology:
         """The nodes of which something is to be passed on, in the order in which it was heard."""
         self._own_epoch = -1
         self.epoch_end_ns = 0
-        """The instant at which the next epoch begins."""
         self._rings: list[int] = []
         """The nodes that are so many hops away."""
         self._hops: dict[NodeId, int] = {}
@@ -84,7 +83,6 @@ class Topology:
         self.changes = 0
         """How often links, or who takes part in bulk slots often, have changed."""
         self._link_changes = 0
-        """How often links have changed."""
         self._arranged_for = -1
         """The state of the links for which the rings were computed."""
 

@@ -97,7 +97,6 @@ class Lines(Shape):
         self._joints = joints or (formation.lanes // 2,) * formation.teams
         self._most_m = most_m
         self._half = half = formation.teams // 2
-        """The number of lines to the north of the middle, and to the south."""
         self._apart_m = formation.last_m - formation.first_m
         straight_s = self._apart_m / formation.speed_m_s
         back_s = (formation.last_m - min(FIRST_M, formation.first_m)) / (BACK * formation.speed_m_s)

@@ -63,7 +63,6 @@ class OneWay:
         self._takes = takes
         self._ways: dict[NodeId, Way] = {}
         self._under_way: dict[int, _Attempt] = {}
-        """By the sequence number of the transmit request."""
         self._shown_ns = -_SHOW_NS
 
     def __len__(self) -> int:

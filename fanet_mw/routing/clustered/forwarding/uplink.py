@@ -40,7 +40,6 @@ class Uplink:
         self._lifetime_ns = routing.lifetime_ns(-1)
         """The longest lifetime of all priority classes; packets that expire sooner are known to the queue."""
         self._under_way: dict[int, Attempt] = {}
-        """The unfinished attempts, by the sequence number of their transmit request."""
 
     def __len__(self) -> int:
         return len(self._held) + len(self._under_way)

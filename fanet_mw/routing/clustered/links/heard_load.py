@@ -50,7 +50,6 @@ class HeardLoads:
         self._marks: dict[int, list[tuple[int, int]]] = {}
         """Of each origin, the births [ns] and sequence numbers of some packets, oldest first."""
         self._heard_ns: dict[int, int] = {}
-        """The instant at which a packet of each origin was last received."""
         self._asked_ns: int | None = None
         """The instant since which loads have asked for another timetable; None if they do not."""
         self.refused = 0

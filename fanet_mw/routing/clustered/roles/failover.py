@@ -55,11 +55,9 @@ class Failover:
         self._lease = lease
         self._hello_ns = hello_ns
         self._since_ns = 0
-        """The instant at which this node began to follow its present head."""
         self._named = NodeId(0)
         """The head that the last schedule named for this node's cluster."""
         self._object_ns = 0
-        """The instant from which this node may object again."""
         self._watch_ns: int | None = None
         """The instant at which this node next judges the head, or announces itself again as its stand-in."""
 

@@ -30,7 +30,6 @@ class HeadFailureDetector:
         self._liveness = liveness
         self._hello_ns = hello_ns
         self._unreachable_ns = -1
-        """The instant at which the MAC last failed to reach the head."""
 
     def on_unreachable(self, now_ns: int) -> None:
         self._unreachable_ns = now_ns

@@ -39,11 +39,9 @@ class Joining:
         self._links = links
         self._random = random
         self._has_told_links = False
-        """True once a join of this node has stated its links."""
         self._links_are_announced = False
         """True if the leader has announced measured links, which it does when it knows the links of most nodes."""
         self.due_ns: int | None = None
-        """The instant of the node's next join; None if it has no reason to join."""
 
     def start(self, now_ns: int) -> None:
         """The node has started, and belongs to no cluster."""

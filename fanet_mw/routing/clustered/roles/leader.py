@@ -134,7 +134,6 @@ class Leader:
         it."""
         self._assigned = _Assigned()
         self._due_ns = now_ns if elected else now_ns + _FIRST_CALL_NS
-        """The instant of the next announcement."""
         self._announced_ns = now_ns
         self._not_before_ns = now_ns + ANSWER_NS if elected else now_ns
         """No assignment is made before this instant, at which all nodes have had time to answer the call."""

@@ -49,7 +49,6 @@ class Lease:
         self._until_ns = 0
         """The end of the lease, unless another announcement arrives."""
         self.stand_ns = 0
-        """The instant at which the node next checks whether it must take office."""
 
     def start(self, now_ns: int) -> None:
         self._until_ns = self.stand_ns = now_ns + _FIRST_NS + self._silence_ns

@@ -26,7 +26,6 @@ class ScheduleCheck:
         self._port = port
         self._membership = membership
         self._renewed_ns = 0
-        """The instant at which this node last began to follow another schedule."""
 
     def on_new_schedule(self, now_ns: int) -> None:
         self._renewed_ns = now_ns

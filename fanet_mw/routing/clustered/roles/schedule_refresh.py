@@ -23,11 +23,9 @@ class ScheduleRefresh:
         self._random = random
         self._version: tuple[Authority, int] | None = None
         self._packets: dict[int, Packet] = {}
-        """The packets of the schedule, by part."""
         self._kept_ns = 0
         """No refresh is planned until `FLOOD_OVER_NS` after this instant."""
         self.due_ns: int | None = None
-        """The instant at which the packets are sent again; None if no refresh is planned."""
         self.pending: set[int] = set()
         """The keys of the packets that are to be sent again."""
 

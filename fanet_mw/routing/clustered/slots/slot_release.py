@@ -42,7 +42,6 @@ class SlotRelease:
         self._free_ns = 0
         """No packet is released before this instant, which is one gap after the last release."""
         self._next_ns: int | None = None
-        """The instant of the next release; None if nothing is queued, or if the node has no slot."""
 
     def __len__(self) -> int:
         return len(self._queue)

@@ -28,7 +28,6 @@ class Admission:
         self._node = node
         self._deadline_ns = deadline_ns
         self._interval_ns = interval_ns
-        """The interval between packets that the application has stated."""
         self._met: bool | None = None
         """True if the deadline is met by the last answer that was recorded; None before the first one."""
         self._least_ns = 0

@@ -43,7 +43,6 @@ class NodeRows:
         self.ids = tuple(nodes)
         self.row = {node: row for row, node in enumerate(self.ids)}
         self.everyone = (1 << len(self.ids)) - 1
-        """The bit set of all rows."""
 
     def of(self, bits: int) -> tuple[NodeId, ...]:
         """The nodes of a bit set, in the order of their rows."""

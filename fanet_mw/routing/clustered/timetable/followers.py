@@ -23,7 +23,6 @@ class Followers:
     def __init__(self, node: NodeId) -> None:
         self._node = node
         self._known: dict[Version, dict[NodeId, int]] = {}
-        """The instant at which each node was last heard in its turn."""
         self._doubted_ns: int | None = None
 
     def follow(self, version: Version) -> None:

@@ -49,13 +49,11 @@ class Flood:
         self.root = root
         self.goal, self.hops = swarm.part(root)
         self.sent: list[tuple[int, int]] = []
-        """The transmissions of this flood as (offset, row), in order."""
         self._hears = swarm.hears
         self._way = way
         """The rows that must transmit first, in this order."""
         self._has = 1 << root
         self._ready = {root: 0}
-        """The offset from which each holder of the packet can transmit."""
         self._offers: list[tuple[int, int, int, int]] | None = None
 
     @property

@@ -48,7 +48,6 @@ class Wave:
         self.root = root
         self.call = call
         self.sent: list[tuple[int, int]] = []
-        """The transmissions of this wave as (offset, row), in order."""
         self.goal = network.hears[root] | 1 << root if call else reach(network.hears, root)[0]
         self._network = network
         self._enough = enough

@@ -63,7 +63,6 @@ class StatedDelays:
         self._interval_ns = seconds_to_ns(port.scenario.traffic.interval_s)
         self._hello_ns = seconds_to_ns(port.scenario.routing.hello_interval_s)
         self._now_ns = 0
-        """The instant at which the node last did anything."""
         self._bounds_ns: list[tuple[NodeTimetable, Mapping[int, int]]] = []
         """The bound of each priority class of the node's packets by each timetable; classes without a bound are
         missing."""

@@ -62,7 +62,6 @@ class FromPlaces:
         self._followers = followers
         self._schedules: dict[int, tuple[Schedule, PartDetails]] = {}
         self._measured: dict[int, Links] = {}
-        """The links of this version of the schedule, by part."""
         self._version: Version | None = None
         self._planned: Version | None = None
         self._announced_ns: dict[Version, int] = {}

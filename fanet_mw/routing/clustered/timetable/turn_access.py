@@ -69,7 +69,6 @@ class TurnAccess:
         self._has_shown: NodeTimetable | None = None
         """The timetable in whose turns the node has last begun a flood."""
         self._shown_ns = 0
-        """The instant of that turn."""
         self._hello_ns = seconds_to_ns(port.scenario.routing.hello_interval_s)
         self._lifetime_ns = seconds_to_ns(port.scenario.routing.lifetime_s)
         self._hello_sent_ns = self._hello_waits_ns = 0

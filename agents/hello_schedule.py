@@ -58,7 +58,7 @@ class HelloSchedule:
         else:
             time.announced(self._node.say_hello(inner, start_ns=start_ns, now_ns=now_ns, time=time.frames()))
         vary = 1 + _JITTER * (2 * self._random() - 1)
-        step_ns = int(self._interval_ns * vary * self._node.hello_share(now_ns))
+        step_ns = int(self._interval_ns * vary * self._node.hello_share(now_ns=now_ns))
         self._next_ns = self._node.hello_due_ns(max(self._next_ns + step_ns, now_ns))
 
     def on_hello(self, sender: NodeId, now_ns: int) -> None:

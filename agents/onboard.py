@@ -3,7 +3,9 @@ goes.
 
     a message, a reading, a hello  ->  the applications that listen to it, in their order (`listeners.py`)
     a message that one sends       ->  the node, at once (`messenger.py`)
-    a course that one commands     ->  the vehicle, once all have had the same input (`course_arbitration.py`)
+    a course that one commands     ->  the vehicle, once all have had the same input
+
+The last command of each application counts, and no other application may object to it, unless it avoids a collision.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -11,7 +13,6 @@ from functools import partial
 from random import Random
 from typing import Any, Final
 
-from agents.course_arbitration import CourseArbitration
 from agents.listeners import Callbacks, Listeners
 from agents.messenger import Messenger
 from agents.submission import Sending, Submission, positive, priority_of
@@ -61,7 +62,9 @@ class Onboard:
         self._listeners = Listeners(applications)
         node.listened = self._listeners.wanted(also=_OF_MESSENGER)
         self._messenger = Messenger(node, self._listeners)
-        self.arbitration = CourseArbitration(applications, self._callbacks.permits, fly)
+        self._fly = fly
+        self._commanded: dict[str, Course] = {}
+        """The courses that were commanded since the last input, by application."""
 
     @property
     def hears_hellos(self) -> bool:
@@ -176,6 +179,9 @@ class Onboard:
     def send(self, application: Application, submission: Submission) -> int:
         return self._messenger.send(application, submission, now_ns=self.now_ns)
 
+    def command(self, application: Application, course: Course) -> None:
+        self._commanded[application.name] = course
+
     def settle(self, now_ns: int) -> None:
         """Hand over complete messages, report on sent ones, and fly the commanded course."""
         self._call(now_ns)  # news of the node alone may have led here, and an application that hears them may send
@@ -184,7 +190,15 @@ class Onboard:
                 self._guard(application.on_message, message, now_ns)
             for application, status in self._messenger.statuses(now_ns):
                 application.on_status(status, now_ns)
-        self.arbitration.settle(now_ns)
+        commanded, self._commanded = self._commanded, {}
+        for application in self._applications if commanded else ():
+            course = commanded.get(application.name)
+            if course is None:
+                continue
+            judges = () if application.avoids else self._callbacks.permits
+            objections = [o for o in judges if o is not application and not o.permits(course, now_ns)]
+            if not objections:
+                self._fly(course, now_ns)
 
 
 class _ApplicationPort:
@@ -235,7 +249,7 @@ class _ApplicationPort:
     def fly(self, course: Course) -> None:
         if not isinstance(course, Course):
             raise LocalProtocolError(f"course = {course!r} must be a Course")
-        self._onboard.arbitration.command(self._application, course)
+        self._onboard.command(self._application, course)
 
     def tap(self, frames: bytes) -> None:
         self._onboard.tap(frames, self._onboard.now_ns)

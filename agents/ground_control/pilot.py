@@ -8,7 +8,7 @@
     hold                 where it is
 
 The pilot commands courses by the arbitration on board like any application, and objects to those of others while it
-commands; courses that avoid a collision pass (`agents/course_arbitration.py`). Failsafes of the flight controller are
+commands; courses that avoid a collision pass (`agents/onboard.py`). Failsafes of the flight controller are
 below all this.
 """
 

@@ -17,15 +17,9 @@ from agents.mission.paper_rule import PaperRule
 from agents.mission.searcher import Searcher, phone_model
 from fanet_mw.application import Application, AppPort, Received
 from fanet_mw.bus.messages import (
-    Altimeter,
-    Battery,
-    Camera,
     Gps,
-    Radar,
     SensorReading,
-    Voice,
     WifiScan,
-    WindEstimate,
 )
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.geodesy import Geodetic
@@ -143,22 +137,7 @@ class PlannedSearch(Application):
         self._settle()
 
     def on_sensor(self, reading: SensorReading, now_ns: int) -> None:
-        if isinstance(reading, WifiScan):
-            self._searcher.scan(reading.heard, now_ns=now_ns)
-        elif isinstance(reading, Camera):
-            people = [(person.bearing_rad, person.elevation_rad) for person in reading.people]
-            self._searcher.camera(people, now_ns=now_ns)
-        elif isinstance(reading, Altimeter):
-            self._searcher.altimeter(reading.above_ground_m, now_ns=now_ns)
-        elif isinstance(reading, Voice):
-            calls = [(call.bearing_rad, call.elevation_rad, call.snr_db) for call in reading.calls]
-            self._searcher.voice(calls, now_ns=now_ns)
-        elif isinstance(reading, Battery):
-            self._searcher.on_battery(reading.charge, now_ns=now_ns)
-        elif isinstance(reading, WindEstimate):
-            self._searcher.on_wind(reading.velocity)
-        elif isinstance(reading, Radar):
-            self._searcher.radar(reading.echoes, now_ns=now_ns)
+        self._searcher.on_sensor(reading, now_ns=now_ns)
         self._settle()
 
     def wake(self, now_ns: int) -> None:

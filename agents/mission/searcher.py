@@ -13,7 +13,7 @@ All that a UAV knows it has sensed itself or received over the air. At each posi
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Final, assert_never
 
 from agents.mission.finding.announcing import Announcing
@@ -51,7 +51,16 @@ from agents.mission.tasking.absence import Absence
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import Bidding
 from agents.mission.tasking.voice_descent import VoiceDescent
-from fanet_mw.bus.messages import Echo
+from fanet_mw.bus.messages import (
+    Altimeter,
+    Battery,
+    Camera,
+    Radar,
+    SensorReading,
+    Voice,
+    WifiScan,
+    WindEstimate,
+)  # fmt: skip
 from fanet_mw.motion import Motion
 from fanet_mw.orders import OrderKind
 from fanet_mw.rng import stream
@@ -99,7 +108,7 @@ class Searcher:
         self._radio = radio
         self._survivors = survivors = KnownSurvivors(phone_model(scenario))
         obstacles = KnownObstacles(onboard_map, scenario.world.no_fly_m)
-        own_motion = OwnMotion(position, obstacles)
+        self._own_motion = own_motion = OwnMotion(position, obstacles)
         self._neighbors = neighbors = NeighborMotions(hello_interval_s=scenario.routing.hello_interval_s)
         self._radar = RadarWatch(own_motion, obstacles, neighbors)
         aside_m, ahead_m = _view_m(scenario)
@@ -232,13 +241,28 @@ class Searcher:
         if self._radio is not None:
             self._radio.hold(self._flight.held)
 
-    def on_battery(self, charge: float, *, now_ns: int) -> None:
-        """A reading of the battery; a UAV that must leave gives up its place and its task at once."""
-        if self._return_home.on_battery(charge, now_ns=now_ns):
-            self._leave(now_ns)
-
-    def on_wind(self, velocity: Enu) -> None:
-        self._return_home.on_wind(velocity)
+    def on_sensor(self, reading: SensorReading, *, now_ns: int) -> None:
+        """A UAV whose battery makes it leave gives up its place and its task at once."""
+        match reading:
+            case WifiScan():
+                self._reception.scan(reading.heard, now_ns=now_ns)
+            case Camera():
+                self._sightings.camera(reading.people, now_ns=now_ns)
+                self._identify(now_ns)
+            case Voice():
+                self._sightings.voice(reading.calls, now_ns=now_ns)
+                self._identify(now_ns)
+            case Altimeter():
+                self._own_motion.altimeter(reading.above_ground_m, now_ns=now_ns)
+            case Battery():
+                if self._return_home.on_battery(reading.charge, now_ns=now_ns):
+                    self._leave(now_ns)
+            case WindEstimate():
+                self._return_home.on_wind(reading.velocity)
+            case Radar():
+                self._radar.scan(reading.echoes, now_ns=now_ns)
+            case _:
+                pass
 
     def _leave(self, now_ns: int) -> None:
         """Give up the place and the task, tell all, and fly home."""
@@ -260,25 +284,6 @@ class Searcher:
         """True once the area was swept often enough."""
         sweeps = self._limits.sweeps
         return bool(sweeps) and self._place.is_swept(now_ns, times=sweeps)
-
-    def scan(self, heard: Sequence[tuple[int, float]], *, now_ns: int) -> None:
-        """The receiver detects these phones with these powers [dBm], and no others."""
-        self._reception.scan(heard, now_ns=now_ns)
-
-    def altimeter(self, above_ground_m: float | None, *, now_ns: int) -> None:
-        self._flight.altimeter(above_ground_m, now_ns=now_ns)
-
-    def radar(self, echoes: Sequence[Echo], *, now_ns: int) -> None:
-        self._radar.scan(echoes, now_ns=now_ns)
-
-    def camera(self, people: Sequence[tuple[float, float]], *, now_ns: int) -> None:
-        self._sightings.camera(people, now_ns=now_ns)
-        self._identify(now_ns)
-
-    def voice(self, calls: Sequence[tuple[float, float, float]], *, now_ns: int) -> None:
-        """Calls at these bearings and elevations [rad], with these signal-to-noise ratios [dB]."""
-        self._sightings.voice(calls, now_ns=now_ns)
-        self._identify(now_ns)
 
     def _identify(self, now_ns: int) -> None:
         for survivor in self._sightings.review(now_ns):

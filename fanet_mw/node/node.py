@@ -97,6 +97,11 @@ class Node:
         self.timeless = type(protocol).next_wake_ns is RoutingProtocol.next_wake_ns
         """True for a protocol that never asks to be woken: no reception changes the instant at which the node is
         due."""
+        self.first_hello_ns, self.hello_due_ns = protocol.first_hello_ns, protocol.hello_due_ns
+        self.hello_share, self.clusters = protocol.hello_share, protocol.clusters
+        self.bound_ns, self.bounds = protocol.bound_ns, protocol.bounds
+        self.least_interval_ns = protocol.least_interval_ns
+        self.parted, self.hold = protocol.parted, protocol.hold
         self._on_copy = None if type(protocol).on_copy is RoutingProtocol.on_copy else protocol.on_copy
         """The protocol's handler of copies; None for a protocol that ignores copies, as most receptions are copies."""
 
@@ -206,16 +211,6 @@ class Node:
         )
         request = self._protocol.send_hello(packet, start_ns=start_ns, wants_status=time is not None, now_ns=now_ns)
         return AnnouncedHello(request, packet.header.seq)
-
-    def first_hello_ns(self, earliest_ns: int, start_ns: int) -> int:
-        return self._protocol.first_hello_ns(earliest_ns, start_ns)
-
-    def hello_due_ns(self, start_ns: int) -> int:
-        return self._protocol.hello_due_ns(start_ns)
-
-    def hello_share(self, now_ns: int) -> float:
-        """The part of the hello interval after which the next hello should go."""
-        return self._protocol.hello_share(now_ns=now_ns)
 
     def hear(self, reception: Reception, now_ns: int) -> bool:
         """Handle a reception; returns True if it was only a copy of a packet that was handled before."""
@@ -328,24 +323,6 @@ class Node:
             most = min(self._protocol.most_packet_bytes(priority), self.scenario.radio.max_frame_bytes)
             self._most_bytes[priority] = most
         return most
-
-    def bound_ns(self) -> int | None:
-        return self._protocol.bound_ns()
-
-    def bounds(self, priority: int) -> bool:
-        return self._protocol.bounds(priority)
-
-    def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
-        return self._protocol.clusters()
-
-    def parted(self, now_ns: int, *, without: Collection[int] = ()) -> Collection[NodeId]:
-        return self._protocol.parted(now_ns, without=without)
-
-    def hold(self, nodes: Collection[NodeId]) -> None:
-        self._protocol.hold(nodes)
-
-    def least_interval_ns(self, deadline_ns: int) -> int | None:
-        return self._protocol.least_interval_ns(deadline_ns)
 
     def report(self) -> Mapping[str, object]:
         return {

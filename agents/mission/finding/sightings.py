@@ -12,6 +12,7 @@ from agents.mission.finding.person_track import PersonTrack
 from agents.mission.finding.phone_localization import Estimate
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
+from fanet_mw.bus.messages import Call, Person
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Sighted
 from fanet_mw.units import Enu, NodeId, S
@@ -95,23 +96,21 @@ class Sightings:
         self._imaged_ns: int | None = None
         """The instant up to which the images are taken in."""
 
-    def camera(self, people: Sequence[tuple[float, float]], *, now_ns: int) -> None:
-        """The camera shows people at these bearings and elevations [rad]."""
+    def camera(self, people: Sequence[Person], *, now_ns: int) -> None:
         self._empty_images(now_ns)
         here = self._own_motion.over_ground(now_ns)
         self._imaged_ns = now_ns
         evidence = self._view.sighting_evidence(here.up)
-        directions = [(*direction, _ANGLE_RAD) for direction in people]
+        directions = [(person.bearing_rad, person.elevation_rad, _ANGLE_RAD) for person in people]
         shown = self._sighted("camera", directions, math.inf, evidence=evidence, now_ns=now_ns)
         self._identities.on_images(
             1, lambda place: self._shows(place, here), evidence=self._view.empty_evidence(here.up), but=shown
         )
 
-    def voice(self, calls: Sequence[tuple[float, float, float]], *, now_ns: int) -> None:
-        """The microphones detect voices at these bearings and elevations [rad], with these signal-to-noise ratios."""
+    def voice(self, calls: Sequence[Call], *, now_ns: int) -> None:
         directions = [
-            (bearing_rad, elevation_rad, max(_ANGLE_RAD, self._voice_rad * math.pow(10.0, -snr_db / 20)))
-            for bearing_rad, elevation_rad, snr_db in calls
+            (call.bearing_rad, call.elevation_rad, max(_ANGLE_RAD, self._voice_rad * math.pow(10.0, -call.snr_db / 20)))
+            for call in calls
         ]
         self._sighted("voice", directions, _FARTHEST_M, evidence=_CALL_EVIDENCE, now_ns=now_ns)
 

@@ -45,10 +45,6 @@ class Flight:
         self.held: Collection[NodeId] = ()
         """The neighbors that stay in reach, because this UAV flies so."""
 
-    def altimeter(self, above_ground_m: float | None, *, now_ns: int) -> None:
-        """The rangefinder has measured the height over whatever is below; None if nothing is within its range."""
-        self._own_motion.altimeter(above_ground_m, now_ns=now_ns)
-
     def fix(self, position: Enu, velocity: Enu, survivor: int | None, *, now_ns: int) -> None:
         self._own_motion.fix(position, velocity, now_ns=now_ns)
         self.held = ()

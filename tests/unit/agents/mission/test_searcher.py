@@ -10,7 +10,7 @@ from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.mission.outbox import Outbox
 from agents.mission.search_formation.formation_planner import plan_of
 from agents.mission.searcher import Searcher, formation, phone_model
-from fanet_mw.bus.messages import Echo
+from fanet_mw.bus.messages import Battery, Call, Camera, Echo, Person, Radar, Voice, WifiScan
 from fanet_mw.motion import Motion
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Confirmed, MissionModeChanged, Sighted
@@ -71,7 +71,8 @@ class Flight:
             )
             self.searcher.fix(self.at, velocity, now_ns=self.now_ns)
             if charge is not None and self.now_ns % S == 0:
-                self.searcher.on_battery(charge(self.now_ns / S), now_ns=self.now_ns)
+                reading = Battery(self.now_ns, 15.0, 20.0, charge(self.now_ns / S))
+                self.searcher.on_sensor(reading, now_ns=self.now_ns)
             if heard and self.now_ns % S == 0:
                 self.searcher.hello(3, Motion(Enu(0.0, 400.0, 90.0), STILL, self.now_ns), now_ns=self.now_ns)
             self.searcher.wake(self.now_ns)
@@ -220,15 +221,15 @@ def test_somebody_who_is_seen_or_heard_at_close_range_is_confirmed(
         flight.searcher.on_message(report, now_ns=flight.now_ns)
     for _ in range(30):
         here = flight.at
-        flight.searcher.scan(
-            [(2, 15 - 40.05 - 30 * math.log10(here.minus(victim._replace(up=0)).norm()))], now_ns=flight.now_ns
-        )
+        rssi_dbm = 15 - 40.05 - 30 * math.log10(here.minus(victim._replace(up=0)).norm())
+        flight.searcher.on_sensor(WifiScan(flight.now_ns, ((2, rssi_dbm),)), now_ns=flight.now_ns)
         east, north = victim.east - here.east, victim.north - here.north
         bearing, elevation = math.atan2(east, north), -math.atan2(here.up, math.hypot(east, north))
         if sensor == "camera":
-            flight.searcher.camera([(bearing, elevation)], now_ns=flight.now_ns)
+            flight.searcher.on_sensor(Camera(flight.now_ns, (Person(bearing, elevation, 20.0),)), now_ns=flight.now_ns)
         else:
-            flight.searcher.voice([(bearing, elevation, 20.0)], now_ns=flight.now_ns)
+            call = Call(bearing, elevation, 60.0, 20.0)
+            flight.searcher.on_sensor(Voice(flight.now_ns, (call,)), now_ns=flight.now_ns)
         flight.fly(1)
     found = [r for r in flight.outbox.records if isinstance(r, Confirmed)]
     assert [r.survivor for r in found] == [2]
@@ -277,7 +278,7 @@ def test_another_uav_is_avoided_by_its_hellos_and_by_radar(make_scenario: Callab
     if by == "hellos":
         met.searcher.hello(3, motion, now_ns=met.now_ns)
     else:
-        met.searcher.radar([echo], now_ns=met.now_ns)
+        met.searcher.on_sensor(Radar(met.now_ns, (echo,)), now_ns=met.now_ns)
     for flight in (met, alone):
         flight.fly(0.4)
     assert (met.searcher.velocity or STILL).minus(alone.searcher.velocity or STILL).norm() > 0.5

@@ -12,6 +12,7 @@ from agents.mission.navigation.known_obstacles import KnownObstacles
 from agents.mission.navigation.onboard_map import OnboardMap
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
+from fanet_mw.bus.messages import Person
 from fanet_mw.trace import Sighted
 from fanet_mw.units import STILL, Enu, NodeId, S
 
@@ -26,6 +27,7 @@ def test_a_person_on_a_hillside_is_seen_where_the_ray_meets_it(make_scenario: Ma
     scenario = make_scenario(**{"sensors.camera_hz": 2.0, "sensors.camera_fov_deg": 90.0})
     sightings = Sightings(scenario, NodeId(1), KnownSurvivors(MODEL), own, outbox)
     down_m = UP_M - SLOPE.ground_m(east_m, 10.0)
-    sightings.camera([(math.atan2(east_m, 10.0), -math.atan2(down_m, math.hypot(east_m, 10.0)))], now_ns=S)
+    elevation_rad = -math.atan2(down_m, math.hypot(east_m, 10.0))
+    sightings.camera([Person(math.atan2(east_m, 10.0), elevation_rad, 20.0)], now_ns=S)
     (seen,) = [record for record in outbox.records if isinstance(record, Sighted)]
     assert (seen.east_m, seen.north_m) == pytest.approx((east_m, 10.0), abs=0.1)

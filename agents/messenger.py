@@ -25,11 +25,11 @@ from fanet_mw.wire.application_message import (
     MAVLINK_PORT,
     MOST_LIFETIME_MS,
     RECEIPT_BYTES,
-    Piece,
     decode_piece,
     decode_receipts,
     encode_receipts,
 )
+from fanet_mw.wire.frame import message_id
 
 _RECEIPT_APP: Final = "receipt"
 _RADIO_FATES: Final = frozenset((Fate.SENT, Fate.TURNED_AWAY))
@@ -50,7 +50,10 @@ class Messenger:
         self._node = node
         self._listeners = listeners
         self._sender = Sender(node.node, scenario.node_ids, room=self._room, wait_ns=wait_ns, holds=node.holds)
-        self._receiver = Receiver(node.node, self._has_listener, random=stream(scenario.seed, "receipts", node.node))
+        self._receiver = Receiver(
+            node.node, listens=lambda piece: bool(self._of(piece.head.port, piece.data)),
+            random=stream(scenario.seed, "receipts", node.node),
+        )  # fmt: skip
         self._in_time_ns: int | None = None
         """The instant at which the last message with a deadline was accepted."""
         self._statuses = Statuses(node)
@@ -177,12 +180,11 @@ class Messenger:
         for receipt in decode_receipts(packet.frame):
             self._sender.receipt(packet.origin, receipt, now_ns)
 
-    def _has_listener(self, piece: Piece) -> bool:
-        return bool(self._of(piece.head.port, piece.data))
-
     def _of(self, port: int, data: bytes) -> Sequence[Application]:
         """The applications that listen to a message, by its port or by the id of its MAVLink frame."""
-        return self._listeners.of_message(_message_id(data)) if port == MAVLINK_PORT else self._listeners.of_port(port)
+        if port == MAVLINK_PORT:
+            return self._listeners.of_message(message_id(data))
+        return self._listeners.of_port(port)
 
     @property
     def owes_receipts(self) -> bool:
@@ -238,10 +240,6 @@ class Messenger:
 def _targets(to: NodeId, named: tuple[NodeId, ...]) -> tuple[NodeId, ...] | None:
     """The nodes that a message is for; None if it is for all."""
     return None if to == BROADCAST and not named else named or (to,)
-
-
-def _message_id(frames: bytes) -> int:
-    return int.from_bytes(frames[7:10], "little")
 
 
 def _received(whole: Whole) -> Received:

@@ -14,6 +14,7 @@ from typing import Any, Final
 from agents.clock.local_clock import LocalClock
 from agents.clock.steady_clock import SteadyClock
 from agents.clock.swarm_time import SwarmTime, swarm_time
+from agents.hello_schedule import HelloTime
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.uav import NodeState, Uav
 from fanet_mw import wire
@@ -59,30 +60,12 @@ class _TimeInHellos:
 class ClockedUav(Actor):
     """A UAV that sees the world through a clock of its own."""
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        node: NodeId,
-        swarm: str,
-        *,
-        position: Enu,
-        applications: Sequence[Application] = (),
-        onboard_map: OnboardMap = NO_MAP,
-        reader: Reader | None = None,
-    ) -> None:
+    def __init__(self, scenario: Scenario, node: NodeId, make: Callable[[HelloTime | None], Uav]) -> None:
+        """`make`: makes the UAV, given what adds time beacons to its hellos."""
         clock = LocalClock(scenario.clock, seed=scenario.seed, node=node)
         self._clock = SteadyClock(clock) if scenario.clock.counter else clock
         self._time = swarm_time(scenario, node)
-        self._uav = Uav(
-            scenario,
-            node,
-            swarm,
-            position=position,
-            applications=applications,
-            onboard_map=onboard_map,
-            hello_time=_TimeInHellos(self._time, self._local_now_ns) if self._time.in_hellos else None,
-            reader=reader,
-        )
+        self._uav = make(_TimeInHellos(self._time, self._local_now_ns) if self._time.in_hellos else None)
         super().__init__(self._uav.name, self._uav.subscriptions)
         self.slack_ns = self._uav.slack_ns
         self._node = node
@@ -267,7 +250,11 @@ def make_uav(
     reader: Reader | None = None,
 ) -> Uav | ClockedUav:
     """Make a UAV by its scenario, with the host's clock or its own; `reader` is shared by all nodes of a run."""
-    kind = ClockedUav if scenario.clock.modelled else Uav
-    return kind(
-        scenario, node, swarm, position=position, applications=applications, onboard_map=onboard_map, reader=reader
-    )
+
+    def make(hello_time: HelloTime | None = None) -> Uav:
+        return Uav(
+            scenario, node, swarm, position=position, applications=applications, onboard_map=onboard_map,
+            hello_time=hello_time, reader=reader,
+        )  # fmt: skip
+
+    return ClockedUav(scenario, node, make) if scenario.clock.modelled else make()

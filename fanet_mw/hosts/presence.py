@@ -43,25 +43,18 @@ class Presence:
         """The processes that are present more than once."""
         return sorted(name for name in self._tokens if len(self._right(name)) > 1)
 
-    def of_another_scenario(self) -> list[str]:
-        """The processes that run another scenario under the name of this swarm."""
-        return sorted(name for name, tokens in self._tokens.items() if len(self._right(name)) < len(tokens))
-
-    def unexpected(self) -> list[str]:
-        """The processes that this scenario does not have."""
-        return sorted(name for name, tokens in self._tokens.items() if tokens and name not in self._expected)
-
     def complete(self) -> bool:
         """True if all expected processes are present, each of them once."""
         return not self.missing() and not self.twice()
 
     def sentence(self) -> str:
         """A sentence on what is wrong; empty if nothing is."""
+        there = sorted(self._tokens.items())
         parts = {
             "missing": self.missing(),
             "there twice": self.twice(),
-            "with another scenario": self.of_another_scenario(),
-            "not of this scenario": self.unexpected(),
+            "with another scenario": [name for name, tokens in there if len(self._right(name)) < len(tokens)],
+            "not of this scenario": [name for name, tokens in there if tokens and name not in self._expected],
         }
         return "; ".join(f"{what}: {few(names)}" for what, names in parts.items() if names)
 

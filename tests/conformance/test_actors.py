@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 from kit import examples
 
-from agents.clock.clocked_uav import ClockedUav
+from agents.clock.clocked_uav import make_uav
 from agents.uav import Uav
 from emulator.medium import Medium
 from fanet_mw import wire
@@ -52,8 +52,8 @@ def clocked(scenario: Scenario, sync: str) -> Scenario:
 MAKERS: list[Callable[[Scenario], Actor]] = [
     lambda scenario: Uav(scenario, NodeId(1), "contract", position=Enu(0, 0, 50)),
     lambda scenario: Uav(scenario, NodeId(2), "contract", position=Enu(0, 0, 50)),
-    lambda scenario: ClockedUav(clocked(scenario, "beacons"), NodeId(1), "contract", position=Enu(0, 0, 50)),
-    lambda scenario: ClockedUav(clocked(scenario, "gps"), NodeId(1), "contract", position=Enu(0, 0, 50)),
+    lambda scenario: make_uav(clocked(scenario, "beacons"), NodeId(1), "contract", position=Enu(0, 0, 50)),
+    lambda scenario: make_uav(clocked(scenario, "gps"), NodeId(1), "contract", position=Enu(0, 0, 50)),
     lambda scenario: Medium(scenario, "contract"),
     lambda scenario: WorldActor(scenario, "contract"),
 ]

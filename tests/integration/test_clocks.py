@@ -127,7 +127,7 @@ def test_before_it_has_swarm_time_no_schedule_reaches_a_node(make_scenario: Make
     scenario = make_scenario(**{"nodes.count": 3, "clock.sync": "beacons", "clock.offset_ms": 50})
     outcome = simulate(scenario)
     assert outcome.reports["agent-3"]["role"] in ("head", "member")
-    deaf = ClockedUav(scenario, NodeId(3), "x", position=Enu(0, 0, 50))
+    deaf = make_uav(scenario, NodeId(3), "x", position=Enu(0, 0, 50))
     deaf.start(0)
     told = [m for m in heard_schedules(scenario) if m]
     assert told

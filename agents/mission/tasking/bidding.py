@@ -233,13 +233,9 @@ class Bidding:
             east_m, north_m = round(place.east_m, 2), round(place.north_m, 2)
             self._outbox.records.append(Located(now_ns, self._node, survivor, east_m, north_m))
 
-    def _is_reported(self, known: KnownSurvivor) -> bool:
-        """True if enough different nodes have reported a survivor (`mission.reports_to_approach`)."""
-        return len(known.reporters) >= self._config.reports_to_approach
-
     def _wanted(self, known: KnownSurvivor, now_ns: int) -> int:
         """The number of UAVs that a survivor needs now."""
-        if self._is_reported(known):
+        if len(known.reporters) >= self._config.reports_to_approach:
             return self._config.responders
         if now_ns - known.first_ns < _SCOUT_AFTER_NS:
             return 1

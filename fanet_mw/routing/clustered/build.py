@@ -114,24 +114,11 @@ def _ground(port: Port) -> _Ground:
             window_ns=_ASKED_NS, capacity=_STORE_PACKETS, random=random_repair,
             begin_ns=contention.announced_ns,
         )  # fmt: skip
-    return _Ground(
-        port=port,
-        random=random,
-        contention=contention,
-        neighbors=neighbors,
-        gradient=gradient,
-        uplink=Uplink(port, gradient),
-        repair=repair,
-        floods=Floods(port, repair, contention),
-        missing=missing,
-    )
+    uplink, floods = Uplink(port, gradient), Floods(port, repair, contention)
+    return _Ground(port, random, contention, neighbors, gradient, uplink, repair, floods, missing)
 
 
 # --- slots of heads ---------------------------------------------------------------------------------------------------
-
-
-def _by_all(ground: _Ground) -> Clustered:
-    return _in_slots(ground, RelayAll())
 
 
 def _by_counter(ground: _Ground) -> Clustered:
@@ -139,12 +126,8 @@ def _by_counter(ground: _Ground) -> Clustered:
     return _in_slots(ground, rule, rule.open_until)
 
 
-def _membership(ground: _Ground) -> Membership:
-    return Membership(ground.port.node)
-
-
 def _in_slots(ground: _Ground, rule: Rule, *hear_copies: HearsCopies) -> Clustered:
-    parts = _role_parts(ground, _membership(ground), takes_slot=True)
+    parts = _role_parts(ground, takes_slot=True)
     access = _slots(ground, parts.membership)
     roles = _roles(ground, parts, access, NoTimetable())
     relaying = ContendingRelaying(ground.port, rule, ground.contention)
@@ -181,7 +164,7 @@ def _by_timetable(ground: _Ground) -> Clustered:
     timetables = TimetablesInForce()
     ground.contention.turns_at = timetables.turns_at
     ground.contention.most_jitter_ns = round(scenario.clusters.contention_ms * MS * _JITTER)
-    parts = _role_parts(ground, _membership(ground), takes_slot=False)
+    parts = _role_parts(ground, takes_slot=False)
     lead_ns = scenario.radio.lead_ns
     roots = RootRelease(port.node, ground.queue(), reserved=reserved(scenario), lead_ns=lead_ns)
     calls = CallRelease(TxQueue(capacity=scenario.routing.queue_frames), lead_ns=lead_ns)
@@ -234,12 +217,12 @@ def _admission(port: Port) -> Admission | None:
 # --- roles ------------------------------------------------------------------------------------------------------------
 
 
-def _role_parts(ground: _Ground, membership: Membership, *, takes_slot: bool) -> RoleParts:
+def _role_parts(ground: _Ground, *, takes_slot: bool) -> RoleParts:
     """The parts of a node's roles. `takes_slot`: nodes watch heads, and who replaces a silent head uses its slot; else
     nodes watch all neighbors, and only tell the leader of a silent one.
     """
     port, scenario = ground.port, ground.port.scenario
-    liveness = Liveness()
+    liveness, membership = Liveness(), Membership(port.node)
     lease = Lease(port.node, period_ns=scenario.clusters.period_ns, liveness=liveness)
     links = LinkQuality(port.node, hello_ns=ground.hello_ns) if scenario.measures_links else None
     updates = PositionUpdates(range_m=scenario.clusters.link_m or scenario.radio.range_m)
@@ -285,7 +268,7 @@ def _protocol(ground: _Ground, whole: Parts, *hear_copies: HearsCopies) -> Clust
 
 
 RELAYS: Final[Mapping[str, Callable[[_Ground], Clustered]]] = {
-    "all": _by_all,
+    "all": lambda ground: _in_slots(ground, RelayAll()),
     "counter": _by_counter,
     "scheduled": _by_timetable,
 }

@@ -327,10 +327,6 @@ class RoundFlooding(RoutingProtocol):
             self._turn_ns = self._timing.turn_start_ns(self._port.node, from_ns=now_ns + self._lead_ns)
         self._turn_asked = True
 
-    @property
-    def _needs_turn(self) -> bool:
-        return bool(self._spreading.urgent or self._hello is not None or self._held or self._topology.news)
-
     def _fill(self, turn_ns: int, now_ns: int) -> None:
         """Announce the frame of a turn: urgent packets, what neighbors are told, then the hello, as they fit."""
         room, together = self._timing.turn_bytes, list[Packet]()
@@ -593,7 +589,8 @@ class RoundFlooding(RoutingProtocol):
             return
         if turn_ns + self._timing.turn_ns // 2 >= now_ns:
             self._fill(turn_ns, now_ns)
-        self._turn_asked = self._needs_turn
+        waits = self._spreading.urgent or self._hello is not None or self._held or self._topology.news
+        self._turn_asked = bool(waits)
         self._turn_ns = self._timing.turn_start_ns(self._port.node, from_ns=max(turn_ns + 1, now_ns + self._lead_ns))
 
     def _repair_due(self, now_ns: int) -> None:

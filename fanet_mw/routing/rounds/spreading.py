@@ -146,11 +146,7 @@ class Spreading:
 
     def waiting(self) -> int:
         """The number of packets that have not been sent yet."""
-        return len(self._waiting) + self.waiting_bulk()
-
-    def waiting_bulk(self) -> int:
-        """The number of bulk packets that have not been sent yet."""
-        return sum(1 for entry in self._bulk.values() if not entry.sent)
+        return len(self._waiting) + sum(1 for entry in self._bulk.values() if not entry.sent)
 
     def due_bulk(self) -> int:
         """Bulk packets, about, that wait for a slot, and that this node sends before others, or again."""

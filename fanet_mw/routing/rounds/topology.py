@@ -29,10 +29,6 @@ def nodes_of(bits: int) -> tuple[NodeId, ...]:
     return tuple(nodes)
 
 
-def _seldom(rival: tuple[NodeId, bool]) -> bool:
-    return not rival[1]
-
-
 class _Stated(NamedTuple):
     epoch: int
     heard: int
@@ -245,7 +241,9 @@ class Topology:
             stated = self._stated
             others = nodes_of(reached & ~(1 << (self._node - 1)))
             found = [(node, node not in stated or stated[node].often) for node in others]
-            self._rivals = sorted(found, key=_seldom)  # those that take part in each slot decide soonest
+            self._rivals = sorted(
+                found, key=lambda rival: not rival[1]
+            )  # those that take part in each slot decide soonest
         return self._rivals
 
     def dominates(self) -> bool:

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-from agents.clock.clocked_uav import ClockedUav
+from agents.clock.clocked_uav import ClockedUav, make_uav
 from fanet_mw import wire
 from fanet_mw.bus.messages import Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.bus.topics import Topics
@@ -31,7 +31,8 @@ MakeScenario = Callable[..., Scenario]
 
 
 def uav(make_scenario: MakeScenario, node: NodeId, **keys: Any) -> ClockedUav:
-    made = ClockedUav(make_scenario(**EVERYTHING | keys), node, "h", position=Enu(10.0 * node, 0.0, 50.0))
+    made = make_uav(make_scenario(**EVERYTHING | keys), node, "h", position=Enu(10.0 * node, 0.0, 50.0))
+    assert isinstance(made, ClockedUav)
     made.start(0)
     return made
 

@@ -76,7 +76,7 @@ def carried_on(present: Sequence[Cluster], swarm: Swarm, stand_ins: Mapping[Node
         if members:
             stand_in = stand_ins.get(cluster.head, cluster.head)
             head = next((node for node in (cluster.head, stand_in) if node in members), None)
-            head = head or _nearest_to_all(members, here)
+            head = head or min((_distance(node, members, here), node) for node in members)[1]
             clusters.append(Cluster(head, tuple(sorted(levels(among(members, here), head)))))
     return _with_the_others(clusters, here) if clusters else []
 
@@ -103,10 +103,6 @@ def _with_the_others(clusters: list[Cluster], here: Adjacency) -> list[Cluster]:
         hops[k][node] = far
         left.remove(node)
     return [cluster._replace(members=tuple(sorted(m))) for cluster, m in zip(clusters, members, strict=True)]
-
-
-def _nearest_to_all(members: Sequence[NodeId], adjacency: Adjacency) -> NodeId:
-    return min(members, key=lambda node: (_distance(node, members, adjacency), node))
 
 
 def in_their_slots(fresh: Sequence[Cluster], kept: Sequence[Cluster], adjacency: Adjacency) -> list[Cluster]:

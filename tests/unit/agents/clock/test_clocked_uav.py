@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from agents.clock.clocked_uav import ClockedUav
+from agents.clock.clocked_uav import ClockedUav, make_uav
 from fanet_mw.bus.messages import Reception, TxRequest
 from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Scenario
@@ -20,7 +20,8 @@ MakeScenario = Callable[..., Scenario]
 
 def clocked(make_scenario: MakeScenario, **keys: Any) -> ClockedUav:
     given = {"nodes.count": 3, "clock.sync": "beacons", "clock.offset_ms": 5, "clock.drift_ppm": 20}
-    made = ClockedUav(make_scenario(**given | keys), NodeId(2), "c", position=Enu(0.0, 0.0, 50.0))
+    made = make_uav(make_scenario(**given | keys), NodeId(2), "c", position=Enu(0.0, 0.0, 50.0))
+    assert isinstance(made, ClockedUav)
     made.start(0)
     return made
 

@@ -7,116 +7,84 @@ idle; interrupted it begins again, until it has passed or a frame is received. I
 begins at the end of the bad frame, and passes while the medium is busy.
 """
 
+from emulator.kernel import state as k
 from emulator.kernel.heap import push
 from emulator.kernel.jit import jit
 from emulator.kernel.random_numbers import MODULUS, uniform
-from emulator.kernel.state import (
-    ACCESS,
-    ACK_TO,
-    BAD_UNTIL,
-    BASE,
-    BO,
-    BUSY_NS,
-    BUSY_SINCE,
-    CS,
-    CW,
-    CW_MAX,
-    CW_MIN,
-    DIFS_FIRST,
-    DIFS_NS,
-    EIFS_EXTRA_NS,
-    EIFS_FROM_FRAME,
-    FAILURES,
-    FRESH,
-    HEAD,
-    HS_N,
-    IDLE_FROM,
-    KEEPS_WINDOW,
-    MAX_ATTEMPTS,
-    NAV,
-    NEVER,
-    NOTHING,
-    RANDOM,
-    RESUME_FROM,
-    SCHEDULED,
-    SLOT_NS,
-    TX_KIND,
-    WAITING,
-    Ints,
-)
+from emulator.kernel.state import Ints
 
 
 @jit
 def draw(st: Ints, s: int) -> None:
-    st[BO, s] = uniform(st, RANDOM, s) * (st[CW, s] + 1) // MODULUS
+    st[k.BO, s] = uniform(st, k.RANDOM, s) * (st[k.CW, s] + 1) // MODULUS
 
 
 @jit
 def reset_window(p: Ints, st: Ints, s: int) -> None:
     """Begin anew with the least window."""
-    st[CW, s] = p[CW_MIN]
-    st[FAILURES, s] = 0
+    st[k.CW, s] = p[k.CW_MIN]
+    st[k.FAILURES, s] = 0
 
 
 @jit
 def widen_window(p: Ints, st: Ints, s: int) -> None:
     """Double the window after a failure; where it outlives frames, begin anew after so many failures in a row."""
-    if p[KEEPS_WINDOW] == 1 and st[FAILURES, s] == p[MAX_ATTEMPTS]:
+    if p[k.KEEPS_WINDOW] == 1 and st[k.FAILURES, s] == p[k.MAX_ATTEMPTS]:
         reset_window(p, st, s)
     else:
-        st[FAILURES, s] += 1
-        st[CW, s] = min(2 * st[CW, s] + 1, p[CW_MAX])
+        st[k.FAILURES, s] += 1
+        st[k.CW, s] = min(2 * st[k.CW, s] + 1, p[k.CW_MAX])
 
 
 @jit
 def access_from(p: Ints, st: Ints, s: int) -> int:
     """The instant from which backoff slots count, if the medium stays idle."""
-    return int(max(st[IDLE_FROM, s], st[BAD_UNTIL, s], st[RESUME_FROM, s], st[NAV, s]) + p[DIFS_NS])
+    return int(max(st[k.IDLE_FROM, s], st[k.BAD_UNTIL, s], st[k.RESUME_FROM, s], st[k.NAV, s]) + p[k.DIFS_NS])
 
 
 @jit
 def arm(g: Ints, p: Ints, st: Ints, hs: Ints, s: int) -> None:
     """Start the countdown of a station whose medium is idle, and plan its access if it has a frame."""
-    if st[CS, s] > 0 or st[TX_KIND, s] != NOTHING or st[WAITING, s] >= 0 or st[ACK_TO, s] >= 0:
+    if st[k.CS, s] > 0 or st[k.TX_KIND, s] != k.NOTHING or st[k.WAITING, s] >= 0 or st[k.ACK_TO, s] >= 0:
         return
-    st[BASE, s] = access_from(p, st, s)
-    if st[HEAD, s] >= 0:
-        t = st[BASE, s] + st[BO, s] * p[SLOT_NS]
-        st[SCHEDULED, s] = t
-        push(hs, g, HS_N, t, ACCESS, s, 0)
+    st[k.BASE, s] = access_from(p, st, s)
+    if st[k.HEAD, s] >= 0:
+        t = st[k.BASE, s] + st[k.BO, s] * p[k.SLOT_NS]
+        st[k.SCHEDULED, s] = t
+        push(hs, g, k.HS_N, t, k.ACCESS, s, 0)
 
 
 @jit
 def slots_left(p: Ints, st: Ints, s: int, t: int) -> int:
     """The backoff slots that are left at `t`, if the medium has been idle until then."""
-    if t <= st[BASE, s]:
-        return int(st[BO, s])
-    return int(max(0, st[BO, s] - (t - st[BASE, s]) // p[SLOT_NS]))
+    if t <= st[k.BASE, s]:
+        return int(st[k.BO, s])
+    return int(max(0, st[k.BO, s] - (t - st[k.BASE, s]) // p[k.SLOT_NS]))
 
 
 @jit
 def on_busy(p: Ints, st: Ints, s: int, t: int) -> None:
     """Freeze the backoff of a station, because its medium becomes busy."""
-    if st[BUSY_SINCE, s] < 0:
-        st[BUSY_SINCE, s] = t
-        if st[BAD_UNTIL, s] + p[DIFS_NS] <= t:
-            st[BAD_UNTIL, s] = 0  # the EIFS has passed
-    st[BO, s] = slots_left(p, st, s, t)
-    st[BASE, s] = NEVER
-    if st[SCHEDULED, s] >= 0:
-        st[SCHEDULED, s] = -1
-        if st[FRESH, s] == 1 and p[DIFS_FIRST] == 0:
+    if st[k.BUSY_SINCE, s] < 0:
+        st[k.BUSY_SINCE, s] = t
+        if st[k.BAD_UNTIL, s] + p[k.DIFS_NS] <= t:
+            st[k.BAD_UNTIL, s] = 0  # the EIFS has passed
+    st[k.BO, s] = slots_left(p, st, s, t)
+    st[k.BASE, s] = k.NEVER
+    if st[k.SCHEDULED, s] >= 0:
+        st[k.SCHEDULED, s] = -1
+        if st[k.FRESH, s] == 1 and p[k.DIFS_FIRST] == 0:
             draw(st, s)
-            st[FRESH, s] = 0
+            st[k.FRESH, s] = 0
 
 
 @jit
 def on_idle(g: Ints, p: Ints, st: Ints, hs: Ints, s: int, t: int) -> None:
     """Resume the backoff of a station, because its medium becomes idle."""
-    if st[BUSY_SINCE, s] >= 0:
-        st[BUSY_NS, s] += t - st[BUSY_SINCE, s]
-        st[BUSY_SINCE, s] = -1
-    st[IDLE_FROM, s] = t
-    if p[EIFS_FROM_FRAME] == 0 and st[BAD_UNTIL, s] > 0:
-        st[BAD_UNTIL, s] = t + p[EIFS_EXTRA_NS]
+    if st[k.BUSY_SINCE, s] >= 0:
+        st[k.BUSY_NS, s] += t - st[k.BUSY_SINCE, s]
+        st[k.BUSY_SINCE, s] = -1
+    st[k.IDLE_FROM, s] = t
+    if p[k.EIFS_FROM_FRAME] == 0 and st[k.BAD_UNTIL, s] > 0:
+        st[k.BAD_UNTIL, s] = t + p[k.EIFS_EXTRA_NS]
     arm(g, p, st, hs, s)

@@ -3,6 +3,7 @@
 queue -> access (DIFS or EIFS, backoff with freezing) -> frame -> ACK or timeout -> next attempt or done
 """
 
+from emulator.kernel import state as k
 from emulator.kernel.channel_access import (
     access_from,
     arm,
@@ -17,170 +18,86 @@ from emulator.kernel.fading_gain import gain
 from emulator.kernel.frame_ends import done, lost, put, release
 from emulator.kernel.heap import push
 from emulator.kernel.jit import jit
-from emulator.kernel.state import (
-    ACCESS,
-    ACK,
-    ACK_NS,
-    ACK_TIMEOUT,
-    ACK_TIMEOUT_NS,
-    ACK_TO,
-    AIRTIME,
-    ALL_DETECT,
-    ALL_END,
-    ALL_START,
-    ATTEMPT_ROWS,
-    ATTEMPTS,
-    ATTEMPTS_FAILED,
-    ATTEMPTS_MADE,
-    AUDIBLE,
-    BASE,
-    BEGINS,
-    BO,
-    CAPTURE,
-    CARRIER_SENSE_MW,
-    COPY,
-    CS,
-    DATA,
-    DELAY,
-    DETECT_NS,
-    DIFS_FIRST,
-    DIFS_NS,
-    DONE_ACKED,
-    DONE_EXPIRED,
-    DONE_FULL,
-    DONE_RETRY,
-    DONE_SENT,
-    DST,
-    ENDS,
-    EVERYONE,
-    EXPIRES,
-    FADING,
-    FAILED_BY,
-    FATE,
-    FATE_HALF_DUPLEX,
-    FATE_OPEN,
-    FAULT,
-    FRESH,
-    HEAD,
-    HR_N,
-    HS_N,
-    KEEPS_WINDOW,
-    LAST_END,
-    LINK_DST,
-    LINK_FRAME,
-    LINK_KIND,
-    LINK_POWER,
-    LOCK,
-    LOCK_HEADER_END,
-    MADE_BY,
-    MAX_ATTEMPTS,
-    NAV,
-    NEXT,
-    NOTHING,
-    ON_AIR,
-    ON_AIR_COPIES,
-    ON_AIR_LIST,
-    ON_AIR_N,
-    OPEN,
-    OUT_START,
-    QLEN,
-    QUEUE_LIMIT,
-    REACH_NS,
-    RESUME_FROM,
-    SCHEDULED,
-    SENSED,
-    SLOT_NS,
-    SRC,
-    TAIL,
-    TARGETS,
-    TX_DONE,
-    TX_END,
-    TX_FRAME,
-    TX_KIND,
-    UNDERWAY,
-    WAITING,
-    Ints,
-    Reals,
-)
+from emulator.kernel.state import Ints, Reals
 
 
 @jit
 def take_head(st: Ints, fr: Ints, s: int) -> None:
     """Remove the first frame of a station's queue."""
-    st[HEAD, s] = fr[NEXT, st[HEAD, s]]
-    if st[HEAD, s] < 0:
-        st[TAIL, s] = -1
-    st[QLEN, s] -= 1
+    st[k.HEAD, s] = fr[k.NEXT, st[k.HEAD, s]]
+    if st[k.HEAD, s] < 0:
+        st[k.TAIL, s] = -1
+    st[k.QLEN, s] -= 1
 
 
 @jit
 def expire(g: Ints, st: Ints, fr: Ints, out: Ints, s: int, t: int) -> None:
     """Drop frames that waited beyond their lifetime, but not the first while on the air or its ACK is awaited."""
-    kept = st[HEAD, s] if st[TX_KIND, s] == DATA or st[WAITING, s] >= 0 else -1
+    kept = st[k.HEAD, s] if st[k.TX_KIND, s] == k.DATA or st[k.WAITING, s] >= 0 else -1
     if kept >= 0:
         take_head(st, fr, s)
-    while st[HEAD, s] >= 0 and t >= fr[EXPIRES, st[HEAD, s]]:
-        f = st[HEAD, s]
+    while st[k.HEAD, s] >= 0 and t >= fr[k.EXPIRES, st[k.HEAD, s]]:
+        f = st[k.HEAD, s]
         take_head(st, fr, s)
-        done(g, fr, out, f, DONE_EXPIRED, t)
+        done(g, fr, out, f, k.DONE_EXPIRED, t)
     if kept >= 0:
-        fr[NEXT, kept] = st[HEAD, s]
-        st[HEAD, s] = kept
-        if st[TAIL, s] < 0:
-            st[TAIL, s] = kept
-        st[QLEN, s] += 1
+        fr[k.NEXT, kept] = st[k.HEAD, s]
+        st[k.HEAD, s] = kept
+        if st[k.TAIL, s] < 0:
+            st[k.TAIL, s] = kept
+        st[k.QLEN, s] += 1
 
 
 @jit
 def arrive(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, out: Ints, f: int, t: int) -> None:
     """Put a frame into the MAC queue of its station; it is dropped when the queue is full."""
-    s = fr[SRC, f]
-    if st[QLEN, s] >= p[QUEUE_LIMIT]:
+    s = fr[k.SRC, f]
+    if st[k.QLEN, s] >= p[k.QUEUE_LIMIT]:
         expire(g, st, fr, out, s, t)
-    if st[QLEN, s] >= p[QUEUE_LIMIT]:
-        done(g, fr, out, f, DONE_FULL, t)
+    if st[k.QLEN, s] >= p[k.QUEUE_LIMIT]:
+        done(g, fr, out, f, k.DONE_FULL, t)
         return
-    fr[NEXT, f] = -1
-    st[QLEN, s] += 1
-    if st[HEAD, s] >= 0:
-        fr[NEXT, st[TAIL, s]] = f
-        st[TAIL, s] = f
+    fr[k.NEXT, f] = -1
+    st[k.QLEN, s] += 1
+    if st[k.HEAD, s] >= 0:
+        fr[k.NEXT, st[k.TAIL, s]] = f
+        st[k.TAIL, s] = f
         return
-    st[HEAD, s] = f
-    st[TAIL, s] = f
+    st[k.HEAD, s] = f
+    st[k.TAIL, s] = f
     request(g, p, st, hs, s, t)
 
 
 @jit
 def request(g: Ints, p: Ints, st: Ints, hs: Ints, s: int, t: int) -> None:
     """Ask for the medium on behalf of a frame in an empty queue (802.11-2020, 10.3.4.2: at once after DIFS of idle)."""
-    if st[TX_KIND, s] == DATA or st[WAITING, s] >= 0:
+    if st[k.TX_KIND, s] == k.DATA or st[k.WAITING, s] >= 0:
         return  # the station's own frame has not ended: its post-backoff is still to be drawn
-    if st[CS, s] > 0 or st[TX_KIND, s] == ACK or st[ACK_TO, s] >= 0 or st[NAV, s] > t:
-        before_ack = st[CS, s] == 0 and st[TX_KIND, s] != ACK and st[NAV, s] <= t  # in ns-3 this medium is idle
-        if st[BO, s] == 0 and not (before_ack and p[DIFS_FIRST] == 1):
+    if st[k.CS, s] > 0 or st[k.TX_KIND, s] == k.ACK or st[k.ACK_TO, s] >= 0 or st[k.NAV, s] > t:
+        before_ack = st[k.CS, s] == 0 and st[k.TX_KIND, s] != k.ACK and st[k.NAV, s] <= t  # in ns-3 this medium is idle
+        if st[k.BO, s] == 0 and not (before_ack and p[k.DIFS_FIRST] == 1):
             draw(st, s)
-        st[FRESH, s] = 0
-        if st[CS, s] == 0:
+        st[k.FRESH, s] = 0
+        if st[k.CS, s] == 0:
             arm(g, p, st, hs, s)
         return
     if slots_left(p, st, s, t) == 0:
-        st[BO, s] = 0
-        st[FRESH, s] = 1
+        st[k.BO, s] = 0
+        st[k.FRESH, s] = 1
         start = access_from(p, st, s)
-        if p[DIFS_FIRST] == 1:
-            st[BASE, s] = max(start, t + p[DIFS_NS])
+        if p[k.DIFS_FIRST] == 1:
+            st[k.BASE, s] = max(start, t + p[k.DIFS_NS])
         elif start <= t:
-            st[BASE, s] = t
+            st[k.BASE, s] = t
         else:  # the medium is idle, but has not been so for DIFS: a backoff is due
             draw(st, s)
-            st[FRESH, s] = 0
-            st[BASE, s] = start
+            st[k.FRESH, s] = 0
+            st[k.BASE, s] = start
     else:
-        st[FRESH, s] = 0
-    at = st[BASE, s] + st[BO, s] * p[SLOT_NS]
-    st[SCHEDULED, s] = at
-    push(hs, g, HS_N, at, ACCESS, s, 0)
+        st[k.FRESH, s] = 0
+    at = st[k.BASE, s] + st[k.BO, s] * p[k.SLOT_NS]
+    st[k.SCHEDULED, s] = at
+    push(hs, g, k.HS_N, at, k.ACCESS, s, 0)
 
 
 @jit
@@ -202,33 +119,33 @@ def access(
     t: int,
 ) -> None:
     """Transmit the first frame that is still alive, because the backoff has run out."""
-    if st[SCHEDULED, s] != t:
+    if st[k.SCHEDULED, s] != t:
         return  # the backoff was frozen or planned anew after this event was made
-    st[SCHEDULED, s] = -1
-    st[BO, s] = 0
-    st[FRESH, s] = 0
-    st[BASE, s] = t
+    st[k.SCHEDULED, s] = -1
+    st[k.BO, s] = 0
+    st[k.FRESH, s] = 0
+    st[k.BASE, s] = t
     expire(g, st, fr, out, s, t)
-    f = st[HEAD, s]
+    f = st[k.HEAD, s]
     if f < 0:
         return
-    fr[ATTEMPTS, f] += 1
-    begin_tx(g, p, pf, st, fr, lk, lp, ptr, wv, tb, hr, s, f, DATA, t)
+    fr[k.ATTEMPTS, f] += 1
+    begin_tx(g, p, pf, st, fr, lk, lp, ptr, wv, tb, hr, s, f, k.DATA, t)
     targets = 0
     for link in range(ptr[s], ptr[s + 1]):
-        if fr[DST, f] == EVERYONE or fr[DST, f] == lk[LINK_DST, link]:
-            if lp[LINK_POWER, link] > 0.0 and lk[COPY, link] == 1:
+        if fr[k.DST, f] == k.EVERYONE or fr[k.DST, f] == lk[k.LINK_DST, link]:
+            if lp[k.LINK_POWER, link] > 0.0 and lk[k.COPY, link] == 1:
                 targets += 1
-            elif lk[FAULT, link] != 0:
-                g[ON_AIR_COPIES] += 1
-                lost(g, fr, lk, lk[FAULT, link], link, f)
-    fr[TARGETS, f] = targets
-    g[ON_AIR_COPIES] += targets
-    if fr[DST, f] != EVERYONE:
-        g[ATTEMPTS_MADE] += 1
-        g[MADE_BY - 1 + min(fr[ATTEMPTS, f], ATTEMPT_ROWS)] += 1
-    if p[CAPTURE] == 1:
-        put(g, out, OUT_START, f, s, t, DATA, fr[ATTEMPTS, f])
+            elif lk[k.FAULT, link] != 0:
+                g[k.ON_AIR_COPIES] += 1
+                lost(g, fr, lk, lk[k.FAULT, link], link, f)
+    fr[k.TARGETS, f] = targets
+    g[k.ON_AIR_COPIES] += targets
+    if fr[k.DST, f] != k.EVERYONE:
+        g[k.ATTEMPTS_MADE] += 1
+        g[k.MADE_BY - 1 + min(fr[k.ATTEMPTS, f], k.ATTEMPT_ROWS)] += 1
+    if p[k.CAPTURE] == 1:
+        put(g, out, k.OUT_START, f, s, t, k.DATA, fr[k.ATTEMPTS, f])
 
 
 @jit
@@ -250,78 +167,78 @@ def begin_tx(
     t: int,
 ) -> None:
     """Let a station start to transmit; what it was receiving is lost."""
-    if st[LOCK, s] >= 0:
-        lk[FATE, st[LOCK, s]] = FATE_HALF_DUPLEX
-        st[LOCK, s] = -1
+    if st[k.LOCK, s] >= 0:
+        lk[k.FATE, st[k.LOCK, s]] = k.FATE_HALF_DUPLEX
+        st[k.LOCK, s] = -1
     on_busy(p, st, s, t)
-    airtime = fr[AIRTIME, f] if kind == DATA else p[ACK_NS]
-    st[TX_KIND, s] = kind
-    st[TX_FRAME, s] = f
-    st[TX_END, s] = t + airtime
-    st[ON_AIR_LIST, g[ON_AIR_N]] = s
-    g[ON_AIR_N] += 1
-    push(hr, g, HR_N, t + airtime, TX_DONE, s, 0)
+    airtime = fr[k.AIRTIME, f] if kind == k.DATA else p[k.ACK_NS]
+    st[k.TX_KIND, s] = kind
+    st[k.TX_FRAME, s] = f
+    st[k.TX_END, s] = t + airtime
+    st[k.ON_AIR_LIST, g[k.ON_AIR_N]] = s
+    g[k.ON_AIR_N] += 1
+    push(hr, g, k.HR_N, t + airtime, k.TX_DONE, s, 0)
     first, last = ptr[s], ptr[s + 1]
-    while last > first and lp[LINK_POWER, last - 1] == 0.0:
+    while last > first and lp[k.LINK_POWER, last - 1] == 0.0:
         last -= 1  # links without power come last and carry nothing
     for link in range(first, last):
-        lp[ON_AIR, link] = lp[LINK_POWER, link]
-        if p[FADING] != 0:
-            lp[ON_AIR, link] *= gain(g, p, pf, wv, tb, s, lk[LINK_DST, link], t)
-        lk[SENSED, link] = 1 if lp[ON_AIR, link] >= pf[CARRIER_SENSE_MW] else 0
-        lk[COPY, link] = lk[AUDIBLE, link]
-        lk[FATE, link] = FATE_OPEN
-        lk[LINK_FRAME, link] = f
-        lk[LINK_KIND, link] = kind
-        lk[UNDERWAY, link] = 1
-        lk[BEGINS, link] = t + lk[DELAY, link]
-        lk[ENDS, link] = lk[BEGINS, link] + airtime
+        lp[k.ON_AIR, link] = lp[k.LINK_POWER, link]
+        if p[k.FADING] != 0:
+            lp[k.ON_AIR, link] *= gain(g, p, pf, wv, tb, s, lk[k.LINK_DST, link], t)
+        lk[k.SENSED, link] = 1 if lp[k.ON_AIR, link] >= pf[k.CARRIER_SENSE_MW] else 0
+        lk[k.COPY, link] = lk[k.AUDIBLE, link]
+        lk[k.FATE, link] = k.FATE_OPEN
+        lk[k.LINK_FRAME, link] = f
+        lk[k.LINK_KIND, link] = kind
+        lk[k.UNDERWAY, link] = 1
+        lk[k.BEGINS, link] = t + lk[k.DELAY, link]
+        lk[k.ENDS, link] = lk[k.BEGINS, link] + airtime
     if first < last:
-        fr[OPEN, f] += last - first
-        push(hr, g, HR_N, lk[BEGINS, first], ALL_START, first, last)
-        push(hr, g, HR_N, lk[BEGINS, first] + p[DETECT_NS], ALL_DETECT, first, last)
-        push(hr, g, HR_N, lk[ENDS, first], ALL_END, first, last)
+        fr[k.OPEN, f] += last - first
+        push(hr, g, k.HR_N, lk[k.BEGINS, first], k.ALL_START, first, last)
+        push(hr, g, k.HR_N, lk[k.BEGINS, first] + p[k.DETECT_NS], k.ALL_DETECT, first, last)
+        push(hr, g, k.HR_N, lk[k.ENDS, first], k.ALL_END, first, last)
 
 
 @jit
 def leave_air(g: Ints, st: Ints, s: int, t: int) -> None:
     """Take a station off the list of those that transmit."""
-    last = g[ON_AIR_N] - 1
-    g[ON_AIR_N] = last
-    g[LAST_END] = t + g[REACH_NS]
+    last = g[k.ON_AIR_N] - 1
+    g[k.ON_AIR_N] = last
+    g[k.LAST_END] = t + g[k.REACH_NS]
     for i in range(last):
-        if st[ON_AIR_LIST, i] == s:
-            st[ON_AIR_LIST, i] = st[ON_AIR_LIST, last]
+        if st[k.ON_AIR_LIST, i] == s:
+            st[k.ON_AIR_LIST, i] = st[k.ON_AIR_LIST, last]
             return
 
 
 @jit
 def tx_done(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, out: Ints, s: int, t: int) -> None:
     """The last bit of a frame has left the antenna of its transmitter."""
-    kind, f = st[TX_KIND, s], st[TX_FRAME, s]
-    st[TX_KIND, s] = NOTHING
+    kind, f = st[k.TX_KIND, s], st[k.TX_FRAME, s]
+    st[k.TX_KIND, s] = k.NOTHING
     leave_air(g, st, s, t)
-    if kind == DATA:
-        if fr[DST, f] == EVERYONE:
+    if kind == k.DATA:
+        if fr[k.DST, f] == k.EVERYONE:
             take_head(st, fr, s)
             draw(st, s)
-            done(g, fr, out, f, DONE_SENT, t)
+            done(g, fr, out, f, k.DONE_SENT, t)
         else:
-            st[WAITING, s] = f
-            push(hs, g, HS_N, t + p[ACK_TIMEOUT_NS], ACK_TIMEOUT, s, f)
-    if st[CS, s] == 0:
+            st[k.WAITING, s] = f
+            push(hs, g, k.HS_N, t + p[k.ACK_TIMEOUT_NS], k.ACK_TIMEOUT, s, f)
+    if st[k.CS, s] == 0:
         on_idle(g, p, st, hs, s, t)
 
 
 @jit
 def acknowledged(g: Ints, p: Ints, st: Ints, fr: Ints, out: Ints, s: int, t: int) -> None:
     """End the frame of a station that has received the ACK for it."""
-    f = st[WAITING, s]
-    st[WAITING, s] = -1
+    f = st[k.WAITING, s]
+    st[k.WAITING, s] = -1
     reset_window(p, st, s)
     take_head(st, fr, s)
     draw(st, s)
-    done(g, fr, out, f, DONE_ACKED, t)
+    done(g, fr, out, f, k.DONE_ACKED, t)
 
 
 @jit
@@ -329,22 +246,22 @@ def ack_timeout(g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, hs: Ints, out: I
     """No ACK: try again with a doubled window, or give up (802.11-2020, 10.3.4.4). If some header has been received by
     now, that frame may be the ACK: its end decides (10.3.2.11).
     """
-    if st[WAITING, s] != f:
+    if st[k.WAITING, s] != f:
         return
-    link = st[LOCK, s]
-    if link >= 0 and st[LOCK_HEADER_END, s] <= t:
-        push(hs, g, HS_N, lk[ENDS, link] + 1, ACK_TIMEOUT, s, f)
+    link = st[k.LOCK, s]
+    if link >= 0 and st[k.LOCK_HEADER_END, s] <= t:
+        push(hs, g, k.HS_N, lk[k.ENDS, link] + 1, k.ACK_TIMEOUT, s, f)
         return
-    st[WAITING, s] = -1
-    st[RESUME_FROM, s] = t
-    g[ATTEMPTS_FAILED] += 1
-    g[FAILED_BY - 1 + min(fr[ATTEMPTS, f], ATTEMPT_ROWS)] += 1
+    st[k.WAITING, s] = -1
+    st[k.RESUME_FROM, s] = t
+    g[k.ATTEMPTS_FAILED] += 1
+    g[k.FAILED_BY - 1 + min(fr[k.ATTEMPTS, f], k.ATTEMPT_ROWS)] += 1
     widen_window(p, st, s)
-    if fr[ATTEMPTS, f] >= p[MAX_ATTEMPTS]:
-        if p[KEEPS_WINDOW] == 0:
+    if fr[k.ATTEMPTS, f] >= p[k.MAX_ATTEMPTS]:
+        if p[k.KEEPS_WINDOW] == 0:
             reset_window(p, st, s)
         take_head(st, fr, s)
-        done(g, fr, out, f, DONE_RETRY, t)
+        done(g, fr, out, f, k.DONE_RETRY, t)
     draw(st, s)
     arm(g, p, st, hs, s)
 
@@ -369,13 +286,13 @@ def send_ack(
     t: int,
 ) -> None:
     """Send an ACK, SIFS after the end of a unicast frame, whether or not the medium is busy."""
-    st[ACK_TO, s] = -1
-    if st[TX_KIND, s] == NOTHING:
-        if p[CAPTURE] == 1:
-            put(g, out, OUT_START, f, s, t, ACK, 0)
-        begin_tx(g, p, pf, st, fr, lk, lp, ptr, wv, tb, hr, s, f, ACK, t)
+    st[k.ACK_TO, s] = -1
+    if st[k.TX_KIND, s] == k.NOTHING:
+        if p[k.CAPTURE] == 1:
+            put(g, out, k.OUT_START, f, s, t, k.ACK, 0)
+        begin_tx(g, p, pf, st, fr, lk, lp, ptr, wv, tb, hr, s, f, k.ACK, t)
         release(g, fr, out, f, t)
         return
     release(g, fr, out, f, t)
-    if st[CS, s] == 0:
+    if st[k.CS, s] == 0:
         arm(g, p, st, hs, s)

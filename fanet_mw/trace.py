@@ -8,10 +8,11 @@ refuses what no record could hold: each field has its type, integers have 64 bit
 import itertools
 import json
 import math
+import re
 import types
 from typing import Any, Final, NamedTuple, get_args, get_type_hints
 
-from fanet_mw.errors import DropReason, MalformedFrameError
+from fanet_mw.errors import MalformedFrameError
 
 
 class Generated(NamedTuple):
@@ -375,37 +376,7 @@ Record = (
 )
 
 _KINDS: Final[dict[str, type[Any]]] = {
-    "generated": Generated,
-    "let_out": LetOut,
-    "bound_stated": BoundStated,
-    "bound_excludes": BoundExcludes,
-    "likely_stated": LikelyStated,
-    "delivered": Delivered,
-    "dropped": Dropped,
-    "role_changed": RoleChanged,
-    "detected": Detected,
-    "located": Located,
-    "approaching": Approaching,
-    "arrived": Arrived,
-    "confirmed": Confirmed,
-    "placed_inside": PlacedInside,
-    "known_on_ground": KnownOnGround,
-    "ordered": Ordered,
-    "refuted": Refuted,
-    "planned": Planned,
-    "posed": Posed,
-    "flight_mode_changed": FlightModeChanged,
-    "mission_mode_changed": MissionModeChanged,
-    "sighted": Sighted,
-    "collided": Collided,
-    "conflict_foreseen": ConflictForeseen,
-    "warned": Warned,
-    "conflict_over": ConflictOver,
-    "process_ended": ProcessEnded,
-    "radio_fault": RadioFault,
-    "clock_sampled": ClockSampled,
-    "deadline_met": DeadlineMet,
-    "deadline_lost": DeadlineLost,
+    re.sub(r"\B([A-Z])", r"_\1", kind.__name__).lower(): kind for kind in get_args(Record)
 }
 _NAMES: Final[dict[type[Any], str]] = {kind: name for name, kind in _KINDS.items()}
 DELIVERED_LINE: Final = '["delivered",%d,%d,%d,%d,%d,%d,%d]'
@@ -470,12 +441,3 @@ def parse(text: str) -> Record:
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise MalformedFrameError(f"trace line {text[:80]!r} is no record") from error
     return record
-
-
-__all__ = [
-    "Approaching", "Arrived", "BoundExcludes", "BoundStated", "ClockSampled", "Collided", "Confirmed",
-    "ConflictForeseen", "ConflictOver", "DeadlineLost", "DeadlineMet", "Delivered", "Detected", "DropReason", "Dropped",
-    "FlightModeChanged", "Generated", "KnownOnGround", "LetOut", "LikelyStated", "Located", "MissionModeChanged",
-    "Ordered", "PlacedInside", "Planned", "Posed", "ProcessEnded", "RadioFault", "Record", "Refuted", "RoleChanged",
-    "Sighted", "Warned", "kind_of", "line", "name_of", "parse",
-]  # fmt: skip

@@ -16,10 +16,7 @@ _UNWRAPPED: Final = 10_000
 
 
 class Console(RichConsole):
-    """The console of rich, except that writing to a closed pipe raises an error, with which `main` ends the command,
-    that brackets are brackets, because the names of files may contain some, and that lines which no terminal shows are
-    neither wrapped nor padded.
-    """
+    """rich, but a closed pipe raises an error, brackets are no markup, lines without a terminal are not wrapped."""
 
     def __init__(self, *, wraps: bool = False, **options: Any) -> None:  # noqa: ANN401  (they are those of rich)
         """`wraps`: lines are wrapped in a pipe, too."""
@@ -54,10 +51,7 @@ def printable(text: str) -> str:
 
 
 def open_closed_streams() -> None:
-    """Give a command that was started with a standard stream closed (`>&-`) one that leads nowhere.
-
-    Otherwise the first file that it opens would become its standard output, and receive what others print there.
-    """
+    """Let a standard stream that is closed (`>&-`) lead nowhere, so that no file which is opened takes its number."""
     closed = []
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
@@ -72,9 +66,7 @@ def open_closed_streams() -> None:
 
 
 def nobody_reads() -> NoReturn:
-    """End the command without a message. The default handling of SIGPIPE would also end a service whose peer closes a
-    socket.
-    """
+    """End the command without a message. (The default handling of SIGPIPE would also end services.)"""
     discard_output()
     sys.exit(CLOSED)
 

@@ -48,11 +48,7 @@ def find_swarm(bus: Bus) -> str:
 
 
 def change(endpoint: str, swarm: str | None, control: Control, *, zenoh_config: Path | None = None) -> list[RadioFault]:
-    """Send one change; returns what the emulator has done.
-
-    Raises BusError without a router, and FanetError without a swarm or if the emulator does not confirm within
-    CONFIRM_TIMEOUT_S.
-    """
+    """Send one change; returns what the emulator has done. Raises BusError without a router, else FanetError."""
     with Bus.join(endpoint, config_of(zenoh_config, OPERATOR)) as bus:
         names = Topics(swarm or find_swarm(bus))
         count = scenario_of_swarm(bus, names).get("nodes", {}).get("count")

@@ -61,7 +61,6 @@ class _CertificateAuthority:
         self._make("ca", "fanet-authority", ours)
 
     def settings(self, name: str, hosts: str) -> dict[str, Any]:
-        """The Zenoh settings of a participant, with a new key."""
         self._make(
             name,
             name,

@@ -17,11 +17,7 @@ _ALL: Final = "*"
 
 
 def give(endpoint: str, swarm: str | None, order: Order, *, zenoh_config: Path | None = None) -> Ordered:
-    """Give an order; returns what the post has recorded of it.
-
-    Raises BusError without a router, and FanetError without a swarm, or if its post does not give the order within
-    CONFIRM_TIMEOUT_S.
-    """
+    """Give an order; returns what the post has recorded of it. Raises BusError without a router, else FanetError."""
     with Bus.join(endpoint, config_of(zenoh_config, OPERATOR)) as bus:
         names = Topics(swarm or find_swarm(bus))
         tree = scenario_of_swarm(bus, names)

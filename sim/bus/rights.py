@@ -97,7 +97,6 @@ def rights(scenario: Scenario, names: Topics) -> dict[str, Rights]:
 
 
 def access_control(participants: dict[str, Rights]) -> dict[str, Any]:
-    """The section `access_control` of the router's configuration."""
     everything = (f"{ROOT}/**",)
     rules: list[dict[str, Any]] = [
         # Without this rule a client's publisher never learns that there are subscribers, and sends nothing.

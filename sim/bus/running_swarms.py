@@ -17,8 +17,7 @@ from fanet_mw.errors import FanetError
 
 DEFAULT_ENDPOINT: Final = "tcp/127.0.0.1:7447"
 _START_TIME: Final = 22 - 3
-"""The index of a field of /proc/PID/stat (proc_pid_stat(5)), counted from the field after the command's closing
-parenthesis."""
+"""Index of a field of /proc/PID/stat (proc_pid_stat(5)), from the one after the closing parenthesis."""
 
 
 class Running(NamedTuple):
@@ -83,7 +82,6 @@ def _create(folder: Path, pid: int) -> tuple[int, str]:
 
 
 def running() -> list[Running]:
-    """The swarms that run on this machine, by name."""
     folder = _folder()
     if not _ours(folder):
         return []
@@ -106,10 +104,7 @@ def _read(path: Path) -> Running | None:
 
 
 def locate(connect: str | None, swarm: str | None) -> tuple[str, str | None]:
-    """The endpoint and the name of a swarm: given by endpoint, by name, or because no other swarm runs here.
-
-    The name is None if only the router knows it. Raises FanetError if several swarms fit.
-    """
+    """The endpoint and the name, None if only the router knows it; raises FanetError if several swarms fit."""
     if connect is not None:
         return connect, swarm
     found = [entry for entry in running() if swarm in (None, entry.swarm)]

@@ -68,11 +68,7 @@ for option in ("--help", "--version", "--install-completion"):
 
 
 def changes_last(words: Sequence[str]) -> list[str]:
-    """The words of a command line, with `--set` and its values moved to the end, where no other word can be taken for a
-    value.
-
-    `--set` takes the word after it and all further ones that contain `=`.
-    """
+    """The words of a command line with `--set` last. It takes the next word, and all further ones that contain `=`."""
     changes: list[str] = []
     rest: list[str] = []
     taking, first = False, False
@@ -107,7 +103,6 @@ def _printable(line: str) -> str:
 
 
 def main() -> None:
-    """The console script."""
     interrupts.install()
     open_closed_streams()
     if sys.flags.optimize >= 2 and (not sys.argv[1:] or "--help" in sys.argv or "-h" in sys.argv):

@@ -65,7 +65,6 @@ class Companions:
             self._folder.cleanup()
 
     def _written(self, scenario: "Scenario") -> Path:
-        """A file with the scenario."""
         import tomli_w
 
         self._folder = self._folder or tempfile.TemporaryDirectory(prefix="fanet-")
@@ -79,10 +78,8 @@ def _give_way() -> None:
 
 
 def record_command(path: Path) -> list[str]:
-    """The words that record to a file."""
     return ["record", str(path.absolute()), "--quiet"]
 
 
 def view_command(port: int | None) -> list[str]:
-    """The words that show a swarm."""
     return ["view", "--until-gone", *([] if port is None else ["--port", str(port)])]

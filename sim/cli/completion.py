@@ -14,7 +14,6 @@ def scenario_names(context: CompletionContext) -> list[str]:
 
 
 def keys(context: CompletionContext) -> list[str]:
-    """The dotted keys of a scenario, each with its `=`."""
     from fanet_mw.scenario.reference import dotted_keys
 
     return [f"{key}=" for key in dotted_keys() if key.startswith(context.incomplete)]

@@ -31,10 +31,7 @@ def watch(
     console: Console,
     zenoh_config: Path | None = None,
 ) -> int:
-    """Show the links, or those of one node, until interrupted, or until `reports` reports have come.
-
-    Raises BusError if there is no router or if it goes away, FanetError if there is no swarm.
-    """
+    """Show links until interrupted, or until `reports` have come. Raises BusError without a router, else FanetError."""
     with Bus.join(endpoint, config_of(zenoh_config, OPERATOR)) as bus:
         name = swarm or find_swarm(bus)
         with _screen(console) as show, contextlib.suppress(KeyboardInterrupt):

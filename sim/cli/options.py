@@ -24,8 +24,7 @@ if TYPE_CHECKING:
 
 _err = Console(stderr=True)
 _LEAD_MS: Final = 40
-"""The lead in real time of a scenario without one, because asyncio's timers and the bus are late by
-some milliseconds."""
+"""The lead in real time of a scenario without one: timers of asyncio and the bus are late by some milliseconds."""
 
 
 def _seconds(_type: object, tokens: Sequence[Token]) -> float:
@@ -61,7 +60,6 @@ class ScenarioFlags:
     """random:N lets N UAVs crash, fall mute, or lose their program, drawn by the seed; added to the scenario's."""
 
     def scenario(self, name: str) -> "Scenario":
-        """The scenario with these changes."""
         from sim.scenarios import catalog
 
         overrides = list(self.set)
@@ -136,7 +134,6 @@ class OutputFlags:
             raise ConfigError(f"--record {path}: cannot be written: {error.strerror}") from error
 
     def capture_path(self) -> Path | None:
-        """The path of the capture, if one is wanted."""
         from emulator.pcap_file import NAME
 
         wanted = self.pcap or self.pcap_receptions
@@ -243,7 +240,6 @@ def require_file_or_nothing(path: Path) -> None:
 
 
 def given(scenario: Path | None) -> "Scenario | None":
-    """The scenario of a file, if one is given."""
     if scenario is None:
         return None
     from sim.scenarios import catalog

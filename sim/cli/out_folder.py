@@ -20,10 +20,7 @@ _MOST_SAID: Final = 8
 
 
 def prepare(out: Path, *, force: bool) -> None:
-    """Make the folder; with `force`, remove what an earlier run has left in it, and nothing else.
-
-    Raises ConfigError if it cannot be written, or if it has files of an earlier run and `force` is not given.
-    """
+    """Make the folder, or raise ConfigError; with `force`, remove what an earlier run has left, and nothing else."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=out) as file:

@@ -80,7 +80,6 @@ def _in_3d(folder: Path, *, html: Path | None, start_s: float, port: int | None)
 
 
 def _show(run: "Replay", t_s: float) -> None:
-    """Print tables of the UAVs and of the survivors at an instant."""
     from rich.table import Table
 
     from fanet_mw.units import S

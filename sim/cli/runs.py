@@ -214,7 +214,6 @@ def plan(
 
 @contextmanager
 def _recording(scenario: "Scenario", path: Path | None, *, epoch_unix_ns: int) -> "Iterator[McapRecording | None]":
-    """A recording in a file, if one is wanted."""
     if path is None:
         yield None
         return

@@ -99,7 +99,6 @@ def carry_out(
     dry_run: bool = False,
     json: bool = False,
 ) -> int:
-    """Plan a sweep, say how many runs it has, and carry it out."""
     from sim.sweep.provenance import code
     from sim.sweep.remaining_runs import RemainingRuns
     from sim.sweep.store import TABLE, Store
@@ -266,7 +265,6 @@ def _left(at: "Progress") -> str:
 
 
 def spoken(seconds: float) -> str:
-    """A duration in words."""
     if seconds < 90:
         return f"{math.ceil(seconds)} s"
     return f"{round(seconds / 60)} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

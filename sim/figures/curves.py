@@ -58,9 +58,8 @@ def curves(
     variants: Mapping[str, str] | None = None,
 ) -> Callable[[Runs], Drawing]:
     """A function that draws the panels over a setting; `value` converts a value of the setting into a number on the
-    horizontal axis, which is logarithmic or linear. `variants` names the variant of a protocol that a case shows.
-
-    A mark is hollow where some runs were cut, and has an arrow where all were.
+    horizontal axis, `variants` names the variant of a protocol that a case shows. A mark is hollow where some runs were
+    cut, and has an arrow where all were.
     """
 
     def draw(runs: Runs) -> Drawing:

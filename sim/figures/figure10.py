@@ -84,7 +84,6 @@ def draw(runs: Runs) -> Drawing:
 
 
 def _intervals(runs: Runs) -> list[float]:
-    """The generation intervals, the longest first."""
     return list(reversed(runs.levels("traffic.interval_s")))
 
 
@@ -99,7 +98,6 @@ def _many(runs: Runs) -> list[int]:
 
 
 def _over_periods(runs: Runs, case: str, clusters: int, interval_s: float) -> Mapping[int, float]:
-    """The PDR of each seed, as the mean over all flooding periods."""
     periods = runs.levels("clusters.flooding_period_s")
     return mean_per_seed(*(_pdr(runs, case, clusters, period_s, interval_s) for period_s in periods))
 

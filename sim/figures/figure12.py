@@ -46,9 +46,7 @@ _BARS_SINCE_S: Final = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 _APART_S: Final = 1.3
 _APART: Final = 0.18
 _NEAR: Final = 0.05
-"""The distance of the bars of two methods: a time, or a share of what a logarithmic axis shows; of intervals less, as
-there are few.
-"""
+"""The distance of the bars of two methods: a time, or a share on a logarithmic axis."""
 
 
 def _times(row: Row) -> list[float]:
@@ -62,19 +60,15 @@ def _by(limit_s: float) -> Callable[[Row], float]:
 
 
 def _at_end(row: Row) -> float:
-    """The number of UAVs that have changed course when the run ends."""
     return float(len(_times(row)))
 
 
 def _at_end_if_any(row: Row) -> float | None:
-    """The number of UAVs that have changed course when the run ends; None if none has, because three never received the
-    same phone.
-    """
+    """None if nobody has, because three never received the same phone."""
     return _at_end(row) or None
 
 
 def _heard(row: Row) -> float:
-    """The number of UAVs that have received a phone."""
     return float(len(row["first_detected_s"] or ()))
 
 
@@ -96,9 +90,7 @@ def _in_window(row: Row) -> float | None:
 
 
 def _after(limit_s: float) -> Callable[[Row], float]:
-    """The number of UAVs that have changed course this long after enough had received a phone; 0 if that never
-    happened.
-    """
+    """UAVs that have changed course so long after enough had received a phone; 0 if that never happened."""
     return lambda row: _by((row["enough_heard_s"] or 0.0) + limit_s)(row)
 
 
@@ -115,9 +107,7 @@ class _TimeAxis(NamedTuple):
 
 
 def _draw_shares(axes: Axes, look: Look, rows: Sequence[Row], clock: _TimeAxis, place: int) -> list[Mapping[str, Any]]:
-    """The mean share of UAVs that have turned by each instant; bars show its interval at some of them, beside those of
-    other methods.
-    """
+    """The mean share of UAVs that have turned by each instant; bars show its interval at some of them."""
 
     def shares(instants_s: Sequence[float]) -> list[Interval]:
         return [interval([clock.quantity(at)(row) / row["nodes"] for row in rows], SHARE) for at in instants_s]

@@ -45,7 +45,6 @@ class _Curve(NamedTuple):
     """The unit of the quantity; a quantity without one is a share."""
 
     def draw(self, runs: Runs, axes: Axes, *, number: int, of: int) -> list[Mapping[str, Any]]:
-        """Draw it as one of several lines; returns its numbers."""
         speeds = runs.levels(_SPEED, case=self.case)
         found = [runs.of(self.quantity, case=self.case, **{_AT: speed}) for speed in speeds]
         places = [beside(speed, number, of, log=False, apart=_APART_M_S) for speed in speeds]
@@ -93,12 +92,10 @@ def _seen(runs: Runs, quantity: Quantity, case: str, speed_m_s: float) -> dict[i
 
 
 def _slow(runs: Runs, quantity: Quantity, case: str) -> dict[int, float]:
-    """The quantity of each seed at the lowest speed."""
     return _seen(runs, quantity, case, runs.levels(_SPEED)[0])
 
 
 def _fast(runs: Runs, quantity: Quantity, case: str) -> dict[int, float]:
-    """The quantity of each seed at the highest speed."""
     return _seen(runs, quantity, case, runs.levels(_SPEED)[-1])
 
 
@@ -113,7 +110,6 @@ def _rise(runs: Runs, quantity: Quantity, case: str) -> list[float]:
 
 
 def _span(runs: Runs) -> str:
-    """The lowest and the highest speed as text."""
     speeds = runs.levels(_SPEED)
     return f"from {speeds[0]:g} to {speeds[-1]:g} m/s"
 

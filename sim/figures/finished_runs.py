@@ -31,16 +31,12 @@ class Runs:
         self.failed = len(rows) - len(self.rows)
 
     def where(self, **settings: object) -> list[Row]:
-        """The rows with these settings. A setting is a column of the table: `case`, or a scenario key in which each dot
-        is written as `__`.
-        """
+        """The rows with these settings: `case`, or scenario keys in which each dot is written as `__`."""
         wanted = {key.replace("__", "."): value for key, value in settings.items()}
         return [row for row in self.rows if all(row.get(key) == value for key, value in wanted.items())]
 
     def per_seed(self, quantity: Quantity, **settings: object) -> dict[int, float]:
-        """The quantity by seed, ascending, of the rows with these settings, of which each seed has one; runs in which
-        the quantity is undefined are left out.
-        """
+        """The quantity by seed, ascending; runs in which it is undefined are left out."""
         found: dict[int, float] = {}
         for row in sorted(self.where(**settings), key=lambda row: row["seed"]):
             value = row.get(quantity) if isinstance(quantity, str) else quantity(row)
@@ -58,17 +54,13 @@ class Runs:
 
 
 def arrived(runs: Runs, case: str) -> list[Interval]:
-    """The cumulative distribution of delay in one case: for each upper edge of the delay classes (`DELAY_EDGES_S`), the
-    share of all pairs of packet and target that were delivered within that delay, as a mean over the seeds.
-    """
+    """For each upper edge of `DELAY_EDGES_S` the share of packets x targets delivered by then, mean over the seeds."""
     sums = [[had / row["wanted"] for had in accumulate(row["delay_counts"])] for row in runs.where(case=case)]
     return [interval(column) for column in zip(*sums, strict=True)][: len(DELAY_EDGES_S)]
 
 
 def differences(left: Mapping[int, float], right: Mapping[int, float]) -> list[float]:
-    """The differences left minus right, one for each seed that both have. The two runs of a seed have random numbers in
-    common, so statistics of paired samples apply.
-    """
+    """Left minus right for each seed that both have: paired samples, as they have random numbers in common."""
     return [left[seed] - right[seed] for seed in left if seed in right]
 
 

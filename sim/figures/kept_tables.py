@@ -12,8 +12,7 @@ import pyarrow.parquet as pq
 from sim.results.run_table import read_parquet
 
 _LEFT_OUT: Final = ("summary", "trace_sha256")
-"""The summary as JSON, whose figures are columns, and the hash of each trace, which nothing compresses: half of the
-file."""
+"""The summary, whose figures are columns, and hashes, which nothing compresses: half of the file."""
 
 
 def keep(table: pa.Table, folder: Path, sweep: str, variant: str) -> Path:
@@ -25,7 +24,6 @@ def keep(table: pa.Table, folder: Path, sweep: str, variant: str) -> Path:
 
 
 def read_kept(folder: Path, sweep: str, variant: str) -> pa.Table | None:
-    """The kept table of a sweep; None if there is none."""
     path = _path(folder, sweep, variant)
     return read_parquet(path, follow=True) if path.exists() else None
 

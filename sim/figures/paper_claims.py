@@ -70,7 +70,6 @@ class Statement:
         return f"{self.what}: {self.interval.text(self.unit)}, {verb} {bound}: {self.finding}"
 
     def plain(self, verb: str = "claimed") -> dict[str, Any]:
-        """As plain values, for JSON."""
         found = self.interval
         return {
             "what": self.what,
@@ -118,7 +117,6 @@ class Reason:
         return {statement.finding for statement in self.statements} == {Finding.HOLDS}
 
     def plain(self) -> dict[str, Any]:
-        """As plain values, for JSON."""
         return {
             "text": self.text,
             "shown": self.shown,
@@ -145,7 +143,6 @@ class Claim:
         return Verdict.DIFFERS if findings == {Finding.FAILS} else Verdict.PARTLY
 
     def plain(self) -> dict[str, Any]:
-        """As plain values, for JSON."""
         return {
             "figure": self.figure,
             "claim": self.claim,

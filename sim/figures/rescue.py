@@ -26,9 +26,7 @@ def loss_share(faults: str) -> float:
 
 
 def confirmed_s(row: Row, share: float) -> float:
-    """The instant at which this share of the survivors was confirmed, or the end of the run if that
-    never happened [s].
-    """
+    """The instant at which this share of the survivors was confirmed, else the end of the run [s]."""
     times = sorted(row["mission.time_to_confirm_s"] or ())
     wanted = _people(row, share)
     return float(times[wanted - 1] if len(times) >= wanted else row["duration_s"])

@@ -53,7 +53,6 @@ class Interval(NamedTuple):
     runs: int
 
     def scaled(self, factor: float) -> "Interval":
-        """The interval in another unit."""
         return Interval(self.mean * factor, self.low * factor, self.high * factor, self.runs)
 
     def text(self, unit: str = "") -> str:
@@ -72,9 +71,7 @@ def _said(value: float) -> str:
 
 
 def quantile_975(freedom: int) -> float:
-    """The quantile of Student's t. Beyond 30 degrees of freedom it is interpolated between the table's last value and
-    the normal quantile, by 1/freedom.
-    """
+    """The quantile of Student's t; beyond the table it is interpolated towards the normal one, by 1/freedom."""
     if freedom <= len(_T_975):
         return _T_975[freedom - 1]
     last = len(_T_975)
@@ -82,9 +79,7 @@ def quantile_975(freedom: int) -> float:
 
 
 def interval(values: Sequence[float], possible: Possible = ANY) -> Interval:
-    """The interval of one value per run; for a single run it is all that is possible, and without runs the mean is
-    NaN.
-    """
+    """The interval of one value per run: of one run all that is possible, of none NaN as well."""
     if not values:
         return Interval(math.nan, *possible, 0)
     mean = math.fsum(values) / len(values)
@@ -100,9 +95,7 @@ def _by_student(values: Sequence[float], mean: float) -> tuple[float, float]:
 
 
 def _by_bootstrap(values: Sequence[float]) -> tuple[float, float]:
-    """The percentiles of the means of resamples, at the levels that would give Student's interval if the values were
-    normal: further out than 2.5 and 97.5 %, as a resample of few values varies too little.
-    """
+    """The percentiles of the means of resamples, at the levels that give Student's interval of normal values."""
     count = len(values)
     tail = statistics.NormalDist().cdf(-math.sqrt(count / (count - 1)) * quantile_975(count - 1))
     means = np.asarray(values)[_resamples(count)].mean(axis=1)

@@ -81,17 +81,13 @@ _PARAMETERS: Final[Mapping[str, Any]] = {
 
 
 def look_of(case: str, variants: Mapping[str, str], number: int = 0) -> Look:
-    """The look of a case: that of a protocol is the same in all figures, which name the variant that they show; other
-    cases get theirs by their order.
-    """
+    """The look of a case: of a protocol the same in all figures, which name its variant; of others by their order."""
     look = LOOKS[case] if case in LOOKS else SERIES[number % len(SERIES)]._replace(label=case)
     return look._replace(label=variants.get(case, look.label))
 
 
 def applied() -> AbstractContextManager[None]:
-    """The style applies to all that is drawn and saved within the context; matplotlib's settings are restored
-    afterwards.
-    """
+    """The style, for what is drawn and saved within the context."""
     return mpl.rc_context(dict(_PARAMETERS))
 
 
@@ -138,10 +134,7 @@ def reaches(
 
 
 def beside(place: float, number: int, of: int, *, log: bool, apart: float) -> float:
-    """The position of the marks of one of several lines, so that their bars do not cover each other.
-
-    `apart` is the distance to the next line: a difference, or a share on a logarithmic axis.
-    """
+    """The position of several marks; `apart`: to the next one, a difference, or a share on a logarithmic axis."""
     steps = number - (of - 1) / 2
     return place * math.pow(1 + apart, steps) if log else place + apart * steps
 
@@ -154,9 +147,7 @@ def ticks_at(axis: Axis, places: Mapping[float, str]) -> None:
 
 
 def spaced(places: Sequence[float], *, least: float = 0.04) -> list[float]:
-    """The positions whose labels have room on a linear axis, each at least this share of its length from the one
-    before.
-    """
+    """The places whose labels have room on a linear axis: at least this share of its length apart."""
     kept = list(places[:1])
     for place in places[1:]:
         if place - kept[-1] >= least * (places[-1] - places[0]):

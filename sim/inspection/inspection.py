@@ -65,11 +65,9 @@ class Inspection:
         self.messages.take(node, "tap", t_ns, data)
 
     def take_frame(self, node: int, t_ns: int, frame: bytes) -> None:
-        """A frame that a node sends."""
         self.messages.take(node, "air", t_ns, frame)
 
     def turns(self) -> Turns | None:
-        """Who may send when, now."""
         return turns(self.scenario, self._reports)
 
 

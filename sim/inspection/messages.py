@@ -84,7 +84,6 @@ class Messages:
         self._order: list[Key] = []
 
     def take(self, node: int, where: str, t_ns: int, data: bytes) -> None:
-        """Some whole frames of a node."""
         try:
             for frame in wire.frames(data):
                 self.count += 1
@@ -139,7 +138,6 @@ def _shown(value: Any) -> str:  # noqa: ANN401  (a field of pymavlink)
 
 
 def _meaning(message: Any, name: str) -> str:  # noqa: ANN401
-    """The names of an enumerated value."""
     kind, value = message.fieldenums_by_name.get(name), getattr(message, name)
     entries = common.enums.get(kind, {})
     if not isinstance(value, int) or not entries:

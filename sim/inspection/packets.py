@@ -31,7 +31,6 @@ class Way:
     """(instant, node, reason)."""
 
     def lines(self) -> list[str]:
-        """The way as text, hop by hop."""
         said = [f"packet {self.seq} of node {self.origin}"]
         if self.born_ns is not None:
             said[0] += f": {self.app}, {self.size} bytes, handed over at {self.born_ns / S:.3f} s"

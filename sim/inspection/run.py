@@ -13,7 +13,6 @@ from sim.results.run_folder import RunFolder
 
 
 def live(endpoint: str, swarm: str | None, *, zenoh_config: Path | None) -> int:
-    """Inspect a swarm that runs until its user has seen enough."""
     with BusFeed(endpoint, swarm, zenoh_config=zenoh_config) as feed:
         inspection, frames = Inspection(feed.scenario), LiveFrames()
 
@@ -38,7 +37,6 @@ def live(endpoint: str, swarm: str | None, *, zenoh_config: Path | None) -> int:
 
 
 def recorded(folder: Path) -> int:
-    """Inspect the folder of a run."""
     inspection = of_folder(RunFolder(folder))
     note = "a recording: rates are of the whole run"
     _run(lambda ended: Inspector(inspection, title=str(folder), pump=lambda _: note, live=False, ended=ended))

@@ -234,9 +234,7 @@ class Inspector(App[None]):
 
 
 def turn_lines(found: Turns, now_ns: int) -> Text:
-    """The superframe of the moment: one line for each owner, `#` where it may send, `~` what is left, and whose
-    turn it is now.
-    """
+    """A line for each owner, `#` where it may send, `~` what is left, and whose turn it is now."""
     period_ns = found.period_ns
     superframe, place_ns = divmod(now_ns - found.start_ns, period_ns)
     owners = sorted({span.node for span in found.own})

@@ -137,7 +137,6 @@ def rate(window: list[tuple[float, int]]) -> str:
 
 
 def bandwidth(window: list[tuple[float, int]]) -> str:
-    """How many bytes were put."""
     if len(window) < 2:
         return f"no bandwidth yet: {len(window)} puts"
     span_s, sizes = window[-1][0] - window[0][0], [size for _, size in window]
@@ -175,7 +174,6 @@ def plain(value: Any) -> Any:  # noqa: ANN401  (whatever is on the bus)
 
 
 def _frames(data: object) -> object:
-    """The MAVLink messages in some bytes."""
     if not isinstance(data, bytes):
         return plain(data)
     try:

@@ -63,7 +63,6 @@ class AirCauses:
         return AirTime(start_ns, node, length_ns, cause, priority)
 
     def ack(self, start_ns: int) -> AirTime:
-        """An acknowledgment, which does not say whose it is."""
         length_ns = airtime.airtime_ns(airtime.ACK_BYTES, self._radio, rate_mbps=self._radio.ack_rate_mbps)
         return AirTime(start_ns, 0, length_ns, Cause.ACK)
 

@@ -54,9 +54,7 @@ class BusFeed:
         name: str = OPERATOR,
         scenario: Scenario | None = None,
     ) -> None:
-        """`scenario`: that of the swarm, if it names files, which the bus does not carry; otherwise it is asked for.
-        `name`: whose certificate the session has.
-
+        """`scenario`: of a swarm whose scenario names files, which the bus does not carry; `name`: of the certificate.
         Raises BusError without a router, and FanetError without a swarm whose clock's keeper answers.
         """
         self.bus = Bus.join(endpoint, config_of(zenoh_config, name))
@@ -111,7 +109,6 @@ class BusFeed:
         return self.drain(observer)
 
     def look(self) -> None:
-        """Read the clock."""
         if time.monotonic() >= self._asked_s + _ASK_CLOCK_S:
             self._ask_clock()
         while self._clocks:

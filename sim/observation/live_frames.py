@@ -28,7 +28,6 @@ class LiveFrames:
             self._puts.append((topic, payload))
 
     def take(self) -> Iterator[tuple[int, TxRequest]]:
-        """The frames that have come, each with its sender."""
         for _ in range(len(self._puts)):
             topic, payload = self._puts.popleft()
             try:

@@ -29,7 +29,6 @@ class Surroundings(NamedTuple):
     half_m: float
 
     def on_ground(self, at: Enu, *, above_m: float = 0.0) -> Enu:
-        """The place above the ground there."""
         up = self.hills.height_m(at.east, at.north) if self.hills is not None else 0.0
         return Enu(at.east, at.north, up + above_m)
 

@@ -204,7 +204,6 @@ class SwarmState:
     # --- what is heard --------------------------------------------------------------------------------------------
 
     def take_poses(self, poses: Poses) -> None:
-        """The true positions of all bodies."""
         self._by_poses = True
         if poses.t_ns < self.t_ns - S:
             return
@@ -214,7 +213,6 @@ class SwarmState:
         self._advance(poses.t_ns)
 
     def take_records(self, records: Iterable[Record]) -> None:
-        """Records of the trace, of one actor in their order."""
         for record in records:
             match record:
                 case Delivered():
@@ -234,13 +232,11 @@ class SwarmState:
                 self._advance(record.t_ns)
 
     def take_links(self, stats: LinkStats) -> None:
-        """What each link carried since the last report."""
         self._links.append(stats)
         while self._links[0].t_ns <= stats.t_ns - _LINKS_NS:
             self._links.popleft()
 
     def take_report(self, name: str, content: Mapping[str, Any], *, t_ns: int) -> None:
-        """The counters that an actor has reported."""
         if name == "emulator":
             self.emulator = content
             self._hear_air(content, t_ns)
@@ -325,7 +321,6 @@ class SwarmState:
         return name, self.packets[name]
 
     def latest_events(self, count: int) -> list[Event]:
-        """The latest events, the oldest of them first."""
         return list(self.events)[-count:] if count > 0 else []
 
     def heads(self) -> dict[int, list[int]]:

@@ -144,9 +144,7 @@ class Timeline:
 
 
 def _recorded(folder: Path, epoch_ns: int, scenario: Scenario) -> tuple[list[LinkStats], list[_Report]]:
-    """What links carried and actors reported each second, from a recording in the folder; nothing without one, or
-    without MCAP installed.
-    """
+    """What links carried and actors reported each second, from a recording in the folder, if there is one and MCAP."""
     try:
         from google.protobuf.message import DecodeError
         from mcap.exceptions import McapError

@@ -68,7 +68,6 @@ def turns(scenario: Scenario, reports: Mapping[int, Mapping[str, Any]]) -> Turns
 
 
 def spans_of(node: int, frame: Mapping[str, Any]) -> Iterator[Span]:
-    """The turns of a node, by its report of them."""
     for offset in frame["own"]:
         turn_ns = _ns(frame["turn_ms"])
         yield Span(node, (_ns(frame.get("contention_ms", 0.0)) + offset * turn_ns) % _ns(frame["period_ms"]), turn_ns)

@@ -1,8 +1,4 @@
-"""Analysis before take-off: whether a scenario is feasible, which delays its traffic classes get, and what would help.
-
-`plan` judges a scenario with given positions and returns a `ScenarioPlan`. `cheapest_change` finds a change that
-makes a scenario feasible. `describe` turns results into text, and `answer` is what `fanet plan` says of a scenario.
-"""
+"""Analysis before take-off: whether a scenario is feasible, which delays its traffic gets, and what would help."""
 
 from sim.planner.cheapest_change import ScenarioChange, cheapest_change
 from sim.planner.demand import ClassPlan, TrafficClass, demands

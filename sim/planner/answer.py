@@ -57,9 +57,7 @@ _GPS_DRAWS: Final = 20
 def judge(
     scenario: Scenario, *, deadline_s: float | None = None, change: bool = True
 ) -> tuple[str, dict[str, Any], bool]:
-    """(text, JSON, feasible) for a scenario at its starting positions; `change`: look for the cheapest change if it
-    is not feasible.
-    """
+    """(text, JSON, feasible) at the starting positions; `change`: look for a change if it is not feasible."""
     if scenario.routing.protocol not in ("clustered", "rounds"):
         raise ConfigError(
             f'routing.protocol = {scenario.routing.protocol}: only "clustered" and "rounds" can be planned'
@@ -171,7 +169,6 @@ def _reported(scenario: Scenario, at: dict[NodeId, Enu]) -> list[dict[NodeId, En
 
 
 def _displaced(place: Enu, sigma_m: float, random: Random) -> Enu:
-    """A place with a Gaussian error along each axis, in whole metres."""
     return rounded(Enu(*(axis + random.gauss(0.0, sigma_m) for axis in place)))
 
 
@@ -181,8 +178,8 @@ def _has_floods(found: ScenarioPlan, at: Mapping[NodeId, Enu]) -> bool:
 
 
 def _with_loss(found: ScenarioPlan, at: Mapping[NodeId, Enu]) -> tuple[ScenarioPlan, Loss | None]:
-    """The plan, with a problem more if the floods of its timetable lose too much, and their loss; None without a
-    timetable, and if its probability is not known. Ways to a head in contention are not included.
+    """The plan, with a problem more if its floods lose too much, and their loss; None without a timetable, and if the
+    probability is not known. Ways to a head in contention are not included.
     """
     scenario, superframe = found.scenario, found.superframe
     chance = chance_of(scenario, at)
@@ -201,8 +198,8 @@ def _with_loss(found: ScenarioPlan, at: Mapping[NodeId, Enu]) -> tuple[ScenarioP
 
 
 def _delivers_m(scenario: Scenario, at: Mapping[NodeId, Enu]) -> float | None:
-    """The distance of the two nodes farthest from each other up to which the channel delivers frames to all that are as
-    near; None if two nodes that are nearest do not hear each other, or if all is within reach of the radio's range.
+    """The distance up to which the channel delivers frames to all that are as near; None if not even to the nearest, or
+    if all are within `radio.range_m`.
     """
     chance = chance_of(scenario, at)
     if chance is None or scenario.radio.channel == "range":

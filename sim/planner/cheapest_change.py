@@ -52,11 +52,8 @@ def cheapest_change(
     delivers_m: float | None = None,
     delivers: Callable[[ScenarioPlan], bool] = lambda _: True,
 ) -> ScenarioChange | None:
-    """The least change that makes `plan` feasible; None if none of those searched does. `delivers_m`: the greatest
-    distance of nodes up to which the channel delivers frames, if that is a problem; `delivers`: whether the floods of a
-    feasible plan lose few enough packets.
-
-    Nothing is searched for a separated swarm, which is helped only if nodes come nearer to each other.
+    """The least change that makes `plan` feasible, if any searched does; nothing is searched for a separated swarm.
+    `delivers_m`: up to which distance the channel delivers; `delivers`: whether floods lose few enough packets.
     """
     site = Site(scenario, positions, adjacency, reported)
     found = judge(site, sources, deadline_ns)
@@ -121,8 +118,8 @@ def _hello_options(site: Site) -> list[dict[str, Value]]:
 
 def _link_options(site: Site, delivers_m: float | None) -> list[dict[str, Value]]:
     """Changes that help when timetables count on links that are not there: a greatest distance of links up to which the
-    channel delivers, or, if reported positions leave open which nodes hear each other, one that no two nodes are near,
-    although errors of GPS are twice what they are likely to be.
+    channel delivers, or, if reports leave open who hears whom, one that no two nodes are near by twice the error of
+    GPS.
     """
     range_m, clear_m = delivers_m or site.scenario.radio.range_m, distance_error_m(site.scenario)
     if delivers_m is None and (not any(site.reported) or site.scenario.radio.channel != "range"):

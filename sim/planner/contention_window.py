@@ -17,8 +17,8 @@ _NONE: Final[Mapping[NodeId, int]] = MappingProxyType({})
 
 
 def too_short(scenario: Scenario, adjacency: Adjacency, uplinks_ns: Mapping[NodeId, int] = _NONE) -> Iterator[str]:
-    """A sentence about a window that is too short for the hellos, and for what members send to their heads; nothing if
-    it is long enough. `uplinks_ns`: the airtime of the latter in a superframe, by the node that transmits.
+    """A sentence if hellos and packets to heads do not fit the window. `uplinks_ns`: airtime of the latter in a
+    superframe, by sender.
     """
     needed_ns = hellos_ns(scenario, crowd(adjacency)) + _densest_ns(adjacency, uplinks_ns)
     window_ns = round(scenario.clusters.contention_ms * MS)
@@ -35,9 +35,7 @@ def too_short(scenario: Scenario, adjacency: Adjacency, uplinks_ns: Mapping[Node
 def uplinks_ns(
     scenario: Scenario, through: Mapping[NodeId, Sequence[int]], classes: Sequence[TrafficClass]
 ) -> dict[NodeId, int]:
-    """The airtime in a superframe of what each node sends towards a head, own packets and those of others; `through`:
-    the number of sources whose packets it sends, by class.
-    """
+    """The airtime in a superframe of what each node sends towards a head; `through`: its sources by class."""
     return {
         node: sum(
             n * scenario.clusters.period_ns * mean_access_ns(c.payload_bytes, scenario.radio) // c.interval_ns

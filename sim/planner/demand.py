@@ -72,8 +72,8 @@ def _all(scenario: Scenario) -> tuple[NodeId, ...]:
 
 
 def _eligible(scenario: Scenario, traffic: Traffic) -> tuple[NodeId, ...]:
-    """The nodes that may be sources. If a scenario gives only their number, a run draws them by its seed; a plan takes
-    the nodes with the lowest ids. Both take the leader only if the others are too few.
+    """The nodes that may be sources. Of a number, a run draws them by its seed and a plan takes the lowest ids; both
+    take the leader only if the others are too few.
     """
     if isinstance(traffic.sources, tuple):
         return tuple(NodeId(n) for n in sorted(set(traffic.sources)))

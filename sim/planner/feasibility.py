@@ -50,9 +50,7 @@ class _Judged(NamedTuple):
 
 
 def members_of(scenario: Scenario, positions: Mapping[NodeId, Enu]) -> list[Cluster]:
-    """The clusters that the leader will make if all nodes have joined before. The leader belongs to none if there are
-    other nodes; a timetable gives it turns.
-    """
+    """The clusters that the leader will make once all have joined. It belongs to none; a timetable gives it turns."""
     settings, range_m = scenario.clusters, scenario.clusters.link_m or scenario.radio.range_m
     others = {node: at for node, at in positions.items() if node != scenario.leader}
     swarm = Swarm(others or positions, within_range(others or positions, range_m=range_m, reaches=scenario.reaches))
@@ -66,9 +64,7 @@ def members_of(scenario: Scenario, positions: Mapping[NodeId, Enu]) -> list[Clus
 def evaluate(
     site: Site, classes: Sequence[TrafficClass], *, deadline_ns: int | None = None, quick: bool = False
 ) -> ScenarioPlan:
-    """Judge one scenario. With `quick`, no timetable is computed that carries less than the load, or that takes
-    seconds.
-    """
+    """Judge one scenario. `quick`: compute no timetable that carries less than the load, or takes seconds."""
     scenario = site.scenario
     fitted = _fitted(site, quick=quick) if site.timetable else None
     clusters = members_of(scenario, site.positions)
@@ -141,7 +137,6 @@ def evaluate(
 def _out_of_hops(
     site: Site, fitted: FittedTimetable | Refused | None, clusters: Sequence[ClusterPlan]
 ) -> Iterator[str]:
-    """Sentences about floods that do not reach all nodes, because of the hop limit or of links that do not exist."""
     scenario = site.scenario
     if not isinstance(fitted, FittedTimetable):
         hops = max((c.hops + max(levels(site.adjacency, NodeId(c.head)).values()) for c in clusters), default=0)
@@ -157,9 +152,7 @@ def _out_of_hops(
 
 
 def _unheard(scenario: Scenario, fitted: FittedTimetable) -> Iterator[str]:
-    """A sentence about a leader whose announcements expire while they wait for its turns, so that nodes elect
-    another.
-    """
+    """A sentence if the leader's announcements expire before its turns, so that nodes elect another."""
     roots = fitted.table.offsets_of(scenario.leader)
     if not roots:
         return
@@ -182,9 +175,7 @@ def goodput(site: Site, classes: Sequence[TrafficClass]) -> Goodput | None:
 def _loads(
     heads: Sequence[NodeId], head_of: Mapping[NodeId, NodeId], found: Ways, classes: Sequence[TrafficClass]
 ) -> list[list[int]]:
-    """The number of sources of each class at each head. A node without a head is counted at the head with the lowest
-    id.
-    """
+    """The number of sources of each class at each head; a node without a head counts at the lowest one."""
     homeless = frozenset(found.homeless)
     rows = {head: [0] * len(classes) for head in heads}
     for index, c in enumerate(classes):
@@ -217,9 +208,7 @@ def _assumed_ns(site: Site) -> int:
 def _access(
     site: Site, found: Ways, classes: Sequence[TrafficClass], shares: Sequence[Sequence[ClassLoad]]
 ) -> DelayBound:
-    """The delay to the head. With a timetable, this traffic does not contend with floods, but it must fit the
-    contention window.
-    """
+    """The delay to the head; with a timetable it must fit the contention window, where no floods are."""
     if not site.timetable:
         spacing_ns = min((s.flood.spacing_ns for row in shares for s in row), default=S)
         return access_outcome(site.scenario, site.adjacency, found, classes, spacing_ns=spacing_ns)
@@ -363,9 +352,7 @@ def _split(adjacency: Adjacency, *, leader: NodeId) -> tuple[NodeId, ...]:
 
 
 def _missed(uncovered: Mapping[NodeId, Sequence[NodeId]], *, leader: NodeId) -> tuple[NodeId, ...]:
-    """The nodes that a timetable does not reach: those that the leader's floods miss, or else those
-    of some other root.
-    """
+    """The nodes that the leader's floods miss, or else those of some other root."""
     found = uncovered.get(leader) or next((nodes for _, nodes in sorted(uncovered.items()) if nodes), ())
     return tuple(found)
 

@@ -15,9 +15,7 @@ from fanet_mw.units import MS, NodeId
 
 
 class FloodCost(NamedTuple):
-    """`duration_ns`: from the head's first bit to the last node's reception. `spacing_ns`: from one flood to the next.
-    And the number of frames.
-    """
+    """From the head's first bit to the last node's reception; from one flood to the next; and the number of frames."""
 
     duration_ns: int
     spacing_ns: int
@@ -26,7 +24,6 @@ class FloodCost(NamedTuple):
 
 
 def frame_ns(radio: Radio, payload_bytes: int) -> int:
-    """The airtime of a data frame with this UDP payload."""
     return airtime_ns(payload_bytes + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
 
 

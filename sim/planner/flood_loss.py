@@ -40,9 +40,7 @@ class Loss(NamedTuple):
 
 
 def loss(table: Timetable, adjacency: Adjacency, *, per_superframe: int, hop_turns: int, chance: Chance) -> Loss:
-    """The loss of the floods of a timetable. `adjacency` has the links that count; all others are taken to carry
-    nothing.
-    """
+    """The loss of the floods of a timetable over the links of `adjacency`; all others carry nothing."""
     together: dict[int, list[NodeId]] = {}
     for turn in table.turns:
         together.setdefault(turn.offset % per_superframe, []).append(turn.node)
@@ -61,9 +59,7 @@ def loss(table: Timetable, adjacency: Adjacency, *, per_superframe: int, hop_tur
 
 
 def problems(found: Loss, *, link_m: float, delivers_m: float | None) -> Iterator[str]:
-    """A sentence about floods that lose too much; nothing if they do not. `delivers_m`: the greatest distance of nodes
-    up to which the channel delivers frames; None if it is unknown.
-    """
+    """A sentence if floods lose too much. `delivers_m`: up to which distance the channel delivers, if known."""
     if found.mean > MOST:
         yield (
             f"a packet misses a node with probability {found.mean:.2g} at most on average, which may be {MOST:g}: the "
@@ -82,9 +78,7 @@ def _send(
     hop_turns: int,
     chance: Chance,
 ) -> None:
-    """Let a relay transmit what has reached it in time, and note the probability with which each
-    neighbor receives it.
-    """
+    """Let a relay send what it has, and note with which probability each neighbor receives it."""
     sent = _best([item for item in arrivals.get(turn.node, ()) if item[0] + hop_turns <= turn.offset])
     for node in adjacency[turn.node] if sent else ():
         arrivals.setdefault(node, []).append((turn.offset, sent * chance(turn.node, node, others)))

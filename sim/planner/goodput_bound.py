@@ -53,9 +53,7 @@ class Goodput(NamedTuple):
 def goodput_bound(
     adjacency: Adjacency, sources: Collection[NodeId], *, send_ns: int, receive_ns: int
 ) -> Goodput | None:
-    """The bound, if a transmission occupies its sender for `send_ns` and each receiver for `receive_ns`; None if the
-    swarm is separated.
-    """
+    """The bound, if a frame occupies its sender and each receiver so long; None if the swarm is separated."""
     nodes, senders = len(adjacency), frozenset(sources)
     if nodes < 2 or not senders or len(components(adjacency)) > 1:
         return None
@@ -82,9 +80,7 @@ def fewest_transmissions(adjacency: Adjacency) -> int:
 
 
 def any_protocol(scenario: Scenario, adjacency: Adjacency, sources: Collection[NodeId]) -> Goodput | None:
-    """The bound for the application's packets with the scenario's MAC, and as many packets in a
-    frame as it can hold.
-    """
+    """The bound for the application's packets, as many in a frame as it holds."""
     together = most_together(scenario)
     frame = frame_ns(scenario.radio, together * scenario.traffic.payload_bytes)
     send_ns = (frame + Timing.of(scenario.radio).difs_ns) // together

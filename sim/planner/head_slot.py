@@ -45,9 +45,7 @@ class ClassLoad(NamedTuple):
 
 
 class ClusterPlan(NamedTuple):
-    """The slot of one head. Floods may begin in `usable_ns` of it; `work_ns` is how much of it they take per flooding
-    period.
-    """
+    """The slot of one head, of which `work_ns` per period are taken; floods may begin in `usable_ns` of it."""
 
     head: int
     members: int
@@ -76,9 +74,8 @@ def work_ns(shares: Sequence[ClassLoad], *, period_ns: int) -> int:
 def slot_delays(
     shares: Sequence[ClassLoad], *, usable_ns: int, period_ns: int, jitter_ns: int
 ) -> tuple[list[DelayBound], int | None]:
-    """For each class, the most urgent first, the longest time from the head's queue to the last node; and the backlog.
-
-    A class without sources is bounded by 0. Packets arrive late by up to `jitter_ns`.
+    """For each class the longest time from the head's queue to the last node (0 without sources), and the backlog.
+    Packets arrive late by up to `jitter_ns`.
     """
     present = [s for s in shares if s.sources]
     if not present:
@@ -105,9 +102,7 @@ def slot_delays(
 def _by_priority(
     index: int, shares: Sequence[ClassLoad], units: Sequence[Sequence[Periodic]], server: SlotServer
 ) -> DelayBound:
-    """The bound of one class: all packets of the same or more urgent classes go first, and a less urgent one may have
-    begun.
-    """
+    """Packets of the same or more urgent classes go first, and a less urgent one may have begun."""
     if not units[index]:
         return Bounded(0)
     before = [*chain.from_iterable(units[:index]), *units[index][1:]]

@@ -35,19 +35,16 @@ class Drawn(NamedTuple):
     links: int
     """The number of pairs of nodes that receive each other at all."""
     fitted: FittedTimetable | None
-    """The timetable with repeated frames; None if none fits. The swarm then flies with one from positions, without
-    stated delays."""
+    """None if none fits: the swarm then flies with one from positions, without stated delays."""
     likely_ns: Mapping[NodeId, int | None]
     """The likely delay of each source; None if its packets miss too many nodes."""
 
     @property
     def silent(self) -> list[NodeId]:
-        """The sources that state no delay."""
         return [node for node, delay_ns in self.likely_ns.items() if delay_ns is None]
 
     @property
     def known_ns(self) -> list[int]:
-        """The stated delays, ascending."""
         return sorted(delay_ns for delay_ns in self.likely_ns.values() if delay_ns is not None)
 
 
@@ -80,10 +77,7 @@ def plan_lossy(
     *,
     deadline_ns: int | None = None,
 ) -> LossyPlan:
-    """Judge a scenario with lossy links, for each of several draws of the links.
-
-    The leader states no delay for its own packets, because its announcements go before them.
-    """
+    """Judge a scenario for several draws of its links. The leader states no delay: its announcements go first."""
     places = tuple(sorted(positions.items()))
     sources = [node for node in application.sources if node != scenario.leader]
     found = tuple(_drawn(scenario, places, links, sources) for links in draws)

@@ -8,9 +8,7 @@ from fanet_mw.units import Enu, NodeId
 
 
 def outdated(scenario: Scenario, at: Mapping[NodeId, Enu], adjacency: Adjacency) -> Iterator[str]:
-    """A sentence about two UAVs that may fly out of range of each other while a timetable counts on their link; none
-    without a timetable.
-    """
+    """A sentence about two UAVs that may fly out of range while a timetable counts on their link."""
     speed_m_s, range_m = scenario.mobility.speed_m_s, scenario.radio.range_m
     lengths = [at[a].minus(at[b]).norm() for a in adjacency for b in adjacency[a] if a < b]
     lengths = [length_m for length_m in lengths if length_m <= range_m]  # antennas of the ground reach farther

@@ -1,8 +1,4 @@
-"""Plans one scenario with given positions: its traffic classes first, then whether they are feasible.
-
-plan -> demand.py                  the traffic classes
--> feasibility.py             in slots of heads, or in turns of a timetable
-"""
+"""Plans one scenario with given positions: its traffic classes first (`demand.py`), then `feasibility.py`."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
@@ -18,20 +14,14 @@ from sim.planner.scenario_plan import ScenarioPlan
 from sim.planner.site import Site
 
 _TURNS: Final = 50_000
-"""The number of turns of all timetables that are computed for reported positions; a thousand take a tenth of a
-second."""
+"""The turns of all timetables for reported positions; a thousand take a tenth of a second."""
 _LEAST_DRAWS: Final = 3
 
 
 def worst_of(exact: ScenarioPlan, drawn: Sequence[ScenarioPlan], *, varying: int) -> ScenarioPlan:
-    """The plan for the exact positions, with the greatest bounds of all `drawn` plans, and with what fails in them.
-
-    Nodes compute their timetable from positions that GPS reports, which may give another timetable even where all links
-    are the same. The greatest bound of n draws is exceeded by that of another draw with a probability of 1 / (n + 1)
-    (Hahn and Meeker, Statistical Intervals, 1991); the bound that a node states in flight always holds.
-
-    `varying`: the number of pairs of nodes that are linked in some draws only. Reports then change the links in flight,
-    and the leader makes another timetable now and then.
+    """The plan for the exact positions, with the greatest bounds of all `drawn` plans, and with what fails in them. The
+    greatest bound of n draws is exceeded by that of another one with a probability of 1 / (n + 1) (Hahn and Meeker,
+    Statistical Intervals, 1991). `varying`: the pairs of nodes that are linked in some draws only.
     """
     classes = tuple(
         c._replace(
@@ -80,12 +70,9 @@ def plan(
     sources: Sequence[NodeId] | None = None,
     deadline_ns: int | None = None,
 ) -> ScenarioPlan | Refused:
-    """Judge the scenario as it stands; refused if its traffic cannot be planned at all.
-
-    `adjacency` says which nodes hear each other, by default those within `radio.range_m`; a timetable uses only
-    positions. Nodes take these from GPS, so a timetable is judged for each draw of `reported` positions as well: the
-    bounds are the greatest of all, and what fails with one is a problem. `sources` are the nodes that send the
-    application's traffic. Each class has to meet the deadline.
+    """Judge the scenario as it stands; refused if its traffic cannot be planned at all. A timetable is judged for each
+    draw of `reported` positions as well: the greatest bounds count, and what fails with one is a problem. `sources`
+    send the application's traffic.
     """
     return judge(Site(scenario, positions, adjacency, reported), sources, deadline_ns)
 
@@ -93,9 +80,7 @@ def plan(
 def judge(
     site: Site, sources: Sequence[NodeId] | None, deadline_ns: int | None, *, quick: bool = False
 ) -> ScenarioPlan | Refused:
-    """Judge a scenario at its site; with `quick`, only for the exact positions, and a timetable that carries too little
-    is not computed (`evaluate`).
-    """
+    """Judge a scenario at its site; `quick`: for the exact positions alone (`evaluate`)."""
     classes = demands(site.scenario, sources)
     if isinstance(classes, Refused):
         return classes

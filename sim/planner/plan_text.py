@@ -24,14 +24,11 @@ _LABEL: Final = 14
 
 
 def describe(found: ScenarioPlan | Refused) -> str:
-    """The plan as text, without a final newline."""
     return f"cannot be planned: {found.reason}" if isinstance(found, Refused) else "\n".join(_lines(found))
 
 
 def describe_loss(found: Loss | None, *, everyone: bool) -> str:
-    """A sentence on the probability that a packet misses a node. `everyone`: nothing but such a loss keeps packets from
-    any node.
-    """
+    """`everyone`: nothing but such a loss keeps packets from any node."""
     if found is None:
         return item("loss", "no probability: shadowing, fading and obstacles spoil links for longer than a frame")
     if not found.worst:
@@ -44,12 +41,10 @@ def describe_loss(found: Loss | None, *, everyone: bool) -> str:
 
 
 def describe_not_counted(sentences: Sequence[str]) -> str:
-    """What a scenario has and its plan does not count, as text."""
     return "\n".join(item("not counted" if index == 0 else "", said) for index, said in enumerate(sentences))
 
 
 def describe_lossy(found: LossyPlan) -> str:
-    """A plan over links that lose frames, as text."""
     scenario = found.scenario
     lines = [
         f"{'FEASIBLE' if found.feasible else 'NOT FEASIBLE'}  {scenario.name}: {scenario.node_count} nodes, "
@@ -78,7 +73,6 @@ def _likely(drawn: Drawn) -> str:
 
 
 def describe_change(change: ScenarioChange | None, found: ScenarioPlan) -> str:
-    """What would make the plan feasible, as text."""
     if found.cut_off:
         return item("change", "nodes have to come nearer: nothing that can be set joins the parts of a swarm")
     if change is None:
@@ -90,8 +84,8 @@ def describe_change(change: ScenarioChange | None, found: ScenarioPlan) -> str:
 
 
 def describe_operator(scenario: Scenario, bounds: list[int], *, known_gone_ns: int = 0) -> str | None:
-    """What a ground station in band may count on; None without a post on the ground. `known_gone_ns`: after so long
-    the swarm knows that a node is off the air.
+    """What a ground station in band may count on; None without a post. `known_gone_ns`: how long until the swarm knows
+    that a node has left the air.
     """
     if scenario.post is None:
         return None

@@ -19,15 +19,11 @@ from sim.planner.head_slot import ClusterPlan
 
 _JOINED_S: Final = 6.0
 _JOINED_HELLOS: Final = 4
-"""The time in which all nodes of a swarm have joined, and have heard the first schedule: so many seconds, or so many
-hello intervals if that is longer.
-"""
+"""The time, or if that is longer the hello intervals, until all have joined and heard a schedule."""
 _LISTENED_HELLOS: Final = 4
 _PASSED_ON_HELLOS: Final = 3
-"""The time in which clocks agree by time beacons, in hello intervals: at the leader, and for each hop from it. 15 of 16
-swarms of 2 to 45 nodes, 1 to 13 hops wide, took at least two intervals less; lines take longest, because a node then
-has only one neighbor to believe. A line with a window too short for its hellos took two intervals more.
-"""
+"""Hello intervals until clocks agree by time beacons: at the leader, and for each hop from it. 15 of 16 swarms of 2 to
+45 nodes took at least two less; a line with too short a window took two more."""
 _MOST_SLACK_US: Final = 1_000_000
 _LIFETIMES: Final = {wire.PRIORITY_SAFETY: "safety_lifetime_s", wire.PRIORITY_REPORT: "report_lifetime_s"}
 
@@ -39,9 +35,7 @@ def late(classes: Sequence[ClassPlan], deadline_ns: int) -> Iterator[str]:
 
 
 def refused_together(scenario: Scenario, classes: Sequence[TrafficClass]) -> Iterator[str]:
-    """A sentence about a node whose bulk packets of two classes come together, although with `traffic.deadline_s` it
-    accepts only packets that are far enough apart; nothing if there is none.
-    """
+    """A sentence about a node with two bulk classes, of which `traffic.deadline_s` lets it accept one only."""
     if scenario.traffic.deadline_s is None:
         return
     bulk = [c for c in classes if c.priority == wire.PRIORITY_BULK]
@@ -94,8 +88,8 @@ def problems(
 
 
 def clocks_apart(scenario: Scenario, *, slack: str = "clusters.turn_slack_us") -> Iterator[str]:
-    """Sentences about clocks that nothing brings together: they differ by more than the slack of a turn, which is that
-    of the key `slack`, and are not synchronized, or by more than nodes accept.
+    """Sentences about clocks that differ by more than the slack of a turn, the key `slack`, and that nothing
+    synchronizes, or by more than nodes accept.
     """
     yield from refused_time(scenario)
     clock, slack_us = scenario.clock, attrgetter(slack)(scenario)
@@ -129,9 +123,7 @@ def refused_time(scenario: Scenario) -> Iterator[str]:
 
 
 def unsynchronized_slack_ns(scenario: Scenario) -> int:
-    """The slack that turns need at the end of the run if nothing synchronizes the clocks; 0 if something does, or if
-    the clocks are exact.
-    """
+    """The slack that turns need at the end of the run if nothing synchronizes the clocks; else 0."""
     clock = scenario.clock
     if clock.sync != "none" or not clock.modelled:
         return 0

@@ -25,10 +25,7 @@ def chance_of(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance | None:
 
 
 def _by_error_rate(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance:
-    """For channels with powers: the error rates at the signal to interference and noise ratio.
-
-    Modules that need numpy are imported here, so that a plan on the channel `range` needs no extra of the package.
-    """
+    """The error rates at the signal to interference and noise ratio; numpy is imported for these channels only."""
     import numpy as np
 
     from emulator.channel.error_rate import header_rates, log_success_per_bit
@@ -63,8 +60,6 @@ def _by_error_rate(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance:
 
 
 def _clear(at: Mapping[NodeId, Enu], receiver: NodeId, senders: tuple[NodeId, ...], range_m: float) -> float:
-    """For the channel `range`: 1 if exactly one sender is within range of the receiver, and the receiver does not send
-    itself.
-    """
+    """1 if exactly one sender is within range of the receiver, which does not send itself."""
     heard = sum(at[receiver].minus(at[sender]).norm() <= range_m for sender in senders)
     return float(heard == 1 and receiver not in senders)

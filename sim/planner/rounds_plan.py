@@ -120,9 +120,7 @@ def _of_bulk(load: BulkLoad | None) -> str:
 def greatest_load(
     adjacency: Adjacency, rates: Mapping[NodeId, float], timing: RoundTiming, *, longest_bytes: int
 ) -> BulkLoad:
-    """The node whose slots are fullest. `rates`: the packets for all that each node makes a second; `longest_bytes`: of
-    a packet on the air.
-    """
+    """The node whose slots are fullest. `rates`: packets for all, a second; `longest_bytes`: of a packet on the air."""
     relays = {node for node in adjacency if dominates(node, adjacency)}
     slots = timing.slots * (timing.slot_bytes // longest_bytes) * S / timing.period_ns
     total = sum(rates.values())

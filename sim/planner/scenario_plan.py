@@ -49,18 +49,13 @@ class ScenarioPlan(NamedTuple):
 
     @property
     def confidence(self) -> float:
-        """The probability that the bounds hold for the positions that GPS gives in flight: another draw exceeds the
-        greatest of n with a probability of 1 / (n + 1).
-        """
+        """Another draw of GPS positions exceeds the greatest bound of n with a probability of 1 / (n + 1)."""
         return self.draws / (self.draws + 1) if self.draws else 1.0
 
     @property
     def carried_per_second(self) -> float | None:
-        """The application packets per second, of all sources together, that this configuration can carry; None if
-        unknown.
-
-        With a timetable whose capacity was computed, it is exact. If relays contend, it is the load that would fill the
-        fullest slot.
+        """Packets per second of all sources that this configuration can carry: exact with a timetable whose capacity
+        was computed, else the load that fills the fullest slot; None if unknown.
         """
         application = next((c for c in self.classes if c.name == "application"), None)
         if application is None or not application.sources:
@@ -73,5 +68,4 @@ class ScenarioPlan(NamedTuple):
 
     @property
     def bottleneck(self) -> ClusterPlan | None:
-        """The cluster with the fullest slot."""
         return max(self.clusters, key=lambda c: (c.utilization, -c.head), default=None)

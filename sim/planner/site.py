@@ -21,8 +21,8 @@ class Site:
         reported: Sequence[Mapping[NodeId, Enu]] = (),
         standing: Mapping[NodeId, Enu] | None = None,
     ) -> None:
-        """`reported`: draws of the positions that nodes report, which differ from `positions` by errors of GPS;
-        `standing`: where the nodes are, if `positions` is one of these draws.
+        """`reported`: draws of positions with errors of GPS; `standing`: where the nodes are, if `positions` is such a
+        draw.
         """
         self.scenario = scenario
         self.positions = {node: rounded(at) for node, at in positions.items()} if self.timetable else positions
@@ -38,9 +38,7 @@ class Site:
         self._floods: dict[tuple[NodeId, int], FloodCost] = {}
 
     def of(self, scenario: Scenario) -> "Site":
-        """The same nodes with another scenario; the costs of floods are shared if the rules of
-        relaying are the same.
-        """
+        """The same nodes with another scenario; the costs of floods are shared if relaying is the same."""
         other = Site(scenario, self._exact, self.adjacency, self.reported)
         if scenario.clusters.relay == self.scenario.clusters.relay and scenario.radio == self.scenario.radio:
             other._floods = self._floods

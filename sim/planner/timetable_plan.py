@@ -66,9 +66,8 @@ class TimetablePlan(NamedTuple):
 def table_for(
     scenario: Scenario, places: Places, head_of: Mapping[NodeId, NodeId], *, quick: bool = False
 ) -> FittedTimetable | Refused:
-    """The timetable that nodes with these heads will compute; refused if one packet of each root does not fit.
-
-    With `quick` it is also refused if the load does not fit.
+    """The timetable that nodes with these heads will compute; refused if one packet of each root, or with `quick` the
+    load, does not fit.
     """
     found = fit(scenario, places, head_of, quick=quick)
     if found is not None:
@@ -110,11 +109,8 @@ def judge(
     control: int = 0,
     bulk_bytes: int,
 ) -> ClusterPlan:
-    """Judge one root: the wait for its turns, the duration of the flood, and `receipt_ns` until the applications have
-    it.
-
-    `control` is the number of announcements per period, which go before all bulk; `bulk_bytes` the room that a turn has
-    for bulk.
+    """Judge one root. `receipt_ns`: until applications have a packet; `control`: announcements per period, before all
+    bulk; `bulk_bytes`: the room for bulk in a turn.
     """
     table, turns = found.table, found.turns
     offsets = tuple(table.offsets_of(NodeId(candidate.head)))
@@ -173,10 +169,7 @@ class _Room(NamedTuple):
         return 1 if self.urgent else self.own.together
 
     def parts(self, share: ClassLoad) -> int:
-        """The number of packets as which one packet of a class counts.
-
-        A bulk packet that is longer than others may find too little room behind them, and take the next turn alone.
-        """
+        """A longer bulk packet may find too little room behind others, and take the next turn alone."""
         longer = not self.urgent and share.payload_bytes > self.part_bytes
         return 2 * self.per_turn - 1 if longer else 1
 
@@ -199,10 +192,8 @@ class _Room(NamedTuple):
         return parts / self.per_turn + self.announced if parts else 0.0
 
     def delay(self, share: ClassLoad) -> DelayBound:
-        """The bound of one of the classes.
-
-        A packet waits for packets of its priority only; bulk also waits for announcements. If there is only one source,
-        the bound that this source states in flight (`RootTurns`) is tighter.
+        """A packet waits for packets of its priority only, bulk also for announcements. Of a single source the bound is
+        that which it states in flight (`RootTurns`), which is tighter.
         """
         if not share.sources:
             return Bounded(0)
@@ -245,10 +236,8 @@ class _Room(NamedTuple):
         return [Periodic(self.own.turns.period_ns, 0)] * (self.announced * self.per_turn)
 
     def _server(self) -> TurnServer:
-        """The service of turns in which k packets are sent: such a turn counts as k parts with one packet each.
-
-        A packet must be announced before the whole turn, so its lead counts as longer, and all packets of a turn are
-        completed at its end.
+        """Turns of k packets as k parts with one each, all of which are completed at the end of the turn. A packet must
+        be announced before the whole turn, so its lead counts as longer.
         """
         turns, parts = self.own.turns, self.per_turn
         part_ns = turns.turn_ns // parts

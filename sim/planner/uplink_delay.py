@@ -24,9 +24,7 @@ _ROUNDS: Final = 200
 
 
 class Ways(NamedTuple):
-    """The routes to the heads: `hops` of each node to its head; `through[n]`, the packets per class that node n sends
-    on.
-    """
+    """`hops` of each node to its head; `through[n]`, the packets per class that node n sends on."""
 
     hops: Mapping[NodeId, int]
     through: Mapping[NodeId, tuple[int, ...]]
@@ -74,9 +72,7 @@ def _tree(adjacency: Adjacency, roots: Sequence[NodeId]) -> dict[NodeId, NodeId]
 def access_outcome(
     scenario: Scenario, adjacency: Adjacency, found: Ways, classes: Sequence[TrafficClass], *, spacing_ns: int | None
 ) -> DelayBound:
-    """The longest time from any member to its head over all hops. `spacing_ns` is the least time between floods, if
-    any.
-    """
+    """The longest time from any member to its head over all hops; `spacing_ns`: the least time between floods."""
     if not classes or not any(found.hops.values()):
         return Bounded(0)
     most_hops = max(found.hops.values())
@@ -93,10 +89,8 @@ def access_outcome(
 
 
 def _neighborhoods(adjacency: Adjacency, found: Ways) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
-    """The traffic with which each sender contends, without repetitions.
-
-    Each entry is a pair. The first part has the packets per class of all other nodes within two hops, and then the
-    number of these nodes. The second part has the sender's own packets per class.
+    """What each sender contends with, without repetitions: packets per class of all nodes within two hops, then the
+    number of these nodes; and its own packets per class.
     """
     rivals = two_hop(adjacency)
     kinds: dict[tuple[tuple[int, ...], tuple[int, ...]], None] = {}
@@ -116,9 +110,7 @@ def _hop_ns(
     hops: int,
     spacing_ns: int | None,
 ) -> int | None:
-    """The least w that holds all transmissions that may come before the end of a packet of this node; None if there is
-    none.
-    """
+    """The least w that holds all transmissions before the end of a packet of this node; None if there is none."""
     radio, dcf = scenario.radio, Dcf.of(scenario.radio)
     *packets, stations = near
     hello_every_ns = max(1, seconds_to_ns(scenario.routing.hello_interval_s) or scenario.duration_ns)

@@ -28,9 +28,7 @@ class Variant(NamedTuple):
 
     @property
     def size(self) -> tuple[int, float, tuple[str, ...]]:
-        """The measure by which changes are compared: the number of keys, then octaves; then the arguments, to break
-        ties.
-        """
+        """The number of keys, then octaves; then the arguments, to break ties."""
         return len(self.settings), self.octaves, self.arguments
 
 

@@ -31,9 +31,7 @@ def link_color(share: float) -> str:
 
 
 def attitude(uav: UavNow) -> tuple[float, float, float, float]:
-    """The attitude of a multirotor that flies so, as a quaternion w, x, y, z in ENU: it tilts towards its acceleration
-    and faces its direction of flight.
-    """
+    """As a quaternion w, x, y, z in ENU: it tilts towards its acceleration and faces its direction of flight."""
     yaw = math.pi / 2 - uav.yaw_rad  # from east towards north
     east, north, _ = uav.acceleration
     forward = max(-6.0, min(6.0, east * math.cos(yaw) + north * math.sin(yaw)))

@@ -26,9 +26,7 @@ _LAST_WORDS_S: Final = 3.0
 def record(
     feed: BusFeed, path: Path, *, ended: Sequence[int] = (), on_progress: Callable[[float], None] = lambda _: None
 ) -> int:
-    """Write what is heard to a file until the swarm is over, its router is gone, or `ended` is not empty; returns how
-    many puts were heard.
-    """
+    """Write what is heard until the swarm is over, its router gone, or a signal has `ended` it; returns the puts."""
     paced, heard = Paced(_RATE_HZ), 0
     feed.listen()
     while feed.clock is None and not ended:
@@ -52,9 +50,7 @@ def record(
 
 
 def write_mcap(outcome: Outcome, path: Path) -> int:
-    """Write the recording; returns its number of messages. Links and airtime per second are not in a trace: a
-    recording that is made during the run (`--record`) has them.
-    """
+    """Write the recording; returns its number of messages. A trace has no links and airtime per second."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with (
@@ -68,7 +64,6 @@ def write_mcap(outcome: Outcome, path: Path) -> int:
 
 
 def _retell(outcome: Outcome, recording: McapRecording) -> None:
-    """Tell a recording all that a trace has, in the order of time."""
     velocities: dict[int, tuple[float, float, float]] = {}
     last: dict[int, Posed] = {}
     for t_ns, together in groupby(_timeline(outcome), key=lambda item: item[0]):

@@ -108,9 +108,7 @@ class McapRecording:
     """A recording that is being written; a context manager, which closes the file."""
 
     def __init__(self, path: Path, scenario: Scenario, *, epoch_unix_ns: int, file: BinaryIO | None = None) -> None:
-        """Raises ConfigError when the file cannot be opened. With `file` that is written instead, and whatever hinders
-        it is raised.
-        """
+        """Raises ConfigError when the file cannot be opened. With `file` whatever hinders it is raised."""
         self.state = SwarmState(scenario)
         self.path = path
         self.epoch_unix_ns = epoch_unix_ns

@@ -207,7 +207,6 @@ def batches(name: str, outcome: Outcome, folder: Path | None = None) -> Iterator
 
 
 def table(name: str, outcome: Outcome, folder: Path | None = None) -> pa.Table:
-    """A whole table in memory."""
     if name not in TABLES:
         raise ConfigError(f"table {name!r}: must be one of {', '.join(TABLES)}")
     return pa.Table.from_batches(batches(name, outcome, folder))

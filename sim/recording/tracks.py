@@ -24,9 +24,7 @@ _GX: Final = "http://www.google.com/kml/ext/2.2"
 
 
 def write_gpx(outcome: Outcome, out: Path) -> dict[Path, int]:
-    """Write uav-N.gpx for each UAV into a folder, with the survivors that it confirmed as way points; returns the
-    number of points of each track.
-    """
+    """Write uav-N.gpx for each UAV, with its confirmations as way points; returns the points of each track."""
     tracks, finds = _tracks(outcome), _finds(outcome)
     written = {}
     for node, track in sorted(tracks.items()):

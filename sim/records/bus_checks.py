@@ -50,8 +50,7 @@ _SPEAKERS: Final[dict[type[Any], str | None]] = {
     RadioFault: "emulator",
     ProcessEnded: None,
 }
-"""The only actor that may send each of these kinds of records; None if no actor may. All other kinds are sent by the
-node that they name."""
+"""The only actor that may send each of these kinds; None: no actor. All others are sent by the node that they name."""
 _ABOUT_NOBODY: Final = (MissionModeChanged, Sighted)
 """The kinds of records in which survivor 0 means none."""
 _ABOUT_PERSONS: Final = frozenset({Confirmed, KnownOnGround, Refuted})
@@ -225,7 +224,6 @@ class BusChecks:
         return None
 
     def links(self, stats: LinkStats) -> str | None:
-        """What is wrong with a report of links; None if nothing is."""
         if not -_SLACK_NS <= stats.t_ns <= self._until_ns:
             return "instant"
         if any(not 1 <= node <= self._nodes for node in stats.ends):

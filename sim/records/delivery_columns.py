@@ -39,14 +39,12 @@ class StoredInColumns(Protocol):
 
 
 def delivery_columns(records: Iterable[Record]) -> Iterator[DeliveryColumns]:
-    """All deliveries of a trace in its order, in portions."""
     if isinstance(records, StoredInColumns):
         return records.delivery_columns()
     return in_columns(records_of(records, Delivered))
 
 
 def in_columns(deliveries: Iterable[Delivered]) -> Iterator[DeliveryColumns]:
-    """These deliveries in portions of columns."""
     rest = iter(deliveries)
     while portion := list(islice(rest, _PORTION)):
         yield DeliveryColumns(*np.array(portion, dtype=np.int64).T)

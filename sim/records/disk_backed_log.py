@@ -15,12 +15,9 @@ from sim.records.spool import Spool
 
 T = TypeVar("T")
 MOST_IN_MEMORY: Final = 1 << 9
-"""The number of items at which those in memory are packed. So few trace records are still in the processor's cache when
-they are packed, and the next ones take their place there: a run takes less time than if all its records stayed in
-memory."""
+"""Items at which those in memory are packed: so few records are still in the processor's cache then."""
 MOST_PACKED_BYTES: Final = 1 << 18
-"""The number of packed bytes at which they are written. Each call of the operating system takes the processor's cache
-from the run, so there are few."""
+"""Packed bytes at which they are written; each call of the operating system takes the cache from the run."""
 
 
 class DiskBackedLog(Generic[T]):
@@ -34,9 +31,7 @@ class DiskBackedLog(Generic[T]):
         most_in_memory: int = MOST_IN_MEMORY,
         most_packed_bytes: int = MOST_PACKED_BYTES,
     ) -> None:
-        """`pack` encodes items together, as one or several byte strings. The file is made in `folder`, by default in
-        the system's folder for temporary files.
-        """
+        """`pack` encodes items together, as one or several byte strings; the file is made in `folder`."""
         self._pack = pack
         self._folder = folder
         self._most = most_in_memory

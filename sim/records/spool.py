@@ -65,10 +65,7 @@ class Spool:
         return True
 
     def items(self, start: int = 0, end: int | None = None) -> Iterator[bytes]:
-        """The items in the order of their appending, or only those between two sizes that the spool has had.
-
-        They may be read repeatedly, and by several readers at the same time.
-        """
+        """The items in their order, or those between two sizes that the spool has had; several readers may read."""
         end = self.size if end is None else end
         unread, at, block = start, 0, b""
         while unread < end or at < len(block):
@@ -87,16 +84,14 @@ class Spool:
             block, at = block[at:] + more, 0
 
     def close(self) -> None:
-        """Free the disk space."""
         self._close()
 
 
 def in_order(
     source: Spool, key: Callable[[bytes], Any], *, change: Callable[[bytes], bytes] = lambda item: item
 ) -> Spool | None:
-    """A new spool with the items sorted by their keys (a stable sort), and `change` applied to each.
-
-    Only some megabytes of them are in memory at once. Returns None if the disk has no room for it.
+    """A new spool with the items sorted by key (stably), each with `change` applied, some megabytes in memory at once;
+    None if the disk has no room.
     """
     runs, ends = Spool(source.folder), [0]
     for portion in batches(source.items(), least_bytes=_SORTED_BYTES):

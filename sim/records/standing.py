@@ -49,7 +49,6 @@ class Standing:
                     pass
 
     def records(self) -> list[Record]:
-        """Them, the oldest first."""
         return sorted(self._kept.values(), key=lambda record: record.t_ns)
 
     def _find(self, key: tuple[object, ...], record: Record) -> None:

@@ -12,8 +12,7 @@ from sim.records.record_kinds import CODES
 from sim.records.spool import Spool, in_order
 
 _KEY: Final = struct.Struct("<qHB")
-"""The first bytes of a stored record, which are also its sort key: its instant, its node, and the number of its kind
-(`CODES`). The record itself follows as a line of JSON."""
+"""The first bytes of a stored record and its sort key: instant, node, kind (`CODES`). A line of JSON follows."""
 
 
 class RecordSpools:
@@ -37,7 +36,6 @@ class RecordSpools:
 
     @property
     def size(self) -> int:
-        """The number of bytes on disk."""
         return self._deliveries.size + self._others.size
 
     @property
@@ -46,16 +44,12 @@ class RecordSpools:
         return self._deliveries.failure or self._others.failure
 
     def close(self) -> None:
-        """Free the disk space."""
         self._deliveries.close()
         self._others.close()
 
     def records(self, *, true_delays: bool) -> Collection[Record]:
-        """All records, sorted by instant, node and kind.
-
-        The result is a `StoredRecords`, or a list in memory if the disk has no room for sorted copies. With
-        `true_delays` the delay of a delivery is computed anew, from the true instant at which its packet was generated,
-        if the trace has that instant; otherwise it stays as the receiver measured it by its own clock.
+        """All records, sorted by instant, node and kind: `StoredRecords`, or a list if the disk has no room for sorted
+        copies. `true_delays`: delays count from the true instant of generation, where the trace has it.
         """
         born: dict[tuple[int, int], int] = {}
         if true_delays:

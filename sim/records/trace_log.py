@@ -52,7 +52,6 @@ class TraceLog(Collection[Record]):
         self._change: Change | None = None
 
     def extend(self, records: Iterable[Record]) -> None:
-        """Take in records at the end."""
         self._records.extend(records)
 
     def changed(self, change: Change) -> "TraceLog":
@@ -75,7 +74,6 @@ class TraceLog(Collection[Record]):
         yield from self._latest()
 
     def of_kinds(self, kinds: tuple[type[Record], ...]) -> Iterator[Record]:
-        """The records of these kinds, in the order of the trace."""
         if Delivered in kinds and len(kinds) > 1:
             yield from (record for record in self if type(record) in kinds)
             return
@@ -91,7 +89,6 @@ class TraceLog(Collection[Record]):
         yield from (record for record in self._latest() if type(record) in kinds)
 
     def delivery_columns(self) -> Iterator[DeliveryColumns]:
-        """All deliveries in the order of the trace, in portions of columns."""
         if self._change is not None:
             yield from in_columns(self.of_kinds((Delivered,)))  # type: ignore[arg-type]
             return
@@ -101,7 +98,6 @@ class TraceLog(Collection[Record]):
         yield from in_columns(record for record in self._latest() if type(record) is Delivered)
 
     def lines(self) -> Iterator[bytes]:
-        """The lines of the trace file."""
         if self._change is not None:
             yield from (f"{line(record)}\n".encode() for record in self)
             return

@@ -165,7 +165,6 @@ def against_dominating_set(run: RunRecords, air: Air) -> str:
 
 
 def _dominating_sets(run: RunRecords) -> Iterator[set[int]]:
-    """The sets at instants over the traffic's time."""
     reach_m = heard_m(run.scenario.radio)
     begin_ns, end_ns = run.scenario.traffic_window_ns
     for step in range(_INSTANTS):
@@ -183,8 +182,8 @@ def _at(track: Sequence[Posed], at_ns: int) -> Posed:
 
 
 def greedy_dominating_set(links: Mapping[int, set[int]]) -> set[int]:
-    """A small connected set from which every node of the greatest part is reached: the node that reaches most of the
-    others first, then always the one next to the set that reaches most (Guha and Khuller, 1998, algorithm I).
+    """The node that reaches most others, then always the one next to the set that does (Guha and Khuller, 1998,
+    algorithm I).
     """
     if not links:
         return set()

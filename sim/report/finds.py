@@ -93,9 +93,7 @@ def _seen(record: Confirmed) -> Find:
 
 
 def told(folder: RunFolder) -> Mapping[tuple[int, Standing], Found]:
-    """The last estimate and the last confirmation of each survivor that UAVs told each other, from the telemetry log;
-    none without such a log.
-    """
+    """The last estimate and the last confirmation of each survivor that UAVs told each other, by the telemetry log."""
     latest: dict[tuple[int, Standing], Found] = {}
     for _, frame in folder.telemetry():
         if message_id(frame) == FOUND.msgid:
@@ -141,7 +139,6 @@ def without_doubles(known: Sequence[Find]) -> tuple[list[Find], int]:
 
 
 def found_rows(run: RunRecords, known: Sequence[Find]) -> Rows:
-    """The table of finds."""
     sensors, world = run.scenario.sensors, run.scenario.world
     origin = Geodetic(*world.origin_deg, 0.0)
     gps_m = math.hypot(sensors.gps_common_m, sensors.gps_bias_m, world.gps_sigma_m)
@@ -223,7 +220,6 @@ def _places(run: RunRecords) -> Iterator[tuple[float, float, float]]:
 
 
 def unsearched_rows(share: float, pieces: Sequence[Piece]) -> Rows:
-    """The table of what is not searched."""
     rows = [
         [f"{piece.area_m2 / _M2_PER_HA:.1f} ha", f"{piece.west:.0f} to {piece.east:.0f}",
          f"{piece.south:.0f} to {piece.north:.0f}"]

@@ -97,7 +97,6 @@ def _draw_counts(axes: Axes, lines: Sequence[tuple[str, list[Step], str, str, st
 
 
 def _coverage(run: RunRecords) -> Iterator[Step]:
-    """The share of the area covered at each instant with positions."""
     cells = OverflownCells(run.scenario)
     posed = sorted((one for track in run.tracks.values() for one in track), key=lambda one: one.t_ns)
     for t_ns, together in groupby(posed, key=lambda one: one.t_ns):

@@ -13,7 +13,6 @@ FORMATS: Final = (".png", ".svg")
 
 
 def pictures(folder: Path) -> list[Path]:
-    """The pictures of runs in a page's folder."""
     kinds = tuple(f"-{kind}" for kind in KINDS)
     found = [] if (folder / PICTURES).is_symlink() else sorted((folder / PICTURES).glob("*"))
     return [path for path in found if path.suffix in FORMATS and path.stem.endswith(kinds)]

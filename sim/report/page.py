@@ -179,7 +179,6 @@ _COLUMNS: Final = ("claim", "findings", "verdict", "why")
 
 
 def write(folders: Sequence[Path], out: Path) -> list[Path]:
-    """Write report.html and report.md of these folders; returns their paths."""
     for folder in folders:
         if folder.exists() and not folder.is_dir():
             raise ConfigError(f"{folder}: a file, and no folder of figures (fanet figures) or of a run (--out)")
@@ -231,7 +230,6 @@ class FigurePage(NamedTuple):
 
 
 def overview(folders: Sequence[Path]) -> list[Block]:
-    """The verdicts of all claims, and the settings."""
     return [*_overview(_all(folders)), *_SETTINGS]
 
 
@@ -241,7 +239,6 @@ def figure_pages(folders: Sequence[Path]) -> list[FigurePage]:
 
 
 def commands(folders: Sequence[Path]) -> list[Block]:
-    """The commands that made the figures."""
     return _commands(_all(folders))
 
 

@@ -140,7 +140,6 @@ def _solids(scenario: Scenario) -> list[list[list[int]]]:
 
 
 def _outline(box: Box) -> list[list[int]]:
-    """The corners of a building."""
     cos, sin = math.cos(box.yaw), math.sin(box.yaw)
     corners = []
     for along, across in ((-1, -1), (1, -1), (1, 1), (-1, 1)):

@@ -90,14 +90,12 @@ def _drawings(
 
 
 def _verdict(summary: Mapping[str, Any]) -> list[Block]:
-    """Whether the result may be used, and if not, why."""
     if summary["valid"]:
         return [Text("The result may be used.")]
     return [Quoted(f"NOT VALID: {'; '.join(summary['invalid_because'])}.")]
 
 
 def _finds(run: RunRecords, folder: RunFolder) -> list[Block]:
-    """Who was found, where, how sure and when, and what is not searched yet."""
     blocks: list[Block] = []
     known, doubles = finds.without_doubles(finds.with_estimates(finds.finds(run), finds.told(folder)))
     if run.scenario.mission.survivors:

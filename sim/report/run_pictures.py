@@ -21,8 +21,7 @@ from sim.report.run_records import RunRecords
 _WINDOWS: Final = 40
 """The number of steps of the delivery ratio over time."""
 _SHARES: Final = ListedColormap([colormaps["viridis"](step / 255) for step in range(200)])
-"""Colors from dark violet, for links that lose everything, to green; the yellow end of the color map is invisible on
-white."""
+"""From dark violet, links that lose everything, to green; the yellow end is invisible on white."""
 _LONG_NS: Final = 10 * S
 """Delays are drawn in seconds if the longest is at least this long."""
 _NARROWEST: Final = 0.35
@@ -91,7 +90,6 @@ def _steps(axes: Axes, values: Sequence[float], whole: int, label: str, color: s
 
 
 def delivery(run: RunRecords) -> RunPicture | None:
-    """The delivery ratio over time, and per receiver."""
     if not run.sent:
         return None
     figure, (over_time, per_node) = canvas(2, width=4.6)
@@ -127,7 +125,6 @@ def delivery(run: RunRecords) -> RunPicture | None:
 
 
 def links(run: RunRecords, counted: Sequence[Mapping[str, Any]]) -> RunPicture | None:
-    """The links over the area."""
     places = run.places()
     known = [link for link in counted if link["copies"] and {link["src"], link["dst"]} <= places.at.keys()]
     if not known:

@@ -21,7 +21,6 @@ def mission(summary: Mapping[str, Any], *, confirms: bool) -> Rows:
 
 
 def lateness(summary: Mapping[str, Any]) -> Rows:
-    """How late frames were handed over in real time."""
     late = summary["lateness"]
     return Rows(
         ("late frames", "of", "share", "limit", "p50", "p99", "worst"),
@@ -45,7 +44,6 @@ def _network(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _bounds(bound: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """How much had a bound, and how much of that was kept."""
     within, stated = bound["within_share"], bound.get("stated_share")
     if not stated or within is None:
         yield "packets x targets within the bound stated for each", percent(within)
@@ -112,7 +110,6 @@ def number(value: float | None) -> str:
 
 
 def milliseconds(value_ms: float | None) -> str:
-    """A time given in milliseconds, with its unit."""
     if value_ms is None:
         return "-"
     return f"{number(value_ms / 1000)} s" if value_ms >= _LONG_MS else f"{number(value_ms)} ms"

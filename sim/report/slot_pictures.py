@@ -45,7 +45,6 @@ class _Frame(NamedTuple):
     own: Sequence[Span]
 
     def place_ns(self, one: LetOut) -> int:
-        """The place of an instant in the superframe."""
         return (one.t_ns - self.start_ns) % self.period_ns
 
     def kept(self, let_out: Sequence[LetOut]) -> int:

@@ -10,11 +10,9 @@ from sim.results.packets import AppPackets, first_class_of, packets_of
 
 
 def age_s(outcome: Outcome) -> float:
-    """The mean age of information [s]: the time since the generation of the newest packet that a node has of another
-    one.
-
-    The mean is over the window in which packets are generated and over all pairs (source, target). Before the first
-    packet arrives, the information counts as generated at the beginning of the window.
+    """The mean time [s] since the generation of the newest packet that a node has of another one, over the window of
+    the traffic and all pairs (source, target). Before the first packet it counts as generated at the window's
+    beginning.
     """
     start_ns, end_ns = outcome.scenario.traffic_window_ns
     heard = _heard_of(first_class_of(outcome))
@@ -27,10 +25,8 @@ def age_s(outcome: Outcome) -> float:
 
 
 def report_age_s(outcome: Outcome) -> float | None:
-    """The mean age of the newest survivor report that a UAV has of another UAV [s]; None if no UAV has reported twice.
-
-    The mean is over all pairs of UAVs and over the time from a reporter's first report to its last. Before the first
-    report arrives, it counts as generated at the beginning of this time.
+    """The same of survivor reports, over all pairs of UAVs and from a reporter's first report to its last; None if no
+    UAV has reported twice.
     """
     reports = packets_of(outcome)["report"]
     heard = _heard_of(reports)

@@ -20,9 +20,7 @@ from sim.results.packets import AppPackets
 
 
 def against_bounds(applications: Mapping[str, AppPackets], *, ended_ns: int) -> dict[str, Any]:
-    """The table `bound` of `summary.json`: for all applications together, and for each; the run ended
-    at `ended_ns`.
-    """
+    """The table `bound` of `summary.json`, for all applications together and for each."""
     promised = {name: app for name, app in applications.items() if _promises(app)}
     if not promised:
         return {}
@@ -33,12 +31,8 @@ def against_bounds(applications: Mapping[str, AppPackets], *, ended_ns: int) -> 
 
 
 def likely(applications: Mapping[str, AppPackets]) -> dict[str, Any]:
-    """The table `likely` of `summary.json`: compares stated delays and shares with the copies that arrived.
-
-        within_share = deliveries within the delay stated for their packet / (packets with a statement x their targets)
-
-    Nodes that an origin took to be gone are no targets. A statement holds if `within_share` is at least the stated
-    `share`. The result is empty if no origin has stated any delay.
+    """The table `likely` of `summary.json`; empty if no origin stated a delay. within_share = deliveries within the
+    delay stated for their packet / (packets with a statement x their targets, without nodes taken to be gone)
     """
     stated = [
         (app, name, sent.likely) for app in applications.values() for name, sent in app.sent.items() if sent.likely

@@ -27,7 +27,6 @@ _FAR: Final = 4
 
 
 def clusters(outcome: Outcome, links: LinksOverTime) -> dict[str, Any]:
-    """The table `clusters` of `summary.json`."""
     first_ns, end_ns = outcome.scenario.traffic_window_ns
     end_ns = min(end_ns, outcome.simulated_ns)
     head_of: dict[int, int] = {}

@@ -90,9 +90,7 @@ def finish(
     cut: Mapping[str, str] | None = None,
 ) -> dict[str, Any]:
     """Summarize a run and, if a folder is given, write its files, and then what `page` makes of them. `cut` names what
-    was written during the run and ends early, and why.
-
-    Raises ConfigError if the folder cannot be used at all. The trace is written even if summarizing raises.
+    was written during the run and ends early. Raises ConfigError if the folder cannot be used.
     """
     if out is not None and not all((out / name).exists() for name in RESERVED):
         begin(out)
@@ -169,9 +167,7 @@ def _write(outcome: Outcome, out: Path, files: dict[str, dict[str, Any]], unwrit
 
 
 def _maps(world: dict[str, Any]) -> dict[str, tuple[Path, str]]:
-    """The files that a world names, which go into the folder, by the names that they have there; the world then names
-    those; each with its digest.
-    """
+    """The files that a world names, by their names in the folder, which the world then has; each with its digest."""
     found: dict[str, tuple[Path, str]] = {}
     for key, digest_key in FILE_KEYS.items():
         if world[digest_key]:

@@ -7,9 +7,7 @@ Cell = float | bool | str | list[float] | None
 
 
 def flat(summary: Mapping[str, Any], prefix: str = "") -> dict[str, Cell]:
-    """All numbers, truth values and texts of a summary under their dotted names, and lists of
-    numbers; no other lists.
-    """
+    """All numbers, truth values, texts and lists of numbers of a summary, under their dotted names."""
     row: dict[str, Cell] = {}
     for key, value in summary.items():
         name = f"{prefix}{key}"

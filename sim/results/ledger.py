@@ -46,9 +46,7 @@ def frames(outcome: Outcome) -> dict[str, Any]:
 
 
 def _differences(outcome: Outcome, requests: Mapping[str, Mapping[str, int]]) -> tuple[int, int]:
-    """The number of requests that did not reach the medium, and the number of those that the medium had and no node
-    made.
-    """
+    """The requests that did not reach the medium, and those that it had and no node made."""
     missing = unasked = 0
     for node in outcome.scenario.node_ids:
         name = f"agent-{node}"

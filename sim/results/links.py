@@ -22,7 +22,6 @@ class LinkTotals:
 
     @classmethod
     def of(cls, rows: Iterable[LinkRow]) -> Self:
-        """The sums that these rows state, one for each link."""
         found, totals = list(rows), cls()
         totals._links = np.array([[row.src, row.dst] for row in found], np.uint16).reshape(-1, 2)
         sums = [[row.rssi_sum_mdbm, row.received, *row.lost] for row in found]
@@ -30,7 +29,6 @@ class LinkTotals:
         return totals
 
     def add(self, stats: LinkStats) -> None:
-        """Add a report."""
         self._pending.append(stats)
         if len(self._pending) >= _PENDING:
             self._merge()
@@ -44,7 +42,6 @@ class LinkTotals:
         ]
 
     def _merge(self) -> None:
-        """Add the waiting reports to the sums."""
         ends, sums = [self._links], [self._sums]
         for report in self._pending:
             ends.append(np.frombuffer(report.ends, np.uint16).reshape(-1, 2))
@@ -57,9 +54,7 @@ class LinkTotals:
 
 
 def described(rows: Iterable[LinkRow]) -> list[dict[str, Any]]:
-    """The rows of `links.json`: copies, received, lost by reason, and the mean RSSI of the received ones [dBm], if the
-    channel knows any.
-    """
+    """The rows of `links.json`; RSSI: the mean of the received ones [dBm], if the channel knows any."""
     return [
         {
             "src": row.src,

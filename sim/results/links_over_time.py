@@ -35,8 +35,8 @@ class LinksOverTime:
         self._links: dict[int, Flags] = {}
 
     def at(self, second: int) -> Flags:
-        """Whether each pair of nodes had a link in a second; each node has one with itself. The same array is returned
-        while nothing changes.
+        """Whether each pair of nodes had a link in a second; each has one with itself. The same array while nothing
+        changes.
         """
         if second not in self._links:
             links, before = self._near_at(second) | self._near_at(second + 1), self._links.get(second - 1)

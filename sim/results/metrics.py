@@ -183,9 +183,7 @@ def _lateness(outcome: Outcome, emulator: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _admission(outcome: Outcome) -> dict[str, Any]:
-    """The number of packets refused by admission control, and how often nodes met or lost the deadline; empty without
-    `traffic.deadline_s`.
-    """
+    """Packets refused, and how often nodes met or lost `traffic.deadline_s`; empty without that."""
     deadline_s = outcome.scenario.traffic.deadline_s
     if deadline_s is None:
         return {}

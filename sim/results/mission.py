@@ -67,8 +67,7 @@ _MOST_DECADES: Final = 12.0
 """The greatest range of a phone's receiver is 10^12 m, farther than anything is apart; its square is a number."""
 _NEARLY_ALL: Final = 0.95
 MISTAKEN_M: Final = 25.0
-"""A UAV that announces a survivor farther than this from the true place has mistaken another person
-for that survivor."""
+"""A UAV that announces a survivor farther than this from the true place has mistaken somebody else."""
 
 Rows = npt.NDArray[np.float64]
 Values = npt.NDArray[np.float64]
@@ -136,8 +135,7 @@ class Confirmations:
         """`truth`: the true places of the survivors, in the order of their ids."""
         self._truth = truth
         self._held: dict[int, list[Confirmed]] = {}
-        """For each survivor, and each person found without a phone, the confirmations that hold, in the order of their
-        announcement."""
+        """For each survivor, and each person without a phone, the confirmations that hold, in their order."""
         self.reopened = 0
         """The number of times that a confirmation was taken back."""
 
@@ -151,7 +149,6 @@ class Confirmations:
             self.reopened += not is_person(record.survivor) and len(self._held[record.survivor]) < len(held)
 
     def error_m(self, confirmed: Confirmed) -> float:
-        """The distance between the announced place and the true one."""
         at = self._truth[confirmed.survivor - 1]
         return math.hypot(at.east - confirmed.east_m, at.north - confirmed.north_m)
 
@@ -164,8 +161,8 @@ class Confirmations:
         return [one for one in self._first() if self.error_m(one) > MISTAKEN_M]
 
     def persons(self) -> tuple[list[int], int]:
-        """The survivors who were found as persons without a phone, and the number of finds of persons that are of
-        nobody, or of somebody of whom there is another one. Each find is of one survivor, the nearest pairs first.
+        """The survivors found as persons without a phone, and the finds that are of nobody, or of somebody of whom
+        there is another one. Each find is of one survivor, the nearest pairs first.
         """
         finds = [held[0] for number, held in sorted(self._held.items()) if held and is_person(number)]
         near = sorted(
@@ -199,13 +196,11 @@ def _to_ground_s(right: Sequence[Confirmed], records: Collection[Record]) -> lis
 
 
 def _known_after(values_s: list[float]) -> dict[str, float | None]:
-    """How many times these are, the median, the 95th percentile and the greatest."""
     p95 = round(float(np.quantile(values_s, 0.95)), 3) if values_s else None
     return {"count": len(values_s), "p95": p95, **_waits(values_s)}
 
 
 def _waits(values_s: list[float]) -> dict[str, float | None]:
-    """The median and the greatest of some times."""
     if not values_s:
         return {"p50": None, "max": None}
     return {"p50": round(statistics.median(values_s), 3), "max": round(max(values_s), 3)}
@@ -262,20 +257,16 @@ def _all_reached(linked: Flags, first: Flags) -> bool:
 
 
 def _spread(distances_m: Values) -> dict[str, float]:
-    """The least distance, the first percentile, and the median."""
     least, hundredth, median = np.quantile(distances_m, (0.0, 0.01, 0.5)).tolist()
     return {"least": round(least, 2), "p1": round(hundredth, 2), "p50": round(median, 2)}
 
 
 def _usual(values: list[int]) -> dict[str, float]:
-    """The median over time, and the most."""
     return {"p50": statistics.median(values), "most": max(values)}
 
 
 def searching_instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows, Flags]]:
-    """The instants with positions in the trace, the positions of the UAVs alive then, and which of
-    these UAVs search.
-    """
+    """The instants with positions, the positions of the UAVs alive then, and which of these search."""
     dead: set[int] = set()
     wrecked: set[int] = set()
     homeward: set[int] = set()
@@ -336,7 +327,6 @@ class OverflownCells(_Cells):
         self._range_m = 10 ** min(_MOST_DECADES, budget_db / (10 * mission.phone_exponent))
 
     def add(self, at: Iterable[tuple[float, float, float]]) -> None:
-        """UAVs were at these places."""
         for east, north, up in at:
             ground2 = self._range_m**2 - up**2
             if ground2 <= 0:

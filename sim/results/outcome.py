@@ -23,9 +23,8 @@ class Outcome:
     mode: Literal["virtual", "realtime"]
     wall_s: float
     records: Collection[Record]
-    """The trace records by instant, within one instant in the order in which they were made (virtual time) or by node
-    (real time). They are on disk and decoded each time they are read; in virtual time the latest are in memory.
-    `collecting.record_kinds.records_of` reads those of some kinds."""
+    """By instant, then in the order in which they were made (virtual time) or by node (real time). They are on disk,
+    and decoded each time they are read; `record_kinds.records_of` reads those of some kinds."""
     reports: Mapping[str, Mapping[str, Any]]
     """The last report of each actor, by its name."""
     taps: Collection[tuple[int, bytes]] = ()
@@ -47,8 +46,8 @@ class Outcome:
     absent: Mapping[str, str] = field(default_factory=dict)
     """Why the report of an actor is missing, by the actor's name; in real time only."""
     slowed: Sequence[tuple[int, float]] = ()
-    """When the pace of the swarm's clock changed because the machine could not keep up, or could again: swarm instant
-    [ns] and the scale from then on; in real time only."""
+    """When the pace of the clock changed as the machine could not keep up, or could again: swarm instant [ns], scale.
+    """
     pauses: Mapping[str, Any] = field(default_factory=dict)
     """The pauses of the machine as the launcher saw them, in real time only."""
     leads: Mapping[str, Any] = field(default_factory=dict)
@@ -58,5 +57,4 @@ class Outcome:
 
     @property
     def simulated_ns(self) -> int:
-        """The swarm time that has passed."""
         return self.scenario.duration_ns if self.ended_ns is None else self.ended_ns

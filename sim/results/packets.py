@@ -36,9 +36,8 @@ class SentPacket(NamedTuple):
     likely: tuple[int, float] | None = None
     """The likely delay, and the share of copies that the origin stated to arrive within it; None if it stated none."""
     targets: int = 0
-    """The number of nodes for which it was meant, less those that its bound or likely delay excludes; 0 if the trace
-    does not tell.
-    """
+    """The nodes for which it was meant, less those that its bound or likely delay excludes; 0 if the trace does not
+    tell."""
     excluded: frozenset[int] = frozenset()
     """The nodes for which what its origin stated is not meant."""
 
@@ -71,15 +70,12 @@ class AppPackets:
         self.deliveries = _NONE
         self.repeated = 0
         self.unknown = 0
-        """The number of deliveries of unknown packets, whatever application they claimed; it is only counted for the
-        first application."""
+        """Deliveries of unknown packets, whatever they claimed; counted for the first application only."""
 
 
 def packets_of(outcome: Outcome) -> Mapping[str, AppPackets]:
-    """The packets by application: traffic classes, those of `OTHER_APPS`, then users' applications in the order of
-    their first packets.
-
-    The trace does not tell for which nodes a user's packet is meant, so `wanted` is 0 for users' applications.
+    """The packets by application: traffic classes, those of `OTHER_APPS`, then users' in the order of their first
+    packets, whose targets the trace does not tell (`wanted` is 0).
     """
     classes = [*outcome.scenario.traffic_classes]
     found = {app: AppPackets() for app in (*classes, *OTHER_APPS)}
@@ -112,10 +108,8 @@ def packets_of(outcome: Outcome) -> Mapping[str, AppPackets]:
 
 
 def _sent(outcome: Outcome) -> list[tuple[Name, str, SentPacket]]:
-    """Each packet with its application, in the order of generation, and all that its origin stated about it.
-
-    In real time a statement may come before the packet's own record, at one instant. If two records name one packet,
-    the first counts.
+    """Each packet with its application, in the order of generation, and all that its origin stated; the first of two
+    records counts. In real time a statement may come before the packet's own record.
     """
     born: dict[Name, Generated] = {}
     out_ns: dict[Name, int] = {}
@@ -150,18 +144,14 @@ class _Known(NamedTuple):
 
 
 class _DeliveryCount:
-    """Counts the deliveries of known packets, portion by portion.
-
-    Packets are numbered in the order of their generation; -1 stands for an unknown one, and finds the last row of each
-    column here, which belongs to no packet.
+    """Counts the deliveries of known packets, portion by portion. Packets are numbered in the order of their
+    generation; -1, an unknown one, finds the last row of each column, which belongs to no packet.
     """
 
     def __init__(
         self, packets: Mapping[Name, _Known], apps: list[str], targets: list[frozenset[int]], *, exact: bool
     ) -> None:
-        """`exact`: clocks are exact, so the delay of a delivery tells when its packet was generated. With other clocks
-        the trace has true delays, whatever the header said.
-        """
+        """`exact`: clocks are exact, so the delay of a delivery tells when its packet was generated."""
         number_of_app = {name: number for number, name in enumerate(apps)}
         known = [*packets.values(), _Known(apps[0], 0, -1, _EVERYONE)]
         self._exact = exact
@@ -182,7 +172,6 @@ class _DeliveryCount:
         self.unknown = 0
 
     def take(self, columns: DeliveryColumns) -> None:
-        """Count some more deliveries."""
         names = zip(columns.origin.tolist(), columns.seq.tolist(), strict=True)
         packet = np.array([self._numbers.get(name, -1) for name in names], np.int64)
         known = packet >= 0
@@ -215,7 +204,6 @@ class _DeliveryCount:
         return first
 
     def deliveries(self) -> list[Deliveries]:
-        """The deliveries of each application, in the order of the trace."""
         return [
             Deliveries(*map(np.concatenate, zip(*portions, strict=True))) if portions else _NONE
             for portions in self._found

@@ -84,9 +84,7 @@ class Replay:
 
     @classmethod
     def read(cls, folder: Path, *kinds: type[Any]) -> Self:
-        """Read what `fanet simulate --out` or `fanet launch --out` has written, or records of these kinds alone; raises
-        ConfigError.
-        """
+        """Read the folder of a run, or records of these kinds alone; raises ConfigError."""
         found = RunFolder(folder)
         return cls(found.scenario, list(found.records(*kinds)))
 
@@ -139,9 +137,7 @@ class Replay:
 
     @cached_property
     def covered_ns(self) -> npt.NDArray[np.int64]:
-        """The instant at which each cell of the area was covered first, -1: never; the cells by rows from south to
-        north, each row from west to east.
-        """
+        """The instant at which each cell was covered first, -1: never; rows from south to north."""
         cells = OverflownCells(self.scenario)
         first = np.full(cells.seen.shape, -1, np.int64)
         posed = sorted((one for track in self._posed.values() for one in track), key=lambda one: one.t_ns)
@@ -151,16 +147,13 @@ class Replay:
         return first
 
     def coverage(self, t_s: float) -> float:
-        """The share of the area that was covered by an instant."""
         first = self.covered_ns
         return float(((first >= 0) & (first <= round(t_s * S))).mean())
 
     def mission(self) -> Mapping[str, Any]:
-        """The table `mission` of the summary, computed anew."""
         return mission(self.scenario, self.records)
 
     def _latest(self, kind: type[R], node: NodeId, t_ns: int) -> R | None:
-        """The latest record of a kind of one UAV up to an instant."""
         records: Sequence[R] = self._changes.get((kind, node), ())
         index = bisect_right(records, t_ns, key=lambda record: record.t_ns)
         return records[index - 1] if index else None

@@ -208,7 +208,6 @@ class RunFolder:
         return scenario
 
     def links(self) -> Sequence[Mapping[str, Any]]:
-        """The rows of `links.json`."""
         found: Sequence[Mapping[str, Any]] = self._json(LINKS_FILE, _LINKS, missing=[])
         return found
 
@@ -279,9 +278,8 @@ class RunFolder:
 
 
 def read_trace(folder: Path, *kinds: type[R]) -> Iterator[R]:
-    """The records of these kinds, or of all, in the order of the trace, whatever else is in the folder.
-
-    Raises ConfigError if `folder` has no trace that can be read, and at a line that is no record, by its number.
+    """The records of these kinds, or of all, whatever else is in the folder; raises ConfigError, with the number of a
+    line that is no record.
     """
     for _, record in _lines(folder / TRACE_FILE, kinds):
         if record is not None:

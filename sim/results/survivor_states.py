@@ -17,8 +17,7 @@ class SurvivorState(NamedTuple):
 
     t_ns: int
     status: str
-    """`not heard`, `detected`, `approached`, `reached`, `confirmed`, `mistaken` (confirmed far from the true place), or
-    `reopened` (the confirmation was taken back)."""
+    """`mistaken`: confirmed far from the true place; `reopened`: the confirmation was taken back."""
     node: int
     """The UAV that brought this about; 0 if there was none."""
 
@@ -47,7 +46,6 @@ class SurvivorStates:
         return record.survivor, state
 
     def count(self, status: str) -> int:
-        """The number of survivors in a state."""
         return sum(state.status == status for state in self.now.values())
 
     def _status(self, record: Record, before: str) -> str:

@@ -19,16 +19,16 @@ from typing import Any, Final, NamedTuple
 from sim.results.outcome import Outcome, described
 
 LOST_LIMIT: Final = 0.0025
-"""The greatest sum of four shares that a slow machine loses: of all transmit requests, those lost on the bus, those
-dropped as too late, and turns to relay that a node missed; of all receptions, those lost on the bus."""
+"""The greatest sum of four shares: of all transmit requests those lost on the bus, dropped as too late, and turns to
+relay that were missed; of all receptions those lost on the bus."""
 HEARD_LATE_LIMIT: Final = 0.02
 """The greatest share of receptions that reach their node later than `radio.handover_ms` plus `radio.lead_ms` after the
 end of the frame."""
 STALL_LIMIT_MS: Final = 500.0
 """The longest time for which the emulator, the world or the launcher may stand still; each UAV depends on them."""
 UAV_STALL_LIMIT_MS: Final = 1000.0
-"""The longest time for which the process of one UAV may stand still. In a small swarm a shorter standstill is too long
-already, by the frames that it costs: one UAV of nine that stands still for 300 ms exceeds the limit of `lost`."""
+"""The same for the process of one UAV. In a small swarm the frames that it costs count first: one UAV of nine that
+stands still for 300 ms exceeds the limit of `lost`."""
 SKIPPED_TICKS_LIMIT: Final = 0.02
 """The greatest share of the world's ticks that may be skipped."""
 _PARTS: Final = frozenset({"lost_on_bus", "dropped_late", "missed_turns", "copies_lost"})
@@ -165,10 +165,7 @@ def _named(names: list[str]) -> str:
 
 
 def _copies_lost(outcome: Outcome) -> float:
-    """The share of receptions that the emulator sent to a node's process and that never arrived there.
-
-    Nodes whose process died are left out.
-    """
+    """The share of receptions that the emulator sent and that never arrived; not of nodes whose process died."""
     dead = {name for name, _ in outcome.ended}
     handed = lost = 0
     for node, count in outcome.reports.get("emulator", {}).get("handed", {}).items():

@@ -28,10 +28,7 @@ def scenario_of(given: Scenario | str | Path, *, seed: int | None = None, overri
 
 
 def by_node(applications: object, scenario: Scenario) -> Callable[[int], Sequence[Application]]:
-    """A function that makes the applications of each node, from what a user has given.
-
-    Raises ConfigError for anything else, and for a node that does not exist.
-    """
+    """A function that makes the applications of each node; raises ConfigError for anything else, and unknown nodes."""
     if applications is None:
         return lambda _: ()
     if isinstance(applications, Mapping):

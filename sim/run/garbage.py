@@ -1,10 +1,7 @@
-"""Switches the garbage collector off in runs in virtual time, and has it collect what they leave behind.
-
-A run makes millions of small tuples and no cycles, so the collector is off in it, which saves a tenth of the time. The
-actors of a swarm refer to each other, however, so only the collector frees those of an ended run (3 to 40 MB of 45
-UAVs). A program that makes many runs, such as a sweep, would keep them all: nothing that is alive at the end of a run
-is young, and the collector by itself hardly ever examines what is old. So it is asked to, before a run, as soon as the
-runs since it last did have taken much more time than it takes.
+"""Switches the garbage collector off in runs in virtual time, which saves a tenth of their time, and has it collect
+what they leave behind: the actors of an ended run refer to each other (3 to 40 MB of 45 UAVs), and the collector by
+itself hardly ever examines what is old. So it is asked to, before a run, when those since the last time took much
+longer than that takes.
 """
 
 import gc

@@ -27,7 +27,6 @@ Tell = Callable[[str], None]
 
 
 def expected_names(scenario: Scenario) -> list[str]:
-    """The names of all actors of a swarm."""
     return ["emulator", "world", *(f"agent-{node}" for node in scenario.node_ids)]
 
 
@@ -41,9 +40,7 @@ async def serve(
     zenoh_config: Path | None = None,
 ) -> int:
     """Serve the bus and the clock until the scenario is over; with `out`, collect and write what the services did.
-
-    Returns the exit code: 0, or 1 when a result was asked for and may not be used. Raises BusError when it cannot
-    listen on the endpoint.
+    Returns 1 when a result was asked for and may not be used; raises BusError when it cannot listen.
     """
     listen = with_port(listen)
     with contextlib.ExitStack() as held:

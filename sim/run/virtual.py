@@ -33,8 +33,7 @@ from sim.world.environment.map_on_board import map_on_board
 from sim.world.world import WorldActor
 
 EPOCH_UNIX_NS: Final = 1_735_689_600 * S
-"""2025-01-01T00:00:00Z: the unix time of swarm instant 0 in logs. It is fixed, so that the same scenario and seed give
-the same files. It is not 1970, which some tools take for no time at all."""
+"""2025-01-01T00:00:00Z: fixed, so that the same seed gives the same files; some tools take 1970 for no time at all."""
 Applications = Callable[[int], Sequence[Application]]
 """A user's applications for each node."""
 
@@ -85,13 +84,9 @@ def simulate(
     spool_folder: Path | None = None,
     observer: Observer | None = None,
 ) -> Outcome:
-    """Run a scenario to its end, or until `signals` holds the number of a signal; then the outcome is what there is so
-    far.
-
-    `applications` gives the user's applications for each node, in addition to those of the scenario. `on_progress` is
-    told how many seconds have been simulated. A long run keeps what it collects in a nameless file in `spool_folder`,
-    by default in the folder for temporary files. `observer` is told what happens. Raises
-    KeyboardInterrupt with the signal's number if it comes before anything was simulated.
+    """Run a scenario to its end, or until `signals` holds the number of a signal; then the outcome is partial, or
+    KeyboardInterrupt is raised before anything was simulated. `on_progress` is told the simulated seconds; a long run
+    keeps what it collects in a nameless file in `spool_folder`.
     """
     with GARBAGE.not_collected():
         observed = Observed(
@@ -104,10 +99,8 @@ def simulate(
 
 
 class Observed:
-    """The actors of a scenario on their host, and what is collected from them.
-
-    The host refers to all that is collected, and this object does not. So everything is freed, and the files are
-    closed, as soon as nobody refers to the outcome any more, without the garbage collector, which is off in a run.
+    """The actors of a scenario on their host, and what is collected from them. The host refers to that, and this object
+    does not, so it is freed with the outcome although the garbage collector is off in a run.
     """
 
     def __init__(
@@ -119,9 +112,7 @@ class Observed:
         folder: Path | None = None,
         observer: Observer | None = None,
     ) -> None:
-        """What is too long for memory is kept in a nameless file in `folder`, by default in the folder for temporary
-        files.
-        """
+        """What is too long for memory is kept in a nameless file in `folder`."""
         self.scenario = scenario
         self.records = TraceLog(folder)
         self.names = Topics(scenario.name)

@@ -33,9 +33,7 @@ class DaskCluster:
             raise
 
     def _checked(self) -> int:
-        """The number of workers; raises ConfigError if their code or packages differ, because then
-        rows might differ.
-        """
+        """The number of workers; raises ConfigError if their code differs, because then rows might."""
         try:
             self._client.wait_for_workers(1, timeout=_WORKERS_S)
         except TimeoutError as error:

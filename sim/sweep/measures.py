@@ -24,14 +24,11 @@ _DECADES: Final = 6
 DELAY_EDGES_S: Final = tuple(
     _LEAST_S * math.pow(10.0, step / _PER_DECADE) for step in range(_PER_DECADE * _DECADES + 1)
 )
-"""The upper edges of the classes of `delay_counts`: 40 per decade from 1 ms to 1,000 s; the first class has all shorter
-delays."""
+"""Upper edges of the classes of `delay_counts`: 40 per decade from 1 ms, below which is the first, to 1,000 s."""
 
 
 def delay_counts(outcome: Outcome) -> list[float]:
-    """The number of deliveries of application packets in each class of delay (`DELAY_EDGES_S`), and
-    of all longer ones.
-    """
+    """Deliveries of application packets in each class of delay (`DELAY_EDGES_S`), and of all longer ones."""
     delays_s = first_class_of(outcome).deliveries.delay_ns / S
     counts = np.bincount(np.searchsorted(DELAY_EDGES_S, delays_s), minlength=len(DELAY_EDGES_S) + 1)
     return [float(count) for count in counts]
@@ -77,9 +74,7 @@ def first_approach_s(outcome: Outcome) -> list[float]:
 
 
 def enough_heard_s(outcome: Outcome) -> float | None:
-    """The instant [s] from which enough UAVs had received the same phone for the mission's rule; no UAV turns before
-    it.
-    """
+    """The instant [s] from which enough UAVs had received the same phone; none turns before it."""
     enough = outcome.scenario.mission.reports_to_approach
     who: dict[int, set[int]] = {}
     for record in records_of(outcome.records, Detected):

@@ -52,7 +52,6 @@ def _cpu_s() -> float:
 
 
 def carry_out(task: Task) -> Finished:
-    """Simulate or launch, summarize and measure one run."""
     began, began_cpu = time.perf_counter(), _cpu_s()
 
     def ended(**came_to: str) -> Finished:

@@ -23,9 +23,7 @@ _LIVES: Final = 2
 
 
 def _work(tasks: Connection) -> None:
-    """The work of a worker: it receives tasks and returns their results, until the other end of the connection is
-    closed.
-    """
+    """Receive tasks and return their results, until the other end of the connection is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the sweep receives the signal, and ends its workers
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     be_killed_with_parent()

@@ -27,7 +27,6 @@ def code() -> str:
 
 
 def digest(sources: dict[str, Path]) -> str:
-    """The digest of the names and contents of some sources."""
     whole = hashlib.sha256()
     for name, path in sources.items():
         whole.update(f"{name} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())

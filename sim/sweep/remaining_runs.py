@@ -53,7 +53,6 @@ class TimeLeft:
         """The sizes of finished runs in virtual time, and the seconds that they took."""
 
     def on_end(self, key: str, took_s: float) -> None:
-        """A run has ended, after so many seconds."""
         size, realtime = self._left.pop(key)
         if not realtime:
             self._done += size

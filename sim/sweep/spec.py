@@ -88,9 +88,7 @@ class Case(_Table):
 
 
 class SweepVariant(_Table):
-    """The parts of a sweep that a variant replaces: the seeds, single keys of `set`, single axes of the grid, the
-    cases.
-    """
+    """What a variant replaces: the seeds, single keys of `set`, single axes of the grid, the cases."""
 
     like: Literal["quick"] | None = None
     """The variant of which this one replaces what it names itself."""
@@ -110,7 +108,6 @@ class Setting(_Table):
     slow_down_to: float | None = None
 
     def overrides(self) -> list[str]:
-        """The changes in the form of `--set`."""
         return [f"{key}={toml_value(value)}" for key, value in self.changes.items()]
 
 
@@ -174,7 +171,6 @@ class Sweep(_Table):
                 yield Setting(case=case.name, changes=changes, realtime=case.realtime, slow_down_to=case.slow_down_to)
 
     def count(self) -> int:
-        """The number of runs."""
         points = sum(1 for _ in itertools.islice(self.settings(), MOST_RUNS + 1))
         return points * len(self.seed_list())
 
@@ -183,7 +179,6 @@ VARIANTS: Final = ("quick", "full")
 
 
 def shipped() -> list[str]:
-    """The names of the shipped sweeps."""
     return sorted(
         item.name.removesuffix(".toml") for item in files("sim.sweeps").iterdir() if item.name.endswith(".toml")
     )

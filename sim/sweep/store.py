@@ -140,10 +140,7 @@ class Store:
 
 
 def write_whole(path: Path, table: pa.Table) -> None:
-    """Write a table so that the file is either complete or missing, even if the process or the machine dies.
-
-    Raises ConfigError.
-    """
+    """Write a table so that it is complete or missing, even if the machine dies; raises ConfigError."""
     fresh = path.with_name(f"{path.stem}-{os.getpid()}.tmp")
     try:
         fresh.unlink(missing_ok=True)

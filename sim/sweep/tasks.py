@@ -22,8 +22,7 @@ class Task:
     """One run as plain values, which can be sent to any process on any machine."""
 
     key: str
-    """A hash of the resolved scenario, of the contents of its files and modules, and of the measures: runs with equal
-    keys are equal."""
+    """A hash of the resolved scenario, of its files and modules, and of the measures: equal runs have equal keys."""
     case: str
     seed: int
     tree: Mapping[str, Any]

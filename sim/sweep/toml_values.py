@@ -11,7 +11,6 @@ _CLOSING = "]}"
 
 
 def toml_value(value: object) -> str:
-    """A value as one line of TOML."""
     match value:
         case bool():
             return "true" if value else "false"

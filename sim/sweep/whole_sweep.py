@@ -1,8 +1,4 @@
-"""Carries out the remaining runs of a sweep (`remaining_runs.py`), and stores each result at once.
-
-The file of a sweep is read in `spec.py` and its grid becomes tasks in `tasks.py`, which `pool.py` or `dask_cluster.py`
-carry out side by side.
-"""
+"""Carries out the remaining runs of a sweep (`remaining_runs.py`), and stores each result at once."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -47,9 +43,8 @@ def run(
     *,
     on_progress: Callable[[Progress], None] = lambda _: None,
 ) -> pa.Table:
-    """Carry out the remaining runs, the longest first and those in real time last; returns the table.
-
-    However it ends, the table with the finished runs has been written.
+    """Carry out the remaining runs, the longest first and those in real time last; returns the table, which is written
+    however it ends.
     """
     left = TimeLeft(plan, workers=workers.workers)
     todo = sorted(plan.todo, key=lambda task: -plan.sizes[task.key])

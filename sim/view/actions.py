@@ -38,11 +38,9 @@ class Actions:
         self._present_s = 0.0
 
     def cut(self, node: int) -> str:
-        """Switch a UAV's radio off."""
         return self._control(Cut(node_label(node), NodeId(node)), f"UAV {node}: radio off")
 
     def crash(self, node: int) -> str:
-        """Let a UAV's motors stop."""
         return self._control(Mishap(node_label(node), NodeId(node), MishapKind.CRASH, STILL), f"UAV {node} crashes")
 
     def degrade(self, a: int, b: int, *, loss_share: float) -> str:
@@ -56,17 +54,14 @@ class Actions:
         )
 
     def jam(self, label: str, east: float, north: float, radius: float) -> str:
-        """Let nothing be received in a circle."""
         return self._control(
             Jam(label, Enu(east, north, 0.0), radius, math.inf), f"jammed {radius:.0f} m about {east:.0f}, {north:.0f}"
         )
 
     def restore(self) -> str:
-        """End all faults on the air."""
         return self._control(Restore(""), "all faults end")
 
     def pace(self, time_scale: float) -> str:
-        """Let the swarm's time pass at another pace."""
         scale = min(max(time_scale, PACE_BOUNDS[0]), PACE_BOUNDS[1])
         self._feed.bus.put(self._feed.names.clock_control, codecs.encode([ClockRequest(scale)]), reliable=True)
         return "the clock stands" if scale == PAUSED else f"clock at {scale:g}"
@@ -80,7 +75,6 @@ class Actions:
         return self._command(node, common.MAV_CMD_DO_REPOSITION, said, -1.0, 1.0, place=at)
 
     def recall(self, node: int) -> str:
-        """Send a UAV home."""
         said = f"UAV {node} sent home"
         if self.has_post:
             return self._order(Order(OrderKind.RECALL, node), said)

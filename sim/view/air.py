@@ -47,9 +47,7 @@ class AirSource(Protocol):
         """The transmissions that began in a span of swarm time, in their order."""
         ...
 
-    def rest(self) -> None:
-        """Nobody looks any more."""
-        ...
+    def rest(self) -> None: ...
 
 
 class LiveAir:
@@ -124,9 +122,7 @@ def air_text(
     losses: Mapping[str, float] = MappingProxyType({}),
     selected: int = 0,
 ) -> str:
-    """The picture of the time before an instant, and the shares of the last seconds, as HTML. `losses`: the share of
-    copies that was lost, by reason.
-    """
+    """The picture before an instant, and shares of the last seconds, as HTML. `losses`: share of copies, by reason."""
     span_ns = min(TAKEN_NS, t_ns)
     sent = source.between(t_ns - span_ns, t_ns)
     if not sent or not span_ns:
@@ -157,7 +153,6 @@ def air_text(
 
 
 def _row(name: str, sent: Sequence[AirTime], span_ns: int) -> str:
-    """How many frames were sent a second, and what they took of the air."""
     share = sum(one.length_ns for one in sent) / span_ns
     return f"<tr><td>{name}</td><td>{len(sent) * S / span_ns:.0f}</td><td>{100 * share:.2f} %</td></tr>"
 

@@ -86,7 +86,6 @@ class Panels:
     # --- for the loop that draws ----------------------------------------------------------------------------------
 
     def run_jobs(self) -> None:
-        """Do what was asked for since the last frame."""
         while True:
             try:
                 job = self.jobs.get_nowait()
@@ -130,11 +129,9 @@ class Panels:
         self._write("_uav", self._uav_text())
 
     def clear_charts(self) -> None:
-        """Forget the past, because time has jumped."""
         self._history.clear()
 
     def say(self, text: str) -> None:
-        """Say what an action has done, below the clock."""
         self._said = text
 
     # --- parts ----------------------------------------------------------------------------------------------------
@@ -471,7 +468,6 @@ def _dot(color: str) -> str:
 
 
 def legend(*, by_cluster: bool, links_known: bool) -> str:
-    """What the colors mean."""
     bars = ((colors.BLUE, "90 % received"), (colors.ORANGE, "half"), (colors.RED, "less"))
     links = ", ".join(f"<nobr><span style='color:{color}'>&#9644;</span> {said}</nobr>" for color, said in bars)
     modes = ((MODE_COLORS["search"], "search"), (MODE_COLORS["respond"], "respond"),

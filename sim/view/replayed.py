@@ -52,7 +52,6 @@ class _Player:
         self._list.on_update(later(lambda: self._jump_to(self._list.value, names)))
 
     def advance(self, elapsed_s: float) -> None:
-        """Go on by some wall time."""
         if self.plays:
             self.t_ns = min(self._timeline.end_ns, self.t_ns + round(elapsed_s * self.speed * S))
             if self.t_ns // (500 * MS) != self._shown_ns // (500 * MS):
@@ -60,7 +59,6 @@ class _Player:
                 self._slider.value = round(self.t_ns / S, 1)
 
     def jump(self, t_ns: int) -> None:
-        """Go to an instant."""
         self.t_ns = min(max(0, t_ns), self._timeline.end_ns)
         self._panels.clear_charts()
 

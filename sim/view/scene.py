@@ -107,7 +107,6 @@ class Scene:
                 self._draw_jams()
 
     def spreading(self) -> tuple[tuple[int, int], PacketNow] | None:
-        """The packet whose spreading is shown."""
         return self._packet
 
     def shown_spread(self, t_ns: int) -> tuple[int, int]:
@@ -118,9 +117,7 @@ class Scene:
         return sum(copy.delay_ns <= own_ns for copy in self._packet[1].got.values()), own_ns
 
     def turn_ns(self, t_ns: int) -> int:
-        """The instant of which it is shown whose turn it is: where turns are too short to be seen, that of the packet
-        which spreads.
-        """
+        """The instant whose turn is shown: where turns are too short to be seen, that of the packet which spreads."""
         turns = self.state.turns
         short = turns is not None and min((span.length_ns for span in turns.own), default=_SEEN_NS) < _SEEN_NS
         if not short or self._packet is None or not self.shown.spreading:
@@ -286,7 +283,6 @@ class Scene:
         self._lines("links", segments, tints, round(max(0.5, min(1.5, _MOST_THICK / max(1, len(segments)))), 1))
 
     def _in_reach(self) -> tuple[list[Any], list[Any]]:
-        """The pairs of UAVs in each other's reach."""
         at = np.array([uav.position for _, uav in sorted(self.state.uavs.items())])
         apart = np.linalg.norm(at[:, None] - at[None], axis=2)
         pairs = np.argwhere(np.triu(apart <= self._reach_m, k=1))

@@ -53,7 +53,6 @@ def open_server(port: int | None) -> viser.ViserServer:
 
 
 def close_server(server: viser.ViserServer) -> None:
-    """Stop a server without a word."""
     with contextlib.suppress(RuntimeError), contextlib.redirect_stdout(io.StringIO()):
         server.stop()
 

@@ -19,7 +19,6 @@ _BOX_FACES: Final = np.array(
 
 
 def box() -> tuple[Rows, Faces]:
-    """A cube of side 1 about the origin."""
     return _BOX, _BOX_FACES
 
 
@@ -76,14 +75,11 @@ def circle_segments(east: float, north: float, up: float, radius: float, *, corn
 
 
 def rgb(web: str) -> tuple[int, int, int]:
-    """A web color as numbers from 0 to 255."""
     return int(web[1:3], 16), int(web[3:5], 16), int(web[5:7], 16)
 
 
 def linear(paints: object) -> npt.NDArray[np.uint8]:
-    """Colors as the light that they stand for, sRGB's curve undone: viser takes the colors of batches and of ends of
-    lines for light, and those of single things for colors.
-    """
+    """Colors as light, sRGB's curve undone, which viser takes in batches and at ends of lines."""
     return np.rint(255 * (np.asarray(paints, float) / 255) ** 2.2).astype(np.uint8)
 
 

@@ -14,7 +14,6 @@ def run(scenario: Scenario, address: SwarmAddress, *, flight: SwarmFlight | None
 
 
 def main() -> int:
-    """Parse the command line and run; returns the exit code."""
     return service.serve(service.parser("sim.world", "Run the world against a router.").parse_args(), run)
 
 

@@ -58,9 +58,7 @@ _CONTROL_S: Final = 0.05
 
 
 class Ticks:
-    """The instants at which the world moves bodies and publishes their poses: one period apart. A host that wakes the
-    world late does not shift later ticks.
-    """
+    """The instants, one period apart, at which the world moves bodies; a late host does not shift later ticks."""
 
     def __init__(self) -> None:
         self.next_ns: int | None = None
@@ -73,21 +71,18 @@ class Ticks:
         """The number of ticks that were left out, because the host woke the world more than a period after them."""
 
     def begin(self, now_ns: int, *, period_ns: int) -> None:
-        """Start to count; the first tick is one period ahead."""
         self.last_ns = now_ns
         self.next_ns = now_ns + period_ns
 
     def resume(self, now_ns: int, *, tick_ns: int) -> None:
-        """Continue after a time in which nothing moved, with a new phase: the next tick is `tick_ns` ahead. It moves
-        bodies for the time since the last tick, but for no more than twice `tick_ns`.
+        """Continue after a time in which nothing moved: the next tick is `tick_ns` ahead, and moves bodies for at most
+        two.
         """
         self.last_ns = max(self.last_ns, now_ns - tick_ns)
         self.next_ns = now_ns + tick_ns
 
     def follow(self, due_ns: int, now_ns: int, *, period_ns: int) -> None:
-        """Plan the tick after the one at `due_ns`. If several ticks have been due since, all but the latest of them are
-        skipped, so that the phase stays as it was.
-        """
+        """Plan the tick after the one at `due_ns`; of several that are due all but the latest are skipped."""
         self.count += 1
         self.next_ns = due_ns + period_ns
         behind = (now_ns - self.next_ns) // period_ns
@@ -228,7 +223,6 @@ class WorldActor(Actor):
         return max(tick_ns, min(_STILL_NS, self._suite.shortest_ns)) if self._guidance.still else tick_ns
 
     def _suffer(self, now_ns: int) -> None:
-        """Bring about the mishaps that are due."""
         for mishap in self._mishaps.due(now_ns):
             if mishap.what is MishapKind.CRASH and self._flies[mishap.node - 1]:
                 self._falling.add(mishap.node)
@@ -288,8 +282,8 @@ class WorldActor(Actor):
         self.records += [FlightModeChanged(now_ns, node, mode.value) for node, mode in changes]
 
     def _find_wrecks(self, solids: Solids) -> None:
-        """In a world that continues an earlier one: mark UAVs as crashed that lie on the ground without having been
-        told to land.
+        """In a world that continues an earlier one, UAVs are wrecks that lie on the ground without having been told to
+        land.
         """
         at = self._engine.positions()
         for row in np.flatnonzero(solids.gap_m(at) <= _WRECK_M).tolist():

@@ -35,8 +35,7 @@ from sim.run.collecting.taps import encoded_tap, taps_of
 BURST_BYTES: Final = 16 << 20
 """The number of bytes that one actor may put at once; ten hours of a UAV's trace in `rescue`."""
 BYTES_PER_S: Final = 1 << 20
-"""The number of bytes per second that one actor may put in the long run; two hundred times those of
-a UAV in `rescue`."""
+"""In the long run, of one actor: two hundred times what a UAV in `rescue` puts."""
 _LONGEST_WHY: Final = 120
 Subscribe = Callable[[str, OnSample], None]
 
@@ -195,16 +194,12 @@ class Collector:
         )
 
     def records(self, further: Iterable[Record] = ()) -> Collection[Record]:
-        """All trace records and some further ones, sorted by instant, node and kind; with true delays if clocks drift.
-
-        They remain on disk, and can be read after the collector is closed.
-        """
+        """All records and some further ones, by instant, node and kind, on disk; with true delays if clocks drift."""
         with self._lock:
             self._keep(further)
             return self._records.records(true_delays=self._true_delays)
 
     def reports(self) -> dict[str, dict[str, Any]]:
-        """The last valid report of each actor, by name."""
         with self._lock:
             return {name: self._reports[name] for name in sorted(self._reports)}
 
@@ -239,7 +234,6 @@ class Collector:
         return self._records.failure or self._taps.failure
 
     def close(self) -> None:
-        """Free the disk space."""
         with self._lock:
             self._records.close()
             self._taps.close()

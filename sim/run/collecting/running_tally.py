@@ -59,9 +59,7 @@ class Progress(NamedTuple):
 
 
 class RunningTally:
-    """The share of the first class of traffic that was delivered, and the survivors that were confirmed near their
-    true places.
-    """
+    """What of the first class of traffic was delivered, and the survivors confirmed near their true places."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._traffic = next(iter(scenario.traffic_classes))

@@ -66,10 +66,7 @@ class StoredTaps(Collection[Tap]):
 
 
 def taps_of(spool: Spool) -> Collection[Tap]:
-    """The taps of a run in real time, sorted by instant; `spool` holds them encoded by `encoded_tap`, unsorted.
-
-    They are sorted on disk, or in memory if the disk has no room for a sorted copy.
-    """
+    """The taps of a run in real time, sorted by instant, on disk or, where that has no room, in memory."""
     ordered = in_order(spool, _INSTANT.unpack_from)
     if ordered is None:
         return sorted(map(_decoded_tap, spool.items()), key=lambda tap: tap[0])

@@ -26,8 +26,8 @@ from sim.run.launcher.parent_death import be_killed_with_parent
 
 _PRELOAD: Final = ["agents.__main__", "emulator.__main__", "sim.world.__main__", "sim.run.launcher.services"]
 _NICENESS: Final = 4
-"""The niceness of a child that runs with lower priority, added to that of the launcher. With 10, two busy loops beside
-`rescue` on two processors slow the swarm's clock to 0.56; with 4 it stays at 1, and the emulator still goes first."""
+"""Added to the launcher's. With 10, two busy loops beside `rescue` on two processors slow the swarm's clock to 0.56;
+with 4 it stays at 1, and the emulator still goes first."""
 _FOR_THE_LAUNCHER: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _LAUNCHES_WHEN_IMPORTED: Final = 79
 """The exit code of a child whose import of the main program starts a swarm."""
@@ -39,14 +39,11 @@ Entry = Callable[..., int]
 _PR_SET_NAME: Final = 15
 _NAME_BYTES: Final = 15
 _ARG_START, _ARG_END = 48 - 3, 49 - 3
-"""The indices of fields of /proc/PID/stat (proc_pid_stat(5)), counted from the field after the command's closing
-parenthesis."""
+"""Indices of fields of /proc/PID/stat (proc_pid_stat(5)), from the one after the closing parenthesis."""
 
 
 def entitle(name: str, title: str) -> None:
-    """Name this process `name` (its first 15 characters), and make its command line `title`, as far
-    as there is room.
-    """
+    """Name this process (15 characters), and make its command line `title`, as far as there is room."""
     if sys.platform != "linux":
         return
     ctypes.CDLL(None).prctl(_PR_SET_NAME, name.encode()[:_NAME_BYTES], 0, 0, 0)
@@ -68,7 +65,6 @@ class ChildRecipe(NamedTuple):
 
 
 def _child(recipe: ChildRecipe) -> None:
-    """Prepare a child process, do its work, and exit with its code."""
     for number in _FOR_THE_LAUNCHER:
         signal.signal(number, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _FOR_THE_LAUNCHER)
@@ -86,11 +82,8 @@ def _child(recipe: ChildRecipe) -> None:
 
 
 def _keep_no_server_alive() -> None:
-    """Close this child's copy of the pipe that keeps the fork server alive.
-
-    The server lives until nobody holds that pipe, and it gives each child a copy, so that children could start
-    children, too. Children of a swarm do not. Without the copies, the server ends when the launcher ends, even if the
-    launcher is killed, and all children end with the server.
+    """Close this child's copy of the pipe that keeps the fork server alive, so that the server, and with it all
+    children, ends with the launcher, even a killed one.
     """
     kept = forkserver._forkserver._forkserver_alive_fd  # type: ignore[attr-defined]  # noqa: SLF001
     if kept is not None:
@@ -99,10 +92,8 @@ def _keep_no_server_alive() -> None:
 
 
 def _give_way() -> None:
-    """Let processes of higher priority go first, and let another child finish its step before this one wakes up.
-
-    When the world publishes positions, all UAVs of a swarm become ready at once. With `SCHED_BATCH` the one that wakes
-    up does not interrupt the one that runs, so each does its short step with a warm cache.
+    """Let processes of higher priority go first; with `SCHED_BATCH` a UAV that wakes up does not interrupt another's
+    step, when all become ready at once by the world's positions.
     """
     os.nice(_NICENESS)
     if sys.platform == "linux":
@@ -111,18 +102,13 @@ def _give_way() -> None:
 
 
 def end_if_imported_by_a_child() -> None:
-    """End this process if it is a child that imports the main program, as each child does before it begins.
-
-    Only a program that does not ask whether it is the main one comes here in a child. Each of its children would start
-    a swarm, and print multiprocessing's traceback; `warm_up` says what is wrong instead.
-    """
+    """End a child whose import of the main program would start a swarm; `warm_up` says then what is wrong."""
     if getattr(multiprocessing.current_process(), "_inheriting", False):  # as multiprocessing itself asks
         os._exit(_LAUNCHES_WHEN_IMPORTED)
 
 
 _started: Final[dict[str, int]] = {}
-"""Which of multiprocessing's helper processes were started here, and by which process; a program of a user's may use
-them, too."""
+"""Which of multiprocessing's helper processes were started here, and by which process."""
 
 
 def _first() -> None:
@@ -133,10 +119,8 @@ def _first() -> None:
 
 
 def _start_server() -> None:
-    """Start the server from which children are forked, with the launcher's signals blocked in it and in its children.
-
-    Ctrl-C, the end of a system service and of a terminal send a signal to all of them. The server ignores Ctrl-C only
-    after its imports, and a child only from `_child` on; without the block each would print a traceback until then.
+    """Start the server from which children are forked, with the launcher's signals blocked: it ignores them only after
+    its imports, and a child only from `_child` on; until then each would print a traceback.
     """
     helpers = {
         "tracker": resource_tracker._resource_tracker._pid,  # type: ignore[attr-defined]  # noqa: SLF001
@@ -175,9 +159,8 @@ class Processes:
         self._empty = asyncio.Event()
 
     async def warm_up(self) -> bool:
-        """Wait until the server has imported what children need; otherwise the first `start` would block the event
-        loop. Returns True if the emulator's kernel will be compiled. Raises HostError if children cannot import the
-        main program because it starts a swarm of its own then.
+        """Wait until the server has imported what children need. Returns True if the emulator's kernel will be
+        compiled; raises HostError if the main program starts a swarm when it is imported.
         """
         first = self._context.Process(target=_first)
 
@@ -244,7 +227,6 @@ class Processes:
         return True
 
     async def end_all(self) -> None:
-        """Kill all children that have not ended by themselves."""
         for process in list(self._running.values()):
             process.kill()
         if self._running:
@@ -253,10 +235,8 @@ class Processes:
 
 @atexit.register
 def end_servers() -> None:
-    """End those of multiprocessing's helper processes that this process has started for a swarm; by themselves they
-    would end some tens of milliseconds later.
-
-    Each ends when its last user does, and is waited for. A program with living children of its own is not held up.
+    """End those of multiprocessing's helper processes that were started for a swarm, some tens of milliseconds before
+    they would end. A program with living children of its own is not held up.
     """
     if _started.get("process") != os.getpid() or multiprocessing.active_children():
         return

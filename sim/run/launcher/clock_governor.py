@@ -38,8 +38,8 @@ _BAD_SECONDS: Final = 3
 """Lateness on average counts only if it was beyond the limit in this many seconds: one pause can spoil two."""
 _CALM: Final = 0.5
 _CLOSE_LIMIT: Final = 0.05
-"""The pace rises only if less than this part of a limit is late, and no more than this share of the requests come in
-the last quarter of their lead."""
+"""The pace rises only if less than this part of a limit is late, and this share of requests come in the last quarter of
+their lead."""
 _RETURN_NS: Final = 24 * S
 """The real time without lateness after which the pace is the full one."""
 _PLATEAU: Final = 0.5
@@ -96,8 +96,8 @@ class ClockGovernor:
     """Decides from the actors' reports at which pace the swarm's clock runs."""
 
     def __init__(self, time_scale: float, *, least: float, late_limit: float, end_ns: int, processors: float) -> None:
-        """`least` is the smallest scale to which the clock may slow down; not less than `time_scale`: it never does.
-        The run ends at the swarm instant `end_ns`; its processes share that many `processors`.
+        """`least`: the smallest scale; not less than `time_scale`: the clock never slows down. The run ends at the
+        swarm instant `end_ns`.
         """
         self.steps: list[tuple[int, float]] = []
         """When the pace changed: swarm instant [ns] and the scale from then on."""
@@ -143,7 +143,6 @@ class ClockGovernor:
         return scale
 
     def _judged(self, second: Counts, at: Instant, before: Instant) -> float:
-        """The scale after one second."""
         if self._overloaded(second, at, before):
             too_fast = not self._catches_up(second.late_ms / second.late_frames)
         else:

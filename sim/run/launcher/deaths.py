@@ -27,9 +27,7 @@ class Deaths:
         self._late_starts: Counter[str] = Counter()
 
     def grant_late_start(self, name: str, exit_code: int) -> bool:
-        """True if a process that has found no router may be started again before the swarm's time begins; False if it
-        has used all its starts.
-        """
+        """True if a process that has found no router may be started again before the swarm's time begins."""
         if exit_code != BUS_EXIT_CODE or self._late_starts[name] >= _MAX_LATE_STARTS:
             return False
         self._late_starts[name] += 1

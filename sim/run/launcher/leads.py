@@ -47,7 +47,6 @@ class Leads(NamedTuple):
 
 
 def fitting(*, processes: int, processors: float, pause_ms: float) -> Leads:
-    """The lead and the handover for that many processes on a machine with such pauses."""
     share = processes / processors
     wanted_ms = max(_LEAST_MS, _TURN_MS * share, _PAUSES * pause_ms)
     lead_ms = min(_MOST_MS, _STEP_MS * math.ceil(wanted_ms / _STEP_MS))
@@ -62,10 +61,7 @@ def states_leads(scenario: Scenario) -> bool:
 
 
 def fitted(scenario: Scenario, tell: Callable[[str], None]) -> tuple[Scenario, Leads | None]:
-    """The scenario for processes on this machine, and what was chosen; None if the scenario states its lead.
-
-    A handover that the scenario states stays as it is. It takes a second.
-    """
+    """The scenario for processes on this machine, and what was chosen; None if it states its lead. Takes a second."""
     if states_leads(scenario):
         return scenario, None
     pause_ms = longest_pause_ns(_MEASURED_S) / MS

@@ -1,8 +1,4 @@
-"""A child process asks Linux to kill it when its parent process ends, however the parent ends.
-
-The parent of a swarm's process is the fork server, which in turn ends with the launcher; the parent of a sweep's worker
-is the process of the sweep.
-"""
+"""Asks Linux to kill a child (a swarm's process, a sweep's worker) when its parent ends, however that ends."""
 
 import ctypes
 import signal

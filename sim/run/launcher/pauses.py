@@ -29,7 +29,6 @@ class PauseWatch:
         self.restart()
 
     def restart(self) -> None:
-        """Count from now on."""
         self.count = 0
         self.longest_ns = 0
         """The longest delay, also if it was too short for a pause."""
@@ -50,11 +49,9 @@ class PauseWatch:
         self._wait()
 
     def close(self) -> None:
-        """Stop watching."""
         self._timer.cancel()
 
     def summary(self) -> dict[str, Any]:
-        """The figures for the summary of a run."""
         return {
             "count": self.count,
             "longest_ms": round(self.longest_ns / MS, 1),

@@ -14,21 +14,18 @@ from sim.world.environment.layout import positions
 
 
 def run_emulator(**arguments: Any) -> int:  # noqa: ANN401
-    """The emulator's process."""
     from emulator.__main__ import run
 
     return run(**arguments)
 
 
 def run_world(**arguments: Any) -> int:  # noqa: ANN401
-    """The world's process."""
     from sim.world.__main__ import run
 
     return run(**arguments)
 
 
 def run_agent(**arguments: Any) -> int:  # noqa: ANN401
-    """The process of one UAV."""
     from agents.__main__ import run
 
     return run(**arguments)

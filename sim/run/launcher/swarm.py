@@ -49,8 +49,7 @@ from sim.world.flight_recorder import FlightRecorder
 from sim.world.possible_world import require_possible
 
 READY_TIMEOUT_S: Final = 300.0
-"""How long the launcher waits until all processes are present: on a busy machine 47 processes take a minute, and a
-compilation may come on top."""
+"""Until all processes are present: 47 take a minute on a busy machine, and a compilation may come on top."""
 WORD_EVERY_S: Final = 10.0
 """The interval at which the launcher says for which processes it is waiting."""
 _NOTICE_S: Final = 1.0
@@ -58,8 +57,7 @@ _NOTICE_S: Final = 1.0
 _GRACE_S: Final = 5.0
 """How long the launcher waits for last reports after the end of the swarm's time."""
 _LAST_WORDS_S: Final = 1.0
-"""How long the launcher waits for last messages after the end of all processes, because some may
-still be on the bus."""
+"""After the end of all processes: some last messages may still be on the bus."""
 _PROGRESS_S: Final = 0.25
 Tell = Callable[[str], None]
 OnProgress = Callable[[Progress], None]
@@ -130,10 +128,7 @@ class SwarmRun:
         self._signal: int | None = None
 
     async def run(self, on_progress: OnProgress, on_started: Callable[["SwarmRun"], None]) -> Outcome:
-        """Start, run and collect. Whatever happens, no process and no temporary file is left.
-
-        `on_started` receives this run when nothing is left that could keep its processes from starting.
-        """
+        """Start, run and collect; whatever happens, no process and no temporary file is left."""
         with contextlib.closing(self._collector), contextlib.closing(self._pauses):
             began = time.monotonic()
             try:
@@ -180,7 +175,6 @@ class SwarmRun:
         )
 
     def interrupt(self, number: int) -> None:
-        """End the run early because of a signal."""
         self._signal = number
         nothing = "" if self._clock else " before the swarm's time began: there is no result"
         self.abort(f"interrupted by {signal.Signals(number).name}{nothing}")
@@ -223,7 +217,6 @@ class SwarmRun:
         return ready_s
 
     async def _follow(self, on_progress: OnProgress) -> None:
-        """Wait until the swarm's time is over or the run is aborted."""
         assert self._clock is not None, "the clock was started"
         while self._clock.wait_s(self._services.scenario.duration_ns) > 0 and not self._over.is_set():
             reports = self._collector.reports()
@@ -364,9 +357,7 @@ async def _any_done(*futures: asyncio.Future[Any], timeout_s: float) -> bool:
 
 
 def _bus(listen: str | None, connect: str | None, zenoh_config: Path | None) -> tuple[Bus, str]:
-    """The launcher's session, and the endpoint to which its children connect; with keys for all of them it uses TLS by
-    default.
-    """
+    """The launcher's session, and the endpoint for its children; TLS by default if there are keys for all."""
     config = config_of(zenoh_config, ROUTER)
     if connect is not None:
         return Bus.join(connect, config), connect
@@ -394,19 +385,14 @@ async def launch(
     heed_signals: bool = True,
     leads: Leads | None = None,
 ) -> Outcome:
-    """Run a scenario as real processes. `on_started` receives the swarm while it runs, for tests and tools.
+    """Run a scenario as real processes; `on_started` receives the swarm while it runs.
 
-    With `slow_down_to` the swarm's clock slows down, at most to that scale, while the machine cannot keep up with it,
-    and speeds up again afterwards.
-    The nodes of `leave_out` are waited for and not started: a program of the user's own joins in their place.
-    Without `own_world` the swarm waits for a foreign world, which declares the liveliness token of `world`.
-    `leads`: what was chosen for the scenario's lead and handover, for the outcome.
-    `zenoh_config` is Zenoh's own configuration: a file for all processes, or a folder with one file for each. What is
-    collected waits in temporary files in `spool_folder`, by default where the system keeps such files.
-
-    Raises BusError when the bus cannot be used or the swarm does not come up, ConfigError when the world is impossible
-    or a limit of the machine is too low, HostError when the program launches also when it is imported, and
-    KeyboardInterrupt with its number when a signal comes before there is anything to report.
+    `slow_down_to`: the scale to which the clock may slow down while the machine cannot keep up. Nodes of `leave_out`
+    are joined by a program of the user's. Without `own_world` a foreign world declares the liveliness token of `world`.
+    `leads`: what was chosen for the scenario, for the outcome. `zenoh_config`: a file for all processes, or a folder
+    with one for each. Raises BusError when the swarm does not come up, ConfigError when the world is impossible or a
+    limit too low, HostError when the program launches when it is imported, and KeyboardInterrupt for a signal before
+    there is anything to report.
     """
     end_if_imported_by_a_child()
     require_possible(scenario)

@@ -28,10 +28,8 @@ def _numbers(count: int) -> Indices:
 
 
 def approaches(before: Rows, after: Rows, *, within_m: float) -> tuple[Indices, Indices, Values]:
-    """The pairs of bodies that come nearer than this to each other in a step, and how near.
-
-    Candidates are found by sorting the middles of all steps along one direction (sweep and prune; Cohen et al.,
-    I-COLLIDE, 1995), in which no two places of a grid lie beside each other.
+    """The pairs that come nearer than this in a step, and how near: by sorting the middles of all steps along one
+    direction (sweep and prune; Cohen et al., I-COLLIDE, 1995), in which no two places of a grid lie beside each other.
     """
     way = after - before
     reach = within_m + math.sqrt(float((way * way).sum(axis=1).max(initial=0.0)))

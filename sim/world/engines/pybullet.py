@@ -91,7 +91,6 @@ class Physics(Engine):
         self._contacts.reset()
 
     def _build(self) -> list[int]:
-        """Place hills and buildings; returns their bodies."""
         if self._obstacles is None:
             return []
         client, bodies = self._client, []

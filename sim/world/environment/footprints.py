@@ -86,10 +86,7 @@ class Town(NamedTuple):
 
 @lru_cache(maxsize=8)
 def read(path: Path, *, origin_deg: tuple[float, float], height_m: float, area_m: float, digest: str = "") -> Town:
-    """The buildings of a file whose middle lies in the area; raises ConfigError with the name of the file.
-
-    `digest` is that of the content, so that a file that has changed is read again.
-    """
+    """The buildings whose middle lies in the area; raises ConfigError. `digest`: that of a changed file is another."""
     data = content(path, key="world.buildings_geojson", digest=digest)
     try:
         found = outlines.parse(data)
@@ -138,7 +135,6 @@ def height_of(tags: Mapping[str, Any], default_m: float) -> tuple[float, str]:
 
 
 def _said(tags: Mapping[str, Any], key: str) -> str:
-    """The text of a tag; empty if there is none."""
     return "" if tags.get(key) is None else str(tags[key]).strip()
 
 
@@ -174,9 +170,7 @@ def _turn(yaw: float) -> Rows:
 
 
 def _rectangle(ring: Rows, height: float) -> Footprint:
-    """The smallest rectangle around a ring; one of its sides lies along a side of the ring's hull (Freeman and Shapira,
-    1975).
-    """
+    """The smallest rectangle around a ring has a side along one of its hull (Freeman and Shapira, 1975)."""
     edges = np.diff(_hull(ring), axis=0)
     angles = np.unique(np.round(np.arctan2(edges[:, 1], edges[:, 0]) % (math.pi / 2), 9))
     best: tuple[float, Footprint] | None = None
@@ -189,7 +183,6 @@ def _rectangle(ring: Rows, height: float) -> Footprint:
 
 
 def _around(ring: Rows, yaw: float, height: float) -> Footprint:
-    """The rectangle of this rotation around a ring."""
     turned = ring @ _turn(yaw)
     low, high = turned.min(axis=0), turned.max(axis=0)
     width, depth = np.maximum(high - low, _LEAST_SIDE_M).tolist()
@@ -245,9 +238,7 @@ def _covered(ring: Rows) -> float:
 
 
 def _halves(ring: Rows) -> list[Rows]:
-    """The parts on both sides of the best cut: their rectangles are smallest, or else one of them needs no further cut.
-    What encloses nothing is no part.
-    """
+    """Both sides of the best cut: the smallest rectangles, or else one that needs no further cut."""
     best: tuple[float, float] | None = None
     halves: list[Rows] = []
     for axis in (0, 1):

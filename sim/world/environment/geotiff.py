@@ -21,9 +21,7 @@ _MEMORY_FILE: Final = re.compile(r"(?:/vsimem/)?[0-9a-f-]{36}\S*?(?:: ?|, )|/vsi
 def read(
     path: Path, data: bytes, places: Sequence[Geodetic], *, most_cells: int
 ) -> tuple[Rows, list[tuple[float, float]], tuple[float, float]]:
-    """The heights of the first band, the southernmost row first, NaN where there is none; the column and row of each
-    place; and latitude and longitude of the middle.
-    """
+    """Heights of the first band, southernmost row first, NaN: none; column and row of each place; middle (lat, lon)."""
     try:
         from rasterio._err import CPLE_BaseError  # transform() lets GDAL's own errors through
         from rasterio.enums import ColorInterp

@@ -8,9 +8,7 @@ from fanet_mw.scenario.named_files import MOST_BYTES, digest_of_bytes
 
 
 def content(path: Path, *, key: str, digest: str = "") -> bytes:
-    """The bytes of the file that this key of a scenario names; raises ConfigError if it cannot be read, or is not the
-    one with this digest.
-    """
+    """The bytes of the file that a key names; raises ConfigError if it cannot be read, or has another digest."""
     try:
         data = read_regular(path, most_bytes=MOST_BYTES)
     except ConfigError as error:

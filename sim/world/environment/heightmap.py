@@ -55,7 +55,6 @@ class Heightmap(NamedTuple):
 
     @property
     def cell_m(self) -> float:
-        """The lesser extent of a cell."""
         return 1 / float(np.linalg.norm(self.per_m, axis=1).max())
 
     def cell(self, east: Values, north: Values) -> tuple[Values, Values]:
@@ -176,9 +175,8 @@ def _centered(metres: Rows, cell_m: tuple[float, float]) -> Heightmap:
 def _laid(
     metres: Rows, cells: list[tuple[float, float]], lattice: list[_Place], middle_deg: tuple[float, float]
 ) -> Heightmap:
-    """Heights under the area, of which column and row are known at each place of the lattice.
-
-    The cells are taken for parallelograms: over an area of 10 km that is right to about 5 m.
+    """Heights under the area, by column and row of each place of the lattice. Cells are taken for parallelograms: over
+    10 km that is right to about 5 m.
     """
     known = np.array([[1.0, place.at.east, place.at.north] for place in lattice])
     fit, *_ = np.linalg.lstsq(known, np.array(cells), rcond=None)

@@ -12,9 +12,7 @@ ON_GROUND_M: Final = 0.1
 
 
 def positions(scenario: Scenario) -> list[Enu]:
-    """The start of every node, in order of id: the layout about the base, in the air or on the ground, and the antenna
-    of the post on the ground.
-    """
+    """The start of every node, by id: the layout about the base, and the antenna of the post on the ground."""
     places = _with_leader(_layout(scenario), scenario)
     east, north = scenario.world.base_m
     if east or north:
@@ -47,7 +45,6 @@ def _with_leader(places: list[Enu], scenario: Scenario) -> list[Enu]:
 
 
 def _layout(scenario: Scenario) -> list[Enu]:
-    """The places of all nodes around the origin."""
     nodes = scenario.nodes
     if nodes.layout == "grid":
         columns = nodes.columns or grid_columns(nodes.count)
@@ -66,7 +63,6 @@ def _layout(scenario: Scenario) -> list[Enu]:
 
 
 def _disc(scenario: Scenario) -> list[Enu]:
-    """Uniform over a disc."""
     random = stream(scenario.seed, "layout")
     places = []
     for _ in range(scenario.nodes.count):

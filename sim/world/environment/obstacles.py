@@ -64,8 +64,8 @@ class Box(NamedTuple):
 
 
 class Hills(NamedTuple):
-    """The ground, as triangles over a square grid of heights above 0 that is centered at the origin, row by row to the
-    north. Each cell is divided along its diagonal from southwest to northeast; beyond the grid its edge continues.
+    """The ground as triangles over a square grid of heights above 0, centered at the origin, row by row to the north.
+    Each cell is divided from southwest to northeast; beyond the grid its edge continues.
     """
 
     heights: Rows
@@ -101,13 +101,10 @@ class Hills(NamedTuple):
         return math.hypot(*steps)
 
     def height_m(self, east: float, north: float) -> float:
-        """Height of the ground at one place."""
         return float(self.at(np.array([[east, north]]))[0])
 
     def mesh(self) -> tuple[Rows, Indices]:
-        """The same surface for a physics engine or a renderer: corners [n, 3], and three of them for each triangle. It
-        extends `_BEYOND_M` beyond the grid.
-        """
+        """Corners [n, 3], and three of them for each triangle, up to `_BEYOND_M` beyond the grid."""
         side = self.heights.shape[0] + 2
         axis = (np.arange(side) - (side - 1) / 2) * self.cell_m
         axis[[0, -1]] += [self.cell_m - _BEYOND_M, _BEYOND_M - self.cell_m]
@@ -126,7 +123,6 @@ class Obstacles(NamedTuple):
 
     @property
     def top_m(self) -> float:
-        """The height of the highest obstacle."""
         hill = float(self.hills.heights.max()) if self.hills else 0.0
         return max([hill, *(box.roof for box in self.boxes)])
 
@@ -166,7 +162,6 @@ def obstacles(scenario: Scenario, starts: Rows) -> Obstacles:
 
 
 def town_of(world: World) -> footprints.Town:
-    """What the scenario's GeoJSON file holds."""
     return footprints.read(
         Path(world.buildings_geojson),
         origin_deg=world.origin_deg,
@@ -177,7 +172,6 @@ def town_of(world: World) -> footprints.Town:
 
 
 def heightmap_of(world: World) -> heightmap.Heightmap:
-    """The heights of the scenario's file."""
     return heightmap.read(
         Path(world.heightmap),
         origin_deg=world.origin_deg,
@@ -208,9 +202,8 @@ def _of_file(world: World, hills: Hills | None, starts: Rows) -> Iterator[Box]:
 
 
 def _hills_of_file(scenario: Scenario) -> Hills:
-    """The heights of the file on a square grid over the area; outside of the file its edge continues.
-
-    The grid is nowhere lower than the file: where it is coarser, ridges and towers keep their highest point.
+    """The heights of the file on a square grid over the area, nowhere lower than the file: where the grid is coarser,
+    ridges and towers keep their highest point.
     """
     world = scenario.world
     found = heightmap_of(world)
@@ -226,8 +219,8 @@ def _hills_of_file(scenario: Scenario) -> Hills:
 
 
 def _not_below(heights: Rows, cell_m: float, east: Values, north: Values, least: Values) -> Rows:
-    """The heights of a grid, raised where it would be lower than `least` at a place between its points, but nowhere
-    above the highest of the places beside a point.
+    """A grid raised where it would be lower than `least` between its points, but nowhere above the highest place beside
+    one.
     """
     side = len(heights)
     x, y = (np.clip(part / cell_m + (side - 1) / 2, 0, side - 1 - 1e-9) for part in (east, north))

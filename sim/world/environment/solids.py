@@ -48,12 +48,10 @@ class Solids:
 
     @property
     def hilly(self) -> bool:
-        """True if the ground is not flat."""
         return self._hills is not None
 
     @property
     def any(self) -> bool:
-        """True if there is anything solid."""
         return bool(len(self._middle)) or self._hills is not None
 
     def ground_m(self, places: Rows) -> Values:
@@ -63,9 +61,7 @@ class Solids:
         return self._hills.at(places)
 
     def surface_m(self, at: Rows) -> Values:
-        """The height of the surface straight below each place [n, 3]: a roof or the ground. For a place inside a
-        building it is the roof.
-        """
+        """The height of the roof or ground straight below each place [n, 3]; inside a building the roof."""
         surface = self.ground_m(at)
         if len(self._middle):
             inside = (np.abs(self._local(at)[..., :2]) <= self._half[None, :, :2]).all(axis=2)
@@ -74,15 +70,13 @@ class Solids:
         return surface
 
     def gap_m(self, at: Rows) -> Values:
-        """The distance from each place [n, 3] to the nearest wall, roof, hillside or flat ground; negative below the
-        ground.
-        """
+        """The distance of each place [n, 3] from the nearest solid; negative below the ground."""
         gap: Values = at[:, 2] - self.ground_m(at)
         return gap if not len(self._middle) else np.minimum(gap, self._boxes_gap_m(at).min(axis=1))
 
     def least_gap_m(self, before: Rows, after: Rows, *, within_m: float) -> Values:
-        """The least gap on the straight path of each body; that at its end where no path can lead nearer than
-        `within_m`. Over a slope it is at most `within_m` where the path leads so near to it in any direction.
+        """The least gap on each straight path; that at its end where none leads nearer than `within_m`. Over a slope at
+        most `within_m` where the path leads so near to it.
         """
         gap = self.gap_m(after)
         path = after - before
@@ -105,8 +99,8 @@ class Solids:
         return gap
 
     def stop(self, before: Rows, after: Rows, velocity: Rows) -> Flags:
-        """Put those bodies of `after` where something solid stops them on their straight path from `before`, from where
-        they may still rise or fall beside a wall, and change their velocities; returns which these are.
+        """Put bodies of `after` where something stops them on their way from `before`, beside a wall at their height,
+        and change their velocities; returns which these are.
         """
         up = after[:, 2].copy()
         stopped = self._put_back(before, after)
@@ -151,9 +145,7 @@ class Solids:
         return np.stack([east, north, local[:, 2]], axis=1) + self._middle
 
     def corners_near(self, start: Rows, way: Rows, *, margin_m: float) -> tuple[npt.NDArray[np.int64], Values, Values]:
-        """The buildings near straight paths, seen from above: each by the row of the path, its corners [4, 2], and its
-        roof.
-        """
+        """The buildings near straight paths from above: the row of the path, corners [4, 2], roof."""
         middle, span = start[:, :2] + way[:, :2] / 2, np.linalg.norm(way[:, :2], axis=1) / 2
         apart = np.linalg.norm(middle[:, None] - self._middle[None, :, :2], axis=2)
         ray, box = np.nonzero(apart <= span[:, None] + self._radius[None] + margin_m)
@@ -175,9 +167,7 @@ class Solids:
         return np.asarray(self.first_hit_m(first, direction, length) < length)
 
     def first_hit_m(self, origin: Rows, direction: Rows, range_m: Values | float) -> Values:
-        """The distance at which each ray [n, 3] of unit direction hits something; infinite if nothing is within its
-        range.
-        """
+        """Where each ray [n, 3] of unit direction hits something; infinite if nothing is within its range."""
         reach = np.broadcast_to(np.asarray(range_m, dtype=np.float64), (len(origin),))
         hit = np.full(len(origin), math.inf)
         if len(origin) == 0:
@@ -194,9 +184,7 @@ class Solids:
         return np.asarray(np.sqrt((out**2).sum(axis=2)))
 
     def _boxes_least_m(self, start: Rows, way: Rows, *, within_m: float) -> Values:
-        """The least distance from the boxes on straight paths; infinite if it is greater than `within_m`. It is convex
-        along a path, because boxes are convex.
-        """
+        """The least distance from the boxes on straight paths, along which it is convex; infinite beyond `within_m`."""
         rows = np.arange(len(start))
         reach = np.linalg.norm(way, axis=1)
         first, second = np.nonzero(self._boxes_gap_m(start) <= reach[:, None] + within_m)
@@ -219,8 +207,8 @@ class Solids:
         return least
 
     def _hill_within(self, start: Rows, way: Rows, radius_m: float) -> Flags:
-        """Which paths lead so near to a hillside: where the nearest of its places lies along its normal, or towards an
-        edge, some point at this distance from the path is below the ground.
+        """Which paths lead so near to a hillside: some point at this distance along a normal, or towards an edge, is
+        below the ground.
         """
         assert self._hills is not None, "asked only where there are hills"
         normals = [self._hills.normals(place + off) for place in (start, start + way) for off in _ROUND * radius_m]
@@ -244,9 +232,7 @@ class Solids:
         return np.stack([along, across, vectors[..., 2]], axis=-1)
 
     def _boxes_hit_m(self, origin: Rows, direction: Rows, reach: Values) -> Values:
-        """The slab method: a ray is inside a box where it is between the planes of all three pairs (Kay and Kajiya,
-        1986).
-        """
+        """The slab method: inside a box a ray is between all three pairs of planes (Kay and Kajiya, 1986)."""
         middle = origin[:, :2] + direction[:, :2] * (reach / 2)[:, None]
         span = reach / 2 * np.linalg.norm(direction[:, :2], axis=1)
         apart = np.linalg.norm(middle[:, None] - self._middle[None, :, :2], axis=2)
@@ -290,9 +276,8 @@ class Solids:
         return hit
 
     def above_hills(self, origin: Rows, direction: Rows, reach: Values) -> tuple[Values, Values]:
-        """Where each ray begins, crosses the edges of triangles, and ends, in order; and its height above them there.
-
-        The edges lie where east, north, or their difference is a whole number of cells.
+        """Where each ray begins, crosses edges of triangles (east, north, or their difference a whole number of cells)
+        and ends; and its height above them.
         """
         assert self._hills is not None, "asked only where there are hills"
         cell_m, last = self._hills.cell_m, self._hills.heights.shape[0] - 1

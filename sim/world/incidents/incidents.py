@@ -13,10 +13,7 @@ from sim.world.engines.contacts import approaches
 
 
 class Separation:
-    """The least distance between any two UAVs, and how often two came nearer than they should.
-
-    Bodies are taken to fly straight between two steps of the engine, so the least distance within a step is known.
-    """
+    """The least distance of two UAVs, and how often two came too near; ways within a step are straight."""
 
     def __init__(self, distance_m: float) -> None:
         """`distance_m`: the distance that any two UAVs should keep; with 0 nothing is watched."""
@@ -60,9 +57,7 @@ class NoFlyEntries:
             raise ConfigError(f"world.no_fly_m.{columns[0]}: node {rows[0] + 1} starts within it")
 
     def watch(self, before: Rows, after: Rows) -> None:
-        """Count the UAVs that enter an area on their straight ways from `before` to `after`, also those that leave it
-        at once.
-        """
+        """Count the UAVs that enter an area on their straight ways, also those that leave it at once."""
         if not len(self._areas):
             return
         self.entries += int((self._reached(before, after) & ~self._within).sum())

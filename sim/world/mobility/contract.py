@@ -13,10 +13,8 @@ class Track(NamedTuple):
 
 
 class MobilityModel(Protocol):
-    """A mobility model: where UAVs fly while no setpoint says otherwise.
-
-    Another package may bring one (`fanet_mw.extensions`): a class that takes the places [n, 3] where the UAVs start,
-    and the scenario.
+    """Where UAVs fly while no setpoint says otherwise. A class of another package (`fanet_mw.extensions`) takes the
+    places [n, 3] where they start, and the scenario.
     """
 
     def track(self, t_s: float) -> Track:

@@ -12,10 +12,8 @@ from sim.world.mobility.contract import Track
 
 
 class Formation:
-    """The whole layout moves from the base to the middle of the area, and then around it again and again.
-
-    Its way is a rectangle on which the edges of the formation touch those of the area. All of the area is overflown if
-    the layout is at least half as large as the area.
+    """The whole layout moves from the base to the middle of the area, and then around it on a rectangle on which its
+    edges touch those of the area.
     """
 
     def __init__(self, starts: Rows, scenario: Scenario) -> None:

@@ -53,11 +53,9 @@ class FlightMode(StrEnum):
     TAKEOFF = "takeoff"
     LAND = "land"
     RETURN = "return"
-    """The UAV flies home and lands: its computer has commanded it or has fallen silent, or it was beyond the
-    geofence."""
+    """It flies home and lands: commanded, its computer has fallen silent, or it was beyond the geofence."""
     FAILSAFE = "failsafe"
-    """The UAV holds its position because velocity setpoints are no longer renewed, or lands because its battery is
-    nearly empty."""
+    """It holds its position as velocity setpoints are no longer renewed, or lands as its battery is nearly empty."""
     FALLEN = "fallen"
     """The UAV has crashed and obeys nothing."""
 
@@ -88,20 +86,16 @@ _Command = _GoTo | _FlyAt | _Land | Homeward
 
 
 def makes_sense(setpoint: Setpoint) -> bool:
-    """False for a malformed setpoint: one with a coordinate or speed that is not a number or is absurdly great.
-
-    Every process on the bus can send setpoints. Great values would overflow when they are squared, and stop the
-    flight of all UAVs.
+    """False for a setpoint with a coordinate or speed that is no number or absurdly great: any process on the bus may
+    send it, and it would overflow for all UAVs.
     """
     possible = setpoint.position.is_within(FARTHEST_M) and setpoint.velocity.is_within(FASTEST_M_S)
     return possible and abs(setpoint.speed_m_s) <= FASTEST_M_S
 
 
 class Guidance:
-    """The flight controllers of all UAVs, one row of each array for each UAV.
-
-    A UAV follows the track of the mobility model until a setpoint commands something else. The state of each UAV is its
-    command, its flight mode, and whether it may still stand on the ground.
+    """The flight controllers of all UAVs, a row of each array for each: its command, its flight mode, and whether it
+    may still stand on the ground.
     """
 
     def __init__(self, starts: Rows, scenario: Scenario, *, surface_m: Callable[[Rows], Values] | None = None) -> None:
@@ -184,9 +178,7 @@ class Guidance:
             assert_never(kind)
 
     def land_at_once(self, node: int) -> None:
-        """Land a UAV where it is, because its battery is nearly empty or it has lost its position; it obeys no further
-        setpoint.
-        """
+        """Land a UAV where it is, with its battery nearly empty or its position lost; it obeys nothing further."""
         row = node - 1
         if self._obeys(row):
             self._command(row, _Land(_FORCED_M_S))
@@ -199,9 +191,7 @@ class Guidance:
         self._enter(row, FlightMode.FALLEN)
 
     def _obeys(self, row: int) -> bool:
-        """False for a UAV that has crashed, that lands because its battery is nearly empty, or that returns from beyond
-        the geofence.
-        """
+        """False if it has crashed, lands with its battery nearly empty, or returns from beyond the geofence."""
         mode = self._modes.get(row)
         landing = isinstance(self._commands.get(row), _Land)
         forced = (mode is FlightMode.FAILSAFE and landing) or row in self._returns.from_fence
@@ -262,10 +252,8 @@ class Guidance:
         return self._model.track(t_s) if self._model else Track(self._starts, np.zeros_like(self._starts))
 
     def wanted(self, t_s: float, true: Rows, velocity: Rows, off: Rows | None = None) -> Rows:
-        """The velocity that each UAV should fly now [m/s], given the places and velocities of all.
-
-        `off`: by how much flight controllers are mistaken about where they are [n, 3]; None means not at all. The track
-        of a mobility model is where UAVs really fly, and the ground is felt, whatever they believe.
+        """The velocity that each UAV should fly now [m/s]. `off`: by how much flight controllers mistake their places
+        [n, 3]; the track of a mobility model is where UAVs really fly, whatever they believe.
         """
         at = true
         if off is not None and self.flown:
@@ -321,10 +309,8 @@ class Guidance:
             self._enter(row, FlightMode.RETURN)
 
     def _near_the_ground(self, wish: Rows, at: Rows, landings: Mapping[int, float]) -> None:
-        """Set the velocities of UAVs that land or stand on the ground.
-
-        Landing UAVs (`landings`: sinking speed by row) sink over their places, slowly near the ground. Those that wait
-        for take-off stand still. A UAV that has climbed clear of the ground leaves `_grounded`.
+        """UAVs that land (`landings`: sinking speed by row) sink over their places, slowly near the ground; those that
+        wait for take-off stand still; who has climbed clear leaves `_grounded`.
         """
         height = at[:, 2] - self._surface_m(at)
         for row, speed_m_s in landings.items():

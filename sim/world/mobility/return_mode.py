@@ -42,11 +42,9 @@ class Homeward(NamedTuple):
 
 
 class _Heights:
-    """The heights above the highest home at which the UAVs of a swarm return, such that no two share one.
-
-    Row k has the height k steps above `mobility.return_height_m`. A UAV that is higher takes the next height of its
-    own, which is higher by as many steps as there are UAVs, because it never sinks before it is home. If a swarm is too
-    large for steps below the ceiling, UAVs share heights.
+    """Heights above the highest home at which UAVs return, such that no two share one: row k is k steps above
+    `mobility.return_height_m`; a higher UAV takes the next height of its own, as it never sinks before it is home.
+    Below the ceiling a large swarm shares heights.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -98,9 +96,7 @@ class ReturnMode:
         return Homeward(Enu(east, north, ground_m + height_m), speed_m_s if speed_m_s > 0 else self._speed_m_s)
 
     def due(self, able: Collection[int], at: Rows, beyond: Flags, t_s: float) -> Iterator[tuple[int, Homeward]]:
-        """Those UAVs of the rows `able` that have to return now, each with its way. The silence of a UAV that is not
-        able to, because it stands on the ground, begins when it is.
-        """
+        """The rows of `able` that have to return now, each with its way; silence counts from when a UAV is able to."""
         self._told_s |= dict.fromkeys(self._told_s.keys() - set(able), t_s)
         for row in able:
             silent = bool(self._after_s) and t_s - self._told_s.get(row, t_s) >= self._after_s

@@ -21,10 +21,8 @@ _ROUNDS: Final = 4
 
 
 def kept_clear(wish: Rows, at: Rows, see_m: float) -> Rows:
-    """Cap each UAV's own speed towards each neighbor within `see_m`, and push UAVs apart that are too near.
-
-    Two UAVs that fly towards each other at v each, and brake at `BRAKE_M_S2`, need v^2 / BRAKE_M_S2 to stop. The cap
-    is the v for which this is the gap between them less `CLEAR_M`.
+    """Cap each UAV's speed towards each neighbor within `see_m`, and push apart those that are too near. Two that brake
+    at `BRAKE_M_S2` from v each need v^2 / BRAKE_M_S2, which is the gap between them less `CLEAR_M`.
     """
     apart = at[:, None] - at[None]
     distance = np.sqrt((apart**2).sum(axis=2))

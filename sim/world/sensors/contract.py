@@ -68,9 +68,7 @@ def generator(seed: int, *names: str) -> np.random.Generator:
 
 
 class Drift:
-    """Slow errors: a Gauss-Markov process for each UAV and axis, x' = -x / tau + noise, with a given standard
-    deviation.
-    """
+    """Slow errors: a Gauss-Markov process for each UAV and axis, x' = -x / tau + noise, of a given deviation."""
 
     def __init__(self, random: np.random.Generator, shape: tuple[int, ...], *, sigma: float, tau_s: float) -> None:
         self._random = random

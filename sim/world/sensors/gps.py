@@ -73,7 +73,6 @@ class GpsReceiver(Sensor):
         return self._last[1:]
 
     def _out(self, truth: Truth) -> Flags:
-        """The UAVs that get no fix now."""
         out = np.zeros(len(truth.at), bool)
         for place, radius_m, begin_ns, end_ns in self._outages:
             if begin_ns <= truth.now_ns < end_ns:

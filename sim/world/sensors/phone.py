@@ -75,9 +75,7 @@ class PhoneSensor(Sensor):
         return tuple(sorted(heard, key=lambda h: (-h[1], h[0])))
 
     def _shadowing_db(self, survivors: npt.NDArray[np.intp], at: npt.NDArray[np.float64]) -> Values:
-        """The shadowing between these survivors and a place, which is the same each time: the sum of the cosines of
-        both phases together.
-        """
+        """The shadowing between these survivors and a place, each time the same: the cosines of both phases."""
         here = at @ self._waves
         waves = self._cos[survivors] @ np.cos(here) - self._sin[survivors] @ np.sin(here)
         return np.asarray(self._mission.shadowing_db * math.sqrt(2 / _WAVES) * waves)
@@ -92,7 +90,5 @@ class PhoneSensor(Sensor):
 
 
 def _wave_vectors(random: np.random.Generator) -> Values:
-    """Wave vectors [3, _WAVES] for a correlation distance of 1 m: multivariate Cauchy, a normal vector over an
-    independent normal number.
-    """
+    """Wave vectors [3, _WAVES] for a correlation distance of 1 m: multivariate Cauchy."""
     return np.asarray(random.normal(size=(3, _WAVES)) / np.abs(random.normal(size=_WAVES)))

@@ -133,9 +133,7 @@ class RadarSensor(Sensor):
     def _echoes(
         self, distance: Values, direction: Values, closing: Values, area_m2: float
     ) -> Iterator[tuple[int, Echo]]:
-        """The returns of targets with one cross section that exceed the threshold, with the errors that follow from
-        their SNR, each beside the number of its target.
-        """
+        """The returns that exceed the threshold, with the errors of their SNR, each beside the number of its target."""
         config, random = self._config, self._random
         mean_db = config.radar_snr_db + 10 * math.log10(area_m2) - 40 * np.log10(np.maximum(distance, 1.0) / 100)
         power = (1 + 10 ** (mean_db / 10)) * random.exponential(1.0, len(distance))

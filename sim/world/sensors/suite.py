@@ -57,10 +57,9 @@ def sensors_of(
     gps: GpsReceiver | None = None,
     engine: Engine | None = None,
 ) -> list[Sensor]:
-    """The sensors that a scenario asks for, in the order in which their readings are sent.
-
-    `drain`: the batteries; None if UAVs have none. `obstacles`: the same obstacles as in `solids`, for rendered
-    images; None if there are none. `gps`: receivers that flight controllers use, too. `engine`: its air is measured.
+    """The sensors that a scenario asks for, in the order of their readings. `drain`: None without batteries;
+    `obstacles`: those of `solids`, for rendered images; `gps`: which flight controllers use, too; `engine`: for its
+    air.
     """
     config = scenario.sensors
     found: list[Sensor] = []

@@ -52,7 +52,6 @@ def wind_noise_db(airspeed_m_s: Values) -> Values:
 
 
 def power_sum_db(first_db: Values | float, second_db: Values) -> Values:
-    """The level of two noises together."""
     return np.asarray(10 * np.log10(10 ** (np.asarray(first_db) / 10) + 10 ** (second_db / 10)))
 
 

@@ -38,7 +38,6 @@ def induced_m_s(thrust_n: Values, across_m_s: Values, through_m_s: Values, *, di
 
 
 def rotor_power_w(vehicle: Vehicle, speed_rad_s: Values, thrust_n: Values, across: Values, through: Values) -> Values:
-    """Mechanical power of a rotor."""
     disc = math.pi * vehicle.rotor_radius_m**2
     still_n = vehicle.thrust_n_s2 * speed_rad_s**2
     still_v = np.sqrt(still_n / (2 * AIR_KG_M3 * disc))
@@ -49,15 +48,11 @@ def rotor_power_w(vehicle: Vehicle, speed_rad_s: Values, thrust_n: Values, acros
 
 
 def electrical_w(vehicle: Vehicle, mechanical_w: Values) -> Values:
-    """Power taken from the battery for the mechanical power of all rotors together."""
     return np.asarray(mechanical_w / vehicle.drive_efficiency + vehicle.avionics_w)
 
 
 def trimmed_w(vehicle: Vehicle, airspeed_m_s: Values, climb_m_s: Values) -> Values:
-    """Electrical power in steady flight: the rotors carry weight and drag, and nothing accelerates.
-
-    The lean at which the forces across the body balance is found by bisection.
-    """
+    """Electrical power in steady flight: the lean at which the forces across the body balance, by bisection."""
     speed = np.minimum(np.asarray(airspeed_m_s, dtype=np.float64), _FASTEST_M_S)
     weight_n = vehicle.mass_kg * GRAVITY_M_S2
     frame = vehicle.frame_drag_kg_m * np.hypot(speed, climb_m_s)

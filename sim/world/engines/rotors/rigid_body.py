@@ -42,10 +42,8 @@ _TUMBLE_PER_S: Final = 2.0
 
 
 class Rotors(Engine):
-    """A swarm of one type of vehicle.
-
-    Eight of its sixteen attributes are the state of all bodies: one array for each quantity, with a column for each
-    body, because numpy is fast only with such arrays.
+    """A swarm of one type of vehicle. The state is one array for each quantity, with a column for each body, because
+    numpy is fast only with such.
     """
 
     name = "rotors"
@@ -127,7 +125,6 @@ class Rotors(Engine):
         self._attitude[:, rows] = [[1.0], [0.0], [0.0], [0.0]]
 
     def _drag_n(self, across: Values, rotors_rad_s: Values, airflow: Values) -> Values:
-        """Drag of the rotors by the air across them, and of the frame."""
         size = np.sqrt((airflow**2).sum(axis=0))
         rotors = self.vehicle.rotor_drag_n_s2_m * rotors_rad_s * across
         return np.asarray(rotors + self.vehicle.frame_drag_kg_m * size * airflow)
@@ -149,7 +146,6 @@ class Rotors(Engine):
         self._attitude = attitude / np.sqrt((attitude**2).sum(axis=0))
 
     def _stop(self, before: Values) -> None:
-        """Stop the bodies that have reached the ground or a wall."""
         if self._solids is None:
             inside = self._at[2] < 0
             self._at[2, inside] = 0.0

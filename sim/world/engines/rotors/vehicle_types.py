@@ -52,8 +52,7 @@ class Vehicle(NamedTuple):
     """Time constant of a rotor that speeds up."""
     motor_down_s: float
     lead: float
-    """The share of the wanted change by which a motor is driven beyond it, so that it follows 1 + lead times as
-    fast."""
+    """A motor is driven beyond a wanted change by this share, so that it follows 1 + lead times as fast."""
     drive_efficiency: float
     """Mechanical power of the rotors over electrical power of the motors."""
     avionics_w: float

@@ -5,9 +5,8 @@ from collections.abc import Sequence
 from typing import Final
 
 from sim.figures.finished_runs import Quantity, Runs, differences
-from sim.figures.paper_claims import NEARLY_ALL, Claim, Reason, Statement, above, below
+from sim.figures.paper_claims import NEARLY_ALL, Claim, Reason, Statement, above, below, share_above
 from sim.figures.recipe import Drawing, Recipe, point
-from sim.figures.statistics import SHARE
 from sim.figures.style import SERIES, Look, canvas, legend_above, reaches
 
 _URGENT_P95: Final = "classes.urgent.delay_ms.p95"
@@ -39,10 +38,8 @@ def draw(runs: Runs) -> Drawing:
                 at, [one.mean for one in found], xerr=reach, height=height, color=look.color, label=look.label,
                 error_kw={"elinewidth": 1.0},
             )  # fmt: skip
-            data += [
-                point(one, panel=label, packets=look.label, mechanism=case)
-                for one, case in zip(found, cases, strict=True)
-            ]
+            for one, case in zip(found, cases, strict=True):
+                data.append(point(one, panel=label, packets=look.label, mechanism=case))
         axes.set_xlabel(label)
         axes.grid(visible=False, axis="y")
         axes.set_xlim(left=0)
@@ -61,42 +58,29 @@ def claims(runs: Runs) -> list[Claim]:
         return Claim(0, text, statements, reasons)
 
     spread = change("pdr", "+ spread over the slot", "+ 8 clusters with slots")
-    repaired, table = runs.per_seed("pdr", case="+ repair"), runs.per_seed("pdr", case="timetable instead")
+    at_once = Reason(
+        "A head lets its queue out at once, and the copies of one packet collide with those of the next: the same "
+        "packets in the same slots arrive when they are spread.",
+        [above("PDR, spread minus at once", spread, 0.0)],
+    )
+    urgent_ms = change(_URGENT_P95, "+ priorities", "+ fewer relays")
     return [
         said(
             "Slots of clusters deliver more than plain flooding.",
             above("PDR", change("pdr", "+ 8 clusters with slots", "plain flooding"), 0.0),
-            reasons=[
-                Reason(
-                    "A head lets its queue out at once, and the copies of one packet collide with those of the next: "
-                    "the same packets in the same slots arrive when they are spread.",
-                    [above("PDR, spread minus at once", spread, 0.0)],
-                )
-            ],
+            reasons=[at_once],
         ),
-        said(
-            "Letting packets out evenly over the slot delivers more.",
-            above("PDR", spread, 0.0),
-        ),
+        said("Letting packets out evenly over the slot delivers more.", above("PDR", spread, 0.0)),
         said(
             "Fewer relays leave the air free.",
             below("busy share", change("air.busy", "+ fewer relays", "+ spread over the slot"), 0.0),
         ),
-        said(
-            "Priorities make urgent packets faster.",
-            below("urgent, 95th percentile", change(_URGENT_P95, "+ priorities", "+ fewer relays"), 0.0, "ms"),
-        ),
-        said(
-            "Aggregation saves air.",
-            below("busy share", change("air.busy", "+ aggregation", "+ priorities"), 0.0),
-        ),
-        said(
-            "Repair delivers all.",
-            above("PDR", repaired, NEARLY_ALL, possible=SHARE),
-        ),
+        said("Priorities make urgent packets faster.", below("urgent, 95th percentile", urgent_ms, 0.0, "ms")),
+        said("Aggregation saves air.", below("busy share", change("air.busy", "+ aggregation", "+ priorities"), 0.0)),
+        said("Repair delivers all.", share_above("PDR", runs.per_seed("pdr", case="+ repair"), NEARLY_ALL)),
         said(
             "A timetable delivers all in less time, in less air.",
-            above("PDR", table, NEARLY_ALL, possible=SHARE),
+            share_above("PDR", runs.per_seed("pdr", case="timetable instead"), NEARLY_ALL),
             below("95th percentile", change("delay_ms.p95", "timetable instead", "+ repair"), 0.0, "ms"),
             below("busy share", change("air.busy", "timetable instead", "+ repair"), 0.0),
         ),

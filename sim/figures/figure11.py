@@ -12,9 +12,8 @@ from fanet_mw.bounds.paper import cluster_estimate
 from fanet_mw.units import S
 from sim.figures.colors import DARK
 from sim.figures.finished_runs import Quantity, Row, Runs, arrived, differences
-from sim.figures.paper_claims import Claim, Reason, above, below
+from sim.figures.paper_claims import Claim, Reason, above, below, share_above, share_below
 from sim.figures.recipe import Drawing, Recipe, point
-from sim.figures.statistics import SHARE
 from sim.figures.style import CONTROL, LOOKS, band, canvas, legend_above, look_of, plain_log
 from sim.sweep.measures import DELAY_EDGES_S
 
@@ -118,14 +117,10 @@ def draw(runs: Runs) -> Drawing:
     return Drawing(figure, data)
 
 
-def _seen(runs: Runs, quantity: Quantity, case: str) -> dict[int, float]:
-    return runs.per_seed(quantity, case=case)
-
-
 def _flooding_is_faster_on_average(runs: Runs) -> Claim:
     def longer(quantity: str) -> list[float]:
         """The paper's method minus flooding, for each seed."""
-        return differences(_seen(runs, quantity, "paper"), _seen(runs, quantity, "flooding"))
+        return differences(runs.per_seed(quantity, case="paper"), runs.per_seed(quantity, case="flooding"))
 
     slots = Reason(
         "A flooded packet is relayed at once; under the paper's method it waits for its head's slot first.",
@@ -140,95 +135,78 @@ def _flooding_is_faster_on_average(runs: Runs) -> Claim:
 
 
 def _flooding_has_a_tail(runs: Runs) -> Claim:
-    tail = [1 - share for share in _seen(runs, _OF_DELIVERIES, "flooding").values()]
+    def flooded(quantity: Quantity) -> dict[int, float]:
+        return runs.per_seed(quantity, case="flooding")
+
     losses = Reason(
         "Flooding loses packets, it does not delay them: a copy is relayed at once or collides. A tail needs queues "
         "that hold packets for seconds, and flooding has none.",
         [
-            below("flooding: delivery ratio", _seen(runs, "pdr", "flooding"), _MOST, possible=SHARE),
-            below("flooding: longest delay", _seen(runs, "delay_ms.max", "flooding"), _WITHIN_S * 1e3, "ms"),
-            below("flooding: wait at nodes", _seen(runs, "delay_parts_ms.queue", "flooding"), 1.0, "ms"),
+            share_below("flooding: delivery ratio", flooded("pdr"), _MOST),
+            below("flooding: longest delay", flooded("delay_ms.max"), _WITHIN_S * 1e3, "ms"),
+            below("flooding: wait at nodes", flooded("delay_parts_ms.queue"), 1.0, "ms"),
         ],
     )
+    tail = [1 - share for share in flooded(_OF_DELIVERIES).values()]
     return Claim(
         11,
         "Flooding's delays have a long tail.",
-        [above("flooding: deliveries later than 0.5 s", tail, _LONG, possible=SHARE)],
+        [share_above("flooding: deliveries later than 0.5 s", tail, _LONG)],
         [losses],
     )
 
 
 def _the_method_is_in_time(runs: Runs) -> Claim:
+    def seen(quantity: Quantity, case: str = "paper") -> dict[int, float]:
+        return runs.per_seed(quantity, case=case)
+
     overload = Reason(
         "Most packets do not arrive at all: the slot holds a period's packets by their airtime on one link, but each "
         "flood takes the air of every relay. At a tenth of the load the claim is true.",
         [
-            below("the paper's method: delivery ratio", _seen(runs, "pdr", "paper"), _MOST, possible=SHARE),
-            above(
-                "every 1 s: packets x targets within 0.5 s",
-                _seen(runs, _OF_ALL, "paper, every 1 s"),
-                _MOST,
-                possible=SHARE,
-            ),
+            share_below("the paper's method: delivery ratio", seen("pdr"), _MOST),
+            share_above("every 1 s: packets x targets within 0.5 s", seen(_OF_ALL, "paper, every 1 s"), _MOST),
         ],
     )
+    all_heads = "paper, 44 clusters"
     unicast = Reason(
         "What arrives late is late on its way to a head, by unicast through air that floods keep busy: where every "
         "node is a head nearly all that arrives does so in time, though no more arrives.",
         [
-            above(
-                "44 clusters: deliveries within 0.5 s",
-                _seen(runs, _OF_DELIVERIES, "paper, 44 clusters"),
-                _NEARLY,
-                possible=SHARE,
-            ),
-            below("44 clusters: delivery ratio", _seen(runs, "pdr", "paper, 44 clusters"), _MOST, possible=SHARE),
-            above(
-                "share of unicast frames that fail", _seen(runs, "air.attempt_failure", "paper"), _OFTEN, possible=SHARE
-            ),
+            share_above("44 clusters: deliveries within 0.5 s", seen(_OF_DELIVERIES, all_heads), _NEARLY),
+            share_below("44 clusters: delivery ratio", seen("pdr", all_heads), _MOST),
+            share_above("share of unicast frames that fail", seen("air.attempt_failure"), _OFTEN),
         ],
     )
     return Claim(
         11,
         "With the proposed method most packets arrive within 0.5 s.",
         [
-            above(
-                "the paper's method: deliveries within 0.5 s",
-                _seen(runs, _OF_DELIVERIES, "paper"),
-                _MOST,
-                possible=SHARE,
-            ),
-            above(
-                "the paper's method: packets x targets within 0.5 s",
-                _seen(runs, _OF_ALL, "paper"),
-                _MOST,
-                possible=SHARE,
-            ),
+            share_above("the paper's method: deliveries within 0.5 s", seen(_OF_DELIVERIES), _MOST),
+            share_above("the paper's method: packets x targets within 0.5 s", seen(_OF_ALL), _MOST),
         ],
         [overload, unicast],
     )
 
 
 def _the_timetable_is_in_time(runs: Runs) -> Claim:
+    def ours(quantity: Quantity) -> dict[int, float]:
+        return runs.per_seed(quantity, case="ours")
+
     turns = Reason(
         "Turns in which nothing collides carry the whole load, each packet within the bound that was stated when it "
         "was accepted.",
         [
-            above("fanet-mw: delivery ratio", _seen(runs, "pdr", "ours"), _ALL, possible=SHARE),
-            above(
-                "fanet-mw: packets x targets with a bound",
-                _seen(runs, "bound.stated_share", "ours"),
-                _STATED,
-                possible=SHARE,
-            ),
-            above("fanet-mw: of these within their bound", _seen(runs, _kept, "ours"), _ALL, possible=SHARE),
+            share_above("fanet-mw: delivery ratio", ours("pdr"), _ALL),
+            share_above("fanet-mw: packets x targets with a bound", ours("bound.stated_share"), _STATED),
+            share_above("fanet-mw: of these within their bound", ours(_kept), _ALL),
         ],
         "the limit of 0.99.",
     )
     return Claim(
         0,
         "With the timetable most packets arrive within 0.5 s.",
-        [above("fanet-mw: packets x targets within 0.5 s", _seen(runs, _OF_ALL, "ours"), _MOST, possible=SHARE)],
+        [share_above("fanet-mw: packets x targets within 0.5 s", ours(_OF_ALL), _MOST)],
         [turns],
     )
 
@@ -236,37 +214,27 @@ def _the_timetable_is_in_time(runs: Runs) -> Claim:
 def _motion_does_not_matter(runs: Runs) -> Claim:
     def lost(quantity: Quantity) -> list[float]:
         """What the timetable loses by flying, for each seed."""
-        return differences(_seen(runs, quantity, _REST), _seen(runs, quantity, "ours"))
+        return differences(runs.per_seed(quantity, case=_REST), runs.per_seed(quantity, case="ours"))
 
+    later_ms = [-later for later in lost("delay_ms.p95")]
     return Claim(
         0,
         "A timetable serves a formation that flies as well as one at rest.",
         [
-            below("delivery ratio at rest minus that at 7.5 m/s", lost("pdr"), _ALIKE, possible=SHARE),
-            below(
-                "within the bound at rest minus that at 7.5 m/s",
-                lost("bound.within_share"),
-                _NEARLY_ALIKE,
-                possible=SHARE,
-            ),
-            below(
-                "95 % of delays at 7.5 m/s minus those at rest",
-                [-later for later in lost("delay_ms.p95")],
-                _SLOWER_MS,
-                "ms",
-            ),
+            share_below("delivery ratio at rest minus that at 7.5 m/s", lost("pdr"), _ALIKE),
+            share_below("within the bound at rest minus that at 7.5 m/s", lost("bound.within_share"), _NEARLY_ALIKE),
+            below("95 % of delays at 7.5 m/s minus those at rest", later_ms, _SLOWER_MS, "ms"),
         ],
     )
 
 
 def _the_window_is_not_why(runs: Runs) -> Claim:
-    short = _seen(runs, "pdr", CONTROL)
     return Claim(
         0,
         "Flooding with the timetable's contention window (cw_min 1) delivers less than half, as with its own (31).",
         [
-            below("flooding, cw_min 1: delivery ratio", short, _MOST, possible=SHARE),
-            below("flooding, cw_min 31: delivery ratio", _seen(runs, "pdr", "flooding"), _MOST, possible=SHARE),
+            share_below("flooding, cw_min 1: delivery ratio", runs.per_seed("pdr", case=CONTROL), _MOST),
+            share_below("flooding, cw_min 31: delivery ratio", runs.per_seed("pdr", case="flooding"), _MOST),
         ],
     )
 

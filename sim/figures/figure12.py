@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 from matplotlib.axes import Axes
 
 from sim.figures.finished_runs import Quantity, Row, Runs, differences
-from sim.figures.paper_claims import Claim, Reason, above, below
+from sim.figures.paper_claims import Claim, Reason, Statement, above, below, share_above, share_below
 from sim.figures.recipe import Drawing, Recipe, point
 from sim.figures.statistics import DISTANCE, SHARE, Interval, Possible, interval
 from sim.figures.style import Look, beside, canvas, legend_above, line, look_of, plain_log, ticks_at
@@ -196,14 +196,13 @@ def _seen(runs: Runs, quantity: Quantity, case: str, interval_s: float) -> dict[
 
 
 def _geometry(runs: Runs) -> Reason:
+    flooded, papers = (_seen(runs, _wait_s, case, _SLOW_S) for case in ("flooding", "paper"))
     return Reason(
         "The instant is one of geometry: nobody turns before three UAVs have heard the same phone, which rests on "
         "where the survivors of a seed are and where the swarm comes from. The network adds to it what slots take.",
         [
-            below("flooding: half turns so much later", _seen(runs, _wait_s, "flooding", _SLOW_S), _AT_ONCE_S, "s"),
-            below(
-                "the paper's method: half turns so much later", _seen(runs, _wait_s, "paper", _SLOW_S), _SECONDS_S, "s"
-            ),
+            below("flooding: half turns so much later", flooded, _AT_ONCE_S, "s"),
+            below("the paper's method: half turns so much later", papers, _SECONDS_S, "s"),
         ],
         _LIMIT_SET_AFTERWARDS,
     )
@@ -211,16 +210,15 @@ def _geometry(runs: Runs) -> Reason:
 
 def _flooding_is_first(runs: Runs) -> Claim:
     ahead = differences(_seen(runs, _half_s, "paper", _SLOW_S), _seen(runs, _half_s, "flooding", _SLOW_S))
+    flooded, papers = (_seen(runs, _by(_EARLY_S), case, _SLOW_S) for case in ("flooding", "paper"))
     return Claim(
         12,
         "At a packet every second flooding is faster at first: by 50-55 s about 38 UAVs approach, of the proposed "
         "method fewer than 5.",
         [
             above("half of the swarm has turned: the paper's method minus flooding", ahead, 0.0, "s"),
-            above("flooding: UAVs by 55 s", _seen(runs, _by(_EARLY_S), "flooding", _SLOW_S), _MANY, possible=_SWARM),
-            below(
-                "the paper's method: UAVs by 55 s", _seen(runs, _by(_EARLY_S), "paper", _SLOW_S), _FEW, possible=_SWARM
-            ),
+            above("flooding: UAVs by 55 s", flooded, _MANY, possible=_SWARM),
+            below("the paper's method: UAVs by 55 s", papers, _FEW, possible=_SWARM),
         ],
         [_geometry(runs)],
     )
@@ -229,6 +227,7 @@ def _flooding_is_first(runs: Runs) -> Claim:
 def _the_method_is_ahead_later(runs: Runs) -> Claim:
     flooding, paper = (_seen(runs, _at_end, case, _SLOW_S) for case in ("flooding", "paper"))
     flooded, told = (_seen(runs, _at_end_if_any, case, _SLOW_S) for case in ("flooding", "paper"))
+    lead = differences(paper, flooding)
     nobody_left = Reason(
         "Under both the news reaches everyone in the end: whoever has not turned yet is told again by the next "
         "report, and nobody is left by whom the other could be ahead.",
@@ -241,53 +240,41 @@ def _the_method_is_ahead_later(runs: Runs) -> Claim:
     return Claim(
         12,
         "Later the proposed method is ahead.",
-        [
-            above(
-                "UAVs that have turned by the end, the paper's method minus flooding",
-                differences(paper, flooding),
-                0.0,
-            )
-        ],
+        [above("UAVs that have turned by the end, the paper's method minus flooding", lead, 0.0)],
         [nobody_left],
     )
 
 
 def _flooding_chokes(runs: Runs) -> Claim:
+    def flooded(quantity: Quantity) -> dict[int, float]:
+        return _seen(runs, quantity, "flooding", _FAST_S)
+
     few_send = Reason(
         "Only UAVs that hear a phone send app_2, and few do: the load stays far from what chokes a flood, and the "
         "news is there as soon as it can be.",
         [
-            below("UAVs that have heard a phone", _seen(runs, _heard, "flooding", _FAST_S), _MANY, possible=_SWARM),
-            below(
-                "flooding: busy share of the air", _seen(runs, "air.busy", "flooding", _FAST_S), _FREE, possible=SHARE
-            ),
-            below("flooding: half turns so much later", _seen(runs, _wait_s, "flooding", _FAST_S), _AT_ONCE_S, "s"),
+            below("UAVs that have heard a phone", flooded(_heard), _MANY, possible=_SWARM),
+            share_below("flooding: busy share of the air", flooded("air.busy"), _FREE),
+            below("flooding: half turns so much later", flooded(_wait_s), _AT_ONCE_S, "s"),
         ],
         _LIMIT_SET_AFTERWARDS,
     )
     return Claim(
         12,
         "At a packet every 0.1 s nobody ever approaches under flooding.",
-        [below("flooding: UAVs at the end", _seen(runs, _at_end, "flooding", _FAST_S), 1.0, possible=_SWARM)],
+        [below("flooding: UAVs at the end", flooded(_at_end), 1.0, possible=_SWARM)],
         [few_send],
     )
 
 
+def _change_of_half(what: str, left: Mapping[int, float], right: Mapping[int, float]) -> Statement:
+    change_s = [abs(value) for value in differences(left, right)]
+    return below(f"{what}change of the time when half have turned", change_s, _HARDLY_S, "s", possible=DISTANCE)
+
+
 def _the_method_hardly_changes(runs: Runs) -> Claim:
-    change = differences(_seen(runs, _half_s, "paper", _FAST_S), _seen(runs, _half_s, "paper", _SLOW_S))
-    return Claim(
-        12,
-        "The proposed method hardly changes at 0.1 s.",
-        [
-            below(
-                "change of the time when half have turned",
-                [abs(value) for value in change],
-                _HARDLY_S,
-                "s",
-                possible=DISTANCE,
-            )
-        ],
-    )
+    fast, slow = (_seen(runs, _half_s, "paper", at) for at in (_FAST_S, _SLOW_S))
+    return Claim(12, "The proposed method hardly changes at 0.1 s.", [_change_of_half("", fast, slow)])
 
 
 def _most_turn_in_the_window(runs: Runs) -> Claim:
@@ -295,11 +282,10 @@ def _most_turn_in_the_window(runs: Runs) -> Claim:
         12,
         "Under the proposed method most start within 50-70 s.",
         [
-            above(
+            share_above(
                 f"app_2 every {interval_s:g} s: share of those that turn that do so within 50-70 s",
                 _seen(runs, _in_window, "paper", interval_s),
                 _MOST,
-                possible=SHARE,
             )
             for interval_s in reversed(runs.levels(_INTERVAL))
         ],
@@ -308,21 +294,8 @@ def _most_turn_in_the_window(runs: Runs) -> Claim:
 
 
 def _point_masses_do(flown: Mapping[int, float], simple: Mapping[int, float]) -> Claim:
-    """The claim about the time until half of the swarm has turned, with the physics engine and with point masses."""
-    change = [abs(value) for value in differences(flown, simple)]
-    return Claim(
-        0,
-        "UAVs as point masses turn when those of the physics engine do.",
-        [
-            below(
-                "the paper's method, every 1 s: change of the time when half have turned",
-                change,
-                _HARDLY_S,
-                "s",
-                possible=DISTANCE,
-            )
-        ],
-    )
+    statement = _change_of_half("the paper's method, every 1 s: ", flown, simple)
+    return Claim(0, "UAVs as point masses turn when those of the physics engine do.", [statement])
 
 
 _CLAIMS: Final = (

@@ -7,9 +7,8 @@ from typing import Any, Final, NamedTuple
 from matplotlib.axes import Axes
 
 from sim.figures.finished_runs import Quantity, Row, Runs, differences, mean_per_seed
-from sim.figures.paper_claims import Claim, Reason, above, below
+from sim.figures.paper_claims import Claim, Reason, above, below, share_above, share_below
 from sim.figures.recipe import Drawing, Recipe, point
-from sim.figures.statistics import SHARE
 from sim.figures.style import LOOKS, Look, beside, canvas, legend_above, line, look_of, plain_log, ticks_at
 
 _SPEED: Final = "mobility.speed_m_s"
@@ -145,9 +144,7 @@ def _falls_in_formation(runs: Runs) -> Claim:
         "To fall with speed, a formation needs clusters that move relative to each other, or UAVs that do so within "
         "them; the paper describes neither.",
         [
-            above(
-                f"{name}, formation: PDR at {fastest}", _fast(runs, "pdr", f"{case}, formation"), _HIGH, possible=SHARE
-            )
+            share_above(f"{name}, formation: PDR at {fastest}", _fast(runs, "pdr", f"{case}, formation"), _HIGH)
             for case, name in _NAMES.items()
         ],
     )
@@ -168,17 +165,14 @@ def _is_low_when_slow(runs: Runs) -> Claim:
         "Nothing is there to lose packets: while a run lasts, the slowest swarm is nearly the grid that it starts as, "
         "and a packet a second of each node leaves most of the air free.",
         [
-            above("share of pairs with a path", _slow(runs, "connected", "aodv"), _HIGH, possible=SHARE),
-            below("AODV: busy share of the air", _slow(runs, "air.busy", "aodv"), _IDLE, possible=SHARE),
+            share_above("share of pairs with a path", _slow(runs, "connected", "aodv"), _HIGH),
+            share_below("AODV: busy share of the air", _slow(runs, "air.busy", "aodv"), _IDLE),
         ],
     )
     return Claim(
         8,
         "The PDR is low even when nodes are slow.",
-        [
-            below(f"{name}: PDR at {slowest}", _slow(runs, "pdr", case), _LOW, possible=SHARE)
-            for case, name in _NAMES.items()
-        ],
+        [share_below(f"{name}: PDR at {slowest}", _slow(runs, "pdr", case), _LOW) for case, name in _NAMES.items()],
         [nothing_lost],
     )
 

@@ -5,9 +5,8 @@ collide.
 from typing import Final
 
 from sim.figures.finished_runs import Row, Runs, differences
-from sim.figures.paper_claims import Claim, Statement, alike
+from sim.figures.paper_claims import Claim, above, alike, share_above
 from sim.figures.recipe import Drawing, Recipe, point
-from sim.figures.statistics import SHARE
 from sim.figures.style import SERIES, canvas, crosses, legend_above, line, spaced, ticks_at
 
 _FALLS: Final = 0.02
@@ -71,25 +70,17 @@ def claims(runs: Runs) -> list[Claim]:
             _ALIKE,
         )
         falls.append(
-            Statement(
+            above(
                 f"every {interval_s:g} s: PDR with {sources[0]} minus with {sources[-1]} sources",
                 differences(one, many),
-                "above",
                 _FALLS,
             )
         )
         shares = runs.per_seed(
             _by_collision, case=_MOVING, traffic__interval_s=interval_s, traffic__sources=sources[-1]
         )
-        collide.append(
-            Statement(
-                f"every {interval_s:g} s, {sources[-1]} sources: lost copies that collided",
-                list(shares.values()),
-                "above",
-                _MOSTLY,
-                possible=SHARE,
-            )
-        )
+        what = f"every {interval_s:g} s, {sources[-1]} sources: lost copies that collided"
+        collide.append(share_above(what, shares, _MOSTLY))
     return [
         Claim(9, "Under plain flooding the PDR falls as sources are added.", falls),
         Claim(9, "What is lost is lost to collisions.", collide),

@@ -5,7 +5,7 @@ value, ascending by seed, holds one quantity of such runs. Values are always com
 seed have random numbers in common and are not independent of each other; seeds are.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import accumulate
 from typing import Any
 
@@ -66,11 +66,14 @@ def differences(left: Mapping[int, float], right: Mapping[int, float]) -> list[f
 
 def mean_per_seed(*many: Mapping[int, float]) -> dict[int, float]:
     """For each seed that all of these quantities have, their mean."""
-    seeds = [seed for seed in many[0] if all(seed in other for other in many)] if many else []
-    return {seed: sum(one[seed] for one in many) / len(many) for seed in seeds}
+    return {seed: sum(values) / len(values) for seed, values in _together(many).items()}
 
 
 def max_per_seed(*many: Mapping[int, float]) -> dict[int, float]:
     """For each seed that all of these quantities have, the greatest one of them."""
+    return {seed: max(values) for seed, values in _together(many).items()}
+
+
+def _together(many: Sequence[Mapping[int, float]]) -> dict[int, list[float]]:
     seeds = [seed for seed in many[0] if all(seed in other for other in many)] if many else []
-    return {seed: max(one[seed] for one in many) for seed in seeds}
+    return {seed: [one[seed] for one in many] for seed in seeds}

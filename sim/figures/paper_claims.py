@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Final, Literal
 
-from sim.figures.statistics import ANY, Interval, Possible, interval
+from sim.figures.statistics import ANY, SHARE, Interval, Possible, interval
 
 BEYOND: Final = "(Beyond the paper) "
 """The text before a claim that is not the paper's."""
@@ -93,9 +93,17 @@ def below(what: str, values: Values, threshold: float, unit: str = "", *, possib
     return Statement(what, _listed(values), "below", threshold, unit, possible)
 
 
-def alike(what: str, values: Values, within: float, unit: str = "") -> list[Statement]:
+def share_above(what: str, share: Values, threshold: float) -> Statement:
+    return above(what, share, threshold, possible=SHARE)
+
+
+def share_below(what: str, share: Values, threshold: float) -> Statement:
+    return below(what, share, threshold, possible=SHARE)
+
+
+def alike(what: str, values: Values, within: float) -> list[Statement]:
     """Two statements that hold together if a difference lies within a limit on either side."""
-    return [above(what, values, -within, unit), below(what, values, within, unit)]
+    return [above(what, values, -within), below(what, values, within)]
 
 
 def _listed(values: Values) -> Sequence[float]:

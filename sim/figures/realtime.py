@@ -3,9 +3,9 @@
 from typing import Final
 
 from sim.figures.finished_runs import Quantity, Runs, arrived, differences
-from sim.figures.paper_claims import Claim, below
+from sim.figures.paper_claims import Claim, below, share_below
 from sim.figures.recipe import Drawing, Recipe, point
-from sim.figures.statistics import DISTANCE, SHARE
+from sim.figures.statistics import DISTANCE
 from sim.figures.style import SERIES, band, canvas, legend_above, plain_log
 from sim.sweep.measures import DELAY_EDGES_S
 
@@ -48,38 +48,16 @@ def claims(runs: Runs) -> list[Claim]:
         real, virtual = (runs.per_seed(quantity, case=f"{protocol}, {host}") for host in ("real", "virtual"))
         return [abs(one) for one in differences(real, virtual)]
 
+    as_virtual, in_time = [], []
+    for protocol, name in _PROTOCOLS.items():
+        median_ms = apart("delay_ms.p50", protocol)
+        late = runs.per_seed("lateness.share", case=f"{protocol}, real")
+        as_virtual.append(share_below(f"{name}: PDR, apart by", apart("pdr", protocol), _APART))
+        as_virtual.append(below(f"{name}: median delay, apart by", median_ms, _APART_MS, "ms", possible=DISTANCE))
+        in_time.append(share_below(f"{name}: share of frames that were late", late, _LATE))
     return [
-        Claim(
-            0,
-            "Real time gives what virtual time says.",
-            [
-                statement
-                for protocol, name in _PROTOCOLS.items()
-                for statement in (
-                    below(f"{name}: PDR, apart by", apart("pdr", protocol), _APART, possible=SHARE),
-                    below(
-                        f"{name}: median delay, apart by",
-                        apart("delay_ms.p50", protocol),
-                        _APART_MS,
-                        "ms",
-                        possible=DISTANCE,
-                    ),
-                )
-            ],
-        ),
-        Claim(
-            0,
-            "Frames are announced in time.",
-            [
-                below(
-                    f"{name}: share of frames that were late",
-                    runs.per_seed("lateness.share", case=f"{protocol}, real"),
-                    _LATE,
-                    possible=SHARE,
-                )
-                for protocol, name in _PROTOCOLS.items()
-            ],
-        ),
+        Claim(0, "Real time gives what virtual time says.", as_virtual),
+        Claim(0, "Frames are announced in time.", in_time),
     ]
 
 

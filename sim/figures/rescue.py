@@ -6,7 +6,7 @@ from typing import Final
 
 from sim.figures.curves import Panel, curves
 from sim.figures.finished_runs import Quantity, Row, Runs, differences
-from sim.figures.paper_claims import Claim, Reason, above, below
+from sim.figures.paper_claims import Claim, Reason, Statement, above, below
 from sim.figures.recipe import Recipe
 from sim.figures.statistics import DISTANCE, interval
 
@@ -47,11 +47,7 @@ def _all_s(row: Row) -> float:
 
 def _misses(share: float) -> Callable[[Row], bool]:
     """Whether a run ended before this share of the survivors was confirmed."""
-
-    def misses(row: Row) -> bool:
-        return len(row["mission.time_to_confirm_s"] or ()) < _people(row, share)
-
-    return misses
+    return lambda row: len(row["mission.time_to_confirm_s"] or ()) < _people(row, share)
 
 
 def claims_reports(runs: Runs) -> list[Claim]:
@@ -64,45 +60,33 @@ def claims_reports(runs: Runs) -> list[Claim]:
         )
         return differences(ours, theirs)
 
+    def at_each(
+        side: Callable[..., Statement], what: str, quantity: Quantity, rival: str, unit: str = ""
+    ) -> list[Statement]:
+        return [side(f"every {at:g} s: {what}", lead(quantity, rival, at), 0.0, unit) for at in intervals]
+
     waits = Reason(
         "A flooded report goes out at once; fanet-mw's waits for its head's slot and for relays to count copies, and "
         "what is lost is sent again later. For news that is repeated anyway a lost report costs one interval, which is "
         "less than such a wait: slots and repair are for what is said once.",
-        [
-            above(
-                f"every {interval_s:g} s: median delay of reports, fanet-mw minus plain flooding",
-                lead("reports.delay_ms.p50", "flooding", interval_s),
-                0.0,
-                "ms",
-            )
-            for interval_s in intervals
-        ],
+        at_each(
+            above,
+            "median delay of reports, fanet-mw minus plain flooding",
+            "reports.delay_ms.p50",
+            "flooding",
+            "ms",
+        ),
     )
     no_sooner = Reason(
         "More of them arrive, but not sooner: reports wait for slots under both, and the newest that has arrived is "
         "about as old.",
-        [
-            above(
-                f"every {interval_s:g} s: share of reports delivered, fanet-mw minus the paper's method",
-                lead("reports.pdr", "paper", interval_s),
-                0.0,
-            )
-            for interval_s in intervals
-        ],
+        at_each(above, "share of reports delivered, fanet-mw minus the paper's method", "reports.pdr", "paper"),
     )
     return [
         Claim(
             0,
             f"Reports by fanet-mw are younger than by {name}.",
-            [
-                below(
-                    f"every {interval_s:g} s: age by fanet-mw minus by {name}",
-                    lead("report_age_s", rival, interval_s),
-                    0.0,
-                    "s",
-                )
-                for interval_s in intervals
-            ],
+            at_each(below, f"age by fanet-mw minus by {name}", "report_age_s", rival, "s"),
             [waits if rival == "flooding" else no_sooner],
         )
         for rival, name in _RIVALS.items()

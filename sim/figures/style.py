@@ -106,12 +106,11 @@ def line(
     xs: Sequence[float],
     intervals: Sequence[Interval],
     *,
-    least: float = 0.0,
     most: float = math.inf,
 ) -> None:
-    """Means with their intervals, as one line; bars end at the least and the greatest possible value."""
+    """Means with their intervals, as one line; bars end at 0 and the greatest possible value."""
     axes.errorbar(
-        xs, [item.mean for item in intervals], yerr=reaches(intervals, least=least, most=most), label=look.label,
+        xs, [item.mean for item in intervals], yerr=reaches(intervals, most=most), label=look.label,
         color=look.color, marker=look.marker or None, linestyle=look.dash, elinewidth=1.0,
     )  # fmt: skip
 
@@ -124,11 +123,9 @@ def crosses(axes: Axes, look: Look, points: Sequence[tuple[float, float]]) -> No
     )  # fmt: skip
 
 
-def reaches(
-    intervals: Sequence[Interval], *, least: float = 0.0, most: float = math.inf
-) -> tuple[list[float], list[float]]:
+def reaches(intervals: Sequence[Interval], *, most: float = math.inf) -> tuple[list[float], list[float]]:
     """How far the bars of these means reach down and up, within possible values; a single run has no bar."""
-    down = [0.0 if item.runs < 2 else item.mean - max(least, item.low) for item in intervals]
+    down = [0.0 if item.runs < 2 else item.mean - max(0.0, item.low) for item in intervals]
     up = [0.0 if item.runs < 2 else min(most, item.high) - item.mean for item in intervals]
     return down, up
 
@@ -174,18 +171,10 @@ def legend_above(figure: Figure, axes: Axes) -> None:
         legend.remove()
 
 
-def band(
-    axes: Axes,
-    look: Look,
-    xs: Sequence[float],
-    intervals: Sequence[Interval],
-    *,
-    least: float = 0.0,
-    most: float = math.inf,
-) -> None:
-    """The intervals of a line as a band, within possible values; there is none where a mean is of one run."""
+def band(axes: Axes, look: Look, xs: Sequence[float], intervals: Sequence[Interval], *, most: float) -> None:
+    """The intervals of a line as a band, within [0, most]; there is none where a mean is of one run."""
     if all(item.runs > 1 for item in intervals):
-        low, high = [max(least, item.low) for item in intervals], [min(most, item.high) for item in intervals]
+        low, high = [max(0.0, item.low) for item in intervals], [min(most, item.high) for item in intervals]
         axes.fill_between(xs, low, high, color=look.color, alpha=0.15, linewidth=0)
 
 

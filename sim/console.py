@@ -45,6 +45,11 @@ class Console(RichConsole):
         raise
 
 
+def tell(text: str) -> None:
+    """Say something on standard error, as it is."""
+    Console(stderr=True).print(text, highlight=False, soft_wrap=True)
+
+
 def printable(text: str) -> str:
     """A text in which what would move the cursor, but for ends of lines and tabs, is escaped."""
     return text if text.isprintable() else "".join(c if c.isprintable() or c in "\n\t" else repr(c)[1:-1] for c in text)

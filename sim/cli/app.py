@@ -15,10 +15,12 @@ from fanet_mw import __version__
 from fanet_mw.errors import FanetError
 from fanet_mw.hosts import interrupts
 from sim.cli import (
+    air,
     figures,
     gateway,
     inspect,
     log,
+    order,
     replay,
     runs,
     scenario_files,
@@ -28,10 +30,8 @@ from sim.cli import (
     tool_files,
     view,
 )
-from sim.cli.air import app as air_app
-from sim.cli.command_groups import OPTIONS
+from sim.cli.command_groups import OPTIONS, RUN, RUNNING, SCENARIO, SERVICE, STUDY, TOOLS
 from sim.cli.memory import require_for
-from sim.cli.order import app as order_app
 from sim.console import Console, discard_output, nobody_reads, open_closed_streams, printable
 
 app = App(
@@ -42,23 +42,20 @@ app = App(
     console=Console(wraps=True),
     suppress_keyboard_interrupt=False,
 )
-app.command(air_app)
-app.command(order_app)
-for commands in (
-    scenario_files,
-    sweep,
-    figures,
-    runs,
-    replay,
-    log,
-    single_services,
-    swarms,
-    gateway,
-    view,
-    inspect,
-    tool_files,
+for group_of_commands in (air.app, order.app, log.app, inspect.topic):
+    app.command(group_of_commands)
+for group, commands in (
+    (SCENARIO, (scenario_files.scenarios, scenario_files.init, scenario_files.show, scenario_files.check)),
+    (SCENARIO, (scenario_files.schema,)),
+    (STUDY, (sweep.sweep, figures.figures, figures.report)),
+    (RUN, (runs.simulate, runs.launch, runs.plan, replay.replay)),
+    (SERVICE, (single_services.router, single_services.emulator, single_services.world, single_services.agent)),
+    (SERVICE, (single_services.autopilots,)),
+    (RUNNING, (log.record, swarms.links, swarms.swarms, gateway.gateway, view.view, view.top, inspect.inspect)),
+    (TOOLS, (tool_files.keys, tool_files.dialect, tool_files.dissector)),
 ):
-    commands.add_to(app)
+    for command in commands:
+        app.command(command, group=group)
 app.register_install_completion_command()
 _NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _MOST_LINES: Final = 20

@@ -7,21 +7,14 @@ from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import App, Parameter
+from cyclopts import Parameter
 from cyclopts.validators import Number
 from rich.table import Table
 from rich.text import Text
 
 from fanet_mw.errors import ConfigError
-from sim.cli.command_groups import STUDY
 from sim.cli.sweep import carry_out, runs_of_other_code
 from sim.console import Console
-
-
-def add_to(app: App) -> None:
-    """Register the commands."""
-    app.command(figures, group=STUDY)
-    app.command(report, group=STUDY)
 
 
 def figures(

@@ -12,12 +12,6 @@ from sim.cli.options import SwarmFlags
 topic = App(name="topic", group=RUNNING, help="The topics of a swarm that runs: list, echo, hz, bw.")
 
 
-def add_to(app: App) -> None:
-    """Register the commands."""
-    app.command(inspect, group=RUNNING)
-    app.command(topic)
-
-
 def inspect(what: str | None = None, *, where: SwarmFlags = SwarmFlags()) -> int:
     """Inspect what a swarm says: messages with rates and values, ways of packets, turns, links; needs a terminal.
 
@@ -31,10 +25,7 @@ def inspect(what: str | None = None, *, where: SwarmFlags = SwarmFlags()) -> int
 
     if what is not None and Path(what).is_dir():
         return recorded(Path(what))
-    from dataclasses import replace
-
-    chosen = where if what is None else replace(where, swarm=what)
-    return live(*chosen.located(), zenoh_config=where.zenoh_config)
+    return live(*where.located(what), zenoh_config=where.zenoh_config)
 
 
 _Count = Annotated[int | None, Parameter(validator=Number(gte=1))]

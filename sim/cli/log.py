@@ -10,20 +10,14 @@ from cyclopts import App, Parameter
 from rich.table import Table
 
 from fanet_mw.errors import ConfigError
-from sim.cli.command_groups import RUNNING, TOOLS
-from sim.cli.options import SwarmFlags, given, require_file_or_nothing
+from sim.cli.command_groups import TOOLS
+from sim.cli.options import SwarmFlags, require_file_or_nothing
 from sim.console import Console
 
 if TYPE_CHECKING:
     from sim.results.result import Result
 
 app = App(name="log", group=TOOLS, help="What the folder or the recording of a run holds, and its export.")
-
-
-def add_to(parent: App) -> None:
-    """Register the commands."""
-    parent.command(app)
-    parent.command(record, group=RUNNING)
 
 
 def record(
@@ -48,8 +42,6 @@ def record(
         The scenario of the swarm, needed only if it names files (maps), which the bus does not carry.
 
     """
-    from fanet_mw.hosts import interrupts
-    from sim.observation.bus_feed import BusFeed
     from sim.recording.from_result import record as carry_out
 
     if file.suffix != ".mcap":
@@ -57,12 +49,7 @@ def record(
     require_file_or_nothing(file)
     if file.exists() and not force and file.stat().st_size:
         raise ConfigError(f"{file}: exists; choose another file, or replace it with --force")
-    signals: list[int] = []
-    endpoint, swarm = where.located()
-    with (
-        BusFeed(endpoint, swarm, zenoh_config=where.zenoh_config, scenario=given(scenario)) as feed,
-        interrupts.handed_to(signals.append),
-    ):
+    with where.heard(scenario) as (feed, signals):
         carry_out(feed, file, ended=signals)
         if not quiet:
             lost = f"; {feed.lost} puts were lost" if feed.lost else ""

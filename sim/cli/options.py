@@ -5,7 +5,8 @@ The names of the fields are the flags and their docstrings the help text; the co
 """
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Literal
@@ -15,12 +16,13 @@ from cyclopts import Parameter, Token
 from fanet_mw.errors import ConfigError
 from sim.bus.running_swarms import DEFAULT_ENDPOINT, locate
 from sim.cli.completion import keys
-from sim.console import Console
+from sim.console import Console, tell
 
 if TYPE_CHECKING:
     from fanet_mw.gateway.gateway import Doors
     from fanet_mw.hosts.realtime import SwarmAddress
     from fanet_mw.scenario import Scenario
+    from sim.observation.bus_feed import BusFeed
 
 _err = Console(stderr=True)
 _LEAD_MS: Final = 40
@@ -172,10 +174,29 @@ class SwarmFlags:
     zenoh_config: Path | None = None
     """Zenoh's own configuration, JSON5 (TLS and the like): a file, or a folder of `fanet keys`."""
 
-    def located(self) -> tuple[str, str | None]:
-        """The endpoint and, if it is known, the name of the swarm; warns if others can reach the endpoint."""
+    def located(self, swarm: str | None = None) -> tuple[str, str | None]:
+        """The endpoint and, if it is known, the name of the swarm; warns if others can reach the endpoint.
+
+        `swarm` is a name that was given otherwise.
+        """
         warn_of(self.connect, listens=False)
-        return locate(self.connect, self.swarm)
+        return locate(self.connect, swarm or self.swarm)
+
+    @contextmanager
+    def heard(self, scenario: Path | None, swarm: str | None = None) -> "Iterator[tuple[BusFeed, list[int]]]":
+        """What is heard of the swarm, and the signals that come meanwhile; `scenario`: its file, if that names maps."""
+        from fanet_mw.hosts import interrupts
+        from sim.observation.bus_feed import BusFeed
+        from sim.scenarios import catalog
+
+        signals: list[int] = []
+        endpoint, name = self.located(swarm)
+        known = None if scenario is None else catalog.find(scenario)
+        with (
+            BusFeed(endpoint, name, zenoh_config=self.zenoh_config, scenario=known) as feed,
+            interrupts.handed_to(signals.append),
+        ):
+            yield feed, signals
 
 
 @Parameter(name="*")
@@ -220,7 +241,7 @@ def print_notes(scenario: "Scenario") -> None:
     from sim.scenarios.notes import notes
 
     for note in notes(scenario):
-        _err.print(f"note: {note}", highlight=False, soft_wrap=True, markup=False)
+        tell(f"note: {note}")
 
 
 def warn_of(endpoint: str | None, *, listens: bool) -> None:
@@ -230,18 +251,10 @@ def warn_of(endpoint: str | None, *, listens: bool) -> None:
     from fanet_mw.hosts.bus import exposure
 
     if (warning := exposure(endpoint, listens=listens)) is not None:
-        _err.print(warning, highlight=False, soft_wrap=True, markup=False)
+        tell(warning)
 
 
 def require_file_or_nothing(path: Path) -> None:
     """Raises ConfigError for a pipe, which would be waited for without end, and for whatever else is no file."""
     if path.exists() and not path.is_file():
         raise ConfigError(f"{path}: cannot be written: not a regular file")
-
-
-def given(scenario: Path | None) -> "Scenario | None":
-    if scenario is None:
-        return None
-    from sim.scenarios import catalog
-
-    return catalog.find(scenario)

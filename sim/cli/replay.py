@@ -4,19 +4,13 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import App, Parameter
+from cyclopts import Parameter
 
 from fanet_mw.errors import ConfigError
-from sim.cli.command_groups import RUN
 from sim.console import Console
 
 if TYPE_CHECKING:
     from sim.results.replay import Replay
-
-
-def add_to(app: App) -> None:
-    """Register the command."""
-    app.command(replay, group=RUN)
 
 
 def replay(

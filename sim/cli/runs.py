@@ -15,7 +15,6 @@ from cyclopts import Parameter
 from cyclopts.validators import Number
 
 from fanet_mw.errors import ConfigError
-from sim.cli.command_groups import RUN
 from sim.cli.companions import Companions, record_command, view_command
 from sim.cli.completion import ScenarioName
 from sim.cli.memory import COMPILING_MB, require
@@ -23,8 +22,6 @@ from sim.cli.options import DoorFlags, OutputFlags, ScenarioFlags, print_notes, 
 from sim.console import Console
 
 if TYPE_CHECKING:
-    from cyclopts import App
-
     from fanet_mw.scenario import Scenario
     from sim.observation.observer import Observer
     from sim.recording.mcap_recording import McapRecording
@@ -34,12 +31,6 @@ if TYPE_CHECKING:
 _err = Console(stderr=True)
 _WORD_EVERY_S = 10.0
 """The interval of the lines that say how a run fares where no terminal shows a progress bar."""
-
-
-def add_to(app: "App") -> None:
-    """Register the commands."""
-    for command in (simulate, launch, plan):
-        app.command(command, group=RUN)
 
 
 def simulate(
@@ -295,7 +286,7 @@ def _watched(scenario: "Scenario", *, quiet: bool) -> Iterator[Callable[["Progre
 def _say(text: str) -> None:
     """Say something to whoever watches; a terminal that has gone must not cost the result."""
     with suppress(OSError):
-        _err.print(text, highlight=False, soft_wrap=True, markup=False)
+        _err.print(text, highlight=False, soft_wrap=True)  # above the bar, if there is one
 
 
 def _finish(outcome: "Outcome", output: OutputFlags, cut: dict[str, str] | None = None) -> int:
@@ -320,6 +311,5 @@ def _finish(outcome: "Outcome", output: OutputFlags, cut: dict[str, str] | None 
             console.print(f"written to {output.out}", highlight=False, soft_wrap=True)
     for name, why in summary["unwritten"].items():
         if name not in (cut or ()):  # those were named as they ended
-            _err.print(f"{name} in --out {output.out} ends early or is missing: {why}", highlight=False, soft_wrap=True,
-                       markup=False)  # fmt: skip
+            _say(f"{name} in --out {output.out} ends early or is missing: {why}")
     return 0 if summary["valid"] else 1

@@ -6,11 +6,10 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import App, Parameter
+from cyclopts import Parameter
 from rich.table import Table
 
 from fanet_mw.errors import ConfigError
-from sim.cli.command_groups import SCENARIO
 from sim.cli.completion import ScenarioName
 from sim.cli.options import ScenarioFlags, print_notes
 from sim.console import Console
@@ -20,12 +19,6 @@ if TYPE_CHECKING:
     from fanet_mw.scenario import Scenario
 
 Switch = Annotated[bool, Parameter(negative="")]
-
-
-def add_to(app: App) -> None:
-    """Register the commands."""
-    for command in (scenarios, init, show, check, schema):
-        app.command(command, group=SCENARIO)
 
 
 def scenarios(*, json_: Annotated[bool, Parameter(name="--json", negative="")] = False) -> int:

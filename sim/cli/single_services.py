@@ -3,22 +3,15 @@
 from pathlib import Path
 from typing import Annotated, Literal
 
-from cyclopts import App, Parameter
+from cyclopts import Parameter
 
 from fanet_mw.errors import FanetError
 from sim.bus.running_swarms import DEFAULT_ENDPOINT
-from sim.cli.command_groups import SERVICE
 from sim.cli.completion import ScenarioName
 from sim.cli.options import OutputFlags, ScenarioFlags, ServiceFlags, SwarmFlags, warn_of
-from sim.console import Console
+from sim.console import Console, tell
 
 _err = Console(stderr=True)
-
-
-def add_to(app: App) -> None:
-    """Register the commands."""
-    for command in (router, emulator, world, agent, autopilots):
-        app.command(command, group=SERVICE)
 
 
 def router(
@@ -64,7 +57,7 @@ def router(
             listen=listen,
             out=out,
             zenoh_config=zenoh_config,
-            on_event=lambda text: _err.print(text, highlight=False, soft_wrap=True, markup=False),
+            on_event=tell,
         )
     )
     if out is not None:
@@ -200,9 +193,6 @@ def autopilots(
 
     from fanet_mw.flavors import Flavor
     from sim.run.autopilots import run
-
-    def tell(text: str) -> None:
-        _err.print(text, highlight=False, soft_wrap=True, markup=False)
 
     endpoint, swarm = where.located()
     return asyncio.run(

@@ -4,20 +4,13 @@ import json
 import sys
 from typing import Annotated
 
-from cyclopts import App, Parameter
+from cyclopts import Parameter
 from cyclopts.validators import Number
 from rich.table import Table
 
 from sim.bus.running_swarms import running
-from sim.cli.command_groups import RUNNING
 from sim.cli.options import SwarmFlags
 from sim.console import Console
-
-
-def add_to(app: App) -> None:
-    """Register the commands."""
-    for command in (links, swarms):
-        app.command(command, group=RUNNING)
 
 
 def links(

@@ -10,11 +10,10 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
-from cyclopts import App, Parameter
+from cyclopts import Parameter
 from cyclopts.validators import Number
 
 from fanet_mw.errors import ConfigError
-from sim.cli.command_groups import STUDY
 from sim.cli.memory import COMPILING_MB, require
 from sim.console import Console
 
@@ -29,11 +28,6 @@ _err = Console(stderr=True)
 _SAY_S: Final = 20.0
 """The interval at which progress is printed if there is no terminal for a progress bar."""
 _KEPT_NOTICE: Final = "they are kept, and the column `code` tells; --rerun-older runs exactly these again"
-
-
-def add_to(app: App) -> None:
-    """Register the command."""
-    app.command(sweep, group=STUDY)
 
 
 def sweep(

@@ -5,19 +5,12 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import App, Parameter
+from cyclopts import Parameter
 
 from fanet_mw.errors import ConfigError
-from sim.cli.command_groups import TOOLS
 from sim.cli.completion import ScenarioName
 from sim.cli.options import ScenarioFlags
 from sim.console import Console
-
-
-def add_to(app: App) -> None:
-    """Register the commands."""
-    for command in (keys, dialect, dissector):
-        app.command(command, group=TOOLS)
 
 
 def keys(

@@ -3,18 +3,11 @@
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import App, Parameter
+from cyclopts import Parameter
 from cyclopts.validators import Number
 
-from sim.cli.command_groups import RUNNING
-from sim.cli.options import SwarmFlags, given
-from sim.console import Console
-
-
-def add_to(app: App) -> None:
-    """Register the commands."""
-    for command in (view, top):
-        app.command(command, group=RUNNING)
+from sim.cli.options import SwarmFlags
+from sim.console import Console, tell
 
 
 def view(
@@ -39,21 +32,10 @@ def view(
         The scenario of the swarm, needed only if it names files (maps), which the bus does not carry.
 
     """
-    from dataclasses import replace
-
-    from fanet_mw.hosts import interrupts
-    from sim.observation.bus_feed import BusFeed
     from sim.view.live import view as show
 
-    chosen = replace(where, swarm=swarm_name) if swarm_name is not None else where
-    console = Console(stderr=True, highlight=False, soft_wrap=True)
-    signals: list[int] = []
-    endpoint, swarm = chosen.located()
-    with (
-        BusFeed(endpoint, swarm, zenoh_config=where.zenoh_config, scenario=given(scenario)) as feed,
-        interrupts.handed_to(signals.append),
-    ):
-        show(feed, port=port, until_gone=until_gone, ended=signals, tell=console.print)
+    with where.heard(scenario, swarm_name) as (feed, signals):
+        show(feed, port=port, until_gone=until_gone, ended=signals, tell=tell)
     return 0
 
 
@@ -76,18 +58,8 @@ def top(
         The scenario of the swarm, needed only if it names files (maps), which the bus does not carry.
 
     """
-    from dataclasses import replace
-
-    from fanet_mw.hosts import interrupts
     from sim.cli.top import watch
-    from sim.observation.bus_feed import BusFeed
 
-    chosen = replace(where, swarm=swarm_name) if swarm_name is not None else where
-    signals: list[int] = []
-    endpoint, swarm = chosen.located()
-    with (
-        BusFeed(endpoint, swarm, zenoh_config=where.zenoh_config, scenario=given(scenario)) as feed,
-        interrupts.handed_to(signals.append),
-    ):
+    with where.heard(scenario, swarm_name) as (feed, signals):
         watch(feed, ended=signals, screens=screens, console=Console())
     return 0

@@ -1,17 +1,14 @@
 """`fanet order`: asks the post of a running swarm to give an order, and waits until its trace shows that it has."""
 
-import threading
 from pathlib import Path
 from typing import Final
 
-from fanet_mw.bus import codecs
-from fanet_mw.bus.messages import TraceBatch
 from fanet_mw.bus.topics import Topics
-from fanet_mw.errors import FanetError, MalformedFrameError
+from fanet_mw.errors import FanetError
 from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.orders import Order
-from fanet_mw.trace import Ordered
-from sim.bus.air_control import CONFIRM_TIMEOUT_S, OPERATOR, find_swarm, scenario_of_swarm
+from fanet_mw.trace import Ordered, Record
+from sim.bus.air_control import CONFIRM_TIMEOUT_S, OPERATOR, find_swarm, put_and_watch, scenario_of_swarm
 
 _ALL: Final = "*"
 
@@ -26,28 +23,19 @@ def give(endpoint: str, swarm: str | None, order: Order, *, zenoh_config: Path |
             raise FanetError(f"swarm {names.swarm} has no post on the ground: its scenario has no ground.at_m")
         if isinstance(count, int) and order.node > count:
             raise FanetError(f"node {order.node}: the UAVs of swarm {names.swarm} are 1 to {count}")
-        given: list[Ordered] = []
-        came = threading.Event()
 
-        def on_trace(_topic: str, payload: bytes) -> None:
-            try:
-                batches = [message for message in codecs.decode(payload) if isinstance(message, TraceBatch)]
-            except MalformedFrameError:
-                return
-            records = [record for batch in batches for record in batch.records if isinstance(record, Ordered)]
-            given.extend(record for record in records if _is(record, order))
-            if given:
-                came.set()
-
-        bus.subscribe(names.trace(_ALL if not isinstance(count, int) else f"agent-{count + 1}"), on_trace)
-        bus.put(names.orders, codecs.encode([order]), reliable=True)
-        if not came.wait(CONFIRM_TIMEOUT_S):
-            raise FanetError(
-                f"the post did not give the order within {CONFIRM_TIMEOUT_S:g} s: refused (`orders_refused` in its "
-                f"report: no UAV that takes part has been heard), or no post on {names.orders}"
+        def confirms(record: Record) -> bool:
+            return (
+                isinstance(record, Ordered)
+                and record.order == order.kind.name.lower()
+                and order.node in (0, record.other)
             )
-        return given[0]
 
-
-def _is(record: Ordered, order: Order) -> bool:
-    return record.order == order.kind.name.lower() and order.node in (0, record.other)
+        trace = names.trace(_ALL if not isinstance(count, int) else f"agent-{count + 1}")
+        for record in put_and_watch(bus, names.orders, order, trace, confirms):
+            if isinstance(record, Ordered):
+                return record
+        raise FanetError(
+            f"the post did not give the order within {CONFIRM_TIMEOUT_S:g} s: refused (`orders_refused` in its "
+            f"report: no UAV that takes part has been heard), or no post on {names.orders}"
+        )

@@ -7,7 +7,6 @@ It asks the keeper of the clock for the scenario and the clock, so it may come a
 on. What roles UAVs took before it came it learns from their reports.
 """
 
-import threading
 import time
 from collections import deque
 from collections.abc import Mapping
@@ -24,7 +23,7 @@ from fanet_mw.hosts.clock import SwarmClock
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.scenario.fingerprint import told_by
 from fanet_mw.trace import Record
-from sim.bus.air_control import OPERATOR, find_swarm
+from sim.bus.air_control import OPERATOR, find_swarm, first_answer
 from sim.observation.observer import Observer
 from sim.observation.turns import MOST_SPANS
 from sim.records.bus_checks import BusChecks
@@ -214,18 +213,11 @@ class BusFeed:
         self.bus.ask(self.names.clock, lambda _, payload: self._clocks.append(payload))
 
     def _ask_scenario(self) -> Scenario:
-        answers: list[bytes] = []
-        came = threading.Event()
-
-        def on_answer(_: str, payload: bytes) -> None:
-            answers.append(payload)
-            came.set()
-
-        self.bus.ask(self.names.scenario, on_answer)
-        if not came.wait(_ANSWER_S):
+        answer = first_answer(self.bus, self.names.scenario, timeout_s=_ANSWER_S)
+        if answer is None:
             raise FanetError(f"swarm {self.names.swarm}: nobody says within {_ANSWER_S:g} s which scenario it runs")
         try:
-            tree = told_by(self.names.swarm, answers[0])
+            tree = told_by(self.names.swarm, answer)
             del tree["modules"]
             return config.build(tree, source=f"swarm {self.names.swarm}", imports=False)
         except (ValueError, TypeError, KeyError, RecursionError) as error:

@@ -68,18 +68,12 @@ def degrade(
 ) -> int:
     """Make a link weaker, or let it lose frames.
 
-    Parameters
-    ----------
-    src
-        Node id of one end.
-    dst
-        Node id of the other.
-    loss_db
-        Added to the path loss [dB].
-    loss_share
-        Share of frames lost, among those that would have been received.
-    one_way
-        Only from src to dst.
+    Args:
+        src: Node id of one end.
+        dst: Node id of the other.
+        loss_db: Added to the path loss [dB].
+        loss_share: Share of frames lost, among those that would have been received.
+        one_way: Only from src to dst.
 
     """
     label = life.label or link_label(src, dst)
@@ -98,16 +92,11 @@ def jam(
 ) -> int:
     """Jam the receivers in a circle, at any height.
 
-    Parameters
-    ----------
-    east_m
-        Center, east of the origin [m].
-    north_m
-        Center, north of the origin [m].
-    radius_m
-        Radius [m].
-    noise_dbm
-        Noise at each receiver inside [dBm]; by default nothing can be received there.
+    Args:
+        east_m: Center, east of the origin [m].
+        north_m: Center, north of the origin [m].
+        radius_m: Radius [m].
+        noise_dbm: Noise at each receiver inside [dBm]; by default nothing can be received there.
 
     """
     center = Enu(east_m, north_m, 0.0)
@@ -145,16 +134,11 @@ def partition(
 ) -> int:
     """Let no frame pass a line on the map.
 
-    Parameters
-    ----------
-    east_m
-        East of one point of the line [m].
-    north_m
-        North of that point [m].
-    other_east_m
-        East of another point of the line [m].
-    other_north_m
-        North of that point [m].
+    Args:
+        east_m: East of one point of the line [m].
+        north_m: North of that point [m].
+        other_east_m: East of another point of the line [m].
+        other_north_m: North of that point [m].
 
     """
     line = (east_m, north_m, other_east_m, other_north_m)
@@ -171,10 +155,8 @@ def crash(node: _Node, *, where: SwarmFlags = SwarmFlags()) -> int:
 def battery(node: _Node, charge: float, *, where: SwarmFlags = SwarmFlags()) -> int:
     """Take charge from a UAV's battery.
 
-    Parameters
-    ----------
-    charge
-        Share of the capacity that is left, at most.
+    Args:
+        charge: Share of the capacity that is left, at most.
 
     """
     return _do(Mishap(node_label(node), NodeId(node), MishapKind.BATTERY, Enu(charge, 0.0, 0.0)), where)
@@ -190,10 +172,8 @@ def gps(
 ) -> int:
     """Let a UAV's GPS receiver give no position, or a wrong one.
 
-    Parameters
-    ----------
-    offset_m
-        By how much it is wrong: east, north, up [m]; by default it gives no position.
+    Args:
+        offset_m: By how much it is wrong: east, north, up [m]; by default it gives no position.
 
     """
     what = MishapKind.GPS_OFF if offset_m is None else MishapKind.GPS
@@ -205,10 +185,9 @@ def gps(
 def restore(label: str = "", *, where: SwarmFlags = SwarmFlags()) -> int:
     """End a fault, or all of them.
 
-    Parameters
-    ----------
-    label
-        Label of the fault: the one given with it, or link-SRC-DST, node-ID, jam. Without a label, all faults end.
+    Args:
+        label: Label of the fault: the one given with it, or link-SRC-DST, node-ID, jam. Without a label, all faults
+            end.
 
     """
     return _do(Restore(label), where)

@@ -33,28 +33,18 @@ def figures(
 
     Runs that are finished in the folder are not repeated; an interrupted command goes on where it was.
 
-    Parameters
-    ----------
-    which
-        8, 9, 10, 11, 12, load, size, clocks, age, ablation, reports, mission, realtime, or all, the default.
-    quick
-        Few seeds and short runs, all figures within 15 minutes on two cores; the default.
-    full
-        10 seeds and long runs: hours.
-    out
-        Folder for the figures (PNG, SVG, CSV, verdicts as JSON) and, under sweeps/, the runs.
-    jobs
-        Processes of this machine; by default one per core.
-    scheduler
-        A Dask scheduler whose workers carry out the runs.
-    retry
-        Repeat runs that failed, among them those in real time for which the machine was too busy.
-    rerun_older
-        Repeat runs that code other than the present one has finished, so that each figure is of one code.
-    draw_only
-        Draw from the runs that are finished, and run nothing.
-    kept
-        With --draw-only: a folder of kept tables of sweeps, for example docs/results/sweeps; those are drawn alone.
+    Args:
+        which: 8, 9, 10, 11, 12, load, size, clocks, age, ablation, reports, mission, realtime, or all, the default.
+        quick: Few seeds and short runs, all figures within 15 minutes on two cores; the default.
+        full: 10 seeds and long runs: hours.
+        out: Folder for the figures (PNG, SVG, CSV, verdicts as JSON) and, under sweeps/, the runs.
+        jobs: Processes of this machine; by default one per core.
+        scheduler: A Dask scheduler whose workers carry out the runs.
+        retry: Repeat runs that failed, among them those in real time for which the machine was too busy.
+        rerun_older: Repeat runs that code other than the present one has finished, so that each figure is of one code.
+        draw_only: Draw from the runs that are finished, and run nothing.
+        kept: With --draw-only: a folder of kept tables of sweeps, for example docs/results/sweeps; those are drawn
+            alone.
 
     """
     from sim.figures.all_figures import chosen
@@ -112,12 +102,9 @@ def figures(
 def report(*folders: Path, out: Path | None = None) -> int:
     """Make one page of figures and verdicts: report.html, which needs nothing else, and report.md.
 
-    Parameters
-    ----------
-    folders
-        Folders of `fanet figures`, and of single runs (`fanet simulate --out`).
-    out
-        Folder for the page; by default the first of the folders.
+    Args:
+        folders: Folders of `fanet figures`, and of single runs (`fanet simulate --out`).
+        out: Folder for the page; by default the first of the folders.
 
     """
     from sim.report.page import write

@@ -12,10 +12,8 @@ def gateway(
 ) -> int:
     """Connect ground stations (QGroundControl, MAVProxy, MAVSDK) to a swarm that runs, until it ends.
 
-    Parameters
-    ----------
-    swarm
-        Name of the swarm; by default the only one running.
+    Args:
+        swarm: Name of the swarm; by default the only one running.
 
     """
     import asyncio

@@ -15,10 +15,8 @@ topic = App(name="topic", group=RUNNING, help="The topics of a swarm that runs: 
 def inspect(what: str | None = None, *, where: SwarmFlags = SwarmFlags()) -> int:
     """Inspect what a swarm says: messages with rates and values, ways of packets, turns, links; needs a terminal.
 
-    Parameters
-    ----------
-    what
-        Name of a swarm that runs, by default the only one; or the folder of a run.
+    Args:
+        what: Name of a swarm that runs, by default the only one; or the folder of a run.
 
     """
     from sim.inspection.run import live, recorded
@@ -39,10 +37,8 @@ def list_(
 ) -> int:
     """List the topics on which something is said, with kinds of messages and rates.
 
-    Parameters
-    ----------
-    seconds
-        How long to listen.
+    Args:
+        seconds: How long to listen.
 
     """
     from sim.inspection.topics import show_list
@@ -54,10 +50,8 @@ def list_(
 def echo(name: _Topic, *, count: _Count = None, where: SwarmFlags = SwarmFlags()) -> int:
     """Print what is said on a topic, one JSON object a line; MAVLink is decoded.
 
-    Parameters
-    ----------
-    count
-        End after this many messages; by default when interrupted.
+    Args:
+        count: End after this many messages; by default when interrupted.
 
     """
     from sim.inspection.topics import show_echo

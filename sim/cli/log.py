@@ -30,16 +30,11 @@ def record(
 ) -> int:
     """Record a swarm that runs, from now until it ends, as MCAP for Foxglove and PlotJuggler.
 
-    Parameters
-    ----------
-    file
-        FILE.mcap.
-    force
-        Replace a file that exists.
-    quiet
-        Say nothing; a file that exists and is empty is filled.
-    scenario
-        The scenario of the swarm, needed only if it names files (maps), which the bus does not carry.
+    Args:
+        file: FILE.mcap.
+        force: Replace a file that exists.
+        quiet: Say nothing; a file that exists and is empty is filled.
+        scenario: The scenario of the swarm, needed only if it names files (maps), which the bus does not carry.
 
     """
     from sim.recording.from_result import record as carry_out
@@ -61,10 +56,8 @@ def record(
 def info(path: Path) -> int:
     """Say what a folder of a run, or a recording (.mcap), holds.
 
-    Parameters
-    ----------
-    path
-        What `fanet simulate --out` or `fanet launch --out` has written, or a file of `--record`.
+    Args:
+        path: What `fanet simulate --out` or `fanet launch --out` has written, or a file of `--record`.
 
     """
     from sim.recording.contents import of_folder, of_recording
@@ -86,17 +79,12 @@ def export(
 ) -> int:
     """Write a run in a format of other tools.
 
-    Parameters
-    ----------
-    folder
-        What `fanet simulate --out` or `fanet launch --out` has written.
-    to
-        The format: parquet or csv (one file per table), mcap (Foxglove, PlotJuggler), gpx (a track per UAV) or kml.
-    out
-        The folder, or the file of a format of one file; by default FOLDER/tables, FOLDER/tracks, FOLDER/recording.mcap,
-        FOLDER/tracks.kml.
-    force
-        Replace what is there.
+    Args:
+        folder: What `fanet simulate --out` or `fanet launch --out` has written.
+        to: The format: parquet or csv (one file per table), mcap (Foxglove, PlotJuggler), gpx (a track per UAV) or kml.
+        out: The folder, or the file of a format of one file; by default FOLDER/tables, FOLDER/tracks,
+            FOLDER/recording.mcap, FOLDER/tracks.kml.
+        force: Replace what is there.
 
     """
     from sim.results.stored_result import load_result

@@ -21,10 +21,8 @@ app = App(
 def recall(node: int = 0, *, where: SwarmFlags = SwarmFlags()) -> int:
     """Let a UAV, or all, fly home and land.
 
-    Parameters
-    ----------
-    node
-        Node id; without it all UAVs.
+    Args:
+        node: Node id; without it all UAVs.
 
     """
     return _give(Order(OrderKind.RECALL, node), where)
@@ -40,14 +38,10 @@ def end(*, where: SwarmFlags = SwarmFlags()) -> int:
 def stay(east_m: float, north_m: float, *, node: int = 0, where: SwarmFlags = SwarmFlags()) -> int:
     """Let a UAV stay over a place, for example over a survivor.
 
-    Parameters
-    ----------
-    east_m
-        East of the origin [m].
-    north_m
-        North of the origin [m].
-    node
-        Node id; without it the post chooses the nearest UAV that can best be spared.
+    Args:
+        east_m: East of the origin [m].
+        north_m: North of the origin [m].
+        node: Node id; without it the post chooses the nearest UAV that can best be spared.
 
     """
     return _give(Order(OrderKind.STAY, node, east_m, north_m), where)
@@ -57,16 +51,11 @@ def stay(east_m: float, north_m: float, *, node: int = 0, where: SwarmFlags = Sw
 def search(east_m: float, north_m: float, radius_m: float, *, node: int = 0, where: SwarmFlags = SwarmFlags()) -> int:
     """Let a UAV search around a place.
 
-    Parameters
-    ----------
-    east_m
-        East of the origin [m].
-    north_m
-        North of the origin [m].
-    radius_m
-        Up to this distance from the place [m].
-    node
-        Node id; without it the post chooses the nearest UAV that can best be spared.
+    Args:
+        east_m: East of the origin [m].
+        north_m: North of the origin [m].
+        radius_m: Up to this distance from the place [m].
+        node: Node id; without it the post chooses the nearest UAV that can best be spared.
 
     """
     return _give(Order(OrderKind.SEARCH, node, east_m, north_m, radius_m), where)
@@ -76,10 +65,8 @@ def search(east_m: float, north_m: float, radius_m: float, *, node: int = 0, whe
 def release(node: int = 0, *, where: SwarmFlags = SwarmFlags()) -> int:
     """Let a UAV, or all, that were recalled or sent somewhere take part in the search again.
 
-    Parameters
-    ----------
-    node
-        Node id; without it all UAVs.
+    Args:
+        node: Node id; without it all UAVs.
 
     """
     return _give(Order(OrderKind.RELEASE, node), where)
@@ -89,14 +76,10 @@ def release(node: int = 0, *, where: SwarmFlags = SwarmFlags()) -> int:
 def no_fly(east_m: float, north_m: float, radius_m: float, *, where: SwarmFlags = SwarmFlags()) -> int:
     """Let all UAVs keep out of a circle, at any height.
 
-    Parameters
-    ----------
-    east_m
-        Center, east of the origin [m].
-    north_m
-        Center, north of the origin [m].
-    radius_m
-        Radius [m].
+    Args:
+        east_m: Center, east of the origin [m].
+        north_m: Center, north of the origin [m].
+        radius_m: Radius [m].
 
     """
     return _give(Order(OrderKind.NO_FLY, 0, east_m, north_m, radius_m), where)

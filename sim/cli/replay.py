@@ -24,20 +24,14 @@ def replay(
 ) -> int:
     """Play a finished run again in a browser, in 3-D, with time to go through; or write it as one file.
 
-    Parameters
-    ----------
-    folder
-        What `fanet simulate --out` or `fanet launch --out` has written.
-    html
-        Write the scene to this file instead, which plays without a network; it needs WebGL.
-    map_
-        Write a map that plays to this file instead, with modes and events; it needs no WebGL, and is a tenth the size.
-    at
-        Print the state at this instant [s] as text instead, and write nothing.
-    start
-        Begin at this instant [s].
-    port
-        Port of the page on this machine; by default 8080, or the next one that is free.
+    Args:
+        folder: What `fanet simulate --out` or `fanet launch --out` has written.
+        html: Write the scene to this file instead, which plays without a network; it needs WebGL.
+        map_: Write a map that plays to this file instead, with modes and events; it needs no WebGL, and is a tenth the
+            size.
+        at: Print the state at this instant [s] as text instead, and write nothing.
+        start: Begin at this instant [s].
+        port: Port of the page on this machine; by default 8080, or the next one that is free.
 
     """
     if not 0 <= start < math.inf:

@@ -24,10 +24,8 @@ Switch = Annotated[bool, Parameter(negative="")]
 def scenarios(*, json_: Annotated[bool, Parameter(name="--json", negative="")] = False) -> int:
     """List the shipped scenarios.
 
-    Parameters
-    ----------
-    json_
-        Print JSON instead of a table.
+    Args:
+        json_: Print JSON instead of a table.
 
     """
     entries = shipped()
@@ -51,18 +49,13 @@ def init(
 ) -> int:
     """Write a scenario file to start from, with every key, its meaning, unit, bound and default in comments.
 
-    Parameters
-    ----------
-    file
-        The file to write, for example mine.toml.
-    from_
-        The scenario that it starts from: a shipped one's name or a .toml file.
-    short
-        Write only those keys that the scenario sets.
-    schema
-        Write the JSON schema beside it too, and name it in the first line, so that editors complete and check keys.
-    force
-        Replace a file that is there.
+    Args:
+        file: The file to write, for example mine.toml.
+        from_: The scenario that it starts from: a shipped one's name or a .toml file.
+        short: Write only those keys that the scenario sets.
+        schema: Write the JSON schema beside it too, and name it in the first line, so that editors complete and check
+            keys.
+        force: Replace a file that is there.
 
     """
     import tomllib
@@ -96,14 +89,10 @@ def show(
 ) -> int:
     """Print a scenario with every value that a run of it would use, as TOML.
 
-    Parameters
-    ----------
-    scenario
-        A shipped scenario's name (see `fanet scenarios`) or a .toml file.
-    changed
-        Print only what differs from the defaults.
-    json_
-        Print JSON instead.
+    Args:
+        scenario: A shipped scenario's name (see `fanet scenarios`) or a .toml file.
+        changed: Print only what differs from the defaults.
+        json_: Print JSON instead.
 
     """
     import tomli_w
@@ -121,10 +110,8 @@ def check(file: ScenarioName, *, choice: ScenarioFlags = ScenarioFlags()) -> int
 
     Exit code 0: it is right; 2: it is not.
 
-    Parameters
-    ----------
-    file
-        A .toml file, or a shipped scenario's name.
+    Args:
+        file: A .toml file, or a shipped scenario's name.
 
     """
     from sim.world.possible_world import require_possible
@@ -139,10 +126,8 @@ def check(file: ScenarioName, *, choice: ScenarioFlags = ScenarioFlags()) -> int
 def schema(file: Path | None = None) -> int:
     """Print the JSON schema of scenario files, from which editors complete and check keys.
 
-    Parameters
-    ----------
-    file
-        Where to write it; by default it is printed.
+    Args:
+        file: Where to write it; by default it is printed.
 
     """
     if file is None:

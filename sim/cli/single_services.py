@@ -28,20 +28,13 @@ def router(
 
     It says every five seconds which services are missing, there twice, or run another scenario.
 
-    Parameters
-    ----------
-    scenario
-        The scenario that the services will run: it says which of them to wait for.
-    listen
-        Zenoh endpoint to serve on.
-    swarm
-        Name of the swarm on the bus; by default the scenario's name.
-    out
-        Folder for the result of the services, as `fanet launch --out` writes it.
-    force
-        Replace the result of another run in that folder.
-    zenoh_config
-        Zenoh's own configuration, JSON5 (TLS, access lists): a file, or a folder of `fanet keys`.
+    Args:
+        scenario: The scenario that the services will run: it says which of them to wait for.
+        listen: Zenoh endpoint to serve on.
+        swarm: Name of the swarm on the bus; by default the scenario's name.
+        out: Folder for the result of the services, as `fanet launch --out` writes it.
+        force: Replace the result of another run in that folder.
+        zenoh_config: Zenoh's own configuration, JSON5 (TLS, access lists): a file, or a folder of `fanet keys`.
 
     """
     from fanet_mw.hosts import loop
@@ -80,14 +73,10 @@ def emulator(
 ) -> int:
     """Run the link emulator alone; it joins a swarm that fanet router serves.
 
-    Parameters
-    ----------
-    scenario
-        The scenario of the swarm.
-    pcap
-        Capture file for every transmission, for Wireshark; if there is one already, the new one gets a number.
-    pcap_receptions
-        Write every reception too, with its RSSI.
+    Args:
+        scenario: The scenario of the swarm.
+        pcap: Capture file for every transmission, for Wireshark; if there is one already, the new one gets a number.
+        pcap_receptions: Write every reception too, with its RSSI.
 
     """
     from emulator.__main__ import run
@@ -104,10 +93,8 @@ def world(
 ) -> int:
     """Run the world alone; it joins a swarm that fanet router serves.
 
-    Parameters
-    ----------
-    scenario
-        The scenario of the swarm.
+    Args:
+        scenario: The scenario of the swarm.
 
     """
     from sim.world.__main__ import run
@@ -131,24 +118,16 @@ def agent(
 ) -> int:
     """Run one UAV alone; it joins a swarm that fanet router serves, or speaks over a real radio.
 
-    Parameters
-    ----------
-    scenario
-        The scenario of the swarm.
-    id
-        Node id, from 1 to the number of nodes.
-    radio_address
-        Send and hear frames on the interface with this address, not emulated.
-    radio_broadcast
-        The broadcast address of that interface's network.
-    radio_port
-        UDP port of the swarm; by default 14560.
-    epoch
-        Unix time of swarm instant 0 [s]: no router, clocks by GPS or NTP.
-    autopilot
-        Its flight controller, which flies it and says where it is: udpin:127.0.0.1:14540, tcpout:, serial:DEVICE:BAUD.
-    flavor
-        Of the flight controller.
+    Args:
+        scenario: The scenario of the swarm.
+        id: Node id, from 1 to the number of nodes.
+        radio_address: Send and hear frames on the interface with this address, not emulated.
+        radio_broadcast: The broadcast address of that interface's network.
+        radio_port: UDP port of the swarm; by default 14560.
+        epoch: Unix time of swarm instant 0 [s]: no router, clocks by GPS or NTP.
+        autopilot: Its flight controller, which flies it and says where it is: udpin:127.0.0.1:14540, tcpout:,
+            serial:DEVICE:BAUD.
+        flavor: Of the flight controller.
 
     """
     from agents.__main__ import Radio
@@ -181,12 +160,9 @@ def autopilots(
 ) -> int:
     """Play the world of a swarm by flight controllers, each at the end of a MAVLink connection; for launch --no-world.
 
-    Parameters
-    ----------
-    connection
-        The connection of UAV 1, whose port is counted up for the others: udpin:127.0.0.1:14540+.
-    flavor
-        Of the flight controllers.
+    Args:
+        connection: The connection of UAV 1, whose port is counted up for the others: udpin:127.0.0.1:14540+.
+        flavor: Of the flight controllers.
 
     """
     import asyncio

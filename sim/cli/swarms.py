@@ -21,12 +21,9 @@ def links(
 ) -> int:
     """Show the links of a swarm that runs, the busiest first, renewed every second.
 
-    Parameters
-    ----------
-    node
-        Only links from and to this node.
-    reports
-        End after this many reports; by default when interrupted.
+    Args:
+        node: Only links from and to this node.
+        reports: End after this many reports; by default when interrupted.
 
     """
     from sim.cli.links import watch
@@ -37,10 +34,8 @@ def links(
 def swarms(*, json_: Annotated[bool, Parameter(name="--json", negative="")] = False) -> int:
     """List the swarms that run on this machine, started by `fanet launch` or `fanet router`.
 
-    Parameters
-    ----------
-    json_
-        Print JSON instead of a table.
+    Args:
+        json_: Print JSON instead of a table.
 
     """
     entries = running()

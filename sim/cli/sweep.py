@@ -48,30 +48,18 @@ def sweep(
 
     Exit code 0: every run is in the table; 1: some failed; 2: the sweep or a flag is wrong.
 
-    Parameters
-    ----------
-    what
-        A sweep file (TOML with a `base`), a shipped sweep, or a scenario.
-    set
-        Scenario key and its value, or its values in turn: KEY=A,B,C ...; repeatable. Every combination is run.
-    seeds
-        Run every setting with this number of seeds, from 1 on.
-    variant
-        `quick` or `full`, where the sweep has it.
-    out
-        Folder for runs.parquet; by default sweeps/NAME. Runs that are finished there are not repeated.
-    jobs
-        Processes of this machine; by default one per core.
-    scheduler
-        A Dask scheduler, for example tcp://10.0.0.1:8786, whose workers carry out the runs.
-    retry
-        Repeat runs that failed.
-    rerun_older
-        Repeat runs that code other than the present one has finished, so that all rows are of one code.
-    dry_run
-        Validate, count, and stop.
-    json
-        Print what came out as JSON, on standard output.
+    Args:
+        what: A sweep file (TOML with a `base`), a shipped sweep, or a scenario.
+        set: Scenario key and its value, or its values in turn: KEY=A,B,C ...; repeatable. Every combination is run.
+        seeds: Run every setting with this number of seeds, from 1 on.
+        variant: `quick` or `full`, where the sweep has it.
+        out: Folder for runs.parquet; by default sweeps/NAME. Runs that are finished there are not repeated.
+        jobs: Processes of this machine; by default one per core.
+        scheduler: A Dask scheduler, for example tcp://10.0.0.1:8786, whose workers carry out the runs.
+        retry: Repeat runs that failed.
+        rerun_older: Repeat runs that code other than the present one has finished, so that all rows are of one code.
+        dry_run: Validate, count, and stop.
+        json: Print what came out as JSON, on standard output.
 
     """
     name, wanted = asked(what, set, seeds, variant)

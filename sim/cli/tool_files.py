@@ -25,18 +25,12 @@ def keys(
     """Make certificates and access lists for a swarm: one file per participant, for --zenoh-config of
     fanet launch. Needs openssl.
 
-    Parameters
-    ----------
-    scenario
-        The scenario of the swarm: it says which UAVs there are.
-    out
-        Folder for router.json5, emulator.json5, world.json5, operator.json5 and agent-1.json5 and so on.
-    swarm
-        Name of the swarm on the bus; by default the scenario's name.
-    host
-        Name or address at which the router is reached, besides localhost; repeatable.
-    days
-        How long the certificates are valid [days].
+    Args:
+        scenario: The scenario of the swarm: it says which UAVs there are.
+        out: Folder for router.json5, emulator.json5, world.json5, operator.json5 and agent-1.json5 and so on.
+        swarm: Name of the swarm on the bus; by default the scenario's name.
+        host: Name or address at which the router is reached, besides localhost; repeatable.
+        days: How long the certificates are valid [days].
 
     """
     from sim.bus.certificates import make
@@ -50,12 +44,9 @@ def keys(
 def dialect(folder: Path | None = None, *, definitions: Annotated[bool, Parameter(negative="")] = False) -> int:
     """Print the path of fanet-mw's MAVLink dialect, fanet.xml, with the definitions that it includes beside it.
 
-    Parameters
-    ----------
-    folder
-        Where to write them; by default `fanet-mw/message_definitions` in the user's folder of data.
-    definitions
-        Print the folder of definitions instead, which pymavlink wants in MDEF.
+    Args:
+        folder: Where to write them; by default `fanet-mw/message_definitions` in the user's folder of data.
+        definitions: Print the folder of definitions instead, which pymavlink wants in MDEF.
 
     """
     from fanet_mw.dialect.export_xml import write
@@ -76,10 +67,8 @@ def _data() -> Path:
 def dissector(folder: Path) -> int:
     """Install Wireshark's dissector for MAVLink with the messages of fanet-mw: writes mavlink.lua.
 
-    Parameters
-    ----------
-    folder
-        Wireshark's folder of personal Lua plugins: see Help, About Wireshark, Folders.
+    Args:
+        folder: Wireshark's folder of personal Lua plugins: see Help, About Wireshark, Folders.
 
     """
     import gzip

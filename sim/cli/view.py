@@ -20,16 +20,11 @@ def view(
 ) -> int:
     """Show a swarm that runs in a browser, in 3-D, with things to do: cut, degrade, jam, crash, pause, send.
 
-    Parameters
-    ----------
-    swarm_name
-        Name of the swarm; by default the only one running on this machine.
-    port
-        Port of the page on this machine; by default 8080, or the next one that is free.
-    until_gone
-        End when the swarm has gone; otherwise its last state stays.
-    scenario
-        The scenario of the swarm, needed only if it names files (maps), which the bus does not carry.
+    Args:
+        swarm_name: Name of the swarm; by default the only one running on this machine.
+        port: Port of the page on this machine; by default 8080, or the next one that is free.
+        until_gone: End when the swarm has gone; otherwise its last state stays.
+        scenario: The scenario of the swarm, needed only if it names files (maps), which the bus does not carry.
 
     """
     from sim.view.live import view as show
@@ -48,14 +43,10 @@ def top(
 ) -> int:
     """Show a swarm that runs on the terminal: a line per UAV with mode, battery, head, neighbors and queue.
 
-    Parameters
-    ----------
-    swarm_name
-        Name of the swarm; by default the only one running on this machine.
-    screens
-        End after this many seconds of the swarm; by default when interrupted.
-    scenario
-        The scenario of the swarm, needed only if it names files (maps), which the bus does not carry.
+    Args:
+        swarm_name: Name of the swarm; by default the only one running on this machine.
+        screens: End after this many seconds of the swarm; by default when interrupted.
+        scenario: The scenario of the swarm, needed only if it names files (maps), which the bus does not carry.
 
     """
     from sim.cli.top import watch

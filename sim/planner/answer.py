@@ -21,31 +21,25 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import LIKELY_SHARE
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.places import rounded
-from sim.planner import (
-    ClassPlan,
-    Loss,
-    LossyPlan,
-    ScenarioChange,
-    ScenarioPlan,
-    cheapest_change,
-    demands,
+from sim.planner import flood_loss
+from sim.planner.cheapest_change import ScenarioChange, cheapest_change
+from sim.planner.demand import ClassPlan, demands
+from sim.planner.expected_links import expected_links
+from sim.planner.lossy_plan import LossyPlan, plan_lossy
+from sim.planner.not_counted import not_counted, outdated
+from sim.planner.plan import plan, with_capacity
+from sim.planner.plan_text import (
     describe,
     describe_change,
     describe_loss,
     describe_lossy,
     describe_not_counted,
-    flood_loss,
-    loss,
-    not_counted,
-    plan,
-    plan_lossy,
-    with_capacity,
+    describe_operator,
+    item,
 )
-from sim.planner.expected_links import expected_links
-from sim.planner.motion import outdated
-from sim.planner.plan_text import describe_operator, item
 from sim.planner.reception_probability import chance_of
 from sim.planner.rounds_plan import judge_rounds
+from sim.planner.scenario_plan import ScenarioPlan
 from sim.world.environment.layout import positions
 
 _DRAWS: Final = 3
@@ -177,7 +171,7 @@ def _has_floods(found: ScenarioPlan, at: Mapping[NodeId, Enu]) -> bool:
     return found.superframe is not None and found.superframe.table is not None and len(at) > 1 and not found.cut_off
 
 
-def _with_loss(found: ScenarioPlan, at: Mapping[NodeId, Enu]) -> tuple[ScenarioPlan, Loss | None]:
+def _with_loss(found: ScenarioPlan, at: Mapping[NodeId, Enu]) -> tuple[ScenarioPlan, flood_loss.Loss | None]:
     """The plan, with a problem more if its floods lose too much, and their loss; None without a timetable, and if the
     probability is not known. Ways to a head in contention are not included.
     """
@@ -190,7 +184,7 @@ def _with_loss(found: ScenarioPlan, at: Mapping[NodeId, Enu]) -> tuple[ScenarioP
     adjacency = within_range(
         {node: rounded(place) for node, place in at.items()}, range_m=geometry.link_m, reaches=scenario.reaches
     )
-    missed = loss(
+    missed = flood_loss.loss(
         superframe.table, adjacency, per_superframe=turns.per_superframe, hop_turns=geometry.hop_turns, chance=chance
     )
     lossy = flood_loss.problems(missed, link_m=geometry.link_m, delivers_m=_delivers_m(scenario, at))

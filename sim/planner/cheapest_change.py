@@ -11,7 +11,6 @@ from itertools import combinations, product
 from typing import Final, NamedTuple
 
 from fanet_mw.bounds import Refused
-from fanet_mw.graph.topology import Adjacency
 from fanet_mw.routing.clustered.tdma.hello_room import crowd, hellos_ns, least_ms
 from fanet_mw.routing.clustered.tdma.turn_timing import turn_slack_ns
 from fanet_mw.routing.clustered.timetable.turn_size import distance_error_m, most_together, superframe
@@ -45,7 +44,6 @@ def cheapest_change(
     scenario: Scenario,
     positions: Mapping[NodeId, Enu],
     *,
-    adjacency: Adjacency | None = None,
     reported: Sequence[Mapping[NodeId, Enu]] = (),
     sources: Sequence[NodeId] | None = None,
     deadline_ns: int | None = None,
@@ -55,7 +53,7 @@ def cheapest_change(
     """The least change that makes `plan` feasible, if any searched does; nothing is searched for a separated swarm.
     `delivers_m`: up to which distance the channel delivers; `delivers`: whether floods lose few enough packets.
     """
-    site = Site(scenario, positions, adjacency, reported)
+    site = Site(scenario, positions, reported=reported)
     found = judge(site, sources, deadline_ns)
     if isinstance(found, ScenarioPlan) and found.cut_off:
         return None

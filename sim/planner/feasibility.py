@@ -29,7 +29,7 @@ from sim.planner.demand import ClassPlan, TrafficClass
 from sim.planner.flood_cost import FloodCost
 from sim.planner.goodput_bound import Goodput, any_protocol
 from sim.planner.head_slot import ClassLoad, ClusterPlan, slot_delays, work_ns
-from sim.planner.motion import outdated
+from sim.planner.not_counted import outdated
 from sim.planner.scenario_plan import ScenarioPlan
 from sim.planner.site import Site
 from sim.planner.timetable_plan import Candidate, TimetablePlan, judge, table_for

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 from fanet_mw.bounds import Bounded, DelayBound, Refused
-from fanet_mw.graph.topology import Adjacency
 from fanet_mw.routing.clustered.timetable.turn_allocation import least_interval_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId
@@ -65,7 +64,6 @@ def plan(
     scenario: Scenario,
     positions: Mapping[NodeId, Enu],
     *,
-    adjacency: Adjacency | None = None,
     reported: Sequence[Mapping[NodeId, Enu]] = (),
     sources: Sequence[NodeId] | None = None,
     deadline_ns: int | None = None,
@@ -74,7 +72,7 @@ def plan(
     draw of `reported` positions as well: the greatest bounds count, and what fails with one is a problem. `sources`
     send the application's traffic.
     """
-    return judge(Site(scenario, positions, adjacency, reported), sources, deadline_ns)
+    return judge(Site(scenario, positions, reported=reported), sources, deadline_ns)
 
 
 def judge(

@@ -34,7 +34,8 @@ from fanet_mw.graph.topology import components, within_range
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.trace import Dropped
 from fanet_mw.units import Enu, NodeId, S
-from sim.planner import ScenarioPlan, plan
+from sim.planner.plan import plan
+from sim.planner.scenario_plan import ScenarioPlan
 from sim.records.record_kinds import records_of
 from sim.results.bounds import Column, delays_under_bound, likely
 from sim.results.outcome import Outcome

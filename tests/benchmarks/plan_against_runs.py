@@ -11,7 +11,8 @@ from fanet_mw.bounds import Bounded
 from fanet_mw.scenario import config
 from fanet_mw.trace import Delivered
 from fanet_mw.units import NodeId, S
-from sim.planner import ScenarioPlan, plan
+from sim.planner.plan import plan
+from sim.planner.scenario_plan import ScenarioPlan
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.world.environment.layout import positions

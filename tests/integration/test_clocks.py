@@ -16,8 +16,8 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.timesync.turn_slack import clocks_fit
 from fanet_mw.trace import Delivered, Generated
 from fanet_mw.units import MS, US, Enu, NodeId
-from sim.planner import plan
 from sim.planner.answer import judge
+from sim.planner.plan import plan
 from sim.results.files import finish
 from sim.results.outcome import Outcome
 from sim.run.virtual import simulate

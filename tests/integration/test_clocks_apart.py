@@ -5,7 +5,7 @@ from kit import slow
 
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.units import NodeId
-from sim.planner import plan
+from sim.planner.plan import plan
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.world.environment.layout import positions

@@ -13,11 +13,13 @@ from fanet_mw.mavlink import Encoder
 from fanet_mw.rng import stream
 from fanet_mw.trace import Delivered
 from fanet_mw.units import Enu, NodeId, S
-from sim.planner import ScenarioPlan, cheapest_change, describe, describe_change, plan
-from sim.planner.cheapest_change import _changes
+from sim.planner.cheapest_change import _changes, cheapest_change
 from sim.planner.demand import TrafficClass, demands
 from sim.planner.flood_cost import FloodCost
 from sim.planner.head_slot import ClassLoad, slot_delays, work_ns
+from sim.planner.plan import plan
+from sim.planner.plan_text import describe, describe_change
+from sim.planner.scenario_plan import ScenarioPlan
 from sim.planner.site import Site
 from sim.planner.timetable_plan import table_for
 from sim.planner.uplink_delay import ways

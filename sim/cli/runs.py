@@ -38,10 +38,8 @@ def simulate(
 ) -> int:
     """Run a scenario in virtual time: deterministic, as fast as it goes.
 
-    Parameters
-    ----------
-    scenario
-        A shipped scenario's name (see `fanet scenarios`) or a .toml file.
+    Args:
+        scenario: A shipped scenario's name (see `fanet scenarios`) or a .toml file.
 
     """
     from emulator.compile_kernel import COMPILING_NOTICE, must_compile, warm_up
@@ -101,32 +99,21 @@ def launch(
 ) -> int:
     """Run a scenario in real time: one process per UAV, the link emulator and the world, over Zenoh.
 
-    Parameters
-    ----------
-    scenario
-        A shipped scenario's name (see `fanet scenarios`) or a .toml file.
-    respawn
-        Start a process again when it dies.
-    slow_down_to
-        Let the swarm's clock slow down while this machine cannot keep up with it, at most to this share of real time,
-        and speed up again afterwards; by default it does not, and the run says that it is not valid.
-    no_world
-        Start no world: another program says where all UAVs are (how is in the documentation, reference/bus).
-    autopilots
-        With --no-world: flight controllers (PX4's or ArduPilot's, by --flavor) fly the UAVs and say where they are; the
-        connection of UAV 1, whose port is counted up for the others: udpin:127.0.0.1:14540+.
-    view
-        Show the swarm in a browser: `fanet view` beside it, until it ends.
-    view_port
-        The port of that page; by default 8080, or the next one that is free.
-    listen
-        Zenoh endpoint to serve on, for example tcp/127.0.0.1:7447; by default a free port of the loopback interface.
-    connect
-        Zenoh endpoint of an existing router to use instead of serving one.
-    swarm
-        Name of the swarm on the bus; by default the scenario's name.
-    zenoh_config
-        Zenoh's own configuration, JSON5 (TLS, access lists): a file, or a folder of `fanet keys`.
+    Args:
+        scenario: A shipped scenario's name (see `fanet scenarios`) or a .toml file.
+        respawn: Start a process again when it dies.
+        slow_down_to: Let the swarm's clock slow down while this machine cannot keep up with it, at most to this share
+            of real time, and speed up again afterwards; by default it does not, and the run says that it is not valid.
+        no_world: Start no world: another program says where all UAVs are (how is in the documentation, reference/bus).
+        autopilots: With --no-world: flight controllers (PX4's or ArduPilot's, by --flavor) fly the UAVs and say where
+            they are; the connection of UAV 1, whose port is counted up for the others: udpin:127.0.0.1:14540+.
+        view: Show the swarm in a browser: `fanet view` beside it, until it ends.
+        view_port: The port of that page; by default 8080, or the next one that is free.
+        listen: Zenoh endpoint to serve on, for example tcp/127.0.0.1:7447; by default a free port of the loopback
+            interface.
+        connect: Zenoh endpoint of an existing router to use instead of serving one.
+        swarm: Name of the swarm on the bus; by default the scenario's name.
+        zenoh_config: Zenoh's own configuration, JSON5 (TLS, access lists): a file, or a folder of `fanet keys`.
 
     """
     import asyncio
@@ -188,14 +175,10 @@ def plan(
 
     Exit code 0: feasible; 1: not feasible; 2: the scenario or a flag is wrong.
 
-    Parameters
-    ----------
-    scenario
-        A shipped scenario's name (see `fanet scenarios`) or a .toml file.
-    deadline
-        Every packet must reach all nodes within this time [s]; by default traffic.deadline_s, if that is set.
-    json
-        Print the plan as JSON.
+    Args:
+        scenario: A shipped scenario's name (see `fanet scenarios`) or a .toml file.
+        deadline: Every packet must reach all nodes within this time [s]; by default traffic.deadline_s, if that is set.
+        json: Print the plan as JSON.
 
     """
     from sim.planner.answer import show
@@ -224,7 +207,7 @@ def _together(*observers: "Observer | None") -> "Observer | None":
 @contextmanager
 def _simulated(scenario: "Scenario", *, quiet: bool) -> "Iterator[tuple[Callable[[float], None], Observer | None]]":
     """A progress bar that says how the swarm fares, for a person who is watching; else a line every ten seconds."""
-    from sim.run.collecting.running_tally import Progress, RunningTally, TallyObserver
+    from sim.run.collecting.running_tally import Progress, RunningTally
 
     began_s = said_s = monotonic()
 
@@ -239,7 +222,7 @@ def _simulated(scenario: "Scenario", *, quiet: bool) -> "Iterator[tuple[Callable
     if _err.is_terminal and not quiet:
         tally = RunningTally(scenario)
         with _progress(scenario, quiet=quiet) as tell:
-            yield lambda s: tell(s, f"{scenario.name}: {figures(s, tally).in_words()}"), TallyObserver(tally)
+            yield lambda s: tell(s, f"{scenario.name}: {figures(s, tally).in_words()}"), tally
         return
 
     def say(seconds: float) -> None:

@@ -12,6 +12,7 @@ from fanet_mw.trace import Record
 from fanet_mw.units import US
 from sim.inspection.messages import Messages
 from sim.inspection.packets import Packets
+from sim.observation.observer import Observer
 from sim.observation.turns import Turns, turns
 from sim.results.file_names import TLOG_FILE
 from sim.results.run_folder import RunFolder
@@ -31,7 +32,7 @@ class LinkLine(NamedTuple):
         return -self.copies, self.src, self.dst
 
 
-class Inspection:
+class Inspection(Observer):
     """What was told of one swarm until now."""
 
     def __init__(self, scenario: Scenario) -> None:
@@ -46,8 +47,8 @@ class Inspection:
     def take_poses(self, poses: Poses) -> None:
         self.now_ns = max(self.now_ns, poses.t_ns)
 
-    def take_records(self, some: Iterable[Record]) -> None:
-        self.packets.take(some)
+    def take_records(self, records: Iterable[Record]) -> None:
+        self.packets.take(records)
 
     def take_links(self, stats: LinkStats) -> None:
         lines = [

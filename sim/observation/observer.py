@@ -1,14 +1,14 @@
 """What an observer of a swarm is told, by whoever runs or hears it."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import Poses
 from fanet_mw.trace import Record
 
 
-class Observer(Protocol):
+class Observer:
     """Someone who is told what can be seen and heard of a swarm, and changes nothing."""
 
     def take_poses(self, poses: Poses) -> None: ...
@@ -22,7 +22,7 @@ class Observer(Protocol):
     def take_tap(self, node: int, t_ns: int, data: bytes) -> None: ...
 
 
-class Several:
+class Several(Observer):
     """Several observers, who are told in turn."""
 
     def __init__(self, observers: Sequence[Observer]) -> None:

@@ -44,6 +44,7 @@ from fanet_mw.wire import FOUND, frames
 from fanet_mw.wire.frame import Content, message_id
 from fanet_mw.wire.survivors import Found, Standing
 from sim.observation.event_text import event_line
+from sim.observation.observer import Observer
 from sim.observation.turns import Turns, turns
 from sim.results.mission import OverflownCells
 from sim.results.survivor_states import SurvivorStates
@@ -159,7 +160,7 @@ class Event(NamedTuple):
     text: str
 
 
-class SwarmState:
+class SwarmState(Observer):
     """What is known of one swarm at `t_ns`."""
 
     def __init__(self, scenario: Scenario) -> None:

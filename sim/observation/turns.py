@@ -33,13 +33,17 @@ class Turns(NamedTuple):
     window_called: str = "all contend"
     period_called: str = "superframe"
 
+    def place_ns(self, t_ns: int) -> int:
+        """How long after the beginning of its period an instant is."""
+        return (t_ns - self.start_ns) % self.period_ns
+
     def in_window(self, t_ns: int) -> bool:
         start_ns, length_ns = self.window
-        return (t_ns - self.start_ns - start_ns) % self.period_ns < length_ns
+        return (self.place_ns(t_ns) - start_ns) % self.period_ns < length_ns
 
     def owners(self, t_ns: int) -> list[int]:
         """The nodes, or the clusters, whose span it is; several where turns are used again far away."""
-        place_ns = (t_ns - self.start_ns) % self.period_ns
+        place_ns = self.place_ns(t_ns)
         return [one.node for one in self.own if (place_ns - one.start_ns) % self.period_ns < one.length_ns]
 
 

@@ -50,6 +50,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record, RoleChanged
 from fanet_mw.units import Enu, S
 from sim.figures import colors
+from sim.observation.observer import Observer
 from sim.observation.surroundings import Surroundings, surroundings
 from sim.observation.swarm_state import SwarmState, UavNow
 from sim.recording.drawing import STATUS_COLORS, attitude, link_color, mode_color
@@ -104,7 +105,7 @@ def _messages() -> tuple[Any, Any, Any, Any]:
 _Metrics, _UavState, _Links, _Report = _messages()
 
 
-class McapRecording:
+class McapRecording(Observer):
     """A recording that is being written; a context manager, which closes the file."""
 
     def __init__(self, path: Path, scenario: Scenario, *, epoch_unix_ns: int, file: BinaryIO | None = None) -> None:

@@ -12,18 +12,29 @@ import os
 import struct
 import tempfile
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.whole_file import batches
 
+T = TypeVar("T")
 _LENGTH: Final = struct.Struct("<I")
 _BLOCK_BYTES: Final = 1 << 18
 _SORTED_BYTES: Final = 1 << 23
 """The number of bytes of items that are sorted in memory at once."""
+
+
+class OnDisk(Collection[T]):
+    """Items that are decoded each time they are gone through."""
+
+    def __contains__(self, value: object) -> bool:
+        return any(item == value for item in self)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
 
 
 class Spool:

@@ -9,7 +9,7 @@ from typing import Final
 from fanet_mw import trace
 from fanet_mw.trace import Delivered, Generated, Record
 from sim.records.record_kinds import CODES
-from sim.records.spool import Spool, in_order
+from sim.records.spool import OnDisk, Spool, in_order
 
 _KEY: Final = struct.Struct("<qHB")
 """The first bytes of a stored record and its sort key: instant, node, kind (`CODES`). A line of JSON follows."""
@@ -33,10 +33,6 @@ class RecordSpools:
             (deliveries if type(record) is Delivered else others).append(_encoded(record))
         parts = ((self._deliveries, deliveries), (self._others, others))
         return sum(len(items) for spool, items in parts if not spool.append(*items))
-
-    @property
-    def size(self) -> int:
-        return self._deliveries.size + self._others.size
 
     @property
     def failure(self) -> str | None:
@@ -71,7 +67,7 @@ class RecordSpools:
         return StoredRecords(deliveries, others)
 
 
-class StoredRecords(Collection[Record]):
+class StoredRecords(OnDisk[Record]):
     """Trace records on disk, sorted: one file of deliveries and one of other records, merged while they are read."""
 
     def __init__(self, deliveries: Spool, others: Spool) -> None:
@@ -83,9 +79,6 @@ class StoredRecords(Collection[Record]):
 
     def __iter__(self) -> Iterator[Record]:
         return map(_decoded, self._items())
-
-    def __contains__(self, value: object) -> bool:
-        return any(record == value for record in self)
 
     def of_kinds(self, kinds: tuple[type[Record], ...]) -> Iterator[Record]:
         if kinds == (Delivered,):

@@ -11,7 +11,7 @@ deliveries are given as columns, and as lines of the trace file, without making 
 
 import pickle
 import struct
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import compress, starmap
 from pathlib import Path
 from typing import Any, Final
@@ -22,6 +22,7 @@ from fanet_mw.trace import DELIVERED_LINE, Delivered, Record, line
 from sim.records.delivery_columns import DeliveryColumns, in_columns
 from sim.records.disk_backed_log import MOST_IN_MEMORY, MOST_PACKED_BYTES, DiskBackedLog
 from sim.records.record_kinds import CODES, KINDS
+from sim.records.spool import OnDisk
 
 _DELIVERED: Final = CODES[Delivered]
 _IS_DELIVERED: Final = bytes(code == _DELIVERED for code in range(256))
@@ -36,7 +37,7 @@ Change = Callable[[Delivered], Delivered]
 """A function that corrects a delivery, such as its delay, which the receiver measured by its own clock."""
 
 
-class TraceLog(Collection[Record]):
+class TraceLog(OnDisk[Record]):
     """The trace records of a run, in the order in which they were added."""
 
     def __init__(
@@ -62,9 +63,6 @@ class TraceLog(Collection[Record]):
 
     def __len__(self) -> int:
         return len(self._records)
-
-    def __contains__(self, record: object) -> bool:
-        return any(one == record for one in self)
 
     def __iter__(self) -> Iterator[Record]:
         for codes, rows, others in self._portions():

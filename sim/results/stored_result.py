@@ -1,6 +1,6 @@
 """Reads the folder of a run as what `simulate` returned: its summary, trace, reports and links."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -8,13 +8,14 @@ from typing import Any
 from fanet_mw.bus.link_stats import LOSSES, LinkRow
 from fanet_mw.trace import Record
 from fanet_mw.units import US, NodeId, S
+from sim.records.spool import OnDisk
 from sim.results.links import LinkTotals
 from sim.results.outcome import Outcome
 from sim.results.result import Result
 from sim.results.run_folder import RunFolder
 
 
-class FolderRecords(Collection[Record]):
+class FolderRecords(OnDisk[Record]):
     """The trace of a folder; each iteration reads the file again."""
 
     def __init__(self, folder: RunFolder) -> None:
@@ -22,7 +23,7 @@ class FolderRecords(Collection[Record]):
 
     @cached_property
     def _count(self) -> int:
-        return sum(1 for _ in self)
+        return super().__len__()
 
     def __len__(self) -> int:
         return self._count
@@ -30,28 +31,19 @@ class FolderRecords(Collection[Record]):
     def __iter__(self) -> Iterator[Record]:
         return self._folder.records()
 
-    def __contains__(self, value: object) -> bool:
-        return any(record == value for record in self)
-
     def of_kinds(self, kinds: tuple[type[Record], ...]) -> Iterator[Record]:
         return self._folder.records(*kinds)
 
 
-class _FolderTaps(Collection[tuple[int, bytes]]):
+class _FolderTaps(OnDisk[tuple[int, bytes]]):
     """The taps of a folder, frame by frame, at instants of whole microseconds."""
 
     def __init__(self, folder: RunFolder, *, epoch_unix_ns: int) -> None:
         self._folder = folder
         self._epoch_ns = epoch_unix_ns
 
-    def __len__(self) -> int:
-        return sum(1 for _ in self)
-
     def __iter__(self) -> Iterator[tuple[int, bytes]]:
         return ((t_us * US - self._epoch_ns, frame) for t_us, frame in self._folder.telemetry())
-
-    def __contains__(self, value: object) -> bool:
-        return any(tap == value for tap in self)
 
 
 def load_result(folder: Path | str) -> Result:

@@ -15,6 +15,7 @@ from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.trace import BoundExcludes, BoundStated, Delivered, Generated
 from fanet_mw.units import MS, Enu, NodeId, S
+from sim.observation.observer import Observer
 from sim.planner.answer import judge
 from sim.run.virtual import Observed
 
@@ -42,7 +43,7 @@ def line(count: int, **changes: Any) -> Scenario:
     )
 
 
-class AtPost:
+class AtPost(Observer):
     """Keeps what is tapped at the post."""
 
     def __init__(self, post: int, heard: list[tuple[int, Any]]) -> None:
@@ -51,14 +52,6 @@ class AtPost:
     def take_tap(self, node: int, t_ns: int, data: bytes) -> None:
         if node == self._post:
             self._heard += [(t_ns, message) for message in mavlink.decode(data)]
-
-    def take_links(self, _: object) -> None: ...
-
-    def take_poses(self, _: object) -> None: ...
-
-    def take_records(self, _: object) -> None: ...
-
-    def take_report(self, *_: object) -> None: ...
 
 
 class Station:

@@ -11,6 +11,7 @@ from fanet_mw.bus.messages import Poses
 from fanet_mw.trace import Record
 from fanet_mw.units import Enu, S
 from sim.cli.app import app
+from sim.observation.observer import Observer
 from sim.observation.swarm_state import SwarmState
 from sim.observation.timeline import Timeline
 from sim.run.virtual import simulate
@@ -24,7 +25,7 @@ RUNS = {
 SECONDS = (4, 9, 13)
 
 
-class Witness:
+class Witness(Observer):
     """An observer that writes down, once it is past some instants, what it knew at the last of its reports."""
 
     def __init__(self, state: SwarmState) -> None:

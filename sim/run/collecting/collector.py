@@ -10,7 +10,7 @@ allowance are counted as `excess` before they are decoded, so a flood of puts co
 
 import threading
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, Final
 
@@ -66,7 +66,6 @@ class Collector:
     ) -> None:
         self._scenario = scenario
         self._checks = BusChecks(scenario)
-        self._true_delays = scenario.clock.modelled
         self._now_ns = now_ns
         self._lock = threading.Lock()  # Zenoh calls from several threads
         self._allowance = Allowance(burst=BURST_BYTES, per_s=BYTES_PER_S)
@@ -136,7 +135,7 @@ class Collector:
             else:
                 self._refused[f"trace: {why}"] += 1
         self._keep(good)
-        self.tally.take(good)
+        self.tally.take_records(good)
         self._standing.take(good)
         return None
 
@@ -179,55 +178,35 @@ class Collector:
         self, further: Iterable[Record] = (), *, wall_s: float, ready_s: float = 0.0, epoch_unix_ns: int = 0
     ) -> Outcome:
         """The result of the run as far as it was received, with some further records."""
-        return Outcome(
-            scenario=self._scenario,
-            mode="realtime",
-            wall_s=wall_s,
-            records=self.records(further),
-            reports=self.reports(),
-            taps=self.taps(),
-            links=self.links(),
-            ready_s=ready_s,
-            epoch_unix_ns=epoch_unix_ns,
-            heard=self.figures(),
-            absent=self.absent(),
-        )
-
-    def records(self, further: Iterable[Record] = ()) -> Collection[Record]:
-        """All records and some further ones, by instant, node and kind, on disk; with true delays if clocks drift."""
         with self._lock:
             self._keep(further)
-            return self._records.records(true_delays=self._true_delays)
+            why = dict(sorted(self._refused.items()))
+            missing = [name for name in self._checks.node_of if name not in self._reports]
+            return Outcome(
+                scenario=self._scenario,
+                mode="realtime",
+                wall_s=wall_s,
+                records=self._records.records(true_delays=self._scenario.clock.modelled),
+                reports=self._sorted_reports(),
+                taps=taps_of(self._taps),
+                links=self._links,
+                ready_s=ready_s,
+                epoch_unix_ns=epoch_unix_ns,
+                heard={"puts": self._puts, "malformed": sum(why.values()), "why": why},
+                absent={name: self._why_no_report.get(name, "no report was heard") for name in missing},
+            )
 
     def reports(self) -> dict[str, dict[str, Any]]:
         with self._lock:
-            return {name: self._reports[name] for name in sorted(self._reports)}
+            return self._sorted_reports()
+
+    def _sorted_reports(self) -> dict[str, dict[str, Any]]:
+        return dict(sorted(self._reports.items()))
 
     def unfinished(self) -> set[str]:
         """The actors that have not yet sent their last report."""
         with self._lock:
             return {name for name in self._checks.node_of if not self._reports.get(name, {}).get("final")}
-
-    def absent(self) -> dict[str, str]:
-        """Why a report is missing, by the actor's name."""
-        with self._lock:
-            missing = [name for name in self._checks.node_of if name not in self._reports]
-            return {name: self._why_no_report.get(name, "no report was heard") for name in missing}
-
-    def links(self) -> LinkTotals:
-        with self._lock:
-            return self._links
-
-    def taps(self) -> Collection[tuple[int, bytes]]:
-        """The taps of all UAVs, sorted by instant; they remain on disk, too."""
-        with self._lock:
-            return taps_of(self._taps)
-
-    def figures(self) -> dict[str, Any]:
-        """The number of puts received, and the number of items refused (records, reports, taps), by what was wrong."""
-        with self._lock:
-            why = dict(sorted(self._refused.items()))
-            return {"puts": self._puts, "malformed": sum(why.values()), "why": why}
 
     def disk_failure(self) -> str | None:
         """Why the trace or the taps are incomplete; None if both are complete."""

@@ -5,15 +5,14 @@ it is forgotten, so memory does not grow with the run. The figures of the result
 """
 
 from collections import Counter, deque
-from collections.abc import Iterable, Mapping
-from typing import Any, Final, NamedTuple
+from collections.abc import Iterable
+from typing import Final, NamedTuple
 
 from agents.applications.traffic import targets_of
-from fanet_mw.bus.link_stats import LinkStats
-from fanet_mw.bus.messages import Poses
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Confirmed, Delivered, Generated, Record, Refuted
 from fanet_mw.wire import PRIORITY_BULK
+from sim.observation.observer import Observer
 from sim.results.mission import Confirmations
 from sim.world.environment.survivors import place
 
@@ -58,7 +57,7 @@ class Progress(NamedTuple):
         return f"{self.swarm_s:.0f} of {self.duration_s:g} s: {self.in_words()}"
 
 
-class RunningTally:
+class RunningTally(Observer):
     """What of the first class of traffic was delivered, and the survivors confirmed near their true places."""
 
     def __init__(self, scenario: Scenario) -> None:
@@ -78,7 +77,7 @@ class RunningTally:
         self.without_phone: set[int] = set()
         """The other survivors who were found as persons."""
 
-    def take(self, records: Iterable[Record]) -> None:
+    def take_records(self, records: Iterable[Record]) -> None:
         """Count records of one process, in the order in which it made them."""
         for record in records:
             match record:
@@ -110,21 +109,3 @@ class RunningTally:
     def delivered_share(self) -> float | None:
         """The share of the copies of ripe packets that arrived; None while there are none."""
         return self._delivered / self._wanted if self._wanted else None
-
-
-class TallyObserver:
-    """A tally as an observer of a run in virtual time."""
-
-    def __init__(self, tally: RunningTally) -> None:
-        self._tally = tally
-
-    def take_records(self, records: Iterable[Record]) -> None:
-        self._tally.take(records)
-
-    def take_poses(self, poses: Poses) -> None: ...
-
-    def take_links(self, stats: LinkStats) -> None: ...
-
-    def take_report(self, name: str, content: Mapping[str, Any], *, t_ns: int) -> None: ...
-
-    def take_tap(self, node: int, t_ns: int, data: bytes) -> None: ...

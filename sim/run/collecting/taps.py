@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from sim.records.disk_backed_log import MOST_IN_MEMORY, DiskBackedLog
-from sim.records.spool import Spool, in_order
+from sim.records.spool import OnDisk, Spool, in_order
 
 _INSTANT: Final = struct.Struct("<q")
 Tap = tuple[int, bytes]
@@ -30,7 +30,7 @@ def _encoded(taps: Sequence[Tap]) -> list[bytes]:
     return [encoded_tap(*tap) for tap in taps]
 
 
-class TapLog(Collection[Tap]):
+class TapLog(OnDisk[Tap]):
     """The taps of a run in virtual time, in the order in which they were added; all but the latest are on disk."""
 
     def __init__(self, folder: Path | None = None, *, most_in_memory: int = MOST_IN_MEMORY) -> None:
@@ -45,11 +45,8 @@ class TapLog(Collection[Tap]):
     def __iter__(self) -> Iterator[Tap]:
         return chain(map(_decoded_tap, self._taps.stored()), self._taps.latest)
 
-    def __contains__(self, tap: object) -> bool:
-        return any(one == tap for one in self)
 
-
-class StoredTaps(Collection[Tap]):
+class StoredTaps(OnDisk[Tap]):
     """Taps that are on disk, encoded by `encoded_tap`; each iteration reads the file again."""
 
     def __init__(self, spool: Spool) -> None:
@@ -60,9 +57,6 @@ class StoredTaps(Collection[Tap]):
 
     def __iter__(self) -> Iterator[Tap]:
         return map(_decoded_tap, self._spool.items())
-
-    def __contains__(self, tap: object) -> bool:
-        return any(one == tap for one in self)
 
 
 def taps_of(spool: Spool) -> Collection[Tap]:

@@ -15,7 +15,7 @@ from typing import Final
 from sim.figures.all_figures import FIGURES
 from sim.figures.kept_tables import keep
 from sim.report.html import Block, Text, as_markdown
-from sim.report.page import commands, figure_pages, overview
+from sim.report.page import commands, figure_pages, figures_of, overview
 from sim.results.run_table import read
 
 ROOT: Final = Path(__file__).resolve().parent.parent
@@ -38,11 +38,10 @@ _WITH_OLD_SENSORS: Final = frozenset({"figure-12", "reports"})
 
 def pages() -> dict[Path, str]:
     """The text of each page: the overview, then a page for each figure."""
-    figures = figure_pages([KEPT])
+    kept = figures_of([KEPT])
+    figures = figure_pages(kept)
     links = "\n".join(f"- [{figure.title}]({_page_of(figure.name).name})" for figure in figures)
-    written = {
-        DOCUMENT: _written("The paper's claims", [Text(_HEAD), Text(links), *overview([KEPT]), *commands([KEPT])])
-    }
+    written = {DOCUMENT: _written("The paper's claims", [Text(_HEAD), Text(links), *overview(kept), *commands(kept)])}
     for figure in figures:
         older = [Text(_SENSORS)] if figure.name in _WITH_OLD_SENSORS else []
         written[_page_of(figure.name)] = _written(figure.title, [Text(_BACK), *figure.blocks, *older])

@@ -174,6 +174,8 @@ class _FigureAbout(_FigureShape):
     claims: list[_FigureClaim]
 
 
+Figure = tuple[Path, dict[str, Any]]
+"""The folder of a figure, and what `fanet figures` has written about it."""
 _COLUMNS: Final = ("claim", "findings", "verdict", "why")
 """The columns of the table of claims; the last one is left out if no claim needs a reason."""
 
@@ -194,7 +196,7 @@ def write(folders: Sequence[Path], out: Path) -> list[Path]:
 
 
 def _blocks(folders: Sequence[Path], out: Path) -> tuple[str, list[Block]]:
-    figures = [found for folder in folders for found in _figures(folder)]
+    figures = figures_of(folders)
     runs = [folder for folder in folders if holds_run(folder)]
     for folder in folders:
         if folder not in runs and not _figures(folder):
@@ -206,19 +208,15 @@ def _blocks(folders: Sequence[Path], out: Path) -> tuple[str, list[Block]]:
             raise ConfigError(
                 f"{folder}: holds neither figures (fanet figures) nor a run (fanet simulate --out){sweep}"
             )
-    blocks = evaluation(folders) if figures else []
+    blocks: list[Block] = []
+    if figures:
+        blocks += overview(figures)
+        for page in figure_pages(figures):
+            blocks += [Heading(page.title), *page.blocks]
+        blocks += commands(figures)
     for folder in runs:
         blocks += blocks_of_run(folder, out)
     return _TITLE if figures else "Runs" if len(runs) > 1 else "A run", blocks
-
-
-def evaluation(folders: Sequence[Path]) -> list[Block]:
-    """The page of all figures in these folders: verdicts, settings, each figure with its claims, commands."""
-    pages = figure_pages(folders)
-    blocks = overview(folders)
-    for page in pages:
-        blocks += [Heading(page.title), *page.blocks]
-    return [*blocks, *commands(folders)]
 
 
 class FigurePage(NamedTuple):
@@ -229,24 +227,16 @@ class FigurePage(NamedTuple):
     blocks: list[Block]
 
 
-def overview(folders: Sequence[Path]) -> list[Block]:
-    return [*_overview(_all(folders)), *_SETTINGS]
-
-
-def figure_pages(folders: Sequence[Path]) -> list[FigurePage]:
-    """Each figure with its claims, in the order of the paper."""
-    return [FigurePage(about["name"], _title(about), _figure(folder, about)) for folder, about in _all(folders)]
-
-
-def commands(folders: Sequence[Path]) -> list[Block]:
-    return _commands(_all(folders))
-
-
-def _all(folders: Sequence[Path]) -> list[tuple[Path, dict[str, Any]]]:
+def figures_of(folders: Sequence[Path]) -> list[Figure]:
     return [found for folder in folders for found in _figures(folder)]
 
 
-def _figures(folder: Path) -> list[tuple[Path, dict[str, Any]]]:
+def figure_pages(figures: Sequence[Figure]) -> list[FigurePage]:
+    """Each figure with its claims."""
+    return [FigurePage(about["name"], _title(about), _figure(folder, about)) for folder, about in figures]
+
+
+def _figures(folder: Path) -> list[Figure]:
     """The figures that `fanet figures` has left in a folder, in the order of the paper."""
     names = [name for name in _ORDER if all(os.path.lexists(folder / f"{name}.{kind}") for kind in ("json", "png"))]
     return [(folder, _about(folder / f"{name}.json")) for name in names]
@@ -260,7 +250,8 @@ def _about(path: Path) -> dict[str, Any]:
     return about
 
 
-def _overview(figures: Sequence[tuple[Path, dict[str, Any]]]) -> list[Block]:
+def overview(figures: Sequence[Figure]) -> list[Block]:
+    """The verdicts, and the settings."""
     claims = [(about["name"], claim) for _, about in figures for claim in about["claims"]]
     papers = [(str(one["figure"]), one["claim"], one["verdict"]) for _, one in claims if one["figure"]]
     ours = [(name, one["claim"], one["verdict"]) for name, one in claims if not one["figure"]]
@@ -277,7 +268,7 @@ def _overview(figures: Sequence[tuple[Path, dict[str, Any]]]) -> list[Block]:
     if ours:
         blocks.append(Text("Beyond the paper, what might be said of fanet-mw, judged in the same way:"))
         blocks.append(Rows(("figure", "statement", "verdict"), ours))
-    return blocks
+    return [*blocks, *_SETTINGS]
 
 
 def _figure(folder: Path, about: dict[str, Any]) -> list[Block]:
@@ -328,7 +319,7 @@ def _reason(reason: Mapping[str, Any]) -> str:
     return f"{doubt}{reason['text']} ({evidence}.){f' Set after such runs had been seen: {chosen}' if chosen else ''}"
 
 
-def _commands(figures: Sequence[tuple[Path, dict[str, Any]]]) -> list[Block]:
+def commands(figures: Sequence[Figure]) -> list[Block]:
     lines = [
         "fanet figures all --quick --out figures",
         "fanet figures all --full --out figures",

@@ -9,18 +9,17 @@ rounds           place in the round, a line for each node; turns are those of th
 from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.trace import LetOut
 from fanet_mw.units import MS, S
 from sim.figures.colors import BLUE, DARK, GRAY, GREEN, ORANGE, PINK, RED, SHADE
 from sim.figures.style import canvas, legend_above
-from sim.observation.turns import Span, spans_of
+from sim.observation.turns import Span, Turns, turns
 from sim.report.run_pictures import RunPicture
 from sim.report.run_records import RunRecords
 
@@ -35,39 +34,16 @@ _LEAST_SHOWN: Final = 0.1
 _WINDOW_COLOR: Final = "#eeeeee"
 
 
-class _Frame(NamedTuple):
-    """A superframe, or a round."""
-
-    start_ns: int
-    period_ns: int
-    window: tuple[int, int]
-    """Where nodes contend: start and length [ns]."""
-    own: Sequence[Span]
-
-    def place_ns(self, one: LetOut) -> int:
-        return (one.t_ns - self.start_ns) % self.period_ns
-
-    def kept(self, let_out: Sequence[LetOut]) -> int:
-        """The number of packets that were let out in a span of their origin."""
-        spans: dict[int, list[Span]] = defaultdict(list)
-        for own in self.own:
-            spans[own.node].append(own)
-        return sum(
-            any((self.place_ns(one) - own.start_ns) % self.period_ns < own.length_ns for own in spans[one.node])
-            for one in let_out
-        )
-
-
 def slots(run: RunRecords, reports: Mapping[int, Mapping[str, Any]]) -> RunPicture | None:
     """The picture for the protocol of a run; None if it gives no time to anybody, or nothing was let out."""
     if not run.let_out:
         return None
-    if run.scenario.routing.protocol == "rounds":
-        return _in_rounds(run)
+    found = turns(run.scenario, reports)
+    if found is not None and run.scenario.routing.protocol == "rounds":
+        return _in_rounds(run, found)
     if run.scenario.routing.protocol != "clustered":
         return None
-    turns = {node: report["turns"] for node, report in reports.items() if report.get("turns")}
-    return _in_turns(run, turns) if turns else _in_slots(run, reports)
+    return _in_turns(run, found) if found is not None and found.called == "turn" else _in_slots(run, reports)
 
 
 def _in_slots(run: RunRecords, reports: Mapping[int, Mapping[str, Any]]) -> RunPicture:
@@ -116,10 +92,7 @@ def _cluster_led_by(run: RunRecords, one: LetOut) -> int | None:
     return roles[index - 1].cluster if index and roles[index - 1].role == "head" else None
 
 
-def _in_turns(run: RunRecords, turns: Mapping[int, Mapping[str, Any]]) -> RunPicture:
-    newest = max(turns.values(), key=lambda frame: float(frame["start_ms"]))
-    own = sorted((one for node, frame in turns.items() for one in spans_of(node, frame)), key=lambda one: one.start_ns)
-    frame = _Frame(_ns(newest["start_ms"]), _ns(newest["period_ms"]), (0, _ns(newest.get("contention_ms", 0.0))), own)
+def _in_turns(run: RunRecords, frame: Turns) -> RunPicture:
     shown = [one for one in run.let_out if one.t_ns >= frame.start_ns]
     if len(shown) < _LEAST_SHOWN * len(run.let_out):
         return RunPicture(
@@ -128,10 +101,10 @@ def _in_turns(run: RunRecords, turns: Mapping[int, Mapping[str, Any]]) -> RunPic
             f"which began at {frame.start_ns / S:.3g} s, was in force for {len(shown):,} of {len(run.let_out):,} "
             "packets, so that no turns are drawn.",
         )
-    picture = _by_node(run, frame, shown, "superframe", ("nodes with turns", "other nodes"), "contention window")
-    owners = {one.node for one in own}
+    picture = _by_node(run, frame, shown, ("nodes with turns", "other nodes"), "contention window")
+    owners = {one.node for one in frame.own}
     owned = [one for one in shown if one.node in owners]
-    kept = frame.kept(owned)
+    kept = _kept(frame, owned)
     said = (
         f"When packets were let out first, under the last timetable, which began at {frame.start_ns / S:.3g} s "
         f"({len(shown):,} of {len(run.let_out):,} packets). Shaded: the turns in which a node transmits packets of its "
@@ -141,18 +114,26 @@ def _in_turns(run: RunRecords, turns: Mapping[int, Mapping[str, Any]]) -> RunPic
     return RunPicture(picture, said)
 
 
-def _in_rounds(run: RunRecords) -> RunPicture:
-    timing = RoundTiming.of(run.scenario)
-    own = [Span(node, (node - 1) * timing.turn_ns, timing.turn_ns) for node in run.scenario.node_ids]
-    frame = _Frame(0, timing.period_ns, (timing.nodes * timing.turn_ns, timing.slots * timing.slot_ns), own)
-    kept = frame.kept(run.let_out)
-    bulk = sum(frame.place_ns(one) >= frame.window[0] for one in run.let_out)
-    window = (", and the slots in which bulk is sent", f", {bulk:,} in the slots") if timing.slots else ("", "")
+def _in_rounds(run: RunRecords, frame: Turns) -> RunPicture:
+    kept = _kept(frame, run.let_out)
+    bulk = sum(frame.place_ns(one.t_ns) >= frame.window[0] for one in run.let_out)
+    window = (", and the slots in which bulk is sent", f", {bulk:,} in the slots") if frame.window[1] else ("", "")
     said = (
         f"When packets were let out first. Shaded: the turn of each node, on its line{window[0]}. Of "
         f"{len(run.let_out):,} packets, {kept:,} were let out in a turn of the origin{window[1]}."
     )
-    return RunPicture(_by_node(run, frame, run.let_out, "round", ("packets", ""), "slots of bulk"), said)
+    return RunPicture(_by_node(run, frame, run.let_out, ("packets", ""), "slots of bulk"), said)
+
+
+def _kept(frame: Turns, let_out: Sequence[LetOut]) -> int:
+    """The number of packets that were let out in a span of their origin."""
+    spans: dict[int, list[Span]] = defaultdict(list)
+    for own in frame.own:
+        spans[own.node].append(own)
+    return sum(
+        any((frame.place_ns(one.t_ns) - own.start_ns) % frame.period_ns < own.length_ns for own in spans[one.node])
+        for one in let_out
+    )
 
 
 def _over_time(run: RunRecords) -> Figure:
@@ -164,9 +145,7 @@ def _over_time(run: RunRecords) -> Figure:
     return figure
 
 
-def _by_node(
-    run: RunRecords, frame: _Frame, shown: Sequence[LetOut], called: str, labels: tuple[str, str], window: str
-) -> Figure:
+def _by_node(run: RunRecords, frame: Turns, shown: Sequence[LetOut], labels: tuple[str, str], window: str) -> Figure:
     """A line for each node, with its own spans shaded. `labels`: of the packets of owners, and of others."""
     figure, (axes,) = canvas(1, width=7.5, height=4.4)
     start_ns, length_ns = frame.window
@@ -179,9 +158,9 @@ def _by_node(
         )  # fmt: skip
     owners = {own.node for own in frame.own}
     for wanted, label, color, marker in ((True, labels[0], BLUE, "|"), (False, labels[1], DARK, ".")):
-        places = [(frame.place_ns(one) / MS, one.node) for one in shown if (one.node in owners) == wanted]
+        places = [(frame.place_ns(one.t_ns) / MS, one.node) for one in shown if (one.node in owners) == wanted]
         _scatter(axes, places, color, marker, label if label == "packets" else f"packets of {label}", 16)
-    _frame_axes(axes, frame.period_ns, called)
+    _frame_axes(axes, frame.period_ns, frame.period_called)
     _node_axis(axes, run)
     legend_above(figure, axes)
     return figure

@@ -30,7 +30,7 @@ from fanet_mw.trace import (
     RoleChanged,
 )
 from fanet_mw.units import Enu, NodeId, S
-from sim.results.mission import OverflownCells, mission
+from sim.results.mission import OverflownCells
 from sim.results.run_folder import RunFolder
 from sim.results.survivor_states import SurvivorState, SurvivorStates
 from sim.world.environment.layout import positions
@@ -149,9 +149,6 @@ class Replay:
     def coverage(self, t_s: float) -> float:
         first = self.covered_ns
         return float(((first >= 0) & (first <= round(t_s * S))).mean())
-
-    def mission(self) -> Mapping[str, Any]:
-        return mission(self.scenario, self.records)
 
     def _latest(self, kind: type[R], node: NodeId, t_ns: int) -> R | None:
         records: Sequence[R] = self._changes.get((kind, node), ())

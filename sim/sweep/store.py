@@ -82,10 +82,6 @@ class Store:
     def get(self, key: str) -> Finished | None:
         return self._finished.get(key)
 
-    def codes(self) -> set[str]:
-        """The versions of the code that have produced the rows."""
-        return {done.code for done in self._finished.values()}
-
     def add(self, done: Finished) -> None:
         """Store the result of a run; it is on disk when this method returns."""
         self._finished[done.key] = done

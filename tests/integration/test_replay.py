@@ -14,6 +14,7 @@ from fanet_mw.trace import Detected, Record, Sighted
 from fanet_mw.units import S
 from sim.results.files import finish
 from sim.results.links import LinkTotals
+from sim.results.mission import mission
 from sim.results.outcome import Outcome
 from sim.results.replay import Replay
 from sim.run.virtual import actors_of
@@ -54,7 +55,7 @@ def test_positions_modes_tasks_and_coverage_come_back_from_the_trace_alone(
             place = seen[node].position
             # 5 m/s2 over half a second either way is 0.6 m off the straight line, and the trace has centimetres
             assert (place.east, place.north, place.up) == pytest.approx((east, north, up), abs=0.8)
-    assert replay.mission() == summary["mission"]
+    assert mission(replay.scenario, replay.records) == summary["mission"]
     assert summary["mission"]["coverage"] > 0.5
     assert replay.coverage(scenario.duration_ns / S) == pytest.approx(summary["mission"]["coverage"], abs=1e-6)
     assert replay.coverage(0) < replay.coverage(15) <= replay.coverage(30)

@@ -25,6 +25,7 @@ from fanet_mw.trace import (
 )
 from fanet_mw.units import S
 from sim.report import replay_page
+from sim.results.mission import mission
 from sim.results.replay import Replay
 from sim.world.environment.layout import positions
 
@@ -111,7 +112,7 @@ def test_the_page_and_the_replay_have_the_same_area_covered_at_every_instant(
         pytest.approx(sum(0 <= first <= tenth / 10 for first in covered) / len(covered)) for tenth in range(75)
     ]
     assert 0 < shares[0] < shares[30] < shares[-1]
-    assert replay.mission()["coverage"] == pytest.approx(shares[-1], abs=1e-6)
+    assert mission(replay.scenario, replay.records)["coverage"] == pytest.approx(shares[-1], abs=1e-6)
 
 
 def test_a_long_run_is_thinned_and_ends_where_it_ended(replay: Replay, monkeypatch: pytest.MonkeyPatch) -> None:

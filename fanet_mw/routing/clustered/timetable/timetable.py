@@ -15,8 +15,8 @@ that are blocked by obstacles; a shorter `link_m` leaves a margin.
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property, lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -41,6 +41,28 @@ class Turn(NamedTuple):
     node: NodeId
     root: NodeId
     instance: int
+
+
+class SpareTurns(Mapping[NodeId, tuple[int, ...]]):
+    """The turns that floods leave each node. They are found when somebody first asks: of the timetables that are tried
+    one is flown, and finding them takes as long as the rest of it.
+    """
+
+    def __init__(self, find: Callable[[], dict[NodeId, tuple[int, ...]]]) -> None:
+        self._find = find
+
+    @cached_property
+    def _found(self) -> dict[NodeId, tuple[int, ...]]:
+        return self._find()
+
+    def __getitem__(self, node: NodeId) -> tuple[int, ...]:
+        return self._found[node]
+
+    def __iter__(self) -> Iterator[NodeId]:
+        return iter(self._found)
+
+    def __len__(self) -> int:
+        return len(self._found)
 
 
 class Timetable(NamedTuple):
@@ -113,14 +135,16 @@ def timetable(
     used = len({turn.offset % whole for turn in turns})
     ids = swarm.nodes.ids
     starts = range(0, blocks * geometry.turns, geometry.turns)
-    spare = {
-        ids[row]: tuple(start + offset for start in starts for offset in offsets)
-        for row, offsets in enumerate(packing.spare(swarm.hears))
-    }
+
+    def spare() -> dict[NodeId, tuple[int, ...]]:
+        found = enumerate(packing.spare(swarm.hears))
+        return {ids[row]: tuple(start + offset for start in starts for offset in offsets) for row, offsets in found}
+
     near = {ids[row]: frozenset(swarm.nodes.of(heard)) for row, heard in enumerate(swarm.hears)}
     crowded = crowd({node: tuple(others) for node, others in near.items()})
+    left = SpareTurns(spare)
     return Timetable(
-        turns, _spans(turns), uncovered, used, hops=hops, sure=swarm.sure, spare=spare, near=near, crowd=crowded
+        turns, _spans(turns), uncovered, used, hops=hops, sure=swarm.sure, spare=left, near=near, crowd=crowded
     )
 
 
@@ -223,13 +247,15 @@ def _repeated(
     block: Sequence[Turn], count: Mapping[NodeId, int], length: int, blocks: int, whole: int
 ) -> tuple[Turn, ...]:
     """The superframe of `whole` turns, of repeated blocks; what outlasts the last continues in the next superframe."""
-    rest = whole - length * blocks
-    turns = [
-        turn._replace(offset=turn.offset + index * length, instance=turn.instance + index * count[turn.root])
-        for index in range(blocks)
-        for turn in block
-    ]
-    return tuple(sorted(turn._replace(offset=turn.offset + turn.offset // (length * blocks) * rest) for turn in turns))
+    period, rest = length * blocks, whole - length * blocks
+    return tuple(
+        sorted(
+            Turn(offset + offset // period * rest, turn.node, turn.root, turn.instance + index * count[turn.root])
+            for index in range(blocks)
+            for turn in block
+            for offset in (turn.offset + index * length,)
+        )
+    )
 
 
 def _spans(turns: Sequence[Turn]) -> dict[NodeId, int]:

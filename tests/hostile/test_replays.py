@@ -25,9 +25,9 @@ def attack(kind: Kind, delay_s: float, *, spoofed: bool, seed: int = 1, place: s
             (attack(Kind.HELLO, 0.2, spoofed=True, seed=2), "old"),
             (attack(Kind.HELLO, 3.0, spoofed=False), "relayed"),
             (attack(Kind.HELLO, 3.0, spoofed=True), "old"),
+            (attack(Kind.JOIN, 1.0, spoofed=True), "duplicate"),
         ),
         (attack(Kind.SCHEDULE, 2.0, spoofed=True, place="corner"), "duplicate"),
-        (attack(Kind.JOIN, 1.0, spoofed=True), "duplicate"),
     ],
     ids=str,
 )
@@ -55,6 +55,7 @@ def test_data_that_fall_into_turns_of_others_cost_no_packets(attack: Attack) -> 
     assert not seen.summary["valid"], "what came after its bound is a broken promise all the same"
 
 
+@pytest.mark.slow
 def test_without_resuming_the_same_station_takes_a_third() -> None:
     seen = replays.run(attack(Kind.DATA, 1.0, spoofed=False), "duration_s=40", "drain_s=4", "clusters.resume=false")
     assert seen.summary["pdr"] < 0.8

@@ -14,7 +14,7 @@ from sim.run.virtual import simulate
 from sim.scenarios import catalog
 
 SMALL = [
-    "duration_s=80", "warmup_s=9", "drain_s=5", "traffic.arrivals=none", "world.engine=kinematic",
+    "duration_s=50", "warmup_s=9", "drain_s=5", "traffic.arrivals=none", "world.engine=kinematic",
     "mission.survivors=0",
 ]  # fmt: skip
 SOURCE = NodeId(2)
@@ -126,7 +126,7 @@ WITH_REPORTS = ["mission.survivors=1", "mission.report_bytes=900", "traffic.payl
     ids=" ".join,
 )
 def test_a_packet_of_the_greatest_length_is_carried_at_each_priority(settings: list[str]) -> None:
-    scenario = catalog.find("quick", [*SMALL, "duration_s=26", *settings])
+    scenario = catalog.find("quick", [*SMALL, "duration_s=22", *settings])
     outcome = simulate(scenario, applications=lambda node: [Boundary(NodeId(node))])
     made = {r.seq: r.payload_bytes for r in outcome.records if isinstance(r, Generated) and r.app == "boundary"}
     assert len(made) == len(wire.PRIORITIES)

@@ -15,7 +15,7 @@ from sim.run.virtual import simulate
 from sim.scenarios import catalog
 
 SMALL = (
-    "nodes.count=6", "clusters.count=1", "nodes.spacing_m=80", "duration_s=30", "warmup_s=1", "drain_s=1",
+    "nodes.count=5", "clusters.count=1", "nodes.spacing_m=80", "duration_s=30", "warmup_s=1", "drain_s=1",
     "mission.survivors=1", "mission.search=spiral", "world.area_m=600",
 )  # fmt: skip
 
@@ -74,7 +74,7 @@ def test_a_program_that_ends_says_nothing_and_takes_part_again_when_it_is_starte
     assert [t_s for t_s in born(outcome, 3) if t_s > 15]
     assert max(born(outcome, 5)) <= 15
     back = {r.node for r in outcome.records if isinstance(r, Delivered) and r.origin == 3 and r.t_ns > 19 * S}
-    assert back >= {1, 2, 4, 6}
+    assert back >= {1, 2, 4}
     summary = finish(outcome, out=None)
     assert summary["frames"]["closes"]
     assert summary["copies"]["closes"]

@@ -1,5 +1,6 @@
 """Packets for a neighbor: one frame each, and soon, whatever relays floods."""
 
+from functools import lru_cache
 from typing import Any
 
 import pytest
@@ -14,6 +15,7 @@ GRID = ["nodes.count=12", "clusters.count=11", "duration_s=16", "warmup_s=11", "
 TO_ONE = ["traffic.destination=6", "traffic.sources=[5,7]", "traffic.interval_s=0.05"]
 
 
+@lru_cache
 def summary_of(*settings: str) -> dict[str, Any]:
     return finish(simulate(catalog.find("clusters", [*GRID, *settings])), out=None)
 

@@ -20,7 +20,10 @@ from sim.run.virtual import simulate
 from sim.scenarios import catalog
 from sim.world.environment.layout import positions
 
-TWENTY = ("nodes.count=20", "clusters.count=19", "traffic.sources=19")
+
+def all_send(nodes: int) -> tuple[str, ...]:
+    """The settings of a swarm whose nodes all send but the leader, and are heads."""
+    return f"nodes.count={nodes}", f"clusters.count={nodes - 1}", f"traffic.sources={nodes - 1}"
 
 
 def planned(*settings: str, deadline_s: float | None = None, **options: bool) -> tuple[str, dict[str, Any], bool]:
@@ -101,7 +104,7 @@ def test_links_that_gps_may_take_for_none_are_a_problem_and_a_greater_distance_o
     spacing_m: float,
 ) -> None:
     """Each node of a line hears only the next ones. Without one of these links the swarm is in parts."""
-    settings = (*LINE, f"nodes.spacing_m={spacing_m}", "world.gps_sigma_m=1.5")
+    settings = (*LINE, "nodes.count=12", "traffic.sources=11", f"nodes.spacing_m={spacing_m}", "world.gps_sigma_m=1.5")
     _, plan, feasible = planned(*settings, change=True)
     assert not feasible
     assert "draws of the positions that GPS gives" in plan["problems"][0]
@@ -162,7 +165,7 @@ def test_a_leader_whose_announcements_expire_before_its_turn_is_a_problem() -> N
 
 @pytest.mark.parametrize(("nodes", "interval_s"), [(12, 0.01), pytest.param(45, 0.1, marks=pytest.mark.slow)])
 def test_a_load_that_does_not_fit_is_told_with_the_one_that_does(nodes: int, interval_s: float) -> None:
-    size = (f"nodes.count={nodes}", f"clusters.count={nodes - 1}", f"traffic.sources={nodes - 1}")
+    size = all_send(nodes)
     text, plan, feasible = planned(*size, f"traffic.interval_s={interval_s}")
     assert not feasible
     assert f"one packet per source every {interval_s}" in text
@@ -172,12 +175,16 @@ def test_a_load_that_does_not_fit_is_told_with_the_one_that_does(nodes: int, int
 
 
 @pytest.mark.parametrize(
-    ("settings", "deadline_s"), [(("clusters.flooding_period_s=0.1",), None), ((), 0.2), (("clusters.relay=all",), 0.3)]
+    ("nodes", "settings", "deadline_s"),
+    [(20, ("clusters.flooding_period_s=0.1",), None), (20, (), 0.2), (9, ("clusters.relay=all",), 0.3)],
 )
-def test_the_change_that_it_proposes_makes_it_feasible(settings: tuple[str, ...], deadline_s: float | None) -> None:
-    _, plan, feasible = planned(*TWENTY, *settings, deadline_s=deadline_s, change=True)
+def test_the_change_that_it_proposes_makes_it_feasible(
+    nodes: int, settings: tuple[str, ...], deadline_s: float | None
+) -> None:
+    size = all_send(nodes)
+    _, plan, feasible = planned(*size, *settings, deadline_s=deadline_s, change=True)
     assert not feasible
-    assert planned(*TWENTY, *settings, *plan["change"]["set"], deadline_s=deadline_s)[2]
+    assert planned(*size, *settings, *plan["change"]["set"], deadline_s=deadline_s)[2]
 
 
 def test_a_deadline_that_cannot_be_met_is_no_plan() -> None:

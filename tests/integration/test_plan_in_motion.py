@@ -12,7 +12,7 @@ from sim.scenarios import catalog
 
 TWELVE = (
     "nodes.count=12", "clusters.count=11", "traffic.sources=11", "routing.protocol=rounds", "routing.lifetime_s=3",
-    "duration_s=14", "drain_s=4", "warmup_s=2",
+    "duration_s=10", "drain_s=4", "warmup_s=2",
 )  # fmt: skip
 
 
@@ -37,7 +37,8 @@ def test_urgent_packets_that_overfill_the_turns_though_their_bytes_do_not_are_no
     interval_s: float, *, fits: bool
 ) -> None:
     """A turn of 700 bytes has room for one packet of 400 bytes."""
-    urgent = ("traffic.priority=report", "traffic.payload_bytes=400", "rounds.turn_bytes=700", "traffic.arrivals=cbr")
+    urgent = ("traffic.priority=report", "traffic.payload_bytes=400", "rounds.turn_bytes=700", "traffic.arrivals=cbr",
+              "duration_s=14")  # fmt: skip
     scenario, content, feasible = planned(*TWELVE, *urgent, f"traffic.interval_s={interval_s}", "rounds.bulk_share=0")
     assert content["offered_bytes_per_s"] < content["carried_bytes_per_s"]
     _, idle, _ = planned(*TWELVE, *urgent, "traffic.interval_s=100", "rounds.bulk_share=0")

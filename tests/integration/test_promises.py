@@ -110,7 +110,7 @@ def test_a_node_that_hears_nothing_ends_promises_to_it() -> None:
     """It flooded in its turns on and on, and was taken for one that has what others flood."""
     deaf_s, known_s = 17, 5 + 5 + 2
     deaf = f'faults=[{{kind="deaf", node=8, at_s={deaf_s}}}]'
-    outcome = simulate(catalog.find("clusters", [deaf, "duration_s=35", "drain_s=3"]))
+    outcome = simulate(catalog.find("clusters", [*GRID, deaf, "duration_s=35", "drain_s=3"]))
     stated = [r for r in outcome.records if type(r) is BoundStated]
     gone = {(r.node, r.seq) for r in outcome.records if type(r) is BoundExcludes and r.other == 8}
     assert any(r.t_ns < deaf_s * S for r in stated)

@@ -20,7 +20,7 @@ from sim.results.replay import Replay
 from sim.run.virtual import actors_of
 
 KEYS = {
-    "nodes.count": 12, "nodes.spacing_m": 60, "nodes.altitude_m": 65, "duration_s": 30, "warmup_s": 1, "drain_s": 1,
+    "nodes.count": 8, "nodes.spacing_m": 60, "nodes.altitude_m": 65, "duration_s": 30, "warmup_s": 1, "drain_s": 1,
     "mission.survivors": 3, "mission.search": "lines", "mobility.model": "onboard", "world.area_m": 600,
     "sensors.camera_hz": 2, "sensors.camera_fov_deg": 90, "clusters.relay": "counter", "radio.range_m": 250,
     "traffic.arrivals": "none",
@@ -63,7 +63,7 @@ def test_positions_modes_tasks_and_coverage_come_back_from_the_trace_alone(
     assert {state.mission for state in first.values()} == {""}
     assert {state.mission for state in last.values()} <= {"deploy", "search", "respond"}
     assert {state.flight for state in last.values()} == {"velocity"}
-    assert sorted(state.place for state in last.values()) == list(range(12))
+    assert sorted(state.place for state in last.values()) == list(range(8))
     assert {type(r) for r in replay.records} >= {Detected, Sighted}
 
 

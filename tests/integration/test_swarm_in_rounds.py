@@ -70,7 +70,7 @@ def test_bulk_beyond_what_the_air_carries_leaves_the_bounds_alone() -> None:
 
 def test_bulk_with_a_deadline_is_refused_at_its_origin_or_arrives_in_time() -> None:
     traffic = {"payload_bytes": 1000, "priority": "bulk", "interval_s": 0.12, "deadline_s": 2}
-    tables = {"mobility": {"model": "formation", "speed_m_s": 10}, "rounds": {"turn_bytes": 600}, "duration_s": 20}
+    tables = {"mobility": {"model": "formation", "speed_m_s": 10}, "rounds": {"turn_bytes": 600}, "duration_s": 15}
     summary = flown(traffic=traffic, **tables)
     refused, packets = summary["admission"]["refused"], summary["generated"]
     assert 0.1 * packets < refused < 0.8 * packets, "it was to be more than the air carries"
@@ -155,7 +155,7 @@ def test_bounds_do_not_count_on_those_who_fly_away() -> None:
     """UAVs that mix at 20 m/s on 700 m leave each other's range all the time, and often the swarm."""
     mixing = {"model": "random_waypoint", "speed_m_s": 20.0}
     summary = flown(
-        seed=3, duration_s=22, nodes={"layout": "disc", "spacing_m": 100, "telemetry_hz": 1}, world={"area_m": 700},
+        seed=3, duration_s=16, nodes={"layout": "disc", "spacing_m": 100, "telemetry_hz": 1}, world={"area_m": 700},
         mobility=mixing, rounds={"bulk_share": 0},
     )  # fmt: skip
     bound = summary["bound"]
@@ -268,13 +268,13 @@ def test_bounds_of_reports_hold_though_warnings_overtake_them_at_each_hop() -> N
 def test_over_lossy_links_a_likely_delay_is_stated_again_soon_after_a_uav_is_lost() -> None:
     """Since one was lost, nobody stated any: the likely delay was meant for all or for nobody."""
     tree = {
-        **BASE, "duration_s": 24, "drain_s": 2,
+        **BASE, "duration_s": 18, "drain_s": 2,
         "radio": {**BASE["radio"], "channel": "log_distance", "shadowing_db": 4, "fading": "rician"},
         "traffic": {**BASE["traffic"], "interval_s": 0.25},
-        "faults": [{"kind": "mute", "at_s": 14, "node": 8}],
+        "faults": [{"kind": "mute", "at_s": 8, "node": 8}],
     }  # fmt: skip
     outcome = simulate(config.build(tree))
-    born = [one for one in outcome.records if isinstance(one, Generated) and one.t_ns > 18 * S and one.node != 8]
+    born = [one for one in outcome.records if isinstance(one, Generated) and one.t_ns > 12 * S and one.node != 8]
     stated = {(one.node, one.seq) for one in outcome.records if isinstance(one, LikelyStated)}
     assert sum((one.node, one.seq) in stated for one in born) > 0.9 * len(born)
     assert finish(outcome, out=None)["likely"]["within_share"] > 0.98

@@ -15,7 +15,7 @@ GRID = [
     "nodes.count=12",
     "clusters.count=11",
     "traffic.sources=11",
-    "duration_s=50",
+    "duration_s=30",
     "warmup_s=5",
     "clusters.reassign_s=0",
 ]
@@ -29,7 +29,8 @@ def summary_of(*settings: str, more: bool) -> dict[str, Any]:
 
 
 def test_nodes_that_send_more_get_turns_for_it_and_their_bounds_hold() -> None:
-    said, heard = (summary_of(f"clusters.load={load}", more=True) for load in ("scenario", "heard"))
+    said = summary_of("clusters.load=scenario", more=True)
+    heard = summary_of("clusters.load=heard", "duration_s=50", more=True)
     assert said["classes"]["more"]["pdr"] < 0.75, "the load that nobody was told of does not fit the turns"
     assert heard["classes"]["more"]["pdr"] > 0.99
     assert heard["pdr"] > 0.99

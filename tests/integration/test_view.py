@@ -292,7 +292,7 @@ class VirtualFeed:
 
 def test_a_uav_is_sent_to_the_mark_without_a_post_and_released_again() -> None:
     scenario = catalog.find("rescue", [
-        "nodes.count=12", "nodes.spacing_m=60", "world.area_m=700", "mission.survivors=0", "duration_s=46",
+        "nodes.count=6", "nodes.spacing_m=60", "world.area_m=700", "mission.survivors=0", "duration_s=46",
         "traffic.arrivals=none",
     ])  # fmt: skip
     state = SwarmState(scenario)

@@ -84,6 +84,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.realtime)
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection() -> None:
+    """What is collected stays: the garbage collector would examine it again and again."""
+    gc.disable()
+
+
 def pytest_collection_finish() -> None:
     """From the first test on nobody writes bytecode: a process that may write no more, or is killed while it writes,
     would leave truncated files to all others. What pytest makes of test files while it collects them is kept.
@@ -92,6 +98,7 @@ def pytest_collection_finish() -> None:
     """
     gc.collect()
     gc.freeze()
+    gc.enable()
     sys.dont_write_bytecode = True
     os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
 

@@ -163,7 +163,7 @@ def fails_in(tree: Path, mutants: Sequence[Mutant], *, jobs: int) -> str:
     return "" if code == PASSED else said or "took too long"
 
 
-def plant(mutants: Sequence[Mutant], *, jobs: int, pass_without: bool) -> int:
+def plant(mutants: Sequence[Mutant], *, jobs: int, pass_without: bool = True) -> int:
     """Judge all; the exit code. `pass_without`: first see that the tests pass without any bug."""
     with tempfile.TemporaryDirectory(prefix="fanet-mutants-") as folder:
         trees: queue.Queue[Path] = queue.Queue()

@@ -115,9 +115,7 @@ class Uav(Actor):
         hello_time: HelloTime | None = None,
         reader: Reader | None = None,
     ) -> None:
-        """`applications`: the user's, beside the scenario's. `hello_time`: adds time beacons to hellos. `reader`:
-        shared by all nodes of a run.
-        """
+        """`applications`: the user's. `hello_time`: adds time beacons. `reader`: shared by all nodes of a run."""
         topics = Topics(swarm)
         self._post = Post(scenario) if node == scenario.post else None
         ordered = () if self._post is None else (topics.orders,)

@@ -87,9 +87,7 @@ class PlannedSearch(Application):
         limits: SearchLimits | None = None,
         radio: HeardByRadio | None = None,
     ) -> None:
-        """`onboard_map`: the map it carries. `limits`: what an operator may change. `radio`: what its node knows of
-        others.
-        """
+        """`limits`: what an operator may change. `radio`: what the node knows of others beside their messages."""
         self._outbox = Outbox()
         self._searcher = Searcher(
             scenario, node, position=position, outbox=self._outbox, onboard_map=onboard_map,

@@ -125,9 +125,7 @@ def rate_row(p: Ints, fr: Ints, lk: Ints, link: int) -> int:
 
 @jit
 def decoded(p: Ints, pf: Reals, st: Ints, sf: Reals, lp: Reals, err: Reals, r: int, link: int, t: int) -> int:
-    """The locked frame's fate: FATE_OPEN if received. One draw with and without interference: what noise spoils is no
-    collision.
-    """
+    """The locked frame's fate: FATE_OPEN if received. One draw with and without interference: noise is no collision."""
     if p[k.INTERFERENCE] == 0:
         return k.FATE_OPEN if st[k.OVERLAPPED, r] == 0 else k.FATE_COLLISION
     if lp[k.ON_AIR, link] < pf[k.SENSITIVITY_MW - 1 + st[k.LOCK_RATE, r]]:

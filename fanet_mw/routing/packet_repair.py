@@ -58,9 +58,7 @@ class Repair:
         flood_over_ns: int = FLOOD_OVER_NS,
         begin_ns: Callable[[int], int] | None = None,
     ) -> None:
-        """`flood_over_ns`: when a received flood should be over. `begin_ns`: draws a due repair's instant; None: in
-        ASSESS_NS.
-        """
+        """`flood_over_ns`: when a received flood should be over. `begin_ns`: draws a due repair's instant."""
         self._window_ns = window_ns
         self._begin_ns = begin_ns or self._within_assessment_ns
         self._flood_over_ns = flood_over_ns

@@ -97,9 +97,7 @@ class PhoneModel(NamedTuple):
 
 
 class PhoneOffset(NamedTuple):
-    """The normal distribution of the offset that all phones of a search have in common, the receivers' calibration
-    included.
-    """
+    """The normal distribution of the offset that all phones have in common, receivers' calibration included."""
 
     mean_db: float
     sigma_db: float

@@ -200,9 +200,7 @@ class DelayLaw:
         return round(found_ns / (1 - urgent))
 
     def over_ns(self, hops: int, *, longest_bytes: int, used: float = 0.0) -> int:
-        """The bound over so many hops if nothing more urgent comes; `used`: share of turns filled, none by over
-        `longest_bytes`.
-        """
+        """The bound over hops if nothing more urgent comes; `used`: share of turns, none by over `longest_bytes`."""
         return self.way_ns(hops) + round((1 + used) * self._burst_ns / (1 - self._hellos(longest_bytes)))
 
     def turns_of(self, size: int) -> float:

@@ -50,9 +50,7 @@ class Floods:
         return packet
 
     def contend_again(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
-        """Transmit again a packet that was due at `due_ns` as soon as it may contend; with a full window wait to be
-        asked again.
-        """
+        """Transmit again a packet that was due at `due_ns` as soon as it may contend, unless the window is full."""
         if not self._goes_on(packet):  # a packet that goes no farther needs no instant
             return
         start_ns, access_ns = self._contention.start_ns(due_ns=due_ns, now_ns=now_ns), self._access_ns(packet)

@@ -47,9 +47,7 @@ class Followers:
         self._doubted_ns = now_ns
 
     def have(self, version: Version, nodes: Iterable[NodeId], *, silent_ns: int, now_ns: int) -> bool:
-        """True if all these nodes have shown within `silent_ns` that they keep a version; of the leader see
-        `stated_delays.py`.
-        """
+        """True if all these nodes have shown within `silent_ns` that they keep a version."""
         if version not in self._known or (self._doubted_ns is not None and now_ns < self._doubted_ns + _DOUBTED_NS):
             return False
         known, leader = self._known[version], version.authority.leader

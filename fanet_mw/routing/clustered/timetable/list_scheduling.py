@@ -61,9 +61,7 @@ class Flood:
         return self._has == self.goal and bool(self.sent)
 
     def offers(self) -> list[tuple[int, int, int, int]]:
-        """The possible transmissions of this flood: (first offset, worth, row, receivers) for each holder with a
-        neighbor that lacks the packet.
-        """
+        """(first offset, worth, row, receivers) of each holder with a neighbor that lacks the packet."""
         if self._offers is None:
             self._offers = self._look()
         return self._offers

@@ -97,9 +97,7 @@ class TurnAccess:
             self.forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
 
     def _stranded(self, now_ns: int) -> list[Packet]:
-        """Take out packets whose turns are gone, to go another way; those with a stated bound are dropped, as that may
-        take longer.
-        """
+        """Take out packets whose turns are gone; those with a stated bound are dropped, as other ways may break it."""
         return self._kept(self._roots.drain(), through_ns=None, now_ns=now_ns)
 
     def _kept(self, packets: Sequence[Packet], *, through_ns: int | None, now_ns: int) -> list[Packet]:

@@ -28,66 +28,23 @@ _ASKED_N, _OUT_N = s.ASKED_N, s.OUT_N
 Rows = list[tuple[int, ...]]
 
 
-class Placement:
-    """The positions and obstructions in force; at first no station is within reach of another."""
-
-    def __init__(self, scenario: Scenario, *, stations: int) -> None:
-        self._radio = scenario.radio
-        self._gains = gains_dbi(scenario)
-        self._shadowing = Shadowing(scenario.radio, seed=scenario.seed) if scenario.radio.shadowing_db else None
-        self.at = np.full((stations, 3), np.inf)
-        """The positions [m]."""
-        self._blocked = Blocked(np.zeros(0, np.int64), np.zeros(0))
-        self._ground_m = np.zeros(stations)
-        self._sight_changed = False
-        """True if the obstructions have changed since the stations were placed."""
-
-    def obstruct(
-        self,
-        pairs: npt.NDArray[np.int64],
-        losses_db: npt.NDArray[np.float64],
-        ground_m: npt.NDArray[np.float64] | float = 0.0,
-    ) -> None:
-        """Set the pairs of stations [n, 2] with something solid between them, and the loss of each, if that is known;
-        and the height of the ground below each station.
-
-        It takes effect at the next `place`.
-        """
-        codes, first = np.unique(pair_codes(pairs, len(self.at)), return_index=True)
-        blocked = Blocked(codes, losses_db[first] if len(losses_db) else losses_db)
-        changed = not all(map(np.array_equal, blocked, self._blocked))
-        self._sight_changed = self._sight_changed or changed
-        self._blocked = blocked
-        self._ground_m[:] = ground_m
-
-    def place(self, at: npt.NDArray[np.float64]) -> bool:
-        """Take over new positions; returns False if the links stay as they are."""
-        if np.array_equal(at, self.at) and not self._sight_changed:
-            return False
-        self._sight_changed = False
-        self.at = at
-        return True
-
-    def links(self, *, spare: int) -> LinkTable:
-        """The links between the stations, with room for `spare` more."""
-        at = np.ascontiguousarray(self.at)
-        return LinkTable(
-            at, self._radio, spare=spare, ground_m=self._ground_m, shadowing=self._shadowing, blocked=self._blocked,
-            gains=self._gains,
-        )  # fmt: skip
-
-
 class KernelInterface:
     """The state of the channel and of the MAC of every station."""
 
     def __init__(self, scenario: Scenario, *, stations: int, faults: Faults, capture: bool = False) -> None:
         self._radio = scenario.radio
+        self._gains = gains_dbi(scenario)
+        self._shadowing = Shadowing(scenario.radio, seed=scenario.seed) if scenario.radio.shadowing_db else None
+        self.at = np.full((stations, 3), np.inf)
+        """The positions in force [m]; infinite where a station's place is unknown, as all are at first."""
+        self._blocked = Blocked(np.zeros(0, np.int64), np.zeros(0))
+        self._ground_m = np.zeros(stations)
+        self._sight_changed = False
         self._lifetime_ns = scenario.mac_lifetime_ns
         self.faults = faults
         self.link_counters = LinkCounters(stations, has_powers=scenario.radio.channel != "range")
-        self._placement = Placement(scenario, stations=stations)
         self._waves = Waves(scenario.radio, seed=scenario.seed) if scenario.radio.fading != "none" else None
-        self.arrays = arrays_of(scenario, self._placement.links(spare=0), stations=stations, capture=capture)
+        self.arrays = arrays_of(scenario, self._links(spare=0), stations=stations, capture=capture)
         # These views share memory with numpy arrays; a few numbers are read faster through the buffer protocol.
         self._counts = self.arrays.g.data
         self._asked_bytes = self.arrays.asked.data.cast("B")
@@ -105,28 +62,40 @@ class KernelInterface:
         losses_db: npt.NDArray[np.float64],
         ground_m: npt.NDArray[np.float64] | float = 0.0,
     ) -> None:
-        self._placement.obstruct(pairs, losses_db, ground_m)
+        """Set the pairs of stations [n, 2] with something solid between them, and the loss of each, if that is known;
+        and the height of the ground below each station. It takes effect at the next `place`.
+        """
+        codes, first = np.unique(pair_codes(pairs, len(self.at)), return_index=True)
+        blocked = Blocked(codes, losses_db[first] if len(losses_db) else losses_db)
+        changed = not all(map(np.array_equal, blocked, self._blocked))
+        self._sight_changed = self._sight_changed or changed
+        self._blocked = blocked
+        self._ground_m[:] = ground_m
 
     def place(self, at: npt.NDArray[np.float64], velocity: npt.NDArray[np.float64], t_ns: int) -> None:
         """Take over positions [m] and velocities [m/s] of an instant; frames in flight go over to the new links."""
         if self._waves is not None:
             self.arrays.wv[:] = self._waves.of(at, velocity, t_ns)
             self.arrays.g[s.WAVES_FROM_NS] = t_ns
-        if self._placement.place(at):
+        if self._sight_changed or not np.array_equal(at, self.at):
+            self._sight_changed = False
+            self.at = at
             self.relink()
 
-    @property
-    def at(self) -> npt.NDArray[np.float64]:
-        """The positions in force [m]; infinite where a station's place is unknown."""
-        return self._placement.at
+    def _links(self, *, spare: int) -> LinkTable:
+        """The links between the stations, with room for `spare` more."""
+        return LinkTable(
+            np.ascontiguousarray(self.at), self._radio, spare=spare, ground_m=self._ground_m,
+            shadowing=self._shadowing, blocked=self._blocked, gains=self._gains,
+        )  # fmt: skip
 
     def relink(self) -> None:
         a = self.arrays
         self._take_in()
         self.link_counters.take(a.lk, a.lp)
         spare = int(a.lk[s.UNDERWAY].sum())
-        links = self._placement.links(spare=spare)
-        a.sf[s.NOISE], jamming = self.faults.apply(links, self._placement.at)
+        links = self._links(spare=spare)
+        a.sf[s.NOISE], jamming = self.faults.apply(links, self.at)
         a.g[s.REACH_NS] = max(a.g[s.REACH_NS] if spare else 0, links.longest_ns)
         room = 4 * (links.ints.shape[1] + a.st.shape[1]) + 64
         if a.hr.shape[0] < room + a.g[s.HR_N]:

@@ -227,7 +227,7 @@ class FlightModeChanged(NamedTuple):
 
 
 class MissionModeChanged(NamedTuple):
-    """A UAV of a planned search decided to do something else (the modes in `agents/mission/mode_record.py`)."""
+    """A UAV of a planned search decided to do something else (`_mode` in `agents/mission/searcher.py`)."""
 
     t_ns: int
     node: int

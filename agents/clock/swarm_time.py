@@ -6,7 +6,6 @@ independent normal noise to each fix; multipath and lasting errors are not model
 """
 
 import math
-from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Mapping
 from typing import Final
@@ -37,40 +36,47 @@ _QUEUED_NS: Final = S
 _PPM: Final = 1e-6
 
 
-class SwarmTime(ABC):
-    """A way in which a node knows swarm time; until the node has learned it, its own clock is taken for swarm time."""
+class SwarmTime:
+    """How a node knows swarm time: `clock.sync = "none"`, by its own clock alone, which counts for it in all other ways
+    until the node has learned better.
+    """
 
     in_hellos: bool = False
+    _error_ns: int = 0
+
+    def __init__(self, *, error_ns: int) -> None:
+        """`error_ns`: the greatest error of any clock by the end of the run, by setting and data sheet."""
+        self._error_ns = error_ns
 
     @property
-    @abstractmethod
     def line(self) -> Line:
         """The line that converts an instant of the node's own clock into swarm time."""
+        return EXACT
 
     @property
-    @abstractmethod
     def synced(self) -> bool:
         """True if the node has learned swarm time, or if its own clock is to be used as it is."""
+        return True
 
-    @abstractmethod
     def error_ns(self, local_ns: int) -> int | None:
         """The greatest error that this node's swarm time may have now; None if the node knows no bound of it."""
+        return None
 
     def worst_ns(self, local_ns: int) -> int:
         """The greatest error of any node's swarm time that is known here; its own bound, or 0, without news."""
-        return self.error_ns(local_ns) or 0
+        return self.error_ns(local_ns) or self._error_ns
 
     def reference_and_hops(self, local_ns: int) -> tuple[int, int]:
         """The node whose clock this one follows, and the hops to it; 0 and 0 if it follows none."""
         return 0, 0
 
-    def start(self, local_ns: int) -> None:  # noqa: B027
+    def start(self, local_ns: int) -> None:
         """The node has started."""
 
-    def pass_time(self, local_ns: int) -> None:  # noqa: B027
+    def pass_time(self, local_ns: int) -> None:
         """Time has passed since the last call of any method."""
 
-    def fix(self, local_ns: int, gps_ns: int) -> None:  # noqa: B027
+    def fix(self, local_ns: int, gps_ns: int) -> None:
         """GPS has given the time `gps_ns` at the instant `local_ns` of the node's own clock."""
 
     def on_hello(self, frame: bytes, src: NodeId, *, ended_ns: int, local_ns: int) -> bool:
@@ -81,7 +87,7 @@ class SwarmTime(ABC):
         """The inner frames to put into the hello that this node sends now."""
         return b""
 
-    def announced(self, hello: AnnouncedHello) -> None:  # noqa: B027
+    def announced(self, hello: AnnouncedHello) -> None:
         """A hello of this node was handed to the radio."""
 
     def on_status(self, status: TxStatus, *, ended_ns: int) -> bool:
@@ -91,22 +97,6 @@ class SwarmTime(ABC):
     def report(self) -> Mapping[str, object]:
         """The counters for the node's report, as JSON values."""
         return {}
-
-
-class OwnTime(SwarmTime):
-    """`clock.sync = "none"`: each node's own clock; the greatest error follows from setting and data sheet."""
-
-    line = EXACT
-    synced = True
-
-    def __init__(self, *, error_ns: int) -> None:
-        self._error_ns = error_ns
-
-    def error_ns(self, local_ns: int) -> int | None:
-        return None
-
-    def worst_ns(self, local_ns: int) -> int:
-        return self._error_ns
 
 
 class GpsTime(SwarmTime):
@@ -303,4 +293,4 @@ def swarm_time(scenario: Scenario, node: NodeId) -> SwarmTime:
         return BeaconTime(scenario, node)
     if scenario.clock.sync == "gps":
         return GpsTime(scenario.clock, seed=scenario.seed, node=node)
-    return OwnTime(error_ns=scenario.clock.unsynchronized_error_ns(scenario.duration_ns))
+    return SwarmTime(error_ns=scenario.clock.unsynchronized_error_ns(scenario.duration_ns))

@@ -33,7 +33,6 @@ from agents.mission.flight.return_home import ReturnHome, ReturnReason
 from agents.mission.flight.search_limits import SearchLimits
 from agents.mission.flight.take_off import TakeOff, take_off_ns, turns_ns
 from agents.mission.flight.velocity_choice import VelocityChoice
-from agents.mission.mode_record import ModeRecord
 from agents.mission.navigation.known_obstacles import KnownObstacles
 from agents.mission.navigation.neighbor_motions import NeighborMotions, RadarWatch
 from agents.mission.navigation.onboard_map import OnboardMap
@@ -66,6 +65,7 @@ from fanet_mw.orders import OrderKind
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.world import FASTEST_AIR_M_S
+from fanet_mw.trace import MissionModeChanged
 from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire.bids import Bids, encode_bids
 from fanet_mw.wire.roll import Roll
@@ -176,7 +176,8 @@ class Searcher:
             own_motion, place, goal, velocity_choice, connectivity,
             roll_call=roll_call, take_off=take_off, return_home=self._return_home,
         )  # fmt: skip
-        self._mode = ModeRecord(node, place, self._flight, self._return_home, orders, outbox)
+        self._last_mode: tuple[str, int] | None = None
+        """The mode that was recorded last, and the survivor to whom the UAV flew then."""
         self._node, self._post = node, scenario.post
         self._outbox = outbox
         self._limits = limits
@@ -219,7 +220,7 @@ class Searcher:
             goes = self._bidding.is_absent(now_ns) or self._place.strays(now_ns)
             goes = goes or (self._place.plan is None and self._bidding.survivor is not None)
             self._plans.be_absent(self._percent, now_ns, goes=goes)
-        self._mode.review(self._bidding.survivor, now_ns)
+        self._review_mode(now_ns)
 
     @property
     def velocity(self) -> Enu | None:
@@ -230,6 +231,28 @@ class Searcher:
         """Return the chosen velocity, and mark it as taken."""
         velocity, self._flight.velocity = self._flight.velocity, None
         return velocity
+
+    def _review_mode(self, now_ns: int) -> None:
+        """Record what this UAV is doing, in one word, whenever it changes."""
+        mode = self._mode(now_ns), self._bidding.survivor or 0
+        if self._last_mode != mode:
+            self._last_mode = mode
+            self._outbox.records.append(MissionModeChanged(now_ns, self._node, *mode))
+
+    def _mode(self, now_ns: int) -> str:
+        if self._return_home.lands:
+            return "land"
+        if self._return_home.reason is not None:
+            return self._return_home.reason.value
+        if self._flight.takes_off:
+            return "takeoff"
+        if self._orders.errand is not None:
+            return "errand"
+        if self._bidding.survivor:
+            return "respond"
+        if self._place.is_taken_up(now_ns):
+            return "search"
+        return "wait" if self._place.place is None else "deploy"
 
     # --- what its own sensors say ---------------------------------------------------------------------------------
 
@@ -272,7 +295,7 @@ class Searcher:
     def _give_up(self, now_ns: int) -> None:
         self._bidding.hand_on(now_ns)
         self._plans.leave()
-        self._mode.review(self._bidding.survivor, now_ns)
+        self._review_mode(now_ns)
 
     def _is_over(self, now_ns: int) -> bool:
         """True once the area was swept often enough, and nobody is sought or it was swept once more."""
@@ -320,7 +343,7 @@ class Searcher:
         """Another UAV was heard; a UAV that flew home because it heard nobody takes part again."""
         if self._return_home.on_heard(now_ns) and self._orders.errand is None:
             self._plans.come_back(self._percent, now_ns)
-            self._mode.review(self._bidding.survivor, now_ns)
+            self._review_mode(now_ns)
 
     def on_message(self, message: Told, *, flooded: bool = True, now_ns: int) -> None:
         """A message of another node was received, `flooded` to all nodes or sent to its neighbors."""
@@ -366,7 +389,7 @@ class Searcher:
             case OrderKind.RELEASE:
                 if self._return_home.release() or not self._return_home.leaves:
                     self._plans.come_back(self._percent, now_ns)
-                    self._mode.review(self._bidding.survivor, now_ns)
+                    self._review_mode(now_ns)
             case _:
                 assert_never(order.kind)
 

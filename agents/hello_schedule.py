@@ -9,8 +9,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, seconds_to_ns
 
 _JITTER: Final = 0.1
-"""Hello intervals vary by this share, so that neighbors that send at the same time do not continue to do so (RFC 3626,
-3.4)."""
+"""Hello intervals vary by this share, so that neighbors do not go on to send at the same time (RFC 3626, 3.4)."""
 
 
 class HelloTime(Protocol):

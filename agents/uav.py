@@ -125,8 +125,7 @@ class Uav(Actor):
         self.patient = (topics.sensors(node),)
         self._topics = _OutTopics(topics.radio_tx(node), topics.setpoint(node), topics.mavlink(node))
         self._prompt_ns = scenario.radio.handover_ns + scenario.radio.lead_ns
-        """The greatest delay of a reception after the end of its frame: a relay must still be
-        announced one lead ahead."""
+        """The greatest delay of a reception whose relay can still be announced one lead ahead."""
         self._node = Node(node, scenario, make_protocol, position=position, reader=reader)
         self._streams = TelemetryStreams(
             node,

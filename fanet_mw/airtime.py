@@ -13,13 +13,11 @@ from typing import Final, NamedTuple, Protocol
 from fanet_mw.units import US
 
 OVERHEAD_BYTES: Final = 8 + 20 + 8 + 24 + 4
-"""The bytes that are sent around each frame of this project, which is the UDP payload: UDP, IPv4, LLC/SNAP, MAC header,
-FCS."""
+"""The bytes around each frame of this project, the UDP payload: UDP, IPv4, LLC/SNAP, MAC header, FCS."""
 ACK_BYTES: Final = 14
 OFDM_RATES_MBPS: Final = (6.0, 9.0, 12.0, 18.0, 24.0, 36.0, 48.0, 54.0)
 DETECT_NS: Final = 4 * US
-"""The time from the first bit of a frame at a station until the station detects it and senses the medium busy (as in
-ns-3)."""
+"""From a frame's first bit at a station until it detects it and senses the medium busy (as in ns-3)."""
 OFDM_HEADER_NS: Final = 20 * US  # 17.3.2.4 and table 17-5: two training fields of 8 us, SIGNAL of 4 us
 SYMBOL_NS: Final = 4 * US  # table 17-5 (T_SYM)
 SIGNAL_EXTENSION_NS: Final = 6 * US  # table 18-5 (aSignalExtension), ERP-OFDM only

@@ -28,8 +28,7 @@ class Geodetic(NamedTuple):
 
 
 ORIGIN: Final = Geodetic(*DEFAULT_ORIGIN_DEG, 0.0)
-"""The point at which the swarm's frame touches the earth unless the scenario or its map names another one
-(`world.origin_deg`)."""
+"""Where the swarm's frame touches the earth unless scenario or map name another point (`world.origin_deg`)."""
 
 
 class _Plane(NamedTuple):

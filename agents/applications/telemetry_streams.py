@@ -20,8 +20,7 @@ from fanet_mw.units import MS, STILL, Enu, NodeId, S
 
 GRAVITY_M_S2: Final = 9.80665
 MAX_TILT: Final = math.radians(35)
-"""The usual tilt limit of a multirotor's position controller; it keeps noise in the velocity from looking like
-acrobatics."""
+"""The usual tilt limit of a multirotor's position controller; noise in the velocity must not look like more."""
 DRAG_PER_S: Final = 0.14
 """What the rotors of an Iris lose for each m/s of airspeed, and what its frame does for each square of it: 4 lambda w /
 m, and c / m of the vehicle that the world flies."""
@@ -122,11 +121,9 @@ class TelemetryStreams:
         self._consumed_mah = 0.0
         self._encoder = Encoder(node, component=AUTOPILOT_COMPONENT, origin=origin)
         self._beacons = Encoder(node, component=AUTOPILOT_COMPONENT, origin=origin)
-        """The encoder of frames for the air. It counts them apart from telemetry, so that a gap in their numbers is a
-        loss."""
+        """The encoder of frames for the air, counted apart from telemetry, so that a gap is a loss."""
         self.encoder = self._encoder
-        """The encoder of all that the flight controller says; answers to a ground station are numbered among
-        telemetry."""
+        """The encoder of all that the flight controller says, answers to a ground station included."""
         self._node = node
         self._base_ns = max(1, round(S / telemetry_hz)) if telemetry_hz else 0
         self._messages = self._encoders(self._encoder)

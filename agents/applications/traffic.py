@@ -201,8 +201,7 @@ class Load(Application):
         self._destination = BROADCAST if traffic.destination == "all" else NodeId(traffic.destination)
         self._priority = PRIORITIES[traffic.priority]
         self._deadline_ns = None if traffic.deadline_s is None or first else seconds_to_ns(traffic.deadline_s)
-        """The deadline of each packet. For the first class it is None, because the protocol's admission control
-        enforces it."""
+        """The deadline of each packet; None for the first class, for which the protocol enforces it."""
         self.follows = _ENDS if self._traffic.saturated else ()
         self._queued: set[int] = set()
         """The packets of a saturated source that have not ended yet, by handle."""

@@ -199,8 +199,7 @@ class BeaconTime(SwarmTime):
             )
         )
         self._announced: dict[int, int] = {}
-        """The sequence numbers of the hellos of this node whose end the radio has not reported yet, by the number of
-        their transmit requests."""
+        """The numbers of this node's hellos whose end was not reported yet, by the numbers of their requests."""
         self._refused: Counter[str] = Counter()
         self._heard = DuplicateSet(_REMEMBERED)
 

@@ -20,8 +20,7 @@ from fanet_mw.units import GOLDEN_ANGLE, US, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.survivors import Survivor
 
 _RING_M: Final = 20.0
-"""UAVs hold on a circle of this radius around the survivor, each at an angle of its own, so that they see it from
-several sides."""
+"""UAVs hold on a circle of this radius around the survivor, each at an angle of its own."""
 _MOVED_M: Final = 10.0
 """A better estimate changes the setpoint only if it has moved this far."""
 

@@ -30,8 +30,7 @@ from fanet_mw.units import Enu, NodeId, S
 T = TypeVar("T")
 _POLL_S: Final = 0.01
 _PATIENCE_S: Final = 10.0
-"""A program waits longer for the router than a person at a terminal would; on a busy machine a handshake may take
-seconds."""
+"""Longer than a person at a terminal would wait; on a busy machine a handshake may take seconds."""
 _LEAVING_S: Final = 5.0
 """A program that leaves waits no longer for what its node has yet to send; a flooding period of the paper."""
 _ORIGIN: Final = Enu(0.0, 0.0, 0.0)

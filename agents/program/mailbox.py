@@ -76,8 +76,7 @@ class Mailbox(Application):
         """`messages`: the ids of the MAVLink messages that the program wants, or ANY."""
         self.listens = messages
         self.to_send: deque[tuple[Callable[[], int], asyncio.Future[Sent], bool]] = deque()
-        """The messages that wait for the host: a function that sends the message, the future for its status, and
-        whether it is confirmed."""
+        """What waits for the host: what sends the message, the future for its status, and whether it is confirmed."""
         self._open: dict[int, tuple[asyncio.Future[Sent], bool, list[int], list[int]]] = {}
         self.got: deque[Message] = deque(maxlen=_MOST_UNREAD)
         self.news = asyncio.Event()

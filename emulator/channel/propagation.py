@@ -150,8 +150,7 @@ class LinkTable:
         self.ints[AUDIBLE, :count] = audible
         only_those = radio.fading == "none" and energy_mw(radio) == math.inf
         self.longest_ns = int((self.ints[DELAY, :count] * (matters if only_those else 1)).max(initial=0))
-        """The delay of the longest link that matters: of one that is heard or sensed, or of any if fading or sums can
-        raise it."""
+        """The delay of the longest link that is heard or sensed, or of any if fading or sums can raise it."""
         self.reals[LINK_POWER, :count] = power_mw
         self.reals[SPARED, :count] = 1.0
         self.ptr = np.searchsorted(found[:, 0], np.arange(stations + 1)).astype(np.int64)

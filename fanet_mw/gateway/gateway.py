@@ -47,8 +47,7 @@ class Doors(NamedTuple):
     flavor: Flavor = Flavor.PX4
     key: Path | None = None
     in_band: bool | None = None
-    """True: over the air, by the post on the ground; False: from the taps of all UAVs; None: over the air if there is a
-    post."""
+    """True: over the air, by the post on the ground; False: from all taps; None: over the air if there is a post."""
 
     def checked(self) -> "Doors":
         """Raises ConfigError for a connection that cannot be."""

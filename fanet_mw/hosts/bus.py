@@ -26,11 +26,9 @@ from fanet_mw.hosts.timebase import THIS_MACHINE
 JOIN_PATIENCE_S: Final = 2.5
 """How long a process waits for a router by default; it is short, so that a mistyped endpoint is soon reported."""
 MAX_PUT_BYTES: Final = 16 << 20
-"""A longer put is dropped by the session that receives it first; Zenoh's default would collect up
-to 1 GiB of one put."""
+"""The first session that receives a longer put drops it; Zenoh's default would collect up to 1 GiB."""
 LOST_AFTER_S: Final = 2.0
-"""A router that does not answer for this long counts as gone. To one that returns earlier, Zenoh
-reconnects by itself."""
+"""A router silent for so long counts as gone; to one that returns earlier, Zenoh reconnects by itself."""
 _RUNTIME_VARIABLE: Final = "ZENOH_RUNTIME"
 """The environment variable from which Zenoh reads its threads when a process opens its first session."""
 _ONE_RUNTIME: Final = (

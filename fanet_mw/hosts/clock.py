@@ -30,8 +30,7 @@ _ASK_EVERY_S: Final = 0.5
 _ASK_AGAIN_S: Final = 0.05
 """The least time between two queries to the keeper."""
 START_PATIENCE_S: Final = 3600.0
-"""How long a service that was started by hand waits for the others. It notices within seconds if
-the router goes away."""
+"""How long a service started by hand waits for the others; it notices within seconds if the router goes away."""
 
 
 class SwarmClock:

@@ -46,8 +46,7 @@ class _WakeUp(NamedTuple):
 
     asked_ns: int
     due_ns: int
-    """The instant from which the wake-up counts as late: the end of the slack, and not before the call at which it was
-    requested."""
+    """From when the wake-up counts as late: the end of the slack, not before the call at which it was requested."""
     timer: asyncio.TimerHandle
 
 

@@ -76,8 +76,7 @@ class VirtualHost:
             self._subscribe(expression, order, _NOBODY, _without_time(listener))
         self._routes: dict[str, Route] = {}
         self._latest: tuple[int, int, int] | None = None
-        """The wake-up that was requested last. It is kept out of the heap, because it is often the
-        next one to happen."""
+        """The wake-up that was requested last, outside of the heap, because it is often the next one."""
         self._stalled = 0
 
     def start(self) -> None:

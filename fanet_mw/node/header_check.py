@@ -23,8 +23,7 @@ from fanet_mw.units import BROADCAST, MS, US, NodeId, S, seconds_to_ns
 from fanet_mw.wire import MOST_HOPS, Fields, Kind
 
 RESTART_STEP_NS: Final = 100 * US
-"""A node sends fewer packets than one in this time, so after a restart it begins above all its earlier sequence
-numbers."""
+"""A node sends fewer packets than one in this time, so a restarted one begins above all its earlier numbers."""
 CONTROL: Final = 0x8000_0000
 """The sequence numbers of control packets begin here. They are separate, so that data packets have no gaps and a lost
 one is noticed."""
@@ -55,8 +54,7 @@ class HeaderCheck:
         error_ns = clock.unsynchronized_error_ns(scenario.duration_ns)
         apart_ns = 2 * error_ns + S if clock.modelled else 0
         self._youngest_ns = -_AHEAD_NS - apart_ns
-        """The least age of a packet. It is negative, because clocks differ: a packet from further in the future is a
-        lie."""
+        """The least age of a packet, negative, because clocks differ; one from further in the future is a lie."""
         self._may_jump = clock.modelled
         self._ahead: dict[NodeId, bool] = {}
         """Whether each of the latest transmitters has sent a packet from the future, the latest last."""

@@ -6,8 +6,7 @@ from fanet_mw.units import NodeId, seconds_to_ns
 from fanet_mw.wire.hello.beacon import Beacon
 
 _LIFETIME_HELLOS: Final = 3.5
-"""A neighbor expires after this number of hello intervals without a hello (3 in OLSR: NEIGHB_HOLD_TIME, RFC 3626,
-18.3)."""
+"""A neighbor expires after so many hello intervals without one (3 in OLSR: NEIGHB_HOLD_TIME, RFC 3626, 18.3)."""
 
 
 def neighbor_lifetime_ns(hello_interval_s: float) -> int:

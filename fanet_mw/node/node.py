@@ -95,8 +95,7 @@ class Node:
         self.next_wake_ns = protocol.next_wake_ns
         """The protocol's own method, because every wake-up is followed by this question."""
         self.timeless = type(protocol).next_wake_ns is RoutingProtocol.next_wake_ns
-        """True for a protocol that never asks to be woken: no reception changes the instant at which the node is
-        due."""
+        """True for a protocol that never asks to be woken, so that no reception changes when the node is due."""
         self.first_hello_ns, self.hello_due_ns = protocol.first_hello_ns, protocol.hello_due_ns
         self.hello_share, self.clusters = protocol.hello_share, protocol.clusters
         self.bound_ns, self.bounds = protocol.bound_ns, protocol.bounds

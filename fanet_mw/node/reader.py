@@ -42,8 +42,7 @@ opened, and its packets are looked up one by one."""
 _LATEST: Final = 64
 """The number of packets whose decoded content is cached: more than the hellos that a radio hands over at once."""
 _UNKNOWN: Final = (-1, b"", 0)
-"""Stands for the length, the inner frames and the hash of a packet that was not looked at lately; no frame has this
-length."""
+"""Length, inner frames and hash of a packet that was not looked at lately; no frame has this length."""
 _LONG: Final = 400
 """A packet of this length has so many inner frames that to pass over them at once pays."""
 _REMEMBERED: Final = 512
@@ -60,8 +59,7 @@ class Looked:
         self.fields = fields
         """The fields of the header, which may be nonsense until `read` has checked them."""
         self.hash = packet_hash
-        """The hash of the packet (`duplicates.hash_of`), by which duplicates are found; 0 if the frame holds several
-        packets."""
+        """`duplicates.hash_of` the packet, by which duplicates are found; 0 if the frame holds several packets."""
         self.phase = phase
         """The bit of the packet's phase (`duplicates.PHASES`); 0 if the phase flags are invalid; BUNDLE if the frame
         holds several packets."""

@@ -28,13 +28,11 @@ FLOOD_OVER_NS: Final = 500 * MS
 RIPE_NS: Final = FLOOD_OVER_NS + ASSESS_NS
 """The time after a flood within which some node sends what a hello shows to be missing."""
 AGAIN_NS: Final = 900 * MS
-"""The time after which a node may repair the same packet again; until then the neighbor has sent a hello that still
-lacks it."""
+"""When a node may repair the same packet again: the neighbor has sent another hello that lacks it."""
 _PER_HELLO: Final = 32
 """The greatest number of packets that are sent for one hello: 35 ms of airtime at 11 Mb/s and 1024 B."""
 _MOST_ORIGINS: Final = 4 * CAPACITY
-"""The greatest number of origins in one hello: four messages, 1028 bytes. In larger swarms hellos state them in
-turn."""
+"""The most origins in one hello: four messages, 1028 bytes. In larger swarms hellos state them in turn."""
 _new: Final = tuple.__new__  # for what is made once per packet
 
 

@@ -43,8 +43,7 @@ _SUFFIXES: Final[Mapping[str, tuple[str, Mapping[str, str]]]] = {
     "_kg": ("kg", {"g": "1e-3", "kg": "1"}),
     "_c": ("°C", {"C": "1", "°C": "1"}),
 }
-"""The unit for each ending of a key's name, the longest ending first, and the factors of units of
-the same dimension."""
+"""The unit of each ending of a key's name, the longest first, and factors of units of the same dimension."""
 _QUANTITY: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([a-zA-Z\u03bc°][a-zA-Z\u03bc°/0-9]*)")
 
 

@@ -174,8 +174,7 @@ _new: Final = tuple.__new__
 Fields = tuple[bytes, bytes, int, int, int, int, int, int, int, int, int, int, int, int]
 """The values at the fixed offsets of a header, unchecked: two marks, the fields of the header, version, CRC."""
 NO_FIELDS: Final[Fields] = (b"", b"", 0, 0, 0, 0, 0, 0, 0, 0, 0, PHASE_MASK, 0, 0)
-"""Stands for the fields of bytes that cannot begin with a routing header: it is in both phases at once, as no packet
-is."""
+"""The fields of bytes that cannot begin with a routing header: in both phases at once, as no packet is."""
 
 
 def fields_of(frame: bytes) -> Fields:

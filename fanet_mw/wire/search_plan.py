@@ -107,8 +107,7 @@ class SearchStatus(NamedTuple):
     node: int
     revision: int
     charge: int
-    """The percentage of the battery that may still be spent, above the way home and a reserve; 0:
-    the UAV flies home."""
+    """The percentage of the battery that may be spent above the way home and a reserve; 0: it flies home."""
     absent: bool = False
     """True while the UAV is out of its place for a survivor, so that others close ranks until it comes back."""
 

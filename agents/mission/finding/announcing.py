@@ -52,8 +52,7 @@ class Announcing:
         """The finds in whose favor this UAV has given up a person."""
         self._told_sigma_m: dict[int, float] = {}
         self._tellings: dict[int, tuple[int, int]] = {}
-        """For each survivor that this UAV has confirmed or refuted: how often the verdict must still be flooded, and
-        when next."""
+        """For each survivor that this UAV has confirmed or refuted: how often that is still flooded, and when next."""
         self._heard_ns: dict[int, int] = {}
         """The instant at which this UAV learned or made the verdict on each survivor, or was last reminded of it by a
         UAV that did not seem to know it."""

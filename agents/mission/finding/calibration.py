@@ -48,13 +48,11 @@ substantial evidence in the scale of Jeffreys (Theory of Probability, 1961, appe
 _LIKELIHOOD_FLOOR: Final = 0.005
 """This share of the maximum is added to the likelihood of each phone at all offsets."""
 _MOST_READINGS: Final = 40
-"""The greatest number of powers of one phone that are used: those from the nearest places, which are least often
-below the threshold."""
+"""The powers of one phone that are used: those from the nearest places, least often below the threshold."""
 _RARELY_HEARD: Final = 1e-12
 """The least probability of reception in the computation."""
 _GRAIN_DB: Final = 0.25
-"""The common offset is rounded to a multiple of this, so that a smaller change does not make all filters compute
-anew."""
+"""The common offset is rounded to a multiple of this: a smaller change makes no filter compute anew."""
 
 
 def likelihood(place: Estimate, readings: Iterable[tuple[Enu, float]], model: PhoneModel) -> tuple[float, ...]:

@@ -50,8 +50,7 @@ _COMPARED_M: Final = 150.0
 _SILENCE_M: Final = 450.0
 """A place without reception is ignored if it is farther than this from the middle of the grid."""
 _NEVER: Final = 0.02
-"""The least probability with which a phone is not received, however near: the receiver misses it, or rubble lies
-between."""
+"""The least probability that a phone is not received, however near: missed, or under rubble."""
 _STEP_M: Final = 5.0
 """The step of distance in the table of probabilities without reception."""
 _SAME_PLACE_M: Final = 25.0
@@ -101,8 +100,7 @@ class PhoneOffset(NamedTuple):
 
     mean_db: float
     sigma_db: float
-    """The standard deviation of the common offset; each phone's own offset (`PhoneModel.offset_db`) is not part of
-    it."""
+    """The standard deviation of the common offset, without each phone's own (`PhoneModel.offset_db`)."""
 
 
 AS_ASSUMED: Final = PhoneOffset(0.0, 0.0)
@@ -129,8 +127,7 @@ class PhoneFilter:
         self._pending: list[tuple[Enu, float | None]] = []
         """The samples that the cells do not include yet; they are added when an estimate is asked for."""
         self._sums: list[float] = []
-        """For each cell, the sum of the whitened residuals of the received powers, each times what the offset adds to
-        it."""
+        """For each cell, the sum of the whitened residuals, each times what the offset adds to it."""
         self._squares: list[float] = []
         """For each cell, the sum of the squared whitened residuals."""
         self._gains = 0.0

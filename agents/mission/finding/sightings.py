@@ -39,8 +39,7 @@ _FRESH: Final = 4
 _SAMPLES: Final = 12
 """A confirmation is not refuted by fewer powers of the phone than this."""
 _SURE_M: Final = 45.0
-"""A confirmation is not refuted while the place of the phone, by received powers alone, has a greater standard
-deviation than this."""
+"""A confirmation is not refuted while the phone's place, by powers alone, has a greater standard deviation."""
 _MARGIN: Final = 6.0
 """The least difference of costs (`Identities.against`) that refutes: the confirmed pair is then 20 times less likely.
 Of 577 simulated pairs of people 35 to 100 m apart who were confirmed rightly, none came to more than 1."""
@@ -54,8 +53,7 @@ class Contradictions:
     def __init__(self, survivors: KnownSurvivors, identities: Identities) -> None:
         self._survivors, self._identities = survivors, identities
         self._judged: dict[int, int] = {}
-        """For each confirmed survivor, the number of received powers when the confirmation was judged last, or first
-        noticed here."""
+        """For each confirmed survivor, the number of received powers when the confirmation was last judged."""
 
     def review(self) -> list[int]:
         """The survivors whose confirmations are contradicted, in order of id."""

@@ -16,8 +16,7 @@ from fanet_mw.motion import Motion
 from fanet_mw.units import Enu, S
 
 _LEVEL_M: Final = 4.0
-"""UAVs whose heights differ by more than twice this are on different levels, and not in each other's way once both keep
-their heights."""
+"""UAVs whose heights differ by more than twice this, and who keep them, are not in each other's way."""
 CLEARANCE_M: Final = 10.0
 """The distance that is kept from other UAVs, in addition to the error of their positions."""
 _HORIZON_S: Final = 6.0

@@ -17,8 +17,7 @@ _LISTEN_NS: Final = 3 * S
 _PATIENCE_NS: Final = 40 * S
 """A UAV takes off this long after its start even if another one still stands beside it: that one may be broken."""
 _LEAD_M: Final = 15.0
-"""Of two UAVs whose pads are nearer to each other than the clearance, the second one takes off when the first one is
-this far above it."""
+"""Of two UAVs on pads closer than the clearance, the second takes off when the first is this far above it."""
 _UP: Final = 0.9
 """A UAV has taken off once it has climbed this share of the height; it climbs the rest on its way."""
 _STOPPED_M_S: Final = 0.3

@@ -19,8 +19,7 @@ _WIDEST_RAD: Final = math.radians(74.0)
 two beside such a gap hear each other at 241 m, and need no head between them. Who is beyond a wider one is not heard,
 so that its width is not known."""
 _TURN: Final = 0.25
-"""The turn, as a share of the difference of the two gaps; with a half the UAV would go to the middle at once, and
-oscillate."""
+"""The turn, as a share of the difference of the two gaps; with a half the UAV would oscillate."""
 _MOST_TURN_RAD: Final = math.radians(12.0)
 _NO_BEARING_M: Final = 1.0
 

@@ -16,8 +16,7 @@ from fanet_mw.units import MS, STILL, US, Enu, NodeId, S
 from fanet_mw.wire.search_plan import Search
 
 _FREE_REACH: Final = 0.84
-"""A follower stays within this share of the radio's reach from its team, so that the team receives it wherever it
-flies."""
+"""A follower stays within this share of the radio's reach from its team."""
 _ASIDE_M: Final = 70.0
 """A UAV of a team examines a survivor who is at most this far to the side of the farthest point that `_LEASH_M`
 permits, or less far if its camera does not look so far to the side."""

@@ -39,8 +39,7 @@ _SETTLED_NS: Final = 10 * S
 _PATIENCE_NS: Final = 14 * S
 """How long the first plan waits for UAVs that have not been received."""
 _NOTICE_NS: Final = 7 * S
-"""The time from the first flood of a plan to its beginning, long enough for a flood through the
-slots of all clusters."""
+"""From the first flood of a plan to its beginning: enough for a flood through the slots of all clusters."""
 _REPEAT_NS: Final = 6 * S
 """The interval at which a new plan is flooded again."""
 _REPEATS: Final = 3

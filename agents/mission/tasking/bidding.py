@@ -33,8 +33,7 @@ _SCOUT_AFTER_NS: Final = 4 * S
 _RETURN_AFTER_NS: Final = 45 * S
 """How long a responder searches for a survivor in vain before it withdraws its bid, without the time of a descent."""
 _OVERDUE_NS: Final = 15 * S
-"""How long after it should have been there a responder that is held back before the sweep withdraws its bid: soon all
-leave."""
+"""How overdue a responder held back before the sweep withdraws its bid: soon all leave."""
 _MEASURES_NS: Final = 30 * S
 """How long a responder is assumed to go round until a vague estimate has become a place."""
 _AGAIN_NS: Final = 20 * S

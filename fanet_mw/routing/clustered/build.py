@@ -56,8 +56,7 @@ from fanet_mw.units import MS, S, seconds_to_ns
 _STORE_PACKETS: Final = 4096
 """The most packets that a node keeps for repair; they take 4 MB at 1024 B."""
 _ASKED_NS: Final = 10 * S
-"""How long a node with a timetable asks for a packet that it lacks, unless the scenario says how long packets are
-repaired."""
+"""How long a node with a timetable asks for a packet that it lacks, unless the scenario repairs packets."""
 _JITTER: Final = 0.25
 """The greatest random wait of a relay, as a share of the contention window. If relays waited longer than the window
 lasts, a flood would advance by only one hop in each superframe."""

@@ -60,8 +60,7 @@ class Parts(NamedTuple):
     delays: StatedDelays | None = None
     """The delay bounds and likely delays of the node's packets; None if this access states no bound."""
     missing: MissingPackets | None = None
-    """What the node lacks; its hellos state what it has only while it lacks something. None if they always do, or
-    never."""
+    """What the node lacks; only then do its hellos state what it has. None if they always do, or never."""
 
 
 class Clustered(RoutingProtocol):

@@ -71,8 +71,7 @@ _AROUND: Final = 1.2
 """Lines that begin around the swarm do so at this share of the radio's reach from the middle at most: whoever is nearer
 and was not found on the way out is found on the way back only."""
 _STEPS: Final = 8
-"""If the swarm would not stay together on the way to the lines, these begin nearer, by one of so many steps each
-time."""
+"""Lines to which the swarm would not stay together begin nearer, by one of so many steps each time."""
 _DENSE: Final = 0.85
 """UAVs in a square grid at this share of the radio's reach, or nearer to each other, hear all between them."""
 _FREE: Final = 4

@@ -32,8 +32,7 @@ from fanet_mw.units import Enu
 _FIRST_M: Final = 45.0
 """The distance of two neighbors along the square when it begins to grow, if it is no larger than `_INNER` then."""
 _INNER: Final = 0.8
-"""At first the middle is within this share of the radio's reach from the ring, so that UAVs may leave it for survivors
-there."""
+"""At first the middle is within this share of the radio's reach from the ring: UAVs may leave it for there."""
 _BEHIND: Final = 0.4
 """At first a follower is at this share of the ring's half-side, to receive what lies in the middle."""
 _CORNERS: Final = 4

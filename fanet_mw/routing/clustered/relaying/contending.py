@@ -25,8 +25,7 @@ class ContendingRelaying:
         self._contention = contention
         self._jitter_ns = port.scenario.routing.jitter_ns
         self.next_wake_ns = rule.open_until.next_wake_ns
-        """The method that tells when a packet is decided whose relay is still open; it is called after every
-        reception."""
+        """Tells when a packet is decided whose relay is still open; called after every reception."""
 
     def start(self, now_ns: int) -> None:
         """The node has started; no packet is known yet."""

@@ -22,8 +22,7 @@ from fanet_mw.wire.join import Join
 from fanet_mw.wire.schedule import Schedule
 
 _AGAIN_HELLOS: Final = 2.0
-"""The number of hello intervals after which a stand-in announces itself again, until a schedule confirms it or the head
-objects."""
+"""The hello intervals after which a stand-in announces itself again, until confirmed by a schedule."""
 _OBJECT_NS: Final = 500 * MS
 """The shortest time between two objections of a node, because each is a flood."""
 _LEADING: Final = State.LEADING  # members of an enumeration are looked up slowly, and this is asked at every wake-up

@@ -22,8 +22,7 @@ from fanet_mw.wire.links import Links
 _FIRST_NS: Final = 500 * MS
 """The least time between the start of a node and its first join."""
 _WINDOW_NS: Final = 3 * S
-"""Joins are spread over this time at random, because all nodes of a swarm may start together, and each join is a
-flood."""
+"""Joins are spread over this time at random: all nodes may start together, and each join is a flood."""
 _REJOIN_NS: Final = 2 * S
 """The least time between two joins of a node that has no place."""
 

@@ -46,8 +46,7 @@ _LONGEST_SETTLING_NS: Final = 10 * S
 OBJECTION_NS: Final = 2 * S
 """The time that a node has to object when it is reported silent; meanwhile a stand-in serves its cluster."""
 _OBJECTION_PERIODS: Final = 4
-"""The same with a timetable, in superframes, because the report waits for a contention window and the objection for a
-turn."""
+"""The same in superframes of a timetable: the report waits for a contention window, the objection for a turn."""
 ANSWER_NS: Final = 3500 * MS
 """The time after a call at which the joins that answer it have arrived; nodes spread them over 3 s."""
 _FIRST_CALL_NS: Final = 5 * S
@@ -130,8 +129,7 @@ class Leader:
         self._estimates = _Estimates(LinkState() if scenario.measures_links else None, heard)
         self._measured_ns = measured_period_ns
         self._outbid = False
-        """True if another node has announced an epoch in this leader's name, so that the next epoch must come after
-        it."""
+        """True if another node has announced an epoch in this leader's name, which the next one must come after."""
         self._assigned = _Assigned()
         self._due_ns = now_ns if elected else now_ns + _FIRST_CALL_NS
         self._announced_ns = now_ns

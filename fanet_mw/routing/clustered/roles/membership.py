@@ -53,8 +53,7 @@ class Membership:
         self.superframe: Superframe | None = None
         """The superframe with the slots of all clusters; None until a schedule has told this node's place."""
         self.succession: tuple[NodeId, ...] = ()
-        """The members of this node's cluster: the head, then the other nodes in the order in which they stand in for
-        it."""
+        """The members of this node's cluster: the head, then the others in the order in which they stand in for it."""
         self._parts: dict[int, Schedule] = {}
         self._named: ClusterPlace | None = None
         """The node's place by the last schedule that was complete enough to tell; it holds until a newer one is."""

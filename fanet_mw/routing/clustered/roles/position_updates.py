@@ -21,8 +21,7 @@ _LEAST_NS: Final = 5 * S
 _QUIET_NS: Final = 20 * S
 """The time without a flood of its own after which a node sends an update as a sign of life."""
 UPDATE_NS: Final = 100 * MS
-"""Updates are spread over this time for each node, so that there are at most ten floods a second when all must
-update."""
+"""Updates are spread over so much per node: at most ten floods a second when all must update."""
 _HELLO_VARIES: Final = 1.1
 """Updates are sent with hellos, whose interval varies by a tenth."""
 _A_LITTLE_NS: Final = 2 * S

@@ -80,8 +80,7 @@ class _Joined(NamedTuple):
 
     motion: Motion
     beside: Motion | None
-    """The leader's own motion at that instant if its velocity was the same, or in a rigid formation; None if not, or if
-    it is not known."""
+    """The leader's motion at that instant if its velocity was the same, or in a rigid formation; or None."""
 
 
 class Roster:

@@ -14,8 +14,7 @@ from fanet_mw.scenario import Clusters
 from fanet_mw.units import MS
 
 _SPREAD_CAP_NS: Final = 40 * MS
-"""Two floods that are this far apart no longer meet (some hops of lead, jitter and airtime); a longer gap would only
-add delay."""
+"""Two floods this far apart no longer meet (some hops of lead, jitter and airtime); more would only add delay."""
 
 
 class Tenure(NamedTuple):

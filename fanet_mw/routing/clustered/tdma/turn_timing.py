@@ -23,8 +23,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, US
 
 TAIL_NS: Final = 5 * MS
-"""In this last part of the contention window no frame becomes due, so that contending frames are over when the turns
-begin."""
+"""In this last part of the contention window no frame becomes due, so that all are over when turns begin."""
 
 
 class Turns(NamedTuple):

@@ -32,8 +32,7 @@ class Odds(NamedTuple):
     """The deliveries to be expected of a timetable over lossy links."""
 
     missed: Mapping[NodeId, tuple[float, ...]]
-    """For the packet of each root: the share of nodes that lack it after the flood, after one round of repair, and so
-    on."""
+    """By root: the share of nodes that lack its packet after the flood, after one round of repair, and so on."""
 
     @property
     def mean(self) -> float:
@@ -88,8 +87,7 @@ def _flood(
     has = [0] * len(network.nodes.ids)
     has[root] = everywhere
     late: list[tuple[int, int, int]] = []
-    """Holders that can relay only later: the offset from which on, the row, and the trials in which
-    it has the packet."""
+    """Holders that can relay only later: from which offset on, the row, and the trials in which it has the packet."""
     for offset, row in sent:
         while late and late[0][0] <= offset:
             _, other, trials = late.pop(0)

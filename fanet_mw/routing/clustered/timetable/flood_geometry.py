@@ -29,8 +29,7 @@ class Geometry(NamedTuple):
     turns: int
     """The number of turns in a superframe."""
     hop_turns: int
-    """The number of turns from the one in which a packet arrives to the first that can relay it; 1
-    means the next turn."""
+    """The turns from the one in which a packet arrives to the first that can relay it; 1: the next turn."""
     margin_m: float = 0.0
     """By so much shorter links are preferred, because positions have errors; the others are used where nodes would be
     cut off without them."""

@@ -29,8 +29,7 @@ from fanet_mw.routing.clustered.timetable.interference import InterferenceByDist
 _NOISE: Final = 50
 _TRIAL: Final = 64
 _HOPE: Final = 1.15
-"""After `_TRIAL` turns with the window full, scheduling is given up if the rest would have to go
-faster by this factor."""
+"""After `_TRIAL` turns with the window full, scheduling ends if the rest must go faster by this factor."""
 
 
 class Effort(NamedTuple):

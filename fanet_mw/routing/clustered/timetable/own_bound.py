@@ -18,8 +18,7 @@ from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.wire.loads import AS_EXPECTED
 
 BURST: Final = 3
-"""In a class without a least interval, this many packets may wait at once, the last one included, and still have a
-bound."""
+"""In a class without a least interval, so many packets may wait at once and still have a bound."""
 
 
 class RootTurns(NamedTuple):

@@ -64,8 +64,7 @@ class StatedDelays:
         self._hello_ns = seconds_to_ns(port.scenario.routing.hello_interval_s)
         self._now_ns = 0
         self._bounds_ns: list[tuple[NodeTimetable, Mapping[int, int]]] = []
-        """The bound of each priority class of the node's packets by each timetable; classes without a bound are
-        missing."""
+        """The bound of each priority class by each timetable; classes without a bound are missing."""
         self._promised: dict[int, tuple[int, int]] = {}
         """The waiting packets for which a bound was stated, by sequence number: the instant at which the flood of each
         is over if the node keeps its turns, and the latest instant that the bound allows."""

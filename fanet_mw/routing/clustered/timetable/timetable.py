@@ -36,8 +36,7 @@ class Turn(NamedTuple):
     """One transmission: `node` sends the packet number `instance` of `root` in this superframe."""
 
     offset: int
-    """The number of turns from the beginning of the superframe in which the flood begins; it may
-    lie in the next one."""
+    """Turns from the beginning of the superframe in which the flood begins; it may lie in the next one."""
     node: NodeId
     root: NodeId
     instance: int
@@ -76,8 +75,7 @@ class Timetable(NamedTuple):
     used: int
     """The number of turns in use, of `geometry.turns`."""
     calls: Mapping[NodeId, tuple[int, ...]] = MappingProxyType({})
-    """For each node, its calls: turns in which it transmits to its neighbors only, a hello or a
-    packet that one lacks."""
+    """For each node, its calls: turns for its neighbors only, for a hello or a packet that one lacks."""
     hops: Mapping[NodeId, int] = MappingProxyType({})
     """For each root, the number of hops to the farthest node, if each relay passes on the first copy that it hears."""
     sure: bool = True

@@ -32,8 +32,7 @@ _MOST_ANSWERS: Final = 2
 _SHOWN_NS: Final = 1 * S
 """Packets of applications show soonest that a node keeps a timetable; if none comes in this time, a join does."""
 _SHOWN: Final = 1.5
-"""A join shows again that the node keeps it when nothing else has for so many superframes, or hello intervals if these
-are longer."""
+"""A join shows it again after so many superframes, or hello intervals if these are longer, without a flood."""
 
 
 class TurnAccess:

@@ -18,7 +18,6 @@ _MOST_PORT: Final = 0xFFFF
 _PRIORITIES: Final[Mapping[str | int, int]] = {
     key: number for name, number in wire.PRIORITIES.items() for key in (name, number)
 }
-"""The priorities that an application may use, by name and by number."""
 
 
 class Submission(NamedTuple):

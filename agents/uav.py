@@ -313,7 +313,6 @@ def _asked_for(
     limits: SearchLimits,
     radio: Node,
 ) -> Sequence[Application]:
-    """The applications of a UAV that a scenario asks for, in the order in which they are called."""
     mission = scenario.mission
     applications: list[Application]
     rescue = (

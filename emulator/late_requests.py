@@ -17,7 +17,6 @@ _STEPS: Final = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
 
 
 def moment_ns(time_scale: float) -> int:
-    """The length of a moment in swarm time, for a scenario with this `time_scale`."""
     return max(1, round(MOMENT_NS * time_scale))
 
 

@@ -13,7 +13,6 @@ from fanet_mw.bus.link_stats import COUNTS, LinkStats
 from fanet_mw.units import S
 
 _ROWS = slice(s.N_RECEIVED, s.N_CUT + 1)
-"""The rows of a link that are counters, one for each name in COUNTS."""
 
 
 class LinkCounters:

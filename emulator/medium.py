@@ -35,7 +35,6 @@ _OUTCOME_OF: Final[Mapping[DropReason, TxOutcome]] = {
     DropReason.TOO_LARGE: TxOutcome.REFUSED,
     DropReason.NO_RECEIVER: TxOutcome.REFUSED,
 }
-"""The status of a refused request, by the reason of its drop."""
 _NO_RECEPTION: Final = Reception(b"", NodeId(0), 0, 0.0)
 """The initial value of a variable that holds the latest reception while rows are read."""
 _HORIZON_NS: Final = 60_000 * MS

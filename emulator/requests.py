@@ -53,7 +53,6 @@ class RequestNumbers:
         return sum(map(self.made, range(len(self.expected))))
 
     def report(self) -> dict[str, Mapping[str, int]]:
-        """The requests of each node, by its id."""
         return {
             str(station + 1): {"all": self.made(station), "before_restart": before}
             for station, before in enumerate(self._before)
@@ -74,7 +73,6 @@ class FrameSlots:
 
     @property
     def in_flight(self) -> int:
-        """The number of unfinished requests."""
         return len(self.requests) - len(self.free)
 
     def add(self, slots: int) -> None:

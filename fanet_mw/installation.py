@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Final
 
 PACKAGES: Final = ("agents", "emulator", "sim")
-"""The packages of this distribution besides `fanet_mw`."""
 _MARK: Final = "fanet-mw"
 """A text that is among the first lines of each package of this distribution."""
 _EXTRAS: Final = {

@@ -25,9 +25,7 @@ class OrderKind(IntEnum):
 
 
 _FOR_ALL: Final = frozenset({OrderKind.RECALL, OrderKind.END, OrderKind.RELEASE, OrderKind.NO_FLY})
-"""The kinds of orders that may be for all UAVs."""
 AROUND: Final = frozenset({OrderKind.SEARCH, OrderKind.NO_FLY})
-"""The kinds of orders with a radius."""
 
 
 class Order(NamedTuple):

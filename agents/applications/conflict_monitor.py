@@ -179,7 +179,6 @@ class ConflictMonitor:
 
     @property
     def avoids(self) -> bool:
-        """True while this UAV avoids others, and does nothing else."""
         return self._avoidance is not None
 
     # --- conflicts ------------------------------------------------------------------------------------------------

@@ -182,7 +182,6 @@ class TelemetryStreams:
         return min((stream.due_ns for stream in self._streams.values()), default=None)
 
     def operator(self, now_ns: int) -> None:
-        """An operator is there from now on."""
         for message_id, interval_ns in _OPERATORS.items():
             stream = self._streams.get(message_id)
             if stream is None:

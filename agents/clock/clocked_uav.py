@@ -72,7 +72,6 @@ class ClockedUav(Actor):
         self._stamp_ns = scenario.clock.stamp_ns
         self._until_ns = scenario.duration_ns
         self._input_ns = 0
-        """The true instant of the input that is being handled."""
         self._shown_ns = 0
         """The swarm time that was last given to the UAV; it never goes back."""
         self._sample_ns = 0
@@ -154,7 +153,6 @@ class ClockedUav(Actor):
         return self._clock.local_ns(self._input_ns)
 
     def _advance_to(self, now_ns: int) -> int:
-        """Advance the swarm time that the UAV is given to this true instant; returns that swarm time."""
         swarm_ns = self._time.line.swarm_ns(self._clock.local_ns(now_ns))
         self._shown_ns = max(self._shown_ns, swarm_ns)
         return self._shown_ns
@@ -170,7 +168,6 @@ class ClockedUav(Actor):
     # --- in -------------------------------------------------------------------------------------------------------
 
     def _translated(self, message: Message, now_ns: int) -> Message | None:
-        """A message as the UAV is to receive it; None if it is not to receive it."""
         if isinstance(message, Reception):
             ended_ns = self._stamped_ns(message.end_ns)
             kind = wire.peek_kind(message.frame)

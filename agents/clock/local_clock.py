@@ -52,7 +52,6 @@ class LocalClock:
             self._walk.append(_Second(last.true_ns + S, _shown(last, last.true_ns + S), rate))
 
     def local_ns(self, true_ns: int) -> int:
-        """The instant that the clock shows at a true instant."""
         by_ns = next(by for at, by in reversed(self._jumps) if at is None or at <= true_ns)
         return self.counter_ns(true_ns) + by_ns
 

@@ -31,7 +31,6 @@ _TELLINGS: Final = 3
 _AGAIN_NS: Final = 5 * S
 """The time between two of these floods."""
 _IN_HELLO: Final = 2
-"""The greatest number of orders in one hello."""
 _MOST_ORDERS: Final = 1000
 
 

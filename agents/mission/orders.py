@@ -17,7 +17,6 @@ from fanet_mw.wire.told_order import ToldOrder
 _TOLD_NS: Final = 12 * S
 """How long hellos tell an order on."""
 _TOLD: Final = 2
-"""The greatest number of orders in one hello."""
 _MOST_KNOWN: Final = 1000
 """The greatest number of orders that are remembered, so that forged ones take no more memory."""
 _SERIAL_BITS: Final = 16

@@ -62,7 +62,6 @@ class PaperRule:
         self.wake(now_ns)
 
     def next_wake_ns(self) -> int | None:
-        """The instant of the next report."""
         if not self._measured:
             return None  # this is so for most nodes, most of the time
         return min((self._due_ns[survivor] for survivor in self._measured), default=None)

@@ -97,7 +97,6 @@ def air_to_ground_db(distance_m: Reals, rise_m: Reals, environment: Environment,
 
 
 def share_of_lower_roofs(height_m: Reals, environment: Environment) -> Reals:
-    """The share of roofs below a height."""
     return np.asarray(-np.expm1(-(np.maximum(height_m, 0.0) ** 2) / (2 * environment.roofs_m**2)), dtype=np.float64)
 
 

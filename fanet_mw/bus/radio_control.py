@@ -144,11 +144,9 @@ def node_label(node: int) -> str:
 JAM_LABEL: Final = "jam"
 """The default label of a jammed area."""
 PARTITION_LABEL: Final = "partition"
-"""The default label of a partition."""
 
 
 def nodes_of(fault: Fault) -> tuple[int, ...]:
-    """The nodes that a fault names."""
     if isinstance(fault, Degrade):
         return () if fault.src == fault.dst == EVERY else (fault.src, fault.dst)
     if isinstance(fault, Partition):

@@ -119,7 +119,6 @@ class _OutgoingMessage:
     born_us: int
     lifetime_ms: int
     everyone: bool
-    """True if the message is for all nodes."""
     lacking: dict[NodeId, int]
     """For each target that has not confirmed the message, the pieces that it has, as bits."""
     again_ns: int = 0

@@ -78,7 +78,6 @@ class SwarmFacts(NamedTuple):
 
     nodes: list[NodeId]
     until_ns: int
-    """The end of the swarm's time."""
     post: NodeId | None
     """The post on the ground, if there is one."""
 

@@ -20,7 +20,6 @@ from fanet_mw.errors import MalformedFrameError
 BOUND: Final = 4096
 """The greatest number of waiting puts."""
 BOUND_BYTES: Final = 16 << 20
-"""The greatest number of waiting bytes."""
 MOST_PUT_BYTES: Final = BOUND_BYTES // 4
 """The greatest length of a put: twice that of the lines of sight that a world of 1,000 nodes publishes."""
 PORTION: Final = 256

@@ -37,12 +37,10 @@ class Neighbors:
         self._by_id.pop(node, None)
 
     def has(self, node: NodeId, *, now_ns: int) -> bool:
-        """True if this node is a neighbor that has not expired."""
         neighbor = self._by_id.get(node)
         return neighbor is not None and neighbor.heard_ns >= now_ns - self._lifetime_ns
 
     def count(self, *, now_ns: int) -> int:
-        """The number of neighbors that have not expired."""
         horizon_ns = now_ns - self._lifetime_ns
         return sum(1 for neighbor in self._by_id.values() if neighbor.heard_ns >= horizon_ns)
 

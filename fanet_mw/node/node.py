@@ -42,9 +42,7 @@ class AnnouncedHello(NamedTuple):
     """A hello of this node that was announced to the radio."""
 
     request: int
-    """The number of the transmit request."""
     number: int
-    """The sequence number of the hello."""
 
 
 class Node:
@@ -74,7 +72,6 @@ class Node:
         self.silences = Silences(count=scenario.node_count)
         """How long neighbors have sent nothing."""
         self._copies = 0
-        """The number of frames that were only copies, as most are."""
         self._others = 0
         self._lifetimes_ns = [scenario.routing.lifetime_ns(wire.PRIORITY_BULK)] * 256
         """The lifetime of a packet by its priority; the air may state any of 256."""

@@ -31,7 +31,6 @@ class PacketNumbering:
         """The names (`wire.NAME`) of data packets that were accepted, and of which no frame has been announced yet."""
 
     def start(self, now_ns: int) -> None:
-        """The node has started, for the first time or again."""
         first = now_ns // RESTART_STEP_NS % CONTROL
         self._first_seq, self._next_seq = first, {False: first, True: CONTROL + first}
 

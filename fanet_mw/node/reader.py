@@ -93,7 +93,6 @@ class Reader:
 
     def __init__(self) -> None:
         self.last = Looked(b"", NO_FIELDS, 0, 0)
-        """The frame that was looked at last."""
         self._hashes: dict[bytes, tuple[int, bytes, int]] = {}
         """The length, the inner frames and the hash of packets that were looked at lately, by what no hop changes in
         their headers. A packet is looked at once for each node that relays it, and to compare its bytes takes a third

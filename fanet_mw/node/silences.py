@@ -22,7 +22,6 @@ class Silences:
         """The longest silence of late between two frames of each neighbor."""
 
     def on_frame(self, src: int, now_ns: int) -> None:
-        """A frame came from this node."""
         heard_ns = self._heard_ns
         if src < len(heard_ns):
             silence_ns = min(now_ns - heard_ns[src], _MOST_NS) if heard_ns[src] else _MOST_NS

@@ -22,7 +22,6 @@ class FloodingProtocol(RoutingProtocol):
 
     origin_flags: ClassVar[int] = FLAG_FLOOD
     stream_name: ClassVar[str]
-    """The name of the random stream."""
 
     def __init__(self, port: Port) -> None:
         super().__init__(port)

@@ -32,7 +32,6 @@ class MissingPackets:
         """The instant until which losses are suspected, whatever is missing."""
 
     def receive(self, origin: int, seq: int, *, now_ns: int) -> None:
-        """A packet of an origin was received, and is not missing any more."""
         noticed, newest = self._noticed_ns, self._newest.get(origin, seq)
         if noticed:
             noticed.pop((origin, seq), None)

@@ -69,7 +69,6 @@ class Repair:
         """Origin, sequence number and instant of generation [swarm us] of each stored packet, in the order in which the
         packets came, so that a packet need not be looked at when it is dropped."""
         self.pending: dict[int, int] = {}
-        """The instant at which each packet is to be repaired, by key."""
         self._due: list[tuple[int, int]] = []
         self._turn = 0
         self.repaired = 0
@@ -112,7 +111,6 @@ class Repair:
 
     @property
     def holds_any(self) -> bool:
-        """True if there is a packet in the store."""
         return bool(self._store)
 
     def digest(self, *, now_ns: int, most: int = _MOST_ORIGINS) -> Digest:

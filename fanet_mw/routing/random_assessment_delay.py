@@ -23,7 +23,6 @@ class Assessment:
         return len(self.pending)
 
     def first_copy(self, packet: Packet, *, due_ns: int) -> None:
-        """Assess a new packet until `due_ns`."""
         header = packet.header
         key = key_of(header.origin, header.seq)
         self.pending[key] = 1, packet

@@ -39,9 +39,7 @@ _MOST_CLUSTERS_ABREAST: Final = 7
 _MOVING_MODELS: Final = ("formation", "random_waypoint", "crossing")
 """The mobility models of the world by which UAVs move without being commanded."""
 _LINKS: Final = 36
-"""The number of links in one FANET_LINKS message."""
 _MOST_LINKS_MESSAGES: Final = 4
-"""The number of FANET_LINKS messages in one frame."""
 _MOST_IN_ROUNDS: Final = 488
 """The nodes about which one FANET_HEARD can tell (64 bytes, of which 3 for node and epoch)."""
 _HELLO_IN_TURN: Final = 36 + 61 + 255

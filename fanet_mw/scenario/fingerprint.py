@@ -25,7 +25,6 @@ _OURS: Final[Mapping[str, Sequence[str]]] = {
 }
 """The keys that name parts, and those parts that are this project's own."""
 DIGITS: Final = 16
-"""Hexadecimal digits of a fingerprint."""
 
 
 def identity(scenario: Scenario) -> dict[str, Any]:

@@ -27,7 +27,6 @@ _MOST_SHAPES: Final = 10_000
 _Point = tuple[float, float]
 _WAYPOINT: Final = 16
 _KEYS: Final = (("mission", "area"), ("world", "no_fly"), ("mission", "survivors_at"))
-"""The keys that name such files."""
 
 
 class Shapes(NamedTuple):

@@ -64,11 +64,9 @@ class Line(NamedTuple):
         return self.offset_ns + round((local_ns - self.at_ns) * self.rate)
 
     def swarm_ns(self, local_ns: int) -> int:
-        """Swarm time at the instant at which the own clock shows `local_ns`."""
         return local_ns + self.offset_at(local_ns)
 
     def local_ns(self, swarm_ns: int) -> int:
-        """The instant that the own clock shows at that swarm time."""
         beyond_ns = swarm_ns - self.at_ns - self.offset_ns
         return self.at_ns + beyond_ns - round(beyond_ns * (self.rate / (1 + self.rate)))
 

@@ -90,9 +90,7 @@ class _LastBeacon:
     heard_ns: int
     reference: int = 0
     round: int = 0
-    """The round of its last news."""
     said: int = 0
-    """The round of its last beacon."""
     hops: int = 0
     advanced_ns: int = 0
     trusted: bool = True
@@ -242,7 +240,6 @@ class TimeSync:
         self._claim_ns = local_ns + int(staggered * self._own.hello_ns)
 
     def _wait(self, local_ns: int) -> None:
-        """Leave the swarm the time to tell this node its own."""
         self._arm(local_ns, hellos=_FIRST_HELLOS)
 
     # --- receiving ------------------------------------------------------------------------------------------------

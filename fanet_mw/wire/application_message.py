@@ -28,7 +28,6 @@ from fanet_mw.wire.frame import (
 MOST_PIECES: Final = 64
 """The greatest number of pieces of a message, which is the number of bits in a receipt."""
 MAVLINK_PORT: Final = 0
-"""The port of messages that consist of MAVLink messages."""
 MOST_LIFETIME_MS: Final = 3_600_000
 HEAD_BYTES: Final = OVERHEAD + MESSAGE.layout.size
 RECEIPT_BYTES: Final = OVERHEAD + RECEIPT.layout.size

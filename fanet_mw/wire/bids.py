@@ -9,7 +9,6 @@ from fanet_mw.wire.frame import ANY_NODE, BIDS, VERSION, encode_inner
 from fanet_mw.wire.survivors import MOST_SURVIVORS
 
 MOST_BIDS: Final = 12
-"""The number of bids in one message."""
 WITHDRAWN: Final = 0xFFFF
 """The time of arrival that marks a withdrawn bid."""
 

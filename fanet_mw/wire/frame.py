@@ -371,7 +371,6 @@ _OURS: Final = {spec.msgid: spec for spec in SPECS}
 CHUNK_HEAD: Final = struct.Struct("<HBB")
 """The beginning of the payload of a FANET_CHUNK: the length of its data, its number, and the number of chunks."""
 CHUNK_DATA: Final = 240
-"""The greatest number of bytes of data in one FANET_CHUNK."""
 _LEAST_CHUNK: Final = OVERHEAD + CHUNK_HEAD.size + 1
 _WHOLE_CHUNK: Final = OVERHEAD + CHUNK_HEAD.size + CHUNK_DATA
 _MOST: Final = 255 * _WHOLE_CHUNK

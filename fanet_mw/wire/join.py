@@ -14,7 +14,6 @@ class Join(NamedTuple):
     node: int
     position: Enu
     velocity: Enu = STILL
-    """The velocity [m/s]."""
     instead_of: int = 0
     """The silent node that the sender reports; if that is its head, the sender stands in for it. 0 means none, and the
     sender's own id that the sender objects to a report."""

@@ -13,7 +13,6 @@ from fanet_mw.wire import LOADS, VERSION, Packed, decode_every, encode_inner
 CAPACITY: Final = 56
 """Entries of a message, which are as many as members of a schedule part."""
 PER_NS: Final = 100 * S
-"""A load is the number of packets in this time."""
 AS_EXPECTED: Final = 0xFFFF
 """The load of a node that is assumed to send as the scenario states."""
 LEAST_LOAD: Final = 1

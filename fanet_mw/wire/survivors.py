@@ -30,7 +30,6 @@ def is_person(survivor: int) -> bool:
 
 
 def called(survivor: int) -> str:
-    """What people call a survivor of this number."""
     return "a person without a phone" if is_person(survivor) else f"survivor {survivor}"
 
 

@@ -34,7 +34,6 @@ _WIDTH: Final = 2 * _HALF_CELLS + 1
 _EVERY_CELL: Final = (True,) * (_WIDTH * _WIDTH)
 _COLUMNS: Final = tuple(float(cell % _WIDTH) for cell in range(_WIDTH * _WIDTH))
 _ROWS: Final = tuple(float(cell // _WIDTH) for cell in range(_WIDTH * _WIDTH))
-"""The column and the row of each cell."""
 _OFF_CENTER_M: Final = 120.0
 """A new grid is made when the strongest power was received farther than this from the middle of the present one."""
 CORRELATION_FACTOR: Final = 1.5

@@ -92,7 +92,6 @@ class Sightings:
         self._voice_rad = math.radians(scenario.sensors.voice_sigma_deg)
         self._view = CameraView(scenario)
         self._imaged_ns: int | None = None
-        """The instant up to which the images are taken in."""
 
     def camera(self, people: Sequence[Person], *, now_ns: int) -> None:
         self._empty_images(now_ns)

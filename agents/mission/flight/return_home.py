@@ -82,7 +82,6 @@ class ReturnHome:
         self.lands = False
 
     def on_battery(self, charge: float, *, now_ns: int) -> bool:
-        """A reading of the battery; returns True if the UAV must leave now."""
         self._endurance.reserve = self._limits.reserve
         self._endurance.wait_s = _TURN_S * len(self._beside)
         self._endurance.read(charge, now_ns=now_ns, velocity=self._own_motion.velocity)

@@ -114,7 +114,6 @@ def _parts(masks: Sequence[int]) -> int:
 
 
 def _near(points: Sequence[Enu], reach_m: float) -> list[list[int]]:
-    """For each point, those of the others within reach."""
     return [
         [b for b, other in enumerate(points) if b != a and point.minus(other).horizontal() <= reach_m]
         for a, point in enumerate(points)

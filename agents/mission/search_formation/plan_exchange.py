@@ -147,5 +147,4 @@ class PlanExchange:
 
 
 def _falls(velocity: Enu) -> bool:
-    """True for a UAV that falls from the sky."""
     return velocity.up <= -_FALLS_M_S

@@ -42,7 +42,6 @@ class Auction:
         self._place(survivor, max(0, min(WITHDRAWN - 1, round(10 * eta_s))), now_ns)
 
     def withdraw(self, survivor: int, *, now_ns: int) -> None:
-        """Withdraw the bid of this node, if there is one."""
         mine = self._bids.get(survivor, {}).get(self._node)
         if mine is not None and mine.eta_ds != WITHDRAWN:
             self._place(survivor, WITHDRAWN, now_ns)
@@ -65,7 +64,6 @@ class Auction:
         self._bids.pop(survivor, None)
 
     def has_bid(self, survivor: int) -> bool:
-        """True while this node has a bid for a task."""
         mine = self._bids.get(survivor, {}).get(self._node)
         return mine is not None and mine.eta_ds != WITHDRAWN
 

@@ -41,7 +41,6 @@ class RoundTiming(NamedTuple):
 
     @classmethod
     def of(cls, scenario: Scenario) -> "RoundTiming":
-        """The rounds that a scenario asks for."""
         rounds, nodes, radio = scenario.rounds, scenario.node_count, scenario.radio
         slack_ns = round(rounds.turn_slack_us * US)
         turn_bytes = min(rounds.turn_bytes, radio.max_frame_bytes)
@@ -68,7 +67,6 @@ class RoundTiming(NamedTuple):
         return None if within_ns >= self.nodes * self.turn_ns else within_ns // self.turn_ns + 1
 
     def slot_start_ns(self, number: int) -> int:
-        """The start of a bulk slot."""
         round_number, slot = divmod(number, self.slots)
         return round_number * self.period_ns + self.nodes * self.turn_ns + slot * self.slot_ns
 

@@ -141,7 +141,6 @@ class RoundFlooding(RoutingProtocol):
         """Whether this node takes part in all bulk slots, as it has stated."""
         self._slot_ns: int | None = None
         self._slot_from_ns = 0
-        """The instant from which that slot was sought."""
         self._slot_by: tuple[int, int, bool] | None = None
         """The neighbors, the state of the topology, and the part in slots, by which it was found."""
         self._gone = 0
@@ -158,7 +157,6 @@ class RoundFlooding(RoutingProtocol):
         self._near = 0
         """The nodes that were heard lately, as a set of bits (`topology.nodes_of`)."""
         self._near_until_ns = 0
-        """The instant until which none of them can become silent."""
         self._turn_ns = 0
         """The next own turn that may still be filled."""
         self._turn_asked = False
@@ -419,7 +417,6 @@ class RoundFlooding(RoutingProtocol):
         self._take_bulk(packet, src=None, from_ns=from_ns, now_ns=now_ns)
 
     def _take_bulk(self, packet: Packet, *, src: int | None, from_ns: int, now_ns: int) -> None:
-        """A bulk packet may be sent from an instant on."""
         spare = src is not None and not self._topology.dominates()
         if spare:
             from_ns += _SPARE_HOPS * self._law.hop_ns

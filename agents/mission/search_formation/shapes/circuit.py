@@ -71,7 +71,6 @@ def _corners(half_m: float, lane_m: float) -> list[tuple[float, float]]:
 
 
 def fitted(count: int, demands: Demands) -> Dimensions:
-    """The circuit for any number of UAVs."""
     half = demands.area_m / 2
     lanes = max(_LEAST_LANES, 2 * math.ceil(demands.area_m / demands.apart_m(math.inf) / 2))
     return Dimensions(

@@ -33,7 +33,6 @@ class Division:
             self._count = None if self._method.promise.dominating else count
 
     def divide(self, swarm: Swarm) -> list[Cluster]:
-        """Divide the swarm; `swarm.previous` is the division that stands."""
         return self._method.divide(swarm)
 
     def renew(self, present: Sequence[Cluster], swarm: Swarm, stand_ins: Mapping[NodeId, NodeId]) -> list[Cluster]:

@@ -31,7 +31,6 @@ class LinkState:
         self._told[node] = {link.a: link for link in links if link.b == node}
 
     def known(self, nodes: Collection[NodeId]) -> int:
-        """The number of these nodes that have reported their links."""
         return sum(1 for node in nodes if node in self._told)
 
     def between(self, nodes: Collection[NodeId]) -> tuple[Link, ...]:

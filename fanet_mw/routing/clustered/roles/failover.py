@@ -45,7 +45,6 @@ class Failover:
         """With `takes_slot` a stand-in uses the slot of the silent head; without it, it only informs the leader."""
         self.state = State.SEEKING
         self.silent_head = NodeId(0)
-        """The head for which this node stands in; 0 while it does not."""
         self._takes_slot = takes_slot
         self._node = node
         self._membership = membership

@@ -43,7 +43,6 @@ class Joining:
         self.due_ns: int | None = None
 
     def start(self, now_ns: int) -> None:
-        """The node has started, and belongs to no cluster."""
         self.due_ns = now_ns + _FIRST_NS + int(self._random() * _WINDOW_NS)
 
     def ask_for_a_place(self, now_ns: int) -> None:

@@ -34,7 +34,6 @@ class Turns(NamedTuple):
     contention_ns: int
     turn_ns: int
     per_superframe: int
-    """The number of turns in a superframe."""
 
     def superframe_start_ns(self, t_ns: int) -> int:
         return t_ns - (t_ns - self.origin_ns) % self.period_ns

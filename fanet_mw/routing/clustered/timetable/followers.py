@@ -26,7 +26,6 @@ class Followers:
         self._doubted_ns: int | None = None
 
     def follow(self, version: Version) -> None:
-        """The node itself has the timetable of another version now."""
         self._known.setdefault(version, {})
         self._doubted_ns = None
         while len(self._known) > _KEPT:

@@ -15,7 +15,6 @@ class TimetablesInForce:
         return self.in_order[-1] if self.in_order else None
 
     def at(self, t_ns: int) -> NodeTimetable | None:
-        """The newest timetable that is in force at an instant."""
         for timetable in reversed(self.in_order):
             if timetable.valid_ns <= t_ns:
                 return timetable

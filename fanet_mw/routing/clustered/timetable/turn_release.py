@@ -34,7 +34,6 @@ class TurnsInForce(NamedTuple):
     offsets: tuple[int, ...]
     """The offsets of the node's turns, ascending."""
     frame_bytes: int
-    """The number of bytes that one turn can carry."""
     span: int
     """The duration of a flood, in turns: from one of the node's turns until all nodes have the packet."""
 
@@ -70,7 +69,6 @@ class TurnRelease(ABC):
         """The first turn of the node from an instant on."""
 
     def has_turn(self, *, now_ns: int) -> bool:
-        """True if this node has a turn from now on."""
         return self._turn(max(now_ns + self._lead_ns, self._free_ns)) is not None
 
     def __len__(self) -> int:

@@ -53,7 +53,6 @@ def schedule_bytes(scenario: Scenario) -> int:
 
 
 def superframe(scenario: Scenario, *, origin_ns: int = 0, period_ns: int | None = None, together: int = 1) -> Turns:
-    """The superframe of a scenario if each turn holds `together` packets."""
     turn = turn_ns(scenario, payload_bytes=largest_frame(scenario, together=together))
     whole_ns = scenario.clusters.period_ns if period_ns is None else period_ns
     contention_ns = round(scenario.clusters.contention_ms * MS)
@@ -61,7 +60,6 @@ def superframe(scenario: Scenario, *, origin_ns: int = 0, period_ns: int | None 
 
 
 def links(scenario: Scenario, turns: Turns) -> Geometry:
-    """The geometry for which a timetable of this scenario is computed."""
     clusters, radio = scenario.clusters, scenario.radio
     wait_ns = radio.lead_ns + radio.handover_ns
     return Geometry(

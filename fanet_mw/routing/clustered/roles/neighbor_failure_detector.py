@@ -6,7 +6,7 @@
 
 A neighbor that has flown away objects, too, and is not reported again until a hello of it is heard. Without an
 objection it is reported again every 10 s for a minute, while no packets of it arrive; a node floods at most one report
-in 5 s.
+in 5 s. Who has received nothing from all of its neighbors for so long is deaf or alone, and reports nobody.
 """
 
 from collections.abc import Callable
@@ -43,10 +43,19 @@ class NeighborFailureDetector:
         if node in self._heard_ns:
             self._reported_ns[node] = now_ns
 
+    def hears_nobody(self, now_ns: int) -> bool:
+        """True if each neighbor is silent."""
+        return all(
+            now_ns - max(heard_ns, self._liveness.last_ns(node) or 0) >= self._silent_ns
+            for node, heard_ns in self._heard_ns.items()
+        )
+
     def find_suspect(self, lists: Callable[[NodeId], bool], *, now_ns: int) -> NodeId | None:
         """The neighbor to report now, of several the one not reported for longest, or None. `lists` tells whether the
         schedule names a node; neighbors that no longer count are forgotten.
         """
+        if len(self._heard_ns) > 1 and self.hears_nobody(now_ns):
+            return None
         for node in sorted(self._heard_ns, key=lambda node: (self._reported_ns.get(node, 0), node)):
             quiet_ns = now_ns - self._heard_ns[node]
             if quiet_ns < self._silent_ns:

@@ -76,6 +76,17 @@ def test_of_several_that_fell_silent_each_is_reported_five_seconds_after_the_one
         detector.on_hello(node, now_ns=10 * S)
         liveness.on_sign_of_life(node, born_ns=10 * S)
     for at_s, node in zip((14, 19, 24, 29), (*silent, OTHER), strict=True):
+        detector.on_hello(NodeId(10), now_ns=at_s * S - 1)
         assert detector.find_suspect(everyone, now_ns=at_s * S - 1) is None
         assert detector.find_suspect(everyone, now_ns=at_s * S) == node
         detector.on_report(node, now_ns=at_s * S)
+
+
+def test_who_hears_nobody_any_more_is_deaf_or_alone_and_reports_nobody(
+    detector: NeighborFailureDetector, liveness: Liveness
+) -> None:
+    detector.on_hello(NodeId(8), now_ns=10 * S)
+    assert all(detector.find_suspect(everyone, now_ns=second * S) is None for second in range(11, 70))
+    liveness.on_sign_of_life(NodeId(8), born_ns=70 * S)
+    detector.on_hello(OTHER, now_ns=66 * S)
+    assert detector.find_suspect(everyone, now_ns=70 * S) == OTHER, "whoever hears somebody can tell who is silent"

@@ -1,7 +1,8 @@
 """Handles the phones that a UAV's own receiver detects: each power goes into the phone's filter, and out as a report.
 
 A receiver that detects no phone says nothing. If no scan has come for a while, a scan without phones is assumed. A
-neighbor that does not report a phone does not receive it where it flies, which tells as much.
+neighbor that does not report a phone does not receive it where it flies, which tells as much. So do the places where
+this UAV and its neighbors were before anybody received the phone: it is ahead of a line that has passed, not behind.
 """
 
 from collections.abc import Sequence
@@ -13,7 +14,7 @@ from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox, ReportFormat
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Detected
-from fanet_mw.units import US, NodeId, S, seconds_to_ns
+from fanet_mw.units import US, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.survivors import Survivor
 
 MISSED_SCANS: Final = 1.5
@@ -26,6 +27,10 @@ _NEAR_M: Final = 450.0
 """Phones that are farther away than this concern others."""
 _ENOUGH: Final = 12
 """A phone that was received so often is placed by its powers."""
+_REMEMBERED_NS: Final = 60 * S
+"""How long it is remembered where somebody has listened: a phone may have been switched on since."""
+_LISTENED_M: Final = 50.0
+"""The side of the cells in each of which one place is remembered; nearer places share their shadowing."""
 
 
 class PhoneReception:
@@ -49,6 +54,10 @@ class PhoneReception:
         self._report_every_ns = seconds_to_ns(scenario.mission.report_interval_s)
         self._scan_ns = 0
         self._reported_ns: dict[int, int] = {}
+        self._listened: dict[tuple[int, int], tuple[int, Enu]] = {}
+        """The newest place in each cell where this UAV or a neighbor has listened, and when."""
+        self._recalled: set[int] = set()
+        """The survivors whose filters know where somebody listened before they were received."""
 
     def review(self, now_ns: int) -> None:
         """If there was no scan for a while, assume one without phones at the present place."""
@@ -57,6 +66,29 @@ class PhoneReception:
         if now_ns - self._others_ns >= _OTHERS_NS:
             self._others_ns = now_ns
             self._note_silent_neighbors(now_ns)
+            self._note_listeners(now_ns)
+        for survivor in self._survivors.sought():
+            if survivor not in self._recalled:
+                self._recall(survivor)
+
+    def _note_listeners(self, now_ns: int) -> None:
+        """Remember where this UAV and its neighbors are."""
+        neighbors = (motion.position for motion in self._neighbors.all(now_ns=now_ns))
+        for at in (self._own_motion.position, *neighbors):
+            self._listened[round(at.east / _LISTENED_M), round(at.north / _LISTENED_M)] = now_ns, at
+        old = [cell for cell, (then_ns, _) in self._listened.items() if now_ns - then_ns > _REMEMBERED_NS]
+        for cell in old:
+            del self._listened[cell]
+
+    def _recall(self, survivor: int) -> None:
+        """Take in that a phone was not received at the places where somebody has listened before."""
+        known = self._survivors.by_id[survivor]
+        if not known.filter.received_powers:
+            return
+        self._recalled.add(survivor)
+        for then_ns, at in list(self._listened.values()):
+            if known.first_ns - then_ns >= _OTHERS_NS and known.filter.near(at, within_m=_NEAR_M):
+                known.filter.on_silence(at)
 
     def _note_silent_neighbors(self, now_ns: int) -> None:
         """Take in that neighbors do not receive phones that are hardly placed yet."""

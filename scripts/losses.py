@@ -282,9 +282,10 @@ def outcome(flight: Flight) -> dict[str, Any]:
     """What a flight that has come to its end has achieved."""
     summary = flight.summary()
     mission, reached = summary["mission"], summary["reachable"]
+    told = reached.get("report", next(iter(reached.values()), {"pdr": None}))
     return {
         "found": mission["confirmed"], "of": mission["survivors"], "covered": mission["coverage"],
-        "pdr": reached.get("report", next(iter(reached.values())))["pdr"], "contacts": mission["collisions"],
+        "pdr": told["pdr"], "contacts": mission["collisions"],
         "last_find_s": max(mission["time_to_confirm_s"], default=None), "covered_95_s": mission["covered_95_s"],
         "nearest_m": mission["nearest_m"]["least"],
     }  # fmt: skip

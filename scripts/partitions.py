@@ -5,6 +5,7 @@ At each drawn instant the process forks, and the copy flies on for 45 s. One JSO
 
     parts    the sizes of the parts while the air is parted, and how many planners each has 3, 5, 10 and 19 s later
     crossed  how many have flown over the line within the 3 s before that: their new part hardly knows them yet
+    wrong    all stretches, from when until when after the cut, in which some part had no planner or several [s]
     merged   the same 1, 2, 3, 5 and 8 s after the air is whole again: who has closed ranks may be out of reach still
     unknown  to how many a find that anybody knew then is unknown: just before, and 1, 2, 3, 5 and 8 s after
     least_m  the least distance of two UAVs from the cut on
@@ -42,6 +43,8 @@ _FROM_S: Final = 60.0
 _UNTIL: Final = 0.75
 _FAR_M: Final = 2000.0
 _ASIDE_M: Final = 500.0
+_LOOKS_S: Final = 0.5
+_SHOWN_S: Final = (3, 5, 10, 19)
 
 
 class Parted(Flight):
@@ -100,11 +103,19 @@ class Parted(Flight):
 def judged(flight: Parted, at_s: float, angle: float, off_m: float) -> dict[str, Any]:
     """Fly on with the air parted, and what became of the swarm."""
     flight.part(angle, off_m)
-    planners, crossed = {}, {}
-    for after_s in (3, 5, 10, 19):
+    planners, crossed, wrong = {}, {}, list[list[float]]()
+    for step in range(1, round(_FOR_S / _LOOKS_S) + 1):
+        after_s = step * _LOOKS_S
         flight.host.run(round((at_s + after_s) * S))
-        planners[after_s], crossed[after_s] = flight.planners(cut=True), flight.crossed()
-    flight.host.run(round((at_s + _FOR_S) * S))
+        now = flight.planners(cut=True)
+        if after_s in _SHOWN_S:
+            planners[round(after_s)], crossed[round(after_s)] = now, flight.crossed()
+        if all(leads == 1 for _, leads in now):
+            continue
+        if wrong and wrong[-1][1] == after_s - _LOOKS_S:
+            wrong[-1][1] = after_s
+        else:
+            wrong.append([after_s - _LOOKS_S, after_s])
     known = flight.finds()
     everything = set[int]().union(*known.values())
     merged, unknown = {}, {0: sum(known[node] != everything for node in known)}
@@ -115,8 +126,8 @@ def judged(flight: Parted, at_s: float, angle: float, off_m: float) -> dict[str,
     flight.host.run(round((at_s + 45) * S))
     return {
         "scenario": flight.scenario.name, "seed": flight.scenario.seed, "at_s": at_s, "angle": round(angle, 2),
-        "off_m": round(off_m), "parts": planners, "crossed": crossed, "merged": merged, "unknown": unknown,
-        "least_m": flight.least_m(round(at_s * S)),
+        "off_m": round(off_m), "parts": planners, "crossed": crossed, "wrong": wrong, "merged": merged,
+        "unknown": unknown, "least_m": flight.least_m(round(at_s * S)),
     }  # fmt: skip
 
 

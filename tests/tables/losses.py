@@ -14,6 +14,7 @@ _AGAIN_S: Final = 3.0
 _WORDS: Final = {0: "none", 1: "one", 2: "two", 3: "three", 4: "four", 5: "five"}
 _CURVE_FROM: Final = 6
 """So many losses one after the other are a line of the curve."""
+_PLANNED_S: Final = 3.0
 _STEP: Final = 2
 """So many losses lie between two rows of it."""
 Copy = dict[str, Any]
@@ -126,19 +127,17 @@ def partitions() -> Rows:
     """What a partition of the air does, from the lines that `scripts/partitions.py` has printed."""
     found = _lines("partitions")
     head = [
-        "times (flights)", "one planner in each part after 3 s", "after 10 s", "one for all 3 s after the air is whole",
-        "who found what is known to all by then", "least distance [m]",
+        "times (flights)", "one planner in each part after 3 s", "later, until again so: median / worst [s]",
+        "one for all 3 s after the air is whole", "who found what is known to all by then", "least distance [m]",
     ]  # fmt: skip
-
-    def planned(after_s: str) -> str:
-        return f"{sum(all(planners == 1 for _, planners in one['parts'][after_s]) for one in found)}"
-
+    planned = sum(all(planners == 1 for _, planners in one["parts"]["3"]) for one in found)
+    later_s = [until_s - from_s for one in found for from_s, until_s in one["wrong"] if from_s >= _PLANNED_S]
     return [
         head,
         [
             f"{len(found)} ({len({one['seed'] for one in found})})",
-            planned("3"),
-            planned("10"),
+            f"{planned}",
+            f"{statistics.median(later_s):.1f} / {max(later_s):.1f}",
             f"{sum(_has_one_planner(one['merged']['3']) for one in found)}",
             f"{sum(not one['unknown']['3'] for one in found)}",
             f"{min(one['least_m'] for one in found)}",

@@ -43,8 +43,8 @@ def test_a_neighbor_that_reports_nothing_tells_where_a_phone_is_not() -> None:
 
 
 def received_after(passed: Sequence[Enu], *, beside: bool = False, since_s: int = 0) -> Enu:
-    """Where a phone is placed that this UAV receives once at the middle, `since_s` after it, or only a neighbor `beside`
-    its way, has passed some places without receiving it.
+    """Where a phone is placed that this UAV receives once at the middle, `since_s` after it, or only a neighbor
+    `beside` its way, has passed some places without receiving it.
     """
     survivors, neighbors = KnownSurvivors(MODEL), NeighborMotions()
     motion = OwnMotion(Enu(0, 0, UP_M), KnownObstacles(NO_MAP))

@@ -1,8 +1,7 @@
 """`fanet keys`: makes certificates for all participants of a swarm, and the router's access list.
 
-Each participant gets one Zenoh configuration file with its certificate, its private key and the authority's
-certificate, which can be carried to its machine. The authority's own key is made in a temporary folder and not kept. So
-nobody can make another certificate for the swarm; whoever needs one makes new keys for all.
+Each participant gets one Zenoh configuration file, which can be carried to its machine. The authority's own key is made
+in a temporary folder and not kept, so whoever needs another certificate makes new keys for all.
 """
 
 import base64

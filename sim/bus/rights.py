@@ -17,7 +17,7 @@ from typing import Any, Final, NamedTuple
 
 from fanet_mw.bus.topics import ROOT, Topics
 from fanet_mw.scenario import Scenario
-from sim.bus.air_control import OPERATOR
+from sim.bus.operator_commands import OPERATOR
 
 GATEWAY: Final = "gateway"
 ROUTER: Final = "router"

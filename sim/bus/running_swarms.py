@@ -1,8 +1,7 @@
 """The swarms that run on this machine, each in a file, so that a command finds a swarm with a random port.
 
 The files are in a folder of this user: `$XDG_RUNTIME_DIR/fanet-mw`, or `fanet-mw-UID` in the folder for temporary
-files. A process that serves or uses a router writes a file and removes it at its end. A file whose process is gone is
-removed by the next reader.
+files. One whose process is gone is removed by the next reader.
 """
 
 import json

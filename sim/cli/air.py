@@ -1,4 +1,4 @@
-"""The `fanet air` commands: parsing and printing; what they do is in `sim.bus.air_control`."""
+"""The `fanet air` commands: parsing and printing; what they do is in `sim.bus.operator_commands`."""
 
 import math
 from dataclasses import dataclass
@@ -194,7 +194,7 @@ def restore(label: str = "", *, where: SwarmFlags = SwarmFlags()) -> int:
 
 
 def _do(control: Control, where: SwarmFlags) -> int:
-    from sim.bus.air_control import change
+    from sim.bus.operator_commands import change
 
     if not isinstance(control, Restore) and (why := wrong(control, count=MAX_NODES)):
         kind, what = type(control).__name__.lower(), why.removeprefix("fault_").replace("_", " ")

@@ -17,7 +17,6 @@ from fanet_mw.hosts import interrupts
 from sim.cli import (
     air,
     figures,
-    gateway,
     inspect,
     log,
     order,
@@ -28,7 +27,6 @@ from sim.cli import (
     swarms,
     sweep,
     tool_files,
-    view,
 )
 from sim.cli.command_groups import OPTIONS, RUN, RUNNING, SCENARIO, SERVICE, STUDY, TOOLS
 from sim.cli.memory import require_for
@@ -51,7 +49,7 @@ for group, commands in (
     (RUN, (runs.simulate, runs.launch, runs.plan, replay.replay)),
     (SERVICE, (single_services.router, single_services.emulator, single_services.world, single_services.agent)),
     (SERVICE, (single_services.autopilots,)),
-    (RUNNING, (log.record, swarms.links, swarms.swarms, gateway.gateway, view.view, view.top, inspect.inspect)),
+    (RUNNING, (log.record, swarms.links, swarms.swarms, swarms.gateway, swarms.view, swarms.top, inspect.inspect)),
     (TOOLS, (tool_files.keys, tool_files.dialect, tool_files.dissector)),
 ):
     for command in commands:

@@ -16,7 +16,7 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.units import S
-from sim.bus.air_control import OPERATOR, find_swarm
+from sim.bus.operator_commands import OPERATOR, find_swarm
 
 _LOOK_S: Final = 0.5
 """The interval at which the router is checked while nothing arrives."""

@@ -1,10 +1,10 @@
 """`fanet record` and `fanet log`: recordings of swarms, and what is in the folder of a run, for other tools."""
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import App, Parameter
 from rich.table import Table
@@ -17,6 +17,10 @@ from sim.console import Console
 if TYPE_CHECKING:
     from sim.results.result import Result
 
+_TARGETS: Final = {
+    "parquet": "tables", "csv": "tables", "mcap": "recording.mcap", "gpx": "tracks", "kml": "tracks.kml",
+}  # fmt: skip
+"""The formats of `fanet log export`, and where each is written in the folder of the run."""
 app = App(name="log", group=TOOLS, help="What the folder or the recording of a run holds, and its export.")
 
 
@@ -89,16 +93,15 @@ def export(
     """
     from sim.results.stored_result import load_result
 
-    if to not in FORMATS:
-        raise ConfigError(f"--to {to}: must be one of {', '.join(FORMATS)}")
-    target, write = FORMATS[to]
-    path = out or folder / target
+    if to not in _TARGETS:
+        raise ConfigError(f"--to {to}: must be one of {', '.join(_TARGETS)}")
+    path = out or folder / _TARGETS[to]
     if out is None and path.is_symlink():
         raise ConfigError(f"{path}: is a link, which might lead anywhere; name a place by --out")
     if path.exists() and not force and (path.is_file() or any(path.glob(f"*.{to}"))):
         raise ConfigError(f"{path}: exists; choose another --out, or replace it with --force")
     console = Console(highlight=False, soft_wrap=True)
-    for written, what in write(load_result(folder), folder, path).items():
+    for written, what in _written(to, load_result(folder), folder, path).items():
         console.print(f"{written}: {what}")
     return 0
 
@@ -110,41 +113,19 @@ def layout() -> int:
     return 0
 
 
-def _parquet(run: "Result", folder: Path, out: Path) -> Mapping[Path, str]:
-    from sim.recording.tables import write_parquet
+def _written(to: str, run: "Result", folder: Path, out: Path) -> Mapping[Path, str]:
+    """Write a run in one of the formats; returns how much each file has."""
+    counts: Mapping[Path, int]
+    if to in ("parquet", "csv"):
+        from sim.recording.tables import write_csv, write_parquet
 
-    return {path: f"{count:,} rows" for path, count in write_parquet(run.outcome, folder, out).items()}
+        counts, what = (write_csv if to == "csv" else write_parquet)(run.outcome, folder, out), "rows"
+    elif to == "mcap":
+        from sim.recording.from_result import write_mcap
 
+        counts, what = {out: write_mcap(run.outcome, out)}, "messages"
+    else:
+        from sim.recording.tracks import write_gpx, write_kml
 
-def _csv(run: "Result", folder: Path, out: Path) -> Mapping[Path, str]:
-    from sim.recording.tables import write_csv
-
-    return {path: f"{count:,} rows" for path, count in write_csv(run.outcome, folder, out).items()}
-
-
-def _mcap(run: "Result", _: Path, out: Path) -> Mapping[Path, str]:
-    from sim.recording.from_result import write_mcap
-
-    return {out: f"{write_mcap(run.outcome, out):,} messages"}
-
-
-def _gpx(run: "Result", _: Path, out: Path) -> Mapping[Path, str]:
-    from sim.recording.tracks import write_gpx
-
-    return {path: f"{count:,} points" for path, count in write_gpx(run.outcome, out).items()}
-
-
-def _kml(run: "Result", _: Path, out: Path) -> Mapping[Path, str]:
-    from sim.recording.tracks import write_kml
-
-    return {out: f"{write_kml(run.outcome, out):,} points"}
-
-
-FORMATS: Final[dict[str, tuple[str, Callable[["Result", Path, Path], Mapping[Path, Any]]]]] = {
-    "parquet": ("tables", _parquet),
-    "csv": ("tables", _csv),
-    "mcap": ("recording.mcap", _mcap),
-    "gpx": ("tracks", _gpx),
-    "kml": ("tracks.kml", _kml),
-}
-"""The formats of `fanet log export`: where each is written in the folder of the run, and by what."""
+        counts, what = write_gpx(run.outcome, out) if to == "gpx" else {out: write_kml(run.outcome, out)}, "points"
+    return {path: f"{count:,} {what}" for path, count in counts.items()}

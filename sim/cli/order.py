@@ -1,4 +1,4 @@
-"""The `fanet order` commands: parsing and printing; what they do is in `sim.bus.operator_orders`."""
+"""The `fanet order` commands: parsing and printing; what they do is in `sim.bus.operator_commands`."""
 
 from cyclopts import App
 
@@ -86,7 +86,7 @@ def no_fly(east_m: float, north_m: float, radius_m: float, *, where: SwarmFlags 
 
 
 def _give(order: Order, where: SwarmFlags) -> int:
-    from sim.bus.operator_orders import give
+    from sim.bus.operator_commands import give
 
     name = order.kind.name.lower().replace("_", "-")
     if (why := wrong(order, uavs=MAX_NODES)) is not None:

@@ -13,8 +13,7 @@ from typing import Final
 from emulator.pcap_file import NAME as CAPTURE
 from emulator.pcap_file import captures
 from fanet_mw.errors import ConfigError
-from sim.report import names
-from sim.results.file_names import RESERVED, RUN_FILES
+from sim.results.file_names import PAGES, PICTURES, RESERVED, RUN_FILES, pictures
 
 _MOST_SAID: Final = 8
 
@@ -25,8 +24,8 @@ def prepare(out: Path, *, force: bool) -> None:
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=out) as file:
             file.write(b"a run would be lost")
-        named = (out / name for name in (*RUN_FILES, *names.PAGES, *RESERVED))
-        used = [path for path in (*named, *captures(out / CAPTURE), *names.pictures(out)) if os.path.lexists(path)]
+        named = (out / name for name in (*RUN_FILES, *PAGES, *RESERVED))
+        used = [path for path in (*named, *captures(out / CAPTURE), *pictures(out)) if os.path.lexists(path)]
         if used and not force:
             raise ConfigError(
                 f"--out {out}: holds the result of another run ({_said(used)}); "
@@ -35,7 +34,7 @@ def prepare(out: Path, *, force: bool) -> None:
         for path in used:
             path.unlink()
         with contextlib.suppress(OSError):  # the file is missing, or belongs to another program
-            (out / names.PICTURES).rmdir()
+            (out / PICTURES).rmdir()
     except OSError as error:
         raise ConfigError(f"--out {out}: cannot be written: {error.strerror}") from error
 

@@ -22,6 +22,8 @@ from sim.cli.options import DoorFlags, OutputFlags, ScenarioFlags, print_notes, 
 from sim.console import Console
 
 if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
     from fanet_mw.scenario import Scenario
     from sim.observation.observer import Observer
     from sim.recording.mcap_recording import McapRecording
@@ -186,15 +188,14 @@ def plan(
     return show(choice.scenario(scenario), deadline=deadline, as_json=json)
 
 
-@contextmanager
-def _recording(scenario: "Scenario", path: Path | None, *, epoch_unix_ns: int) -> "Iterator[McapRecording | None]":
+def _recording(
+    scenario: "Scenario", path: Path | None, *, epoch_unix_ns: int
+) -> "AbstractContextManager[McapRecording | None]":
     if path is None:
-        yield None
-        return
+        return nullcontext()
     from sim.recording.mcap_recording import McapRecording
 
-    with McapRecording(path, scenario, epoch_unix_ns=epoch_unix_ns) as recording:
-        yield recording
+    return McapRecording(path, scenario, epoch_unix_ns=epoch_unix_ns)
 
 
 def _together(*observers: "Observer | None") -> "Observer | None":

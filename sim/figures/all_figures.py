@@ -4,20 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from fanet_mw.errors import ConfigError
-from sim.figures import (
-    ablation,
-    age,
-    clocks,
-    figure8,
-    figure9,
-    figure10,
-    figure11,
-    figure12,
-    load,
-    realtime,
-    rescue,
-    size,
-)
+from sim.figures import ablation, beyond_paper, figure8, figure9, figure10, figure11, figure12, realtime, rescue
 from sim.figures.recipe import Recipe
 
 FIGURES: Final[Mapping[str, Recipe]] = {
@@ -26,10 +13,10 @@ FIGURES: Final[Mapping[str, Recipe]] = {
     "10": figure10.FIGURE,
     "11": figure11.FIGURE,
     "12": figure12.FIGURE,
-    "load": load.FIGURE,
-    "size": size.FIGURE,
-    "clocks": clocks.FIGURE,
-    "age": age.FIGURE,
+    "load": beyond_paper.LOAD,
+    "size": beyond_paper.SIZE,
+    "clocks": beyond_paper.CLOCKS,
+    "age": beyond_paper.AGE,
     "ablation": ablation.FIGURE,
     "reports": rescue.REPORTS,
     "mission": rescue.MISSION,

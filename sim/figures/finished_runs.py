@@ -1,8 +1,7 @@
 """The finished runs of a sweep, looked up by case and settings, and functions that combine their values seed by seed.
 
-A sweep runs the same scenario with several seeds, and each case of it with the same seeds. A dictionary from seed to
-value, ascending by seed, holds one quantity of such runs. Values are always combined within a seed, because runs of one
-seed have random numbers in common and are not independent of each other; seeds are.
+A dictionary from seed to value, ascending, holds one quantity. Runs of one seed have random numbers in common, so
+values are always combined within a seed.
 """
 
 from collections.abc import Callable, Mapping, Sequence

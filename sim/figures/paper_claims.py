@@ -1,12 +1,9 @@
 """The claims of the paper about a figure, and verdicts on them; both are code over the table of a sweep.
 
-A claim consists of statements. A statement is a quantity with one value per seed, and the side of a threshold on which
-the claim expects it. It holds if the whole 95 % interval of the mean is on that side, fails if the whole interval is on
-the other side, and is open if the threshold lies within. A claim agrees if all its statements hold, differs if all
-fail, and is otherwise partly so.
-
-A reason explains a verdict, and is judged in the same way: it has statements over the same runs, an experiment that
-would come out differently if the reason were wrong. It counts as shown if all of them hold.
+A claim consists of statements: a quantity with one value per seed, and the side of a threshold on which it is expected.
+One holds if the whole 95 % interval of the mean is on that side, fails if it is wholly on the other, and is else open.
+A claim agrees if all hold, differs if all fail, and is otherwise partly so. A reason is an experiment over the same
+runs that would come out differently if it were wrong; it counts as shown if all its statements hold.
 """
 
 from collections.abc import Mapping, Sequence

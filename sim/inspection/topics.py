@@ -21,7 +21,7 @@ from fanet_mw.bus.topics import ROOT, Topics
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.mavlink import decode
-from sim.bus.air_control import OPERATOR, find_swarm
+from sim.bus.operator_commands import OPERATOR, find_swarm
 from sim.console import Console
 
 _LOOK_S: Final = 0.5

@@ -3,8 +3,7 @@
     bus threads   each put is kept, as bytes, in a bounded queue; a full one loses the oldest, which is counted
     `pump`        decodes and checks what has come, on the caller's thread, and hands it to the observer
 
-It asks the keeper of the clock for the scenario and the clock, so it may come at any time, and sees a swarm from then
-on. What roles UAVs took before it came it learns from their reports.
+What roles UAVs took before it came it learns from their reports.
 """
 
 import time
@@ -23,7 +22,7 @@ from fanet_mw.hosts.clock import SwarmClock
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.scenario.fingerprint import told_by
 from fanet_mw.trace import Record
-from sim.bus.air_control import OPERATOR, find_swarm, first_answer
+from sim.bus.operator_commands import OPERATOR, find_swarm, first_answer
 from sim.observation.observer import Observer
 from sim.observation.turns import MOST_SPANS
 from sim.records.bus_checks import BusChecks

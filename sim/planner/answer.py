@@ -24,7 +24,7 @@ from fanet_mw.wire.places import rounded
 from sim.planner import flood_loss
 from sim.planner.cheapest_change import ScenarioChange, cheapest_change
 from sim.planner.demand import ClassPlan, demands
-from sim.planner.expected_links import expected_links
+from sim.planner.expected_links import chance_of, expected_links
 from sim.planner.lossy_plan import LossyPlan, plan_lossy
 from sim.planner.not_counted import not_counted, outdated
 from sim.planner.plan import plan, with_capacity
@@ -37,7 +37,6 @@ from sim.planner.plan_text import (
     describe_operator,
     item,
 )
-from sim.planner.reception_probability import chance_of
 from sim.planner.rounds_plan import judge_rounds
 from sim.planner.scenario_plan import ScenarioPlan
 from sim.world.environment.layout import positions
@@ -192,9 +191,7 @@ def _with_loss(found: ScenarioPlan, at: Mapping[NodeId, Enu]) -> tuple[ScenarioP
 
 
 def _delivers_m(scenario: Scenario, at: Mapping[NodeId, Enu]) -> float | None:
-    """The distance up to which the channel delivers frames to all that are as near; None if not even to the nearest, or
-    if all are within `radio.range_m`.
-    """
+    """The distance up to which the channel delivers frames; None if to nobody, or if all are in `radio.range_m`."""
     chance = chance_of(scenario, at)
     if chance is None or scenario.radio.channel == "range":
         return None

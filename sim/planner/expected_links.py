@@ -1,13 +1,13 @@
-"""The expected quality of each link before take-off, by the emulator's channel model: power, and share of received
-frames.
+"""What the emulator's channel model says before take-off: the quality of each link, and the chance of single frames.
 
     mean power (path loss; shadowing of another seed than the run's) -> gains of fading -> mean success of a frame
 
-The frames are those of the application, and no other node transmits, as in turns. Obstacles are not considered.
+The frames are those of the application. For the quality no other node transmits, and there are no obstacles.
 """
 
 import math
 from collections.abc import Mapping
+from functools import cache
 from typing import Final
 
 from fanet_mw.airtime import OVERHEAD_BYTES, Timing
@@ -17,6 +17,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.radio import Radio
 from fanet_mw.units import Enu, NodeId
 from fanet_mw.wire.links import Link, grade_of, power_of
+from sim.planner.flood_loss import Chance
 
 _GAINS: Final = 400
 _LEAST: Final = 0.02
@@ -74,3 +75,56 @@ def _gains(radio: Radio) -> list[float]:
         direct, sigma = math.sqrt(k / (k + 1)), math.sqrt(0.5 / (k + 1))
         return [(direct + random.gauss(0.0, sigma)) ** 2 + random.gauss(0.0, sigma) ** 2 + 1e-12 for _ in range(_GAINS)]
     return [1.0]
+
+
+def chance_of(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance | None:
+    """The `Chance` of the application's frames; interference lasts for the whole frame, the worst case. None with
+    obstacles, with shadowing, whose losses are not independent from frame to frame, and with fading.
+    """
+    radio = scenario.radio
+    if radio.fading != "none" or radio.shadowing_db > 0 or scenario.world.has_obstacles:
+        return None
+    if radio.channel == "range":
+        return lambda sender, receiver, others: _clear(at, receiver, (sender, *others), radio.range_m)
+    return _by_error_rate(scenario, at)
+
+
+def _by_error_rate(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance:
+    """The error rates at the signal to interference and noise ratio; numpy is imported for these channels only."""
+    import numpy as np
+
+    from emulator.channel.error_rate import header_rates, log_success_per_bit
+    from emulator.channel.link_budget import milliwatt, noise_mw, received_dbm
+    from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
+
+    radio = scenario.radio
+    header_rate, bits_per_ns = header_rates(radio.rate_mbps)
+    tables = log_success_per_bit(header_rate), log_success_per_bit(radio.rate_mbps)
+    bits = Timing.of(radio).header_ns * bits_per_ns, 8 * (scenario.traffic.payload_bytes + OVERHEAD_BYTES)
+    noise = noise_mw(radio)
+
+    @cache
+    def power_dbm(sender: NodeId, receiver: NodeId) -> float:
+        from_m, to_m = (np.array([tuple(at[node])]) for node in (sender, receiver))
+        distance = np.array([at[sender].minus(at[receiver]).norm()])
+        return float(received_dbm(distance, from_m, to_m, radio)[0])
+
+    @cache
+    def chance(sender: NodeId, receiver: NodeId, others: tuple[NodeId, ...]) -> float:
+        wanted_dbm = power_dbm(sender, receiver)
+        interference = math.fsum(milliwatt(power_dbm(other, receiver)) for other in others if other != receiver)
+        sinr_db = wanted_dbm - 10 * math.log10(noise + interference)
+        if wanted_dbm < radio.sensitivity_dbm or sinr_db < radio.preamble_snr_db or receiver in others:
+            return 0.0
+        row = int((sinr_db - ERROR_FLOOR_DB) * ERROR_STEPS_PER_DB)
+        return math.exp(
+            sum(count * float(table[min(row, len(table) - 1)]) for count, table in zip(bits, tables, strict=True))
+        )
+
+    return chance
+
+
+def _clear(at: Mapping[NodeId, Enu], receiver: NodeId, senders: tuple[NodeId, ...], range_m: float) -> float:
+    """1 if exactly one sender is within range of the receiver, which does not send itself."""
+    heard = sum(at[receiver].minus(at[sender]).norm() <= range_m for sender in senders)
+    return float(heard == 1 and receiver not in senders)

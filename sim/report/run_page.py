@@ -14,8 +14,8 @@ from fanet_mw.whole_file import require_folder
 from sim.figures.style import applied, save
 from sim.report import air_pictures, finds, mission_pictures, run_pictures, run_rows, slot_pictures
 from sim.report.html import Block, Commands, Heading, Picture, Quoted, Text
-from sim.report.names import KINDS, PICTURES
 from sim.report.run_records import SHOWN, RunRecords
+from sim.results.file_names import KINDS, PICTURES
 from sim.results.printed_summary import clock_sentence
 from sim.results.run_folder import RunFolder
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Final
 from fanet_mw.errors import ConfigError
 from fanet_mw.foreign_file import open_regular
 from sim.results.file_names import SUMMARY_FILE
-from sim.results.flat_summary import flat
 from sim.results.run_folder import RunFolder
 
 if TYPE_CHECKING:
     from pyarrow import Table
+from collections.abc import Mapping
 
 _SWEEP: Final = "runs.parquet"
 _MOST_BYTES: Final = 1 << 31
@@ -72,3 +72,24 @@ def _row(folder: Path) -> dict[str, Any]:
     scenario = run.scenario.model_dump(mode="json", exclude_none=True)
     row: dict[str, Any] = {"seed": scenario["seed"], "status": "ok", **flat(run.summary)}
     return {**row, "scenario": json.dumps(scenario), "summary": run.text.decode()}
+
+
+Cell = float | bool | str | list[float] | None
+
+
+def flat(summary: Mapping[str, Any], prefix: str = "") -> dict[str, Cell]:
+    """All numbers, truth values, texts and lists of numbers of a summary, under their dotted names."""
+    row: dict[str, Cell] = {}
+    for key, value in summary.items():
+        name = f"{prefix}{key}"
+        match value:
+            case Mapping():
+                row.update(flat(value, f"{name}."))
+            case list():
+                if value and all(isinstance(item, int | float) for item in value):
+                    row[name] = [float(item) for item in value]
+            case bool() | str() | None:
+                row[name] = value
+            case int() | float():
+                row[name] = float(value)
+    return row

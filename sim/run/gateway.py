@@ -10,7 +10,7 @@ from fanet_mw.errors import BusError
 from fanet_mw.gateway.gateway import Doors, serve
 from fanet_mw.hosts import interrupts
 from fanet_mw.hosts.bus import Bus, config_of
-from sim.bus.air_control import find_swarm
+from sim.bus.operator_commands import find_swarm
 
 GATEWAY: Final = "gateway"
 """The name of its process, and of its certificate."""

@@ -3,9 +3,7 @@
     DIR/finished/*.parquet   one row per finished run, under its key; each file is written whole, then renamed
     DIR/runs.parquet         the table for people: a row per run of the sweep, in its order, with settings and figures
 
-The key of a run is computed from its resolved scenario. If a sweep is extended, or another sweep uses the same folder,
-finished runs are therefore found and not repeated. `runs.parquet` has nothing that depends on the machine or on the
-order of the runs: the same sweep with the same code gives the same table.
+The same sweep with the same code gives the same `runs.parquet`, whatever the machine and the order of the runs.
 """
 
 import contextlib

@@ -10,7 +10,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from sim.results.flat_summary import flat
+from sim.results.run_table import flat
 from sim.sweep.one_run import Finished
 from sim.sweep.tasks import Task
 from sim.sweep.toml_values import toml_value

@@ -43,9 +43,7 @@ def run(
     *,
     on_progress: Callable[[Progress], None] = lambda _: None,
 ) -> pa.Table:
-    """Carry out the remaining runs, the longest first and those in real time last; returns the table, which is written
-    however it ends.
-    """
+    """Carry out the remaining runs, the longest first, real time last; returns the table, written however it ends."""
     left = TimeLeft(plan, workers=workers.workers)
     todo = sorted(plan.todo, key=lambda task: -plan.sizes[task.key])
     waiting = {task.key for task in todo}

@@ -21,7 +21,7 @@ from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
 from fanet_mw.hosts.realtime import SwarmAddress, run_actor
 from fanet_mw.units import BROADCAST, MS, NodeId, S
-from sim.bus import air_control
+from sim.bus import operator_commands
 from sim.cli.app import app
 from sim.results.files import finish
 from sim.run.launcher.swarm import free_endpoint
@@ -77,11 +77,11 @@ async def test_a_node_is_cut_off_and_restored_by_command(capsys: pytest.CaptureF
 
 @pytest.mark.parametrize("control", [Cut("x", NodeId(99)), Restore("nothing")], ids=["no such node", "no such label"])
 async def test_what_the_emulator_refuses_is_said_and_counted(control: Control, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(air_control, "CONFIRM_TIMEOUT_S", 1.2)
+    monkeypatch.setattr(operator_commands, "CONFIRM_TIMEOUT_S", 1.2)
     reports: list[bytes] = []
     async with emulator("air-test", reports) as (endpoint, _):
         with pytest.raises(FanetError, match=r"did not confirm within 1\.2 s: refused"):
-            await asyncio.to_thread(air_control.change, endpoint, None, control)
+            await asyncio.to_thread(operator_commands.change, endpoint, None, control)
     (last,) = codecs.decode(reports[-1])
     assert isinstance(last, Report)
     assert sum(json.loads(last.json)["refused"].values()) == 1
@@ -91,11 +91,11 @@ async def test_without_a_swarm_or_with_two_the_command_asks_for_the_name() -> No
     endpoint = free_endpoint()
     with Bus.serve(endpoint) as bus:
         with pytest.raises(FanetError, match="no emulator of a swarm runs on this router"):
-            await asyncio.to_thread(air_control.change, endpoint, None, Restore(""))
+            await asyncio.to_thread(operator_commands.change, endpoint, None, Restore(""))
         for swarm in ("one", "two"):
             bus.announce(Topics(swarm).alive("emulator"))
         with pytest.raises(FanetError, match=r"2 swarms with an emulator on this router \(one, two\): say --swarm"):
-            await asyncio.to_thread(air_control.change, endpoint, None, Restore(""))
+            await asyncio.to_thread(operator_commands.change, endpoint, None, Restore(""))
 
 
 def test_a_scenarios_faults_are_the_same_in_every_run_of_a_seed() -> None:
@@ -141,5 +141,5 @@ async def test_a_node_that_the_swarm_does_not_have_is_named_at_once() -> None:
             keeper.answer(Topics("air-test").scenario, lambda: b'{"nodes": {"count": 9}}')
             began = time.monotonic()
             with pytest.raises(FanetError, match="node 99: the nodes of swarm air-test are 1 to 9"):
-                await asyncio.to_thread(air_control.change, endpoint, "air-test", Cut("x", NodeId(99)))
-            assert time.monotonic() - began < air_control.CONFIRM_TIMEOUT_S
+                await asyncio.to_thread(operator_commands.change, endpoint, "air-test", Cut("x", NodeId(99)))
+            assert time.monotonic() - began < operator_commands.CONFIRM_TIMEOUT_S

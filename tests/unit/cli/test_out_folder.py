@@ -11,8 +11,7 @@ from fanet_mw import tlog
 from fanet_mw.errors import ConfigError
 from sim.cli.app import app
 from sim.cli.out_folder import prepare
-from sim.report.names import PAGES
-from sim.results.file_names import RUN_FILES
+from sim.results.file_names import PAGES, RUN_FILES
 
 SHORT = ("--set", "duration_s=1", "--set", "warmup_s=0", "--set", "drain_s=0", "--json")
 

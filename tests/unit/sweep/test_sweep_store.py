@@ -14,7 +14,7 @@ import pytest
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.results import read
-from sim.results.flat_summary import flat
+from sim.results.run_table import flat
 from sim.sweep import spec
 from sim.sweep.one_run import Finished, carry_out
 from sim.sweep.provenance import code

@@ -1,7 +1,6 @@
-"""`fanet air`: changes the air of a running swarm, and confirms that the emulator has made the change.
+"""`fanet air` and `fanet order`: one message, and the wait until the trace of who obeys shows that it was done.
 
-A change is one message on `fanet/<swarm>/radio/control`. The emulator's trace shows that it was made. Silence means
-that it was refused (the emulator's report counts why), or that no emulator serves that swarm.
+Silence means that it was refused (the report of the emulator or the post counts why), or that nobody is there.
 """
 
 import queue
@@ -16,8 +15,9 @@ from fanet_mw.bus.radio_control import Control, Restore, nodes_of
 from fanet_mw.bus.topics import ROOT, Topics
 from fanet_mw.errors import FanetError, MalformedFrameError
 from fanet_mw.hosts.bus import Bus, config_of
+from fanet_mw.orders import Order
 from fanet_mw.scenario.fingerprint import told_by
-from fanet_mw.trace import RadioFault, Record
+from fanet_mw.trace import Ordered, RadioFault, Record
 
 OPERATOR: Final = "operator"
 """The name that access lists give to an operator's commands."""
@@ -76,9 +76,7 @@ def change(endpoint: str, swarm: str | None, control: Control, *, zenoh_config: 
 def put_and_watch(
     bus: Bus, topic: str, message: Message, trace: str, confirms: Callable[[Record], bool]
 ) -> list[Record]:
-    """Put a message; returns the records of the first part of a trace with some that confirm it, those that do; none if
-    no such part comes in time.
-    """
+    """Put a message; returns the first records of a trace that confirm it, none if none come in time."""
     parts: queue.SimpleQueue[list[Record]] = queue.SimpleQueue()
 
     def on_trace(_topic: str, payload: bytes) -> None:
@@ -113,3 +111,34 @@ def first_answer(bus: Bus, topic: str, *, timeout_s: float) -> bytes | None:
         return answers.get(timeout=timeout_s)
     except queue.Empty:
         return None
+
+
+_ALL: Final = "*"
+
+
+def give(endpoint: str, swarm: str | None, order: Order, *, zenoh_config: Path | None = None) -> Ordered:
+    """Give an order; returns what the post has recorded of it. Raises BusError without a router, else FanetError."""
+    with Bus.join(endpoint, config_of(zenoh_config, OPERATOR)) as bus:
+        names = Topics(swarm or find_swarm(bus))
+        tree = scenario_of_swarm(bus, names)
+        count = tree.get("nodes", {}).get("count")
+        if tree and not tree.get("ground", {}).get("at_m"):
+            raise FanetError(f"swarm {names.swarm} has no post on the ground: its scenario has no ground.at_m")
+        if isinstance(count, int) and order.node > count:
+            raise FanetError(f"node {order.node}: the UAVs of swarm {names.swarm} are 1 to {count}")
+
+        def confirms(record: Record) -> bool:
+            return (
+                isinstance(record, Ordered)
+                and record.order == order.kind.name.lower()
+                and order.node in (0, record.other)
+            )
+
+        trace = names.trace(_ALL if not isinstance(count, int) else f"agent-{count + 1}")
+        for record in put_and_watch(bus, names.orders, order, trace, confirms):
+            if isinstance(record, Ordered):
+                return record
+        raise FanetError(
+            f"the post did not give the order within {CONFIRM_TIMEOUT_S:g} s: refused (`orders_refused` in its "
+            f"report: no UAV that takes part has been heard), or no post on {names.orders}"
+        )

@@ -3,7 +3,9 @@ commands.
 """
 
 import os
+import tomllib
 from collections.abc import Mapping, Sequence
+from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, NamedTuple
 
@@ -23,114 +25,6 @@ _ORDER: Final = (
     "reports", "mission", "realtime",
 )  # fmt: skip
 _HEAD: Final = ("quantity", "the paper", "here", "why it differs")
-_TABLE_1: Final = Rows(
-    _HEAD,
-    (
-        ("channel", "Wi-Fi", "Wi-Fi, 250 m, sharp", "the paper says about 250 m in its text, and not how it ends"),
-        (
-            "application",
-            "on-off",
-            "constant rate, random phases",
-            "our choice: the paper gives no on and off times, and traffic.on_s and off_s would need some",
-        ),
-        ("traffic type", "UDP", "the same", ""),
-        (
-            "MAC protocol",
-            "802.11",
-            "the same; own kernel of 802.11 DCF, held against ns-3.44. Contention window 31 slots, that of DSSS; 1 for "
-            "fanet-mw's timetable in figure 11 and load (7 in age, clocks, ablation and realtime)",
-            "turns of a timetable need no random backoff; figure 11 and load have flooding with 1, too",
-        ),
-        ("packet size", "1024 B", "the same", ""),
-        ("data rate", "DSSS 11 Mb/s", "the same", ""),
-        ("topology size", "2500 x 2500 m", "the same", ""),
-        ("internode spacing", "200 m", "the same; 9 x 5 grid at first", ""),
-        (
-            "simulation time",
-            "100 s",
-            "27-90 s, of which warm-up and drain are not measured; 100 s: rescue-paper, the scenario, by itself",
-            "our choice, for the time of ten seeds: several hundred runs a figure",
-        ),
-        ("number of nodes", "45", "the same; to 1,000 in size", ""),
-        (
-            "node movement speed",
-            "5-10 m/s",
-            "1-20 m/s in figure 8; 7.5 m/s in figures 9 to 11, beside it at rest; 7.5 m/s, to a "
-            "survivor 5-10 m/s by UAV, in figure 12",
-            "a trend needs more than two speeds",
-        ),
-        ("number of survivors", "16", "the same", ""),
-        (
-            "number of clusters",
-            "2, 4, 22, 44",
-            "2, 8, 22, 44 in figure 10; 8 in figure 11; 4 in figure 12",
-            "the paper's figures have 8 where this table has 4",
-        ),
-        ("packet generation period", "0.1, 1 s", "the same", ""),
-        ("packet flooding period", "0.5, 1, 5 s", "the same", ""),
-    ),
-)
-_TABLE_2: Final = Rows(
-    _HEAD,
-    (
-        ("packet size", "app_1 1024 B, app_2 512 B", "the same", ""),
-        (
-            "packet generation interval",
-            "app_1 1 s; app_2 0.1, 0.5, 1 s",
-            "the same; app_1 from everyone to everyone, app_2 is the report of a phone that a UAV hears",
-            "who sends which is not said",
-        ),
-        (
-            "flooding interval",
-            "5 s, both",
-            "5 s for the paper's method, 0.5 s for fanet-mw",
-            "each use has settings of its own",
-        ),
-        ("number of UAVs", "45, both", "the same", ""),
-    ),
-)
-_UNSAID: Final = Rows(
-    _HEAD,
-    (
-        (
-            "fanet-mw",
-            "",
-            "by figure, named in each legend: every node a head, relays that count copies, repair (8, 12, reports); "
-            "4 clusters likewise (mission); the timetable, every node a head (11, load, age)",
-            "each use has settings of its own",
-        ),
-        (
-            "mobility, figures 8 to 11",
-            "clusters in formation",
-            "waypoints; a rigid formation",
-            "relative motion not said",
-        ),
-        (
-            "robots",
-            "Gazebo, ROS",
-            "point masses, one case in pybullet too; all in pybullet by fanet sweep fig12 without a variant",
-            "three quarters of the time",
-        ),
-        (
-            "runs per point",
-            "not said",
-            "ten seeds (quick: three), 95 % intervals by the bootstrap with expanded percentiles (Hesterberg, The "
-            "American Statistician 69(4), 2015); below eight seeds Student's t, cut at what is possible",
-            "",
-        ),
-    ),
-)
-_SETTINGS: Final = (
-    Heading("Settings"),
-    Heading("Table 1, simulation parameters", 3),
-    _TABLE_1,
-    Heading("Table 2, application parameters of figure 12", 3),
-    _TABLE_2,
-    Heading("What is in neither table", 3),
-    _UNSAID,
-)
-"""The settings of the paper beside those here."""
-
 Sentence = Annotated[str, Field(max_length=10_000)]
 Word = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.+-]{1,64}$")]
 
@@ -251,7 +145,7 @@ def _about(path: Path) -> dict[str, Any]:
 
 
 def overview(figures: Sequence[Figure]) -> list[Block]:
-    """The verdicts, and the settings."""
+    """The verdicts, and the settings of the paper beside those here."""
     claims = [(about["name"], claim) for _, about in figures for claim in about["claims"]]
     papers = [(str(one["figure"]), one["claim"], one["verdict"]) for _, one in claims if one["figure"]]
     ours = [(name, one["claim"], one["verdict"]) for name, one in claims if not one["figure"]]
@@ -268,7 +162,11 @@ def overview(figures: Sequence[Figure]) -> list[Block]:
     if ours:
         blocks.append(Text("Beyond the paper, what might be said of fanet-mw, judged in the same way:"))
         blocks.append(Rows(("figure", "statement", "verdict"), ours))
-    return [*blocks, *_SETTINGS]
+    blocks.append(Heading("Settings"))
+    settings = files("sim.report").joinpath("paper_settings.toml").read_text(encoding="utf-8")
+    for table in tomllib.loads(settings)["tables"]:
+        blocks += [Heading(table["title"], 3), Rows(_HEAD, table["rows"])]
+    return blocks
 
 
 def _figure(folder: Path, about: dict[str, Any]) -> list[Block]:

@@ -1,19 +1,6 @@
 """Writes what is observed of a swarm as MCAP, in Foxglove's schemas, so that Foxglove and PlotJuggler draw it.
 
-    /tf             FrameTransforms, each UAV's frame in `map` (ENU, z up), as poses come
-    /poses          PosesInFrame, all UAVs by id
-    /uav/N/fix      LocationFix, true place on earth, once a second
-    /uav/N/state    fanet.UavState, once a second
-    /scene/world    SceneUpdate, once: ground, buildings, no-fly areas, true places of survivors
-    /scene/uavs     SceneUpdate, when a UAV appears or takes another role; without clusters, another mode
-    /scene/links    SceneUpdate, once a second: links by what they delivered, and clusters
-    /scene/finds    SceneUpdate, once a second: survivors by state, estimates with their uncertainty
-    /links          fanet.Links, once a second, as the emulator counts them
-    /reports        fanet.Report, once a second and actor: queue, turns, airtime, lateness; a replay reads them
-    /metrics        fanet.Metrics, once a second
-    /log            Log, events for people
-
-Instants are unix time: that of swarm instant 0 plus swarm time.
+What is on which topic is in docs/how-to/recordings.md. Instants are unix time: that of swarm instant 0 plus swarm time.
 """
 
 import contextlib
@@ -25,8 +12,6 @@ from pathlib import Path
 from typing import Any, BinaryIO, Final, Self
 
 from foxglove_schemas_protobuf import (
-    CubePrimitive_pb2,
-    CylinderPrimitive_pb2,
     FrameTransforms_pb2,
     LinePrimitive_pb2,
     LocationFix_pb2,
@@ -34,9 +19,6 @@ from foxglove_schemas_protobuf import (
     PosesInFrame_pb2,
     SceneEntity_pb2,
     SceneUpdate_pb2,
-    SpherePrimitive_pb2,
-    TextPrimitive_pb2,
-    TriangleListPrimitive_pb2,
 )
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from google.protobuf.timestamp_pb2 import Timestamp
@@ -243,16 +225,14 @@ class McapRecording(Observer):
         look = self._looks[node] = self._look(uav)
         entity = self._entity(f"uav-{node}", t_ns, frame=f"uav-{node}")
         entity.frame_locked = True
-        body = CubePrimitive_pb2.CubePrimitive()
+        body = entity.cubes.add()
         _size(body.size, 8.0, 8.0, 2.5)
         body.pose.orientation.w = 1.0
         _paint(body.color, look)
-        entity.cubes.append(body)
-        text = TextPrimitive_pb2.TextPrimitive(text=str(node), font_size=12, scale_invariant=True, billboard=True)
+        text = entity.texts.add(text=str(node), font_size=12, scale_invariant=True, billboard=True)
         text.pose.position.z = 8.0
         text.pose.orientation.w = 1.0
         _paint(text.color, colors.DARK)
-        entity.texts.append(text)
         self._put("/scene/uavs", SceneUpdate_pb2.SceneUpdate(entities=[entity]), t_ns)
 
     @staticmethod
@@ -261,37 +241,32 @@ class McapRecording(Observer):
 
     def _links_scene(self, t_ns: int) -> SceneUpdate_pb2.SceneUpdate:
         entity = self._entity("links", t_ns)
-        lines = LinePrimitive_pb2.LinePrimitive(
-            type=LinePrimitive_pb2.LinePrimitive.LINE_LIST, thickness=1.5, scale_invariant=True
-        )
+        lines = entity.lines.add(type=LinePrimitive_pb2.LinePrimitive.LINE_LIST, thickness=1.5, scale_invariant=True)
         lines.pose.orientation.w = 1.0
         for src, dst, copies, received in self.state.link_rows():
             if src in self.state.uavs and dst in self.state.uavs and received:
                 for node in (src, dst):
                     _place(lines.points.add(), self.state.uavs[node].position)
                     _paint(lines.colors.add(), link_color(received / copies), alpha=0.6)
-        entity.lines.append(lines)
         return SceneUpdate_pb2.SceneUpdate(entities=[entity])
 
     def _finds_scene(self, t_ns: int) -> SceneUpdate_pb2.SceneUpdate:
         entity = self._entity("finds", t_ns)
         for survivor, state in self.state.survivors.now.items():
             at = self.state.places[survivor - 1]
-            ball = SpherePrimitive_pb2.SpherePrimitive()
+            ball = entity.spheres.add()
             _place(ball.pose.position, self._around.on_ground(at))
             ball.pose.orientation.w = 1.0
             _size(ball.size, 10.0, 10.0, 10.0)
             _paint(ball.color, STATUS_COLORS[state.status])
-            entity.spheres.append(ball)
         for one in self.state.estimates.values():
-            disk = CylinderPrimitive_pb2.CylinderPrimitive(top_scale=1.0, bottom_scale=1.0)
+            disk = entity.cylinders.add(top_scale=1.0, bottom_scale=1.0)
             at = self._around.on_ground(Enu(one.east_m, one.north_m, 0.0), above_m=0.5)
             _place(disk.pose.position, at)
             disk.pose.orientation.w = 1.0
             width = 2 * max(1.0, one.sigma_m)
             _size(disk.size, width, width, 1.0)
             _paint(disk.color, colors.PINK, alpha=0.4)
-            entity.cylinders.append(disk)
         return SceneUpdate_pb2.SceneUpdate(entities=[entity])
 
     def _entity(self, name: str, t_ns: int, *, frame: str = FRAME) -> SceneEntity_pb2.SceneEntity:
@@ -319,35 +294,29 @@ def _world(
 ) -> SceneUpdate_pb2.SceneUpdate:
     entity = SceneEntity_pb2.SceneEntity(frame_id=FRAME, id="world")
     entity.timestamp.CopyFrom(stamp)
-    ground = TriangleListPrimitive_pb2.TriangleListPrimitive()
+    ground = entity.triangles.add()
     ground.pose.orientation.w = 1.0
     _paint(ground.color, "#d9dccf")
     for corner in around.corners:
         _place(ground.points.add(), Enu(*corner.tolist()))
     ground.indices.extend(around.triangles.ravel().tolist())
-    entity.triangles.append(ground)
     for box in around.boxes:
-        cube = CubePrimitive_pb2.CubePrimitive()
+        cube = entity.cubes.add()
         _place(cube.pose.position, Enu(box.east, box.north, box.roof / 2))
         cube.pose.orientation.z, cube.pose.orientation.w = math.sin(box.yaw / 2), math.cos(box.yaw / 2)
         _size(cube.size, box.width, box.depth, box.roof)
         _paint(cube.color, "#b0a99f")
-        entity.cubes.append(cube)
     for outline in around.no_fly:
-        lines = LinePrimitive_pb2.LinePrimitive(
-            type=LinePrimitive_pb2.LinePrimitive.LINE_LOOP, thickness=2.0, scale_invariant=True
-        )
+        lines = entity.lines.add(type=LinePrimitive_pb2.LinePrimitive.LINE_LOOP, thickness=2.0, scale_invariant=True)
         lines.pose.orientation.w = 1.0
         _paint(lines.color, colors.RED)
         for east, north in outline:
             _place(lines.points.add(), around.on_ground(Enu(east, north, 0.0), above_m=2.0))
-        entity.lines.append(lines)
     for number, at in enumerate(places, 1):
-        text = TextPrimitive_pb2.TextPrimitive(text=f"S{number}", font_size=11, scale_invariant=True, billboard=True)
+        text = entity.texts.add(text=f"S{number}", font_size=11, scale_invariant=True, billboard=True)
         _place(text.pose.position, around.on_ground(at, above_m=10.0))
         text.pose.orientation.w = 1.0
         _paint(text.color, colors.DARK)
-        entity.texts.append(text)
     return SceneUpdate_pb2.SceneUpdate(entities=[entity])
 
 

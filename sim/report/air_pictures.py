@@ -182,9 +182,7 @@ def _at(track: Sequence[Posed], at_ns: int) -> Posed:
 
 
 def greedy_dominating_set(links: Mapping[int, set[int]]) -> set[int]:
-    """The node that reaches most others, then always the one next to the set that does (Guha and Khuller, 1998,
-    algorithm I).
-    """
+    """The node that reaches most others, then always the best beside the set (Guha and Khuller, 1998, algorithm I)."""
     if not links:
         return set()
     chosen = {max(links, key=lambda node: (len(links[node]), -node))}

@@ -5,13 +5,13 @@ nobody has found need the truth, which a simulation knows.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
 from agents.mission.finding.known_survivors import SAME_PLACE_M
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.geodesy import Geodetic, to_geodetic
-from fanet_mw.trace import Approaching, Confirmed, Detected, PlacedInside, Posed, Refuted
+from fanet_mw.trace import Approaching, Confirmed, Detected, PlacedInside, Refuted
 from fanet_mw.units import US, Enu, S
 from fanet_mw.wire import FOUND
 from fanet_mw.wire.frame import Content, message_id
@@ -156,17 +156,7 @@ def found_rows(run: RunRecords, known: Sequence[Find]) -> Rows:
                 off = f"{math.hypot(truth.east - east, truth.north - north):.0f} m"
         rows.append([who, place, on_earth, _how_sure(one, gps_m), _seconds(one.heard_ns),
                      _seconds(one.said_ns), f"UAV {one.node}", off])  # fmt: skip
-    headings = (
-        "who",
-        "where [m]",
-        "latitude, longitude",
-        "how sure",
-        "heard",
-        "said",
-        "by",
-        "truly off by",
-    )
-    return Rows(headings, rows)
+    return Rows(("who", "where [m]", "latitude, longitude", "how sure", "heard", "said", "by", "truly off by"), rows)
 
 
 def _how_sure(one: Find, gps_m: float) -> str:
@@ -188,7 +178,7 @@ def _seconds(t_ns: int | None) -> str:
 def unsearched(run: RunRecords) -> tuple[float, list[Piece]]:
     """The share of the area that no UAV has searched, and its connected pieces, the largest first."""
     cells = OverflownCells(run.scenario)
-    cells.add(_places(run))
+    cells.add(run.flown())
     missing = ~cells.seen
     half, count = run.scenario.world.area_m / 2, len(missing)
     side = 2 * half / count
@@ -210,13 +200,6 @@ def unsearched(run: RunRecords) -> tuple[float, list[Piece]]:
             )
         )  # fmt: skip
     return float(missing.mean()), sorted(pieces, key=lambda piece: (-piece.area_m2, piece.west, piece.south))
-
-
-def _places(run: RunRecords) -> Iterator[tuple[float, float, float]]:
-    for track in run.tracks.values():
-        for one in track:
-            assert isinstance(one, Posed), "tracks are of positions"
-            yield one.east_m, one.north_m, one.up_m
 
 
 def unsearched_rows(share: float, pieces: Sequence[Piece]) -> Rows:

@@ -157,7 +157,7 @@ def tracks(run: RunRecords) -> RunPicture | None:
     axes.add_patch(Rectangle((-half, -half), 2 * half, 2 * half, fill=False, edgecolor=DARK, linestyle="--",
                              linewidth=0.9, label="area to be searched"))  # fmt: skip
     cells = OverflownCells(run.scenario)
-    cells.add((one.east_m, one.north_m, one.up_m) for track in run.tracks.values() for one in track)
+    cells.add(run.flown())
     if not cells.seen.all():
         axes.imshow(~cells.seen, extent=(-half, half, -half, half), origin="lower", cmap=_UNSEARCHED, vmin=0, vmax=1,
                     zorder=0, interpolation="nearest")  # fmt: skip

@@ -115,6 +115,10 @@ class RunRecords:
         """The nodes for which the load of a node is meant."""
         return targets_of(self.scenario, origin)
 
+    def flown(self) -> Iterable[tuple[float, float, float]]:
+        """The positions of all UAVs, in no order of time [m]."""
+        return ((one.east_m, one.north_m, one.up_m) for track in self.tracks.values() for one in track)
+
     @property
     def searches(self) -> bool:
         """True if the run has a mission: people to be found, or an area to be searched."""

@@ -1,9 +1,6 @@
 """The pictures of when nodes let packets out, against what the protocol gives them: slots of heads, turns, rounds.
 
-slots of heads   place in the superframe over the time of the run: heads change, and a cluster keeps its slot
-turns            place in the superframe, a line for each node; under the last timetable, or over the time of the run if
-                 that came too late to show anything
-rounds           place in the round, a line for each node; turns are those of the node ids, and never change
+Of turns the last timetable is drawn, or the time of the run if that came too late to show anything.
 """
 
 from bisect import bisect_right

@@ -18,7 +18,7 @@ def parts(linked: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
     """The number of the connected component of each node; `linked` holds for a node and itself, too."""
     part = np.arange(len(linked))
     while True:
-        lower = np.where(linked, part[None], len(linked)).min(axis=1)
+        lower = np.where(linked, part[None], len(linked)).min(axis=1, initial=len(linked))
         if (lower == part).all():
             return part
         part = lower

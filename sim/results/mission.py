@@ -1,24 +1,5 @@
 """The outcome of a search mission, from the trace: survivors confirmed, area covered, coherence and separation of the
-swarm.
-
-    coverage    share of the area that came within the nominal range of the phone receiver of a UAV, cell by cell
-    photographed share of the area that was in an image of a UAV's camera, likewise
-    connected   share of the time in which all searching UAVs were one connected component at the radio's reach; UAVs
-                that have crashed, fly home or stand there, or whose radio is off, do not count
-    biconnected share of the time in which they would have remained so after the loss of any one of them
-    diameter    the most hops between two of them, median and greatest over time
-    cut_vertices those whose loss would separate others, likewise
-    confirmed   survivors whom a UAV announced within 25 m of their true place and did not take back; farther ones are
-                mistaken. The error is that of the first announced place, for both
-    reopened    confirmations that were taken back, because later receptions contradicted them
-    persons     survivors whom a UAV has told of by name, or as a person without a phone (within 25 m, each find of one)
-    false       finds of persons where nobody is, or somebody of whom there is another find
-    wait        time from the first reception of a survivor's phone by any UAV to the right confirmation
-    post_knows  time from the right confirmation to the instant at which the post on the ground learned of it
-    post_connected share of the time in which the post and all searching UAVs were one connected component
-    nearest     distance of each living UAV to the nearest other one, once a second
-
-Positions are the true ones, once a second (`Posed`).
+swarm. `summary_figures.py` defines each figure; positions are the true ones, once a second (`Posed`).
 """
 
 import math
@@ -27,7 +8,6 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from agents.mission.finding.known_survivors import SAME_PLACE_M
 from fanet_mw.scenario import Scenario
@@ -52,7 +32,9 @@ from fanet_mw.units import Enu, S
 from fanet_mw.wire.survivors import is_person
 from sim.records.record_kinds import records_of
 from sim.results.coherence import Coherence, coherence
+from sim.results.connectivity import parts
 from sim.results.links_over_time import OFF_AIR
+from sim.world.arrays import Flags, Rows, Values
 from sim.world.environment.layout import positions
 from sim.world.environment.survivors import place
 from sim.world.sensors.phone import REFERENCE_LOSS_DB
@@ -68,10 +50,6 @@ _MOST_DECADES: Final = 12.0
 _NEARLY_ALL: Final = 0.95
 MISTAKEN_M: Final = 25.0
 """A UAV that announces a survivor farther than this from the true place has mistaken somebody else."""
-
-Rows = npt.NDArray[np.float64]
-Values = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 
 def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
@@ -224,8 +202,8 @@ def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
         linked = apart[np.ix_(searching, searching)] <= range_m
         graphs.append(coherence(linked))
         if post is not None:
-            heard = np.linalg.norm(at[searching] - post, axis=1) <= range_m * reaches
-            with_post.append(_all_reached(linked, heard))
+            part, heard = parts(linked), np.linalg.norm(at[searching] - post, axis=1) <= range_m * reaches
+            with_post.append(bool(np.isin(part, part[heard]).all()))
         if len(at) > 1:
             np.fill_diagonal(apart, math.inf)
             nearest.append(apart.min(axis=0))
@@ -244,16 +222,6 @@ def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
         "cut_vertices": _usual([graph.cut_vertices for graph in graphs]) if graphs else None,
         "nearest_m": _spread(np.concatenate(nearest)) if nearest else None,
     }
-
-
-def _all_reached(linked: Flags, first: Flags) -> bool:
-    """True if everyone is among the `first`, or linked with them over others."""
-    reached = first
-    while True:
-        further = reached | linked[reached].any(axis=0)
-        if (further == reached).all():
-            return bool(reached.all())
-        reached = further
 
 
 def _spread(distances_m: Values) -> dict[str, float]:

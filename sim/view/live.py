@@ -10,7 +10,7 @@ from sim.view.actions import Actions
 from sim.view.air import LiveAir
 from sim.view.panels import Panels
 from sim.view.scene import Scene
-from sim.view.server import HOST, close_server, look_over, open_server
+from sim.view.server import HOST, look_over, served
 
 RATE_HZ: Final = 10.0
 
@@ -19,8 +19,7 @@ def view(
     feed: BusFeed, *, port: int | None, until_gone: bool, ended: Sequence[int], tell: Callable[[str], None]
 ) -> None:
     """Serve the view until `ended`; with `until_gone` also no longer than the swarm's router is there."""
-    server = open_server(port)
-    try:
+    with served(port) as server:
         state = SwarmState(feed.scenario)
         panels: Panels
         scene = Scene(server, state, on_select=lambda node: panels.jobs.put(lambda: panels.select(node)))
@@ -53,8 +52,6 @@ def view(
             panels.refresh(now_ns, note=note)
             panels.show_image(feed.images.get(scene.selected))
             paced.wait()
-    finally:
-        close_server(server)
 
 
 def mark_clicks(server: Any, scene: Scene, panels: Panels) -> None:  # noqa: ANN401  (a server of viser)

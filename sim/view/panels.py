@@ -86,12 +86,8 @@ class Panels:
     # --- for the loop that draws ----------------------------------------------------------------------------------
 
     def run_jobs(self) -> None:
-        while True:
-            try:
-                job = self.jobs.get_nowait()
-            except queue.Empty:
-                return
-            job()
+        while not self.jobs.empty():
+            self.jobs.get()()
 
     def refresh(self, t_ns: int, *, note: str = "", all_of_it: bool = False) -> None:
         """Write the figures of an instant; those that need no hurry once a second."""
@@ -390,39 +386,21 @@ def _figures(state: SwarmState, metrics: dict[str, float | None]) -> str:
         value = metrics[name]
         return "-" if value is None else f"{value:,.0f} ms"
 
+    since_s, until_s = state.settling_ns / S, (state.settling_ns + LATELY_NS) / S
     rows = [
-        (
-            "delivered lately",
-            f"<b>{percent('delivered_share')}</b> of packets {state.settling_ns / S:.0f} to "
-            f"{(state.settling_ns + LATELY_NS) / S:.0f} s old",
-        ),
+        ("delivered lately", f"<b>{percent('delivered_share')}</b> of packets {since_s:.0f} to {until_s:.0f} s old"),
         ("delay median, longest", f"{ms('delay_p50_ms')}, {ms('delay_max_ms')}"),
-        *(
-            [
-                (
-                    "with a bound: 95 %, longest",
-                    f"{ms('bounded_p95_ms')}, {ms('bounded_max_ms')}; bound "
-                    f"{ms('bound_max_ms')}, broken {metrics['bounds_broken']:.0f}",
-                )
-            ]
-            if metrics["bound_max_ms"] is not None or metrics["bounds_broken"]
-            else []
-        ),
-        *(
-            [("air busy", f"{percent('airtime_lately_share')} lately, {percent('airtime_share')} on average")]
-            if metrics["airtime_share"] is not None
-            else []
-        ),
-        *(
-            [("frames late", f"{percent('late_share', 2)}, 99 of 100 below {ms('late_p99_ms')}")]
-            if metrics["late_share"] is not None
-            else []
-        ),
-        ("confirmed", f"<b>{metrics['confirmed']:.0f} of {metrics['survivors']:.0f}</b>"),
-        ("area covered", percent("coverage_share")),
     ]
-    if not state.scenario.mission.survivors and state.scenario.mission.search == "none":
-        del rows[-2:]  # nobody is looked for
+    if metrics["bound_max_ms"] is not None or metrics["bounds_broken"]:
+        kept = f"{ms('bounded_p95_ms')}, {ms('bounded_max_ms')}; bound {ms('bound_max_ms')}"
+        rows.append(("with a bound: 95 %, longest", f"{kept}, broken {metrics['bounds_broken']:.0f}"))
+    if metrics["airtime_share"] is not None:
+        rows.append(("air busy", f"{percent('airtime_lately_share')} lately, {percent('airtime_share')} on average"))
+    if metrics["late_share"] is not None:
+        rows.append(("frames late", f"{percent('late_share', 2)}, 99 of 100 below {ms('late_p99_ms')}"))
+    if state.scenario.mission.survivors or state.scenario.mission.search != "none":
+        rows.append(("confirmed", f"<b>{metrics['confirmed']:.0f} of {metrics['survivors']:.0f}</b>"))
+        rows.append(("area covered", percent("coverage_share")))
     flown, heads, parts = len(state.uavs) - (state.scenario.post in state.uavs), len(state.heads()), state.parts()
     rows.append(("UAVs, clusters", f"{flown}, {heads}") if heads else ("UAVs", f"{flown}"))
     if parts is not None:

@@ -17,7 +17,7 @@ from sim.observation.timeline import Timeline
 from sim.view.air import CapturedAir
 from sim.view.panels import Panels, legend
 from sim.view.scene import Scene
-from sim.view.server import HOST, Sight, close_server, look_over, open_server, sight
+from sim.view.server import HOST, Sight, look_over, served, sight
 
 _RATE_HZ: Final = 10.0
 _SPEEDS: Final = ("0.1", "0.5", "1", "2", "5", "10", "30")
@@ -100,8 +100,7 @@ def told_apart(names: Sequence[str]) -> list[str]:
 def serve(folder: Path, *, port: int | None, start_s: float, ended: Sequence[int], tell: Callable[[str], None]) -> None:
     """Show a run until somebody ends it; raises ConfigError for a folder that holds none."""
     timeline = Timeline(folder)
-    server = open_server(port)
-    try:
+    with served(port) as server:
         start_ns = round(start_s * S)
         panels: Panels
         state = timeline.at(start_ns)
@@ -124,8 +123,6 @@ def serve(folder: Path, *, port: int | None, start_s: float, ended: Sequence[int
             scene.draw(player.t_ns, all_of_it=jumped)
             panels.refresh(player.t_ns, all_of_it=jumped)
             paced.wait()
-    finally:
-        close_server(server)
 
 
 def _step_back(seen: Sight) -> str:
@@ -149,25 +146,23 @@ def _caption(scenario: Scenario, scene: Scene) -> str:
 def write_html(folder: Path, path: Path, *, tell: Callable[[str], None]) -> None:
     """Write the scene of a run as one file that plays without a network; raises ConfigError."""
     timeline = Timeline(folder)
-    server = open_server(None)
     try:
-        scene = Scene(server, timeline.at(0), on_select=lambda _: None)
-        scene.by_range = not timeline.has_links
-        scene.shown = scene.shown._replace(turns=False, spreading=False)
-        look_over(server, scene)
-        step_ns = max(S, -(-timeline.end_ns // _FRAMES // S) * S)
-        serializer = server.get_scene_serializer()
-        for t_ns in range(0, timeline.end_ns + 1, step_ns):
-            scene.state = timeline.at(t_ns)
-            scene.draw(t_ns)
-            scene.write_time(t_ns)
-            server.flush()
-            serializer.insert_sleep(step_ns / S / FILE_SPEED)
-        page = serializer.as_html().replace("<head>", f"<head><script>{_step_back(sight(scene))}</script>", 1)
-        caption = _caption(timeline.scenario, scene)
-        replace_file(path, page.replace('<div id="root"></div>', f'<div id="root"></div>{caption}', 1).encode())
+        with served(None) as server:
+            scene = Scene(server, timeline.at(0), on_select=lambda _: None)
+            scene.by_range = not timeline.has_links
+            scene.shown = scene.shown._replace(turns=False, spreading=False)
+            look_over(server, scene)
+            step_ns = max(S, -(-timeline.end_ns // _FRAMES // S) * S)
+            serializer = server.get_scene_serializer()
+            for t_ns in range(0, timeline.end_ns + 1, step_ns):
+                scene.state = timeline.at(t_ns)
+                scene.draw(t_ns)
+                scene.write_time(t_ns)
+                server.flush()
+                serializer.insert_sleep(step_ns / S / FILE_SPEED)
+            page = serializer.as_html().replace("<head>", f"<head><script>{_step_back(sight(scene))}</script>", 1)
+            caption = _caption(timeline.scenario, scene)
+            replace_file(path, page.replace('<div id="root"></div>', f'<div id="root"></div>{caption}', 1).encode())
     except OSError as error:
         raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
-    finally:
-        close_server(server)
     tell(f"written to {path}, {path.stat().st_size / 1e6:.1f} MB; it plays {FILE_SPEED:g} swarm seconds per second")

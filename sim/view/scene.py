@@ -134,19 +134,17 @@ class Scene:
             self._api.add_mesh_simple(
                 "/world/ground", corners, np.array([[0, 1, 3], [0, 3, 2]]), color=_GROUND, receive_shadow=False
             )
+            lines = [
+                ((at, -half, 0.0), (at, half, 0.0)) if along else ((-half, at, 0.0), (half, at, 0.0))
+                for along in (True, False)
+                for at in np.arange(-half, half + 1e-6, _step_m(half))
+            ]
+            self._api.add_line_segments(
+                "/world/grid", np.array(lines, np.float32), (190, 194, 182), thickness=1.0, thickness_units="screen"
+            )
         else:
             self._api.add_mesh_simple(
                 "/world/ground", around.corners.astype(np.float32), around.triangles, color=_GROUND, flat_shading=True
-            )
-        step = _step_m(half)
-        lines = [
-            ((at, -half, 0.0), (at, half, 0.0)) if along else ((-half, at, 0.0), (half, at, 0.0))
-            for along in (True, False)
-            for at in np.arange(-half, half + 1e-6, step)
-        ]
-        if around.hills is None:
-            self._api.add_line_segments(
-                "/world/grid", np.array(lines, np.float32), (190, 194, 182), thickness=1.0, thickness_units="screen"
             )
         for text, east, north in (("N", 0.0, half * 1.05), (f"{2 * half:g} m", half, -half * 1.05)):
             self._api.add_label(f"/world/label-{text}", text, position=around.on_ground(Enu(east, north, 0.0)))
@@ -192,15 +190,11 @@ class Scene:
         else:
             handle.batched_positions = places
             handle.batched_wxyzs = turned
-            _set(handle, batched_colors=tints)
-            _set(handle, batched_scales=sizes)
+            _set(handle, batched_colors=tints, batched_scales=sizes)
         faulty = sorted({fault.node for fault in self.state.faults.values() if fault.node in uavs})
         self._rings("faulty", [uavs[node].position for node in faulty], [rgb(colors.RED)] * len(faulty), 1.9)
-        if self.selected in uavs:
-            at = uavs[self.selected].position
-            self._rings("selected", [at], [(255, 255, 255)], 1.5)
-        else:
-            self._rings("selected", [], [], 1.5)
+        selected = [uavs[self.selected].position] if self.selected in uavs else []
+        self._rings("selected", selected, [(255, 255, 255)] * len(selected), 1.5)
 
     def _tint(self, uav: UavNow) -> tuple[int, int, int]:
         if uav.flight == "fallen":
@@ -260,8 +254,7 @@ class Scene:
             )  # fmt: skip
             return
         handle.batched_positions = at
-        _set(handle, batched_colors=paints)
-        _set(handle, visible=True)
+        _set(handle, batched_colors=paints, visible=True)
 
     # --- twice a second -------------------------------------------------------------------------------------------
 
@@ -445,8 +438,7 @@ class Scene:
             return
         if not np.array_equal(handle.points, points):
             handle.points = points
-        _set(handle, colors=paints)
-        _set(handle, visible=True)
+        _set(handle, colors=paints, visible=True)
 
     def _clicked(self, event: Any) -> None:  # noqa: ANN401  (viser's events)
         """Select the UAV that was clicked, or the one nearest to the ray if the client does not say which it was."""
@@ -481,7 +473,5 @@ def _off_ray(at: Enu, origin: Rows, direction: Rows) -> float:
 
 def _step_m(half_m: float) -> float:
     """The step of the grid: a round number of metres that divides the area into five to twelve."""
-    for step in (10, 20, 50, 100, 200, 500, 1000, 2000, 5000):
-        if 2 * half_m / step <= 12:
-            return float(step)
-    return half_m / 4
+    steps = (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0)
+    return next((step for step in steps if 2 * half_m / step <= 12), half_m / 4)

@@ -4,6 +4,7 @@ import contextlib
 import io
 import math
 import socket
+from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -30,7 +31,8 @@ GOAL: Final = (0.04, -0.1, 0.0)
 _SKY: Final = np.full((2, 2, 3), (236, 240, 245), np.uint8)
 
 
-def open_server(port: int | None) -> viser.ViserServer:
+@contextlib.contextmanager
+def served(port: int | None) -> Iterator[viser.ViserServer]:
     """A server on this port, or on the first free one from the default on; raises ConfigError when it is taken."""
     chosen = _free_port() if port is None else port
     if not 1 <= chosen <= 65_535:
@@ -49,12 +51,11 @@ def open_server(port: int | None) -> viser.ViserServer:
     server.scene.add_light_directional("/light/sun", intensity=1.9, position=(0.5, -0.8, 1.0), cast_shadow=False)
     server.scene.configure_default_lights(enabled=False)
     server.scene.set_background_image(_SKY)
-    return server
-
-
-def close_server(server: viser.ViserServer) -> None:
-    with contextlib.suppress(RuntimeError), contextlib.redirect_stdout(io.StringIO()):
-        server.stop()
+    try:
+        yield server
+    finally:
+        with contextlib.suppress(RuntimeError), contextlib.redirect_stdout(io.StringIO()):
+            server.stop()
 
 
 class Sight(NamedTuple):

@@ -34,7 +34,7 @@ from sim.run.virtual import Observed
 from sim.scenarios import catalog
 from sim.view.panels import Panels
 from sim.view.scene import Scene
-from sim.view.server import HOST, close_server, look_over, open_server
+from sim.view.server import HOST, look_over, served
 
 ROOT: Final = Path(__file__).parents[2]
 PORT: Final = 8765
@@ -184,33 +184,32 @@ def virtual(seconds: float) -> dict[str, Any]:
         "nodes.count=200", f"duration_s={seconds}", "warmup_s=1", "drain_s=1", "world.engine=kinematic",
         "mobility.model=random_waypoint", "world.area_m=3000", "traffic.sources=10", "traffic.interval_s=1",
     ])  # fmt: skip
-    server = open_server(PORT)
-    state = SwarmState(scenario)
-    scene = Scene(server, state, on_select=lambda _: None)
-    look_over(server, scene)
-    panels = Panels(server, scene, actions=None)
-    browser = Taker(browse)
-    observed = Observed(scenario, observer=state)
-    observed.host.start()
-    time.sleep(2)
-    draw_s, frames, began = 0.0, 0, browser.bytes
-    for t_ns in range(S // 10, scenario.duration_ns, S // 10):
-        observed.host.run(t_ns)
-        observed.tell_reports()
-        start = time.process_time()
-        scene.draw(t_ns)
-        panels.refresh(t_ns)
-        draw_s += time.process_time() - start
-        frames += 1
-        time.sleep(0.02)
-    time.sleep(1)
-    row = {
-        "uavs": 200, "frames": frames, "cpu_ms_per_frame": round(1000 * draw_s / frames, 2),
-        "cpu_share_at_10_hz": round(10 * draw_s / frames, 3),
-        "kB_per_swarm_s": round((browser.bytes - began) / seconds / 1000, 1),
-    }  # fmt: skip
-    browser.ends = True
-    close_server(server)
+    with served(PORT) as server:
+        state = SwarmState(scenario)
+        scene = Scene(server, state, on_select=lambda _: None)
+        look_over(server, scene)
+        panels = Panels(server, scene, actions=None)
+        browser = Taker(browse)
+        observed = Observed(scenario, observer=state)
+        observed.host.start()
+        time.sleep(2)
+        draw_s, frames, began = 0.0, 0, browser.bytes
+        for t_ns in range(S // 10, scenario.duration_ns, S // 10):
+            observed.host.run(t_ns)
+            observed.tell_reports()
+            start = time.process_time()
+            scene.draw(t_ns)
+            panels.refresh(t_ns)
+            draw_s += time.process_time() - start
+            frames += 1
+            time.sleep(0.02)
+        time.sleep(1)
+        row = {
+            "uavs": 200, "frames": frames, "cpu_ms_per_frame": round(1000 * draw_s / frames, 2),
+            "cpu_share_at_10_hz": round(10 * draw_s / frames, 3),
+            "kB_per_swarm_s": round((browser.bytes - began) / seconds / 1000, 1),
+        }  # fmt: skip
+        browser.ends = True
     return row
 
 

@@ -35,7 +35,7 @@ from sim.view.actions import Actions
 from sim.view.panels import Panels
 from sim.view.replayed import told_apart, write_html
 from sim.view.scene import CLUSTER_COLORS, Scene
-from sim.view.server import open_server
+from sim.view.server import served
 from sim.view.shapes import linear, rgb
 
 
@@ -157,17 +157,16 @@ def test_a_folder_without_a_run_cannot_be_replayed(tmp_path: Path) -> None:
 
 @pytest.fixture
 def server() -> Iterator[viser.ViserServer]:
-    opened = open_server(None)
-    yield opened
-    opened.stop()
+    with served(None) as opened:
+        yield opened
 
 
 def test_the_server_is_on_the_loopback_interface_alone(server: viser.ViserServer) -> None:
     assert server.get_host() == "127.0.0.1"
-    with pytest.raises(ConfigError, match=f"--port {server.get_port()}: is in use"):
-        open_server(server.get_port())
-    with pytest.raises(ConfigError, match="--port 70000: must be in"):
-        open_server(70_000)
+    with pytest.raises(ConfigError, match=f"--port {server.get_port()}: is in use"), served(server.get_port()):
+        pass
+    with pytest.raises(ConfigError, match="--port 70000: must be in"), served(70_000):
+        pass
 
 
 def test_the_scene_shows_places_clusters_turns_links_and_survivors(

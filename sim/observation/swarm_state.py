@@ -1,11 +1,5 @@
 """The state of a swarm as an observer knows it: fed with what is heard on the bus, or with the records of a trace.
 
-    positions   `Poses` as they come; without them `posed`, once a second
-    packets     those of the last seconds: who had each when, against its bound
-    links       what each directed link carried in the last seconds (`LinkStats`)
-    reports     counters, roles and turns as each actor said last
-    survivors   how far the search for each has come, and where UAVs estimate it to be
-
 Shares of delivery are those of packets that had time to arrive: older than the longest delay seen lately, and sent
 within `LATELY_NS` before that.
 """
@@ -20,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from agents.applications.traffic import targets_of
-from fanet_mw.bus.link_stats import LinkRow, LinkStats
+from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import Poses
 from fanet_mw.errors import ConfigError, MalformedFrameError
 from fanet_mw.graph.topology import components
@@ -66,7 +60,6 @@ _BATTERY_ID: Final = 1
 """SYS_STATUS of MAVLink, whose byte 30 is the charge in percent, -1: unknown."""
 _BATTERY_AT: Final = 10 + 30
 _ACK_ID: Final = int(common.MAVLINK_MSG_ID_COMMAND_ACK)
-Rows = npt.NDArray[np.float64]
 
 
 @dataclass(slots=True)
@@ -278,7 +271,9 @@ class SwarmState(Observer):
         found: dict[tuple[int, int], list[int]] = {}
         for stats in self._links:
             for row in stats.rows():
-                self._add(found, row)
+                sums = found.setdefault((row.src, row.dst), [0, 0])
+                sums[0] += row.copies
+                sums[1] += row.received
         for (src, dst), (copies, received) in found.items():
             yield src, dst, copies, received
 
@@ -525,12 +520,6 @@ class SwarmState(Observer):
             min(found.t_us * 1000, t_ns), found.survivor, found.node, found.east_m, found.north_m, found.sigma_m,
             found.standing.name.lower(),
         )  # fmt: skip
-
-    @staticmethod
-    def _add(found: dict[tuple[int, int], list[int]], row: LinkRow) -> None:
-        sums = found.setdefault((row.src, row.dst), [0, 0])
-        sums[0] += row.copies
-        sums[1] += row.received
 
 
 def _refusal(frame: bytes) -> str:

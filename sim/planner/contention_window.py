@@ -17,9 +17,7 @@ _NONE: Final[Mapping[NodeId, int]] = MappingProxyType({})
 
 
 def too_short(scenario: Scenario, adjacency: Adjacency, uplinks_ns: Mapping[NodeId, int] = _NONE) -> Iterator[str]:
-    """A sentence if hellos and packets to heads do not fit the window. `uplinks_ns`: airtime of the latter in a
-    superframe, by sender.
-    """
+    """A sentence if hellos and packets to heads (`uplinks_ns`: their airtime by sender) do not fit the window."""
     needed_ns = hellos_ns(scenario, crowd(adjacency)) + _densest_ns(adjacency, uplinks_ns)
     window_ns = round(scenario.clusters.contention_ms * MS)
     what = "hellos and packets to heads" if any(uplinks_ns.values()) else "hellos"

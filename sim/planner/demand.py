@@ -72,9 +72,7 @@ def _all(scenario: Scenario) -> tuple[NodeId, ...]:
 
 
 def _eligible(scenario: Scenario, traffic: Traffic) -> tuple[NodeId, ...]:
-    """The nodes that may be sources. Of a number, a run draws them by its seed and a plan takes the lowest ids; both
-    take the leader only if the others are too few.
-    """
+    """The nodes that may be sources: of a number the lowest ids, the leader only if the others are too few."""
     if isinstance(traffic.sources, tuple):
         return tuple(NodeId(n) for n in sorted(set(traffic.sources)))
     candidates = tuple(n for n in _all(scenario) if n != traffic.destination)

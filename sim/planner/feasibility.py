@@ -3,11 +3,8 @@
     source --access--> head's queue --slot--> flood --> last node
            uplink_ns          slot_delays        FloodCost.duration
 
-In the slot of a head, floods follow each other at a spacing; in a timetable, each turn holds one flood. Packets reach
-the head late by up to `uplink_ns`. If that has no bound, one second (or a period) is assumed, and a note says so.
-
-A scenario is feasible if each slot is stable, each packet arrives before its lifetime and any deadline end, no queue
-overflows, and a flood reaches all nodes within the hop limit.
+It is feasible if each slot is stable, each packet arrives before its lifetime and any deadline end, no queue overflows,
+and a flood reaches all nodes within the hop limit. Where the access has no bound, a second (or a period) is assumed.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

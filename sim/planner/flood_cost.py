@@ -1,9 +1,8 @@
 """The cost of one flood whose relays contend: how long until all nodes have it, and how soon the next one may follow.
 
-Around the busiest node all relays within two hops transmit one after another on one channel, each for airtime + DIFS +
-the mean backoff. Floods that are closer together pile up. The duration is that time for each hop, plus jitter, handover
-and lead. This is an estimate, because CSMA/CA bounds neither. With a timetable both are exact
-(`fanet_mw/bounds/timetable_flood.py`).
+Around the busiest node all relays within two hops transmit one after another, each for airtime + DIFS + the mean
+backoff; the duration is that time for each hop, plus jitter, handover and lead. CSMA/CA bounds neither, so this is an
+estimate; with a timetable both are exact (`fanet_mw/bounds/timetable_flood.py`).
 """
 
 from typing import NamedTuple

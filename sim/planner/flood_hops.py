@@ -1,9 +1,8 @@
 """How many hops the floods of a plan make, and whether the radio and `routing.hop_limit` let them reach all nodes.
 
-A timetable is computed for the links that `clusters.link_m` and `clusters.interference_m` state. With `radio.channel =
-"range"` it is known which frames arrive: those of the only transmitting node within `radio.range_m`. So the floods are
-followed through the turns of the timetable with these links; with other channels, with those of the timetable itself.
-All turns are taken to be in use, as at the greatest load.
+They are followed through the turns of the timetable, all of which are in use, as at the greatest load: with
+`radio.channel = "range"` over the links of the only transmitting node within `radio.range_m`, else over those for which
+the timetable is computed (`clusters.link_m`, `clusters.interference_m`).
 """
 
 from collections.abc import Iterator, Mapping

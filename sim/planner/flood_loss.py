@@ -1,15 +1,10 @@
 """The probability that a packet with a delay bound does not reach a node because frames are lost (timetables only).
 
-The timetable says which nodes transmit in the same turn, so the probability of each copy is that of its link with those
-as interferers. A packet reaches a node at least if all frames on one way to it arrive. Frames are lost independently,
-so
+    P(reached) >= max over ways of the product of the probabilities of their frames, with those of a turn as interferers
 
-    P(reached) >= max over ways of the product of the probabilities of their frames
-
-The true probability is greater, because copies on other ways count, too, and unused turns do not interfere. The bound
-holds for losses that are independent from frame to frame. It does not hold for shadowing, which weakens a link for
-long, nor for a member's way to its head, where attempts that collide once tend to collide again. Frames of the
-contention window that extend into the turns are not included.
+The true probability is greater: copies on other ways count, too, and unused turns do not interfere. The bound holds for
+losses that are independent from frame to frame, so neither for shadowing nor for a member's way to its head. Frames of
+the contention window that extend into the turns are not included.
 """
 
 from collections.abc import Callable, Iterator, Sequence

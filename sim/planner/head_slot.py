@@ -74,9 +74,7 @@ def work_ns(shares: Sequence[ClassLoad], *, period_ns: int) -> int:
 def slot_delays(
     shares: Sequence[ClassLoad], *, usable_ns: int, period_ns: int, jitter_ns: int
 ) -> tuple[list[DelayBound], int | None]:
-    """For each class the longest time from the head's queue to the last node (0 without sources), and the backlog.
-    Packets arrive late by up to `jitter_ns`.
-    """
+    """For each class the longest time from the head's queue to the last node (0 without sources); and the backlog."""
     present = [s for s in shares if s.sources]
     if not present:
         return [Bounded(0) for _ in shares], None

@@ -54,9 +54,7 @@ class ScenarioPlan(NamedTuple):
 
     @property
     def carried_per_second(self) -> float | None:
-        """Packets per second of all sources that this configuration can carry: exact with a timetable whose capacity
-        was computed, else the load that fills the fullest slot; None if unknown.
-        """
+        """Packets per second that can be carried: by the capacity, else what fills the fullest slot; None: unknown."""
         application = next((c for c in self.classes if c.name == "application"), None)
         if application is None or not application.sources:
             return None

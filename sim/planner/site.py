@@ -21,9 +21,7 @@ class Site:
         reported: Sequence[Mapping[NodeId, Enu]] = (),
         standing: Mapping[NodeId, Enu] | None = None,
     ) -> None:
-        """`reported`: draws of positions with errors of GPS; `standing`: where the nodes are, if `positions` is such a
-        draw.
-        """
+        """`reported`: draws with errors of GPS; `standing`: where nodes are, if `positions` is such a draw."""
         self.scenario = scenario
         self.positions = {node: rounded(at) for node, at in positions.items()} if self.timetable else positions
         """The positions in whole metres if timetables are computed from them, as a leader announces them."""

@@ -66,9 +66,7 @@ class TimetablePlan(NamedTuple):
 def table_for(
     scenario: Scenario, places: Places, head_of: Mapping[NodeId, NodeId], *, quick: bool = False
 ) -> FittedTimetable | Refused:
-    """The timetable that nodes with these heads will compute; refused if one packet of each root, or with `quick` the
-    load, does not fit.
-    """
+    """The timetable of nodes; refused if one packet of each root, or with `quick` the load, does not fit."""
     found = fit(scenario, places, head_of, quick=quick)
     if found is not None:
         return found

@@ -1,11 +1,9 @@
 """The delay bound of a member's packets on their way to the head, hop by hop in contention; none if there is too much
 traffic.
 
-The backoff of a station is frozen by every transmission within two hops of it, and by the acknowledgements to it:
-unicasts, own and forwarded, with all attempts, relays of floods, and hellos. Their periods limit how many of them fall
-into a time w. The bound of a hop is the least w that holds them all, each at its cost by `bounds.mac`. A packet that
-waits is delayed by a varying time, so the bound of each hop enters that of the next as jitter. If the bound exceeds the
-flooding period, there is none.
+The backoff of a station is frozen by every transmission within two hops of it, and by the acknowledgements to it. Their
+periods limit how many fall into a time w; the bound of a hop is the least w that holds them all, each at its cost by
+`bounds.mac`, and enters that of the next hop as jitter. Beyond the flooding period there is none.
 """
 
 from collections.abc import Mapping, Sequence

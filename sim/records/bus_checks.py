@@ -2,9 +2,7 @@
 
     sender -> the kinds it may send -> the nodes and survivors it names (they exist) -> the instant (within the run)
 
-Each check returns a word for what is wrong, or None. The reports of actors must have the keys that metrics read, with
-the right types. Not checked: who really sent a message, which is the task of the router's access list
-(docs/how-to/security.md).
+Who really sent a message is not checked: that is the task of the router's access list (docs/how-to/security.md).
 """
 
 import json

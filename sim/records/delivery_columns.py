@@ -1,7 +1,6 @@
 """The deliveries of a trace as columns of numbers, portion by portion.
 
-Nine records in ten are deliveries, and there are millions of them in an hour of a large swarm. Analysis code that goes
-through all of them asks for columns here: numpy handles a column many times as fast as Python handles records.
+There are millions in an hour of a large swarm, and numpy handles a column many times as fast as Python its records.
 """
 
 from collections.abc import Iterable, Iterator

@@ -1,8 +1,5 @@
-"""A list of items that only grows, and that moves its items from memory to a file on disk whenever they become many.
-
-    latest items  ->  packed, some hundred at a time  ->  written to the file, some hundred kilobytes at a time
-
-It bounds the memory that a long run needs. Once the disk is full, what is packed stays in memory.
+"""A list of items that only grows: what becomes much is packed, some hundred items at a time, and written to a file,
+some hundred kilobytes at a time. Once the disk is full, what is packed stays in memory.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence

@@ -1,7 +1,6 @@
 """The kinds of trace records; and the records of a trace while it is in memory or on disk, by kind or as lines.
 
-A trace is any iterable of records: a list, or a log on disk. A log on disk can leave most of what was not asked for
-undecoded, so analysis code calls `records_of` and `lines` here rather than iterate over the whole trace.
+A log on disk can leave most of what was not asked for undecoded, so analysis code calls `records_of` and `lines`.
 """
 
 from collections.abc import Iterable, Iterator

@@ -2,9 +2,8 @@
 
     file = (length, bytes)*
 
-The file has no name. Items that are appended together are written whole or not at all. If the disk is full, the spool
-accepts no more items, but the run goes on, and the stored items can be read. The file is gone when the spool is closed,
-or when nothing refers to it any more.
+It has no name, and is gone when nothing refers to it. Items that are appended together are written whole or not at all.
+If the disk is full, no more are accepted, but the run goes on, and the stored ones can be read.
 """
 
 import heapq
@@ -101,9 +100,7 @@ class Spool:
 def in_order(
     source: Spool, key: Callable[[bytes], Any], *, change: Callable[[bytes], bytes] = lambda item: item
 ) -> Spool | None:
-    """A new spool with the items sorted by key (stably), each with `change` applied, some megabytes in memory at once;
-    None if the disk has no room.
-    """
+    """A new spool with the items sorted by key (stably) after `change`; None if the disk has no room."""
     runs, ends = Spool(source.folder), [0]
     for portion in batches(source.items(), least_bytes=_SORTED_BYTES):
         portion.sort(key=key)

@@ -1,12 +1,10 @@
 """The trace of a run in virtual time: the latest records are in memory, all records before them in a file on disk.
 
-Records are packed in portions of some hundred. Each portion consists of three byte strings:
+Records are packed in portions of some hundred, each of three byte strings:
 
     the kind of each record, one byte each | the deliveries, packed in rows | all other records, pickled
 
-Nine records in ten are deliveries. A reader that asks only for deliveries unpickles nothing, and one that asks for
-other kinds only does not decode the deliveries; one that asks for deliveries and other kinds decodes everything. The
-deliveries are given as columns, and as lines of the trace file, without making a record of each.
+Nine records in ten are deliveries: who asks for them alone unpickles nothing, and gets them as columns or lines too.
 """
 
 import pickle

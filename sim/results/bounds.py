@@ -2,10 +2,8 @@
 
     within_share = deliveries within the bound of their packet / (all packets x the nodes for which each was meant)
 
-The share is lowered by packets that never arrive, that arrive too late, or for which no bound was stated. A promise is
-broken at each target at which a packet with a bound arrives too late, or never, if the bound was over before the run.
-Packets of users' applications, whose targets the trace does not tell, are in no share, and only what arrives too late
-is a violation of theirs. The result is empty if no origin has stated any bound.
+A promise is broken at each target at which a packet with a bound arrives too late, or never, if the bound was over
+before the run. Packets of users' applications, whose targets the trace does not tell, are in no share.
 """
 
 from collections.abc import Mapping

@@ -1,12 +1,7 @@
 """How well clusters follow the network: the roles in the trace on the links of each second of the measured window.
 
-    torn          share of (cluster, second) in which the cluster's members were not connected among themselves
-    hops_to_head  hops from a member to its head over any nodes, once a second: mean, 95th percentile, and the share of
-                  members that were farther than 4, or had no way
-    role_changes  changes of role or head, a UAV and minute
-    sizes         members of a cluster, its head included: least, median, most
-
-A node that stands in for a head that is gone is the head. Empty for protocols without clusters.
+`summary_figures.py` defines the figures. A node that stands in for a head that is gone is the head. Empty for protocols
+without clusters.
 """
 
 import statistics
@@ -20,8 +15,9 @@ from fanet_mw.trace import RoleChanged
 from fanet_mw.units import S
 from sim.records.record_kinds import records_of
 from sim.results.connectivity import parts
-from sim.results.links_over_time import Flags, LinksOverTime
+from sim.results.links_over_time import LinksOverTime
 from sim.results.outcome import Outcome
+from sim.world.arrays import Flags
 
 _FAR: Final = 4
 

@@ -8,17 +8,14 @@ Obstacles, fading and collisions are left out: this is what distance allows.
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from emulator.channel.link_budget import heard_m
 from fanet_mw.trace import Posed, ProcessEnded, RadioFault
 from fanet_mw.units import S
 from sim.records.record_kinds import records_of
 from sim.results.outcome import Outcome
+from sim.world.arrays import Flags, Rows
 from sim.world.environment.layout import positions
-
-Flags = npt.NDArray[np.bool_]
-Rows = npt.NDArray[np.float64]
 
 OFF_AIR: Final = frozenset({"cut", "mute", "deaf", "stop", "crash"})
 """The faults that take a UAV out of the network."""
@@ -35,9 +32,7 @@ class LinksOverTime:
         self._links: dict[int, Flags] = {}
 
     def at(self, second: int) -> Flags:
-        """Whether each pair of nodes had a link in a second; each has one with itself. The same array while nothing
-        changes.
-        """
+        """Whether each pair had a link in a second, each node with itself; the same array while nothing changes."""
         if second not in self._links:
             links, before = self._near_at(second) | self._near_at(second + 1), self._links.get(second - 1)
             self._links[second] = before if before is not None and np.array_equal(before, links) else links

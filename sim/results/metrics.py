@@ -1,9 +1,4 @@
-"""Computes the summary of a run from its outcome. `summary_figures.py` defines each figure.
-
-pdr      = unique deliveries of application packets at their targets / (packets generated x targets), at most 1
-repeated = further deliveries of a packet at a target whose process was restarted, and so has forgotten the first
-delay    = from the hand-over by one application to the receipt by the other, per (packet, target)
-"""
+"""Computes the summary of a run from its outcome. `summary_figures.py` defines each figure."""
 
 from collections import Counter
 from collections.abc import Mapping

@@ -1,8 +1,7 @@
 """The packets that applications sent, and their deliveries at the nodes for which they were meant.
 
-A packet is identified by origin and sequence number. Only the first delivery at each target counts. A second one at the
-same node is `repeated`: the node's process was restarted, and has forgotten the first. A delivered packet is `unknown`
-if no node sent it at the instant that its header states: it is forged, or its origin's record is lost.
+Only the first delivery at each target counts; a second one is `repeated`: the node's process was restarted. A packet is
+`unknown` if no node sent it at the instant that its header states: it is forged, or its origin's record is lost.
 """
 
 from collections.abc import Mapping

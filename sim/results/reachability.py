@@ -2,11 +2,8 @@
 
     reached   the nodes of the origin's part of the network when the packet is born; then, second by second, of every
               part that holds one of them (time-respecting paths: a node keeps what it has), until its lifetime is over
-    pdr       deliveries / pairs of packet and target that were reached
-    within    deliveries within the bound of their packet / pairs that were reached within that bound
 
-What was delivered was reachable, whatever geometry says. Packets whose lifetime was not over when the run ended are
-left out, because what is still on its way is neither delivered nor lost.
+What was delivered was reachable, whatever geometry says. Packets whose lifetime was not over at the end are left out.
 """
 
 from collections import defaultdict
@@ -23,8 +20,7 @@ from sim.results.connectivity import parts
 from sim.results.links_over_time import LinksOverTime
 from sim.results.outcome import Outcome
 from sim.results.packets import OTHER_APPS, AppPackets, targets_by_source
-
-Flags = npt.NDArray[np.bool_]
+from sim.world.arrays import Flags
 
 
 def reachability(outcome: Outcome, applications: Mapping[str, AppPackets], links: LinksOverTime) -> dict[str, Any]:

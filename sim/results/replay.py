@@ -1,11 +1,6 @@
-"""Replays a mission from the files of its run: where each UAV was, what it did, and which area was covered.
+"""Replays a mission from the trace of its run: where each UAV was, what it did, and which area was covered.
 
-position      `posed`, once a second; in between on a straight line; a swarm that stands has none, and is at its start
-cluster       `role_changed`: the role and the head
-flight        `flight_mode_changed`: the mode of the flight controller; from `fallen` on the UAV is a wreck
-mission       `mission_mode_changed`: the UAV's decision, and for which survivor; `planned`: its place in the plan
-sensors       `detected`, `sighted`
-finds         `approaching`, `arrived`, `confirmed`
+Between positions, once a second, UAVs are on a straight line; a swarm that stands has none, and is at its start.
 """
 
 from bisect import bisect_right

@@ -278,9 +278,7 @@ class RunFolder:
 
 
 def read_trace(folder: Path, *kinds: type[R]) -> Iterator[R]:
-    """The records of these kinds, or of all, whatever else is in the folder; raises ConfigError, with the number of a
-    line that is no record.
-    """
+    """The records of these kinds, or all, whatever else the folder has; raises ConfigError that names a wrong line."""
     for _, record in _lines(folder / TRACE_FILE, kinds):
         if record is not None:
             yield record  # type: ignore[misc]  # the kinds are those that were asked for

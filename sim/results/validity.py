@@ -1,15 +1,7 @@
-"""Decides whether the result of a run may be used. `reasons` lists, in sentences, everything that speaks against it.
-
-A result is valid, and the exit code 0, when all of this holds:
-
-    the run ended by itself, and no process died before its end
-    every actor has sent its last report, and no record of the trace was refused
-    every frame is accounted for
-    no bound that a node stated, of a delay or of its clock, was wrong
-    in real time: each measure of how the machine disturbed the run is within its limit
+"""Decides whether the result of a run may be used: `reasons` lists, in sentences, everything that speaks against it.
 
 In virtual time the machine cannot disturb a run. The limits come from runs in virtual time that were disturbed on
-purpose: within the limits, their delivery ratio is within 0.015 of that of the undisturbed run
+purpose: within them, the delivery ratio is within 0.015 of that of the undisturbed run
 (`tests/benchmarks/disturbed_runs.py`; table in docs/reference/validity.md).
 """
 

@@ -1,7 +1,5 @@
 """Switches the garbage collector off in runs in virtual time, which saves a tenth of their time, and has it collect
-what they leave behind: the actors of an ended run refer to each other (3 to 40 MB of 45 UAVs), and the collector by
-itself hardly ever examines what is old. So it is asked to, before a run, when those since the last time took much
-longer than that takes.
+what they leave behind (3 to 40 MB of 45 UAVs), which it hardly ever examines by itself.
 """
 
 import gc

@@ -1,7 +1,6 @@
 """Remembers the last known flight of a swarm, from which a world that is started again continues.
 
-Poses and setpoints are on the bus anyway. The launcher remembers the newest ones, and hands them to the next world.
-Implausible ones are ignored, because it is better that a world starts from the beginning than not at all.
+Implausible poses are ignored, because it is better that a world starts from the beginning than not at all.
 """
 
 import threading

@@ -282,9 +282,7 @@ class WorldActor(Actor):
         self.records += [FlightModeChanged(now_ns, node, mode.value) for node, mode in changes]
 
     def _find_wrecks(self, solids: Solids) -> None:
-        """In a world that continues an earlier one, UAVs are wrecks that lie on the ground without having been told to
-        land.
-        """
+        """UAVs that lie on the ground without having been told to land are wrecks in a world that continues another."""
         at = self._engine.positions()
         for row in np.flatnonzero(solids.gap_m(at) <= _WRECK_M).tolist():
             if not self._guidance.may_touch_down(row + 1):

@@ -3,9 +3,7 @@
     put -> from a known actor? -> within its allowance? -> decoded -> each item valid? -> spool on disk, or last report
                                   items that fail a check are counted by what was wrong, and dropped
 
-Only the last report of each actor and the sums of the links are in memory, so memory does not grow with the run: trace
-records and taps go to temporary files, and are read when the run is over. Puts with which an actor exceeds its
-allowance are counted as `excess` before they are decoded, so a flood of puts costs neither time nor disk space.
+A put beyond the allowance is counted before it is decoded, so a flood of puts costs neither time nor disk space.
 """
 
 import threading

@@ -82,9 +82,7 @@ def _child(recipe: ChildRecipe) -> None:
 
 
 def _keep_no_server_alive() -> None:
-    """Close this child's copy of the pipe that keeps the fork server alive, so that the server, and with it all
-    children, ends with the launcher, even a killed one.
-    """
+    """Close this copy of the fork server's pipe, so that it, and all children, end with a launcher that is killed."""
     kept = forkserver._forkserver._forkserver_alive_fd  # type: ignore[attr-defined]  # noqa: SLF001
     if kept is not None:
         os.close(kept)
@@ -92,9 +90,7 @@ def _keep_no_server_alive() -> None:
 
 
 def _give_way() -> None:
-    """Let processes of higher priority go first; with `SCHED_BATCH` a UAV that wakes up does not interrupt another's
-    step, when all become ready at once by the world's positions.
-    """
+    """With `SCHED_BATCH` a UAV that wakes up does not interrupt another's step, when the world's poses wake all."""
     os.nice(_NICENESS)
     if sys.platform == "linux":
         with contextlib.suppress(OSError):  # a container may forbid it; the niceness helps, too

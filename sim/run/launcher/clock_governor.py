@@ -5,13 +5,9 @@
     late in a few moments                               a pause of the machine: the limits of the run judge it
     nothing late                                        the pace rises again
 
-The limits are those within which a whole run is valid (`sim.results.validity`). A slower clock cures an overload; it
-cures no pause, and most machines that are guests of others are paused now and then.
-
-The pace rises by the curve of CUBIC (RFC 9438, section 4.2): soon to nearly the pace at which the overload was met,
-then hardly at all, then faster and faster, so that after `_RETURN_NS` it is the full one again. Where the swarm itself
-takes all the processor time there is, it stays below the pace of the overload; where others do, it tries again, because
-it cannot know what they would leave to it. In its last second of real time a run is left alone: a process that hears
+The limits are those within which a whole run is valid (`sim.results.validity`). The pace rises by the curve of CUBIC
+(RFC 9438, section 4.2) to the full one after `_RETURN_NS`; where the swarm itself takes all the processor time there
+is, it stays below the pace of the overload. In its last second of real time a run is left alone: a process that hears
 late of another pace would not end with the others.
 """
 

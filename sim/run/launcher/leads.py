@@ -3,8 +3,7 @@
     lead       long enough for the pauses of the machine, and for all processes of a processor to have their turn
     handover   where many processes share a processor, so that each wakes less often
 
-Both delay each hop. The machine is measured for a second before the swarm starts; a pause that comes every ten seconds
-is mostly missed, and a scenario for a machine with such pauses should state a lead.
+The machine is measured for a second before the swarm starts; a pause that comes every ten seconds is mostly missed.
 """
 
 import math

@@ -3,10 +3,8 @@
     start all -> wait until all are present -> start the clock -> collect traces, reports and taps -> all end -> outcome
                                                (and slow it down, if that is allowed, while the machine cannot keep up)
 
-A signal ends the swarm early, at an instant that all are told a second before, so that the partial result closes.
-
-If the process of a UAV dies, that is reported and the others go on. A run needs the emulator and the world, so it ends
-if either of them dies. With `respawn`, any process is started again, and continues by the clock.
+A signal ends the swarm early, at an instant that all are told a second before, so that the partial result closes. If
+the process of a UAV dies, the others go on; a run needs the emulator and the world.
 """
 
 import asyncio

@@ -42,9 +42,7 @@ class Engine(ABC):
         """
 
     def stand(self, rows: Flags) -> None:  # noqa: B027  (an engine without wind moves nobody who wants no velocity)
-        """Switch the motors of these bodies off until the next call: they stand on the ground, where friction holds
-        them, or sink to it.
-        """
+        """Switch the motors of these bodies off until the next call: they stand where friction holds them, or sink."""
 
     def drift(self, rows: Flags, tilt_m_s2: Rows) -> None:  # noqa: B027  (where no air moves nobody is taken along)
         """Let these bodies control nothing but their heights until the next call, with attitudes that are level but for

@@ -175,9 +175,7 @@ def _centered(metres: Rows, cell_m: tuple[float, float]) -> Heightmap:
 def _laid(
     metres: Rows, cells: list[tuple[float, float]], lattice: list[_Place], middle_deg: tuple[float, float]
 ) -> Heightmap:
-    """Heights under the area, by column and row of each place of the lattice. Cells are taken for parallelograms: over
-    10 km that is right to about 5 m.
-    """
+    """Heights under the area by column and row of the lattice; cells as parallelograms are right to 5 m over 10 km."""
     known = np.array([[1.0, place.at.east, place.at.north] for place in lattice])
     fit, *_ = np.linalg.lstsq(known, np.array(cells), rcond=None)
     return Heightmap(metres, (float(fit[0, 0]), float(fit[0, 1])), fit[1:].T, middle_deg)

@@ -202,9 +202,7 @@ def _of_file(world: World, hills: Hills | None, starts: Rows) -> Iterator[Box]:
 
 
 def _hills_of_file(scenario: Scenario) -> Hills:
-    """The heights of the file on a square grid over the area, nowhere lower than the file: where the grid is coarser,
-    ridges and towers keep their highest point.
-    """
+    """The heights of the file on a square grid, nowhere lower than it: ridges and towers keep their highest point."""
     world = scenario.world
     found = heightmap_of(world)
     cells = max(8, min(_FILE_CELLS, math.ceil(world.area_m / found.cell_m - 1e-6)))
@@ -219,9 +217,7 @@ def _hills_of_file(scenario: Scenario) -> Hills:
 
 
 def _not_below(heights: Rows, cell_m: float, east: Values, north: Values, least: Values) -> Rows:
-    """A grid raised where it would be lower than `least` between its points, but nowhere above the highest place beside
-    one.
-    """
+    """A grid raised where it would be lower than `least`, but nowhere above the highest place beside one."""
     side = len(heights)
     x, y = (np.clip(part / cell_m + (side - 1) / 2, 0, side - 1 - 1e-9) for part in (east, north))
     i, j = y.astype(np.int64), x.astype(np.int64)

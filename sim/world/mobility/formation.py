@@ -12,9 +12,7 @@ from sim.world.mobility.contract import Track
 
 
 class Formation:
-    """The whole layout moves from the base to the middle of the area, and then around it on a rectangle on which its
-    edges touch those of the area.
-    """
+    """The layout moves from the base to the middle of the area, then around it along the edges."""
 
     def __init__(self, starts: Rows, scenario: Scenario) -> None:
         self._starts = starts

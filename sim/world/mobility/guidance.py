@@ -1,11 +1,9 @@
 """The simulated flight controllers: the velocity that each UAV should fly now, by its mobility model or its setpoint.
 
 A UAV follows a moving place by a proportional controller, to which the velocity of the place is added (feed-forward).
-If the scenario says so, the world keeps UAVs apart (`separation_keeping.py`).
-
-Whatever a flight controller is asked to do, it holds its position when velocity setpoints are no longer renewed, brakes
-before the geofence or returns from it (`geofence.py`), and lands at once when its battery is nearly empty. It returns
-when it is asked to, and if the scenario says so also when its computer falls silent (`return_mode.py`).
+Whatever it is asked to do, it holds its position when velocity setpoints are no longer renewed, brakes before the
+geofence or returns from it (`geofence.py`), and lands at once when its battery is nearly empty. It returns when it is
+asked to, and if the scenario says so also when its computer falls silent (`return_mode.py`).
 """
 
 from collections.abc import Callable, Mapping
@@ -86,9 +84,7 @@ _Command = _GoTo | _FlyAt | _Land | Homeward
 
 
 def makes_sense(setpoint: Setpoint) -> bool:
-    """False for a setpoint with a coordinate or speed that is no number or absurdly great: any process on the bus may
-    send it, and it would overflow for all UAVs.
-    """
+    """False for a setpoint that is no number or absurdly great: any process may send it, and all would overflow."""
     possible = setpoint.position.is_within(FARTHEST_M) and setpoint.velocity.is_within(FASTEST_M_S)
     return possible and abs(setpoint.speed_m_s) <= FASTEST_M_S
 

@@ -1,7 +1,6 @@
 """Keeps UAVs apart that the world itself flies: they slow down towards each other, and are pushed apart when too near.
 
-So several UAVs that are sent to one point settle around it. UAVs that are flown by their companion computers avoid
-each other by what they have received (`agents/`).
+UAVs that are flown by their companion computers avoid each other by what they have received (`agents/`).
 """
 
 import math

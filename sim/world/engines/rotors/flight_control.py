@@ -63,9 +63,7 @@ class FlightControl:
         self._integral[:, rows] = 0.0
 
     def thrust_vector(self, wanted: Values, velocity: Values, dt_s: float, level: Drifting | None = None) -> Values:
-        """The wanted force of the rotors [N], east, north, up, within the limits; `level`: bodies that keep their
-        heights alone.
-        """
+        """The wanted force of the rotors within the limits [N]; `level`: bodies that keep their heights alone."""
         error = wanted - velocity
         mass, gravity = self._vehicle.mass_kg, GRAVITY_M_S2
         acceleration = self.velocity_per_s * error + still_drag_m_s2(self._vehicle, velocity) + self._integral

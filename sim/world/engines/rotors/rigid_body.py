@@ -42,9 +42,7 @@ _TUMBLE_PER_S: Final = 2.0
 
 
 class Rotors(Engine):
-    """A swarm of one type of vehicle. The state is one array for each quantity, with a column for each body, because
-    numpy is fast only with such.
-    """
+    """A swarm of one type of vehicle. The state is an array for each quantity, with a column for each body."""
 
     name = "rotors"
 

@@ -24,8 +24,7 @@ from fanet_mw.bus.radio_control import (
 )
 from fanet_mw.errors import ConfigError
 from fanet_mw.units import MAX_NODES, STILL, Enu, NodeId, S, seconds_to_ns
-from sim.cli.command_groups import RUNNING
-from sim.cli.options import SwarmFlags
+from sim.cli.options import RUNNING, SwarmFlags
 from sim.console import Console
 
 app = App(

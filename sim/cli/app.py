@@ -28,8 +28,8 @@ from sim.cli import (
     sweep,
     tool_files,
 )
-from sim.cli.command_groups import OPTIONS, RUN, RUNNING, SCENARIO, SERVICE, STUDY, TOOLS
 from sim.cli.memory import require_for
+from sim.cli.options import OPTIONS, RUN, RUNNING, SCENARIO, SERVICE, STUDY, TOOLS
 from sim.console import Console, discard_output, nobody_reads, open_closed_streams, printable
 
 app = App(

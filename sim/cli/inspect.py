@@ -6,8 +6,7 @@ from typing import Annotated
 from cyclopts import App, Parameter
 from cyclopts.validators import Number
 
-from sim.cli.command_groups import RUNNING
-from sim.cli.options import SwarmFlags
+from sim.cli.options import RUNNING, SwarmFlags
 
 topic = App(name="topic", group=RUNNING, help="The topics of a swarm that runs: list, echo, hz, bw.")
 

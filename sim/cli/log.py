@@ -10,8 +10,7 @@ from cyclopts import App, Parameter
 from rich.table import Table
 
 from fanet_mw.errors import ConfigError
-from sim.cli.command_groups import TOOLS
-from sim.cli.options import SwarmFlags, require_file_or_nothing
+from sim.cli.options import TOOLS, SwarmFlags, require_file_or_nothing
 from sim.console import Console
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
-from cyclopts import Parameter, Token
+from cyclopts import Group, Parameter, Token
 
 from fanet_mw.errors import ConfigError
 from sim.bus.running_swarms import DEFAULT_ENDPOINT, locate
@@ -25,6 +25,14 @@ if TYPE_CHECKING:
     from sim.observation.bus_feed import BusFeed
 
 _err = Console(stderr=True)
+RUN: Final = Group("Run a swarm", sort_key=1)
+SCENARIO: Final = Group("Scenarios", sort_key=2)
+STUDY: Final = Group("Many runs, figures and reports", sort_key=3)
+RUNNING: Final = Group("While a swarm runs", sort_key=4)
+SERVICE: Final = Group("Services one by one (instead of fanet launch)", sort_key=5)
+TOOLS: Final = Group("For other tools", sort_key=6)
+OPTIONS: Final = Group("Options", sort_key=7)
+"""The groups in which `fanet --help` lists the commands, in the order in which a newcomer meets them."""
 _LEAD_MS: Final = 40
 """The lead in real time of a scenario without one: timers of asyncio and the bus are late by some milliseconds."""
 

@@ -5,8 +5,7 @@ from cyclopts import App
 from fanet_mw.errors import ConfigError
 from fanet_mw.orders import Order, OrderKind, wrong
 from fanet_mw.units import MAX_NODES, S
-from sim.cli.command_groups import RUNNING
-from sim.cli.options import SwarmFlags
+from sim.cli.options import RUNNING, SwarmFlags
 from sim.console import Console
 
 app = App(

@@ -193,10 +193,6 @@ def _shares(site: Site, head: NodeId, load: Sequence[int], classes: Sequence[Tra
     return [ClassLoad(n, c.interval_ns, site.flood(head, c.payload_bytes)) for n, c in zip(load, classes, strict=True)]
 
 
-def _longest(shares: Sequence[ClassLoad]) -> FloodCost:
-    return max((s.flood for s in shares), key=lambda f: f.duration_ns, default=FloodCost(0, 1, 0, proven=True))
-
-
 def _assumed_ns(site: Site) -> int:
     """The assumed delay to the head if it has no bound; with a timetable members can contend only once per period."""
     return max(_ASSUMED_UPLINK_NS, site.scenario.clusters.period_ns) if site.timetable else _ASSUMED_UPLINK_NS
@@ -269,24 +265,26 @@ def _in_slots(site: Site, candidates: Sequence[Candidate], jitter_ns: int) -> _J
 
 
 def _refused(candidate: Candidate, why: Refused, period_ns: int) -> ClusterPlan:
-    return ClusterPlan(
-        head=candidate.head,
-        members=candidate.members,
-        hops=candidate.hops,
-        slot_ns=0,
-        usable_ns=0,
-        work_ns=work_ns(candidate.shares, period_ns=period_ns),
-        packets=_packets(candidate.shares, period_ns),
-        flood=_longest(candidate.shares),
-        delays=tuple(why if s.sources else Bounded(0) for s in candidate.shares),
-        backlog=None,
-    )
+    delays = [why if s.sources else Bounded(0) for s in candidate.shares]
+    return _in_slot(candidate, delays, None, slot_ns=0, usable_ns=0, period_ns=period_ns)
 
 
 def _cluster(candidate: Candidate, *, slot_ns: int, period_ns: int, guard_ns: int, jitter_ns: int) -> ClusterPlan:
-    shares = candidate.shares
     usable_ns = max(0, slot_ns - guard_ns)
-    delays, waiting = slot_delays(shares, usable_ns=usable_ns, period_ns=period_ns, jitter_ns=jitter_ns)
+    delays, waiting = slot_delays(candidate.shares, usable_ns=usable_ns, period_ns=period_ns, jitter_ns=jitter_ns)
+    return _in_slot(candidate, delays, waiting, slot_ns=slot_ns, usable_ns=usable_ns, period_ns=period_ns)
+
+
+def _in_slot(
+    candidate: Candidate,
+    delays: Sequence[DelayBound],
+    backlog: int | None,
+    *,
+    slot_ns: int,
+    usable_ns: int,
+    period_ns: int,
+) -> ClusterPlan:
+    shares = candidate.shares
     return ClusterPlan(
         head=candidate.head,
         members=candidate.members,
@@ -294,15 +292,11 @@ def _cluster(candidate: Candidate, *, slot_ns: int, period_ns: int, guard_ns: in
         slot_ns=slot_ns,
         usable_ns=usable_ns,
         work_ns=work_ns(shares, period_ns=period_ns),
-        packets=_packets(shares, period_ns),
-        flood=_longest(shares),
+        packets=sum(s.sources * period_ns / s.interval_ns for s in shares),
+        flood=max((s.flood for s in shares), key=lambda f: f.duration_ns, default=FloodCost(0, 1, 0, proven=True)),
         delays=tuple(delays),
-        backlog=waiting,
+        backlog=backlog,
     )
-
-
-def _packets(shares: Sequence[ClassLoad], period_ns: int) -> float:
-    return sum(s.sources * period_ns / s.interval_ns for s in shares)
 
 
 def _planned(c: TrafficClass, bound: DelayBound, from_head: DelayBound) -> ClassPlan:

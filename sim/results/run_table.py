@@ -2,6 +2,7 @@
 
 import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -12,7 +13,6 @@ from sim.results.run_folder import RunFolder
 
 if TYPE_CHECKING:
     from pyarrow import Table
-from collections.abc import Mapping
 
 _SWEEP: Final = "runs.parquet"
 _MOST_BYTES: Final = 1 << 31

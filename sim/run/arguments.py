@@ -10,7 +10,7 @@ from fanet_mw.application import Application
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario, config
 from sim.scenarios import catalog
-from sim.scenarios.available_engine import with_engine
+from sim.scenarios.catalog import with_engine
 
 OfUser = Callable[[int], Sequence[Application]] | Mapping[int, Sequence[Application]]
 """A user's applications: a list for each node, or a function that makes the list for a node."""

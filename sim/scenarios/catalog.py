@@ -1,13 +1,15 @@
 """Finds a scenario by name or path, reads and checks it."""
 
+import sys
 from collections.abc import Iterable
+from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.scenario.text_files import read_text
 from fanet_mw.wire.search_plan import MOST_PLACES
-from sim.scenarios.available_engine import with_engine
 from sim.scenarios.shipped import Entry, entry, is_file, shipped
 
 __all__ = ["Entry", "find", "shipped", "text_of"]
@@ -55,3 +57,19 @@ def text_of(name: str) -> str:
 
 def _is_file(name: str) -> bool:
     return is_file(name, [entry.name for entry in shipped()])
+
+
+def with_engine(scenario: Scenario) -> Scenario:
+    """The scenario; with the engine `kinematic` in place of a pybullet that is not there, which is said once."""
+    if scenario.world.engine != "pybullet" or find_spec("pybullet") is not None:
+        return scenario
+    say_engine()
+    world = scenario.world.model_copy(update={"engine": "kinematic"})
+    return scenario.model_copy(update={"world": world})
+
+
+@cache
+def say_engine() -> None:
+    sys.stderr.write(
+        "pybullet is not installed (pip install 'fanet-mw[pybullet]'): world.engine = \"kinematic\" serves instead.\n"
+    )

@@ -14,7 +14,7 @@ from fanet_mw.scenario import Scenario, config
 from fanet_mw.scenario.fingerprint import fingerprint
 from sim.cli.options import ScenarioFlags
 from sim.run.arguments import scenario_of
-from sim.scenarios import available_engine, catalog
+from sim.scenarios import catalog
 from sim.sweep.spec import Sweep
 from sim.sweep.tasks import tasks_of
 
@@ -117,7 +117,7 @@ def test_where_pybullet_is_not_installed_kinematic_serves_for_all_and_one_senten
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setitem(sys.modules, "pybullet", None)  # an import of it fails
-    available_engine.say.cache_clear()
+    catalog.say_engine.cache_clear()
     given = Scenario.model_validate({"world": {"engine": "pybullet"}, "duration_s": 1, "warmup_s": 0})
     (task, *_) = tasks_of(Sweep(base="quick"))
     found = {

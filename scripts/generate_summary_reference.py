@@ -1,24 +1,26 @@
 """Generate the table of figures in docs/reference/results.md; `--check` compares.
 
-What each figure means stands in `sim/results/summary_figures.py`.
+What each figure means stands in `sim/results/summary_figures.toml`.
 """
 
 import re
 import sys
+import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from sim.results.summary_figures import FIGURES
-
-DOCUMENT: Final = Path(__file__).resolve().parent.parent / "docs" / "reference" / "results.md"
+ROOT: Final = Path(__file__).resolve().parent.parent
+DOCUMENT: Final = ROOT / "docs" / "reference" / "results.md"
+FIGURES: Final = ROOT / "sim" / "results" / "summary_figures.toml"
 BEGIN: Final = "<!-- figures: summary by scripts/generate_summary_reference.py -->\n"
 END: Final = "<!-- end of summary -->\n"
 
 
 def table() -> str:
     """One row for each group of figures."""
-    rows = (f"| {', '.join(f'`{key}`' for key in keys)} | {meaning} |\n" for keys, meaning in FIGURES.items())
+    figures = tomllib.loads(FIGURES.read_text(encoding="utf-8"))
+    rows = (f"| `{keys.replace(', ', '`, `')}` | {meaning} |\n" for keys, meaning in figures.items())
     return f"| key | definition |\n|---|---|\n{''.join(rows)}"
 
 

@@ -20,9 +20,8 @@ from sim.console import Console
 if TYPE_CHECKING:
     from pyarrow import Table
 
-    from sim.sweep.remaining_runs import RemainingRuns
     from sim.sweep.spec import Sweep
-    from sim.sweep.whole_sweep import Progress, Workers
+    from sim.sweep.whole_sweep import Progress, RemainingRuns, Workers
 
 _err = Console(stderr=True)
 _SAY_S: Final = 20.0
@@ -82,10 +81,9 @@ def carry_out(
     json: bool = False,
 ) -> int:
     from sim.sweep.provenance import code
-    from sim.sweep.remaining_runs import RemainingRuns
     from sim.sweep.store import TABLE, Store
     from sim.sweep.tasks import tasks_of
-    from sim.sweep.whole_sweep import run
+    from sim.sweep.whole_sweep import RemainingRuns, run
 
     tasks = tasks_of(wanted)
     store = Store(out)

@@ -1,7 +1,7 @@
 """How well clusters follow the network: the roles in the trace on the links of each second of the measured window.
 
-`summary_figures.py` defines the figures. A node that stands in for a head that is gone is the head. Empty for protocols
-without clusters.
+`summary_figures.toml` defines the figures. A node that stands in for a head that is gone is the head. Empty for
+protocols without clusters.
 """
 
 import statistics

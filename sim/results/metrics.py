@@ -1,4 +1,4 @@
-"""Computes the summary of a run from its outcome. `summary_figures.py` defines each figure."""
+"""Computes the summary of a run from its outcome. `summary_figures.toml` defines each figure."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -8,14 +8,7 @@ from typing import Any
 import numpy as np
 
 from fanet_mw.errors import DropReason
-from fanet_mw.trace import (
-    ConflictForeseen,
-    DeadlineLost,
-    DeadlineMet,
-    Delivered,
-    Dropped,
-    Warned,
-)
+from fanet_mw.trace import ConflictForeseen, DeadlineLost, DeadlineMet, Delivered, Dropped, Warned
 from fanet_mw.units import MS, S
 from sim.records.record_kinds import records_of
 from sim.results import delays, ledger, validity

@@ -1,5 +1,5 @@
 """The outcome of a search mission, from the trace: survivors confirmed, area covered, coherence and separation of the
-swarm. `summary_figures.py` defines each figure; positions are the true ones, once a second (`Posed`).
+swarm. `summary_figures.toml` defines each figure; positions are the true ones, once a second (`Posed`).
 """
 
 import math

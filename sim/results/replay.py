@@ -16,14 +16,7 @@ import numpy.typing as npt
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import (
-    FlightModeChanged,
-    MissionModeChanged,
-    Planned,
-    Posed,
-    Record,
-    RoleChanged,
-)
+from fanet_mw.trace import FlightModeChanged, MissionModeChanged, Planned, Posed, Record, RoleChanged
 from fanet_mw.units import Enu, NodeId, S
 from sim.results.mission import OverflownCells
 from sim.results.run_folder import RunFolder

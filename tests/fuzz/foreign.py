@@ -39,10 +39,10 @@ from sim.results.stored_result import load_result
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 from sim.sweep.one_run import Finished
-from sim.sweep.remaining_runs import RemainingRuns
 from sim.sweep.spec import Sweep
 from sim.sweep.store import Store
 from sim.sweep.tasks import tasks_of
+from sim.sweep.whole_sweep import RemainingRuns
 from sim.world.possible_world import require_possible
 
 LONGEST_S: Final = 20

@@ -7,10 +7,9 @@ from typing import Any, Final
 from fanet_mw.results import read
 from sim.sweep import spec
 from sim.sweep.one_run import Finished, carry_out
-from sim.sweep.remaining_runs import RemainingRuns
 from sim.sweep.store import Store
 from sim.sweep.tasks import Task, tasks_of
-from sim.sweep.whole_sweep import run
+from sim.sweep.whole_sweep import RemainingRuns, run
 
 FILE = """
 base = "flooding"

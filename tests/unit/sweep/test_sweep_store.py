@@ -18,10 +18,9 @@ from sim.results.run_table import flat
 from sim.sweep import spec
 from sim.sweep.one_run import Finished, carry_out
 from sim.sweep.provenance import code
-from sim.sweep.remaining_runs import RemainingRuns
 from sim.sweep.store import TABLE, Store, write_whole
 from sim.sweep.tasks import Task, tasks_of
-from sim.sweep.whole_sweep import Progress, run
+from sim.sweep.whole_sweep import Progress, RemainingRuns, run
 
 FILE = """
 base = "flooding"

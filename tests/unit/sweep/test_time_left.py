@@ -6,9 +6,9 @@ import pytest
 
 from sim.cli.sweep import spoken
 from sim.sweep import spec
-from sim.sweep.remaining_runs import RemainingRuns, TimeLeft
 from sim.sweep.store import Store
 from sim.sweep.tasks import tasks_of
+from sim.sweep.whole_sweep import RemainingRuns, TimeLeft
 
 FILE = """
 base = "flooding"

@@ -9,14 +9,15 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal, TypeAlias
 
 from cyclopts import Group, Parameter, Token
+from cyclopts.completion import CompletionContext
 
 from fanet_mw.errors import ConfigError
 from sim.bus.running_swarms import DEFAULT_ENDPOINT, locate
-from sim.cli.completion import keys
 from sim.console import Console, tell
+from sim.scenarios.shipped import shipped
 
 if TYPE_CHECKING:
     from fanet_mw.gateway.gateway import Doors
@@ -35,6 +36,21 @@ OPTIONS: Final = Group("Options", sort_key=7)
 """The groups in which `fanet --help` lists the commands, in the order in which a newcomer meets them."""
 _LEAD_MS: Final = 40
 """The lead in real time of a scenario without one: timers of asyncio and the bus are late by some milliseconds."""
+
+
+def scenario_names(context: CompletionContext) -> list[str]:
+    """Shipped scenarios; the shell itself offers files."""
+    return [entry.name for entry in shipped() if entry.name.startswith(context.incomplete)]
+
+
+def keys(context: CompletionContext) -> list[str]:
+    from fanet_mw.scenario.reference import dotted_keys
+
+    return [f"{key}=" for key in dotted_keys() if key.startswith(context.incomplete)]
+
+
+ScenarioName: TypeAlias = Annotated[str, Parameter(completer=scenario_names)]
+"""A shipped scenario's name, or a .toml file."""
 
 
 def _seconds(_type: object, tokens: Sequence[Token]) -> float:

@@ -16,9 +16,8 @@ from cyclopts.validators import Number
 
 from fanet_mw.errors import ConfigError
 from sim.cli.companions import Companions, record_command, view_command
-from sim.cli.completion import ScenarioName
 from sim.cli.memory import COMPILING_MB, require
-from sim.cli.options import DoorFlags, OutputFlags, ScenarioFlags, print_notes, warn_of
+from sim.cli.options import DoorFlags, OutputFlags, ScenarioFlags, ScenarioName, print_notes, warn_of
 from sim.console import Console
 
 if TYPE_CHECKING:

@@ -10,8 +10,7 @@ from cyclopts import Parameter
 from rich.table import Table
 
 from fanet_mw.errors import ConfigError
-from sim.cli.completion import ScenarioName
-from sim.cli.options import ScenarioFlags, print_notes
+from sim.cli.options import ScenarioFlags, ScenarioName, print_notes
 from sim.console import Console
 from sim.scenarios.shipped import shipped
 

@@ -7,8 +7,7 @@ from cyclopts import Parameter
 
 from fanet_mw.errors import FanetError
 from sim.bus.running_swarms import DEFAULT_ENDPOINT
-from sim.cli.completion import ScenarioName
-from sim.cli.options import OutputFlags, ScenarioFlags, ServiceFlags, SwarmFlags, warn_of
+from sim.cli.options import OutputFlags, ScenarioFlags, ScenarioName, ServiceFlags, SwarmFlags, warn_of
 from sim.console import Console, tell
 
 _err = Console(stderr=True)

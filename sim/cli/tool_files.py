@@ -8,8 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from fanet_mw.errors import ConfigError
-from sim.cli.completion import ScenarioName
-from sim.cli.options import ScenarioFlags
+from sim.cli.options import ScenarioFlags, ScenarioName
 from sim.console import Console
 
 

@@ -1,6 +1,7 @@
 """The page of results says of each figure of a summary what its definition in the source says."""
 
 import runpy
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -28,5 +29,6 @@ def test_a_page_without_the_marks_is_refused(tmp_path: Path) -> None:
 
 
 def test_no_figure_is_defined_twice() -> None:
-    keys = [key for group in SCRIPT["FIGURES"] for key in group]
+    figures = tomllib.loads(SCRIPT["FIGURES"].read_text(encoding="utf-8"))
+    keys = [key for group in figures for key in group.split(", ")]
     assert len(keys) == len(set(keys))

@@ -22,7 +22,7 @@ from fanet_mw.trace import LIKELY_SHARE
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.places import rounded
 from sim.planner import flood_loss
-from sim.planner.cheapest_change import ScenarioChange, cheapest_change
+from sim.planner.cheapest_change import cheapest_change
 from sim.planner.demand import ClassPlan, demands
 from sim.planner.expected_links import chance_of, expected_links
 from sim.planner.lossy_plan import LossyPlan, plan_lossy
@@ -99,7 +99,10 @@ def judge(
                 delivers=delivers,
             )
         text.append(describe_change(cheapest, found))
-        content["change"] = None if cheapest is None else _change_json(cheapest)
+        content["change"] = None if cheapest is None else {
+            "set": list(cheapest.variant.arguments),
+            "classes": [_class_json(c, cheapest.plan.deadline_ns) for c in cheapest.plan.classes],
+        }  # fmt: skip
     return "\n".join(text), content, found.feasible
 
 
@@ -154,15 +157,12 @@ def _reported(scenario: Scenario, at: dict[NodeId, Enu]) -> list[dict[NodeId, En
     """Draws of the starting positions as UAVs report them, with errors of GPS; none if GPS is exact."""
     noise_m = error_m(sigma_m=scenario.world.gps_sigma_m, range_m=scenario.radio.range_m)
     sigma_m = math.hypot(noise_m, scenario.sensors.gps_bias_m)
+
+    def displaced(place: Enu, random: Random) -> Enu:
+        return rounded(Enu(*(axis + random.gauss(0.0, sigma_m) for axis in place)))
+
     draws = range(_GPS_DRAWS) if sigma_m else ()
-    return [
-        {node: _displaced(place, sigma_m, stream(draw, "plan/gps", node)) for node, place in at.items()}
-        for draw in draws
-    ]
-
-
-def _displaced(place: Enu, sigma_m: float, random: Random) -> Enu:
-    return rounded(Enu(*(axis + random.gauss(0.0, sigma_m) for axis in place)))
+    return [{node: displaced(place, stream(draw, "plan/gps", node)) for node, place in at.items()} for draw in draws]
 
 
 def _has_floods(found: ScenarioPlan, at: Mapping[NodeId, Enu]) -> bool:
@@ -256,13 +256,6 @@ def _class_json(c: ClassPlan, deadline_ns: int | None) -> dict[str, Any]:
         "from_head_ms": _ms(c.from_head),
         "refused": c.bound.reason if isinstance(c.bound, Refused) else None,
         "deadline_met": None if deadline_ns is None else c.meets(deadline_ns),
-    }
-
-
-def _change_json(change: ScenarioChange) -> dict[str, Any]:
-    return {
-        "set": list(change.variant.arguments),
-        "classes": [_class_json(c, change.plan.deadline_ns) for c in change.plan.classes],
     }
 
 

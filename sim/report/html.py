@@ -6,9 +6,8 @@ import base64
 import html
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from fanet_mw.foreign_file import read_regular
 
@@ -34,45 +33,39 @@ pre { padding: .7rem; overflow-x: auto; } .wide { overflow-x: auto; } .short { w
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Heading:
+class Heading(NamedTuple):
     """The title of a part of the page."""
 
     text: str
     level: int = 2
 
 
-@dataclass(frozen=True, slots=True)
-class Text:
+class Text(NamedTuple):
     """A paragraph of the page."""
 
     text: str
 
 
-@dataclass(frozen=True, slots=True)
-class Quoted:
+class Quoted(NamedTuple):
     """A paragraph that somebody else has written: shown as it is, whatever it would mean in HTML or Markdown."""
 
     text: str
 
 
-@dataclass(frozen=True, slots=True)
-class Commands:
+class Commands(NamedTuple):
     """Lines to be typed into a shell."""
 
     lines: Sequence[str]
 
 
-@dataclass(frozen=True, slots=True)
-class Picture:
+class Picture(NamedTuple):
     """A PNG with its caption."""
 
     path: Path
     caption: str
 
 
-@dataclass(frozen=True, slots=True)
-class Rows:
+class Rows(NamedTuple):
     """A table; a cell that is a verdict is shown as one."""
 
     head: Sequence[str]

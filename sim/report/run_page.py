@@ -3,8 +3,7 @@ the mission achieved.
 """
 
 import shlex
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from sim.figures.style import applied, save
 from sim.report import air_pictures, finds, mission_pictures, run_pictures, run_rows, slot_pictures
 from sim.report.html import Block, Commands, Heading, Picture, Quoted, Text
 from sim.report.run_records import SHOWN, RunRecords
-from sim.results.file_names import KINDS, PICTURES
+from sim.results.file_names import PICTURES
 from sim.results.printed_summary import clock_sentence
 from sim.results.run_folder import RunFolder
 
@@ -42,13 +41,25 @@ def blocks_of_run(folder: Path, out: Path) -> list[Block]:
         blocks += [Heading("Mission", 3), run_rows.mission(summary, confirms=run.scenario.mission.search != "none")]
     captured = captures(folder / CAPTURE)
     air = air_pictures.air_of(run, captured, epoch_unix_ns=summary.get("epoch_unix_ns", 0))
-    for kind, draw in zip(KINDS, _drawings(run, links, reports, air), strict=True):
-        with applied():
-            drawn = draw()
-            if drawn is not None:
+    with applied():
+        drawn = {
+            "delays": run_pictures.delays(run),
+            "delivery": run_pictures.delivery(run),
+            "links": run_pictures.links(run, links),
+            "slots": slot_pictures.slots(run, reports),
+            "air": None if air is None else air_pictures.picture(run, air, links),
+        }
+        if run.searches:
+            drawn |= {
+                "mission": mission_pictures.progress(run),
+                "waits": mission_pictures.waits(run),
+                "tracks": mission_pictures.tracks(run),
+            }
+        for kind, picture in drawn.items():
+            if picture is not None:
                 blocks.append(Heading(_TITLES[kind], 3))
-                save(drawn.figure, pictures, f"{name}-{kind}")
-                blocks.append(Picture(pictures / f"{name}-{kind}.png", drawn.caption))
+                save(picture.figure, pictures, f"{name}-{kind}")
+                blocks.append(Picture(pictures / f"{name}-{kind}.png", picture.caption))
                 if kind == "air" and air is not None:
                     blocks += [
                         air_pictures.rows(air),
@@ -70,23 +81,6 @@ _TITLES = {
     "waits": "From heard to confirmed",
     "tracks": "Tracks",
 }
-
-
-def _drawings(
-    run: RunRecords, links: Sequence[Any], reports: dict[int, Any], air: air_pictures.Air | None
-) -> Sequence[Callable[[], run_pictures.RunPicture | None]]:
-    """What draws each kind of picture, in the order of `KINDS`; a mission's pictures only if the run has one."""
-    return (
-        partial(run_pictures.delays, run),
-        partial(run_pictures.delivery, run),
-        partial(run_pictures.links, run, links),
-        partial(slot_pictures.slots, run, reports),
-        _nothing if air is None else partial(air_pictures.picture, run, air, links),
-        *(
-            partial(draw, run) if run.searches else _nothing
-            for draw in (mission_pictures.progress, mission_pictures.waits, mission_pictures.tracks)
-        ),
-    )
 
 
 def _verdict(summary: Mapping[str, Any]) -> list[Block]:
@@ -112,10 +106,6 @@ def _finds(run: RunRecords, folder: RunFolder) -> list[Block]:
         else:
             blocks.append(Text("Nothing: the whole area came within the nominal range of a UAV's phone receiver."))
     return blocks
-
-
-def _nothing() -> None:
-    """No picture."""
 
 
 def _slowed(summary: Mapping[str, Any]) -> list[Block]:

@@ -146,15 +146,7 @@ class Pcap:
     def acknowledged(self, t_ns: int, src: int, dst: int) -> None:
         """Record that an ACK leaves an antenna."""
         tap = _RADIOTAP.pack(
-            0,
-            0,
-            _RADIOTAP.size,
-            _SENT,
-            self._ack_flags,
-            self._ack_rate,
-            *self._channel,
-            self._power_dbm,
-            0,
+            0, 0, _RADIOTAP.size, _SENT, self._ack_flags, self._ack_rate, *self._channel, self._power_dbm, 0
         )
         self._put(t_ns, tap, _ACK.pack(0xD4, 0, 0, mac_address(dst)))
 

@@ -12,17 +12,7 @@ if TYPE_CHECKING:
     from agents.program.attached import Emulated, NodeClosedError, OnAir
     from agents.program.joined import Node, join
     from agents.program.mailbox import Message, Sent
-    from fanet_mw.application import (
-        ANY,
-        HOME,
-        Application,
-        AppPort,
-        Course,
-        Data,
-        Fate,
-        Received,
-        Status,
-    )
+    from fanet_mw.application import ANY, HOME, Application, AppPort, Course, Data, Fate, Received, Status
     from fanet_mw.bus.messages import (
         Altimeter,
         Battery,

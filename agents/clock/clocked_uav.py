@@ -20,16 +20,7 @@ from agents.uav import NodeState, Uav
 from fanet_mw import wire
 from fanet_mw.actor import Actor
 from fanet_mw.application import Application
-from fanet_mw.bus.messages import (
-    Gps,
-    MavlinkTap,
-    Message,
-    Reception,
-    SensorReading,
-    Setpoint,
-    TxRequest,
-    TxStatus,
-)
+from fanet_mw.bus.messages import Gps, MavlinkTap, Message, Reception, SensorReading, Setpoint, TxRequest, TxStatus
 from fanet_mw.node.node import AnnouncedHello
 from fanet_mw.node.reader import Reader
 from fanet_mw.scenario import Scenario

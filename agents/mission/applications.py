@@ -16,11 +16,7 @@ from agents.mission.outbox import Outbox
 from agents.mission.paper_rule import PaperRule
 from agents.mission.searcher import Searcher, phone_model
 from fanet_mw.application import Application, AppPort, Received
-from fanet_mw.bus.messages import (
-    Gps,
-    SensorReading,
-    WifiScan,
-)
+from fanet_mw.bus.messages import Gps, SensorReading, WifiScan
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.geodesy import Geodetic
 from fanet_mw.node.reader import decoded

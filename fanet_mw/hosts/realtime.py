@@ -323,11 +323,7 @@ class RealtimeHost:
         content = {
             **self._actor.report(),
             "final": final,
-            "host": {
-                **self._lateness.summary(),
-                **self._cost.summary(final=final),
-                **self._inbox.figures(),
-            },
+            "host": {**self._lateness.summary(), **self._cost.summary(final=final), **self._inbox.figures()},
         }
         report = Report(self._actor.name, self.now_ns(), json.dumps(content))
         self._bus.put(self._names.report(self._actor.name), codecs.encode([report]), reliable=True)

@@ -89,10 +89,7 @@ def parse(data: bytes) -> AsciiGrid:
             raise ValueError(f"{key} = {found[key]:g} contradicts cellsize = {found['cellsize']:g}")
     columns, rows = _count(found, "ncols"), _count(found, "nrows")
     cell = _side(found, "dx"), _side(found, "dy")
-    middle = (
-        _middle(found, "x", cells=columns, cell=cell[0]),
-        _middle(found, "y", cells=rows, cell=cell[1]),
-    )
+    middle = (_middle(found, "x", cells=columns, cell=cell[0]), _middle(found, "y", cells=rows, cell=cell[1]))
     return AsciiGrid(columns, rows, cell, middle, found.get("nodata"), lines[body:], body + 1)
 
 

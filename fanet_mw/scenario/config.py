@@ -31,14 +31,7 @@ def _name_of(path: Path) -> str:
     return re.sub(r"[^A-Za-z0-9_-]+", "-", letters).strip("-")[:64] or "unnamed"
 
 
-def parse(
-    text: str,
-    *,
-    source: str,
-    name: str,
-    overrides: Iterable[str] = (),
-    folder: Path | None = None,
-) -> Scenario:
+def parse(text: str, *, source: str, name: str, overrides: Iterable[str] = (), folder: Path | None = None) -> Scenario:
     """A scenario from TOML; `source`: in messages. Paths in it are from `folder`, in overrides from here."""
     tree = toml_of(text, source=source)
     tree.setdefault("name", name)

@@ -55,11 +55,7 @@ def json_schema() -> dict[str, Any]:
     keys = schema["properties"]
     one = keys.pop("further_traffic")["items"]  # in a file it is the same table several times
     keys["traffic"] = {"anyOf": [one, {"type": "array", "items": one}]}
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **schema,
-        "title": "fanet-mw scenario",
-    }
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "fanet-mw scenario"}
 
 
 def _described(schema: dict[str, Any]) -> dict[str, Any]:

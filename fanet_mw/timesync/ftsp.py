@@ -112,10 +112,7 @@ class TimeSync:
         self._neighbors: dict[NodeId, _LastBeacon] = {}
         self._doubt_ns = int(_DOUBT_HELLOS * own.hello_ns)
         self._first = InitialSync(
-            own.oscillator,
-            leader=own.leader,
-            wait_ns=self._doubt_ns,
-            memory_ns=int(_FRESH_HELLOS * own.hello_ns),
+            own.oscillator, leader=own.leader, wait_ns=self._doubt_ns, memory_ns=int(_FRESH_HELLOS * own.hello_ns)
         )
         self._sent: tuple[int, int] | None = None
         """The last hello that this node has sent: its number, and when it ended."""

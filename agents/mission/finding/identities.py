@@ -13,12 +13,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
-from agents.mission.finding.confirmation import (
-    GREATEST_MARGIN,
-    is_confirmable,
-    is_seen_enough,
-    required_margin,
-)
+from agents.mission.finding.confirmation import GREATEST_MARGIN, is_confirmable, is_seen_enough, required_margin
 from agents.mission.finding.known_survivors import SAME_PLACE_M, KnownSurvivors, estimate_of
 from agents.mission.finding.person_track import PersonTrack
 from agents.mission.finding.phone_localization import Estimate

@@ -170,11 +170,7 @@ class Sightings:
 
 
 def ground_place(
-    at: Enu,
-    *,
-    bearing_rad: float,
-    elevation_rad: float,
-    rise_m: Callable[[float, float], float] | None = None,
+    at: Enu, *, bearing_rad: float, elevation_rad: float, rise_m: Callable[[float, float], float] | None = None
 ) -> tuple[float, float, float] | None:
     """East and north of the place where a direction from `at` first meets the ground, and the slant range; None above
     the horizon, or so little below it (`_LEAST_DEPRESSION_RAD`) that a small error would move the place by far. `at.up`

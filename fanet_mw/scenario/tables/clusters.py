@@ -5,12 +5,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import Field
 
 from fanet_mw.extensions import Options, OptionsOf, PartName
-from fanet_mw.scenario.tables.sections import (
-    Duration,
-    Length,
-    Milliseconds,
-    Section,
-)
+from fanet_mw.scenario.tables.sections import Duration, Length, Milliseconds, Section
 from fanet_mw.units import seconds_to_ns
 
 METHODS: Final = ("balanced",)

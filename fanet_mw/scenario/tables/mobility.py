@@ -5,11 +5,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import Field
 
 from fanet_mw.extensions import Options, OptionsOf, PartName
-from fanet_mw.scenario.tables.sections import (
-    Duration,
-    Length,
-    Section,
-)
+from fanet_mw.scenario.tables.sections import Duration, Length, Section
 
 MOBILITY_MODELS: Final = ("static", "formation", "random_waypoint", "crossing", "onboard")
 _RIGID: Final = ("static", "formation")

@@ -5,14 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from fanet_mw.scenario.tables.sections import (
-    Coordinate,
-    Count,
-    Length,
-    Rate,
-    Section,
-    SomeLength,
-)
+from fanet_mw.scenario.tables.sections import Coordinate, Count, Length, Rate, Section, SomeLength
 from fanet_mw.units import MAX_NODES
 
 

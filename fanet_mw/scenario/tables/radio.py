@@ -272,10 +272,7 @@ def _disagreements(radio: Radio) -> Iterator[str]:
 
 def _silent_cuts(radio: Radio) -> Iterator[str]:
     """Levels by which frames that could be received would be ignored."""
-    for key, level_dbm in (
-        ("sensitivity_dbm", radio.sensitivity_dbm),
-        ("carrier_sense_dbm", radio.carrier_sense_dbm),
-    ):
+    for key, level_dbm in (("sensitivity_dbm", radio.sensitivity_dbm), ("carrier_sense_dbm", radio.carrier_sense_dbm)):
         if radio.interference_floor_dbm > level_dbm:
             yield (
                 f"radio.interference_floor_dbm = {radio.interference_floor_dbm:g} must be <= radio.{key} = "

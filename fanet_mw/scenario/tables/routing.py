@@ -5,13 +5,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import AfterValidator, Field
 
 from fanet_mw.extensions import Options, OptionsOf, PartName
-from fanet_mw.scenario.tables.sections import (
-    Count,
-    Duration,
-    Milliseconds,
-    Section,
-    SomeTime,
-)
+from fanet_mw.scenario.tables.sections import Count, Duration, Milliseconds, Section, SomeTime
 from fanet_mw.units import MS, seconds_to_ns
 
 

@@ -5,13 +5,7 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from fanet_mw.scenario.tables.sections import (
-    MOST_S,
-    Duration,
-    Id,
-    Section,
-    SomeTime,
-)
+from fanet_mw.scenario.tables.sections import MOST_S, Duration, Id, Section, SomeTime
 from fanet_mw.units import MAX_NODES
 
 LEAST_BYTES: Final = 64

@@ -7,12 +7,7 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from fanet_mw.scenario.named_files import digest_of, middle_deg
-from fanet_mw.scenario.tables.sections import (
-    Coordinate,
-    Section,
-    SomeLength,
-    read_with_file,
-)
+from fanet_mw.scenario.tables.sections import Coordinate, Section, SomeLength, read_with_file
 from fanet_mw.units import DEFAULT_ORIGIN_DEG, MS
 
 FILE_KEYS: Final = {"heightmap": "heightmap_sha256", "buildings_geojson": "buildings_sha256"}

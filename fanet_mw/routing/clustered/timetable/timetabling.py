@@ -219,13 +219,7 @@ class FromPlaces:
                 loads=loads,
             )
         return found or fit(
-            self._port.scenario,
-            places,
-            head_of,
-            leader=leader,
-            origin_ns=origin_ns,
-            period_ns=period_ns,
-            loads=loads,
+            self._port.scenario, places, head_of, leader=leader, origin_ns=origin_ns, period_ns=period_ns, loads=loads
         )
 
 

@@ -117,12 +117,10 @@ class TurnAccess:
             now_ns=now_ns,
         )
         self._calls.follow(
-            [TurnsInForce(one.valid_ns, one.turns, one.calls, one.frame_bytes, 1) for one in timetables],
-            now_ns=now_ns,
+            [TurnsInForce(one.valid_ns, one.turns, one.calls, one.frame_bytes, 1) for one in timetables], now_ns=now_ns
         )
         self._spare.follow(
-            [TurnsInForce(one.valid_ns, one.turns, one.spare, one.frame_bytes, 1) for one in timetables],
-            now_ns=now_ns,
+            [TurnsInForce(one.valid_ns, one.turns, one.spare, one.frame_bytes, 1) for one in timetables], now_ns=now_ns
         )
 
     def serve(self, now_ns: int) -> None:

@@ -1,6 +1,4 @@
-"""Which applications on board are called for each kind of input: those that implement the method for it, or that have
-asked for the message or port. This is found out once, so that no application is called that would do nothing.
-"""
+"""Which applications on board are called for each input: those that implement its method, or asked for its port."""
 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple, Self

@@ -1,7 +1,6 @@
 """Checks what an application submits for sending, before anything is done with it.
 
-A submission that can never be sent is a mistake of the program, whatever the state of the network. It raises
-LocalProtocolError, with the name, the value and the bound, in the call that made it.
+A submission that can never be sent is a mistake of the program: LocalProtocolError, in the call that made it.
 """
 
 from collections.abc import Collection, Mapping

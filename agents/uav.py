@@ -1,7 +1,6 @@
 """The UAV as an actor: connects the node of one id and the applications on board with the topics of the bus.
 
-Inputs are receptions, transmit statuses and sensor readings; outputs are transmit requests, setpoints and MAVLink taps.
-The parts make all decisions; this file only passes inputs and outputs to their places, and sends the UAV's hellos.
+Inputs: receptions, transmit statuses, sensor readings. Outputs: transmit requests, setpoints, MAVLink taps.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,4 @@
-"""The interface between the medium and the kernel, in terms of stations and frame slots.
-
-Only the medium knows bytes, topics and node ids.
-"""
+"""The interface between the medium and the kernel, in terms of stations and frame slots."""
 
 import struct
 from typing import Final

@@ -1,7 +1,6 @@
 """The traffic load of one node: when it sends the next packet, and how long that is.
 
-`TrafficGenerator` computes the instants, and `Load` is the application that sends. Packets are generated at whole
-microseconds, because the header states no more.
+Packets are generated at whole microseconds, because the header states no more.
 """
 
 import math

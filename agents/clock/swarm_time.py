@@ -1,8 +1,6 @@
-"""How a node knows swarm time, by the key `clock.sync`: from its own clock alone, from the time beacons of its
-neighbors, or from GPS.
+"""How a node knows swarm time, by `clock.sync`: from its own clock alone, from neighbors' time beacons, or from GPS.
 
-Each class computes the linear function (line) that converts instants of the node's own clock. The simulated GPS adds
-independent normal noise to each fix; multipath and lasting errors are not modeled.
+Each class computes a line over the node's own clock. Fixes of GPS have independent normal noise, and no lasting errors.
 """
 
 import math

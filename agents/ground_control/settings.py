@@ -1,6 +1,4 @@
-"""The parameters of a UAV that a ground station reads and writes. All are floats; their names are PX4's where it has
-one of that meaning.
-"""
+"""The parameters of a UAV that a ground station reads and writes: floats, with PX4's name where it has such a one."""
 
 import math
 from collections.abc import Sequence

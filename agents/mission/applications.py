@@ -1,8 +1,7 @@
 """Search and rescue as an application of a node, in two kinds of which a node runs one: by the rule of the paper
 ("Reliable Flying IoT Networks for UAV Disaster Rescue Operations", section 4.1), or as a search planned in the air.
 
-Each application passes its inputs to the mission, and empties the mission's outbox into its port. Both have the name
-`report`, by which results count the reports of survivors, whichever of the two has sent them.
+Both have the name `report`, by which results count the reports of survivors, whichever of the two has sent them.
 """
 
 from typing import Final

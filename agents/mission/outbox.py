@@ -1,8 +1,4 @@
-"""Collects the decisions of one UAV's mission: records for the trace, packets to flood, and a course to fly.
-
-The parts of a mission write into one outbox and do not know the node's port; the application empties it after each
-input.
-"""
+"""Collects the decisions of one UAV's mission: records for the trace, packets to flood, and a course to fly."""
 
 from dataclasses import dataclass, field
 from typing import NamedTuple

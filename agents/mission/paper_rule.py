@@ -1,9 +1,4 @@
-"""The paper's rule of search and rescue at one UAV: detect, report, and approach a survivor that enough nodes have
-reported.
-
-In the paper (4.1), reports by three or more different nodes make a UAV change its course. Sans-IO: scans, reports and
-positions go in; survivor reports, courses and trace records come out.
-"""
+"""The paper's rule at one UAV (4.1): detect, report, and approach a survivor that enough different nodes reported."""
 
 import math
 from collections.abc import Sequence

@@ -1,8 +1,4 @@
-"""Finds the pairs of stations within reach of each other by cells as wide as the reach, so the effort follows the
-neighbors.
-
-Distances are in metres and in three dimensions. Cells divide the ground, so stations above each other share one.
-"""
+"""Finds the pairs of stations within reach of each other [m], by cells of the ground that are as wide as the reach."""
 
 import math
 

@@ -1,8 +1,4 @@
-"""Writes the XML of the MAVLink dialect together with the XML that it includes, for tools that read or generate from
-it.
-
-The included XML is that of the installed pymavlink, so it matches the messages that this package's parser knows.
-"""
+"""Writes the XML of the MAVLink dialect together with what it includes, as the installed pymavlink has it."""
 
 import re
 from importlib.resources import files

@@ -1,7 +1,6 @@
 """The topology of a swarm: each node's neighbors in order of id, as plain values. Pure functions.
 
-Clusters, slots and relays are built on links that work both ways; `symmetric` keeps only those. Not modeled: link
-quality; a link exists or not.
+`symmetric` keeps only links that work both ways. Not modeled: link quality; a link exists or not.
 """
 
 from collections.abc import Collection, Iterable, Mapping

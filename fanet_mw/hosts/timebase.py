@@ -1,8 +1,7 @@
 """The clocks of a machine, and an identity of the machine, for everything that measures real time.
 
-Unix time can be stepped by an operator or by NTP. The monotonic clock cannot, and all processes of one machine read the
-same one until the machine is booted again. Instants that must survive a step are therefore told in monotonic time to
-processes of the same machine, and in unix time only to others.
+Unix time can be stepped. Instants that must survive that are told in monotonic time to processes of the same machine,
+which all read the same, and in unix time only to others.
 """
 
 import hashlib

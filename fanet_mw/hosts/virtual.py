@@ -1,9 +1,7 @@
-"""The host for virtual time: all actors share one heap of (t_ns, seq), so a run is deterministic and as fast as
-possible.
+"""The host for virtual time: all actors share one heap of (t_ns, seq), so a run is deterministic.
 
 A message that is put at t is received at t, before time moves on, in the order of the puts. Wake-ups at the same
-instant happen in the order in which they were requested. Nothing depends on a clock, on hashes, or on the order of a
-set.
+instant happen in the order in which they were requested.
 """
 
 import heapq

@@ -1,7 +1,4 @@
-"""Reads the position and velocity of another UAV out of a frame that this UAV has received.
-
-Every UAV puts them into its hellos and into the position messages that it floods through the swarm.
-"""
+"""Reads the position and velocity of another UAV out of a frame that this UAV has received."""
 
 from typing import Final
 

@@ -1,9 +1,7 @@
-"""Counter-based flooding: a node relays a packet unless it receives enough copies of it in time, another answer to the
-broadcast storm (Ni et al., MobiCom 1999, 3.2).
+"""Counter-based flooding: a node relays a packet unless it hears enough copies of it (Ni et al., MobiCom 1999, 3.2).
 
-A node waits U(0, `routing.assess_ms`), and relays the packet if it has received fewer than `routing.counter` copies by
-then. Everything is flooded, even packets for one node. Not modeled: the distance- and location-based schemes of the
-paper.
+A node waits U(0, `routing.assess_ms`), and relays if it has received fewer than `routing.counter` copies by then. Not
+modeled: the distance- and location-based schemes of the paper.
 """
 
 from collections.abc import Mapping, Sequence

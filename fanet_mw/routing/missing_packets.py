@@ -1,5 +1,4 @@
-"""The data packets that a node knows to lack: those that its neighbors say to have, and the gaps, because an origin
-numbers its packets without any.
+"""The data packets that a node knows to lack: those that neighbors say to have, and gaps in an origin's numbers.
 
 A packet counts as missing when its flood should be over, and is given up after a while. Who lacks nothing states what
 it has in every fourth hello, so that a node hears of packets that it never receives.

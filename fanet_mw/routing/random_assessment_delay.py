@@ -1,7 +1,6 @@
-"""Random assessment delay: a packet is relayed unless enough copies of it are received in time (Ni et al., MobiCom
-1999, 3.2).
+"""Random assessment delay: a packet is relayed unless enough copies come in time (Ni et al., MobiCom 1999, 3.2).
 
-    first copy -> wait -> fewer than `enough` copies received: relayed | as soon as there are enough: forgotten
+first copy -> wait -> fewer than `enough` copies received: relayed | as soon as there are enough: forgotten
 """
 
 import heapq

@@ -1,7 +1,7 @@
 """The scenario of a run: its model, the tables it is made of, and how it is read from a TOML file.
 
 model.py, tables/            the whole scenario; each of its tables: `[radio]` in `tables/radio.py`
-checks.py                    what the tables allow together
+cross_checks.py              what the tables allow together
 config.py, overrides.py      reading from files; settings as `--set KEY=VALUE`
 quantities.py                units that a value may be written with
 validation_errors.py         what the user reads of a scenario that is not valid

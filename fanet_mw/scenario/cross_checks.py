@@ -1,7 +1,6 @@
-"""Checks that span several tables of a scenario; each table checks itself, and refuses keys it does not know
-(`tables/sections.py`).
+"""Checks that span several tables of a scenario; each table checks itself (`tables/sections.py`).
 
-Each problem is a sentence with the keys, their values and the bound. All problems are found, not only the first.
+All problems are found, not only the first; each is a sentence with the keys, their values and the bound.
 """
 
 from __future__ import annotations  # `Scenario` imports this module: to it, the name is a type only

@@ -1,8 +1,7 @@
 """The scenario: one frozen model of all that a run depends on. Keys have units that people use, named in the key.
 
 A key is a contract with users, because renaming it breaks their files and sweeps. Derived values are properties, in
-integer nanoseconds. Each table has a file of its name in `tables/` and checks itself; `cross_checks.py` checks what
-spans several tables.
+integer nanoseconds.
 """
 
 import math

@@ -1,5 +1,4 @@
-"""FANET_PLACES: the positions of the members in a part of a schedule, in whole metres, so that all nodes compute the
-same timetable.
+"""FANET_PLACES: positions of the members in a part of a schedule, in whole metres: all nodes compute one timetable.
 
 The message follows its FANET_SCHEDULE in the same packet; entry i belongs to member `first + i` of that part.
 """

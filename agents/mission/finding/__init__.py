@@ -1,3 +1,1 @@
-"""Finding survivors: where phones were received, which people were seen, who carries which phone,
-and who is confirmed.
-"""
+"""Finding survivors: where phones were received, which people were seen, who carries which phone, who is confirmed."""

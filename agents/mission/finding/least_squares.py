@@ -1,5 +1,4 @@
-"""Locates a phone by least squares over received powers, by the log-distance law (the simpler method of the paper's
-rule).
+"""Locates a phone by least squares over received powers, by the log-distance law (the method of the paper's rule).
 
     RSSI_i = P - L0 - 10 n log10(d_i)   ->   minimize over (east, north) the sum of (RSSI_i - predicted_i)^2
 

@@ -1,6 +1,4 @@
-"""One person on the ground whom cameras or microphones show: a Kalman filter over the sightings, and the evidence that
-somebody is there.
-"""
+"""One person whom cameras or microphones show: a Kalman filter over the sightings, and the evidence of presence."""
 
 from dataclasses import dataclass
 from typing import Final

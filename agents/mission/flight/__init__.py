@@ -1,3 +1,1 @@
-"""The flight of a searching UAV: to its goal, clear of others and of obstacles, within reach of its neighbors, and
-home.
-"""
+"""The flight of a searching UAV: to its goal, clear of others and obstacles, within reach of neighbors, and home."""

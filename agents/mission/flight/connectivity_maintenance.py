@@ -1,6 +1,4 @@
-"""Connectivity maintenance: half-planes of velocities that keep a UAV within radio reach of those it is tied to, so
-that the swarm stays one network while it searches.
-"""
+"""Connectivity maintenance: half-planes of velocities that keep a UAV within radio reach of those it is tied to."""
 
 import math
 from typing import Final

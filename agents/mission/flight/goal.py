@@ -1,6 +1,4 @@
-"""The goal of a searching UAV: where an order sends it; a survivor, within the limits of its place in the formation; or
-its lane.
-"""
+"""The goal of a searching UAV: an order's place; a survivor, within the limits of its formation; or its lane."""
 
 from typing import Final
 

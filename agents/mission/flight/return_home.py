@@ -1,6 +1,5 @@
 """The return of a UAV whose battery runs low, that hears nobody any more, or whose search is over: it flies home above
-all UAVs that search, then lands straight down. Its task and its place in the formation are handed on before
-(`agents/mission/searcher.py`, `agents/mission/search_formation/formation_planner.py`).
+all UAVs that search, then lands straight down.
 
 UAVs whose pads are beside each other land in turns: who comes waits `_HOLD_M` from its pad while another one is over
 the pads and has not begun to sink, or while one with a lower id waits as well.

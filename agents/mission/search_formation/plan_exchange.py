@@ -1,6 +1,4 @@
-"""How all UAVs come to the same plan: each sends its status, one of them plans (`formation_planner.py`), and all
-follow the newest plan.
-"""
+"""How all UAVs come to one plan: each sends its status, one of them plans (`formation_planner.py`), all follow it."""
 
 from collections.abc import Callable
 from typing import Final

@@ -1,6 +1,4 @@
-"""The configuration of AODV (RFC 3561, 10). Where the RFC leaves a choice, the value is that of ns-3. Numbers in
-parentheses are sections of the RFC.
-"""
+"""The configuration of AODV (RFC 3561, 10; numbers in parentheses are its sections); free choices are as in ns-3."""
 
 from typing import Final
 

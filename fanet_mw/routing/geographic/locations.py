@@ -1,6 +1,4 @@
-"""The positions of other nodes, of neighbors by their beacons and of any node by the location service; and the neighbor
-to which a packet is handed next.
-"""
+"""Positions of other nodes, by beacons and the location service; and the neighbor that a packet is handed to next."""
 
 from typing import Final
 

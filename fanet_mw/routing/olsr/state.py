@@ -1,5 +1,4 @@
-"""The information repositories of an OLSR node: links, neighbors, 2-hop neighbors, MPR selectors, topology (RFC 3626,
-4).
+"""The repositories of an OLSR node: links, neighbors, 2-hop neighbors, MPR selectors, topology (RFC 3626, 4).
 
 Every entry has its own end; nothing here has a timer. `version` changes whenever a message may have changed an input of
 the routes; `next_change_ns` is the instant at which they next change by the passing of time.

@@ -1,8 +1,6 @@
-"""Transmits floods: broadcasts that begin at one node and that every relay passes on once (the phase FLOOD of a
-packet).
+"""Transmits floods: broadcasts that begin at one node and that every relay passes on once (the phase FLOOD).
 
-Each data packet that the node floods or receives is kept in the store for repair, if the scenario has repair. Other
-parts decide whether and when a node floods; this part carries it out.
+Each data packet that the node floods or receives is kept in the store for repair, if the scenario has repair.
 """
 
 from collections.abc import Sequence

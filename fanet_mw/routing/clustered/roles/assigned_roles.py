@@ -1,9 +1,7 @@
-"""Roles that a leader assigns: a node floods a JOIN, and the leader floods a SCHEDULE with the clusters and their
-heads.
+"""Roles that a leader assigns: a node floods a JOIN, and the leader floods a SCHEDULE with the clusters and heads.
 
-Which state a node takes when heads or leaders fail, or when separated parts of the swarm meet, is decided in
-`failover.py` by the table in `states.py`. This file carries the decisions out: it joins, announces schedules, and tells
-the access what the schedule makes of this node.
+`failover.py` decides by the table in `states.py` which state a node takes. This file carries that out: it joins,
+announces schedules, and tells the access what the schedule makes of this node.
 """
 
 from collections.abc import Mapping, Sequence

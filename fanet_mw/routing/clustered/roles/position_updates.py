@@ -1,9 +1,7 @@
-"""Decides when a node sends its position to the leader: dead reckoning, as in distributed interactive simulation (IEEE
-1278.1).
+"""Decides when a node sends its position to the leader: dead reckoning, as in IEEE 1278.1.
 
 The leader extrapolates from the last position and velocity that it was told. A node sends an update when it is farther
-than a share of the radio range from the extrapolated position, or when it has flooded nothing for so long that the
-leader might take it for failed. A swarm that hovers or flies straight therefore sends few updates.
+than a share of the radio range from there, or has flooded nothing for so long that it might be taken for failed.
 """
 
 from typing import Final

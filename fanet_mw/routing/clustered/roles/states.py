@@ -1,5 +1,4 @@
-"""The state machine of a node's role, as a table: (state, event) -> (state, action). After the start of a node no other
-code changes its state.
+"""The state machine of a node's role: (state, event) -> (state, action). After the start no other code changes a state.
 
 `failover.py` finds the events and asks for a row. A combination without a row cannot happen, and would raise. The
 diagram in docs/explanation/roles.md is generated from the table by `scripts/generate_state_diagram.py`.

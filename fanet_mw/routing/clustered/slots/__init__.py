@@ -1,3 +1,1 @@
-"""Slots of heads: by `slot_access` members send packets to their head, which floods them in its slot; `slot_release` is
-the queue that is emptied then.
-"""
+"""Slots of heads: `slot_access` brings members' packets to the head, whose queue `slot_release` empties in its slot."""

@@ -1,3 +1,1 @@
-"""TDMA: `slot_timing` and `turn_timing` say at which instants a node may transmit, `hello_room` whether hellos fit the
-contention window.
-"""
+"""TDMA: `slot_timing` and `turn_timing`: when a node may transmit; `hello_room`: whether hellos fit the window."""

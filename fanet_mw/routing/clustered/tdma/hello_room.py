@@ -1,5 +1,4 @@
-"""Whether the hellos of a swarm fit the contention window of its superframe; a node that is not heard is taken for
-failed.
+"""Whether the hellos of a swarm fit the contention window of its superframe; who is not heard is taken for failed.
 
 Two frames destroy each other at a common neighbor, so those of all nodes within two hops are added up, each with DIFS
 and a mean backoff. This is an estimate. Where they do not fit, nodes state no bound (`timetable/stated_delays.py`).

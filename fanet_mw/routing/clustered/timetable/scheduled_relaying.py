@@ -1,5 +1,4 @@
-"""Relaying by a timetable: the turn in which a packet is received tells which flood it is, and when this node relays
-it.
+"""Relaying by a timetable: the turn in which a packet is received tells its flood, and when this node relays it.
 
 With a clock behind the sender's a frame may seem to end before its turn begins, by at most the slack; one that found
 the medium busy ends some turns later. What was heard too late for this node's own turn is counted, and passed on in

@@ -23,8 +23,7 @@ from fanet_mw.scenario import Radio, Scenario
 MOST_ASKED: Final = 256
 """The greatest number of requests that wait to be passed to the kernel."""
 _SLOTS: Final = 1000
-"""The initial number of frame slots. It is no power of two: with one, the rows of a frame would compete for the same
-few lines of the processor's cache."""
+"""No power of two: with one, the rows of a frame would compete for the same few lines of the processor's cache."""
 
 
 @dataclass(slots=True)

@@ -32,8 +32,7 @@ class Actor(ABC):
     patient: Collection[str] = ()
     """The topics whose messages may wait for a wake-up that is due within the slack."""
     hears_out = False
-    """True for an actor that accounts for what others send. In real time it then still receives, before `stop`, the
-    messages that were on their way when the run ended."""
+    """True for an actor that, in real time, still receives before `stop` what was on its way when the run ended."""
 
     def __init__(self, name: str, subscriptions: tuple[str, ...]) -> None:
         self.name = name

@@ -161,9 +161,7 @@ class AppPort(Protocol):
         """The velocity of the last fix [m/s]."""
 
     def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
-        """The nodes of each cluster by its head, the head first, as far as this node knows; empty if the routing
-        protocol makes no clusters.
-        """
+        """The nodes of each cluster by its head, the head first, as far as this node knows; empty without clusters."""
 
     def send(
         self,

@@ -87,9 +87,7 @@ class _RealTime:
         return self._uav.report()
 
     async def let_out(self, lead_ns: int) -> None:
-        """Wait until receipts and packets of this node are on the air (one lead after they are announced), unless the
-        medium is always taken.
-        """
+        """Wait until receipts and packets of this node are on the air, unless the medium is always taken."""
         ends_s = self._now_s() + _LEAVING_S
         while self._host.running and self.state().owing and self._now_s() < ends_s:
             await asyncio.wait((self._task,), timeout=_POLL_S)

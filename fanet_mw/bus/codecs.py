@@ -20,8 +20,7 @@ from fanet_mw.orders import Order
 from fanet_mw.units import Enu, NodeId
 
 MAX_HEARD: Final = 10_000
-"""The greatest number of phones in a scan, people in an image, or voices: the most survivors that a
-scenario may have."""
+"""The greatest number of phones in a scan, people in an image, or voices: the most survivors of a scenario."""
 MAX_ECHOES: Final = 4_096
 """The greatest number of returns in a radar scan."""
 

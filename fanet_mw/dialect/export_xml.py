@@ -14,9 +14,7 @@ _INCLUDE: Final = re.compile(r"<include>\s*(\S+?)\s*</include>")
 
 
 def write(folder: Path) -> Path:
-    """Write `v1.0/fanet.xml` and what it includes, as in MAVLink's own repository; returns its path. Raises ConfigError
-    if files cannot be written, or pymavlink lacks its definitions.
-    """
+    """Write `v1.0/fanet.xml` and what it includes; returns its path. Raises ConfigError."""
     target = folder / "v1.0"
     ours, theirs = files("fanet_mw.dialect"), files("pymavlink.dialects.v20")
     try:

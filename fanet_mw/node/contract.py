@@ -52,9 +52,7 @@ class Port(Protocol):
         """Pass a flooded packet on in a frame of its own; its hop count grows by one."""
 
     def relay_together(self, relays: Sequence[Relay]) -> None:
-        """Pass flooded packets on in as few frames as possible; a frame is sent at the earliest instant of the packets
-        in it.
-        """
+        """Pass flooded packets on in as few frames as possible, each at the earliest instant of the packets in it."""
 
     def announce(
         self, kind: Kind, inner: bytes, *, now_ns: int, flags: int, hop_limit: int, destination: NodeId = BROADCAST
@@ -70,9 +68,7 @@ class Port(Protocol):
         """From now on, treat copies of a packet in the phase of these flags as duplicates."""
 
     def forget(self, packet: Packet) -> None:
-        """Treat a later copy of a packet as new, because this node was not to handle it yet, or has handed over its
-        custody.
-        """
+        """Treat a later copy of a packet as new: this node was not to handle it yet, or has handed over its custody."""
 
     def record(self, record: Record) -> None: ...
 
@@ -93,9 +89,7 @@ class RoutingProtocol(ABC):
 
     @abstractmethod
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
-        """Handle a packet of an own application; its first frame may be sent from `due_ns`, one lead after its
-        generation.
-        """
+        """Handle a packet of an own application; its first frame may be sent from `due_ns`."""
 
     @abstractmethod
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> Sequence[Relay] | None:
@@ -135,9 +129,7 @@ class RoutingProtocol(ABC):
         """A neighbor's hello was received."""
 
     def on_impersonation(self, packet: Packet, *, now_ns: int) -> None:  # noqa: B027
-        """A packet was received that names this node as its origin, but that another node has made;
-        it goes no further.
-        """
+        """A packet was received that names this node as its origin, but that another node has made."""
 
     def on_copy(self, key: int, src: NodeId, *, now_ns: int) -> None:  # noqa: B027
         """Another copy of a packet (`duplicates.key_of`) was received from a neighbor, in a phase in which it was
@@ -181,9 +173,7 @@ class RoutingProtocol(ABC):
         return {}
 
     def parted(self, now_ns: int, *, without: Collection[int] = ()) -> Collection[NodeId]:
-        """The nodes to which there was a way, and is none any more that avoids those in `without`, who are known to be
-        lost, as far as this node knows.
-        """
+        """The nodes to which there was a way, and is none any more that avoids those in `without`, known to be lost."""
         return ()
 
     def hold(self, nodes: Collection[NodeId]) -> None:  # noqa: B027

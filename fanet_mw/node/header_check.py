@@ -25,13 +25,11 @@ from fanet_mw.wire import MOST_HOPS, Fields, Kind
 RESTART_STEP_NS: Final = 100 * US
 """A node sends fewer packets than one in this time, so a restarted one begins above all its earlier numbers."""
 CONTROL: Final = 0x8000_0000
-"""The sequence numbers of control packets begin here. They are separate, so that data packets have no gaps and a lost
-one is noticed."""
+"""Control packets are numbered from here, so that data packets have no gaps and a lost one is noticed."""
 _AHEAD_NS: Final = 100 * MS
 """How far ahead an instant of generation may be if all clocks are exact, because hosts get their time over a bus."""
 _BURST: Final = 100_000
-"""A sequence number may be greater by this than one packet per `RESTART_STEP_NS` would reach: it is ten seconds of the
-densest traffic."""
+"""How much faster sequence numbers may grow than one per `RESTART_STEP_NS`: ten seconds of the densest traffic."""
 _LATEST: Final = 8
 """The transmitters that decide whether the own clock is behind: those that were heard last."""
 _SEVERAL: Final = 2

@@ -65,8 +65,7 @@ class Node:
         self.deliveries: list[Packet] = []
         """The packets for the applications of this node, of those to which one of them listens."""
         self.listened: Collection[bytes] | None = None
-        """The ids of first inner messages to which the applications listen, as they stand in a frame; None: every id.
-        Other packets are delivered as well, but nobody takes them."""
+        """The ids of first inner messages to which the applications listen, as in a frame; None: every id."""
         self.hellos: list[Packet] = []
         """The hellos of neighbors, in which the applications and the clock read more than routing does."""
         self.silences = Silences(count=scenario.node_count)

@@ -37,8 +37,7 @@ _KIND: Final = 7
 _FLAGS: Final = 11
 """The index of its flags among them."""
 BUNDLE: Final = 1 << 30
-"""Stands for the phase of a frame that holds several packets. No duplicate set ever has this bit, so each such frame is
-opened, and its packets are looked up one by one."""
+"""Stands for the phase of a frame with several packets; in no duplicate set, so each such frame is opened."""
 _LATEST: Final = 64
 """The number of packets whose decoded content is cached: more than the hellos that a radio hands over at once."""
 _UNKNOWN: Final = (-1, b"", 0)
@@ -61,8 +60,7 @@ class Looked:
         self.hash = packet_hash
         """`duplicates.hash_of` the packet, by which duplicates are found; 0 if the frame holds several packets."""
         self.phase = phase
-        """The bit of the packet's phase (`duplicates.PHASES`); 0 if the phase flags are invalid; BUNDLE if the frame
-        holds several packets."""
+        """The bit of the packet's phase (`duplicates.PHASES`); 0: invalid flags; BUNDLE: several packets."""
         self.packet: Packet | None = None
         """The packet in the frame; None until `read` has been called."""
         self.parts: Sequence[Looked] | None = None
@@ -74,9 +72,7 @@ class Looked:
         return 0 if self.phase == BUNDLE else key_of(self.fields[_ORIGIN], self.fields[_SEQ])
 
     def read(self, cached: bool = True) -> Packet:
-        """The packet in the frame; raises MalformedFrameError. `cached`: a hello, which the clock has asked for
-        already.
-        """
+        """The packet; raises MalformedFrameError. `cached`: a hello, which the clock has asked for already."""
         frame, fields = self.frame, self.fields
         if not self.phase:
             raise MalformedFrameError("no routing header, or one of two phases")

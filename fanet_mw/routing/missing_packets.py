@@ -25,8 +25,7 @@ class MissingPackets:
         """The number of hellos since the last one that stated what this node has."""
         self._newest: dict[int, int] = {}
         self._noticed_ns: dict[tuple[int, int], int] = {}
-        """The instant at which each packet was noticed, by origin and number; those given up stay until their origin
-        has sent so many more that nobody speaks of them."""
+        """When each packet was noticed, by origin and number; those given up stay until nobody speaks of them."""
         self._until_ns = 0
         """The instant until which losses are suspected, whatever is missing."""
 

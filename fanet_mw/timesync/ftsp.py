@@ -53,8 +53,7 @@ _STAMPS: Final = 4
 """The number of hellos of each neighbor whose ends are remembered."""
 _NEIGHBORS: Final = 256
 MOST_STATED_NS: Final = 20 * MS
-"""The greatest error that hellos state. A greater one means a node without a time, or nonsense, and guard times do not
-allow for it."""
+"""The greatest error that hellos state: a greater one means no time, or nonsense."""
 WORST_LIFE_NS: Final = 20 * S
 _APART_HELLOS: Final = 9
 """A neighbor that for this long has stated no time, or one that cannot be followed, is out of step."""
@@ -330,9 +329,7 @@ class TimeSync:
             self._consider(beacon.reference, pair, local_ns)
 
     def contradicted(self, src: int, local_ns: int) -> None:
-        """If several that agreed state another time, and nobody agrees, this clock has jumped; not nodes that never
-        agreed: a station may repeat what is sent far away.
-        """
+        """If several that agreed state another time, and nobody agrees, this clock has jumped."""
         if src in self._agreed:
             self._contradicting.add(src)
         if self._is_contradicted(local_ns, hellos=_QUESTION_HELLOS):

@@ -15,8 +15,7 @@ class Join(NamedTuple):
     position: Enu
     velocity: Enu = STILL
     instead_of: int = 0
-    """The silent node that the sender reports; if that is its head, the sender stands in for it. 0 means none, and the
-    sender's own id that the sender objects to a report."""
+    """The silent node that the sender reports, or stands in for if it is its head; 0: none; its own id: it objects."""
 
     def encode_frame(self, node: int) -> bytes:
         payload = JOIN.layout.pack(*self.position, *self.velocity, self.node, self.instead_of, VERSION)

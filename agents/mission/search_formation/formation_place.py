@@ -18,8 +18,7 @@ from fanet_mw.wire.search_plan import Search
 _FREE_REACH: Final = 0.84
 """A follower stays within this share of the radio's reach from its team."""
 _ASIDE_M: Final = 70.0
-"""A UAV of a team examines a survivor who is at most this far to the side of the farthest point that `_LEASH_M`
-permits, or less far if its camera does not look so far to the side."""
+"""A UAV of a team examines a survivor at most so far aside of what `_LEASH_M` permits, or less far by its camera."""
 _LOOK_SHARE: Final = 0.9
 """The share of its view to the side that a UAV relies on."""
 _AHEAD_M: Final = 250.0
@@ -49,8 +48,7 @@ class FormationPlace:
         self.pattern: Pattern | None = None
         self.place: int | None = None
         self._left_from: Enu | None = None
-        """The position at which this UAV was when it received its first plan, or had taken off after that; it flies to
-        its place from there."""
+        """Where this UAV was when it received its first plan, or had taken off after that."""
         self._left_ns = 0
         """The instant at which it leaves that position."""
         self._gaps: frozenset[int] = frozenset()

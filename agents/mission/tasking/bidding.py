@@ -42,8 +42,7 @@ _LONG_AGO_NS: Final = -(10**18)
 _HANDOVER_S: Final = 15.0
 """The time that a responder is assumed to need at its present survivor."""
 _ASTRAY_M: Final = 100.0
-"""Before the sweep a UAV may be this far from where it would be on the way to its place, or farther if it will be at
-its place in time."""
+"""How far a UAV may be from its way before the sweep, or farther if it will be at its place in time."""
 _LATE_S: Final = 6.0
 """A UAV is in time if it is at its place at most so long after the sweep has begun: it catches up then."""
 _GLANCE_S: Final = 8.0

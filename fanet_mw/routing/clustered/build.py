@@ -58,8 +58,7 @@ _STORE_PACKETS: Final = 4096
 _ASKED_NS: Final = 10 * S
 """How long a node with a timetable asks for a packet that it lacks, unless the scenario repairs packets."""
 _JITTER: Final = 0.25
-"""The greatest random wait of a relay, as a share of the contention window. If relays waited longer than the window
-lasts, a flood would advance by only one hop in each superframe."""
+"""The greatest random wait of a relay, as a share of the window: longer, a flood would advance one hop a superframe."""
 _JOINED_NS: Final = 7500 * MS
 """A node should be in a timetable at the latest three superframes and this duration after its start. A join takes 3 s
 and may be lost once; then the leader waits for further joins, and announces the timetable before it takes effect."""

@@ -9,8 +9,7 @@ HELLO_INTERVAL_NS: Final = 1 * S
 NEIGHBOR_LIFETIME_NS: Final = 5 * HELLO_INTERVAL_NS // 2
 """One beacon may be lost, but not two in a row."""
 MIN_PROGRESS_M: Final = 10.0
-"""A packet is handed over only to a neighbor that is nearer to the destination by at least this, which is several times
-the error of a position fix."""
+"""The least progress towards the destination for which a packet is handed over: several times the error of a fix."""
 _FUTURE_US: Final = 1_000_000
 """A location from further in the future than this is not believed, because it would never be replaced."""
 

@@ -42,8 +42,7 @@ FIRST_M: Final = 16.0
 """The distance of each line from the middle, or of a sector's team from the side where its sweep begins, at the
 beginning: far enough for two teams not to be in each other's way, and near enough to receive what lies behind them."""
 TURN_S: Final = 10.0
-"""How long lines and sectors' teams wait at the edge of the area before they fly back, so that a UAV that has fallen
-behind gets there, too."""
+"""How long lines and sectors' teams wait at the edge, so that a UAV that has fallen behind gets there, too."""
 SHIFT: Final = 1.15
 """The greatest speed at which a team shifts sideways at a turn, as a multiple of the speed of the sweep."""
 BACK: Final = 1.2

@@ -56,8 +56,7 @@ begin around the swarm, whose relays must have a short way to their places."""
 _STRAIGHT_M: Final = 300.0
 """Once the lines have flown this far, the relays are no longer displaced: the chain is a straight line to the north."""
 _SIDE_M: Final = 65.0
-"""The distance of the outermost lanes from the edge of the area, at most a quarter of the area's side; a UAV there may
-still shift to either side."""
+"""The distance of the outermost lanes from the edge, at most a quarter of the area's side; it leaves room to shift."""
 _LEAST_LANES: Final = 2
 """The least number of lanes of a line, which has one at each end."""
 _LEAST_APART_M: Final = 60.0

@@ -16,8 +16,7 @@ from fanet_mw.units import Enu, NodeId
 from fanet_mw.wire.links import Link
 
 _CHANCES: Final = (0.5, 0.25, 0.1)
-"""The least share of frames that must arrive over a link for it to be used. The lower values are tried only if nodes
-would be cut off otherwise."""
+"""The least share of frames that must arrive over a link for it to be used; lower ones if nodes would be cut off."""
 _SINR_DB: Final = 11
 """A frame survives another one in its turn if stronger by this: 8 dB at 11 Mb/s, and a margin of 3 dB."""
 _DECADE_DB: Final = 30

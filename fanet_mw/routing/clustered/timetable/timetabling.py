@@ -33,8 +33,7 @@ from fanet_mw.wire.places import Places, rounded
 from fanet_mw.wire.schedule import Schedule
 
 _LINKS_PART: Final = 1 << 16
-"""Added to the number of a part of the links, so that it differs from those of the schedule in the store of parts that
-neighbors may lack."""
+"""Added to the number of a part of the links, to tell it from parts of the schedule in the store."""
 
 
 class FromPlaces:

@@ -248,10 +248,7 @@ class Application:
         """Another application on board has written a record into the trace."""
 
     def permits(self, course: Course, now_ns: int) -> bool:
-        """True if this application does not object to a course that another one has commanded.
-
-        An application that objects is asked about the next course, too, and so learns which one is wanted.
-        """
+        """True if this application does not object to another's course; who objects is asked about the next, too."""
         return True
 
     def wake(self, now_ns: int) -> None:

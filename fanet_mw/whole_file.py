@@ -49,9 +49,7 @@ def write_items(path: Path, items: Iterable[bytes], held: Written | None = None)
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """A new file in the place of a file or link of this name, once it is whole and nothing is raised; raises OSError.
-    Nothing is ever written through a link.
-    """
+    """A new file in place of one of this name once it is whole, never through a link; raises OSError."""
     if path.exists() and not (path.is_file() or path.is_symlink()):
         raise OSError(errno.EINVAL, "not a regular file")
     fresh = path.with_name(f".{path.name}.{os.getpid()}.new")

@@ -196,9 +196,7 @@ class OnAir:
         *,
         through: Callable[[HostBus], HostBus] = lambda bus: bus,
     ) -> AsyncIterator[tuple[RealtimeHost, UdpRadio]]:
-        """The host of a UAV and its radio, which is open within the block; the caller runs the host. `through`: puts
-        something between the host and its bus.
-        """
+        """The host of a UAV and its radio, open within the block; `through` comes between the host and its bus."""
         if (self.epoch_unix_s is None) == (self.endpoint is None):
             raise ConfigError("a real radio needs epoch_unix_s or endpoint, and not both: one of them keeps the clock")
         names = Topics(self.swarm or scenario.name)

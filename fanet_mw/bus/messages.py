@@ -106,8 +106,7 @@ class SetpointKind(IntEnum):
     LAND = 4
     """Sink straight down at `speed_m_s`, and stop the motors on the ground."""
     RETURN = 5
-    """Climb to the height of its return, fly to where it started at `speed_m_s` (0 or less: the cruising speed), and
-    land there; a UAV that stands on the ground stays there."""
+    """Climb to its height of return, fly to its start at `speed_m_s` (0 or less: cruising speed), and land."""
 
 
 VELOCITY_LASTS_NS: Final = 1 * S

@@ -25,10 +25,7 @@ EVERY: Final = NodeId(0)
 
 
 class Degrade(NamedTuple):
-    """The link from `src` to `dst` is weaker, or loses a share of its frames (ACKs too), or both.
-
-    With 0 as both ends that is so of every link.
-    """
+    """The link from `src` to `dst` (0 to 0: every link) is weaker, loses a share of its frames and ACKs, or both."""
 
     label: str
     src: NodeId

@@ -167,9 +167,7 @@ class RoutingProtocol(ABC):
         return True
 
     def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
-        """The nodes of each cluster by its head, the head first, as far as this node knows; empty if there are no
-        clusters.
-        """
+        """The nodes of each cluster by its head, the head first, as far as this node knows; or empty."""
         return {}
 
     def parted(self, now_ns: int, *, without: Collection[int] = ()) -> Collection[NodeId]:
@@ -180,9 +178,7 @@ class RoutingProtocol(ABC):
         """The UAV flies so that these neighbors stay in reach, until it says otherwise."""
 
     def least_interval_ns(self, deadline_ns: int) -> int | None:
-        """The least interval between packets of this node that meets this deadline at all nodes; None if it is unknown,
-        or if there is none.
-        """
+        """The least interval between packets of this node that meets this deadline at all nodes, if it is known."""
         return None
 
     def report(self) -> Mapping[str, object]:

@@ -54,8 +54,7 @@ class DuplicateSet:
     def __init__(self, capacity: int = 32_768) -> None:
         self._capacity = capacity
         self.young: dict[int, int] = {}
-        """The newer generation; where it has a key, it has all bits of that key. It is public, so that a node can look
-        into it at each reception without the cost of a call."""
+        """The newer generation, with all bits of its keys; public, so that a node looks into it without a call."""
         self.old: dict[int, int] = {}
         """The older generation, which is dropped when the newer one is full."""
 

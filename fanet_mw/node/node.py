@@ -30,8 +30,7 @@ from fanet_mw.wire import Kind
 _DATA: Final = int(Kind.DATA)
 _HELLO: Final = int(Kind.HELLO)
 _PREV_HOP: Final = 6
-"""The index of the transmitter among the fields of a header (`wire.Fields`). A copy that another station transmits says
-nothing about who has the packet."""
+"""The index of the transmitter in `wire.Fields`: another station's copy says nothing about who has the packet."""
 _NONE: Final[Sequence[Relay]] = ()
 _LEADERLESS: Final = {"state": "leaderless", "leader": 0, "term": 0, "epoch": 0}
 """What a node reports of a leader unless its protocol has one, so that one program reads the reports of all."""
@@ -259,9 +258,7 @@ class Node:
                 self.port.relay_together([relay for relay in together if relay is not None])
 
     def _first_copy(self, seen: Looked, reception: Reception, before: int, now_ns: int) -> Sequence[Relay]:
-        """Handle a packet that is new in its phase; returns its relays. `reception`: of its frame; `before`: the phases
-        in which it was handled.
-        """
+        """Handle a packet that is new in its phase; returns its relays. `before`: phases in which it was handled."""
         packet_hash, bits = seen.hash, before | seen.phase
         _, _, origin_us, seq, origin, destination, _, kind, _, hops, priority, _, _, _ = seen.fields
         end_ns = reception.end_ns

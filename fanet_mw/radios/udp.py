@@ -113,8 +113,7 @@ class UdpRadio:
         self._tasks: set[asyncio.Task[None]] = set()
         self._seen = DuplicateSet(capacity=8192)
         self._first_seq = secrets.randbits(32)
-        """The number of the datagram of request 0. A process that starts again counts its requests from 0 again, and
-        its datagrams must not be taken for copies of earlier ones."""
+        """The number of request 0's datagram: random, as those after a restart are no copies of earlier ones."""
         self._transports: list[asyncio.DatagramTransport] = []
         """The socket of the own address, by which everything is sent, and that of the broadcast address."""
         self.counts: Counter[str] = Counter()

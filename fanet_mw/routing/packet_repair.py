@@ -66,8 +66,7 @@ class Repair:
         self._store: dict[int, dict[int, _Kept]] = {}
         """The stored packets by sequence number, for each origin of which there is any."""
         self._order: deque[tuple[int, int, int]] = deque()
-        """Origin, sequence number and instant of generation [swarm us] of each stored packet, in the order in which the
-        packets came, so that a packet need not be looked at when it is dropped."""
+        """Origin, sequence number and generation [swarm us] of each stored packet, in the order of arrival."""
         self.pending: dict[int, int] = {}
         self._due: list[tuple[int, int]] = []
         self._turn = 0

@@ -125,9 +125,7 @@ class RoutingContract:
     # --- one node, driven by hand ---------------------------------------------------------------------------------
 
     def test_what_the_air_brings_never_raises(self) -> None:
-        """Received frames are complete, cut off, or have flipped bits; they come from neighbors and
-        from unknown nodes.
-        """
+        """Frames are complete, cut off, or have flipped bits, and come from neighbors and from unknown nodes."""
         random = Random(1)
         bench = _Bench(self.scenario(3, moving=False))
         for frame in _hostile(random, 400):

@@ -116,8 +116,7 @@ class TimeSync:
         self._sent: tuple[int, int] | None = None
         """The last hello that this node has sent: its number, and when it ended."""
         self.reference: int | None = None
-        """The reference whose time this node has; None if it has none. After a restart it may be the node's own id
-        without `is_reference`, because the swarm still has the time of this node."""
+        """The reference whose time this node has, or None; after a restart it may be itself, not `is_reference`."""
         self.is_reference = False
         self._led_at: float | None = None
         """The rate of swarm time over this node's clock that it gave as the reference before it lost the time."""

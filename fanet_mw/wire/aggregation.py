@@ -14,9 +14,7 @@ _NOTHING: Final[Mapping[bytes, bytes]] = MappingProxyType({})
 
 
 def aggregated(packets: Iterable[tuple[int, bytes]], *, most_bytes: int) -> Iterator[tuple[int, bytes, int]]:
-    """As few frames as possible for packets in order, each of at most `most_bytes`, with the earliest instant of its
-    packets, and their number.
-    """
+    """As few frames as possible of at most `most_bytes`, each with its earliest instant and number of packets."""
     chunk: list[bytes] = []
     first_ns = size = 0
     for start_ns, packet in packets:

@@ -378,9 +378,7 @@ _MOST: Final = 255 * _WHOLE_CHUNK
 
 @lru_cache(maxsize=256)
 def filler(size: int, *, node: int = 1) -> bytes:
-    """Inner FANET_CHUNK frames of exactly `size` bytes, 0 or at least 17, whose content does not matter: fixed,
-    pseudo-random, never zero, so that nothing is truncated.
-    """
+    """Inner FANET_CHUNK frames of exactly `size` bytes (0, or at least 17), pseudo-random and never zero."""
     if size == 0:
         return b""
     if not _LEAST_CHUNK <= size <= _MOST:

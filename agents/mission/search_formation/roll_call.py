@@ -22,8 +22,7 @@ from fanet_mw.wire.roll import LONG_AGO, ROLL_NS, Roll
 from fanet_mw.wire.search_plan import Search
 
 _SILENT_NS: Final = 3 * S
-"""How long nobody may have heard a UAV until its neighbors say that it is lost, at least; with rare hellos it is as
-long as a neighbor lasts."""
+"""How long nobody may have heard a UAV until it is lost, at least; with rare hellos as long as a neighbor lasts."""
 _NEIGHBOR_NS: Final = 15 * S
 """A UAV was a neighbor until lately if it was heard within this time."""
 _AWAY_NS: Final = 40 * S

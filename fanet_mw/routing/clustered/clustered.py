@@ -52,8 +52,7 @@ class Parts(NamedTuple):
     access: Access
     relaying: Relaying
     contending: ContendingRelaying
-    """Relaying in contention with other nodes, outside of slots and turns. `relaying` is this part itself, or hands it
-    those packets about which it does not decide."""
+    """Relaying in contention, outside of slots and turns; `relaying` itself, or for what that does not decide."""
     one_way: OneWay
     loads: HeardLoads | None = None
     """The loads of the nodes, as this node hears them; None if timetables are made for what the scenario says."""
@@ -70,8 +69,7 @@ class Clustered(RoutingProtocol):
         super().__init__(port)
         self.parts = parts
         self._hear_copies = tuple((part.pending, part.on_copy) for part in hear_copies)
-        """For each part that wants to hear of copies: the keys of the packets it waits for, and its handler. The keys
-        are tested here, because most copies belong to packets for which no part waits."""
+        """The keys for which each part waits, and its handler of copies; most copies are of other packets."""
         timed = (parts.roles, parts.access, parts.contending, parts.repair)
         self._asks = tuple(part.next_wake_ns for part in timed if part is not None)
         """The methods by which the parts tell when they want to be woken; they are called after every reception."""

@@ -32,10 +32,7 @@ class Access(Protocol):
         """Flood an own application's packet from here, or send it towards a node that will."""
 
     def forward(self, packet: Packet, *, start_ns: int, now_ns: int, tries: int = 0) -> None:
-        """Flood a packet from here, or send it one hop towards a node that will.
-
-        `tries`: how often this node has tried already.
-        """
+        """Flood a packet from here, or send it one hop towards a node that will; `tries`: how often already."""
 
     def flood_control(
         self, kind: Kind, inner: bytes, *, now_ns: int, urgent: bool = False, patient: bool = False

@@ -47,8 +47,7 @@ class DsdvTable:
         self.seq = 0
         """This node's own sequence number, which is even."""
         self.own_due_ns: int | None = None
-        """The instant at which a newer number of this node is to be advertised, because another node has advertised
-        this one as unreachable; None if none has."""
+        """When a newer number of this node is to be advertised, as another has called it unreachable."""
 
     def next_hop(self, destination: NodeId) -> NodeId | None:
         route = self._routes.get(destination)

@@ -95,8 +95,7 @@ class DelayLaw:
         """The same, smoothed over the windows so far."""
         self._waited_ns: defaultdict[int, int] = defaultdict(int)
         self._waited_before_ns: Mapping[int, int] = {}
-        """How long a packet has waited for turns on its way, by priority, of those that came in the present window and
-        in the one before."""
+        """How long a packet has waited for turns on its way, by priority, in this window and the one before."""
         self._stated = self._stated_turns(scenario)
         """The turns of a round that packets fill by the scenario, by priority."""
 

@@ -34,9 +34,7 @@ Corners = tuple[tuple[float, float], ...]
 
 
 class Fan(Shape):
-    """The positions of the places of one fan. Its dimensions name the base: `first_m` to the east of the middle of the
-    area, `last_m` to the north.
-    """
+    """The places of one fan; `first_m` and `last_m` are the base, east and north of the area's middle."""
 
     def __init__(self, formation: Dimensions, *, most_m: float = math.inf) -> None:
         self._formation = formation

@@ -21,8 +21,7 @@ class ContentionTiming:
         self._jitter = jitter
         self._window = window
         self.turns_at: Callable[[int], Turns | None] | None = None
-        """Gives the superframe that is in force at an instant, or None if none is: then a frame may start at any time.
-        The attribute itself is None in a protocol without turns."""
+        """Gives the superframe in force at an instant, or None: frames start at any time. None without turns."""
         self.most_jitter_ns: int | None = None
         """The longest jitter; None if there is no limit."""
         self._used_ns: dict[int, int] = {}

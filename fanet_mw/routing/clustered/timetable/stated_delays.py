@@ -31,8 +31,7 @@ from fanet_mw.wire import PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY
 from fanet_mw.wire.loads import AS_EXPECTED, interval_ns_of
 
 _SAME: Final = 0.95
-"""A node whose packets come at less than this share of the interval of its scenario sends others as well, about whose
-intervals nothing is known."""
+"""A node whose packets come at less than this share of the scenario's interval sends others as well."""
 _SILENT: Final = 5
 """After so many superframes, or hello intervals if these are longer, a node that no flood was heard from is silent."""
 _LOST: Final = 10

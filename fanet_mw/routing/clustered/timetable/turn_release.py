@@ -161,9 +161,7 @@ class RootRelease(TurnRelease):
         return turn.frame_bytes - sum(self.reserved.values())
 
     def _rank(self, packet: Packet) -> int:
-        """The rank at which a packet waits: as bulk without room for its class; only a leader's announcements, for
-        which it states no bound, go before all.
-        """
+        """The rank at which a packet waits: without room for its class as bulk; a leader's announcements first."""
         header = packet.header
         if header.kind in (Kind.SCHEDULE, Kind.LINKS) and header.origin == self._node:
             return PRIORITY_CONTROL

@@ -110,9 +110,8 @@ class TelemetryStreams:
         """By how much the receiver is wrong in height; the flight controller tells heights without it."""
         self._acceleration = STILL
         self._wind = STILL
-        self._yaw: float | None = None
-        """The heading; it is unknown until the UAV has flown. A heading of 0 would also shorten hellos, because MAVLink
-        drops trailing zeros."""
+        self.yaw: float | None = None
+        """The heading; None until the UAV has flown or was turned, because 0 would shorten hellos."""
         self._fix_ns: int | None = None
         self._flight: FlightState | None = None
         """What a real flight controller said lately."""
@@ -157,7 +156,7 @@ class TelemetryStreams:
                 self._estimate, self.velocity, now_ns=now_ns
             ),
             common.MAVLINK_MSG_ID_VFR_HUD: lambda _: encoder.vfr_hud(
-                self._estimate, self.velocity, airspeed_m_s=self._airflow.norm(), yaw=self._yaw
+                self._estimate, self.velocity, airspeed_m_s=self._airflow.norm(), yaw=self.yaw
             ),
             common.MAVLINK_MSG_ID_MISSION_CURRENT: lambda _: encoder.mission_current(
                 self.flown.mission_at, items=self.flown.mission_items, flies=self.flown.mission_flies
@@ -243,23 +242,18 @@ class TelemetryStreams:
         if self._flight is not None and gps.t_ns - self._flight.t_ns > _FIX_LASTS_NS:
             self._flight = None
         if self._flight is None and gps.velocity.horizontal() >= TURNING_M_S:
-            self._yaw = math.atan2(gps.velocity.east, gps.velocity.north)
-
-    @property
-    def yaw(self) -> float | None:
-        """The heading; None until the UAV has flown or was turned."""
-        return self._yaw
+            self.yaw = math.atan2(gps.velocity.east, gps.velocity.north)
 
     def face(self, yaw: float) -> None:
         """Turn a UAV that hovers: the vehicles of the world have no heading of their own, so this is told alone."""
         if self.velocity.horizontal() < TURNING_M_S:
-            self._yaw = math.remainder(yaw, math.tau)
+            self.yaw = math.remainder(yaw, math.tau)
 
     def on_flight(self, reading: FlightState) -> None:
         angles = (reading.roll_rad, reading.pitch_rad, reading.yaw_rad)
         roll, pitch, yaw = (math.remainder(angle, math.tau) for angle in angles)
         self._flight = reading._replace(roll_rad=roll, pitch_rad=pitch, yaw_rad=yaw)
-        self._yaw = yaw
+        self.yaw = yaw
 
     def on_wind(self, reading: WindEstimate) -> None:
         self._wind = reading.velocity
@@ -282,7 +276,7 @@ class TelemetryStreams:
         air = self._airflow
         drag = DRAG_PER_S + DRAG_PER_M * air.norm()
         east, north, up = (a + drag * v for a, v in zip(self._acceleration, (air.east, air.north, 0.0), strict=True))
-        yaw = self._yaw or 0.0
+        yaw = self.yaw or 0.0
         forward = east * math.sin(yaw) + north * math.cos(yaw)
         right = east * math.cos(yaw) - north * math.sin(yaw)
         thrust_up = max(GRAVITY_M_S2 + up, 0.1 * GRAVITY_M_S2)  # propellers push only one way
@@ -315,11 +309,11 @@ class TelemetryStreams:
 
     def _global_position(self, encoder: Encoder, now_ns: int) -> bytes:
         return encoder.global_position(
-            self._estimate, self.velocity, yaw=self._yaw, now_ns=now_ns, home_m=self.flown.home.up
+            self._estimate, self.velocity, yaw=self.yaw, now_ns=now_ns, home_m=self.flown.home.up
         )
 
     def _position(self, encoder: Encoder, now_ns: int) -> bytes:
-        return encoder.global_position(self.position, self.velocity, yaw=self._yaw, now_ns=now_ns)
+        return encoder.global_position(self.position, self.velocity, yaw=self.yaw, now_ns=now_ns)
 
     @property
     def _estimate(self) -> Enu:

@@ -12,10 +12,10 @@ from fanet_mw.flavors import Mode, mode_of
 from fanet_mw.mavlink import common
 from fanet_mw.units import US, Enu
 
-_ACCEPTED: Final = common.MAV_RESULT_ACCEPTED
-_DENIED: Final = common.MAV_RESULT_DENIED
-_LATER: Final = common.MAV_RESULT_TEMPORARILY_REJECTED
-_UNSUPPORTED: Final = common.MAV_RESULT_UNSUPPORTED
+_ACCEPTED: Final[int] = common.MAV_RESULT_ACCEPTED
+_DENIED: Final[int] = common.MAV_RESULT_DENIED
+_LATER: Final[int] = common.MAV_RESULT_TEMPORARILY_REJECTED
+_UNSUPPORTED: Final[int] = common.MAV_RESULT_UNSUPPORTED
 _MOST_US: Final = 1800 * 1_000_000  # MESSAGE_INTERVAL tells them in 31 bits
 _NONE: Final = 0x7FFF_FFFF
 """A latitude or longitude that is not given (INT32_MAX)."""
@@ -71,11 +71,18 @@ class Commands:
     def on_command(self, message: Any, peer: Peer, now_ns: int) -> None:  # noqa: ANN401
         command = command_of(message)
         does = self._DOES.get(command.number)
-        result = _UNSUPPORTED if does is None else does(self, command, now_ns)
+        if does is None:
+            result = _UNSUPPORTED
+        else:
+            result = self._change_to(does, now_ns) if isinstance(does, Mode) else does(self, command, now_ns)
         self._reply(common.MAVLink_command_ack_message(command.number, result, 0, 0, *peer))
 
     def set_mode(self, number: int, now_ns: int) -> int:
-        pilot, mode = self._pilot, mode_of(number)
+        mode = mode_of(number)
+        return _UNSUPPORTED if mode is None else self._change_to(mode, now_ns)
+
+    def _change_to(self, mode: Mode, now_ns: int) -> int:
+        pilot = self._pilot
         does: Mapping[Mode, Callable[[], bool]] = {
             Mode.HOLD: pilot.hold,
             Mode.TAKEOFF: lambda: pilot.take_off(None),
@@ -84,41 +91,32 @@ class Commands:
             Mode.LAND: pilot.land,
             Mode.GUIDED: pilot.guide,
         }
-        return int(_UNSUPPORTED if mode is None else _ACCEPTED if does[mode]() else _LATER)
+        return _ACCEPTED if does[mode]() else _LATER
 
     # --- flight ---------------------------------------------------------------------------------------------------
 
     def _arm(self, command: Command, _now_ns: int) -> int:
         wanted = command.params[0]
         if wanted not in (0, 1):
-            return int(_DENIED)
-        return int(_ACCEPTED if (self._pilot.arm() if wanted else self._pilot.disarm()) else _LATER)
+            return _DENIED
+        return _ACCEPTED if (self._pilot.arm() if wanted else self._pilot.disarm()) else _LATER
 
     def _take_off(self, command: Command, _now_ns: int) -> int:
         up_m = None if command.z is None else self._ground().height(command.frame, command.z)
-        return int(_ACCEPTED if self._pilot.take_off(up_m) else _LATER)
-
-    def _land(self, _command: Command, _now_ns: int) -> int:
-        return int(_ACCEPTED if self._pilot.land() else _LATER)
-
-    def _return(self, _command: Command, _now_ns: int) -> int:
-        return int(_ACCEPTED if self._pilot.go_home() else _LATER)
-
-    def _hold(self, _command: Command, _now_ns: int) -> int:
-        return int(_ACCEPTED if self._pilot.hold() else _LATER)
+        return _ACCEPTED if self._pilot.take_off(up_m) else _LATER
 
     def _reposition(self, command: Command, _now_ns: int) -> int:
         place = self._place(command)
         if place is None or not self._pilot.allows(place):
-            return int(_DENIED)
+            return _DENIED
         speed_m_s = command.params[0]
         if speed_m_s > 0 and not self._pilot.change_speed(speed_m_s):
-            return int(_DENIED)
+            return _DENIED
         flags = command.params[1]
         guided = self._pilot.mode is Mode.GUIDED and not (0 < flags < 256 and int(flags) & _CHANGE_MODE)
         if math.isfinite(command.params[3]):
             self._streams.face(command.params[3])
-        return int(_ACCEPTED if self._pilot.go_to(place, guided=guided) else _LATER)
+        return _ACCEPTED if self._pilot.go_to(place, guided=guided) else _LATER
 
     def _place(self, command: Command) -> Enu | None:
         """Where a command leads; what it leaves out stays as it is."""
@@ -134,36 +132,33 @@ class Commands:
     def _speed(self, command: Command, _now_ns: int) -> int:
         speed_m_s = command.params[1]
         known = math.isfinite(speed_m_s) and self._pilot.change_speed(-1.0 if speed_m_s == -2 else speed_m_s)
-        return int(_ACCEPTED if known else _DENIED)
+        return _ACCEPTED if known else _DENIED
 
     def _yaw(self, command: Command, _now_ns: int) -> int:
         degrees, _, turn, relative = command.params
         if not math.isfinite(degrees):
-            return int(_DENIED)
+            return _DENIED
         way = math.radians(degrees if turn >= 0 else -degrees) if relative else math.radians(degrees)
         self._streams.face((self._streams.yaw or 0.0) + way if relative else way)
-        return int(_ACCEPTED)
+        return _ACCEPTED
 
     def _pause(self, command: Command, now_ns: int) -> int:
         if command.params[0] == 0:
-            return self._hold(command, now_ns)
-        return self._start(command, now_ns) if command.params[0] == 1 else int(_DENIED)
-
-    def _start(self, _command: Command, now_ns: int) -> int:
-        return int(_ACCEPTED if self._pilot.start_mission(now_ns) else _LATER)
+            return self._change_to(Mode.HOLD, now_ns)
+        return self._change_to(Mode.MISSION, now_ns) if command.params[0] == 1 else _DENIED
 
     def _set_current(self, command: Command, _now_ns: int) -> int:
         at = command.params[0]
         steps = self._pilot.mission.steps
         if not (0 <= at < len(steps)) or at != int(at):
-            return int(_DENIED)
+            return _DENIED
         self._pilot.mission.go_to(int(at))
-        return int(_ACCEPTED)
+        return _ACCEPTED
 
     def _mode(self, command: Command, now_ns: int) -> int:
         base, main, sub = command.params[:3]
         if not (0 <= main < 256 and 0 <= sub < 256 and base == base):
-            return int(_DENIED)
+            return _DENIED
         return self.set_mode(int(main) << 16 | int(sub) << 24, now_ns)
 
     # --- what is told ---------------------------------------------------------------------------------------------
@@ -171,45 +166,45 @@ class Commands:
     def _set_interval(self, command: Command, now_ns: int) -> int:
         message_id, interval_us = command.params[:2]
         if not (0 <= message_id < 2**24 and -1 <= interval_us <= _MOST_US):
-            return int(_DENIED)
+            return _DENIED
         if self.paced:
-            return int(_DENIED)
+            return _DENIED
         interval_ns = None if interval_us == 0 else round(interval_us) * US
-        return int(_ACCEPTED if self._streams.set_interval(int(message_id), interval_ns, now_ns) else _DENIED)
+        return _ACCEPTED if self._streams.set_interval(int(message_id), interval_ns, now_ns) else _DENIED
 
     def _get_interval(self, command: Command, _now_ns: int) -> int:
         message_id = command.params[0]
         if not 0 <= message_id < 2**16:
-            return int(_DENIED)
+            return _DENIED
         interval_ns = self._streams.interval_ns(int(message_id))
         interval_us = 0 if interval_ns is None else -1 if not interval_ns else interval_ns // US
         self._reply(common.MAVLink_message_interval_message(int(message_id), interval_us))
-        return int(_ACCEPTED)
+        return _ACCEPTED
 
     def _request(self, command: Command, now_ns: int) -> int:
         message_id = command.params[0]
         frame = self._one(int(message_id), now_ns) if 0 <= message_id < 2**24 else None
         if frame is None:
-            return int(_DENIED)
+            return _DENIED
         self._send(frame)
-        return int(_ACCEPTED)
+        return _ACCEPTED
 
     def _version(self, command: Command, now_ns: int) -> int:
         if command.params[0] != 1:
-            return int(_DENIED)
+            return _DENIED
         return self._request(command._replace(params=(common.MAVLINK_MSG_ID_AUTOPILOT_VERSION, 0, 0, 0)), now_ns)
 
-    _DOES: Final = {
+    _DOES: Final[Mapping[int, Mode | Callable[[Any, Command, int], int]]] = {
         common.MAV_CMD_COMPONENT_ARM_DISARM: _arm,
         common.MAV_CMD_NAV_TAKEOFF: _take_off,
-        common.MAV_CMD_NAV_LAND: _land,
-        common.MAV_CMD_NAV_RETURN_TO_LAUNCH: _return,
-        common.MAV_CMD_NAV_LOITER_UNLIM: _hold,
+        common.MAV_CMD_NAV_LAND: Mode.LAND,
+        common.MAV_CMD_NAV_RETURN_TO_LAUNCH: Mode.RETURN,
+        common.MAV_CMD_NAV_LOITER_UNLIM: Mode.HOLD,
         common.MAV_CMD_DO_REPOSITION: _reposition,
         common.MAV_CMD_DO_CHANGE_SPEED: _speed,
         common.MAV_CMD_CONDITION_YAW: _yaw,
         common.MAV_CMD_DO_PAUSE_CONTINUE: _pause,
-        common.MAV_CMD_MISSION_START: _start,
+        common.MAV_CMD_MISSION_START: Mode.MISSION,
         common.MAV_CMD_DO_SET_MISSION_CURRENT: _set_current,
         common.MAV_CMD_DO_SET_MODE: _mode,
         common.MAV_CMD_SET_MESSAGE_INTERVAL: _set_interval,

@@ -63,7 +63,8 @@ class RealtimeHost:
         self._drain_asked = False
         self._failure: asyncio.Future[None] = self._loop.create_future()
         self._clock: SwarmClock | None = None
-        self._running = False
+        self.running = False
+        """True once the actor has been started, until it is called no more."""
         self._wake_up: _WakeUp | None = None
         self._call_ns = 0
         self._records: list[Record] = []
@@ -91,7 +92,7 @@ class RealtimeHost:
         on_epoch(self._clock.epoch_unix_ns)
         await self._sleep_until(0)
         gc.freeze()  # what start-up has made stays alive: the collector need not examine it in the middle of a slot
-        self._running = True
+        self.running = True
         try:
             self._call_ns = self.now_ns()
             self._actor.start(self._call_ns)
@@ -124,14 +125,9 @@ class RealtimeHost:
             keys = few(f"{key} = {ours!r} here, {other!r} there" for key, ours, other in found)
             raise ConfigError(f"{self._actor.name} runs another scenario than swarm {self._names.swarm}: {keys}")
 
-    @property
-    def running(self) -> bool:
-        """True once the actor has been started, until it is called no more."""
-        return self._running
-
     def nudge(self) -> None:
         """Let the actor look now at what was given to it from outside, on this thread; nothing before it runs."""
-        if self._running:
+        if self.running:
             self._guard(self._nudge_actor)
 
     def _nudge_actor(self) -> None:
@@ -179,7 +175,7 @@ class RealtimeHost:
 
     def _halt(self) -> None:
         """Make no more calls of the actor from the loop."""
-        self._running = False
+        self.running = False
         if self._wake_up is not None:
             self._wake_up.timer.cancel()
             self._wake_up = None
@@ -214,13 +210,13 @@ class RealtimeHost:
     def _wakes_soon(self) -> bool:
         """True if the actor will be woken within its slack, and takes what has come then."""
         wake_up = self._wake_up
-        if not self._running or wake_up is None:
+        if not self.running or wake_up is None:
             return False
         return 0 < wake_up.due_ns - self.now_ns() <= self._actor.slack_ns
 
     def _drain(self) -> None:
         self._drain_asked = False
-        if self._running:  # otherwise samples wait for the start, or come after the end
+        if self.running:  # otherwise samples wait for the start, or come after the end
             self._guard(self._take_inbox)
 
     def _guard(self, step: Callable[[], None]) -> None:

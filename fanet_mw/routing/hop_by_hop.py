@@ -18,7 +18,7 @@ from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.routing.address_resolution import Knowledge, Outgoing, Resolver
-from fanet_mw.routing.rival_control_messages import BodyReader, Family, check_node, type_of
+from fanet_mw.routing.rival_control_messages import Family, check_node, type_of, unpack
 from fanet_mw.units import BROADCAST, NodeId, earliest
 from fanet_mw.wire import Kind
 
@@ -198,9 +198,7 @@ class HopByHop(RoutingProtocol):
         self, addresses: Resolver, number: int, body: bytes, packet: Packet, reception: Reception, *, now_ns: int
     ) -> None:
         """Handle an address message by RFC 826: learn, send what waited, then answer directly, without a request."""
-        reader = BodyReader(body)
-        target, sender = check_node(reader.take(_TARGET)[0]), reception.src
-        reader.finish()
+        target, sender = check_node(*unpack(_TARGET, body)), reception.src
         if number not in (ADDRESS_REQUEST, ADDRESS_REPLY) or packet.origin != sender:
             raise MalformedFrameError(f"address message {number} of {packet.origin} from {sender}")
         ours = target == self._port.node

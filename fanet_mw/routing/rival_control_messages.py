@@ -95,9 +95,12 @@ class BodyReader:
     def at_end(self) -> bool:
         return self._at == len(self._body)
 
-    def finish(self) -> None:
-        if self._at != len(self._body):
-            raise MalformedFrameError(f"{len(self._body) - self._at} bytes of control too many")
+
+def unpack(layout: struct.Struct, body: bytes) -> tuple[Any, ...]:
+    """The fields of a body, which must be exactly so long."""
+    if len(body) != layout.size:
+        raise MalformedFrameError(f"control of {len(body)} bytes must have {layout.size}")
+    return layout.unpack(body)
 
 
 def check_node(node: int) -> int:

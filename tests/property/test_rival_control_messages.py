@@ -59,5 +59,6 @@ def test_a_reader_never_gives_bytes_that_are_not_there() -> None:
         control.BodyReader(b"\x01\x00\x02").take(pair)
     with pytest.raises(MalformedFrameError):
         list(control.BodyReader(b"\x01\x00\x02").rest(single))
-    with pytest.raises(MalformedFrameError):
-        control.BodyReader(b"\x01").finish()
+    for body in (b"\x01", b"\x01\x00\x02"):
+        with pytest.raises(MalformedFrameError):
+            control.unpack(single, body)

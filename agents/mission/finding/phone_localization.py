@@ -133,7 +133,7 @@ class PhoneFilter:
         """The sum of the squares of what an offset of 1 dB adds to the whitened residuals."""
         self._received: list[tuple[Enu, float]] = []
         """The received powers that the cells include."""
-        self._count = 0
+        self.included_powers = 0
         self._taken: dict[int, list[Enu]] = {}
         """For each node, the places at which it received the phone."""
         self._estimate: Estimate | None = None
@@ -181,10 +181,6 @@ class PhoneFilter:
         return sum(map(len, self._taken.values()))
 
     @property
-    def included_powers(self) -> int:
-        return self._count
-
-    @property
     def readings(self) -> list[tuple[Enu, float]]:
         return [(at, rssi_dbm) for at, rssi_dbm in (*self._samples, *self._pending) if rssi_dbm is not None]
 
@@ -208,7 +204,7 @@ class PhoneFilter:
         fresh, self._pending = self._pending, []
         strongest = max((s for s in self._samples if s[1] is not None), key=lambda s: s[1] or 0.0)[0]
         if not self._sums or _ground_m(self._middle, strongest) > _OFF_CENTER_M:
-            self._middle, fresh, self._count = strongest, self._samples, 0
+            self._middle, fresh, self.included_powers = strongest, self._samples, 0
             self._gains, self._received = 0.0, []
             cells = _WIDTH * _WIDTH
             self._sums, self._squares, self._scores = [0.0] * cells, [0.0] * cells, [0.0] * cells
@@ -217,7 +213,7 @@ class PhoneFilter:
                 self._rule_out(position)
             else:
                 self._update(position, rssi_dbm)
-                self._count += 1
+                self.included_powers += 1
         self._estimate = self._moments()
 
     def deficit(self, east_m: float, north_m: float) -> float:

@@ -9,7 +9,7 @@ import struct
 from typing import Final, NamedTuple, Self
 
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.routing.rival_control_messages import BodyReader, check_node
+from fanet_mw.routing.rival_control_messages import BodyReader, check_node, unpack
 
 RREQ: Final = 1
 RREP: Final = 2
@@ -41,9 +41,7 @@ class RouteRequest(NamedTuple):
 
     @classmethod
     def decode(cls, body: bytes) -> Self:
-        reader = BodyReader(body)
-        request = cls(*reader.take(_RREQ))
-        reader.finish()
+        request = cls(*unpack(_RREQ, body))
         check_node(request.destination)
         check_node(request.originator)
         if request.hop_count == 255:  # the next hop count would not fit its byte
@@ -69,9 +67,7 @@ class RouteReply(NamedTuple):
 
     @classmethod
     def decode(cls, body: bytes) -> Self:
-        reader = BodyReader(body)
-        reply = cls(*reader.take(_RREP))
-        reader.finish()
+        reply = cls(*unpack(_RREP, body))
         check_node(reply.destination)
         check_node(reply.originator)
         if reply.hop_count == 255:

@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple, Self
 
 from fanet_mw import wire
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.routing.rival_control_messages import BodyReader, check_node
+from fanet_mw.routing.rival_control_messages import BodyReader, check_node, unpack
 from fanet_mw.units import Enu
 
 BEACON: Final = 1
@@ -70,10 +70,7 @@ class Location(NamedTuple):
 
     @classmethod
     def decode(cls, body: bytes) -> Self:
-        reader = BodyReader(body)
-        position = _position(reader.take(_PLACE))
-        reader.finish()
-        return cls(position)
+        return cls(_position(unpack(_PLACE, body)))
 
 
 class Query(NamedTuple):
@@ -86,7 +83,4 @@ class Query(NamedTuple):
 
     @classmethod
     def decode(cls, body: bytes) -> Self:
-        reader = BodyReader(body)
-        (wanted,) = reader.take(_WANTED)
-        reader.finish()
-        return cls(check_node(wanted))
+        return cls(check_node(*unpack(_WANTED, body)))

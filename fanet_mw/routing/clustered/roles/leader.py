@@ -125,7 +125,7 @@ class Leader:
         self._division = Division(
             clusters.method, count=clusters.count, range_m=self._range_m, options=clusters.options
         )
-        self._epoch = epoch
+        self.epoch = epoch
         self._estimates = _Estimates(LinkState() if scenario.measures_links else None, heard)
         self._measured_ns = measured_period_ns
         self._outbid = False
@@ -168,8 +168,8 @@ class Leader:
 
     def on_outbid(self, epoch: int, *, now_ns: int) -> None:
         """A schedule was received in this leader's name that it has not made: announce a later epoch soon."""
-        if newer(epoch, self._epoch, bits=EPOCH_BITS) and self._assigned.parts:
-            self._epoch, self._outbid = epoch, True
+        if newer(epoch, self.epoch, bits=EPOCH_BITS) and self._assigned.parts:
+            self.epoch, self._outbid = epoch, True
             self._due_ns = min(self._due_ns, now_ns + SETTLE_NS)
 
     def on_suspicion(self, silent: NodeId, by: NodeId, there: Motion, *, now_ns: int) -> None:
@@ -234,7 +234,7 @@ class Leader:
             return
         self._roster.forget_reports()
         ordered = [Cluster(cluster.head, succession(cluster, swarm)) for cluster in clusters]
-        self._epoch, self._outbid = following(self._epoch, bits=EPOCH_BITS) or 1, False
+        self.epoch, self._outbid = following(self.epoch, bits=EPOCH_BITS) or 1, False
         self._assigned = _Assigned(ordered, places, links, start_ns, self._parts(ordered, start_ns), measured, loads)
 
     def _loads(self, now_ns: int) -> Mapping[NodeId, int]:
@@ -283,7 +283,7 @@ class Leader:
                 start_us=start_ns // US,
                 period_us=self._period_ns // US,
                 slot_us=self._period_ns // len(clusters) // US,
-                epoch=self._epoch,
+                epoch=self.epoch,
                 leader=self._authority.leader,
                 clusters=len(clusters),
                 part=part,
@@ -297,10 +297,6 @@ class Leader:
     @property
     def links(self) -> tuple[Link, ...]:
         return self._assigned.measured
-
-    @property
-    def epoch(self) -> int:
-        return self._epoch
 
     def place(self, node: int) -> Enu:
         return self._assigned.places[NodeId(node)]

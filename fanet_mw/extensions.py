@@ -132,9 +132,7 @@ def _imported(path: Path) -> set[str]:
 
 @lru_cache(maxsize=64)
 def load(key: str, name: str) -> Any:  # noqa: ANN401  (whatever the contract of the key asks for)
-    """The class that a scenario names; raises ValueError with a sentence if there is none, and ModuleNotFoundError if
-    it needs modules that only machines with an emulator have.
-    """
+    """The class that a scenario names; ValueError if there is none, ModuleNotFoundError if it needs an emulator."""
     entry = installed(key).get(name)
     text = entry.value if entry is not None else name
     module, colon, path = text.partition(":")

@@ -35,9 +35,7 @@ _PPM: Final = 1e-6
 
 
 class SwarmTime:
-    """How a node knows swarm time: `clock.sync = "none"`, by its own clock alone, which counts for it in all other ways
-    until the node has learned better.
-    """
+    """How a node knows swarm time; by `clock.sync = "none"`, which is this class, by its own clock alone."""
 
     in_hellos: bool = False
     _error_ns: int = 0

@@ -78,9 +78,7 @@ def reach_with_gain_m(radio: Radio, gain_dbi: float) -> float:
 
 
 def heard_m(radio: Radio) -> float:
-    """The distance up to which frames are received without shadowing and fading, by the most favorable path loss; of a
-    channel from another package, which is not loaded for pages, `range_m`.
-    """
+    """The greatest distance of reception without shadowing and fading; of another package's channel `range_m`."""
     if radio.channel == "range" or radio.channel not in CHANNELS:
         return radio.range_m
     return _distance_m(radio, radio.tx_power_dbm - radio.sensitivity_dbm)

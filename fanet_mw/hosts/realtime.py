@@ -352,9 +352,7 @@ async def run_actor(
     on_epoch: Callable[[int], None] = lambda _: None,
     timebase: Timebase = THIS_MACHINE,
 ) -> None:
-    """Join a router, run one actor, leave. Raises BusError, and ConfigError when Zenoh's configuration cannot be used,
-    or the swarm runs another scenario than `scenario`.
-    """
+    """Join a router, run one actor, leave. Raises BusError, and ConfigError if the swarm runs another scenario."""
     config = config_of(address.zenoh_config, actor.name)
     with Bus.join(address.endpoint, config, patience_s=address.patience_s) as bus:
         host = RealtimeHost(actor, bus, Topics(address.swarm), timebase)

@@ -233,9 +233,7 @@ class Node:
         return False
 
     def _hear_bundle(self, seen: Looked, reception: Reception, now_ns: int) -> None:
-        """Handle each packet of a frame as if it came alone; their relays go together again, all first transmissions in
-        one frame, all second ones in another, and so on.
-        """
+        """Handle each packet of a frame as if it came alone; their relays go together again."""
         try:
             parts = self._reader.parts(seen)
         except MalformedFrameError:

@@ -13,9 +13,7 @@ FUTURE_NS: Final = S
 
 
 def motion_in(frame: bytes, *, own: NodeId, now_ns: int, place: mavlink.Geodetic) -> tuple[NodeId, Motion] | None:
-    """The origin of a frame, and its motion at the stated instant; `place`: the origin of coordinates. None if
-    malformed, without a position, too far in the future, or from this UAV itself (`own`).
-    """
+    """The origin of a frame and its motion; None if malformed, without position, too far in the future, or `own`."""
     try:
         origin, heard = packet_of(frame).origin, decoded(frame, mavlink.kinematics_about(place))
     except MalformedFrameError:

@@ -56,9 +56,7 @@ def build(tree: Mapping[str, Any], *, source: str = "scenario", imports: bool = 
 
 
 def departures(scenario: Scenario) -> dict[str, Any]:
-    """What differs from the defaults, as plain values to build from; also a default that depends on a changed key, such
-    as 11 Mb/s, which is not the default of 802.11g.
-    """
+    """What differs from the defaults, as plain values to build from; also defaults that depend on changed keys."""
     whole = scenario.model_dump(mode="json", exclude_none=True)
     tree = scenario.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
     try:

@@ -34,9 +34,7 @@ def bundle(packets: Sequence[bytes]) -> bytes:
 
 
 def unbundle(frame: bytes, known: Mapping[bytes, bytes] = _NOTHING) -> list[bytes]:
-    """The packets in a radio frame, as if each came alone but for its flag; raises MalformedFrameError. `known`: inner
-    frames of packets cut out before, by what no hop changes in headers.
-    """
+    """The packets in a radio frame, as if alone; raises MalformedFrameError. `known`: inner frames cut out before."""
     starts, at, size = list[int](), 0, len(frame)
     while at < size:
         end = end_of_frame(frame, at)

@@ -100,9 +100,7 @@ class ConnectivityMaintenance:
         return [node for node, plane in self._ties if plane.allows((velocity.east, velocity.north), but=_KEPT_M_S)]
 
     def beyond_gap(self, now_ns: int) -> Motion | None:
-        """The likely motion of a UAV beyond a lost one, which hurries here as this UAV hurries there. None if there is
-        nobody, or once this UAV would hear it there: then that one is lost, too.
-        """
+        """The likely motion of a UAV beyond a lost one, which hurries here; None once this UAV would hear it there."""
         plan, pattern, place = self._formation.plan, self._formation.pattern, self._formation.place
         closing_s, swept_s = self._formation.closing_s(now_ns), self._formation.swept_s(now_ns)
         if plan is None or pattern is None or place is None or closing_s is None or swept_s is None:

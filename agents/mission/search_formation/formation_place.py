@@ -73,9 +73,7 @@ class FormationPlace:
     def close_ranks(
         self, lost: Collection[int], now_ns: int, *, away: Collection[int] = (), apart: bool = False
     ) -> None:
-        """Fly on without these: the others of a row share its length. `away`: who left by itself, without urgency.
-        `apart`: others, who are not lost, are in another part of the swarm.
-        """
+        """Fly on without these: `away` left without urgency, `apart` are in another part of the swarm, and not lost."""
         if self.plan is None or self.pattern is None:
             return
         vacant = frozenset(

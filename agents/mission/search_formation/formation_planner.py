@@ -276,9 +276,7 @@ class FormationPlanner:
         return plan._replace(revision=_next(plan.revision), planner=self._node, nodes=tuple(holders))
 
     def _for_those_who_stay(self, pattern: Pattern, holders: list[int], now_ns: int) -> Search | None:
-        """The plan of another formation once too many have flown home to span this one; None while others may be about
-        to leave as well, and if the search is over.
-        """
+        """The plan of another formation once too many have flown home to span this one and nobody else is about to."""
         gone = self.leavers
         if not gone or now_ns - max(self._left_ns[node] for node in gone) < _LEAVE_NS:
             return None

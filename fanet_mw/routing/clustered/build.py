@@ -138,9 +138,7 @@ def _in_slots(ground: _Ground, rule: Rule, *hear_copies: HearsCopies) -> Cluster
 
 
 def _way_beside_turns(ground: _Ground) -> OneWay:
-    """The way of packets where nodes have turns: where turns bound delays, only receipts go it, in the windows between
-    turns; elsewhere all packets do, without waiting for a window.
-    """
+    """The way of packets beside turns: where turns bound delays, only receipts in windows; else all, at any time."""
     scenario = ground.port.scenario
     if scenario.mobility.rigid and not scenario.measures_links:
         not_before = ground.contention.not_before
@@ -216,9 +214,7 @@ def _admission(port: Port) -> Admission | None:
 
 
 def _role_parts(ground: _Ground, *, takes_slot: bool) -> RoleParts:
-    """The parts of a node's roles. `takes_slot`: nodes watch heads, and who replaces a silent head uses its slot; else
-    nodes watch all neighbors, and only tell the leader of a silent one.
-    """
+    """The parts of a node's roles. `takes_slot`: nodes watch heads and replace them; else they watch all neighbors."""
     port, scenario = ground.port, ground.port.scenario
     liveness, membership = Liveness(), Membership(port.node)
     lease = Lease(port.node, period_ns=scenario.clusters.period_ns, liveness=liveness)

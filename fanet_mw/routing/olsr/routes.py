@@ -20,9 +20,7 @@ def routing_table(
     willingness: Mapping[NodeId, int],
     topology: Sequence[tuple[NodeId, NodeId]],
 ) -> dict[NodeId, OlsrRoute]:
-    """The shortest known routes (10): to neighbors, 2-hop neighbors, then over `topology`, pairs (last hop,
-    destination); of equally short ones that with the lowest last hop.
-    """
+    """The shortest known routes (10), `topology` by pairs (last hop, destination); ties by the lowest last hop."""
     routes = {neighbor: OlsrRoute(neighbor, 1) for neighbor in sorted(neighbors)}
     for neighbor in sorted(neighbors):
         if willingness[neighbor] != WILL_NEVER:

@@ -165,9 +165,7 @@ class Spreading:
         spare: bool = False,
         once: bool = False,
     ) -> Packet | None:
-        """A new packet, from the neighbor `src`; bulk from an instant on, `spare` bulk unless others have passed it on
-        by then; `once`: not repeated. Returns a packet that was evicted for it.
-        """
+        """A new packet, from `src`; `spare`: unless others pass it on; `once`: not repeated. Returns an evicted one."""
         key = _key(packet)
         entry = self._entries[key] = _Spread(packet, src, bulk_from_ns or 0, now_ns)
         entry.having |= self._early.pop(key, 0)

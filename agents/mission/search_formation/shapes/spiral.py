@@ -121,9 +121,7 @@ def _on_square(turned: float) -> tuple[float, float]:
 
 
 def fitted(count: int, demands: Demands) -> Dimensions:
-    """As many full arms as there are UAVs for and as have room in the middle, otherwise one winding arm of as many as
-    fly it in the shortest time. Those who are left over become followers.
-    """
+    """As many full arms as have UAVs and room in the middle, else the fastest winding arm; the others are followers."""
     found = (_of(some, demands) for some in range(1, count + 1))
     made = min(found, key=lambda made: Spiral(made).sweep_s)
     return made._replace(followers=count - made.fixed)

@@ -82,9 +82,7 @@ class Lease:
         return self.authority
 
     def review(self, now_ns: int) -> bool:
-        """True if this node must take office: the leader is silent, and no live node with a lower id has taken it in
-        time. Otherwise the next check is set after the turns of those nodes.
-        """
+        """True if this node must take office: the leader is silent, and no live node with a lower id came first."""
         if now_ns < self.stand_ns:
             return False
         lower = self._liveness.alive_below(self._node, since_ns=now_ns - self._silence_ns)

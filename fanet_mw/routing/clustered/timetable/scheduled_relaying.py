@@ -85,9 +85,7 @@ class ScheduledRelaying:
     def _late(
         self, packet: Packet, timetable: NodeTimetable, reception: Reception
     ) -> tuple[tuple[int, NodeId, int], int] | None:
-        """The flood of a frame that ended after its turn, and an instant in that turn; None if it is of no flood, as
-        over lossy links, where it may be an answer to a neighbor.
-        """
+        """The flood of a frame that ended after its turn, and an instant in that turn; None if it is of no flood."""
         turns = timetable.turns
         for instant_ns in range(
             reception.end_ns - turns.turn_ns, reception.end_ns - _MOST_LATE_TURNS * turns.turn_ns - 1, -turns.turn_ns

@@ -183,9 +183,7 @@ class StatedDelays:
         return self._silences(_LOST, now_ns)
 
     def _silences(self, times: int, now_ns: int) -> Mapping[NodeId, int]:
-        """Nodes not heard in their turns for so many superframes or hello intervals, and that time; none until the
-        timetable has been in force for as long, and over lossy links.
-        """
+        """Nodes not heard in their turns for so long, and that time; none in a new timetable, or over lossy links."""
         timetable = self._timetables.at(now_ns)
         if timetable is None or not timetable.whole or timetable.odds is not None:
             return {}

@@ -43,9 +43,7 @@ class Turn(NamedTuple):
 
 
 class SpareTurns(Mapping[NodeId, tuple[int, ...]]):
-    """The turns that floods leave each node. They are found when somebody first asks: of the timetables that are tried
-    one is flown, and finding them takes as long as the rest of it.
-    """
+    """The turns that floods leave each node, found when somebody first asks, as most timetables are only tried."""
 
     def __init__(self, find: Callable[[], dict[NodeId, tuple[int, ...]]]) -> None:
         self._find = find

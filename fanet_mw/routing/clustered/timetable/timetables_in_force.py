@@ -29,9 +29,7 @@ class TimetablesInForce:
         return sum(timetable.valid_ns <= now_ns for timetable in self.in_order[1:])
 
     def follow(self, timetable: NodeTimetable | None, *, now_ns: int) -> None:
-        """Follow a newer timetable; None: none. Forgotten are those no longer in force, and those that would come into
-        force after it: of a leader over which another one prevails.
-        """
+        """Follow a newer timetable, forgetting those no longer in force, and those due after it. None: none."""
         if timetable is None:
             self.in_order = []
             return

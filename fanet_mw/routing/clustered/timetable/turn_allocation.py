@@ -329,9 +329,7 @@ def _per_node(
 
 
 def _blocks(packets: int, senders: int) -> int:
-    """The number of equal blocks of a superframe, of at least `_BLOCK` packets each; where packets divide evenly, a
-    sender has as many turns in one block as in any other.
-    """
+    """The number of equal blocks of a superframe, of at least `_BLOCK` packets each, preferably without remainder."""
     each, more = divmod(packets, max(1, senders))
     if more or not senders:
         return max(1, packets // _BLOCK)

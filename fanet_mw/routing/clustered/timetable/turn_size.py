@@ -83,9 +83,7 @@ def _disturbed_m(scenario: Scenario) -> float:
 
 
 def distance_error_m(scenario: Scenario) -> float:
-    """How far the distance of two nodes may differ from that of their reported positions: four deviations of GPS
-    (averaged, `agents/positioning/steady_fix.py`), and whole metres.
-    """
+    """How far true and reported distances may differ: four deviations of averaged GPS fixes, and whole metres."""
     noise_m = min(scenario.world.gps_sigma_m, _AVERAGED * scenario.radio.range_m)
     return 4 * math.sqrt(2) * math.hypot(noise_m, scenario.sensors.gps_bias_m) + _ROUNDING_M
 

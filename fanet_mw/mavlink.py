@@ -328,9 +328,7 @@ class Encoder:
         return self.pack(common.MAVLink_extended_sys_state_message(common.MAV_VTOL_STATE_UNDEFINED, landed))
 
     def collision(self, other: NodeId, *, closest_s: float, altitude_m: float, horizontal_m: float) -> bytes:
-        """COLLISION with another node, avoided by height; distances are those at the closest approach, `closest_s` from
-        now. `id` is the node, which equals its MAVLink system up to 250.
-        """
+        """COLLISION with node `id` (its system up to 250), avoided by height; distances are those in `closest_s`."""
         return self.pack(
             common.MAVLink_collision_message(
                 common.MAV_COLLISION_SRC_MAVLINK_GPS_GLOBAL_INT,

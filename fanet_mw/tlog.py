@@ -30,9 +30,7 @@ def append(file: BinaryIO, data: bytes, *, t_us: int) -> int:
 
 
 def write(path: Path, taps: Iterable[tuple[int, bytes]], *, epoch_us: int = 0, held: Written | None = None) -> None:
-    """Write (instant ns, frames) pairs; `epoch_us`: unix time of instant 0, `held`: what the file holds. Raises OSError
-    when the disk is full; the file then ends with the last frame that fits.
-    """
+    """Write (instant ns, frames) pairs; `epoch_us`: unix time of 0. Raises OSError after the last whole frame."""
     write_items(path, _stamped(taps, epoch_us), held)
 
 

@@ -147,9 +147,7 @@ class Bus:
 
     @classmethod
     def serve(cls, endpoint: str, config: Path | None = None) -> Self:
-        """Open a session as the router; the file adds what is not set here (TLS, access lists). Raises BusError when it
-        cannot listen on the endpoint, ConfigError when the file cannot be used.
-        """
+        """Open a session as the router; the file adds TLS and access lists. Raises BusError and ConfigError."""
         _require_endpoint(endpoint)
         settings = _config(mode="router", listen=endpoint, connect=None, file=config)
         if endpoint.startswith("tls/") and (off := _clock_outside_certificate(config)) is not None:

@@ -116,9 +116,7 @@ class RoutingProtocol(ABC):
         return self._port.transmit(packet.frame, BROADCAST, start_ns=start_ns, wants_status=wants_status)
 
     def first_hello_ns(self, earliest_ns: int, start_ns: int) -> int:
-        """The instant for which the node's first hello is to be made: at or after `start_ns`, which is at random within
-        the first interval, or sooner if hellos cannot collide.
-        """
+        """When the first hello is to be made: from `start_ns` on, or sooner if hellos cannot collide."""
         return self.hello_due_ns(start_ns)
 
     def hello_due_ns(self, start_ns: int) -> int:

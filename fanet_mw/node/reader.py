@@ -144,9 +144,7 @@ class _Inside:
 
 
 class Decoded:
-    """A cache of the latest packets: inner frames are found, and each message decoded, once for clock, protocol and
-    applications of a node, and for all nodes that hear the same bytes.
-    """
+    """A cache of the latest packets: each is opened and decoded once for all parts of all nodes of a run."""
 
     def __init__(self) -> None:
         self._inside_of = lru_cache(maxsize=_LATEST)(lambda _: _Inside())

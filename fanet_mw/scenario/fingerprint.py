@@ -55,9 +55,7 @@ def as_json(scenario: Scenario) -> str:
 
 
 def told_by(swarm: str, answer: bytes) -> dict[str, Any]:
-    """The scenario's identity that a swarm's keeper told as text. Raises BusError if bus messages are laid out in
-    another way, ValueError or RecursionError if this is no such text.
-    """
+    """The identity that a keeper told as text; BusError: other layouts, ValueError or RecursionError: nonsense."""
     tree = json.loads(answer)
     if not isinstance(tree, dict):
         raise ValueError("no table of keys")  # noqa: TRY004  (like all other texts that are none)

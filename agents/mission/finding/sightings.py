@@ -46,9 +46,7 @@ Of 577 simulated pairs of people 35 to 100 m apart who were confirmed rightly, n
 
 
 class Contradictions:
-    """Finds confirmations of people who, by later powers, do not carry that phone: once another assignment of phones to
-    people is far more likely than any with the confirmed pair, the confirmation is taken back.
-    """
+    """Finds confirmations that later powers contradict: another assignment of phones to people is far likelier."""
 
     def __init__(self, survivors: KnownSurvivors, identities: Identities) -> None:
         self._survivors, self._identities = survivors, identities

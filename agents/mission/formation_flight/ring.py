@@ -27,9 +27,7 @@ _NO_BEARING_M: Final = 1.0
 def place_on_ring(
     middle: Enu, here: Enu, others: Iterable[Enu], *, radius_m: float, node: int, faces: Iterable[Enu] = ()
 ) -> Enu:
-    """The place to fly to, at the height of `here`; `others` fly around the same middle, and `faces` are the middles of
-    the circles to be joined. `node` decides the direction of a UAV that is exactly in the middle.
-    """
+    """The place to fly to at the height of `here`; `faces`: the middles of the circles to be joined."""
     bearing = _bearing(middle, here)
     if bearing is None:
         bearing = node * GOLDEN_ANGLE

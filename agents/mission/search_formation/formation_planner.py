@@ -240,9 +240,7 @@ class FormationPlanner:
     def _shared_out(
         self, pattern: Pattern, nodes: Sequence[int], starts: Sequence[Enu]
     ) -> tuple[Pattern, Sequence[int]]:
-        """The largest formation around the swarm that it reaches in one piece, else the smallest, and each node's
-        place. A UAV that is alone takes the place with its own number.
-        """
+        """The largest formation around the swarm that it reaches in one piece, else the smallest, and all places."""
         if len(nodes) == 1:
             return pattern, [(nodes[0] - 1) % pattern.places]
         absent, followers = self.absent, pattern.followers

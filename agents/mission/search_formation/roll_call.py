@@ -94,9 +94,7 @@ class RollCall:
             self.lost.setdefault(node, now_ns)
 
     def review(self, plan: Search, *, since_ns: int, falls: bool = False, now_ns: int) -> None:
-        """Find who is lost, several times a second. `since_ns`: when this UAV began to follow the plan, before which
-        nobody need have been heard; `falls`: this UAV falls itself.
-        """
+        """Find who is lost, several times a second, of those due to be heard after `since_ns`. `falls`: this UAV."""
         self.parted = () if self._silent is None else self._silent.parted(self.lost, now_ns=now_ns)
         self.has_news |= falls and not self._falls
         self._falls = falls

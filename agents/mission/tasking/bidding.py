@@ -155,9 +155,7 @@ class Bidding:
             self._announce(self.survivor, now_ns)
 
     def _reconsider(self, survivor: int, now_ns: int) -> None:
-        """Give up the present survivor if the auction is lost; or, withdrawing the bid, if searched in vain for too
-        long, not reached in time (a building or a closed area may lie between), or not permitted any more.
-        """
+        """Give up the present survivor if the auction is lost, it takes too long, or it is not permitted any more."""
         known = self._survivors.by_id[survivor]
         lost = not self._wins(survivor, known, now_ns)
         arrived_ns, patience_ns = self._approach.arrived_ns.get(survivor), self._patience_ns

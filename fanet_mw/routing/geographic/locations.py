@@ -51,9 +51,7 @@ class LocationTable:
         return tuple(self._fixes[node] for node in self._used if node in self._fixes)
 
     def next_hop(self, destination: NodeId, *, at: Enu, excluded: NodeId, now_ns: int) -> NodeId | None:
-        """The destination if a neighbor, else that nearest to it, if nearer than `at`; never `excluded`, which handed
-        the packet over: with other locations the two would pass it back and forth.
-        """
+        """The destination, or the neighbor nearest to it if nearer than `at`; never the giver, `excluded`."""
         if destination in self._neighbors and self._neighbors[destination][1] > now_ns:
             return destination
         fix = self._fixes.get(destination)

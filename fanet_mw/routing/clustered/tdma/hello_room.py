@@ -23,9 +23,7 @@ with a range of 400 m, keep all neighbors at a share of 1.4, and lose some at 2.
 
 
 def room_ns(window_ns: int) -> int:
-    """The greatest airtime of hellos for which there is room in a contention window. They fall due before its last
-    part, in which those that had to wait are transmitted.
-    """
+    """The greatest airtime of hellos that a contention window holds before its last part, which is for the late."""
     return max(0, min(int(_MOST * window_ns), int(_BACKLOG * (window_ns - TAIL_NS))))
 
 

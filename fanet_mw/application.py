@@ -248,7 +248,7 @@ class Application:
         """Another application on board has written a record into the trace."""
 
     def permits(self, course: Course, now_ns: int) -> bool:
-        """True if this application does not object to another's course; who objects is asked about the next, too."""
+        """True unless this application objects to another one's course; it is then asked about the next one, too."""
         return True
 
     def wake(self, now_ns: int) -> None:

@@ -91,14 +91,6 @@ class NodeState(NamedTuple):
     """True while receipts, or packets of this node, have not been let out."""
 
 
-class _OutTopics(NamedTuple):
-    """The topics to which a UAV sends."""
-
-    transmit: str
-    setpoint: str
-    tap: str
-
-
 class Uav(Actor):
     """The actor that consists of the node and the applications of one UAV."""
 
@@ -122,7 +114,9 @@ class Uav(Actor):
         super().__init__(f"agent-{node}", heard)
         self.slack_ns = min(scenario.radio.handover_ns, scenario.radio.lead_ns // 2)  # the rest is for the bus
         self.patient = (topics.sensors(node),)
-        self._topics = _OutTopics(topics.radio_tx(node), topics.setpoint(node), topics.mavlink(node))
+        self._tx_topic = topics.radio_tx(node)
+        self._setpoint_topic = topics.setpoint(node)
+        self._tap_topic = topics.mavlink(node)
         self._prompt_ns = scenario.radio.handover_ns + scenario.radio.lead_ns
         """The greatest delay of a reception whose relay can still be announced one lead ahead."""
         self._node = Node(node, scenario, make_protocol, position=position, reader=reader)
@@ -216,7 +210,7 @@ class Uav(Actor):
         self._onboard.fix(fix, now_ns)
         again = self._setpoints.repeated(now_ns)
         if again is not None:
-            self.outbox.append((self._topics.setpoint, again))
+            self.outbox.append((self._setpoint_topic, again))
 
     def wake(self, now_ns: int) -> None:
         self._node.wake(now_ns)
@@ -287,7 +281,7 @@ class Uav(Actor):
             onboard.called = False
             self._own_wake_ns = self._next_own_ns()
         if node.requests:
-            outbox, topic = self.outbox, self._topics.transmit
+            outbox, topic = self.outbox, self._tx_topic
             for request in node.requests:  # mostly there is one
                 outbox.append((topic, request))
             node.requests.clear()
@@ -297,10 +291,10 @@ class Uav(Actor):
         return earliest(self._onboard.next_wake_ns(), self._hellos.due_ns())
 
     def _steer(self, course: Course, now_ns: int) -> None:
-        self.outbox.append((self._topics.setpoint, self._setpoints.of(course, now_ns)))
+        self.outbox.append((self._setpoint_topic, self._setpoints.of(course, now_ns)))
 
     def _tap(self, frames: bytes, now_ns: int) -> None:
-        self.outbox.append((self._topics.tap, MavlinkTap(now_ns, frames)))
+        self.outbox.append((self._tap_topic, MavlinkTap(now_ns, frames)))
 
 
 def _asked_for(

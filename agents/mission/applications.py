@@ -108,10 +108,8 @@ class PlannedSearch(Application):
         self._settle()
 
     def on_hello(self, frame: bytes, now_ns: int) -> None:
-        messages, heard = (
-            decoded(frame, told_in),
-            motion_in(frame, own=self.port.node, now_ns=now_ns, place=self._origin),
-        )
+        messages = decoded(frame, told_in)
+        heard = motion_in(frame, own=self.port.node, now_ns=now_ns, place=self._origin)
         if heard is None:
             self._bad_positions += 1
             return

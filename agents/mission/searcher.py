@@ -1,5 +1,4 @@
-"""The planned search at one UAV: it keeps its lane, reports phones, bids for survivors, responds, confirms, and avoids
-others.
+"""The planned search at one UAV: it keeps its lane, reports phones, bids for survivors, responds, and confirms.
 
     plan received       -> a lane: its place at each instant of swarm time                      formation
     phones in reach     -> reports: flooded, and passed from neighbor to neighbor in hellos     finding.phone_reception
@@ -7,7 +6,7 @@ others.
     too few reporters   -> the auction sends a UAV that has not reported, for another bearing   tasking
     nobody seen, ears   -> a UAV with microphones goes down to listen                           tasking.voice_descent
     seen at close range -> confirmed, announced; responders return to their lanes               finding.announcing
-    contradicted later  -> refuted, announced; reported and bid for as before the confirmation  finding.contradictions
+    contradicted later  -> refuted, announced; reported and bid for as before the confirmation  finding.sightings
 
 All that a UAV knows it has sensed itself or received over the air. At each position fix it chooses a velocity (flight).
 """

@@ -81,13 +81,6 @@ class _Assigned(NamedTuple):
         return [node for cluster in self.clusters for node in cluster.members]
 
 
-class _Estimates(NamedTuple):
-    """What the leader knows of links and loads; None if the scenario says what they are."""
-
-    links: LinkState | None
-    loads: HeardLoads | None
-
-
 class Leader:
     """The leader's work at one node: joins in, schedules out."""
 
@@ -126,7 +119,8 @@ class Leader:
             clusters.method, count=clusters.count, range_m=self._range_m, options=clusters.options
         )
         self.epoch = epoch
-        self._estimates = _Estimates(LinkState() if scenario.measures_links else None, heard)
+        self._links = LinkState() if scenario.measures_links else None
+        self._heard = heard
         self._measured_ns = measured_period_ns
         self._outbid = False
         """True if another node has announced an epoch in this leader's name, which the next one must come after."""
@@ -163,8 +157,8 @@ class Leader:
 
     def on_links(self, node: NodeId, links: Sequence[Link]) -> None:
         """A node, perhaps the leader itself, has reported how well it hears its neighbors."""
-        if self._estimates.links is not None:
-            self._estimates.links.on_report(node, links)
+        if self._links is not None:
+            self._links.on_report(node, links)
 
     def on_outbid(self, epoch: int, *, now_ns: int) -> None:
         """A schedule was received in this leader's name that it has not made: announce a later epoch soon."""
@@ -238,12 +232,11 @@ class Leader:
         self._assigned = _Assigned(ordered, places, links, start_ns, self._parts(ordered, start_ns), measured, loads)
 
     def _loads(self, now_ns: int) -> Mapping[NodeId, int]:
-        heard = self._estimates.loads
-        return {} if heard is None else heard.loads(sorted(self._roster.nodes), now_ns=now_ns)
+        return {} if self._heard is None else self._heard.loads(sorted(self._roster.nodes), now_ns=now_ns)
 
     def _is_loaded_otherwise(self, loads: Mapping[NodeId, int], now_ns: int) -> bool:
         """True if the present assignment is for other loads, and has been in force for some time."""
-        before, heard = self._assigned, self._estimates.loads
+        before, heard = self._assigned, self._heard
         rest_ns = self._reassign_ns or _RELOAD_NS
         if heard is None or not before.parts or now_ns < before.start_ns + rest_ns:
             return False
@@ -252,11 +245,11 @@ class Leader:
 
     def _measured(self) -> tuple[Link, ...]:
         """Measured links to plan with; none until most nodes have reported, the others' being known from neighbors."""
-        if self._estimates.links is None:
+        if self._links is None:
             return ()
         nodes = [*self._roster.nodes, NodeId(self._authority.leader)]
-        known = self._assigned.measured or self._estimates.links.known(nodes) >= _MOST * len(nodes)
-        return self._estimates.links.between(nodes) if known else ()
+        known = self._assigned.measured or self._links.known(nodes) >= _MOST * len(nodes)
+        return self._links.between(nodes) if known else ()
 
     def _near(self, places: Mapping[NodeId, Enu], measured: tuple[Link, ...]) -> Adjacency:
         """The links between nodes at these places: the measured ones, if there are any."""

@@ -113,13 +113,12 @@ class Pilot:
             self.armed = False
         return self.on_ground
 
-    def take_off(self, up_m: float | None, *, force_armed: bool = False) -> bool:
+    def take_off(self, up_m: float | None) -> bool:
         """Climb straight up to a height over the origin; None: the parameter's height over home."""
         up_m = self.home.up + self.settings[names.TAKEOFF_HEIGHT] if up_m is None else up_m
         place = self.position._replace(up=up_m)
-        if not (self.armed or force_armed) or not self.allows(place) or up_m < self.position.up - _THERE_M:
+        if not self.armed or not self.allows(place) or up_m < self.position.up - _THERE_M:
             return False
-        self.armed = True
         self._enter(Mode.TAKEOFF, Course(place, min(3.0, self.cruise_m_s), take_off=True))
         return True
 

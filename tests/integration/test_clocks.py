@@ -29,9 +29,9 @@ GRID = [
     "warmup_s=34", "clock.drift_ppm=20",
 ]  # fmt: skip
 
-SOON = ("duration_s=24", "warmup_s=14")
+SOON = ("duration_s=20", "warmup_s=14")
 """Where no beacon has to go round first."""
-IN_STEP = ("clock.drift_ppm=0", "clock.offset_ms=1", "clusters.turn_slack_us=2020", "duration_s=25", "warmup_s=10")
+IN_STEP = ("clock.drift_ppm=0", "clock.offset_ms=1", "clusters.turn_slack_us=2020", "duration_s=18", "warmup_s=10")
 
 
 @lru_cache

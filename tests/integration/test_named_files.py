@@ -113,7 +113,7 @@ def test_a_sweep_runs_again_what_ran_with_another_plug_in_or_another_helper_of_i
     def sent() -> int:
         subprocess.run(
             [sys.executable, "-m", "fanet_mw", "sweep", "s.toml", "--out", "out"],
-            env={**os.environ, "PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"},
+            env={**os.environ, "PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1", "FANET_NO_NUMBA": "1"},
             cwd=tmp_path, check=True, capture_output=True, timeout=100,
         )  # fmt: skip
         (summary,) = read(tmp_path / "out")["summary"].to_pylist()

@@ -20,11 +20,13 @@ SHORT = ("quick", "--set", "nodes.count=3", "clusters.count=1", "--duration", "1
 def fanet(
     *arguments: str, closing: str = "", flags: tuple[str, ...] = (), **more: str
 ) -> "subprocess.CompletedProcess[str]":
-    """Run a command; `closing` is what a shell is told of its streams, `more` are environment variables."""
+    """Run a command; `closing` is what a shell is told of its streams, `more` are environment variables. Its kernel is
+    not compiled: reading it takes longer than such a run.
+    """
     command = [sys.executable, *flags, "-m", "sim.cli.app", *arguments]
     return subprocess.run(
         ["sh", "-c", f'exec "$@" {closing}', "sh", *command], capture_output=True, text=True, timeout=100,
-        env={**os.environ, **more},
+        env={**os.environ, "FANET_NO_NUMBA": "1", **more},
     )  # fmt: skip
 
 

@@ -16,7 +16,7 @@ def summary_of(*settings: str) -> dict[str, Any]:
     return finish(simulate(catalog.find("clusters", [*SHORT, *settings])), out=None)
 
 
-@pytest.mark.parametrize("period_s", [0.5, 1])
+@pytest.mark.parametrize("period_s", [*slow(0.5), 1])
 def test_on_the_grid_every_packet_reaches_everyone_within_the_bound(period_s: float) -> None:
     summary = summary_of(f"clusters.flooding_period_s={period_s}")
     assert summary["pdr"] >= 0.999
@@ -27,9 +27,9 @@ def test_on_the_grid_every_packet_reaches_everyone_within_the_bound(period_s: fl
     assert summary["frames"]["closes"]
 
 
-def test_a_swarm_that_was_silent_for_a_minute_has_lost_nobody() -> None:
+def test_a_swarm_that_was_silent_for_half_a_minute_has_lost_nobody() -> None:
     """All 45 nodes must tell at once that they live; in seed 2 the first words of three of them got lost."""
-    summary = summary_of("duration_s=52.5", "warmup_s=49", "seed=2")
+    summary = summary_of("duration_s=33.5", "warmup_s=30", "seed=2")
     assert summary["pdr"] >= 0.999
     assert summary["bound"]["within_share"] >= 0.999
     assert summary["bound"]["violations"] == 0

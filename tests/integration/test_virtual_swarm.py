@@ -35,7 +35,7 @@ _KEPT = {settings[0] for settings in FLIGHTS.values()}
 """The scenarios of which `test_kept_flights.py` flies variants and closes the ledgers."""
 
 
-@pytest.mark.parametrize("duration_s", [2.5, pytest.param(8, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("duration_s", [1.5, pytest.param(8, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     "name",
     [pytest.param(entry.name, marks=pytest.mark.slow if entry.name in _KEPT else ()) for entry in catalog.shipped()],

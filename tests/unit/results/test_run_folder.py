@@ -136,20 +136,33 @@ def test_a_summary_with_a_wrong_value_is_named(folder: Path, keys: dict[str, Any
     assert said in refused(folder, by=report)
 
 
+NONE = (b"", b"[]", b"null", b"1", b'"text"', b"{", b"\xff\xfe", b"[" * 100_000, b'{"a":' * 5_000, b"9" * 5_000, b"{}")
+EMPTY = (("reports.json", b"{}"), ("links.json", b"[]"))
+"""Nobody has reported."""
+
+
 @pytest.mark.parametrize(
-    "content",
-    [b"", b"[]", b"null", b"1", b'"text"', b"{", b"\xff\xfe", b"[" * 100_000, b'{"a":' * 5_000, b"9" * 5_000, b"{}"],
+    ("name", "content"),
+    [
+        (name, content)
+        for name in ("summary.json", "scenario.toml", "reports.json", "links.json")
+        for content in NONE
+        if (name, content) not in EMPTY
+    ],
 )
-@pytest.mark.parametrize("name", ["summary.json", "scenario.toml", "reports.json", "links.json"])
 def test_content_that_is_none_is_one_line(folder: Path, name: str, content: bytes) -> None:
     if name == "summary.json":
         (folder / name).write_bytes(content)
     else:
         forge(folder, name, content)
-    if (name, content) in (("reports.json", b"{}"), ("links.json", b"[]")):
-        report(folder)  # nobody has reported
-    else:
-        refused(folder, by=report)
+    refused(folder, by=report)
+
+
+def test_a_run_of_which_nobody_has_reported_has_a_page(folder: Path) -> None:
+    for name, content in EMPTY:
+        forge(folder, name, content)
+    report(folder)
+    assert "The result may be used." in (folder / "report.md").read_text()
 
 
 @pytest.mark.parametrize(
@@ -248,7 +261,6 @@ def test_nothing_that_a_folder_names_is_imported(folder: Path, monkeypatch: pyte
             forge(folder, "scenario.toml", text.replace(old, new).encode())
             Replay.read(folder)
     assert old in text
-    report(folder)  # reads the scenario in the same way
     assert (folder.parents[2] / "foreign").read_text() == "untouched"
 
 
@@ -260,7 +272,6 @@ def test_a_run_of_before_keys_were_removed_is_read_if_they_had_no_effect_in_it(f
     assert old.count("slots = 0") == old.count("coverage_map = false") == 1
     forge(folder, "scenario.toml", old.encode())
     Replay.read(folder)
-    report(folder)
     forge(folder, "scenario.toml", old.replace("slots = 0", "slots = 8").encode())
     with pytest.raises(ConfigError, match=r"clusters\.slots: removed"):
         Replay.read(folder)

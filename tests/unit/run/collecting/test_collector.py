@@ -219,6 +219,7 @@ def test_no_report_that_gets_through_can_keep_the_result_from_being_computed(gen
     replay(made := Ear(), genuine)
     with closing(made.collector):
         outcome = made.outcome()
+    outcome = replace(outcome, records=[*outcome.records][::10])  # a summary takes as long as its trace
     finish(outcome, out=None)
     refused = passed = 0
     for name in ("emulator", "world", "agent-3"):

@@ -75,10 +75,10 @@ class Burst(Application):
 def test_whose_bulk_is_refused_is_told_so_and_no_interval_that_is_for_reports() -> None:
     load = ["traffic.arrivals=cbr", "traffic.interval_s=0.02", "traffic.payload_bytes=1000", "traffic.deadline_s=1"]
     burst = Burst()
-    scenario = catalog.find("quick", ["routing.protocol=rounds", "duration_s=14", *load])
+    scenario = catalog.find("quick", ["routing.protocol=rounds", "duration_s=11", *load])
     observed = Observed(scenario, applications=lambda node: [burst] if node == 1 else [])
     observed.host.start()
-    observed.host.run(12 * S)
+    observed.host.run(9 * S)
     refused = [status for status in burst.told if status.fate is Fate.REFUSED]
     assert refused
     assert {status.interval_ns for status in refused} == {None}

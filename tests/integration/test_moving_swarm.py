@@ -48,12 +48,12 @@ def test_a_formation_keeps_its_timetable_and_its_bound_through_its_turns(speed_m
 
 
 def test_a_timetable_promises_nothing_to_uavs_that_move_among_each_other() -> None:
-    bound = Flight("random_waypoint", 4, 5, area_m=500, duration_s=25).summary()[0]["bound"]
+    bound = Flight("random_waypoint", 4, 5, area_m=500, duration_s=18).summary()[0]["bound"]
     assert not bound.get("stated_share")
 
 
 def test_heads_that_change_under_a_timetable_lose_no_account_of_a_frame() -> None:
-    flight = Flight("random_waypoint", 4, 6, area_m=600, duration_s=30)
+    flight = Flight("random_waypoint", 4, 6, area_m=600, duration_s=22)
     summary, epochs = flight.summary(count=4, reassign_s=5, contention_ms=150)
     assert epochs > 1
     assert summary["frames"]["closes"]

@@ -49,7 +49,8 @@ def without_capacity(*settings: str) -> ScenarioPlan:
 )
 def test_the_bound_that_is_planned_is_the_one_that_the_nodes_compute_in_flight(settings: tuple[str, ...]) -> None:
     scenario = catalog.find(
-        "clusters", ["duration_s=20", "warmup_s=12", "world.gps_sigma_m=0", "sensors.gps_bias_m=0", *settings]
+        "clusters",
+        [*all_send(20), "duration_s=20", "warmup_s=12", "world.gps_sigma_m=0", "sensors.gps_bias_m=0", *settings],
     )
     _, plan, feasible = judge(scenario, deadline_s=None)
     assert feasible

@@ -4,6 +4,7 @@ that do not hear each other keep clear of each other.
 
 import pytest
 from closing_swarm import ClosingSwarm
+from kit import slow
 
 NORTHERN, SOUTHERN = 8, 23
 """The UAVs of the two lines at which the chain ends."""
@@ -30,7 +31,9 @@ def test_of_two_lost_at_once_the_second_one_that_is_noticed_makes_nobody_seek_ot
     assert 4.0 < ClosingSwarm(102.5).heal_s(first, second, within_s=15.0) < 7.0
 
 
-@pytest.mark.parametrize(("from_s", "along", "off_m"), [(60.2, 1.71, -187.0), (77.3, 2.12, 226.0), (184.0, 1.52, -3.0)])
+@pytest.mark.parametrize(
+    ("from_s", "along", "off_m"), [(60.2, 1.71, -187.0), (77.3, 2.12, 226.0), *slow((184.0, 1.52, -3.0))]
+)
 def test_parts_that_take_each_other_for_lost_and_close_the_same_gap_keep_clear(
     from_s: float, along: float, off_m: float
 ) -> None:

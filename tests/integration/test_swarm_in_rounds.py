@@ -155,7 +155,7 @@ def test_bounds_do_not_count_on_those_who_fly_away() -> None:
     """UAVs that mix at 20 m/s on 700 m leave each other's range all the time, and often the swarm."""
     mixing = {"model": "random_waypoint", "speed_m_s": 20.0}
     summary = flown(
-        seed=3, duration_s=16, nodes={"layout": "disc", "spacing_m": 100, "telemetry_hz": 1}, world={"area_m": 700},
+        seed=3, duration_s=22, nodes={"layout": "disc", "spacing_m": 100, "telemetry_hz": 1}, world={"area_m": 700},
         mobility=mixing, rounds={"bulk_share": 0},
     )  # fmt: skip
     bound = summary["bound"]

@@ -7,7 +7,8 @@ are few.
 
 import asyncio
 import selectors
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine, Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from fanet_mw.hosts import interrupts
@@ -22,27 +23,38 @@ def run(main: Coroutine[Any, Any, T]) -> T:
 
 
 async def _cancelled_by_signals(main: Coroutine[Any, Any, T]) -> T:
-    loop, task = asyncio.get_running_loop(), asyncio.ensure_future(main)
+    task = asyncio.ensure_future(main)
     caught: list[int] = []
 
     def on_signal(number: int) -> None:
         caught.append(number)
         task.cancel()
 
-    heeded = interrupts.heeded()
-    for number in heeded:
-        loop.add_signal_handler(number, on_signal, number)
     try:
-        interrupts.raise_again()
-        return await task
+        with heeding(on_signal):
+            return await task
     except asyncio.CancelledError:
         if not caught:
             raise
         raise KeyboardInterrupt(caught[0]) from None
     finally:
-        for number in heeded:
-            loop.remove_signal_handler(number)
         interrupts.install()
+
+
+@contextmanager
+def heeding(on_signal: Callable[[int], object]) -> Iterator[None]:
+    """Call `on_signal` with the number of each signal meanwhile, on the loop that runs, where the process handles it;
+    raises KeyboardInterrupt if one got lost before.
+    """
+    loop, numbers = asyncio.get_running_loop(), interrupts.heeded()
+    for number in numbers:
+        loop.add_signal_handler(number, on_signal, number)
+    try:
+        interrupts.raise_again()
+        yield
+    finally:
+        for number in numbers:
+            loop.remove_signal_handler(number)
 
 
 def _loop() -> asyncio.AbstractEventLoop:

@@ -10,8 +10,8 @@ from fanet_mw.autopilot.serving import Autopilot, serve_world
 from fanet_mw.flavors import Flavor
 from fanet_mw.gateway.gateway import per_uav
 from fanet_mw.geodesy import Geodetic
-from fanet_mw.hosts import interrupts
 from fanet_mw.hosts.clock import START_PATIENCE_S, ClockListener
+from fanet_mw.hosts.loop import heeding
 from fanet_mw.scenario.fingerprint import fingerprint
 from fanet_mw.units import NodeId
 from sim.observation.bus_feed import BusFeed
@@ -32,11 +32,8 @@ async def run(
 ) -> int:
     """Play the world of a swarm until its time is over or a signal comes; returns the exit code."""
     over = asyncio.Event()
-    loop = asyncio.get_running_loop()
-    for number in interrupts.heeded():
-        loop.add_signal_handler(number, over.set)
     per_uav(connection, 1, flag="--autopilots")
-    with BusFeed(endpoint, swarm, zenoh_config=zenoh_config, name=WORLD) as feed:
+    with heeding(lambda _: over.set()), BusFeed(endpoint, swarm, zenoh_config=zenoh_config, name=WORLD) as feed:
         bus, names, scenario = feed.bus, feed.names, feed.scenario
         listener = ClockListener(bus, names)
         origin = Geodetic(*scenario.world.origin_deg, 0.0)

@@ -26,6 +26,7 @@ from fanet_mw.errors import BusError, MalformedFrameError
 from fanet_mw.hosts import interrupts
 from fanet_mw.hosts.bus import Bus, config_of, with_port
 from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
+from fanet_mw.hosts.loop import heeding
 from fanet_mw.hosts.realtime import SwarmAddress
 from fanet_mw.routing import module_of
 from fanet_mw.scenario import Scenario
@@ -407,14 +408,5 @@ async def launch(
             services, bus, respawn=respawn, tell=on_event, spool_folder=spool_folder, slow_down_to=slow_down_to,
             leads=leads,
         )  # fmt: skip
-        loop = asyncio.get_running_loop()
-        signals = interrupts.heeded() if heed_signals else ()
-        for number in signals:
-            loop.add_signal_handler(number, run.interrupt, number)
-        try:
-            if heed_signals:
-                interrupts.raise_again()
+        with heeding(run.interrupt) if heed_signals else contextlib.nullcontext():
             return await run.run(on_progress, on_started)
-        finally:
-            for number in signals:
-                loop.remove_signal_handler(number)

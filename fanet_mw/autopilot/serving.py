@@ -1,7 +1,6 @@
 """Runs the links to flight controllers on asyncio: a UAV's computer beside one, or a world that consists of many."""
 
 import asyncio
-import contextlib
 from array import array
 from collections.abc import Callable, Mapping
 from typing import Final
@@ -69,6 +68,15 @@ class Autopilot:
             self._tell(f"{self._name}: this computer's clock {how} the flight controller's GPS")
 
 
+def _setpoints(payload: bytes, link: AutopilotLink) -> list[Setpoint]:
+    """The setpoints of one put; one that is malformed has none, and is counted."""
+    try:
+        return [message for message in codecs.decode(payload) if isinstance(message, Setpoint)]
+    except MalformedFrameError:
+        link.counts["setpoints_malformed"] += 1
+        return []
+
+
 class AutopilotBus:
     """A bus for one UAV's host, whose sensors and flight controller are at the end of a MAVLink connection."""
 
@@ -90,9 +98,8 @@ class AutopilotBus:
         if topic != self._setpoint or self.autopilot is None:
             self._inner.put(topic, payload, reliable=reliable)
             return
-        for message in codecs.decode(payload):
-            if isinstance(message, Setpoint):
-                self.autopilot.link.command(message, message.t_ns)
+        for setpoint in _setpoints(payload, self.autopilot.link):
+            self.autopilot.link.command(setpoint, setpoint.t_ns)
 
     def announce(self, topic: str) -> None:
         self._inner.announce(topic)
@@ -130,12 +137,9 @@ async def serve_world(
 
     def on_setpoint(topic: str, payload: bytes) -> None:
         autopilot = autopilots.get(NodeId(node_of(topic)))
-        if autopilot is None:
-            return
-        with contextlib.suppress(MalformedFrameError):
-            for message in codecs.decode(payload):
-                if isinstance(message, Setpoint):
-                    loop.call_soon_threadsafe(autopilot.link.command, message, now_ns())
+        if autopilot is not None:
+            for setpoint in _setpoints(payload, autopilot.link):
+                loop.call_soon_threadsafe(autopilot.link.command, setpoint, now_ns())
 
     loop = asyncio.get_running_loop()
     bus.subscribe(names.all_setpoints, on_setpoint)

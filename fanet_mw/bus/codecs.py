@@ -1,7 +1,8 @@
 """The byte format of the messages on the bus, which no other file knows.
 
 One put on the bus carries a batch of messages. Each is one byte for its kind, a 32-bit length and its body, all little
-endian. Any bytes decode either to messages or to MalformedFrameError, and to no other exception.
+endian. Any bytes decode either to messages or to MalformedFrameError, and to no other exception; a message that its
+bytes cannot hold is a LocalProtocolError.
 """
 
 import hashlib
@@ -15,7 +16,7 @@ from fanet_mw import trace
 from fanet_mw.bus import messages as m
 from fanet_mw.bus import radio_control as air
 from fanet_mw.bus.link_stats import COUNTS, LinkStats
-from fanet_mw.errors import MalformedFrameError
+from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.orders import Order
 from fanet_mw.units import Enu, NodeId
 
@@ -75,7 +76,7 @@ def _plain(kind: type[Any], layout: str, check: Callable[[Any], None] = lambda _
 
 
 def _finite(values: Iterable[Any]) -> None:
-    """Raise ValueError for values that no sensor can give: infinite ones and NaN."""
+    """Raise ValueError for values that no sensor gives and nobody can fly to: infinite ones and NaN."""
     for value in values:
         if isinstance(value, tuple):
             _finite(value)
@@ -110,7 +111,6 @@ def _rows(
     layout: str,
     *,
     most: int = MAX_HEARD,
-    check: Callable[[Any], None] = _finite,
 ) -> Codec:
     row = struct.Struct(layout)
 
@@ -123,7 +123,7 @@ def _rows(
         if len(body) != _ROWS.size + count * row.size or count > most:
             raise ValueError("length")
         rows = tuple(map(make, row.iter_unpack(body[_ROWS.size :])))
-        check(rows)
+        _finite(rows)
         return kind(t_ns, rows)
 
     return Codec(kind, encode, decode, (_ROWS, row))
@@ -159,6 +159,8 @@ def _encode_rx(reception: m.Reception) -> bytes:
 
 def _decode_rx(body: bytes) -> m.Reception:
     src, end_ns, rssi_dbm = _RX.unpack_from(body)
+    if not math.isfinite(rssi_dbm):
+        raise ValueError("not finite")
     return m.Reception(body[_RX.size :], NodeId(src), end_ns, rssi_dbm)
 
 
@@ -271,9 +273,9 @@ _CODECS: Final = {
     2: Codec(m.Reception, _encode_rx, _decode_rx, (_RX,)),
     3: Codec(m.TxStatus, _encode_status, _decode_status, (_STATUS,)),
     4: Codec(m.Poses, _encode_poses, _decode_poses, (_POSES,)),
-    5: _plain(m.Setpoint, "<q4dB3d"),
-    6: _plain(m.Gps, "<q6d"),
-    7: _rows(m.WifiScan, tuple, "<If", check=lambda _: None),
+    5: _plain(m.Setpoint, "<q4dB3d", _finite),
+    6: _plain(m.Gps, "<q6d", _finite),
+    7: _rows(m.WifiScan, tuple, "<If"),
     8: Codec(m.MavlinkTap, lambda tap: _INSTANT.pack(tap.t_ns) + tap.data, _decode_tap, (_INSTANT,)),
     9: Codec(m.TraceBatch, _encode_trace, _decode_trace),
     10: _plain(m.ClockEpoch, "<qdBqQIq", _check_clock),
@@ -317,11 +319,16 @@ MAX_ITEMS: Final = 16_384
 
 
 def encode(messages: Iterable[m.Message]) -> bytes:
-    """The bytes of one put that carries these messages, in order."""
+    """The bytes of one put that carries these messages, in order; raises LocalProtocolError for a message with a value
+    for which its bytes have no room.
+    """
     parts = []
     for message in messages:
         code = CODES[type(message)]
-        body = _CODECS[code].encode(message)
+        try:
+            body = _CODECS[code].encode(message)
+        except (struct.error, OverflowError) as error:
+            raise LocalProtocolError(f"{message!r:.200} cannot be put on the bus: {error}") from error
         parts.append(_ITEM.pack(code, len(body)))
         parts.append(body)
     return b"".join(parts)

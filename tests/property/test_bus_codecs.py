@@ -2,6 +2,7 @@
 
 from array import array
 from contextlib import suppress
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -40,8 +41,8 @@ from fanet_mw.bus.messages import (
     WifiScan,
     WindEstimate,
 )
-from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
-from fanet_mw.errors import MalformedFrameError
+from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Mishap, MishapKind, Partition, Restore
+from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.orders import Order, OrderKind
 from fanet_mw.trace import Delivered, Detected, Generated
 from fanet_mw.units import Enu, NodeId
@@ -51,7 +52,10 @@ u32 = st.integers(0, 2**32 - 1)
 nodes = st.integers(0, 0xFFFF).map(NodeId)
 doubles = st.floats(allow_nan=False)
 singles = st.floats(allow_nan=False, width=32)
+finite = st.floats(allow_nan=False, allow_infinity=False)
+finite_singles = st.floats(allow_nan=False, allow_infinity=False, width=32)
 vectors = st.builds(Enu, doubles, doubles, doubles)
+finite_vectors = st.builds(Enu, finite, finite, finite)
 words = st.text(st.characters(codec="utf-8", exclude_characters="\n\r"), max_size=20)
 
 
@@ -66,18 +70,24 @@ def numbers(code: str, values: st.SearchStrategy[int], count: int) -> "st.Search
     return st.lists(values, min_size=count, max_size=count).map(lambda found: array(code, found))
 
 
-finite = st.floats(allow_nan=False, allow_infinity=False)
 records = st.one_of(
     st.builds(Delivered, *[instants] * 7),
     st.builds(Generated, instants, nodes, u32, words, u32),
     st.builds(Detected, instants, nodes, u32, finite),
 )
-messages: st.SearchStrategy[Message] = st.one_of(
-    st.builds(TxRequest, u32, instants, st.binary(max_size=50), nodes, st.booleans()),
-    st.builds(Reception, st.binary(max_size=50), nodes, instants, singles),
-    st.builds(TxStatus, u32, st.sampled_from(TxOutcome), instants, st.integers(0, 255)),
-    poses(),
-    st.builds(
+
+
+def tuples(kind: type[Any], *fields: st.SearchStrategy[Any]) -> "st.SearchStrategy[tuple[Any, ...]]":
+    """Rows of a reading."""
+    return st.lists(st.builds(kind, *fields), max_size=4).map(tuple)
+
+
+KINDS: dict[type[Any], st.SearchStrategy[Any]] = {
+    TxRequest: st.builds(TxRequest, u32, instants, st.binary(max_size=50), nodes, st.booleans(), instants),
+    Reception: st.builds(Reception, st.binary(max_size=50), nodes, instants, finite_singles),
+    TxStatus: st.builds(TxStatus, u32, st.sampled_from(TxOutcome), instants, st.integers(0, 255)),
+    Poses: poses(),
+    Obstructions: st.builds(
         lambda t_ns, pairs, ground: Obstructions(
             t_ns, array("H", [node for pair in pairs for node in pair]), array("H", []), array("f", ground)
         ),
@@ -85,9 +95,16 @@ messages: st.SearchStrategy[Message] = st.one_of(
         st.lists(st.tuples(nodes, nodes), max_size=5),
         st.lists(singles, max_size=5),
     ),
-    st.builds(Setpoint, instants, vectors, doubles, st.sampled_from(SetpointKind), vectors),
-    st.builds(Camera, instants, st.lists(st.builds(Person, *[finite] * 3), max_size=4).map(tuple)),
-    st.tuples(st.integers(0, 4), st.integers(0, 4)).flatmap(
+    Setpoint: st.builds(
+        Setpoint,
+        instants,
+        finite_vectors,
+        finite,
+        st.sampled_from(SetpointKind),
+        finite_vectors,
+    ),
+    Camera: st.builds(Camera, instants, tuples(Person, *[finite] * 3)),
+    CameraImage: st.tuples(st.integers(0, 4), st.integers(0, 4)).flatmap(
         lambda size: st.builds(
             CameraImage,
             instants,
@@ -95,13 +112,13 @@ messages: st.SearchStrategy[Message] = st.one_of(
             st.binary(min_size=3 * size[0] * size[1], max_size=3 * size[0] * size[1]),
         )
     ),
-    st.builds(Voice, instants, st.lists(st.builds(Call, *[finite] * 4), max_size=4).map(tuple)),
-    st.builds(Radar, instants, st.lists(st.builds(Echo, *[finite] * 5), max_size=4).map(tuple)),
-    st.builds(Altimeter, instants, finite, st.none() | finite),
-    st.builds(Inertial, instants, st.builds(Enu, finite, finite, finite)),
-    st.builds(WindEstimate, instants, st.builds(Enu, finite, finite, finite)),
-    st.builds(Battery, instants, finite, finite, finite),
-    st.builds(
+    Voice: st.builds(Voice, instants, tuples(Call, *[finite] * 4)),
+    Radar: st.builds(Radar, instants, tuples(Echo, *[finite] * 5)),
+    Altimeter: st.builds(Altimeter, instants, finite, st.none() | finite),
+    Inertial: st.builds(Inertial, instants, finite_vectors),
+    WindEstimate: st.builds(WindEstimate, instants, finite_vectors),
+    Battery: st.builds(Battery, instants, finite, finite, finite),
+    FlightState: st.builds(
         FlightState,
         instants,
         finite,
@@ -111,11 +128,11 @@ messages: st.SearchStrategy[Message] = st.one_of(
         st.none() | finite,
         st.integers(0, (1 << 63) - 1),
     ),
-    st.builds(Gps, instants, vectors, vectors),
-    st.builds(WifiScan, instants, st.lists(st.tuples(u32, singles), max_size=5).map(tuple)),
-    st.builds(MavlinkTap, instants, st.binary(max_size=50)),
-    st.builds(TraceBatch, st.lists(records, max_size=5).map(tuple)),
-    st.builds(
+    Gps: st.builds(Gps, instants, finite_vectors, finite_vectors),
+    WifiScan: st.builds(WifiScan, instants, st.lists(st.tuples(u32, finite_singles), max_size=5).map(tuple)),
+    MavlinkTap: st.builds(MavlinkTap, instants, st.binary(max_size=50)),
+    TraceBatch: st.builds(TraceBatch, st.lists(records, max_size=5).map(tuple)),
+    ClockEpoch: st.builds(
         ClockEpoch,
         instants,
         st.floats(0.01, 100),
@@ -125,13 +142,15 @@ messages: st.SearchStrategy[Message] = st.one_of(
         st.integers(0, 2**32 - 1),
         instants,
     ),
-    st.builds(ClockRequest, st.floats(1e-3, 100)),
-    st.builds(Degrade, words, nodes, nodes, st.booleans(), doubles, doubles, instants),
-    st.builds(Jam, words, vectors, doubles, doubles, instants),
-    st.builds(Cut, words, nodes, instants),
-    st.builds(Restore, words),
-    st.builds(Order, st.sampled_from(OrderKind), nodes, finite, finite, finite),
-    st.integers(0, 4).flatmap(
+    ClockRequest: st.builds(ClockRequest, st.floats(1e-3, 100)),
+    Degrade: st.builds(Degrade, words, nodes, nodes, st.booleans(), doubles, doubles, instants),
+    Jam: st.builds(Jam, words, vectors, doubles, doubles, instants),
+    Cut: st.builds(Cut, words, nodes, instants, st.booleans(), st.booleans()),
+    Partition: st.builds(Partition, words, st.lists(nodes, max_size=5).map(tuple), st.tuples(*[doubles] * 4), instants),
+    Mishap: st.builds(Mishap, words, nodes, st.sampled_from(MishapKind), vectors, instants),
+    Restore: st.builds(Restore, words),
+    Order: st.builds(Order, st.sampled_from(OrderKind), nodes, finite, finite, finite),
+    LinkStats: st.integers(0, 4).flatmap(
         lambda n: st.builds(
             LinkStats,
             instants,
@@ -141,8 +160,30 @@ messages: st.SearchStrategy[Message] = st.one_of(
             numbers("q", instants, n),
         )
     ),
-    st.builds(Report, words, instants, st.text(st.characters(codec="utf-8"), max_size=50)),
+    Report: st.builds(Report, words, instants, st.text(st.characters(codec="utf-8"), max_size=50)),
+}
+messages: st.SearchStrategy[Message] = st.one_of(*KINDS.values())
+
+
+def test_every_kind_of_message_is_drawn() -> None:
+    assert set(KINDS) == set(codecs.CODES)
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        TxRequest(0, 0, b"x", NodeId(1), wants_status=False, until_ns=2**63),
+        TxRequest(0, -(2**63) - 1, b"x", NodeId(1), wants_status=False),
+        Cut("node-1", NodeId(1), 2**63),
+        Partition("partition", (NodeId(2**16),), (0.0, 0.0, 0.0, 0.0)),
+        Partition("partition", (), (0.0, 0.0, 0.0, 0.0), 2**63),
+        WifiScan(0, ((-1, -80.0),)),
+        Altimeter(2**63, 0.0, None),
+    ],
 )
+def test_a_message_that_its_bytes_cannot_hold_is_named_where_it_is_put(message: Message) -> None:
+    with pytest.raises(LocalProtocolError, match=f"^{type(message).__name__}.* cannot be put on the bus: "):
+        codecs.encode([message])
 
 
 @given(st.lists(messages, max_size=6))
@@ -177,9 +218,18 @@ def test_a_changed_byte_is_one_error_or_other_messages(batch: list[Message], dat
         Battery(0, 11.1, 5.0, float("nan")),
         FlightState(0, 0.0, float("inf"), 0.0),
         FlightState(0, 0.0, 0.0, 0.0, unix_ns=-1),
+        WifiScan(0, ((1, -80.0), (2, float("nan")))),
+        WifiScan(0, ((1, float("-inf")),)),
+        Gps(0, Enu(0.0, float("nan"), 0.0), Enu(0.0, 0.0, 0.0)),
+        Gps(0, Enu(0.0, 0.0, 0.0), Enu(0.0, 0.0, float("inf"))),
+        Reception(b"x", NodeId(1), 0, float("nan")),
+        Reception(b"x", NodeId(1), 0, float("inf")),
+        Setpoint(0, Enu(float("nan"), 0.0, 0.0), 1.0),
+        Setpoint(0, Enu(0.0, 0.0, 0.0), float("inf")),
+        Setpoint(0, Enu(0.0, 0.0, 0.0), 1.0, SetpointKind.VELOCITY, Enu(0.0, 0.0, float("nan"))),
     ],
 )
-def test_a_reading_that_is_no_number_is_malformed(reading: Message) -> None:
+def test_a_reading_reception_or_setpoint_that_is_no_number_is_malformed(reading: Message) -> None:
     with pytest.raises(MalformedFrameError):
         codecs.decode(codecs.encode([reading]))
 

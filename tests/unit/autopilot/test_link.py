@@ -5,20 +5,23 @@ import math
 import os
 import pty
 import random
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega
 
 from fanet_mw.autopilot.link import AutopilotLink
-from fanet_mw.autopilot.serving import Autopilot
+from fanet_mw.autopilot.serving import Autopilot, AutopilotBus
+from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import Battery, FlightState, Gps, Setpoint, SetpointKind
+from fanet_mw.bus.topics import Topics
 from fanet_mw.flavors import Flavor, Mode, number_of
 from fanet_mw.gateway.connections import Address
 from fanet_mw.hosts.timebase import THIS_MACHINE
 from fanet_mw.mavlink import Geodetic, common, decode, to_geodetic
 from fanet_mw.rng import stream
-from fanet_mw.units import MS, STILL, Enu, S
+from fanet_mw.units import MS, STILL, Enu, NodeId, S
 
 ORIGIN = Geodetic(37.5665, 126.978, 0.0)
 AMSL_M = 40.0
@@ -356,3 +359,12 @@ async def test_pymavlink_is_met_over_a_serial_line() -> None:
 def peer_heartbeat(peer: Any) -> bytes:
     message = ardupilotmega.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3)
     return bytes(message.pack(peer))
+
+
+def test_a_setpoint_that_is_no_number_is_counted_and_not_flown() -> None:
+    link, names = AutopilotLink(flavor=Flavor.PX4, origin=ORIGIN), Topics("s")
+    bus: Any = AutopilotBus(SimpleNamespace(), names, NodeId(1))
+    bus.autopilot = SimpleNamespace(link=link)
+    for east_m in (math.nan, math.inf):
+        bus.put(names.setpoint(1), codecs.encode([Setpoint(0, Enu(east_m, 0.0, 50.0), 5.0)]))
+    assert link.counts == {"setpoints_malformed": 2}

@@ -19,7 +19,7 @@ from fanet_mw.wire.survivors import Found, Standing, is_person
 from sim.report.html import Rows
 from sim.report.run_records import RunRecords
 from sim.report.run_rows import number, percent
-from sim.results.mission import OverflownCells
+from sim.results.mission import OverflownCells, left_by
 from sim.results.run_folder import RunFolder
 
 _MOST_PIECES: Final = 5
@@ -74,7 +74,7 @@ def finds(run: RunRecords) -> list[Find]:
                 held.append(record)
                 words[survivor] = _seen(held[0])
             case Refuted() if survivor in confirmed:
-                held = [one for one in confirmed[survivor] if (one.east_m, one.north_m) != record[3:5]]
+                held = left_by(record, confirmed[survivor])
                 at = (record.east_m, record.north_m)
                 words[survivor] = (
                     _seen(held[0]) if held else Find(survivor, "taken back", at, None, record.t_ns, record.node)

@@ -123,7 +123,7 @@ class Confirmations:
             self._held.setdefault(record.survivor, []).append(record)
         elif type(record) is Refuted and record.survivor in self._held:
             held = self._held[record.survivor]
-            self._held[record.survivor] = [one for one in held if not _takes_back(record, one)]
+            self._held[record.survivor] = left_by(record, held)
             self.reopened += not is_person(record.survivor) and len(self._held[record.survivor]) < len(held)
 
     def error_m(self, confirmed: Confirmed) -> float:
@@ -159,9 +159,10 @@ class Confirmations:
         return [held[0] for survivor, held in self._held.items() if held and not is_person(survivor)]
 
 
-def _takes_back(refuted: Refuted, confirmed: Confirmed) -> bool:
-    """True if the refutation is about this confirmation, or about another one at the same place."""
-    return math.hypot(refuted.east_m - confirmed.east_m, refuted.north_m - confirmed.north_m) <= SAME_PLACE_M
+def left_by(refuted: Refuted, held: Sequence[Confirmed]) -> list[Confirmed]:
+    """The confirmations of a survivor that hold after a refutation, which takes back all at the same place."""
+    at = (refuted.east_m, refuted.north_m)
+    return [one for one in held if math.dist(at, (one.east_m, one.north_m)) > SAME_PLACE_M]
 
 
 def _to_ground_s(right: Sequence[Confirmed], records: Collection[Record]) -> list[float]:

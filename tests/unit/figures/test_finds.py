@@ -7,13 +7,13 @@ from kit import MakeScenario
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.trace import Approaching, Confirmed, Detected, PlacedInside, Posed, Record, Refuted
-from fanet_mw.units import S
+from fanet_mw.units import Enu, S
 from fanet_mw.wire.survivors import Found, Standing, person_id
 from sim.report import finds
 from sim.report.html import Rows, as_html
 from sim.report.run_records import RunRecords
 from sim.results.files import finish
-from sim.results.mission import OverflownCells
+from sim.results.mission import Confirmations, OverflownCells
 from sim.results.outcome import Outcome
 from sim.results.run_folder import RunFolder
 
@@ -57,6 +57,18 @@ def test_the_last_word_about_each_survivor_with_place_time_and_uav(make_scenario
         (5, "inside a building", (310.0, 305.0), 10, 1),
     ]
     assert [one.heard_ns for one in known if one.survivor in (1, 5)] == [1 * S, None]
+
+
+@pytest.mark.parametrize(("east_m", "said"), [(160.0, "taken back"), (161.0, "taken back"), (220.0, "confirmed")])
+def test_what_takes_a_find_back_is_what_takes_it_back_in_the_summary(
+    make_scenario: MakeScenario, east_m: float, said: str
+) -> None:
+    news = [Confirmed(20 * S, 1, 4, 160.0, 300.0), Refuted(30 * S, 2, 4, east_m, 299.0)]
+    (found,) = (one for one in finds.finds(run_of(make_scenario, *news)) if one.survivor == 4)
+    counted = Confirmations([Enu(0.0, 0.0, 0.0)] * 6)
+    for record in news:
+        counted.add(record)
+    assert (found.said, len(counted.mistaken())) == (said, int(said == "confirmed"))
 
 
 def test_a_person_where_a_survivor_is_confirmed_is_left_out_and_counted(make_scenario: MakeScenario) -> None:

@@ -13,6 +13,7 @@ PAGES = sorted(
 SOURCES = ("fanet_mw", "agents", "emulator", "sim")
 _LINK = re.compile(r"\]\(([^)#\s]*)(#[^)\s]+)?\)")
 _FILE = re.compile(r"(?<![\w./-])((?:fanet_mw|agents|emulator|sim|tests|scripts|docs|examples)/[\w./-]*\w)(?![\w*{<])")
+_WITH_FOLDER = re.compile(r"`([\w.-]+/[\w./-]*\w\.py)`")
 _ALONE = re.compile(r"`([a-z]\w*\.py)`")
 
 
@@ -48,6 +49,15 @@ def test_a_file_that_source_text_names_by_itself_lies_beside_it() -> None:
     named = ((source, name) for source in sources for name in _ALONE.findall(source.read_text(encoding="utf-8")))
     astray = [(str(source), name) for source, name in named if not (source.parent / name).exists()]
     assert not astray, "a file of another folder is named with its path"
+
+
+def test_a_file_that_source_text_names_with_a_part_of_its_path_exists_somewhere() -> None:
+    ours = [path.relative_to(ROOT) for folder in (*SOURCES, "tests", "scripts") for path in (ROOT / folder).rglob("*.py")]
+    ends = {"/".join(path.parts[at:]) for path in ours for at in range(len(path.parts))}
+    sources = [path for folder in SOURCES for path in (ROOT / folder).rglob("*.py")]
+    named = [(source, name) for source in sources for name in _WITH_FOLDER.findall(source.read_text(encoding="utf-8"))]
+    assert named
+    assert [(str(source), name) for source, name in named if name not in ends] == []
 
 
 def test_every_file_that_an_explanation_names_by_itself_exists_somewhere() -> None:

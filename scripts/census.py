@@ -9,6 +9,7 @@ import ast
 import io
 import os
 import re
+import signal
 import statistics
 import subprocess
 import sys
@@ -276,4 +277,5 @@ def main() -> int:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # into `head` it ends without a word, as other commands do
     sys.exit(main())

@@ -8,10 +8,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from fanet_mw import wire
-from fanet_mw.dialect import fanet
+ROOT: Final = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))  # this tree, not the package that is installed
 
-ROOT: Final = Path(__file__).resolve().parent.parent
+from fanet_mw import wire  # noqa: E402
+from fanet_mw.dialect import fanet  # noqa: E402
+from scripts.generated import write_or_check  # noqa: E402
+
 PAGES: Final = ("air-format.md", "air-messages.md", "air-messages-clusters.md", "air-messages-search.md")
 TYPES: Final = {
     "uint64_t": "Q",
@@ -62,11 +65,8 @@ def listed(entries: Mapping[str, ET.Element]) -> str:
     return "\n".join(text) + "\n"
 
 
-def main(arguments: Sequence[str], *, folder: Path = ROOT / "docs" / "reference") -> int:
-    """Write the tables, or with --check say which page is not what would be written."""
-    if arguments not in ([], ["--check"]):
-        sys.stderr.write(f"usage: generate_air_reference.py [--check]; got {' '.join(arguments)}\n")
-        return 2
+def pages(folder: Path) -> dict[Path, str]:
+    """Each page with its tables; raises ValueError if a message has none, or two."""
     entries = {
         entry.get("name", ""): entry
         for entry in ET.parse(ROOT / "fanet_mw/dialect/fanet.xml").iter("message")  # noqa: S314 - our own file
@@ -75,22 +75,16 @@ def main(arguments: Sequence[str], *, folder: Path = ROOT / "docs" / "reference"
         name: described(spec, entries[name]) for spec in wire.SPECS for name in [fanet.mavlink_map[spec.msgid].msgname]
     }
     tables["every_message"] = listed(entries)
-    found, wrong = [], []
-    for page in (folder / name for name in PAGES):
-        text = page.read_text(encoding="utf-8")
-        found += [name for _, name, _ in PART.findall(text)]
-        wanted = PART.sub(lambda part: part[1] + tables[part[2]] + part[3], text)
-        if wanted != text:
-            wrong.append(page.name)
-            if not arguments:
-                page.write_text(wanted, encoding="utf-8")
+    texts = {folder / name: (folder / name).read_text(encoding="utf-8") for name in PAGES}
+    found = [name for text in texts.values() for _, name, _ in PART.findall(text)]
     if sorted(found) != sorted(tables):
-        sys.stderr.write(f"without a table, or with two: {sorted(set(tables) ^ set(found)) or found}\n")
-        return 1
-    if arguments and wrong:
-        sys.stderr.write(f"run scripts/generate_air_reference.py and check in {', '.join(wrong)}\n")
-        return 1
-    return 0
+        raise ValueError(f"without a table, or with two: {sorted(set(tables) ^ set(found)) or found}")
+    return {page: PART.sub(lambda part: part[1] + tables[part[2]] + part[3], text) for page, text in texts.items()}
+
+
+def main(arguments: Sequence[str], *, folder: Path = ROOT / "docs" / "reference") -> int:
+    """Write the tables, or with --check say which page is not what would be written."""
+    return write_or_check(arguments, script=Path(__file__).name, wanted=lambda: pages(folder))
 
 
 if __name__ == "__main__":

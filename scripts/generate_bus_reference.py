@@ -8,14 +8,18 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from fanet_mw.bus import messages as m
-from fanet_mw.bus.codecs import CODES, HEADS
-from fanet_mw.bus.link_stats import COUNTS, LOSSES, LinkStats
-from fanet_mw.bus.messages import ClockState, SetpointKind, TxOutcome
-from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Mishap, Partition, Restore
-from fanet_mw.orders import Order
+ROOT: Final = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))  # this tree, not the package that is installed
 
-DOCUMENT = Path(__file__).resolve().parent.parent / "docs" / "reference" / "bus.md"
+from fanet_mw.bus import messages as m  # noqa: E402
+from fanet_mw.bus.codecs import CODES, HEADS  # noqa: E402
+from fanet_mw.bus.link_stats import COUNTS, LOSSES, LinkStats  # noqa: E402
+from fanet_mw.bus.messages import ClockState, SetpointKind, TxOutcome  # noqa: E402
+from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Mishap, Partition, Restore  # noqa: E402
+from fanet_mw.orders import Order  # noqa: E402
+from scripts.generated import write_or_check  # noqa: E402
+
+DOCUMENT = ROOT / "docs" / "reference" / "bus.md"
 TYPES: Final = {
     "B": "uint8", "H": "uint16", "I": "uint32", "Q": "uint64", "q": "int64", "f": "float32", "d": "float64",
 }  # fmt: skip
@@ -200,17 +204,7 @@ def _values(values: type[IntEnum]) -> Iterator[str]:
 
 def main(arguments: Sequence[str], *, document: Path = DOCUMENT) -> int:
     """Write the page, or with --check say whether it is the one checked in."""
-    if arguments not in ([], ["--check"]):
-        sys.stderr.write(f"usage: generate_bus_reference.py [--check]; got {' '.join(arguments)}\n")
-        return 2
-    wanted = page()
-    if not arguments:
-        document.write_text(wanted, encoding="utf-8")
-        return 0
-    if document.exists() and document.read_text(encoding="utf-8") == wanted:
-        return 0
-    sys.stderr.write(f"{document}: not what the codecs say; run scripts/generate_bus_reference.py and check it in\n")
-    return 1
+    return write_or_check(arguments, script=Path(__file__).name, wanted=lambda: {document: page()})
 
 
 if __name__ == "__main__":

@@ -12,13 +12,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from sim.figures.all_figures import FIGURES
-from sim.figures.kept_tables import keep
-from sim.report.html import Block, Text, as_markdown
-from sim.report.page import commands, figure_pages, figures_of, overview
-from sim.results.run_table import read
+ROOT: Final = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))  # this tree, not the package that is installed
 
-ROOT: Final = Path(__file__).resolve().parent.parent
+from sim.figures.all_figures import FIGURES  # noqa: E402
+from sim.figures.kept_tables import keep  # noqa: E402
+from sim.report.html import Block, Text, as_markdown  # noqa: E402
+from sim.report.page import commands, figure_pages, figures_of, overview  # noqa: E402
+from sim.results.run_table import read  # noqa: E402
+
 DOCUMENT: Final = ROOT / "docs" / "results" / "paper.md"
 KEPT: Final = DOCUMENT.parent / "pictures"
 """Of each figure the picture, the numbers in it and the verdicts."""

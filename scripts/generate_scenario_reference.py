@@ -4,10 +4,15 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
-from fanet_mw.scenario.reference import REQUIRED, Key, KeyTable, tables
+ROOT: Final = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))  # this tree, not the package that is installed
 
-FOLDER = Path(__file__).resolve().parent.parent / "docs" / "reference" / "scenario"
+from fanet_mw.scenario.reference import REQUIRED, Key, KeyTable, tables  # noqa: E402
+from scripts.generated import write_or_check  # noqa: E402
+
+FOLDER = ROOT / "docs" / "reference" / "scenario"
 """Of the pages of tables; the page above them has its name and stands beside it."""
 HEAD = """# Every key of a scenario
 
@@ -61,31 +66,10 @@ def _row(key: Key) -> str:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Write the pages, or with --check say whether they are those checked in."""
-    if arguments not in ([], ["--check"]):
-        sys.stderr.write(f"usage: generate_scenario_reference.py [--check]; got {' '.join(arguments)}\n")
-        return 2
-    wanted = pages()
-    there = {FOLDER.with_suffix(".md"), *FOLDER.glob("*.md")}
-    if not arguments:
-        FOLDER.mkdir(parents=True, exist_ok=True)
-        for path, text in wanted.items():
-            path.write_text(text, encoding="utf-8")
-        for path in there - set(wanted):
-            path.unlink()
-        return 0
-    old = [
-        path
-        for path in there | set(wanted)
-        if not path.exists() or path.read_text(encoding="utf-8") != wanted.get(path)
-    ]
-    if not old:
-        return 0
-    sys.stderr.write(
-        f"{', '.join(str(path) for path in sorted(old))}: not what the models say; "
-        "run scripts/generate_scenario_reference.py and check the result in\n"
+    """Write the pages, or with --check say whether they are those checked in, and no others."""
+    return write_or_check(
+        arguments, script=Path(__file__).name, wanted=lambda: {**dict.fromkeys(FOLDER.glob("*.md")), **pages()}
     )
-    return 1
 
 
 if __name__ == "__main__":

@@ -52,7 +52,9 @@ def test_a_file_that_source_text_names_by_itself_lies_beside_it() -> None:
 
 
 def test_a_file_that_source_text_names_with_a_part_of_its_path_exists_somewhere() -> None:
-    ours = [path.relative_to(ROOT) for folder in (*SOURCES, "tests", "scripts") for path in (ROOT / folder).rglob("*.py")]
+    ours = [
+        path.relative_to(ROOT) for folder in (*SOURCES, "tests", "scripts") for path in (ROOT / folder).rglob("*.py")
+    ]
     ends = {"/".join(path.parts[at:]) for path in ours for at in range(len(path.parts))}
     sources = [path for folder in SOURCES for path in (ROOT / folder).rglob("*.py")]
     named = [(source, name) for source in sources for name in _WITH_FOLDER.findall(source.read_text(encoding="utf-8"))]

@@ -80,6 +80,7 @@ def carry_out(
     dry_run: bool = False,
     json: bool = False,
 ) -> int:
+    from sim.sweep.one_run import processor_s
     from sim.sweep.provenance import code
     from sim.sweep.store import TABLE, Store
     from sim.sweep.tasks import tasks_of
@@ -97,7 +98,7 @@ def carry_out(
             return 0
         if plan.todo:
             _compile()
-        began = time.monotonic()
+        began, began_cpu_s = time.monotonic(), processor_s()
         with _progress(name, quiet=json) as tell:
             try:
                 table = run(plan, store, workers, wanted.varied(), on_progress=tell)
@@ -111,7 +112,9 @@ def carry_out(
         sys.stdout.write(f"{json_module.dumps(answer)}\n")
     else:
         took = time.monotonic() - began
-        cpu_s = math.fsum(done.cpu_s for task in plan.todo if (done := store.get(task.key)) is not None)
+        cpu_s = processor_s() - began_cpu_s  # that of workers on this machine, which have ended, is in it
+        if scheduler is not None:
+            cpu_s += math.fsum(done.cpu_s for task in plan.todo if (done := store.get(task.key)) is not None)
         spent = f"in {took:.0f} s ({cpu_s:.0f} s of CPU)"
         Console().print(f"{_counted(len(statuses), 'row')} in {out / TABLE}, {len(plan.todo)} of them new, {spent}",
                         highlight=False, soft_wrap=True)  # fmt: skip

@@ -46,16 +46,16 @@ def _launched(scenario: Scenario, *, slow_down_to: float | None) -> Outcome:
     return asyncio.run(launch(scenario, swarm=name, slow_down_to=slow_down_to, heed_signals=False))
 
 
-def _cpu_s() -> float:
+def processor_s() -> float:
     """The processor time of this process and of its finished children."""
     return sum(os.times()[:4])
 
 
 def carry_out(task: Task) -> Finished:
-    began, began_cpu = time.perf_counter(), _cpu_s()
+    began, began_cpu = time.perf_counter(), processor_s()
 
     def ended(**came_to: str) -> Finished:
-        wall_s, cpu_s = time.perf_counter() - began, _cpu_s() - began_cpu
+        wall_s, cpu_s = time.perf_counter() - began, processor_s() - began_cpu
         return Finished(task.key, code(), wall_s, cpu_s=cpu_s, **came_to)
 
     try:

@@ -1,8 +1,14 @@
 """What the flags of `fanet sweep` mean, typed as a user types them."""
 
+import re
+from pathlib import Path
+
 import pytest
 
 from sim.cli.app import app, changes_last
+from sim.cli.sweep import carry_out
+from sim.sweep.one_run import processor_s
+from sim.sweep.spec import Sweep
 
 
 @pytest.mark.parametrize(
@@ -19,3 +25,15 @@ def test_keys_are_set_one_by_one_or_together_before_or_behind_the_name(
     words = [*line.split(), "--dry-run", "--jobs", "1", "--out", str(tmp_path)]
     assert app(changes_last(words), result_action="return_value") == 0
     assert "24 runs (6 settings x 4 seeds)" in capsys.readouterr().err
+
+
+def test_the_cpu_that_a_sweep_took_is_that_of_its_workers_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    settings = {"duration_s": 1.5, "drain_s": 0.5, "nodes.count": 2, "traffic.sources": 1, "world.engine": "kinematic"}
+    before_s = processor_s()
+    assert carry_out("short", Sweep(base="flooding", set=settings), out=tmp_path / "short", jobs=1, scheduler=None) == 0
+    taken_s = processor_s() - before_s
+    said = re.search(r"\((\d+) s of CPU\)", capsys.readouterr().out)
+    assert said is not None
+    assert taken_s - 0.7 < int(said[1]) <= taken_s + 0.5, "the start of a worker takes longer than so short a run"

@@ -146,23 +146,24 @@ def _caption(scenario: Scenario, scene: Scene) -> str:
 def write_html(folder: Path, path: Path, *, tell: Callable[[str], None]) -> None:
     """Write the scene of a run as one file that plays without a network; raises ConfigError."""
     timeline = Timeline(folder)
+    with served(None) as server:
+        scene = Scene(server, timeline.at(0), on_select=lambda _: None)
+        scene.by_range = not timeline.has_links
+        scene.shown = scene.shown._replace(turns=False, spreading=False)
+        look_over(server, scene)
+        step_ns = max(S, -(-timeline.end_ns // _FRAMES // S) * S)
+        serializer = server.get_scene_serializer()
+        for t_ns in range(0, timeline.end_ns + 1, step_ns):
+            scene.state = timeline.at(t_ns)
+            scene.draw(t_ns)
+            scene.write_time(t_ns)
+            server.flush()
+            serializer.insert_sleep(step_ns / S / FILE_SPEED)
+        page = serializer.as_html().replace("<head>", f"<head><script>{_step_back(sight(scene))}</script>", 1)
+        caption = _caption(timeline.scenario, scene)
+    content = page.replace('<div id="root"></div>', f'<div id="root"></div>{caption}', 1)
     try:
-        with served(None) as server:
-            scene = Scene(server, timeline.at(0), on_select=lambda _: None)
-            scene.by_range = not timeline.has_links
-            scene.shown = scene.shown._replace(turns=False, spreading=False)
-            look_over(server, scene)
-            step_ns = max(S, -(-timeline.end_ns // _FRAMES // S) * S)
-            serializer = server.get_scene_serializer()
-            for t_ns in range(0, timeline.end_ns + 1, step_ns):
-                scene.state = timeline.at(t_ns)
-                scene.draw(t_ns)
-                scene.write_time(t_ns)
-                server.flush()
-                serializer.insert_sleep(step_ns / S / FILE_SPEED)
-            page = serializer.as_html().replace("<head>", f"<head><script>{_step_back(sight(scene))}</script>", 1)
-            caption = _caption(timeline.scenario, scene)
-            replace_file(path, page.replace('<div id="root"></div>', f'<div id="root"></div>{caption}', 1).encode())
+        replace_file(path, content.encode())
     except OSError as error:
         raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
     tell(f"written to {path}, {path.stat().st_size / 1e6:.1f} MB; it plays {FILE_SPEED:g} swarm seconds per second")

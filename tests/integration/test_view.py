@@ -1,8 +1,10 @@
 """The view shows the swarm as its trace tells it, again and live, and what is pressed in it happens."""
 
 import asyncio
+import errno
 import json
 import math
+import os
 import random
 import re
 import threading
@@ -356,6 +358,17 @@ def test_one_file_holds_the_scene_and_asks_for_nothing(folder: Path, tmp_path: P
     assert not re.search(r"<(script|link|img)[^>]+(src|href)=[\"']?https?:", page)
     with pytest.raises(ConfigError, match="cannot be written"):
         write_html(folder, tmp_path / "no" / "such.html", tell=lambda _: None)
+
+
+def test_a_server_that_does_not_start_is_no_fault_of_the_file(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_server(**_: object) -> viser.ViserServer:
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+
+    monkeypatch.setattr(viser, "ViserServer", no_server)
+    with pytest.raises(OSError, match=os.strerror(errno.EMFILE)):
+        write_html(folder, tmp_path / "run.html", tell=lambda _: None)
 
 
 # --- live ---------------------------------------------------------------------------------------------------------

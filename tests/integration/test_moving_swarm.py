@@ -48,7 +48,7 @@ def test_a_formation_keeps_its_timetable_and_its_bound_through_its_turns(speed_m
 
 
 def test_a_timetable_promises_nothing_to_uavs_that_move_among_each_other() -> None:
-    bound = Flight("random_waypoint", 4, 5, area_m=500, duration_s=18).summary()[0]["bound"]
+    bound = Flight("random_waypoint", 4, 5, area_m=500, duration_s=25).summary()[0]["bound"]
     assert not bound.get("stated_share")
 
 

@@ -190,8 +190,12 @@ class Onboard:
                 self._guard(application.on_message, message, now_ns)
             for application, status in self._messenger.statuses(now_ns):
                 application.on_status(status, now_ns)
+        if self._commanded:
+            self._fly_commanded(now_ns)
+
+    def _fly_commanded(self, now_ns: int) -> None:
         commanded, self._commanded = self._commanded, {}
-        for application in self._applications if commanded else ():
+        for application in self._applications:
             course = commanded.get(application.name)
             if course is None:
                 continue

@@ -118,7 +118,8 @@ def _written(to: str, run: "Result", folder: Path, out: Path) -> Mapping[Path, s
     if to in ("parquet", "csv"):
         from sim.recording.tables import write_csv, write_parquet
 
-        counts, what = (write_csv if to == "csv" else write_parquet)(run.outcome, folder, out), "rows"
+        write = write_csv if to == "csv" else write_parquet
+        counts, what = write(run.outcome, folder, out), "rows"
     elif to == "mcap":
         from sim.recording.from_result import write_mcap
 
@@ -126,5 +127,6 @@ def _written(to: str, run: "Result", folder: Path, out: Path) -> Mapping[Path, s
     else:
         from sim.recording.tracks import write_gpx, write_kml
 
-        counts, what = write_gpx(run.outcome, out) if to == "gpx" else {out: write_kml(run.outcome, out)}, "points"
+        counts = write_gpx(run.outcome, out) if to == "gpx" else {out: write_kml(run.outcome, out)}
+        what = "points"
     return {path: f"{count:,} {what}" for path, count in counts.items()}

@@ -14,7 +14,7 @@ from sim.figures.style import applied, save
 from sim.report import air_pictures, finds, mission_pictures, run_pictures, run_rows, slot_pictures
 from sim.report.html import Block, Commands, Heading, Picture, Quoted, Text
 from sim.report.run_records import SHOWN, RunRecords
-from sim.results.file_names import PICTURES
+from sim.results.file_names import KINDS, PICTURES
 from sim.results.printed_summary import clock_sentence
 from sim.results.run_folder import RunFolder
 
@@ -56,6 +56,7 @@ def blocks_of_run(folder: Path, out: Path) -> list[Block]:
                 "tracks": mission_pictures.tracks(run),
             }
         for kind, picture in drawn.items():
+            assert kind in KINDS, "whoever replaces a run removes pictures of these kinds alone"
             if picture is not None:
                 blocks.append(Heading(_TITLES[kind], 3))
                 save(picture.figure, pictures, f"{name}-{kind}")

@@ -203,7 +203,8 @@ def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
         linked = apart[np.ix_(searching, searching)] <= range_m
         graphs.append(coherence(linked))
         if post is not None:
-            part, heard = parts(linked), np.linalg.norm(at[searching] - post, axis=1) <= range_m * reaches
+            part = parts(linked)
+            heard = np.linalg.norm(at[searching] - post, axis=1) <= range_m * reaches
             with_post.append(bool(np.isin(part, part[heard]).all()))
         if len(at) > 1:
             np.fill_diagonal(apart, math.inf)

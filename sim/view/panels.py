@@ -87,7 +87,8 @@ class Panels:
 
     def run_jobs(self) -> None:
         while not self.jobs.empty():
-            self.jobs.get()()
+            job = self.jobs.get()
+            job()
 
     def refresh(self, t_ns: int, *, note: str = "", all_of_it: bool = False) -> None:
         """Write the figures of an instant; those that need no hurry once a second."""

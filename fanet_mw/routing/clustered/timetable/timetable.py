@@ -106,9 +106,10 @@ def timetable(
     effort: Effort = PLAIN,
     blocks: int = 1,
 ) -> Timetable | None:
-    """The timetable; None if there are not enough turns. `roots` has one entry per packet and block; `heads`: (node,
-    its head), to which the flood of that node goes first, on a shortest way. Of several `blocks`, equal parts of the
-    superframe, one is computed; floods that outlast it continue in the next.
+    """The timetable; None if there are not enough turns. `roots` has one entry per packet and block, `positions` [m]
+    are in ascending order of ids; `heads`: (node, its head), to which the flood of that node goes first, on a shortest
+    way. Of several `blocks`, equal parts of the superframe, one is computed; floods that outlast it continue in the
+    next.
     """
     whole, geometry = geometry.turns, geometry._replace(turns=geometry.turns // blocks)
     if not geometry.turns:
@@ -244,14 +245,13 @@ def _repeated(
 ) -> tuple[Turn, ...]:
     """The superframe of `whole` turns, of repeated blocks; what outlasts the last continues in the next superframe."""
     period, rest = length * blocks, whole - length * blocks
-    return tuple(
-        sorted(
-            Turn(offset + offset // period * rest, turn.node, turn.root, turn.instance + index * count[turn.root])
-            for index in range(blocks)
-            for turn in block
-            for offset in (turn.offset + index * length,)
-        )
-    )
+    turns = []
+    for index in range(blocks):
+        for turn in block:
+            offset = turn.offset + index * length
+            instance = turn.instance + index * count[turn.root]
+            turns.append(Turn(offset + offset // period * rest, turn.node, turn.root, instance))
+    return tuple(sorted(turns))
 
 
 def _spans(turns: Sequence[Turn]) -> dict[NodeId, int]:

@@ -49,7 +49,9 @@ _REPEATS: Final = 3
 
 
 class Setpoints:
-    """Makes and repeats setpoints, so that the flight controller knows the computer alive; but no velocity."""
+    """Makes setpoints and repeats the last one, so that the flight controller knows the computer alive; but a velocity
+    only once.
+    """
 
     def __init__(self, scenario: Scenario) -> None:
         self._repeat_ns = seconds_to_ns(scenario.mobility.return_after_s) // _REPEATS

@@ -1,4 +1,7 @@
-"""The interface between the medium and the kernel, in terms of stations and frame slots."""
+"""The interface between the medium and the kernel, in terms of stations and frame slots.
+
+Only the medium knows bytes, topics and node ids.
+"""
 
 import struct
 from typing import Final

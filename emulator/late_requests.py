@@ -1,7 +1,7 @@
 """Late requests: those that come to the medium after the instant at which their frame was to start.
 
-Above `TOO_LATE_NS` they are dropped. The moments in which they came are counted, too: after a pause of the machine few,
-in an overload all.
+Each is counted, and its frame starts at once, but above `TOO_LATE_NS` it is dropped. The moments in which they came are
+counted, too: after a pause of the machine they are few, in an overload all.
 """
 
 from typing import Final

@@ -141,6 +141,7 @@ class Medium(Actor):
     # --- requests -------------------------------------------------------------------------------------------------
 
     def _request(self, station: int, request: TxRequest, now_ns: int) -> None:
+        """Handle one request; whatever is wrong with it is counted and not raised."""
         seq, start_ns, frame, dst, wants_status, until_ns = request
         numbers, slots = self._numbers, self._slots
         if seq != numbers.expected[station] and (lost := numbers.lost_before(station, seq)):

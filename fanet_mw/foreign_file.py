@@ -1,6 +1,7 @@
 """Reads files that somebody else may have made: regular ones, of bounded size, and plain values of bounded depth.
 
-A pipe would let the reader wait for ever, a device has no end, and nested values end in Python's recursion. All that is
+A pipe would let the reader wait for ever, a device has no end, and nested values end in Python's recursion. What a
+folder of somebody else holds is opened without following links, so that nothing outside of it is read. All that is
 wrong is a ConfigError of one line.
 """
 

@@ -8,8 +8,8 @@
 
 The ids decide about heights: of two UAVs the one with the lower id goes one level up for the other, the other one down,
 so that any two part and a warning need not state a direction. Levels are one distance to be kept apart, and lie higher
-by the error of a measured height. Not modeled: turns that the other UAV has planned, and conflicts that the change of
-height causes.
+by the error of a measured height. Both are assumed to keep their horizontal velocity. Not modeled: turns that the other
+UAV has planned, and conflicts that the change of height causes.
 """
 
 import math
@@ -265,7 +265,9 @@ class ConflictMonitor:
         return _to_the_middle(own.position, velocity)
 
     def _flying_back(self, own: Motion, velocity: Enu) -> Enu | None:
-        """Once it stands still without a mission: a direction to the middle, chosen once, since all meet there."""
+        """Once it stands still without a mission: a direction to the middle; otherwise whoever keeps its velocity would
+        stand at the geofence for ever. It is chosen once, because those who all fly to the middle meet there.
+        """
         now_ns = own.at_ns
         if now_ns < self._back_until_ns:
             return self._back

@@ -111,7 +111,9 @@ class TelemetryStreams:
         self._acceleration = STILL
         self._wind = STILL
         self.yaw: float | None = None
-        """The heading; None until the UAV has flown or was turned, because 0 would shorten hellos."""
+        """The heading; None until the UAV has flown or was turned: 0 would shorten hellos, as MAVLink drops trailing
+        zeros.
+        """
         self._fix_ns: int | None = None
         self._flight: FlightState | None = None
         """What a real flight controller said lately."""

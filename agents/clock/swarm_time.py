@@ -265,7 +265,9 @@ class BeaconTime(SwarmTime):
         return True
 
     def _apart_ns(self, local_ns: int) -> float:
-        """Greatest difference to a neighbor's time: 0 if others support ours, infinite once our clock has jumped."""
+        """Greatest difference to a neighbor's time: 0 if others support ours, infinite once our clock has jumped,
+        otherwise that of two clocks set before take-off.
+        """
         if self.synced and self._sync.supported(local_ns):
             return 0
         if self._sync.counts["lost"]:

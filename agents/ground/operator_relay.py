@@ -92,7 +92,9 @@ class OperatorRelay(Application):
             self._send(together, target, priority, now_ns)
 
     def _is_under_way(self, frame: Frame, now_ns: int) -> bool:
-        """True if the same was asked lately: ground stations ask again before an answer over several hops can come."""
+        """True if the same was asked lately: ground stations ask again before an answer over several hops can come, and
+        some take the second one for that to their next question.
+        """
         asked = frame.system, frame.component, frame.message_id, frame.data[10:-2]
         last_ns = self._asked.get(asked)
         if last_ns is not None and now_ns - last_ns < _UNDER_WAY_NS:

@@ -1,4 +1,4 @@
-"""The paper's rule at one UAV (4.1): detect, report, and approach a survivor that enough different nodes reported."""
+"""The paper's rule at one UAV (4.1): detect, report, and approach a survivor that enough nodes (3) have reported."""
 
 import math
 from collections.abc import Sequence

@@ -29,7 +29,7 @@ __all__ = ["SHORT_BYTES", "header_rates", "log_success_per_bit"]
 
 @cache
 def log_success_per_bit(rate_mbps: float, ofdm_errors: str = "nist", *, short: bool = False) -> Reals:
-    """ln(1 - bit error rate) by SINR; read-only and kept, as CCK takes .3 s. `short`: frames below SHORT_BYTES."""
+    """ln(1 - bit error rate) by SINR; read-only and kept, as CCK takes 0.3 s. `short`: frames below SHORT_BYTES."""
     found = _log_success_per_bit(rate_mbps, tabled=ofdm_errors == "tables" and is_ofdm(rate_mbps), short=short)
     found.setflags(write=False)
     return found
@@ -70,7 +70,9 @@ def _dqpsk(per_bit: Reals) -> Reals:
 
 
 def _cck_symbol_success(symbol_snr: float, bits: int) -> float:
-    """P(a symbol is decoded): at 11 Mb/s by two decisions, each with half of one quadrature's energy, at 5.5 by one."""
+    """P(a symbol is decoded): at 11 Mb/s by two biorthogonal decisions, each with half of one quadrature's energy
+    (Es/N0 counts both), at 5.5 Mb/s by one.
+    """
     if bits == 8:
         return _biorthogonal_success(symbol_snr / 4, 16) ** 2
     return _biorthogonal_success(symbol_snr / 2, 16)

@@ -134,7 +134,9 @@ def _loss_db(distance_m: Reals, from_m: Reals, to_m: Reals, radio: Radio) -> Rea
 
 
 class Channel(Protocol):
-    """The path loss of a channel from another package (`fanet_mw.extensions`); made anew for each computation."""
+    """The path loss of a channel from another package (`fanet_mw.extensions`): a class that takes `Radio`. It is made
+    anew for each computation, and has no state: the same places always give the same losses.
+    """
 
     def loss_db(self, distance_m: Reals, from_m: Reals, to_m: Reals) -> Reals:
         """The loss of each link [n] between its ends [n, 3], whose heights are those above ground."""

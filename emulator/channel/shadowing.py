@@ -3,8 +3,9 @@
 A Gaussian field over both ends of plane waves, S(a, b) = sqrt(2 / N) sum cos(k a + l b + phase), symmetrized, with
 waves of an exponential correlation (the 3-dimensional Cauchy distribution) for each end: exp(-d / d_corr) when one end
 moves by d (M. Gudmundson, Electronics Letters 27(23), 1991), the product of both when both move (Z. Wang, E. Tameh, A.
-Nix, IEEE Trans. Veh. Technol. 57(2), 2008). Not modeled: dependence on surroundings, angle or height. Within one seed
-the correlation differs from the law by about 1 / sqrt(2 N).
+Nix, IEEE Trans. Veh. Technol. 57(2), 2008). The same poses give the same shadowing, whichever preceded them. Not
+modeled: dependence on surroundings, angle or height. Within one seed the correlation differs from the law by about 1 /
+sqrt(2 N).
 """
 
 import math

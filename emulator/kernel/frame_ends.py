@@ -7,6 +7,7 @@ from emulator.kernel.state import Ints
 
 @jit
 def put(g: Ints, out: Ints, kind: int, frame: int, station: int, t: int, value: int, attempts: int) -> None:
+    """Append an output row; the kernel's loop keeps room for all rows that one event can make."""
     n = g[k.OUT_N]
     g[k.OUT_N] = n + 1
     out[n, 0], out[n, 1], out[n, 2], out[n, 3], out[n, 4], out[n, 5] = kind, frame, station, t, value, attempts

@@ -32,7 +32,9 @@ def take_head(st: Ints, fr: Ints, s: int) -> None:
 
 @jit
 def expire(g: Ints, st: Ints, fr: Ints, out: Ints, s: int, t: int) -> None:
-    """Drop frames that waited beyond their lifetime, but not the first while on the air or its ACK is awaited."""
+    """Drop frames that waited beyond their lifetime, but not the first while on the air or its ACK is awaited; the
+    contention window stays as it is.
+    """
     kept = st[k.HEAD, s] if st[k.TX_KIND, s] == k.DATA or st[k.WAITING, s] >= 0 else -1
     if kept >= 0:
         take_head(st, fr, s)

@@ -112,7 +112,9 @@ def advance(  # noqa: C901  (one dispatch; splitting it would only move the bran
     g: Ints, p: Ints, pf: Reals, st: Ints, sf: Reals, fr: Ints, lk: Ints, lp: Reals, ptr: Ints, wv: Reals,
     tb: Reals, hs: Ints, hr: Ints, asked: Ints, out: Ints, err: Reals, until: int,
 ) -> int:  # fmt: skip
-    """Process all events up to `until`; returns `next_output`, or -1 when room ran out: make room, call again."""
+    """Process all events up to `until`, and fill `out` from its beginning; returns `next_output`, or -1 when room ran
+    out: take what is in `out`, make room, call again.
+    """
     g[k.OUT_N] = 0
     if g[k.HS_N] + g[k.ASKED_N] + MARGIN > hs.shape[0]:
         return -1

@@ -1,6 +1,7 @@
 """The guard time of a slot: set by the scenario, or computed from clock error, propagation and frame length.
 
-Between the turns of a timetable the guard is called slack (`fanet_mw/timesync/turn_slack.py`).
+No frame starts in it (`Superframe` in `fanet_mw/routing/clustered/tdma/slot_timing.py`). Between the turns of a
+timetable the guard is called slack (`fanet_mw/timesync/turn_slack.py`).
 """
 
 from math import ceil

@@ -15,7 +15,8 @@ whole superframe the difference repeats or has become smaller. This is the metho
 Controller Area Network (CAN) schedulability analysis: Refuted, revisited and revised, Real-Time Systems 35, 2007.
 
 The bound holds while the swarm stays as it was when the timetable was made, no frame is lost, and nothing of higher
-priority takes the room of these packets in the turns.
+priority takes the room of these packets in the turns. `fanet_mw/routing/clustered/timetable/own_bound.py` adds the time
+before the turn and after the flood.
 """
 
 from collections.abc import Sequence

@@ -302,6 +302,7 @@ _CODECS: Final = {
 }  # fmt: skip
 CODES: Final = {codec.kind: code for code, codec in _CODECS.items()}
 HEADS: Final = {codec.kind: codec.structs for codec in _CODECS.values()}
+"""The structs of each kind: that of its head, and that of each row for kinds with rows."""
 
 
 def layout_of(kinds: Iterable[type[Any]]) -> str:

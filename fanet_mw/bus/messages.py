@@ -106,7 +106,9 @@ class SetpointKind(IntEnum):
     LAND = 4
     """Sink straight down at `speed_m_s`, and stop the motors on the ground."""
     RETURN = 5
-    """Climb to its height of return, fly to its start at `speed_m_s` (0 or less: cruising speed), and land."""
+    """Climb to its height of return, fly to its start at `speed_m_s` (0 or less: cruising speed), and land; a UAV that
+    stands on the ground stays there.
+    """
 
 
 VELOCITY_LASTS_NS: Final = 1 * S

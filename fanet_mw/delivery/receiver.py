@@ -1,7 +1,7 @@
 """The receiving side of delivery: it puts pieces together, hands each message over once, and answers with receipts.
 
-The memory for incomplete and waiting messages is bounded, per sender and in all; what does not fit gets no receipt, and
-is sent again.
+A confirmed message waits for the one before it in its flow, even if nobody listens to that one. The memory for
+incomplete and waiting messages is bounded, per sender and in all; what does not fit gets no receipt, and is sent again.
 """
 
 from collections.abc import Callable

@@ -327,7 +327,9 @@ class Sender:
         return most_ns << min(message.rounds - 1, _MOST_DOUBLINGS)
 
     def _previous(self, message: _OutgoingMessage, readers: tuple[NodeId, ...]) -> int:
-        """The youngest open message of its flow before this that a reader still lacks and would wait for, or 0."""
+        """The youngest open message of its flow before this that a reader still lacks, or 0. A reader that has
+        confirmed one may have started again since, and would wait for it in vain.
+        """
         older = (number for number in reversed(message.flow.open) if number < message.number)
         return next((n for n in older if not self._messages[n].lacking.keys().isdisjoint(readers)), 0)
 

@@ -175,6 +175,7 @@ class Gateway:
                 self._say_counts()
 
     def _tell_presence(self) -> None:
+        """Let UAVs know that somebody may look at them: many ground stations say nothing before they have heard one."""
         heartbeat = common.MAVLink_heartbeat_message(
             common.MAV_TYPE_ONBOARD_CONTROLLER, _NO_AUTOPILOT, 0, 0, _ACTIVE, 3
         )

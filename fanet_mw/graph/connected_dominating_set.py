@@ -12,11 +12,11 @@ from fanet_mw.units import NodeId
 
 
 def dominates(node: NodeId, adjacency: Adjacency) -> bool:
-    """True if `node` decides to belong to the set; `adjacency` needs only the node and its neighbors.
-
-    It does not if any two of its neighbors are connected directly or over stronger nodes within its two hops (coverage
-    condition I of Wu & Dai, "A generic distributed broadcast scheme in ad hoc wireless networks", ICDCS 2003). A hash
-    of the id breaks ties: with plain ids, a swarm numbered row by row has no node with stronger ones all around.
+    """True if `node` decides to belong to the set; `adjacency` needs only the node and its neighbors. It does not if
+    any two of its neighbors (as where all hear each other) are connected directly or over stronger nodes within its two
+    hops (coverage condition I of Wu & Dai, "A generic distributed broadcast scheme in ad hoc wireless networks", ICDCS
+    2003). A hash of the id breaks ties: with plain ids, a swarm numbered row by row has no node with stronger ones all
+    around.
     """
     near = {n: frozenset(adjacency[n]) for n in (node, *adjacency[node])}
     if _complete(adjacency[node], near):

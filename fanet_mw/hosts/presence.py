@@ -59,6 +59,7 @@ class Presence:
         return "; ".join(f"{what}: {few(names)}" for what, names in parts.items() if names)
 
     def _right(self, name: str) -> set[str]:
+        """The tokens of a process that state this scenario, or none."""
         tokens = self._tokens.get(name, set())
         if self._fingerprint is None:
             return tokens

@@ -1,7 +1,8 @@
 """The host for virtual time: all actors share one heap of (t_ns, seq), so a run is deterministic.
 
 A message that is put at t is received at t, before time moves on, in the order of the puts. Wake-ups at the same
-instant happen in the order in which they were requested.
+instant happen in the order in which they were requested. Nothing depends on a clock, on hashes, or on the order of a
+set.
 """
 
 import heapq
@@ -111,6 +112,7 @@ class VirtualHost:
         self._hand_over()
 
     def _watch(self, index: int) -> None:
+        """Count wake-ups that do not advance time: a few are normal, an endless series is a bug in an actor."""
         self._stalled += 1
         if self._stalled > max(_STALL_LIMIT, _STALL_SHARE * len(self._actors)):
             raise LocalProtocolError(

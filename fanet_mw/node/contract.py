@@ -89,7 +89,9 @@ class RoutingProtocol(ABC):
 
     @abstractmethod
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
-        """Handle a packet of an own application; its first frame may be sent from `due_ns`."""
+        """Handle a packet of an own application; its first frame may be sent from `due_ns`, one lead after its
+        generation.
+        """
 
     @abstractmethod
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> Sequence[Relay] | None:
@@ -116,7 +118,9 @@ class RoutingProtocol(ABC):
         return self._port.transmit(packet.frame, BROADCAST, start_ns=start_ns, wants_status=wants_status)
 
     def first_hello_ns(self, earliest_ns: int, start_ns: int) -> int:
-        """When the first hello is to be made: from `start_ns` on, or sooner if hellos cannot collide."""
+        """When the first hello is to be made: from `start_ns` on, which is at random in the first interval, or sooner
+        if hellos cannot collide.
+        """
         return self.hello_due_ns(start_ns)
 
     def hello_due_ns(self, start_ns: int) -> int:
@@ -127,7 +131,7 @@ class RoutingProtocol(ABC):
         """A neighbor's hello was received."""
 
     def on_impersonation(self, packet: Packet, *, now_ns: int) -> None:  # noqa: B027
-        """A packet was received that names this node as its origin, but that another node has made."""
+        """A packet names this node as its origin, but another node has made it; it goes no further."""
 
     def on_copy(self, key: int, src: NodeId, *, now_ns: int) -> None:  # noqa: B027
         """Another copy of a packet (`duplicates.key_of`) was received from a neighbor, in a phase in which it was

@@ -29,7 +29,7 @@ CONTROL: Final = 0x8000_0000
 _AHEAD_NS: Final = 100 * MS
 """How far ahead an instant of generation may be if all clocks are exact, because hosts get their time over a bus."""
 _BURST: Final = 100_000
-"""How much faster sequence numbers may grow than one per `RESTART_STEP_NS`: ten seconds of the densest traffic."""
+"""How far a sequence number may be beyond one packet per `RESTART_STEP_NS`: ten seconds of the densest traffic."""
 _LATEST: Final = 8
 """The transmitters that decide whether the own clock is behind: those that were heard last."""
 _SEVERAL: Final = 2

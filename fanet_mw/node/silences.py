@@ -5,7 +5,9 @@ from typing import Final
 from fanet_mw.units import NodeId, S
 
 _HALF_NS: Final = 3 * S
-"""After so long half of the longest silence is forgotten, however many frames come, as in a burst."""
+"""After so long half of the longest silence is forgotten, however many frames come: after a burst a node says nothing
+but hellos again.
+"""
 _MOST_NS: Final = 4 * S
 """A longer silence counts as this one, and so does the time before the first frame."""
 _UNUSUAL: Final = 2.5

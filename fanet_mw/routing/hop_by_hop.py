@@ -4,7 +4,7 @@
     receive   -> control? its protocol : for this node? done : broadcast? relay once : hop limit? drop : routes
     status    -> acknowledged? done : the protocol learns that the link has failed, and names the reason of the drop
 
-With `routing.address_resolution` every unicast first waits for the address of its next hop (`resolution`).
+With `routing.address_resolution` every unicast first waits for the address of its next hop (`address_resolution.py`).
 """
 
 import struct

@@ -32,7 +32,9 @@ def _name_of(path: Path) -> str:
 
 
 def parse(text: str, *, source: str, name: str, overrides: Iterable[str] = (), folder: Path | None = None) -> Scenario:
-    """A scenario from TOML; `source`: in messages. Paths in it are from `folder`, in overrides from here."""
+    """A scenario from TOML; `source`: in messages, `name`: unless it has its own. Paths in it are from `folder`, in
+    overrides from here.
+    """
     tree = toml_of(text, source=source)
     tree.setdefault("name", name)
     if folder is not None:

@@ -14,7 +14,9 @@ _NOTHING: Final[Mapping[bytes, bytes]] = MappingProxyType({})
 
 
 def aggregated(packets: Iterable[tuple[int, bytes]], *, most_bytes: int) -> Iterator[tuple[int, bytes, int]]:
-    """As few frames as possible of at most `most_bytes`, each with its earliest instant and number of packets."""
+    """As few frames as possible of at most `most_bytes` for packets in their order, each with its earliest instant and
+    number of packets.
+    """
     chunk: list[bytes] = []
     first_ns = size = 0
     for start_ns, packet in packets:

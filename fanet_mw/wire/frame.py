@@ -162,6 +162,7 @@ class Header(NamedTuple):
     flags: int
 
     def encode(self) -> bytes:
+        """The header's bytes; MAVLink's sender is the transmitter, its sequence the low byte of the packet's number."""
         sender = system_id(self.prev_hop)
         body = _PACKED.pack(_ROUTE_BEFORE, self.seq & 0xFF, sender, _ROUTE_SENDER, *self, VERSION)
         return body + _CRC.pack(mcrf4xx(body[1:] + _EXTRA))
@@ -219,7 +220,7 @@ def checked(frame: bytes, fields: Fields) -> Header:
 
 def rewrite(frame: bytes, prev_hop: int, flags: int, hop: int = 1) -> bytes:
     """The frame as `prev_hop` transmits it: a new header, the same inner frames. A hop less is left and one more made,
-    not with `hop=0` at the origin. The frame must have been decoded.
+    not with `hop=0` at the origin; the frame must have been decoded, with a hop limit of at least `hop`.
     """
     sender = (prev_hop - 1) % 250 + 1  # system_id, without the call
     hops = frame[_HOPS_AT] + hop

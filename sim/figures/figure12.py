@@ -64,7 +64,7 @@ def _at_end(row: Row) -> float:
 
 
 def _at_end_if_any(row: Row) -> float | None:
-    """None if nobody has, because three never received the same phone."""
+    """UAVs that have changed course at the end; None if none has, because three never received the same phone."""
     return _at_end(row) or None
 
 

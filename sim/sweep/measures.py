@@ -108,7 +108,7 @@ def age_s(outcome: Outcome) -> float:
 
 
 def report_age_s(outcome: Outcome) -> float | None:
-    """The same of survivor reports, from a reporter's first to its last; None if no UAV has reported twice."""
+    """As `age_s`, of survivor reports, from a reporter's first to its last; None if no UAV has reported twice."""
     reports = packets_of(outcome)["report"]
     heard = _heard_of(reports)
     born_ns: dict[int, list[int]] = {}

@@ -36,8 +36,9 @@ def keep_together(
     reach_m: float,
     random: Callable[[], float],
 ) -> tuple[list[int], bool]:
-    """The goal of each UAV, and whether links that last join all UAVs; if not, the goals are those of the least sum.
-    `dearer_m2`: what it costs that a UAV flies to a goal, beside the square of its way there [m2].
+    """The goal of each UAV, of no fewer goals than UAVs, and whether links that last join all UAVs; if not, the goals
+    are those of the least sum. `dearer_m2`: what it costs that a UAV flies to a goal, beside the square of its way
+    there [m2].
     """
     ways = [[start.minus(goal).horizontal() for goal in goals] for start in starts]
     costs = [[way * way + dearer_m2(uav, goal) for goal, way in enumerate(row)] for uav, row in enumerate(ways)]

@@ -28,7 +28,9 @@ _NEIGHBOR_NS: Final = 15 * S
 _AWAY_NS: Final = 40 * S
 """A UAV that was not a neighbor is lost after this time; news from the far end of a swarm are fresher."""
 _MUTE_NS: Final = 5 * S
-"""So long a UAV must hear that it is lost until it takes its own radio for mute."""
+"""So long a UAV must hear that it is lost until it takes its own radio for mute; wrong news is taken back by its next
+hello.
+"""
 _LEVELS: Final = 7
 """Places that are closer than this in the plan have different levels; more levels would be too high to hear others."""
 _AHEAD: Final = 2

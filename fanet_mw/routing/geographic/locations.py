@@ -51,7 +51,9 @@ class LocationTable:
         return tuple(self._fixes[node] for node in self._used if node in self._fixes)
 
     def next_hop(self, destination: NodeId, *, at: Enu, excluded: NodeId, now_ns: int) -> NodeId | None:
-        """The destination, or the neighbor nearest to it if nearer than `at`; never the giver, `excluded`."""
+        """The destination, or the neighbor nearest to it if nearer than `at`; never the giver, `excluded`: two nodes
+        that know different locations would pass the packet back and forth.
+        """
         if destination in self._neighbors and self._neighbors[destination][1] > now_ns:
             return destination
         fix = self._fixes.get(destination)

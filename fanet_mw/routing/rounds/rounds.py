@@ -317,7 +317,9 @@ class RoundFlooding(RoutingProtocol):
             self._port.transmit_together([packet], flags=FLAG_FLOOD, at_ns=(start_ns,))
 
     def _reach_turn(self, now_ns: int) -> None:
-        """Something waits: fill the next turn that can be announced in time, or for which the node was woken."""
+        """Something waits: fill the next turn that can be announced in time. One for which the node has asked to be
+        woken stays, because a process is woken up to half a lead late.
+        """
         asked = self._turn_asked and now_ns <= self._turn_ns - self._lead_ns // 2
         if self._turn_ns < now_ns + self._lead_ns and not asked:
             self._turn_ns = self._timing.turn_start_ns(self._port.node, from_ns=now_ns + self._lead_ns)

@@ -4,7 +4,8 @@
                                                (and slow it down, if that is allowed, while the machine cannot keep up)
 
 A signal ends the swarm early, at an instant that all are told a second before, so that the partial result closes. If
-the process of a UAV dies, the others go on; a run needs the emulator and the world.
+the process of a UAV dies, the others go on; a run needs the emulator and the world. With `respawn` any process is
+started again, and continues by the clock.
 """
 
 import asyncio

@@ -99,8 +99,8 @@ class Solids:
         return gap
 
     def stop(self, before: Rows, after: Rows, velocity: Rows) -> Flags:
-        """Put bodies of `after` where something stops them on their way from `before`, beside a wall at their height,
-        and change their velocities; returns which these are.
+        """Put bodies of `after` where something stops them on their way from `before`, from where they may still rise
+        or fall beside a wall, and change their velocities; returns which these are.
         """
         up = after[:, 2].copy()
         stopped = self._put_back(before, after)

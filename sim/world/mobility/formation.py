@@ -12,7 +12,9 @@ from sim.world.mobility.contract import Track
 
 
 class Formation:
-    """The layout moves from the base to the middle of the area, then around it along the edges."""
+    """The layout moves from the base to the middle of the area, then around it along the edges. All of the area is
+    overflown if the layout is at least half as large.
+    """
 
     def __init__(self, starts: Rows, scenario: Scenario) -> None:
         self._starts = starts

@@ -84,7 +84,9 @@ _Command = _GoTo | _FlyAt | _Land | Homeward
 
 
 def makes_sense(setpoint: Setpoint) -> bool:
-    """False for a setpoint that is no number or absurdly great: any process may send it, and all would overflow."""
+    """False for a setpoint that is no number or absurdly great: any process may send one, and its square would overflow
+    and stop the flight of all.
+    """
     possible = setpoint.position.is_within(FARTHEST_M) and setpoint.velocity.is_within(FASTEST_M_S)
     return possible and abs(setpoint.speed_m_s) <= FASTEST_M_S
 

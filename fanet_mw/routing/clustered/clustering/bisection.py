@@ -2,7 +2,7 @@
 
 A cut by position that leaves both sides connected is taken; where it would tear one, the side is grown hop by hop from
 one end of the graph. The head is the node nearest to the middle, unless others have fewer members farther than three
-hops. The paper gives k, but not how it chooses the members.
+hops. Sizes differ by at most one where all cuts are by position. The paper gives k, but not how it chooses the members.
 """
 
 from collections.abc import Mapping, Sequence

@@ -32,8 +32,8 @@ def lost_ns(scenario: Scenario) -> int:
 
 
 def settled_ns(scenario: Scenario) -> int:
-    """When the leader has been told of a turn that all made together, each as it strayed, once per `_LEAST_NS`; until
-    then it believes the swarm to fall apart.
+    """The time after which the leader has been told of a turn that all made together: each tells as it has strayed,
+    once per `_LEAST_NS`. Until then the leader believes the swarm to fall apart.
     """
     speed_m_s = max(scenario.mobility.speed_m_s, 1.0)
     straying_ns = round(STRAYED * (scenario.clusters.link_m or scenario.radio.range_m) / speed_m_s * S)

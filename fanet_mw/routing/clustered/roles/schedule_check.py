@@ -31,6 +31,7 @@ class ScheduleCheck:
         self._renewed_ns = now_ns
 
     def check(self, schedule: Schedule, now_ns: int) -> None:
+        """Raise MalformedFrameError for a schedule that no leader would announce."""
         scenario, epoch = self._port.scenario, schedule.epoch
         period_ns = scenario.clusters.period_ns
         period_us, slot_us = period_ns // US, period_ns // schedule.clusters // US

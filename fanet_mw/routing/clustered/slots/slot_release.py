@@ -2,7 +2,8 @@
 
 By `clusters.pacing = "burst"` they follow each other with the least gap (`clusters.release_gap_ms`), by `"spread"` the
 slot is divided evenly among those that wait when it begins, up to 40 ms apart, so that one flood has moved on before
-the next. A head that loses its role uses its old slot for the rest: sending them to the new head would cost more.
+the next. What does not fit waits for the next occurrence of the slot. A head that loses its role uses its old slot for
+the rest: sending them to the new head would cost more.
 """
 
 from typing import Final, NamedTuple

@@ -29,7 +29,9 @@ class TimetablesInForce:
         return sum(timetable.valid_ns <= now_ns for timetable in self.in_order[1:])
 
     def follow(self, timetable: NodeTimetable | None, *, now_ns: int) -> None:
-        """Follow a newer timetable, forgetting those no longer in force, and those due after it. None: none."""
+        """Follow a newer timetable (None: none), forgetting those no longer in force, and those due after it: they are
+        of a leader over which another prevails.
+        """
         if timetable is None:
             self.in_order = []
             return

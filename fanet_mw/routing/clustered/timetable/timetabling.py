@@ -146,7 +146,9 @@ class FromPlaces:
         self._compute_if_complete(now_ns)
 
     def _compute_if_complete(self, now_ns: int) -> None:
-        """Compute it once, when all parts of schedule and links are there, and the node has the swarm's time."""
+        """Compute it once, when all parts of schedule and links are there, and the node has the swarm's time: without
+        it, it would send in the turns of others.
+        """
         version = self._version
         due = version is not None and version == self._membership.version and version != self._planned
         due = due and has_time(self._port.scenario.clock, clock_error_ns=self._port.clock_error_ns)

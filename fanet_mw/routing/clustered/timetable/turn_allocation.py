@@ -244,7 +244,9 @@ def _table(
     blocks: int,
     hard: bool,
 ) -> Timetable | None:
-    """Of those found with little effort that whose floods end soonest; with `hard` more effort for the first."""
+    """Of the timetables found with little effort that whose floods end soonest; if there is none, with `hard`, that of
+    more effort.
+    """
     if not geometry.turns:
         return None
     found = [(effort, timetable(places, roots, geometry, heads, effort, blocks)) for effort in _EASY]

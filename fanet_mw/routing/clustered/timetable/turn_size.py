@@ -89,7 +89,9 @@ def distance_error_m(scenario: Scenario) -> float:
 
 
 def measured_period_ns(scenario: Scenario) -> int:
-    """The superframe with measured links: a little under one packet interval, 1 to 4 flooding periods."""
+    """The superframe with measured links: a little less than the packets of a source take, 1 to 4 flooding periods, so
+    that there is room for repetitions.
+    """
     one_each_ns = int(LOAD * seconds_to_ns(scenario.traffic.interval_s))
     return max(scenario.clusters.period_ns, min(_MOST_PERIODS * scenario.clusters.period_ns, one_each_ns))
 

@@ -24,6 +24,10 @@ _CLOSING_S: Final = 1.0
 _HASTE: Final = 0.95
 """Whoever is too far away for that is approached at this share of the greatest speed."""
 
+_HURRIES: Final = 0.9
+_SETS_OUT_S: Final = 2.0
+"""Who is beyond a gap has noticed the loss after this time, and flies here at this share of the speed for that."""
+
 _KEPT_M_S: Final = 1e-6
 """A velocity keeps to a limit up to this rounding error."""
 _EARLY_TIES: Final = 2
@@ -101,21 +105,32 @@ class ConnectivityMaintenance:
 
     def beyond_gap(self, now_ns: int) -> Motion | None:
         """The likely motion of a UAV beyond a lost one, which hurries here; None once this UAV would hear it there."""
+        away = [(left_m, motion) for left_m, _, motion in self._unheard(now_ns) if left_m > _CLOSING * self._reach_m]
+        return min(away)[1] if away else None
+
+    def missed(self, now_ns: int) -> int | None:
+        """A UAV beyond a lost one that this one would hear by now if it had hurried here, too: it is lost as well."""
+        since_s = (self._formation.closing_s(now_ns) or 0.0) - _SETS_OUT_S
+        near_m = _CLOSING * self._reach_m + _HURRIES * self._haste_m_s * since_s
+        return next((node for left_m, node, _ in self._unheard(now_ns) if since_s > 0 and left_m <= near_m), None)
+
+    def _unheard(self, now_ns: int) -> list[tuple[float, int, Motion]]:
+        """Those to whom this UAV is tied and whom it does not hear while ranks are closed, each with its motion before
+        the loss and how far away that is.
+        """
         plan, pattern, place = self._formation.plan, self._formation.pattern, self._formation.place
         closing_s, swept_s = self._formation.closing_s(now_ns), self._formation.swept_s(now_ns)
         if plan is None or pattern is None or place is None or closing_s is None or swept_s is None:
-            return None
+            return []
         if self._bidding.is_absent(now_ns) or pattern.may_leave(place, swept_s):
-            return None
-        here, found = self._own_motion.position, None
+            return []
+        unheard = []
         for other in pattern.tethers(place, swept_s):
-            if self._neighbors.motion(plan.nodes[other], now_ns=now_ns) is not None:
-                continue
-            at, velocity = self._formation.known_at(other, swept_s)
-            left_m = here.minus(at).horizontal()
-            if left_m > _CLOSING * self._reach_m and (found is None or left_m < found[0]):
-                found = left_m, Motion(at, velocity, now_ns)
-        return None if found is None else found[1]
+            if self._neighbors.motion(plan.nodes[other], now_ns=now_ns) is None:
+                at, velocity = self._formation.known_at(other, swept_s)
+                left_m = self._own_motion.position.minus(at).horizontal()
+                unheard.append((left_m, plan.nodes[other], Motion(at, velocity, now_ns)))
+        return unheard
 
     def _lasting(self, plan: Search, pattern: Pattern, place: int, now_ns: int) -> dict[NodeId, Motion]:
         """Neighbors whose links to this UAV last; not one with whom a third has strong links to both, each shorter."""

@@ -53,6 +53,9 @@ class Flight:
         elif not self._return_home.leaves:
             goal, feed = self._goal.at(survivor, now_ns)
             hastily = self._place.closing_s(now_ns) is not None
+            missed = self._connectivity.missed(now_ns)
+            if missed is not None:
+                self._roll_call.miss(missed, now_ns=now_ns)
             beyond = self._connectivity.beyond_gap(now_ns)
             if beyond is not None:
                 goal, feed = beyond.position._replace(up=goal.up), beyond.velocity

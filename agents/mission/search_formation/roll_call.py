@@ -7,6 +7,7 @@
     silent    a neighbor whose radio sends nothing for unusually long is lost as well, before a hello is overdue
     away      a UAV that this one has not heard itself for long, or that may be out of its reach, is lost only after
               much longer, because news take a second a hop: then it is cut off with a part of the swarm
+    missed    a UAV beyond a lost one that does not come into reach although it should hurry here is lost, too
     mute      a UAV that hears for some seconds that it is lost itself, and never that it is not, is not heard
 
 Whoever finds by its own receiver that a UAV is lost, or back, floods its roll at once.
@@ -115,6 +116,11 @@ class RollCall:
                 self.lost[node] = now_ns
                 self.has_news |= near
                 heard.setdefault(node, begun)
+
+    def miss(self, node: int, *, now_ns: int) -> None:
+        """A UAV is not where this one must hear it by now: it is lost unless others have heard it lately."""
+        if node not in self.lost and now_ns - self._heard.get(node, 0) * ROLL_NS > self._silent_ns:
+            self.lost[node], self.has_news = now_ns, True
 
     def roll(self, plan: Search, *, now_ns: int) -> Roll:
         """What this UAV tells its neighbors in its next hello."""

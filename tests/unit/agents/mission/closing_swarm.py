@@ -51,14 +51,15 @@ class _Uav:
             node, at, own, neighbors, board.out,
             speed_m_s=_SPEED_M_S, airspeed_m_s=15.0, height_m=at.up, limits=SearchLimits(SCENARIO),
         )  # fmt: skip
+        self._roll_call = RollCall(node, hello_interval_s=1.0)
         self._flight = Flight(
-            own, board.place, board.goal, choice, tied,
-            roll_call=RollCall(node, hello_interval_s=1.0), take_off=None, return_home=home,
-        )  # fmt: skip
+            own, board.place, board.goal, choice, tied, roll_call=self._roll_call, take_off=None, return_home=home
+        )
 
     def fly(self, at: Enu, velocity: Enu, now_ns: int) -> Enu:
         self.board.place.close_ranks(self.lost, now_ns, apart=self.apart)
         self._flight.fix(at, velocity, None, now_ns=now_ns)
+        self.lost |= self._roll_call.lost.keys()
         assert self._flight.velocity is not None
         return self._flight.velocity
 

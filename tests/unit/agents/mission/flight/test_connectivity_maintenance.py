@@ -139,6 +139,26 @@ def test_the_two_beside_a_gap_fly_to_where_the_other_one_was_until_they_would_he
         assert beyond == [lane_of(there, TAKEN_UP_NS + 60 * S), lane_of(there, TAKEN_UP_NS + 68 * S), None]
 
 
+def test_who_does_not_come_to_meet_this_uav_over_a_gap_is_lost_as_well() -> None:
+    missed = []
+    board = Board(LINE, lane_of(LINE, TAKEN_UP_NS))
+    tied = ConnectivityMaintenance(
+        board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
+    )
+    board.place.close_ranks({LINE + 1}, TAKEN_UP_NS + 60 * S)
+    for since_s in range(12):
+        now_ns = TAKEN_UP_NS + (60 + since_s) * S
+        board.neighbors.on_hello(LINE - 1, Motion(lane_of(NodeId(LINE - 1), now_ns), Enu(0, 7.5, 0), now_ns))
+        board.own_motion.position = lane_of(LINE, now_ns).minus(Enu(-9.0 * max(0, since_s - 2), 0, 0))
+        missed.append(tied.missed(now_ns))
+        if since_s == 10:
+            there = board.own_motion.position.minus(Enu(-0.9 * REACH_M, 0, 0))
+            board.neighbors.on_hello(LINE + 2, Motion(there, Enu(0, 7.5, 0), now_ns))
+    assert missed[:5] == [None] * 5
+    assert missed[8:11] == [LINE + 2] * 3
+    assert missed[11] is None, "it was only late"
+
+
 def test_who_is_beyond_a_gap_is_sought_where_it_flew_after_earlier_losses() -> None:
     now_ns, beyond = TAKEN_UP_NS + 60 * S, NodeId(LINE + 2)
     at = {}

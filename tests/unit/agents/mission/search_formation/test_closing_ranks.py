@@ -26,6 +26,10 @@ def test_who_is_left_is_one_network_again_within_15_s_of_each_loss(from_s: float
     assert max(heal_s) > 4.0, "gaps that have to be closed"
 
 
+def test_two_relays_beside_each_other_are_missed_by_both_sides() -> None:
+    assert ClosingSwarm(92.0).heal_s(33, 34, within_s=15.0) < 13.0, "each side knew only one of them as its neighbor"
+
+
 def test_of_two_lost_at_once_the_second_one_that_is_noticed_makes_nobody_seek_others_where_they_are_not_yet() -> None:
     first, second = 45, 32  # a follower, and a relay, which is missed later
     assert 4.0 < ClosingSwarm(102.5).heal_s(first, second, within_s=15.0) < 7.0

@@ -110,6 +110,15 @@ def test_the_two_parts_of_a_swarm_that_is_cut_take_each_other_to_be_lost_and_agr
     assert swarm.lost() == {frozenset()}
 
 
+def test_who_is_missed_is_lost_unless_others_have_heard_it_lately() -> None:
+    plan, call = ring_plan(), RollCall(NodeId(1), hello_interval_s=1.0)
+    for age, is_lost in ((2, False), (30, True)):
+        call.on_roll(Roll(40, 1, 1, (0, age, *[0] * (COUNT - 2)), frozenset()), plan, now_ns=20 * S)
+        call.miss(2, now_ns=20 * S)
+        assert (2 in call.lost) == call.has_news == is_lost
+        call = RollCall(NodeId(1), hello_interval_s=1.0)
+
+
 def test_what_comes_from_another_plan_or_from_the_future_is_not_believed() -> None:
     plan, call = ring_plan(), RollCall(NodeId(1), hello_interval_s=1.0)
     call.on_hello(2, now_ns=10 * S)

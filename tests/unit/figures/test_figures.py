@@ -209,7 +209,7 @@ def test_a_figure_that_there_is_not_is_an_error() -> None:
         chosen(["7"])
 
 
-def tiny(name: str, **changes: object):
+def tiny(name: str, *, seeds: int = 2, **changes: object):
     """A shipped sweep with few nodes and short runs, carried out here."""
     found = spec.find(name)
     grid = {key: changes.get(key, [values[0], values[-1]]) for key, values in found.grid.items()}
@@ -221,7 +221,7 @@ def tiny(name: str, **changes: object):
         case.model_copy(update={"grid": {key: grid.get(key, values) for key, values in case.grid.items()}})
         for case in found.case
     )
-    sweep = found.model_copy(update={"seeds": 2, "grid": grid, "set": {**found.set, **small}, "case": cases})
+    sweep = found.model_copy(update={"seeds": seeds, "grid": grid, "set": {**found.set, **small}, "case": cases})
     rows = [(task, carry_out(task)) for task in tasks_of(sweep)]
     assert [done.error for _, done in rows if done.failed] == []
     return table_of(rows, sweep.varied())
@@ -376,11 +376,13 @@ def test_every_figure_is_drawn_from_its_shipped_sweep(name: str, tmp_path: Path)
         changes = {"nodes.count": 45, "duration_s": 10, "warmup_s": 6, "drain_s": 2}
     if name == "size":
         changes["nodes.count"] = [9, 16]
-    if name in {"11", "clocks"}:  # of which every case must deliver something
+    if name == "clocks":  # of which every case must deliver something
         changes.update({"duration_s": 12, "warmup_s": 8})
+    if name == "11":  # whose load, in flight, must find the timetable there: before, it is flooded without bounds
+        changes.update({"duration_s": 28, "warmup_s": 25})
     if name == "12":
         changes["world.engine"] = "kinematic"
-    table = tiny(recipe.sweep, **changes)
+    table = tiny(recipe.sweep, seeds=1 if name == "11" else 2, **changes)
     claims = render(recipe, table, tmp_path)
     assert (tmp_path / f"{recipe.name}.png").exists()
     assert all(statement.values or claim.figure == 12 for claim in claims for statement in claim.statements)

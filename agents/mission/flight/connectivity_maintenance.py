@@ -95,8 +95,8 @@ class ConnectivityMaintenance:
                     NodeId(plan.nodes[at]): self._neighbors.motion(plan.nodes[at], now_ns=now_ns) for at in places
                 }
                 ties |= {node: motion for node, motion in motions.items() if motion is not None}
-                if not places:
-                    return ties
+                if not places and pattern.kind(place) != "follower":
+                    return ties  # as in a circuit, where nobody keeps in reach of others
         return ties or self._nearest_motions(now_ns)
 
     def held(self, velocity: Enu) -> list[NodeId]:

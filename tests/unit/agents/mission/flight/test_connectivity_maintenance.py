@@ -95,6 +95,17 @@ def test_who_hears_nobody_to_whom_it_is_tied_stays_with_the_nearest() -> None:
     assert [plane.east for plane in tied.planes(now_ns)] == [1.0]
 
 
+def test_a_follower_that_hears_none_of_its_team_stays_with_whom_it_hears() -> None:
+    now_ns = TAKEN_UP_NS + 40 * S
+    here = lane_of(FOLLOWER, now_ns)
+    board = Board(FOLLOWER, here)
+    board.neighbors.on_hello(35, Motion(here.minus(Enu(0, 200.0, 0)), STILL, now_ns))
+    tied = ConnectivityMaintenance(
+        board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
+    )
+    assert [plane.north for plane in tied.planes(now_ns)] == [-1.0]
+
+
 def test_who_closes_ranks_over_a_lost_uav_may_use_up_a_little_more_of_its_reach_in_a_quarter_of_the_time() -> None:
     now_ns = TAKEN_UP_NS + 20 * S
     board = Board(LINE, lane_of(LINE, now_ns))

@@ -32,7 +32,7 @@ from agents.mission.applications import PlannedSearch  # noqa: E402  (the tree's
 from agents.uav import Uav  # noqa: E402
 from fanet_mw.bus.radio_control import PARTITION_LABEL, Partition  # noqa: E402
 from fanet_mw.units import S  # noqa: E402
-from scripts.losses import Flight  # noqa: E402
+from scripts.losses import Flight, stretches  # noqa: E402
 from sim.results.connectivity import parts  # noqa: E402
 from sim.run.garbage import GARBAGE  # noqa: E402
 from sim.run.stoppable_uav import StoppableUav  # noqa: E402
@@ -103,19 +103,15 @@ class Parted(Flight):
 def judged(flight: Parted, at_s: float, angle: float, off_m: float) -> dict[str, Any]:
     """Fly on with the air parted, and what became of the swarm."""
     flight.part(angle, off_m)
-    planners, crossed, wrong = {}, {}, list[list[float]]()
+    planners, crossed, looks = {}, {}, list[tuple[int, bool]]()
     for step in range(1, round(_FOR_S / _LOOKS_S) + 1):
         after_s = step * _LOOKS_S
         flight.host.run(round((at_s + after_s) * S))
         now = flight.planners(cut=True)
         if after_s in _SHOWN_S:
             planners[round(after_s)], crossed[round(after_s)] = now, flight.crossed()
-        if all(leads == 1 for _, leads in now):
-            continue
-        if wrong and wrong[-1][1] == after_s - _LOOKS_S:
-            wrong[-1][1] = after_s
-        else:
-            wrong.append([after_s - _LOOKS_S, after_s])
+        looks.append((round(after_s * S), any(leads != 1 for _, leads in now)))
+    wrong = [[from_s - _LOOKS_S, until_s] for from_s, until_s in stretches(looks)]
     known = flight.finds()
     everything = set[int]().union(*known.values())
     merged, unknown = {}, {0: sum(known[node] != everything for node in known)}

@@ -86,8 +86,8 @@ class PhoneReception:
         if not known.filter.received_powers:
             return
         self._recalled.add(survivor)
-        for then_ns, at in list(self._listened.values()):
-            if known.first_ns - then_ns >= _OTHERS_NS and known.filter.near(at, within_m=_NEAR_M):
+        for then_ns, at in self._listened.values():
+            if known.first_ns - then_ns >= _OTHERS_NS:
                 known.filter.on_silence(at)
 
     def _note_silent_neighbors(self, now_ns: int) -> None:

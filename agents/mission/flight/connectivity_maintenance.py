@@ -111,8 +111,10 @@ class ConnectivityMaintenance:
     def missed(self, now_ns: int) -> int | None:
         """A UAV beyond a lost one that this one would hear by now if it had hurried here, too: it is lost as well."""
         since_s = (self._formation.closing_s(now_ns) or 0.0) - _SETS_OUT_S
+        if since_s <= 0:
+            return None
         near_m = _CLOSING * self._reach_m + _HURRIES * self._haste_m_s * since_s
-        return next((node for left_m, node, _ in self._unheard(now_ns) if since_s > 0 and left_m <= near_m), None)
+        return next((node for left_m, node, _ in self._unheard(now_ns) if left_m <= near_m), None)
 
     def _unheard(self, now_ns: int) -> list[tuple[float, int, Motion]]:
         """Those to whom this UAV is tied and whom it does not hear while ranks are closed, each with its motion before

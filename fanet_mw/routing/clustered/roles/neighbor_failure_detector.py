@@ -43,9 +43,9 @@ class NeighborFailureDetector:
         if node in self._heard_ns:
             self._reported_ns[node] = now_ns
 
-    def hears_nobody(self, now_ns: int) -> bool:
-        """True if each neighbor is silent."""
-        return all(
+    def _hears_nobody(self, now_ns: int) -> bool:
+        """True if all of several neighbors are silent."""
+        return len(self._heard_ns) > 1 and all(
             now_ns - max(heard_ns, self._liveness.last_ns(node) or 0) >= self._silent_ns
             for node, heard_ns in self._heard_ns.items()
         )
@@ -54,7 +54,7 @@ class NeighborFailureDetector:
         """The neighbor to report now, of several the one not reported for longest, or None. `lists` tells whether the
         schedule names a node; neighbors that no longer count are forgotten.
         """
-        if len(self._heard_ns) > 1 and self.hears_nobody(now_ns):
+        if self._hears_nobody(now_ns):
             return None
         for node in sorted(self._heard_ns, key=lambda node: (self._reported_ns.get(node, 0), node)):
             quiet_ns = now_ns - self._heard_ns[node]

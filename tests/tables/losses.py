@@ -14,9 +14,11 @@ _AGAIN_S: Final = 3.0
 _WORDS: Final = {0: "none", 1: "one", 2: "two", 3: "three", 4: "four", 5: "five"}
 _CURVE_FROM: Final = 6
 """So many losses one after the other are a line of the curve."""
-_PLANNED_S: Final = 3.0
 _STEP: Final = 2
 """So many losses lie between two rows of it."""
+_PLANNED_S: Final = 3.0
+_SEEN_S: Final = 17.0
+"""So long after its last loss a copy is looked at that is not flown to the end."""
 Copy = dict[str, Any]
 
 
@@ -68,11 +70,18 @@ def _healing_row(mission: str, lost: str, copies: Sequence[Copy]) -> list[str]:
         f"{len(copies)} ({len({copy['seed'] for copy in copies})})",
         within,
         f"{sum(not one for one in heal_s)}",
-        f"{statistics.median(heal_s):.1f} / {max(heal_s):.1f}",
+        f"{statistics.median(heal_s):.1f} / {_worst(copies)}",
         f"{again} of {len(judged)}" if judged else "-",
         f"{as_good} of {len(judged)}" if judged else "-",
         f"{sum(broken)}" if broken else "-",
     ]
+
+
+def _worst(copies: Sequence[Copy]) -> str:
+    """The longest time apart; more than what was seen of a copy that was still apart when it ended."""
+    longest = max(copies, key=lambda copy: max(copy["heal_s"]))
+    heal_s = max(longest["heal_s"])
+    return f"> {_SEEN_S:.0f}" if heal_s >= _SEEN_S and "found" not in longest else f"{heal_s:.1f}"
 
 
 def to_the_end() -> Rows:

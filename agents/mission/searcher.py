@@ -65,7 +65,7 @@ from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.world import FASTEST_AIR_M_S
 from fanet_mw.trace import MissionModeChanged
-from fanet_mw.units import MS, Enu, NodeId, S
+from fanet_mw.units import MS, Enu, NodeId, S, earliest
 from fanet_mw.wire.bids import Bids, encode_bids
 from fanet_mw.wire.roll import Roll
 from fanet_mw.wire.search_messages import Told
@@ -190,9 +190,10 @@ class Searcher:
         self._plans.start(now_ns)
 
     def next_wake_ns(self) -> int | None:
-        return self._next_review_ns
+        return earliest(self._next_review_ns, self._plans.alarm_ns)
 
     def wake(self, now_ns: int) -> None:
+        self._plans.tell_losses(now_ns)
         if self._next_review_ns is None or now_ns < self._next_review_ns:
             return
         self._next_review_ns = now_ns + _REVIEW_NS
@@ -362,7 +363,7 @@ class Searcher:
             case Found():
                 self._on_found(message, now_ns, flooded=flooded)
             case Roll():
-                self._plans.on_roll(message, now_ns=now_ns)
+                self._plans.on_roll(message, flooded=flooded, now_ns=now_ns)
             case ToldOrder():
                 self._on_order(message, now_ns)
             case _:

@@ -11,7 +11,7 @@ from agents.mission.search_formation.pattern import Pattern
 from agents.mission.search_formation.roll_call import RollCall
 from fanet_mw.motion import Motion
 from fanet_mw.trace import Planned
-from fanet_mw.units import US, Enu, NodeId, S
+from fanet_mw.units import MS, US, Enu, NodeId, S
 from fanet_mw.wire.roll import Roll
 from fanet_mw.wire.search_plan import Search, SearchStatus
 
@@ -19,6 +19,9 @@ _FIRST_STATUS_S: Final = 2
 """A UAV sends its first status at a random instant within this time after its start."""
 _ALARM_NS: Final = 2 * S
 """The least time between two floods by which a UAV tells all who is lost."""
+_SPREAD_NS: Final = 400 * MS
+"""All in reach find a loss at about the same instant. Each tells it at a random one within this time, unless another
+has told the same by then: 45 floods at once are more than bounds allow for."""
 _FALLS_M_S: Final = 6.0
 """Nobody sinks this fast on purpose."""
 
@@ -48,6 +51,8 @@ class PlanExchange:
         self._adopted_ns = 0
         """The instant at which this UAV began to follow its plan."""
         self._next_alarm_ns = 0
+        self.alarm_ns: int | None = None
+        """The instant at which this UAV will tell all who is lost; None if there is no news."""
         self._flies_home = False
         """True if this UAV takes no place any more, whatever the plan says."""
         self._absent = False
@@ -68,15 +73,24 @@ class PlanExchange:
     def close_ranks(self, now_ns: int) -> None:
         """Find who is lost, and fly on without them."""
         if self._place.plan is not None:
-            self._roll_call.review(
-                self._place.plan, since_ns=self._adopted_ns, falls=_falls(self._own_motion.velocity), now_ns=now_ns
-            )
-            if self._roll_call.has_news and now_ns >= self._next_alarm_ns:
-                self._roll_call.has_news, self._next_alarm_ns = False, now_ns + _ALARM_NS
-                self._outbox.packets.append(OutgoingPacket(self.hello_frames(now_ns)))
+            falls = _falls(self._own_motion.velocity)
+            self._roll_call.review(self._place.plan, since_ns=self._adopted_ns, falls=falls, now_ns=now_ns)
+            if self._roll_call.has_news and self.alarm_ns is None:
+                waits = 0.0 if falls else self._random()  # who falls has no time
+                self.alarm_ns = max(now_ns, self._next_alarm_ns) + round(waits * _SPREAD_NS)
+            self.tell_losses(now_ns)
             away = {*self._planner.leavers, *self._planner.absent}
             apart = not self._roll_call.lost.keys() >= set(self._roll_call.parted)
             self._place.close_ranks(self._roll_call.lost, now_ns, away=away, apart=apart)
+
+    def tell_losses(self, now_ns: int) -> None:
+        """If it is time to tell all who is lost, or back, flood it unless another UAV has done so."""
+        if self.alarm_ns is None or now_ns < self.alarm_ns:
+            return
+        self.alarm_ns = None
+        if self._roll_call.has_news:
+            self._roll_call.has_news, self._next_alarm_ns = False, now_ns + _ALARM_NS
+            self._outbox.packets.append(OutgoingPacket(self.hello_frames(now_ns)))
 
     def say_status(self, percent: int, now_ns: int) -> None:
         """Send this UAV's status: its position, its plan, and the percentage of its battery that it may still spend."""
@@ -116,9 +130,9 @@ class PlanExchange:
         self._roll_call.on_hello(node, now_ns=now_ns, falls=falls)
         return returned and not falls
 
-    def on_roll(self, roll: Roll, *, now_ns: int) -> None:
-        """A neighbor tells who was heard when."""
-        self._roll_call.on_roll(roll, self._place.plan, now_ns=now_ns)
+    def on_roll(self, roll: Roll, *, flooded: bool, now_ns: int) -> None:
+        """Another UAV tells its neighbors, or all, who was heard when."""
+        self._roll_call.on_roll(roll, self._place.plan, flooded=flooded, now_ns=now_ns)
 
     def hello_frames(self, now_ns: int) -> bytes:
         """The inner frame for the next hello that tells who was heard when; empty without a plan."""

@@ -4,13 +4,14 @@
     lost      said by a UAV that has heard it itself until lately, when nobody is known to have heard it for some time;
               it is told on with the instant at which the UAV was last heard, and a later one takes it back
     falls     a UAV that falls says so at once, and is lost
-    silent    a neighbor whose radio sends nothing for unusually long is lost as well, before a hello is overdue
+    silent    a neighbor whose radio sends nothing for unusually long is lost as well, before a hello is overdue; not if
+              others have heard it since, because then it is out of reach
     away      a UAV that this one has not heard itself for long, or that may be out of its reach, is lost only after
               much longer, because news take a second a hop: then it is cut off with a part of the swarm
     missed    a UAV beyond a lost one that does not come into reach although it should hurry here is lost, too
     mute      a UAV that hears for some seconds that it is lost itself, and never that it is not, is not heard
 
-Whoever finds by its own receiver that a UAV is lost, or back, floods its roll at once.
+Whoever finds by its own receiver that a UAV is lost, or back, floods its roll soon, unless another has told the same.
 """
 
 from collections.abc import Collection
@@ -55,7 +56,7 @@ class RollCall:
         self.parted: Collection[int] = ()
         """The UAVs to which no way leads any more, by the radio: they are lost, or in another part of the swarm."""
         self.has_news = False
-        """True once this UAV itself has found somebody lost or back, or falls, until the caller has told all of it."""
+        """True once this UAV itself has found somebody lost or back, or falls, until all have been told."""
 
     def on_hello(self, node: int, *, now_ns: int, falls: bool = False) -> None:
         """A neighbor was heard; `falls`: its hello says that it falls from the sky."""
@@ -63,7 +64,8 @@ class RollCall:
         self.has_news |= falls != (node in self.lost)  # it falls, or is back
         self._take(node, now_ns // ROLL_NS, lost=falls, now_ns=now_ns)
 
-    def on_roll(self, roll: Roll, plan: Search | None, *, now_ns: int) -> None:
+    def on_roll(self, roll: Roll, plan: Search | None, *, flooded: bool = False, now_ns: int) -> None:
+        """Another UAV told, its neighbors or all (`flooded`), who was heard when."""
         if plan is None or (roll.planner, roll.revision) != (plan.planner, plan.revision):
             return
         if roll.at > now_ns // ROLL_NS + _AHEAD:
@@ -73,6 +75,8 @@ class RollCall:
                 self._on_called(place, lost=place in roll.lost, now_ns=now_ns)
             elif node and roll.ages[place] < LONG_AGO:
                 self._take(node, roll.at - roll.ages[place], lost=place in roll.lost, now_ns=now_ns)
+        if flooded and roll.lost == self._lost_places(plan):
+            self.has_news = False
 
     def _on_called(self, place: int, *, lost: bool, now_ns: int) -> None:
         if not lost:
@@ -111,7 +115,8 @@ class RollCall:
             near, gone = now_ns - neighbor_ns.get(node, -_NEIGHBOR_NS) < _NEIGHBOR_NS, False
             if near and self._silent is not None:
                 near = self._silent.might_be_heard(NodeId(node), now_ns=now_ns)
-                gone = near and self._silent.has(NodeId(node), now_ns=now_ns)
+                by_others = heard.get(node, 0) > neighbor_ns[node] // ROLL_NS + 1
+                gone = near and not by_others and self._silent.has(NodeId(node), now_ns=now_ns)
             if gone or silent_ns > (self._silent_ns if near else _AWAY_NS):
                 self.lost[node] = now_ns
                 self.has_news |= near
@@ -127,7 +132,10 @@ class RollCall:
         at = now_ns // ROLL_NS
         heard = {**self._heard, self._node: at}
         ages = tuple(min(LONG_AGO, max(0, at - heard[node])) if node in heard else LONG_AGO for node in plan.nodes)
-        lost = frozenset(
+        return Roll(at, plan.planner, plan.revision, ages, self._lost_places(plan))
+
+    def _lost_places(self, plan: Search) -> frozenset[int]:
+        """The places of the plan whose UAVs are lost, or fall."""
+        return frozenset(
             place for place, node in enumerate(plan.nodes) if node in self.lost or (node == self._node and self._falls)
         )
-        return Roll(at, plan.planner, plan.revision, ages, lost)

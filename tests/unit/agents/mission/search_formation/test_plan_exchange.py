@@ -11,7 +11,7 @@ from agents.mission.search_formation.plan_exchange import PlanExchange
 from agents.mission.search_formation.roll_call import RollCall
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.motion import Motion
-from fanet_mw.units import Enu, NodeId, S
+from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire import HEADER_BYTES
 from fanet_mw.wire.roll import Roll
 from fanet_mw.wire.search_plan import SearchStatus
@@ -22,7 +22,8 @@ NOW_NS = TAKEN_UP_NS + 40 * S
 class Exchange:
     """One UAV's part in the exchange, with the plan."""
 
-    def __init__(self, node: NodeId) -> None:
+    def __init__(self, node: NodeId, *, waits: float = 0.5) -> None:
+        """`waits`: all its random numbers."""
         self.out, self.motion = Outbox(), OwnMotion(lane_of(node, NOW_NS), OPEN)
         self.place = FormationPlace(node, self.motion, reach_m=REACH_M)
         roll_call = RollCall(node, hello_interval_s=1.0)
@@ -31,7 +32,7 @@ class Exchange:
             of_few=lambda *_: None, random=lambda: 0.5,
         )  # fmt: skip
         self.plans = PlanExchange(
-            node, planner, roll_call, self.place, self.motion, self.out, pattern=None, random=lambda: 0.5
+            node, planner, roll_call, self.place, self.motion, self.out, pattern=None, random=lambda: waits
         )
         self.plans.on_plan(PLAN, now_ns=NOW_NS)
 
@@ -71,6 +72,14 @@ def test_who_is_absent_keeps_its_own_place_in_its_plan() -> None:
     assert exchange.place.pattern.vacant == frozenset()
 
 
+def who_lost(node: NodeId, out: NodeId, *, waits: float) -> Exchange:
+    """A UAV that has heard another one 4 s ago, and finds now that it is lost."""
+    exchange = Exchange(node, waits=waits)
+    exchange.plans.on_hello(out, Motion(lane_of(out, NOW_NS), Enu(0, 7.5, 0), NOW_NS), now_ns=NOW_NS)
+    exchange.plans.close_ranks(NOW_NS + 4 * S)
+    return exchange
+
+
 def test_who_finds_a_neighbor_lost_floods_that_once() -> None:
     exchange, out = Exchange(LINE), NodeId(6)
     motion = Motion(lane_of(out, NOW_NS), Enu(0, 7.5, 0), NOW_NS)
@@ -78,9 +87,27 @@ def test_who_finds_a_neighbor_lost_floods_that_once() -> None:
     told = []
     for after_s in (1, 4, 5, 8):
         exchange.plans.close_ranks(NOW_NS + after_s * S)
+        exchange.plans.tell_losses(NOW_NS + after_s * S + S // 2)
         told.append([Roll.decode_frame(bytes(HEADER_BYTES) + packet.frames).lost for packet in exchange.out.packets])
         exchange.out.packets.clear()
     assert told == [[], [{PLAN.nodes.index(out)}], [], []]
+
+
+@pytest.mark.parametrize(("flooded", "also_lost", "floods"), [(True, False, 0), (False, False, 1), (True, True, 1)])
+def test_of_two_who_find_the_same_loss_only_the_first_floods_it(flooded: bool, also_lost: bool, floods: int) -> None:
+    out, other = NodeId(6), NodeId(9)
+    first, second = who_lost(LINE, out, waits=0.1), who_lost(NodeId(7), out, waits=0.9)
+    if also_lost:
+        second.plans.on_hello(other, Motion(lane_of(other, NOW_NS), Enu(0, 0, -9.0), NOW_NS), now_ns=NOW_NS + 4 * S)
+    for after_ms in range(0, 500, 20):
+        now_ns = NOW_NS + 4 * S + after_ms * MS
+        first.plans.tell_losses(now_ns)
+        second.plans.tell_losses(now_ns)
+        for packet in first.out.packets:
+            told = Roll.decode_frame(bytes(HEADER_BYTES) + packet.frames)
+            second.plans.on_roll(told, flooded=flooded, now_ns=now_ns)
+        first.out.packets.clear()
+    assert len(second.out.packets) == floods
 
 
 def test_a_status_of_more_charge_than_a_battery_holds_is_malformed() -> None:

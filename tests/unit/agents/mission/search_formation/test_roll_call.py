@@ -193,6 +193,18 @@ def test_a_neighbor_whose_radio_falls_silent_is_lost_before_a_hello_is_missed_an
     assert call.has_news, "all are told that it is back"
 
 
+def test_a_silent_neighbor_that_others_have_heard_since_is_out_of_reach_and_not_lost() -> None:
+    plan, radio = ring_plan(), Radio(2, 3)
+    call, other = (RollCall(NodeId(node), hello_interval_s=1.0, silent=radio) for node in (1, 4))
+    for node in (2, 3):
+        call.on_hello(node, now_ns=10 * S)
+        other.on_hello(node, now_ns=10 * S)
+    other.on_hello(2, now_ns=11 * S)
+    call.on_roll(other.roll(plan, now_ns=11 * S), plan, now_ns=11 * S)
+    call.review(plan, since_ns=10 * S, now_ns=12 * S)
+    assert set(call.lost) == {3}
+
+
 def test_who_is_lost_from_afar_takes_nothing_from_the_news_of_a_silent_neighbor() -> None:
     plan, radio = ring_plan(), Radio(2)
     call = RollCall(NodeId(1), hello_interval_s=1.0, silent=radio)

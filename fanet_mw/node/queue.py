@@ -6,7 +6,7 @@ a second.
 """
 
 from bisect import bisect_left, insort
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
 
@@ -92,6 +92,12 @@ class TxQueue:
         for entry in older:
             self._entries.remove(entry)
         return [entry[2] for entry in older]
+
+    def put_off(self, stays: Callable[[Packet], bool], *, rank: int, behind: int) -> None:
+        """Move packets of one priority to a less important one, in order, but for those that stay."""
+        for entry in [entry for entry in self._of(rank) if not stays(entry[2])]:
+            self._entries.remove(entry)
+            insort(self._entries, (behind, *entry[1:]))
 
     def _of(self, rank: int) -> list[tuple[int, int, Packet]]:
         return self._entries[bisect_left(self._entries, (rank,)) : bisect_left(self._entries, (rank + 1,))]

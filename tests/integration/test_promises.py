@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from kit import slow
 
-from fanet_mw.trace import BoundExcludes, BoundStated, Delivered
+from fanet_mw.trace import BoundExcludes, BoundStated, Delivered, Generated
 from fanet_mw.units import S
 from sim.results.files import finish
 from sim.run.virtual import simulate
@@ -55,6 +55,17 @@ def test_bounds_hold_the_lead_and_the_handover(handover_ms: int) -> None:
         "the first packet may come before all have shown turns"
     )
     assert 0.7 < bound["observed_max_ms"] / bound["worst_ms"] <= 1 - 30 / bound["worst_ms"], "a lead is for the receipt"
+
+
+def test_load_that_begins_before_the_timetable_keeps_no_bounds_away() -> None:
+    """The turns carry just the load: what waited when they began stayed ahead of all that followed."""
+    turns = ("clusters.flooding_period_s=2", "clusters.turn_slack_us=20", "clusters.contention_ms=20", "radio.cw_min=1")
+    load = ("traffic.interval_s=0.1", "routing.hello_interval_s=2", "warmup_s=1", "duration_s=14")
+    outcome = simulate(catalog.find("clusters", [*GRID, *turns, *load]))
+    made = {(r.node, r.seq) for r in outcome.records if type(r) is Generated and r.t_ns > 10 * S}
+    stated = {(r.node, r.seq) for r in outcome.records if type(r) is BoundStated}
+    assert len(made & stated) > 0.9 * len(made) > 0, "one of 14 joins late"
+    assert finish(outcome, out=None)["bound"]["violations"] == 0
 
 
 def test_new_timetables_break_no_promise() -> None:

@@ -10,6 +10,7 @@ from typing import Final
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.forwarding.floods import Floods
+from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
 from fanet_mw.units import earliest
 
@@ -43,13 +44,12 @@ class ResumedFloods:
             return False
         if any(packet.frame == other.frame for other in self._waiting.values()):
             return True
-        turns = timetable.turns
-        own = [offset for (root, _), each in timetable.mine.items() if root == packet.header.origin for offset in each]
+        turns, own = timetable.turns, _relays(timetable, packet)
         first_ns = turns.superframe_start_ns(from_ns)
         starts = sorted(
-            turns.start_ns(offset % turns.per_superframe, superframe_start_ns=first_ns + later * turns.period_ns)
+            turns.start_ns(turn, superframe_start_ns=first_ns + later * turns.period_ns)
             for later in range(_SUPERFRAMES)
-            for offset in own
+            for turn in own
         )
         for start_ns in starts:
             if start_ns >= from_ns and start_ns not in self._waiting:
@@ -61,10 +61,24 @@ class ResumedFloods:
         return earliest(*(start_ns - self._lead_ns for start_ns in self._waiting)) if self._waiting else None
 
     def wake(self, now_ns: int) -> None:
-        """Announce what is due, one lead ahead; what has to give way to a newer packet waits on."""
+        """Announce what is due, one lead ahead. What gives way to a newer packet waits on, and so does what lost its
+        turn to a newer timetable.
+        """
         for start_ns in sorted(start_ns for start_ns in self._waiting if start_ns <= now_ns + self._lead_ns):
             packet = self._waiting.pop(start_ns)
-            if self.take(start_ns, heard_ns=now_ns):
+            timetable = self._timetables.at(start_ns)
+            holds = timetable is not None and timetable.turns.turn_at(start_ns) in _relays(timetable, packet)
+            if holds and self.take(start_ns, heard_ns=now_ns):
                 self._floods.answer([packet], start_ns=start_ns)
             else:
                 self.resume(packet, now_ns=now_ns + 1)
+
+
+def _relays(timetable: NodeTimetable, packet: Packet) -> list[int]:
+    """The turns in which this node relays floods of a packet's origin."""
+    return [
+        offset % timetable.turns.per_superframe
+        for (root, _), offsets in timetable.mine.items()
+        if root == packet.header.origin
+        for offset in offsets
+    ]

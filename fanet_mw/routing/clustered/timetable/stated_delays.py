@@ -211,9 +211,15 @@ class StatedDelays:
             return None  # schedules go before it
         return max(known)
 
-    def state(self, packet: Packet, bound_ns: int | None, *, through_ns: int | None, now_ns: int) -> None:
-        """Record the bound or likely delay of a packet that was just accepted, whose flood is over at `through_ns`."""
-        newest = self._timetables.newest
+    def has_promised(self, packet: Packet) -> bool:
+        """True if a bound was stated for a packet that waits."""
+        return packet.header.origin == self._port.node and packet.header.seq in self._promised
+
+    def state(self, packet: Packet, bound_ns: int | None, *, through_ns: int | None, now_ns: int) -> bool:
+        """Record the bound or likely delay of a packet that was just accepted, whose flood is over at `through_ns`.
+        Returns True if a bound is stated.
+        """
+        newest, stated = self._timetables.newest, False
         if bound_ns is not None and through_ns is not None and newest is not None:
             had_ns = through_ns + receipt_ns(self._port.scenario)
             # every timetable that comes into force before this instant has been announced already
@@ -230,6 +236,7 @@ class StatedDelays:
                 for one in in_force
             )
             if kept and had_ns <= min(due_ns, known_ns, expires_ns):
+                stated = True
                 self._port.record(BoundStated(now_ns, self._port.node, packet.header.seq, bound_ns))
                 self._exclude(in_force, packet, now_ns)
                 self._promised[packet.header.seq] = through_ns, due_ns - receipt_ns(self._port.scenario)
@@ -239,6 +246,7 @@ class StatedDelays:
             record = LikelyStated(now_ns, self._port.node, packet.header.seq, likely_ns, LIKELY_SHARE)
             self._port.record(record)
             self._exclude([newest], packet, now_ns)
+        return stated
 
     def _exclude(self, timetables: Sequence[NodeTimetable], packet: Packet, now_ns: int) -> None:
         """What was stated is not meant for nodes that one of these timetables lacks: no turn surely reaches them."""

@@ -155,14 +155,15 @@ class TurnAccess:
         self.forward(packet, start_ns=due_ns, now_ns=now_ns)
         bound_ns = self._delays.greatest_bound_ns(packet, now_ns=now_ns)
         through_ns = None if bound_ns is None else self._over_ns(packet, now_ns)
-        self._delays.state(packet, bound_ns, through_ns=through_ns, now_ns=now_ns)
+        if self._delays.state(packet, bound_ns, through_ns=through_ns, now_ns=now_ns):
+            self._roots.put_off(self._delays.has_promised)
 
     def _over_ns(self, packet: Packet, now_ns: int) -> int | None:
         """The instant at which all that the node sends of a packet that was just queued is over; None: unknown."""
         timetable = self._timetables.at(now_ns)
         flooded = packet.header.destination == BROADCAST or not self._spare.holds(key_of_packet(packet))
         if timetable is None or flooded:
-            return self._roots.through_ns(packet, now_ns=now_ns)
+            return self._roots.through_ns(packet, stays=self._delays.has_promised, now_ns=now_ns)
         start_ns = self._spare.last_ns(now_ns=now_ns)
         return None if start_ns is None else start_ns + timetable.turns.turn_ns
 

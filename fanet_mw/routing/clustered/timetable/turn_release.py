@@ -7,13 +7,14 @@ span):
                                         | or, in its place, a leader's announcements |
 
 Each class in use (`reserved_room.reserved`) has room of its own in a turn, so bulk waits for nothing that comes later
-but a leader's announcements; a packet larger than its class's room waits like bulk. A turn is used only if its flood is
-over before the next timetable. `CallRelease` sends what only neighbors need: missed packets and hellos in *calls*
+but a leader's announcements; a packet larger than its class's room waits like bulk. Bulk without a bound, such as what
+came before the timetable, gives way to bulk that has one. A turn is used only if its flood is over before the next
+timetable. `CallRelease` sends what only neighbors need: missed packets and hellos in *calls*
 (`redundant_scheduling.py`), packets to one neighbor in *spare turns* (`list_scheduling.py`).
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from fanet_mw.node.packet import Packet
@@ -24,6 +25,10 @@ from fanet_mw.wire import PRIORITY_BULK, PRIORITY_CONTROL, Kind
 
 _LAST: Final = PRIORITY_BULK + 1
 """The rank of packets that only use the room that all classes leave free."""
+
+
+def _all(packet: Packet) -> bool:
+    return True
 
 
 class TurnsInForce(NamedTuple):
@@ -136,8 +141,10 @@ class RootRelease(TurnRelease):
         """Take out waiting announcements of this node that were made before an instant [swarm us]."""
         return self._queue.take_older(before_us=before_us, rank=PRIORITY_CONTROL)
 
-    def through_ns(self, packet: Packet, *, now_ns: int) -> int | None:
-        """The end of the flood of a packet just queued, or None; later packets have room of their own."""
+    def through_ns(self, packet: Packet, *, stays: Callable[[Packet], bool] = _all, now_ns: int) -> int | None:
+        """The end of the flood of a packet just queued, or None; later packets have room of their own. Of the bulk
+        before it only what `stays` counts, as when `put_off` moves the rest.
+        """
         rank = self._rank(packet)
         waiting = self._queue.waiting(rank)
         if not waiting or waiting[-1] is not packet:
@@ -145,6 +152,8 @@ class RootRelease(TurnRelease):
         end_ns, left = None, 0
         turns = self._upcoming(max(now_ns + self._lead_ns, self._free_ns))
         for ahead in waiting:
+            if rank == PRIORITY_BULK and ahead is not packet and not stays(ahead):
+                continue
             if end_ns is None or len(ahead.frame) > left:
                 following = next(turns, None)
                 if following is None:
@@ -153,6 +162,10 @@ class RootRelease(TurnRelease):
                 left = self._room(rank, turn)
             left -= len(ahead.frame)
         return end_ns
+
+    def put_off(self, stays: Callable[[Packet], bool]) -> None:
+        """Move bulk behind all other packets, later ones included, but for what stays."""
+        self._queue.put_off(stays, rank=PRIORITY_BULK, behind=_LAST)
 
     def _room(self, rank: int, turn: OwnTurn) -> int:
         """The number of bytes of a turn that are reserved for a class."""

@@ -287,6 +287,21 @@ def test_a_turn_in_which_something_newer_is_relayed_is_not_taken_for_what_was_mi
     assert relays(node) == [1156.0, 1256.0]
 
 
+def test_what_was_missed_keeps_out_of_turns_that_the_next_timetable_gives_to_another(node: Node) -> None:
+    """It waited for the turn at 1156 ms, and sent there whatever was in force by then: it broke bounds of others."""
+    access = access_of(node)
+    access._timetables.in_order = [planned(FLOODS[:2])]
+    hear(node, ROOT, TURNS.start_ns(9, superframe_start_ns=1000 * MS) + MS)
+    (packet,) = node.deliveries
+    assert access._resumed is not None
+    assert access._resumed.resume(packet, now_ns=1062 * MS)
+    changed = (FLOODS[0], Turn(8, AFTER, ROOT, 0), Turn(11, US, ROOT, 0))
+    access._timetables.in_order = [planned(FLOODS[:2]), planned(changed, valid_ns=1100 * MS)]
+    while (due_ns := access._resumed.next_wake_ns()) is not None and due_ns < 1400 * MS:
+        access._resumed.wake(due_ns)
+    assert relays(node) == [1162.0]
+
+
 def test_what_was_missed_contends_where_the_node_has_no_turn_of_its_flood(node: Node) -> None:
     access_of(node)._timetables.in_order = [planned((Turn(5, ROOT, ROOT, 0), Turn(12, US, US, 0)))]
     hear(node, ROOT, TURNS.start_ns(5, superframe_start_ns=1000 * MS) + MS)
@@ -429,6 +444,26 @@ def test_a_promise_counts_what_waits(node: Node, before: int, is_promised: bool)
     node.records.clear()
     node.send(filler(900), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=0, now_ns=0)
     assert any(isinstance(record, BoundStated) for record in node.records) is is_promised
+
+
+def test_a_packet_with_a_bound_goes_before_what_waits_without_one(node: Node) -> None:
+    """Where turns carry just the load, what came before the timetable would make all that follows late for ever."""
+
+    def send(at_ms: int) -> None:
+        now_ns = at_ms * MS
+        node.send(filler(900), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=now_ns, now_ns=now_ns)
+
+    access = informed(node, told_ms=-10_000)
+    for _ in range(3):
+        send(0)
+    access._delays.announced_ns = 0
+    send(0)
+    node.wake(62 * MS)
+    send(100)
+    for superframe in range(1, 5):
+        node.wake((superframe * 100 + 62) * MS)
+    assert [record.seq for record in node.records if isinstance(record, BoundStated)] == [3, 4]
+    assert [wire.decode_header(r.frame).seq for r in node.requests] == [3, 4, 0, 1, 2]
 
 
 def test_turns_are_used_until_a_timetable_without_any_comes_into_force(node: Node) -> None:

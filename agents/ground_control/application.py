@@ -60,6 +60,7 @@ _OVER_AIR: Final = frozenset({
     common.MAVLINK_MSG_ID_MISSION_ACK,
 })  # fmt: skip
 """The messages with which a packet of the post for a UAV may begin."""
+_TYPE_MISMATCH: Final = 7  # MAV_PARAM_ERROR_TYPE_MISMATCH of common.xml, which pymavlink 2.4.50 does not have yet
 _FTP_ACK, _FTP_NAK = 128, 129
 _FTP_SESSIONS: Final = (1, 2)
 """TerminateSession and ResetSessions, which a vehicle without files carries out at once."""
@@ -388,7 +389,7 @@ class GroundControl(Application):
             self._say_param_error(message, peer, -1, common.MAV_PARAM_ERROR_DOES_NOT_EXIST)
             return
         if message.param_type != common.MAV_PARAM_TYPE_REAL32:
-            self._say_param_error(message, peer, at, common.MAV_PARAM_ERROR_TYPE_MISMATCH)
+            self._say_param_error(message, peer, at, _TYPE_MISMATCH)
         elif not self._settings.change(message.param_id, message.param_value):
             self._say_param_error(message, peer, at, common.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
         elif key := self._settings.known[at].mission_key:

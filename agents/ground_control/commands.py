@@ -35,18 +35,22 @@ class Command(NamedTuple):
     frame: int
 
 
-def command_of(message: Any) -> Command:  # noqa: ANN401  (pymavlink has no types)
-    """The command in a message; a COMMAND_LONG's place is in degrees over the sea."""
+def command_of(message: Any) -> Command | None:  # noqa: ANN401  (pymavlink has no types)
+    """The command in a message, where NaN says that a number is not given; None if its place is none on earth. A
+    COMMAND_LONG's place is in degrees over the sea.
+    """
     params = (message.param1, message.param2, message.param3, message.param4)
     if message.get_type() == "COMMAND_INT":
         x, y = (None, None) if _NONE in (message.x, message.y) else (message.x, message.y)
-        z = message.z if math.isfinite(message.z) else None
-        return Command(message.command, params, x, y, z, message.frame)
-    lat, lon = message.param5, message.param6
-    known = abs(lat) <= 90 and abs(lon) <= 180  # false for what is not a number
-    x, y = (round(lat * 1e7), round(lon * 1e7)) if known else (None, None)
-    z = message.param7 if math.isfinite(message.param7) else None
-    return Command(message.command, params, x, y, z, common.MAV_FRAME_GLOBAL)
+        z, frame = message.z, message.frame
+    else:
+        lat, lon, z, frame = message.param5, message.param6, message.param7, common.MAV_FRAME_GLOBAL
+        if abs(lat) > 90 or abs(lon) > 180:
+            return None
+        x, y = (None, None) if math.isnan(lat + lon) else (round(lat * 1e7), round(lon * 1e7))
+    if math.isinf(z):
+        return None
+    return Command(message.command, params, x, y, None if math.isnan(z) else z, frame)
 
 
 class Commands:
@@ -70,12 +74,14 @@ class Commands:
 
     def on_command(self, message: Any, peer: Peer, now_ns: int) -> None:  # noqa: ANN401
         command = command_of(message)
-        does = self._DOES.get(command.number)
+        does = self._DOES.get(message.command)
         if does is None:
             result = _UNSUPPORTED
+        elif command is None:
+            result = _DENIED
         else:
             result = self._change_to(does, now_ns) if isinstance(does, Mode) else does(self, command, now_ns)
-        self._reply(common.MAVLink_command_ack_message(command.number, result, 0, 0, *peer))
+        self._reply(common.MAVLink_command_ack_message(message.command, result, 0, 0, *peer))
 
     def set_mode(self, number: int, now_ns: int) -> int:
         mode = mode_of(number)
@@ -103,6 +109,8 @@ class Commands:
 
     def _take_off(self, command: Command, _now_ns: int) -> int:
         up_m = None if command.z is None else self._ground().height(command.frame, command.z)
+        if command.z is not None and up_m is None:
+            return _DENIED
         return _ACCEPTED if self._pilot.take_off(up_m) else _LATER
 
     def _reposition(self, command: Command, _now_ns: int) -> int:

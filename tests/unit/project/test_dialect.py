@@ -1,6 +1,7 @@
 """The dialect: the module is what the XML gives, the XML stands beside common.xml, and the document says the same."""
 
 import importlib.util
+import re
 import shutil
 import struct
 from collections.abc import Callable
@@ -183,3 +184,15 @@ def test_the_offsets_of_the_document_are_where_the_header_has_them() -> None:
     for said in ("`FD 18 00`", "`08 CF 00`", "`origin_us` at 10, `seq` at 18, `origin` at 22, `flags` at 32"):
         assert said in DOCUMENT
     assert f"{wire.LATEST_US:,} us" in DOCUMENT
+
+
+def test_every_name_that_is_read_from_common_is_there() -> None:
+    """Nothing else looks: pymavlink has no types, and a rare answer may be the only one that reads a name."""
+    sources = [path for folder in ("fanet_mw", "agents", "sim") for path in (ROOT / folder).rglob("*.py")]
+    read = {
+        (name, str(path.relative_to(ROOT)))
+        for path in sources
+        for name in re.findall(r"\bcommon\.(MAV\w+)", path.read_text(encoding="utf-8"))
+    }
+    assert len(read) > 100
+    assert [use for use in sorted(read) if not hasattr(common, use[0])] == []

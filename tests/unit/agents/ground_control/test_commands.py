@@ -49,6 +49,26 @@ def test_a_take_off_without_a_height_climbs_to_the_parameters() -> None:
     assert bench.courses[-1].position.up == 12.5
 
 
+@pytest.mark.parametrize("place", [(999.0, 0.0, 20.0), (0.0, -181.0, 20.0), (math.inf, 0.0, 20.0), (0.0, 0.0, math.inf)])
+@pytest.mark.parametrize("number", [TAKEOFF, REPOSITION])
+def test_a_command_to_no_place_on_earth_is_denied_not_carried_out_elsewhere(
+    number: int, place: tuple[float, float, float]
+) -> None:
+    bench = Bench()
+    bench.command(ARM, 1)
+    assert bench.command(number, -1, 1, 0, math.nan, *place) == DENIED
+    assert not bench.courses
+
+
+def test_a_take_off_to_a_height_in_an_unknown_frame_is_denied() -> None:
+    bench = Bench()
+    bench.command(ARM, 1)
+    message = common.MAVLink_command_int_message(1, 1, 99, TAKEOFF, 0, 0, 0, 0, 0, math.nan, 0, 0, 100)
+    (ack,) = bench.say(message)
+    assert ack.result == DENIED
+    assert not bench.courses
+
+
 def test_a_landing_ends_on_the_ground_disarmed() -> None:
     bench = Bench().airborne()
     assert bench.command(LAND) == ACCEPTED
@@ -446,6 +466,8 @@ def test_parameters_are_listed_read_written_and_bounded() -> None:
         error, value = bench.say(common.MAVLink_param_set_message(1, 1, b"NAV_ACC_RAD", wrong, 9))
         assert error.error == common.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
         assert value.param_value == 7.0
+    error, value = bench.say(common.MAVLink_param_set_message(1, 1, b"NAV_ACC_RAD", 5.0, common.MAV_PARAM_TYPE_INT32))
+    assert (error.get_type(), error.error, value.param_value) == ("PARAM_ERROR", 7, 7.0)
     (error,) = bench.say(common.MAVLink_param_request_read_message(1, 1, b"SYS_AUTOSTART", -1))
     assert error.get_type() == "PARAM_ERROR"
     (error,) = bench.say(common.MAVLink_param_request_read_message(1, 1, b"", 99))

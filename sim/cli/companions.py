@@ -43,10 +43,12 @@ class Companions:
                 where += ["--zenoh-config", str(address.zenoh_config)]
             if scenario.world.heightmap or scenario.world.buildings_geojson:
                 where += ["--scenario", str(self._written(scenario))]
-            command = [sys.executable, "-m", "fanet_mw", *words, *where]
+            # -P: a file where the launcher was called, say attrs.py, is no module; they find what this process finds
+            command = [sys.executable, "-P", "-m", "fanet_mw", *words, *where]
+            found = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
             self._running.append(
                 subprocess.Popen(  # noqa: S603  (a command of fanet-mw)
-                    command, start_new_session=True, stdin=subprocess.DEVNULL, preexec_fn=_give_way
+                    command, env=found, start_new_session=True, stdin=subprocess.DEVNULL, preexec_fn=_give_way
                 )
             )
 

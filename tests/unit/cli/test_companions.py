@@ -1,0 +1,22 @@
+"""Programs beside a swarm that is launched."""
+
+from pathlib import Path
+
+import pytest
+
+from fanet_mw.hosts.realtime import SwarmAddress
+from sim.cli.companions import Companions
+from sim.scenarios import catalog
+
+
+def test_a_file_in_the_folder_of_whoever_launches_is_no_module_of_theirs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("attrs.py", "numpy.py", "fanet_mw.py"):
+        (tmp_path / name).write_text("raise SystemExit('mine')\n")
+    monkeypatch.chdir(tmp_path)
+    with Companions([["record", "x.mcap", "--nonsense"]]) as companions:
+        companions.start(SwarmAddress("tcp/127.0.0.1:1", "s"), catalog.find("quick"))
+        for running in companions._running:
+            assert running.wait(60) == 2
+    assert "--nonsense" in capfd.readouterr().err

@@ -4,6 +4,7 @@ Time goes forward by feeding records; every `_EVERY_NS` the state is kept, so th
 """
 
 import pickle
+import struct
 from array import array
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
@@ -166,7 +167,7 @@ def _recorded(folder: Path, epoch_ns: int, scenario: Scenario) -> tuple[list[Lin
                         links.append(_stats(t_ns, round(one.span_s * S), rows))
                     elif one.name in names:
                         told.append(_Report(t_ns, one.name, _content(one.json, source=f"{path}: report of {one.name}")))
-        except (McapError, DecodeError, OSError, ValueError, OverflowError) as error:
+        except (McapError, DecodeError, OSError, ValueError, OverflowError, struct.error) as error:
             if isinstance(error, ConfigError):
                 raise
             raise ConfigError(f"{path}: cannot be read: {str(error)[:200]}") from error

@@ -8,12 +8,14 @@ import pytest
 
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import Poses
+from fanet_mw.errors import ConfigError
 from fanet_mw.trace import Record
 from fanet_mw.units import Enu, S
 from sim.cli.app import app
 from sim.observation.observer import Observer
 from sim.observation.swarm_state import SwarmState
 from sim.observation.timeline import Timeline
+from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 
@@ -87,3 +89,12 @@ def test_what_is_replayed_is_what_was_observed(name: str, tmp_path: Path) -> Non
             assert replayed[what] == value, f"{what} at {second} s"
     assert any(witness.seen[SECONDS[-1] * S]["turns"]), "somebody has a turn"
     assert witness.seen[SECONDS[-1] * S]["air"][1], "the air is busy"
+
+
+@pytest.mark.parametrize("content", [b"", b"hi", b"no recording" * 10, b"\x89MCAP0\r\n"])
+def test_what_is_no_recording_beside_a_run_is_named(tmp_path: Path, content: bytes) -> None:
+    keys = ["duration_s=2", "warmup_s=0", "drain_s=0", "mission.survivors=0"]
+    finish(simulate(catalog.find("quick", keys)), out=tmp_path / "run")
+    (tmp_path / "run" / "other.mcap").write_bytes(content)
+    with pytest.raises(ConfigError, match=r"other\.mcap: cannot be read: "):
+        Timeline(tmp_path / "run")

@@ -39,6 +39,8 @@ def parse(text: str, *, source: str, name: str, overrides: Iterable[str] = (), f
     tree.setdefault("name", name)
     if folder is not None:
         _from_folder(tree, folder)
+    if isinstance(overrides, str) or not isinstance(overrides, Iterable):
+        raise ConfigError(f"overrides = {overrides!r}: must be a sequence of KEY=VALUE, not one text")
     for override in overrides:
         apply_override(tree, override)
     return build(tree, source=source)

@@ -13,7 +13,7 @@ from fanet_mw.errors import ConfigError
 
 def apply_override(tree: dict[str, Any], override: str) -> None:
     """Set one dotted key; the value is TOML, or otherwise taken as a string."""
-    key, equals, text = override.partition("=")
+    key, equals, text = str(override).partition("=")
     key = key.strip()
     if not equals or not key:
         raise ConfigError(f"--set {override!r}: must be KEY=VALUE, for example nodes.count=10")

@@ -18,8 +18,6 @@ OfUser = Callable[[int], Sequence[Application]] | Mapping[int, Sequence[Applicat
 
 def scenario_of(given: Scenario | str | Path, *, seed: int | None = None, overrides: Sequence[str] = ()) -> Scenario:
     """The scenario that a program has named, with another seed and other values (`KEY=VALUE`); raises ConfigError."""
-    if isinstance(overrides, str):
-        raise ConfigError(f"overrides = {overrides!r}: must be a sequence of KEY=VALUE, not one text")
     if not isinstance(given, Scenario):
         return catalog.find(given, overrides if seed is None else [*overrides, f"seed={seed}"])
     if overrides:
@@ -37,10 +35,16 @@ def by_node(applications: object, scenario: Scenario) -> Callable[[int], Sequenc
         kind = type(applications).__name__
         raise ConfigError(f"applications must be a mapping by node, or be called with a node's id, not a {kind}")
 
+    aboard: dict[int, tuple[Application, int]] = {}  # which keeps them, so that no other object gets the same id
+
     def checked(node: int) -> Sequence[Application]:
         made = applications.get(node, ()) if isinstance(applications, Mapping) else applications(node)
         if not isinstance(made, Sequence) or not all(isinstance(one, Application) for one in made):
             raise ConfigError(f"applications of node {node} = {made!r}: must be a sequence of Application objects")
+        for one in made:
+            other = aboard.setdefault(id(one), (one, node))[1]
+            if other != node:
+                raise ConfigError(f"applications of node {node}: {one.name!r} is that of node {other}, must be its own")
         return made
 
     return checked
@@ -50,4 +54,4 @@ def known_nodes(what: str, nodes: Collection[int], scenario: Scenario) -> None:
     """Raise ConfigError for a node that the scenario does not have."""
     for node in nodes:
         if node not in scenario.node_ids:
-            raise ConfigError(f"{what}: node {node} must be in [1, {scenario.last_id}]")
+            raise ConfigError(f"{what}: node {node!r} must be in [1, {scenario.last_id}]")

@@ -20,6 +20,8 @@ def find(name: str | Path, overrides: Iterable[str] = ()) -> Scenario:
 
     `overrides` are `KEY=VALUE`. Raises ConfigError with all mistakes.
     """
+    if not isinstance(name, str | Path):
+        raise ConfigError(f"scenario = {name!r}: must be a Scenario, the name of a shipped one, or a file")
     if isinstance(name, Path) or _is_file(name):
         return _searchable(config.load(Path(name), overrides), str(name))
     source = f"scenario {name}"

@@ -186,13 +186,29 @@ def test_a_simulation_gives_its_summary_its_trace_in_columns_and_its_deliveries(
         ({"applications": lambda _: fanet_mw.Application()}, r"of node 1 = .* must be a sequence of Application"),
         ({"applications": lambda _: [fanet_mw.Application]}, r"of node 1 = .* must be a sequence of Application"),
         ({"applications": {10: ()}}, r"applications: node 10 must be in \[1, nodes.count = 9\]"),
+        ({"applications": {"1": ()}}, r"applications: node '1' must be in \[1, nodes.count = 9\]"),
+        ({"applications": {1: (one := [Beacon()]), 2: one}}, "of node 2: 'beacon' is that of node 1, must be its own"),
         ({"overrides": "duration_s=5"}, "must be a sequence of KEY=VALUE, not one text"),
+        ({"overrides": 5}, "overrides = 5: must be a sequence of KEY=VALUE"),
+        ({"overrides": [5]}, "--set 5: must be KEY=VALUE"),
         ({"seed": -1}, "seed = -1: input should be greater than or equal to 0"),
     ],
 )
 def test_what_cannot_be_simulated_is_said_with_its_value(options: dict[str, Any], said: str) -> None:
     with pytest.raises(fanet_mw.ConfigError, match=said):
         fanet_mw.simulate("quick", **options)
+
+
+@pytest.mark.parametrize("given", [None, 5, b"quick", {"duration_s": 5}, ["quick"]])
+def test_what_is_no_scenario_is_said_with_its_value(given: Any) -> None:
+    for take in (fanet_mw.simulate, fanet_mw.load_scenario, fanet_mw.VirtualSwarm):
+        with pytest.raises(fanet_mw.ConfigError, match=re.escape(f"scenario = {given!r}: must be a Scen")):
+            take(given)
+
+
+def test_overrides_of_a_loaded_scenario_are_a_sequence() -> None:
+    with pytest.raises(fanet_mw.ConfigError, match="overrides = 'seed=3': must be a sequence of KEY=VALUE"):
+        fanet_mw.load_scenario("quick", "seed=3")
 
 
 def test_another_seed_is_that_of_the_scenario_built_or_named() -> None:

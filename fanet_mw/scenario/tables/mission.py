@@ -2,7 +2,7 @@
 
 from typing import Annotated, Final, Literal, Self
 
-from pydantic import AfterValidator, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from fanet_mw.scenario.tables.sections import (
     Coordinate,
@@ -30,10 +30,10 @@ class Mission(Section):
     """Number of survivors, at random places drawn by the seed."""
     survivor_positions_m: tuple[tuple[Coordinate, Coordinate], ...] = ()
     """East and north of each survivor; empty: random places."""
-    survivors_at: Annotated[str, AfterValidator(read_with_file)] = ""
+    survivors_at: Annotated[str, read_with_file("mission.survivors_at")] = ""
     """A file with a point for each survivor (.kml, .kmz, .geojson, .plan, .waypoints), read with the scenario; its path
     is relative to the scenario file's folder."""
-    area: Annotated[str, AfterValidator(read_with_file)] = ""
+    area: Annotated[str, read_with_file("mission.area")] = ""
     """A file with the area to search (.plan, .kml, .kmz, .geojson, .waypoints), read with the scenario:
     `world.origin_deg` is the middle of its polygons and `world.area_m` the least square around them, unless those keys
     are there."""

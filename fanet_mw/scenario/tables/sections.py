@@ -12,7 +12,7 @@ from functools import cache
 from itertools import pairwise
 from typing import Annotated, Any, Final, Literal, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from fanet_mw.units import MAX_NODES
@@ -100,8 +100,12 @@ def _types(annotation: object) -> set[object]:
     return found.union(*map(_types, get_args(annotation)))
 
 
-def read_with_file(path: str) -> str:
+def read_with_file(key: str) -> AfterValidator:
     """Refuse a file that is read with the scenario and was not, because there is no scenario file that names it."""
-    if path:
-        raise ValueError(f"{path!r}: is read with a scenario file only")
-    return path
+
+    def refuse(path: str) -> str:
+        if path:
+            raise ValueError(f"{key} = {path!r}: is read with a scenario file only")
+        return path
+
+    return AfterValidator(refuse)

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Final, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from fanet_mw.scenario.named_files import digest_of, middle_deg
 from fanet_mw.scenario.tables.sections import Coordinate, Section, SomeLength, read_with_file
@@ -90,7 +90,7 @@ class World(Section):
     of an ASCII grid in degrees, or else Seoul."""
     no_fly_m: tuple[tuple[Coordinate, Coordinate, SomeLength], ...] = ()
     """No-fly areas, each as [east, north, radius]; the world counts entries."""
-    no_fly: Annotated[str, AfterValidator(read_with_file)] = ""
+    no_fly: Annotated[str, read_with_file("world.no_fly")] = ""
     """A file with further ones (.plan, .kml, .kmz, .geojson): circles, and a circle around each polygon. It is read
     with the scenario, and its path is relative to the scenario file's folder."""
     gps_hz: Annotated[float, Field(ge=1e-6, le=1000)] = 5.0

@@ -158,7 +158,7 @@ def test_what_needs_an_origin_says_so_and_what_is_not_there_is_named(files: Path
         scenario(files, '[mission]\nsurvivors_at = "people.kml"')
     with pytest.raises(ConfigError, match=r"nowhere.kml"):
         scenario(files, '[mission]\narea = "nowhere.kml"')
-    with pytest.raises(ConfigError, match="is read with a scenario file only"):
+    with pytest.raises(ConfigError, match=r"mission\.area = .*: is read with a scenario file only"):
         config.build({"mission": {"area": "area.kml"}})
     with pytest.raises(ConfigError, match="no area to stay out of"):
         scenario(files, '[mission]\narea = "area.kml"\n[world]\nno_fly = "people.kml"')

@@ -49,7 +49,7 @@ def test_a_take_off_without_a_height_climbs_to_the_parameters() -> None:
     assert bench.courses[-1].position.up == 12.5
 
 
-@pytest.mark.parametrize("place", [(999.0, 0.0, 20.0), (0.0, -181.0, 20.0), (math.inf, 0.0, 20.0), (0.0, 0.0, math.inf)])
+@pytest.mark.parametrize("place", [(999.0, 0, 20), (0, -181.0, 20), (math.inf, 0, 20), (0, 0, math.inf)])
 @pytest.mark.parametrize("number", [TAKEOFF, REPOSITION])
 def test_a_command_to_no_place_on_earth_is_denied_not_carried_out_elsewhere(
     number: int, place: tuple[float, float, float]

@@ -1,10 +1,13 @@
 """Which applications on board are called for each input: those that implement its method, or asked for its port."""
 
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple, Self
+from typing import Final, NamedTuple, Self
 
 from fanet_mw.application import ANY, Application
+from fanet_mw.errors import LocalProtocolError
 from fanet_mw.wire import CHUNK
+
+_LAST_PORT: Final = 0xFFFF
 
 
 class Callbacks(NamedTuple):
@@ -42,6 +45,10 @@ class Listeners:
             for message_id in application.listens if application.listens != ANY else ():
                 self._to_message.setdefault(message_id, []).append(application)
             for port in application.ports if application.ports != ANY else ():
+                if not (isinstance(port, int) and 1 <= port <= _LAST_PORT):
+                    raise LocalProtocolError(
+                        f"application {application.name!r}: ports has {port!r}, must be numbers in [1, {_LAST_PORT}]"
+                    )
                 self._to_port.setdefault(port, []).append(application)
 
     def of_message(self, message_id: int) -> Sequence[Application]:

@@ -17,9 +17,11 @@ from agents.listeners import Callbacks, Listeners
 from agents.messenger import Messenger
 from agents.submission import Sending, Submission, positive, priority_of
 from fanet_mw import wire
+from fanet_mw.actor import require_instant
 from fanet_mw.application import Application, Course, Destination, Received
 from fanet_mw.bus.messages import Gps, SensorReading
 from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
+from fanet_mw.extensions import report_of
 from fanet_mw.node.node import Node
 from fanet_mw.node.packet import Packet
 from fanet_mw.rng import stream
@@ -88,7 +90,7 @@ class Onboard:
     def report(self, names: Iterable[str]) -> Mapping[str, Any]:
         """The reports of these applications by name, without empty ones."""
         wanted = set(names)
-        found = {a.name: dict(a.report()) for a in self._applications if a.name in wanted}
+        found = {a.name: report_of(a) for a in self._applications if a.name in wanted}
         return {name: report for name, report in found.items() if report}
 
     # --- input ----------------------------------------------------------------------------------------------------
@@ -170,6 +172,8 @@ class Onboard:
         first_ns = self._messenger.next_wake_ns()
         for timed in self._callbacks.next_wake_ns:
             wake_ns = timed.next_wake_ns()
+            if wake_ns is not None and wake_ns.__class__ is not int:  # NaN would be lost among the others
+                require_instant(wake_ns, who=f"application {timed.name!r} of node {self.node.node}")
             if wake_ns is not None and (first_ns is None or wake_ns < first_ns):
                 first_ns = wake_ns
         return first_ns

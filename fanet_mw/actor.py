@@ -15,9 +15,11 @@ lists by lists of its own before `start`; the actor only appends to them, and on
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping
+from numbers import Integral
 from typing import Any
 
 from fanet_mw.bus.messages import Message
+from fanet_mw.errors import LocalProtocolError
 from fanet_mw.trace import Record
 
 
@@ -66,3 +68,9 @@ class Actor(ABC):
     def report(self) -> Mapping[str, Any]:
         """Counters as JSON values, cumulative since `start`. May be called at any time."""
         return {}
+
+
+def require_instant(wake_ns: object, *, who: str) -> None:
+    """Raise LocalProtocolError for a wake-up at what is no whole number of nanoseconds."""
+    if not isinstance(wake_ns, Integral):
+        raise LocalProtocolError(f"{who}: next_wake_ns() = {wake_ns!r} must be a whole number of ns, or None")

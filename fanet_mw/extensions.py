@@ -14,6 +14,7 @@ import difflib
 import hashlib
 import inspect
 import json
+import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
@@ -174,6 +175,33 @@ def _methods(key: str) -> str:
 
 def _imports(info: ValidationInfo) -> bool:
     return info.context is None or info.context.get("imports", True) is True
+
+
+def report_of(part: Any) -> dict[str, Any]:  # noqa: ANN401  (an application or a protocol)
+    """The counters of a part. Those of another package are told in values of JSON, numbers that are none and whatever
+    else as text, so that no run is lost for its last report.
+    """
+    report = part.report()
+    if type(part).__module__.partition(".")[0] in _OURS:
+        return dict(report)
+    told = _plain(report)
+    return told if isinstance(told, dict) else {} if told is None else {"report": told}
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401
+    if isinstance(value, Mapping):
+        return {str(key): _plain(held) for key, held in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(held) for held in value]
+    if isinstance(value, set | frozenset):
+        return sorted((_plain(held) for held in value), key=str)
+    if hasattr(value, "tolist"):  # of numpy
+        return _plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else str(value)
+    if isinstance(value, int):
+        return value if -(2**63) <= value < 2**63 else str(value)
+    return value if value is None or isinstance(value, str) else str(value)
 
 
 class PartName:

@@ -4,6 +4,7 @@ Nothing here is compiled: pages and results of runs ask for a reach without load
 """
 
 import math
+from numbers import Real
 from typing import Final, Protocol
 
 import numpy as np
@@ -21,6 +22,7 @@ from emulator.channel.path_loss import (
     uma_av_db,
 )
 from emulator.kernel.state import Reals
+from fanet_mw.errors import LocalProtocolError
 from fanet_mw.extensions import load
 from fanet_mw.scenario.tables.radio import CHANNELS, UMA_ANTENNA_M, Radio, default_sensitivity_dbm, noise_dbm
 
@@ -86,7 +88,12 @@ def heard_m(radio: Radio) -> float:
 
 def _distance_m(radio: Radio, budget_db: float) -> float:
     if radio.channel not in CHANNELS:
-        return _foreign(radio).reach_m(budget_db)
+        reach: object = _foreign(radio).reach_m(budget_db)
+        if not (isinstance(reach, Real) and float(reach) > 0):
+            raise LocalProtocolError(
+                f"radio.channel = {radio.channel!r}: reach_m({budget_db:g}) = {reach!r} must be > 0"
+            )
+        return float(reach)
     at_1_m = float(friis_db(np.ones(1), frequency_mhz=radio.frequency_mhz)[0])
     laws = {
         "log_distance": [(radio.reference_loss_db, radio.exponent)],
@@ -109,7 +116,7 @@ def received_dbm(distance_m: Reals, from_m: Reals, to_m: Reals, radio: Radio) ->
 
 def _loss_db(distance_m: Reals, from_m: Reals, to_m: Reals, radio: Radio) -> Reals:
     if radio.channel not in CHANNELS:
-        return _foreign(radio).loss_db(distance_m, from_m, to_m)
+        return _checked(_foreign(radio).loss_db(distance_m, from_m, to_m), len(distance_m), radio)
     mhz = radio.frequency_mhz
     if radio.channel == "log_distance":
         return log_distance_db(distance_m, reference_db=radio.reference_loss_db, exponent=radio.exponent)
@@ -145,6 +152,17 @@ class Channel(Protocol):
     def reach_m(self, budget_db: float) -> float:
         """A distance beyond which each link loses more than `budget_db`."""
         ...
+
+
+def _checked(loss_db: object, count: int, radio: Radio) -> Reals:
+    """The losses that a channel of another package has computed; NaN would be silence that nobody notices."""
+    found = np.asarray(math.nan if loss_db is None else loss_db, dtype=np.float64)
+    if found.shape not in ((), (count,)) or np.isnan(found).any():
+        raise LocalProtocolError(
+            f"radio.channel = {radio.channel!r}: loss_db() must give a number for each of {count} links, "
+            f"not {' '.join(repr(loss_db).split()):.120}"
+        )
+    return found
 
 
 def _foreign(radio: Radio) -> Channel:

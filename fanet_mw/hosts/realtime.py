@@ -16,7 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from fanet_mw.actor import Actor
+from fanet_mw.actor import Actor, require_instant
 from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import Message, Reception, Report, TraceBatch
 from fanet_mw.bus.topics import Topics
@@ -255,6 +255,7 @@ class RealtimeHost:
             self._wake_up = None
         if wake_ns is None:
             return
+        require_instant(wake_ns, who=self._actor.name)
         assert self._clock is not None, "the clock is running"
         self._lateness.asked(wake_ns, call_ns=self._call_ns)
         due_ns = max(wake_ns + self._actor.slack_ns, self._call_ns)

@@ -9,7 +9,7 @@ import heapq
 from collections.abc import Callable, Iterable, Sequence
 from typing import Final
 
-from fanet_mw.actor import Actor
+from fanet_mw.actor import Actor, require_instant
 from fanet_mw.bus.messages import Message
 from fanet_mw.errors import LocalProtocolError
 from fanet_mw.trace import Record
@@ -83,6 +83,7 @@ class VirtualHost:
             actor.start(self.now_ns)
             wake_ns = actor.next_wake_ns()
             if wake_ns is not None:
+                require_instant(wake_ns, who=actor.name)
                 self._seq += 1
                 self._armed[index] = wake_ns = max(wake_ns, self.now_ns)
                 heapq.heappush(self._heap, (wake_ns, self._seq, index))
@@ -174,6 +175,8 @@ class VirtualHost:
                     if wake_ns != armed[index]:
                         armed[index] = wake_ns
                         if wake_ns is not None:
+                            if wake_ns.__class__ is not int:  # NaN would break the order of the heap
+                                require_instant(wake_ns, who=self._actors[index].name)
                             seq += 1
                             if latest is not None:
                                 push(heap, latest)

@@ -14,6 +14,7 @@ from typing import Final, NamedTuple
 from fanet_mw import wire
 from fanet_mw.bus.messages import Reception, TxStatus
 from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
+from fanet_mw.extensions import report_of
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.duplicates import DELIVERED, DuplicateSet
 from fanet_mw.node.header_check import HeaderCheck
@@ -320,7 +321,7 @@ class Node:
             "receptions": self.receptions,
             "dropped": self._drops(),
             **_LEADERLESS,
-            **self._protocol.report(),
+            **report_of(self._protocol),
         }
 
     def _drops(self) -> dict[str, int]:

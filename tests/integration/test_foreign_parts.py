@@ -8,7 +8,7 @@ import pytest
 from installed import Installed
 
 from fanet_mw import extensions
-from fanet_mw.errors import ConfigError
+from fanet_mw.errors import ConfigError, LocalProtocolError
 from fanet_mw.extensions import Options
 from fanet_mw.scenario import config
 from sim.results.files import finish
@@ -129,3 +129,59 @@ def test_a_scenario_with_options_is_a_key_of_a_cache_and_goes_to_other_processes
     assert pickle.loads(pickle.dumps(options)) == options
     with pytest.raises(TypeError, match="options do not change"):
         options["fanout"] = 4
+
+
+PARTS = """
+import math
+import numpy as np
+class Still:
+    def __init__(self, starts, scenario): self.starts = starts
+    def track(self, t_s): return self.starts, self.starts * 0
+class Lost(Still):
+    def track(self, t_s): return self.starts * math.nan, self.starts * 0
+class Few(Still):
+    def track(self, t_s): return self.starts[:1], self.starts[:1]
+class Nowhere(Still):
+    def track(self, t_s): return None
+class Loss:
+    def __init__(self, radio): pass
+    def loss_db(self, distance_m, from_m, to_m): return 40 + 30 * np.log10(np.maximum(distance_m, 1))
+    def reach_m(self, budget_db): return np.float32(1000)
+class Unknown(Loss):
+    def loss_db(self, distance_m, from_m, to_m): return distance_m * math.nan
+class TwoLosses(Loss):
+    def loss_db(self, distance_m, from_m, to_m): return np.zeros(2)
+class Endless(Loss):
+    def reach_m(self, budget_db): return math.nan
+"""
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("mobility.model=parts:Still", ""),
+        (
+            "mobility.model=parts:Lost",
+            "'parts:Lost': track(0) must give the places and the velocities of 9 UAVs, three",
+        ),
+        ("mobility.model=parts:Few", "'parts:Few': track(0) must give the places"),
+        ("mobility.model=parts:Nowhere", "three finite numbers each, not None"),
+        ("radio.channel=parts:Loss", ""),
+        ("radio.channel=parts:Unknown", "'parts:Unknown': loss_db() must give a number for each of 72 links, not"),
+        ("radio.channel=parts:TwoLosses", "'parts:TwoLosses': loss_db() must give a number for each of "),
+        ("radio.channel=parts:Endless", "reach_m(131) = nan must be > 0"),
+    ],
+)
+def test_what_a_part_computes_is_checked_where_it_enters(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change: str, said: str
+) -> None:
+    (tmp_path / "parts.py").write_text(PARTS)
+    monkeypatch.syspath_prepend(tmp_path)
+    scenario = catalog.find("quick", ["duration_s=3", "warmup_s=0", "drain_s=1", "mission.survivors=0", change])
+    if not said:
+        assert simulate(scenario).ended_ns is None
+        return
+    with pytest.raises(LocalProtocolError) as caught:
+        simulate(scenario)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)

@@ -13,6 +13,7 @@ from typing import Final, NamedTuple, assert_never
 import numpy as np
 
 from fanet_mw.bus.messages import VELOCITY_LASTS_NS, Setpoint, SetpointKind
+from fanet_mw.errors import LocalProtocolError
 from fanet_mw.extensions import load
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.mobility import MOBILITY_MODELS
@@ -114,7 +115,7 @@ class Guidance:
             else RandomWaypoint(starts, scenario) if model == "random_waypoint"
             else Crossing(starts, scenario) if model == "crossing"
             else None if model in MOBILITY_MODELS
-            else load("mobility.model", model)(starts.copy(), scenario)
+            else _Foreign(model, load("mobility.model", model)(starts.copy(), scenario), starts)
         )  # fmt: skip
         self._commands: dict[int, _Command] = {}
         """The command of each row, the newest command last; a row without a command follows the mobility model."""
@@ -317,3 +318,25 @@ class Guidance:
         for row in [row for row in self._grounded if height[row] > CLEAR_M]:
             self._grounded.discard(row)
         wish[self._waiting()] = 0.0
+
+
+class _Foreign:
+    """A mobility model of another package, whose tracks are checked: nobody flies to what is no place."""
+
+    def __init__(self, name: str, model: MobilityModel, starts: Rows) -> None:
+        self._name, self._model, self._shape = name, model, starts.shape
+
+    def track(self, t_s: float) -> Track:
+        track = self._model.track(t_s)
+        try:
+            places, velocities = (np.array(rows, dtype=np.float64) for rows in track)
+        except (TypeError, ValueError):
+            known = False
+        else:
+            known = all(rows.shape == self._shape and np.isfinite(rows).all() for rows in (places, velocities))
+        if not known:
+            raise LocalProtocolError(
+                f"mobility.model = {self._name!r}: track({t_s:g}) must give the places and the velocities of "
+                f"{self._shape[0]} UAVs, three finite numbers each, not {' '.join(repr(track).split()):.120}"
+            )
+        return Track(places, velocities)

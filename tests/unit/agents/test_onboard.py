@@ -1,8 +1,11 @@
 """Applications of a user beside the scenario's on one UAV, hand-driven: who is given what, and what becomes of it."""
 
+import json
+import math
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 from pymavlink.dialects.v20 import common
 
@@ -127,6 +130,22 @@ def test_each_is_woken_at_its_own_instant(make_scenario: MakeScenario) -> None:
     assert made.next_wake_ns() is None
 
 
+@pytest.mark.parametrize("wake_ns", [math.nan, 1e9])
+def test_an_instant_that_is_no_whole_number_is_the_mistake_of_an_application_and_does_not_go_under(
+    make_scenario: MakeScenario, wake_ns: float
+) -> None:
+    with pytest.raises(LocalProtocolError, match=r"application 'b' of node 2: next_wake_ns\(\) = .* must be a whole"):
+        uav(make_scenario, Diary("a", wake_ns=300 * MS), Diary("b", wake_ns=wake_ns))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("ports", ["5", (0,), (70_000,), (5.0,)])
+def test_ports_at_which_nothing_could_arrive_are_refused(make_scenario: MakeScenario, ports: Any) -> None:
+    diary = Diary("a")
+    diary.ports = ports
+    with pytest.raises(LocalProtocolError, match=r"application 'a': ports has .*, must be numbers in \[1, 65535\]"):
+        uav(make_scenario, diary)
+
+
 def test_an_instant_that_an_input_brings_nearer_is_heeded(make_scenario: MakeScenario) -> None:
     class Hasty(Diary):
         def on_message(self, message: Received, now_ns: int) -> None:
@@ -207,6 +226,27 @@ def test_a_report_has_what_a_users_applications_say(make_scenario: MakeScenario)
 
 
 # --- messages to ports, and what becomes of them ---------------------------------------------------------------------
+
+
+def test_a_report_with_values_that_json_does_not_know_is_told_as_far_as_it_does(make_scenario: MakeScenario) -> None:
+    class Odd(Diary):
+        def report(self) -> Any:
+            return {
+                "nan": math.nan,
+                "set": {2, 1},
+                "np": np.int64(3),
+                "rows": np.eye(2),
+                7: {"far": 2**70, "none": None},
+            }
+
+    class Silent(Diary):
+        def report(self) -> Any:
+            return None
+
+    told = uav(make_scenario, Odd("odd"), Silent("silent")).report()["applications"]
+    far = {"far": str(2**70), "none": None}
+    assert told == {"odd": {"nan": "nan", "set": [1, 2], "np": 3, "rows": [[1.0, 0.0], [0.0, 1.0]], "7": far}}
+    assert json.loads(json.dumps(told, allow_nan=False)) == told
 
 
 class Post(Application):

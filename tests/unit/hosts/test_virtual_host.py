@@ -1,5 +1,7 @@
 """Virtual time: order, ties and determinism."""
 
+import math
+
 import pytest
 
 from fanet_mw.actor import Actor
@@ -182,3 +184,22 @@ def test_wake_ups_that_do_not_move_time_are_counted_at_one_instant_and_not_over_
     host.start()
     host.run(30 * MS)
     assert len(busy.log) == 1 + 20 * 6_000
+
+
+@pytest.mark.parametrize("wake_ns", [math.nan, math.inf, 1e9])
+@pytest.mark.parametrize("at_start", [True, False])
+def test_a_wake_up_at_no_instant_is_refused_before_it_breaks_the_order_of_others(
+    wake_ns: float, *, at_start: bool
+) -> None:
+    class Odd(Script):
+        def next_wake_ns(self) -> int | None:
+            return wake_ns if at_start or len(self.log) > 1 else MS  # type: ignore[return-value]
+
+    host = VirtualHost([Odd("odd", []), Script("other", [2 * MS])])
+
+    def live() -> None:
+        host.start()
+        host.run(3 * MS)
+
+    with pytest.raises(LocalProtocolError, match=r"odd: next_wake_ns\(\) = .* must be a whole number of ns"):
+        live()

@@ -135,7 +135,9 @@ class ConnectivityMaintenance:
         return unheard
 
     def _lasting(self, plan: Search, pattern: Pattern, place: int, now_ns: int) -> dict[NodeId, Motion]:
-        """Neighbors whose links to this UAV last; not one with whom a third has strong links to both, each shorter."""
+        """Neighbors whose places are in reach of this UAV's; not one with whom a third has strong links to both, each
+        shorter. A link stretched on the way is drawn in again: given up there, it would be when it matters most.
+        """
         swept_s, place_of = self._formation.swept_s(now_ns) or 0.0, {node: at for at, node in enumerate(plan.nodes)}
         present = {node: motion for node, motion in self._present(now_ns).items() if node in place_of}
         here = (self._own_motion.position, pattern.at(place, swept_s))
@@ -143,7 +145,7 @@ class ConnectivityMaintenance:
             node: (motion.position_at(now_ns), pattern.at(place_of[node], swept_s)) for node, motion in present.items()
         }
         links_m = {node: _longest_m(here, there) for node, there in ends.items()}
-        lasting = [node for node, link_m in links_m.items() if link_m <= LASTING * self._reach_m]
+        lasting = [node for node, at in ends.items() if at[1].minus(here[1]).horizontal() <= LASTING * self._reach_m]
 
         def is_spared(node: NodeId) -> bool:
             most_m = min(links_m[node], _STRONG * self._reach_m)

@@ -82,6 +82,20 @@ def test_on_the_way_a_uav_needs_no_tie_to_whom_a_third_one_has_strong_links(asid
     assert len(tied.planes(now_ns)) == ties
 
 
+@pytest.mark.parametrize("apart_m", [230.0, 244.0, 252.0])
+def test_on_the_way_a_link_that_was_stretched_is_drawn_in_again_and_not_given_up(apart_m: float) -> None:
+    """One of two whose places are near each other has gone aside: as long as the other one is known, both come back."""
+    now_ns = 30 * S
+    board = Board(LINE, Enu(0, 0, UP_M))
+    board.neighbors.on_hello(LINE + 1, Motion(Enu(apart_m, 0, UP_M), STILL, now_ns))
+    board.neighbors.on_hello(30, Motion(Enu(0, -150.0, UP_M), STILL, now_ns))  # of the other line
+    board.neighbors.on_hello(LINE - 1, Motion(Enu(-150.0, 0, UP_M), STILL, now_ns))
+    tied = ConnectivityMaintenance(
+        board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
+    )
+    assert sorted(plane.east for plane in tied.planes(now_ns)) == [-1.0, 1.0]
+
+
 def test_who_hears_nobody_to_whom_it_is_tied_stays_with_the_nearest() -> None:
     now_ns = TAKEN_UP_NS + 40 * S
     here = lane_of(LINE, now_ns)

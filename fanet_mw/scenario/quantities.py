@@ -44,7 +44,7 @@ _SUFFIXES: Final[Mapping[str, tuple[str, Mapping[str, str]]]] = {
     "_c": ("°C", {"C": "1", "°C": "1"}),
 }
 """The unit of each ending of a key's name, the longest first, and factors of units of the same dimension."""
-_QUANTITY: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([a-zA-Z\u03bc°][a-zA-Z\u03bc°/0-9]*)")
+_QUANTITY: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?+)\s*([a-zA-Z\u03bc°][a-zA-Z\u03bc°/0-9]*)")
 
 
 _NO_UNIT: Final = frozenset({"nakagami_m"})

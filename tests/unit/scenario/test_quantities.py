@@ -16,11 +16,17 @@ def scenario(*overrides: str, text: str = "") -> Scenario:
     return config.parse(text, source="a.toml", name="a", overrides=overrides)
 
 
+def test_an_exponent_is_no_unit() -> None:
+    assert in_unit_of("duration_s", "1e1") is None
+    assert scenario('duration_s="3e1"').duration_s == 30.0
+
+
 @pytest.mark.parametrize(
     ("key", "text", "value"),
     [
         ("duration_s", "2 min", 120.0),
         ("duration_s", "90s", 90.0),
+        ("duration_s", "9e1 s", 90.0),
         ("lead_ms", "0.06s", 60.0),
         ("lead_ms", "250 us", 0.25),
         ("area_m", "2.5km", 2500.0),

@@ -8,6 +8,7 @@ and records it. What befalls a UAV (`Mishap`) the world or its host brings about
 """
 
 import math
+from collections.abc import Iterator
 from enum import IntEnum
 from typing import Final, NamedTuple, assert_never
 
@@ -158,26 +159,39 @@ def wrong(fault: Fault, *, count: int) -> str | None:
         return "fault_label"
     if any(not 1 <= node <= count for node in nodes_of(fault)):
         return "fault_unknown_node"
-    if not 0 <= fault.for_ns <= MAX_FOR_NS:
-        return "fault_value"
+    return "fault_value" if out_of_bounds(fault) else None
+
+
+def out_of_bounds(fault: Fault) -> str | None:
+    """A sentence on a value of a fault that is out of its bounds; None when all are within."""
+    return next((sentence for holds, sentence in _rules(fault) if not holds), None)
+
+
+def _rules(fault: Fault) -> Iterator[tuple[bool, str]]:
+    """What must hold for the values of a fault, as sentences that name the value and its bound."""
+    yield _within("for_s", fault.for_ns / S, 0, MAX_FOR_NS / S)
     if isinstance(fault, Degrade):
-        a_link = fault.src != fault.dst or fault.src == EVERY
-        fine = 0 <= fault.loss_db <= MAX_LOSS_DB and 0 <= fault.loss_share <= 1 and a_link
+        yield fault.src != fault.dst or fault.src == EVERY, "a link has two different ends"
+        yield _within("loss_db", fault.loss_db, 0, MAX_LOSS_DB)
+        yield _within("loss_share", fault.loss_share, 0, 1)
     elif isinstance(fault, Jam):
-        noise_dbm = fault.noise_dbm
-        fine = (
-            0 < fault.radius_m <= MAX_RADIUS_M
-            and all(abs(value) <= MAX_RADIUS_M for value in fault.center)
-            and (-MAX_LOSS_DB <= noise_dbm <= MAX_NOISE_DBM or noise_dbm == math.inf)
-        )
-    elif isinstance(fault, Partition):
-        east, north, other_east, other_north = fault.line_m
-        fine = bool(fault.group) or (
-            all(abs(value) <= MAX_RADIUS_M for value in fault.line_m) and (east, north) != (other_east, other_north)
-        )
+        yield fault.radius_m > 0, f"radius_m = {fault.radius_m:g} must be > 0"
+        for name, value in (("radius_m", fault.radius_m), *fault.center._asdict().items()):
+            yield _within(name, value, -MAX_RADIUS_M, MAX_RADIUS_M)
+        if fault.noise_dbm != math.inf:
+            yield _within("noise_dbm", fault.noise_dbm, -MAX_LOSS_DB, MAX_NOISE_DBM)
+    elif isinstance(fault, Partition) and not fault.group:
+        for value in fault.line_m:
+            yield _within("line_m", value, -MAX_RADIUS_M, MAX_RADIUS_M)
+        yield fault.line_m[:2] != fault.line_m[2:], "a line goes through two different points"
     elif isinstance(fault, Mishap):
-        share = fault.what is not MishapKind.BATTERY or 0 <= fault.value.east <= 1
-        fine = share and all(abs(value) <= MAX_RADIUS_M for value in fault.value)
-    else:
-        fine = not (fault.sends and fault.hears)
-    return None if fine else "fault_value"
+        if fault.what is MishapKind.BATTERY:
+            yield _within("charge", fault.value.east, 0, 1)
+        for value in fault.value:
+            yield _within("offset_m", value, -MAX_RADIUS_M, MAX_RADIUS_M)
+    elif isinstance(fault, Cut):
+        yield not (fault.sends and fault.hears), "a radio that sends and receives is not cut"
+
+
+def _within(name: str, value: float, least: float, most: float) -> tuple[bool, str]:
+    return least <= value <= most, f"{name} = {value:g} must be in [{least:g}, {most:g}]"

@@ -8,6 +8,8 @@ from cyclopts import App, Parameter
 
 from fanet_mw.bus.radio_control import (
     JAM_LABEL,
+    MAX_FOR_NS,
+    MAX_LABEL,
     PARTITION_LABEL,
     Control,
     Cut,
@@ -17,9 +19,11 @@ from fanet_mw.bus.radio_control import (
     MishapKind,
     Partition,
     Restore,
+    kind_of,
     link_label,
     node_label,
     nodes_of,
+    out_of_bounds,
     wrong,
 )
 from fanet_mw.errors import ConfigError
@@ -51,6 +55,8 @@ class Life:
 
     @property
     def for_ns(self) -> int:
+        if not 0 <= self.for_s <= MAX_FOR_NS / S:  # also what is no number
+            raise ConfigError(f"--for {self.for_s:g}: must be in [0, {MAX_FOR_NS / S:g}] s")
         return seconds_to_ns(self.for_s)
 
 
@@ -196,14 +202,12 @@ def _do(control: Control, where: SwarmFlags) -> int:
     from sim.bus.operator_commands import change
 
     if not isinstance(control, Restore) and (why := wrong(control, count=MAX_NODES)):
-        kind, what = type(control).__name__.lower(), why.removeprefix("fault_").replace("_", " ")
-        if isinstance(control, Degrade) and control.src == control.dst:
-            raise ConfigError(f"{kind} {control.src} {control.dst}: a link has two different ends")
-        if what == "unknown node":
+        kind = kind_of(control)
+        if why == "fault_unknown_node":
             named = " ".join(map(str, nodes_of(control)))
             raise ConfigError(f"{kind} {named}: the id of a node must be within [1, {MAX_NODES}]")
-        bound = f"node ids from 1 to {MAX_NODES}" if nodes_of(control) else "see `fanet air --help`"
-        raise ConfigError(f"{kind} {control.label}: {what} out of bounds ({bound})")
+        bound = f"a label has 1 to {MAX_LABEL} characters of ASCII" if why == "fault_label" else out_of_bounds(control)
+        raise ConfigError(f"{kind} {control.label}: {bound}")
     console = Console(highlight=False)
     for fault in change(*where.located(), control, zenoh_config=where.zenoh_config):
         console.print(f"{fault.label}: {fault.kind} {'since' if fault.active else 'ended at'} {fault.t_ns / S:.3f} s")

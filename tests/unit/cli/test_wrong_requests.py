@@ -30,9 +30,33 @@ def test_launch_refuses_it_before_it_says_anything_else(capsys: pytest.CaptureFi
 
 
 def test_a_link_from_a_node_to_itself_is_refused_in_words() -> None:
-    assert refusal("air", "degrade", "3", "3", "--loss-db", "3") == "degrade 3 3: a link has two different ends"
+    assert refusal("air", "degrade", "3", "3", "--loss-db", "3") == "degrade link-3-3: a link has two different ends"
     assert refusal("air", "cut", "-1") == "cut -1: the id of a node must be within [1, 65534]"
     assert refusal("air", "degrade", "3", "0") == "degrade 3 0: the id of a node must be within [1, 65534]"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("cut 5 --for nan", "--for nan: must be in [0, 1e+06] s"),
+        ("cut 5 --for inf", "--for inf: must be in [0, 1e+06] s"),
+        ("cut 5 --for -3", "--for -3: must be in [0, 1e+06] s"),
+        ("cut 5 --label \u00fc", "cut \u00fc: a label has 1 to 32 characters of ASCII"),
+        ("degrade 1 2 --loss-share 2", "degrade link-1-2: loss_share = 2 must be in [0, 1]"),
+        ("degrade 1 2 --loss-db nan", "degrade link-1-2: loss_db = nan must be in [0, 300]"),
+        ("jam 0 0 0", "jam jam: radius_m = 0 must be > 0"),
+        ("jam 0 0 nan", "jam jam: radius_m = nan must be > 0"),
+        ("jam 0 0 1e9", "jam jam: radius_m = 1e+09 must be in [-1e+07, 1e+07]"),
+        ("jam nan 0 9", "jam jam: east = nan must be in [-1e+07, 1e+07]"),
+        ("jam 0 0 9 --noise-dbm 101", "jam jam: noise_dbm = 101 must be in [-300, 100]"),
+        ("partition 0 0 0 0", "partition partition: a line goes through two different points"),
+        ("partition 0 0 0 inf", "partition partition: line_m = inf must be in [-1e+07, 1e+07]"),
+        ("battery 3 2", "battery node-3: charge = 2 must be in [0, 1]"),
+        ("gps 3 --offset-m nan 0 0", "gps node-3: offset_m = nan must be in [-1e+07, 1e+07]"),
+    ],
+)
+def test_a_change_of_the_air_beyond_its_bounds_is_refused_with_its_value(words: str, said: str) -> None:
+    assert refusal("air", *words.split()) == said
 
 
 def test_an_instant_beyond_the_end_of_a_run_is_refused(tmp_path: Path) -> None:

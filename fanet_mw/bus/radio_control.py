@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from enum import IntEnum
 from typing import Final, NamedTuple, assert_never
 
+from fanet_mw.errors import ConfigError
 from fanet_mw.units import Enu, NodeId, S
 
 MAX_LABEL: Final = 32
@@ -160,6 +161,17 @@ def wrong(fault: Fault, *, count: int) -> str | None:
     if any(not 1 <= node <= count for node in nodes_of(fault)):
         return "fault_unknown_node"
     return "fault_value" if out_of_bounds(fault) else None
+
+
+def require_valid(fault: Fault, *, count: int) -> None:
+    """Raise ConfigError for a fault that is not valid in a swarm of `count` nodes, with the value and its bound."""
+    why = wrong(fault, count=count)
+    if why == "fault_unknown_node":
+        named = " ".join(map(str, nodes_of(fault)))
+        raise ConfigError(f"{kind_of(fault)} {named}: the id of a node must be within [1, {count}]")
+    if why is not None:
+        said = f"a label has 1 to {MAX_LABEL} characters of ASCII" if why == "fault_label" else out_of_bounds(fault)
+        raise ConfigError(f"{kind_of(fault)} {fault.label}: {said}")
 
 
 def out_of_bounds(fault: Fault) -> str | None:

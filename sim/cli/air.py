@@ -9,7 +9,6 @@ from cyclopts import App, Parameter
 from fanet_mw.bus.radio_control import (
     JAM_LABEL,
     MAX_FOR_NS,
-    MAX_LABEL,
     PARTITION_LABEL,
     Control,
     Cut,
@@ -19,12 +18,9 @@ from fanet_mw.bus.radio_control import (
     MishapKind,
     Partition,
     Restore,
-    kind_of,
     link_label,
     node_label,
-    nodes_of,
-    out_of_bounds,
-    wrong,
+    require_valid,
 )
 from fanet_mw.errors import ConfigError
 from fanet_mw.units import MAX_NODES, STILL, Enu, NodeId, S, seconds_to_ns
@@ -201,13 +197,8 @@ def restore(label: str = "", *, where: SwarmFlags = SwarmFlags()) -> int:
 def _do(control: Control, where: SwarmFlags) -> int:
     from sim.bus.operator_commands import change
 
-    if not isinstance(control, Restore) and (why := wrong(control, count=MAX_NODES)):
-        kind = kind_of(control)
-        if why == "fault_unknown_node":
-            named = " ".join(map(str, nodes_of(control)))
-            raise ConfigError(f"{kind} {named}: the id of a node must be within [1, {MAX_NODES}]")
-        bound = f"a label has 1 to {MAX_LABEL} characters of ASCII" if why == "fault_label" else out_of_bounds(control)
-        raise ConfigError(f"{kind} {control.label}: {bound}")
+    if not isinstance(control, Restore):
+        require_valid(control, count=MAX_NODES)
     console = Console(highlight=False)
     for fault in change(*where.located(), control, zenoh_config=where.zenoh_config):
         console.print(f"{fault.label}: {fault.kind} {'since' if fault.active else 'ended at'} {fault.t_ns / S:.3f} s")

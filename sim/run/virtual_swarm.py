@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import math
 import time
 from collections.abc import AsyncIterator, Callable, Collection, Mapping, Sequence
 from pathlib import Path
@@ -13,7 +14,7 @@ from agents.program.joined import Node
 from agents.program.mailbox import Mailbox
 from agents.uav import NodeState, Uav
 from fanet_mw.application import Application
-from fanet_mw.bus.radio_control import Cut, Degrade, Restore
+from fanet_mw.bus.radio_control import Cut, Degrade, Restore, require_valid
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Delivered
@@ -61,6 +62,8 @@ class _Time:
 
     async def step(self, until_ns: int) -> None:
         """Let a little time pass, and then let the other tasks of the program run."""
+        if self.ended:
+            raise NodeClosedError("the swarm's time is over")
         host = self.start().host
         host.run(min(host.now_ns + _STEP_NS, until_ns))
         await _breathe()
@@ -133,21 +136,24 @@ class VirtualSwarm:
     async def run_until(self, wanted: float | Callable[[], bool], *, timeout_s: float | None = None) -> None:
         """Let time pass until an instant [s], or until something is true; raises TimeoutError when that takes longer.
 
-        Other tasks of the program run meanwhile. Time never passes the scenario's end: what is not true by then raises.
+        Other tasks of the program run meanwhile. Time never passes the scenario's end: what is later, or not true by
+        then, raises.
         """
-        until_ns = self.scenario.duration_ns if callable(wanted) else seconds_to_ns(wanted)
-        until_ns = min(until_ns, self.scenario.duration_ns)
+        wanted_ns = self.scenario.duration_ns if callable(wanted) else _ns("wanted", wanted)
+        until_ns = min(wanted_ns, self.scenario.duration_ns)
         if timeout_s is not None:
-            until_ns = min(until_ns, self._time.now_ns() + seconds_to_ns(timeout_s))
+            until_ns = min(until_ns, self._time.now_ns() + _ns("timeout_s", timeout_s))
         self._time.start()
         while self._time.now_ns() < until_ns and not (callable(wanted) and wanted()):
             await self._time.step(until_ns)
         if callable(wanted) and not wanted():
             raise TimeoutError(f"not true by {self.now_s:g} s")
+        if self._time.now_ns() < wanted_ns and not callable(wanted):
+            raise TimeoutError(f"wanted = {wanted:g} s: the time ends at {self.now_s:g} s")
 
     async def run_for(self, duration_s: float) -> None:
         """Let so much time pass."""
-        await self.run_until(self.now_s + duration_s)
+        await self.run_until((self._time.now_ns() + _ns("duration_s", duration_s)) / S)
 
     # --- nodes ----------------------------------------------------------------------------------------------------
 
@@ -179,11 +185,11 @@ class VirtualSwarm:
 
     def cut(self, node: int, *, for_s: float = 0.0) -> None:
         """Switch a node's radio off, for a while or (0) until `restore`."""
-        self._control(Cut(f"cut-{node}", NodeId(node), seconds_to_ns(for_s)))
+        self._control(Cut(f"cut-{node}", NodeId(node), _ns("for_s", for_s)))
 
     def degrade(self, a: int, b: int, *, loss_share: float = 1.0, loss_db: float = 0.0, for_s: float = 0.0) -> None:
         """Let the link between two nodes lose frames, both ways."""
-        for_ns, label = seconds_to_ns(for_s), f"degrade-{a}-{b}"
+        for_ns, label = _ns("for_s", for_s), f"degrade-{a}-{b}"
         self._control(
             Degrade(label, NodeId(a), NodeId(b), both=True, loss_db=loss_db, loss_share=loss_share, for_ns=for_ns)
         )
@@ -193,6 +199,8 @@ class VirtualSwarm:
         self._control(Restore(""))
 
     def _control(self, fault: Cut | Degrade | Restore) -> None:
+        if not isinstance(fault, Restore):
+            require_valid(fault, count=self.scenario.node_count)
         observed = self._time.start()
         observed.host.put(observed.names.radio_control, fault)
 
@@ -224,3 +232,9 @@ class VirtualSwarm:
         """Every frame is accounted for: delivered, dropped with a reason, or in flight. Ends the run."""
         frames = self.result().summary["frames"]
         assert frames["closes"], f"frames are unaccounted for: {frames}"
+
+
+def _ns(name: str, seconds: float) -> int:
+    if not (isinstance(seconds, int | float) and 0 <= seconds < math.inf):
+        raise ConfigError(f"{name} = {seconds!r} must be a number of seconds >= 0")
+    return seconds_to_ns(seconds)

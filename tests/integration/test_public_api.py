@@ -1,9 +1,11 @@
 """The public interface, as a program and a notebook use it, in virtual time."""
 
 import asyncio
+import math
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -72,6 +74,37 @@ async def test_a_node_knows_its_neighbors_and_its_clusters(swarm: MakeSwarm) -> 
         assert all(head == cluster[0] for head, cluster in node.clusters.items())
         assert node.bound_ms is None
         assert node.report()["kind"] == "agent"
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda s: s.cut(10), r"cut 10: the id of a node must be within \[1, 9\]"),
+        (lambda s: s.cut(2, for_s=math.nan), "for_s = nan must be a number of seconds >= 0"),
+        (lambda s: s.degrade(3, 3), "degrade degrade-3-3: a link has two different ends"),
+        (lambda s: s.degrade(1, 2, loss_share=2), r"degrade degrade-1-2: loss_share = 2 must be in \[0, 1\]"),
+    ],
+)
+async def test_a_fault_that_would_change_nothing_is_refused(
+    swarm: MakeSwarm, change: Callable[[fanet_mw.VirtualSwarm], None], said: str
+) -> None:
+    async with swarm("quick", overrides=QUIET) as s:
+        with pytest.raises(fanet_mw.ConfigError, match=said):
+            change(s)
+
+
+async def test_time_is_what_can_pass_and_ends(swarm: MakeSwarm) -> None:
+    async with swarm("quick", overrides=[*QUIET, "duration_s=8", "warmup_s=1", "drain_s=1"]) as s:
+        for wait in (s.run_until(math.nan), s.run_for(-1), s.run_until(lambda: False, timeout_s=-1)):
+            with pytest.raises(fanet_mw.ConfigError, match="must be a number of seconds >= 0"):
+                await wait
+        await s.run_for(7.5)
+        with pytest.raises(TimeoutError, match="wanted = 9 s: the time ends at 8 s"):
+            await s.run_until(9)
+    async with swarm("quick", overrides=QUIET) as s:
+        s.result()
+        with pytest.raises(fanet_mw.NodeClosedError, match="time is over"):
+            await s.run_for(1)
 
 
 async def test_faults_and_who_is_out_of_reach(swarm: MakeSwarm) -> None:

@@ -20,7 +20,8 @@ from xml.etree import ElementTree
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.foreign_file import read_regular
-from fanet_mw.geodesy import Geodetic, to_enu
+from fanet_mw.geodesy import Geodetic, to_enu, to_geodetic
+from fanet_mw.units import Enu
 
 _MOST_BYTES: Final = 16 << 20
 _MOST_SHAPES: Final = 10_000
@@ -33,7 +34,7 @@ class Shapes(NamedTuple):
     """What a file holds, as latitudes and longitudes [degrees]."""
 
     inside: list[list[_Point]]
-    """Polygons that are areas."""
+    """Polygons that are areas; of a circle the four outermost points."""
     outside: list[list[_Point]]
     """Polygons to stay out of; in a file that knows no such thing, the same."""
     circles: list[tuple[float, float, float]]
@@ -234,7 +235,9 @@ def _plan(data: bytes) -> Shapes:
         radius_m = float(entry["circle"]["radius"])
         if not 0 < radius_m < 1e6:
             raise ValueError(f"a circle has a radius of {radius_m:g} m, must be in (0, 1e6)")
-        if not entry.get("inclusion", True):
+        if entry.get("inclusion", True):
+            inside.append(_extremes(Geodetic(lat, lon, 0.0), radius_m))
+        else:
             circles.append((lat, lon, radius_m))
     flown = []
     for item in tree.get("mission", {}).get("items", ()):
@@ -246,6 +249,13 @@ def _plan(data: bytes) -> Shapes:
     if len(inside) + len(outside) + len(rally) + len(flown) > _MOST_SHAPES:
         raise ValueError(f"more than {_MOST_SHAPES} shapes")
     return Shapes(inside, outside, circles, rally or flown)
+
+
+def _extremes(center: Geodetic, radius_m: float) -> list[_Point]:
+    """The points of a circle farthest to the east, north, west and south."""
+    ways = ((radius_m, 0.0), (0.0, radius_m), (-radius_m, 0.0), (0.0, -radius_m))
+    places = [to_geodetic(Enu(east, north, 0.0), center) for east, north in ways]
+    return [_place(place.lat_deg, place.lon_deg) for place in places]
 
 
 def _waypoints(data: bytes) -> Shapes:

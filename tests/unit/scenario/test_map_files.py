@@ -153,6 +153,18 @@ def test_what_cannot_be_used_is_one_line_with_the_file(tmp_path: Path, name: str
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(("polygons", "side_m"), [((), 600), ((SQUARE,), None)])
+def test_a_circle_to_stay_inside_is_area_alone_and_beside_polygons(
+    tmp_path: Path, polygons: tuple[list[tuple[float, float]], ...], side_m: int | None
+) -> None:
+    circle = {"inclusion": True, "circle": {"center": [*degrees((0.0, 2000.0 if polygons else 0.0))], "radius": 300.0}}
+    fences = [{"inclusion": True, "polygon": [list(degrees(point)) for point in square]} for square in polygons]
+    tree = {"fileType": "Plan", "geoFence": {"polygons": fences, "circles": [circle]}}
+    (tmp_path / "round.plan").write_text(json.dumps(tree))
+    area_m = scenario(tmp_path, '[mission]\narea = "round.plan"').world.area_m
+    assert area_m == pytest.approx(side_m, abs=2) if side_m else area_m > 2300
+
+
 def test_what_needs_an_origin_says_so_and_what_is_not_there_is_named(files: Path) -> None:
     with pytest.raises(ConfigError, match=r"needs world.origin_deg, or mission.area"):
         scenario(files, '[mission]\nsurvivors_at = "people.kml"')

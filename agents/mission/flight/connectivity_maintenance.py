@@ -21,6 +21,10 @@ _TETHER_S: Final = 4.0
 _CLOSING: Final = 0.97
 _CLOSING_S: Final = 1.0
 """The same two while ranks are closed over somebody who is lost, and every second counts."""
+_FOLLOWS: Final = 0.88
+"""The greatest distance, as such a share, of one that is nearer to a gap while the swarm is apart: a line waits and
+turns back for its chain rather than hold it back.
+"""
 _HASTE: Final = 0.95
 """Whoever is too far away for that is approached at this share of the greatest speed."""
 
@@ -67,13 +71,18 @@ class ConnectivityMaintenance:
         if (formation.plan is not None and formation.place is None) or self._bidding.is_absent(now_ns):
             return []
         planes, closes = [], formation.closing_s(now_ns) is not None
-        for node, motion in self._tied(now_ns).items():
+        ties = self._tied(now_ns)
+        leading = [node for node in ties if formation.leads_to_gap(node, now_ns)]
+        for node, motion in ties.items():
+            share, within_s = (_CLOSING, _CLOSING_S) if closes else (_TETHER, _TETHER_S)
+            if leading == [node]:  # between two gaps it would draw the sides together
+                share, within_s = _FOLLOWS, _CLOSING_S
             offset = motion.offset_from(self._own_motion.position, now_ns)
             plane = tether_plane(
                 offset,
                 (motion.velocity.east, motion.velocity.north),
-                tether_m=(_CLOSING if closes else _TETHER) * self._reach_m,
-                within_s=_CLOSING_S if closes else _TETHER_S,
+                tether_m=share * self._reach_m,
+                within_s=within_s,
                 haste_m_s=self._haste_m_s,
             )
             if plane is not None:

@@ -5,7 +5,7 @@ Teams and relays connect the swarm, so they stay near their places; a follower m
 """
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import Final
 
 from agents.mission.finding.phone_localization import Estimate
@@ -31,6 +31,8 @@ _LAG_M: Final = 140.0
 
 _CLOSES_S: Final = 15.0
 """The time within which ranks are closed."""
+_APART_S: Final = 40.0
+"""So long after a loss those farther from the gap follow those nearer to it, while the swarm is apart."""
 _FLOWN_NS: Final = 8 * S
 """So long after they began to close ranks most UAVs are at their new places."""
 
@@ -56,6 +58,10 @@ class FormationPlace:
         """True while a part of the swarm that is not lost is out of reach."""
         self._closing_ns = 0
         """The instant at which the last of them was lost."""
+        self._last: frozenset[int] = frozenset()
+        """Those lost since ranks were closed over others, or had been."""
+        self._hops: Mapping[int, int] = {}
+        """How many ties lead from each place to the nearest of these."""
         self._before: Pattern | None = None
         """The formation until then, if all had time to take it up."""
         self._changed_ns = -_FLOWN_NS
@@ -88,6 +94,9 @@ class FormationPlace:
         )
         self._apart = apart
         if not gaps <= self._gaps:
+            is_another = (now_ns - self._closing_ns) / S > _CLOSES_S
+            self._last = (frozenset() if is_another else self._last) | (gaps - self._gaps)
+            self._hops = self.pattern.hops_from(self._last)
             self._closing_ns = now_ns
             if now_ns - self._changed_ns >= _FLOWN_NS:
                 self._before = self.pattern
@@ -101,6 +110,14 @@ class FormationPlace:
         if self.pattern is None or self.place is None or not self._gaps or since_s > _CLOSES_S:
             return None
         return since_s if self.pattern.has_beside(self.place, self._gaps) else None
+
+    def leads_to_gap(self, node: int, now_ns: int) -> bool:
+        """True for a UAV that is fewer ties from those lost last than this one, while the swarm is apart."""
+        plan, hops = self.plan, self._hops
+        own = math.inf if self.place is None else hops.get(self.place, math.inf)
+        if plan is None or not self._apart or now_ns - self._closing_ns > _APART_S * S:
+            return False
+        return any(hops.get(place, math.inf) < own for place, holder in enumerate(plan.nodes) if holder == node)
 
     @property
     def passes_above(self) -> bool:

@@ -3,7 +3,8 @@
 The words place, team, lane, relay and follower are explained in `shapes/contract.py`.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import pairwise
 from typing import Final, assert_never
 
@@ -117,6 +118,17 @@ class Pattern:
         while gap + way * size in lost:
             size += 1
         return size, gap > place
+
+    def hops_from(self, gap: Collection[int]) -> dict[int, int]:
+        """How many ties lead from each place to the nearest of these; a place that none leads to is not in it."""
+        hops, waiting = dict.fromkeys(gap, 0), deque(sorted(gap))
+        while waiting:
+            place = waiting.popleft()
+            for other in self._whole.tethers(place):
+                if other not in hops:
+                    hops[other] = hops[place] + 1
+                    waiting.append(other)
+        return hops
 
     def _tied_to(self, place: int) -> list[int]:
         """The places to which a place is tied, vacant ones, too; where rows meet, whoever flies nearest to there."""

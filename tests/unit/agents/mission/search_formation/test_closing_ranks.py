@@ -30,6 +30,16 @@ def test_two_relays_beside_each_other_are_missed_by_both_sides() -> None:
     assert ClosingSwarm(92.0).heal_s(33, 34, within_s=15.0) < 13.0, "each side knew only one of them as its neighbor"
 
 
+@pytest.mark.parametrize(
+    ("from_s", "lost", "within_s"), [(110.0, [33, 34], 16.0), (140.0, [32], 12.0), (140.0, [33, 37], 18.0)]
+)
+def test_a_line_waits_for_its_chain_that_closes_a_gap_near_it(from_s: float, lost: list[int], within_s: float) -> None:
+    """A line that flies on pulls the end of the chain away: 22.4, 17.2 and 23.4 s. Who is between two gaps follows
+    neither side: 19.6 s if it does.
+    """
+    assert ClosingSwarm(from_s).heal_s(*lost, within_s=25.0) < within_s
+
+
 def test_of_two_lost_at_once_the_second_one_that_is_noticed_makes_nobody_seek_others_where_they_are_not_yet() -> None:
     first, second = 45, 32  # a follower, and a relay, which is missed later
     assert 4.0 < ClosingSwarm(102.5).heal_s(first, second, within_s=15.0) < 7.0

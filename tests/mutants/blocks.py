@@ -3,12 +3,13 @@
     each block of a function (its body, the branches of its conditions, the bodies of its loops) notes that it ran
     ->  per test: the blocks, those of shared fixtures too, and the processor time  ->  map, as JSON
 
-`pytest -p tests.mutants.blocks --blocks FILE TESTS` adds these tests to the map. Compiled code and other processes note
-nothing.
+`pytest -p tests.mutants.blocks --blocks FILE TESTS` adds those of these tests that pass to the map. Other processes
+note nothing, and compiled code does only where it runs uncompiled (FANET_NO_NUMBA=1): then nothing else does.
 """
 
 import ast
 import builtins
+import functools
 import importlib.abc
 import importlib.machinery
 import json
@@ -32,7 +33,9 @@ AREAS = {
     "mission": ("agents/mission", "agents/applications"),
     "world": ("sim/world",),
 }  # fmt: skip
+PACKAGES = ("fanet_mw", "agents", "emulator", "sim")
 _BODIES = ("body", "orelse", "finalbody")
+UNCOMPILED = bool(os.environ.get("FANET_NO_NUMBA"))
 Block = tuple[int, int]
 """The lines of a block, first and last."""
 
@@ -103,15 +106,32 @@ class _Loader(importlib.machinery.SourceFileLoader):
 
 class _Finder(importlib.abc.MetaPathFinder):
     def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> Any:
-        if fullname.partition(".")[0] not in ("fanet_mw", "agents", "emulator", "sim"):
+        if fullname.partition(".")[0] not in PACKAGES:
             return None
         found = importlib.machinery.PathFinder.find_spec(fullname, path)
         if found is None or found.origin is None or not found.origin.endswith(".py"):
             return found
         name = Path(found.origin).relative_to(ROOT).as_posix()
-        if area_of(name) and not is_compiled(Path(found.origin).read_text(encoding="utf-8"), name):
+        if area_of(name) and is_compiled(Path(found.origin).read_text(encoding="utf-8"), name) == UNCOMPILED:
             found.loader = _Loader(fullname, found.origin)
         return found
+
+
+class _Caches:
+    """The `functools.cache` functions of the product's modules: what a test finds there another one has run."""
+
+    def __init__(self) -> None:
+        self._modules = 0
+        self._found: list[Any] = []
+
+    def clear(self) -> None:
+        if len(sys.modules) != self._modules:
+            self._modules = len(sys.modules)
+            ours = [module for name, module in sys.modules.items() if name.partition(".")[0] in PACKAGES]
+            values = (value for module in ours for value in vars(module).values())
+            self._found = [value for value in values if isinstance(value, functools._lru_cache_wrapper)]
+        for cached in self._found:
+            cached.cache_clear()
 
 
 class Recorder:
@@ -121,6 +141,8 @@ class Recorder:
         self._file = file
         self._tests: dict[str, tuple[float, set[int]]] = {}
         self._fixtures: dict[int, set[int]] = defaultdict(set)
+        self._failed: set[str] = set()
+        self._caches = _Caches()
 
     @pytest.hookimpl(hookwrapper=True)
     def pytest_fixture_setup(self, fixturedef: Any) -> Iterator[None]:
@@ -135,6 +157,7 @@ class Recorder:
 
     @pytest.hookimpl(hookwrapper=True)
     def pytest_runtest_protocol(self, item: Any) -> Iterator[None]:
+        self._caches.clear()
         NOTES.taken()
         began_s = sum(os.times()[:4])
         yield
@@ -144,10 +167,17 @@ class Recorder:
                 ran |= self._fixtures.get(id(definition), set())
         self._tests[item.nodeid] = sum(os.times()[:4]) - began_s, ran
 
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.outcome != "passed":
+            self._failed.add(report.nodeid)
+
     def pytest_sessionfinish(self) -> None:
         known = json.loads(self._file.read_text()) if self._file.exists() else {"blocks": [], "tests": {}}
         numbers = {name: number for number, name in enumerate(known["blocks"])}
         for test, (took_s, ran) in self._tests.items():
+            if test in self._failed:  # what fails without any bug notices none
+                known["tests"].pop(test, None)
+                continue
             names = sorted(NOTES.names[block] for block in ran)
             known["tests"][test] = [round(took_s, 3), [numbers.setdefault(name, len(numbers)) for name in names]]
         self._file.write_text(json.dumps({"blocks": list(numbers), "tests": known["tests"]}))

@@ -4,7 +4,8 @@
     ->  the tests that run that block, the shortest first  ->  caught | survived | never run
 
 Which tests run which block is measured once (`blocks.py`) and kept in `tests/mutants/blocks.json` until it is asked
-for anew. Where numba compiles, bugs are planted in the uncompiled code, and tried by the tests of the emulator.
+for anew; where numba compiles, in `uncompiled.json`: bugs are planted there in the uncompiled code, and tried by the
+tests of the emulator.
 What changes nothing that anybody could observe is named in `equivalent.toml`, each with its reason.
 """
 
@@ -28,9 +29,10 @@ from typing import Any, Final, NamedTuple
 HERE: Final = Path(__file__).resolve().parent
 ROOT: Final = HERE.parents[1]
 sys.path.insert(0, str(ROOT))
-from tests.mutants.blocks import AREAS, area_of, blocks_of, is_compiled  # noqa: E402
+from tests.mutants.blocks import AREAS, PACKAGES, area_of, blocks_of, is_compiled  # noqa: E402
 
 MAP: Final = HERE / "blocks.json"
+UNCOMPILED_MAP: Final = HERE / "uncompiled.json"
 EQUIVALENT: Final = HERE / "equivalent.toml"
 BUDGET_S: Final = 60.0
 """The most processor time of the tests for one bug; at least `LEAST` of them."""
@@ -177,7 +179,7 @@ def _is_text(node: ast.BinOp) -> bool:
 def all_bugs(areas: Sequence[str]) -> list[Bug]:
     """Every bug of some areas."""
     found = []
-    for folder in ("fanet_mw", "agents", "emulator", "sim"):
+    for folder in PACKAGES:
         for file in sorted((ROOT / folder).rglob("*.py")):
             path = file.relative_to(ROOT).as_posix()
             if area_of(path) in areas:
@@ -185,50 +187,60 @@ def all_bugs(areas: Sequence[str]) -> list[Bug]:
     return found
 
 
-class Judge:
-    """Says of bugs what the tests say."""
+class Coverage:
+    """Which tests run which blocks, as `blocks.py` has noted it."""
 
-    def __init__(self, known: Any, *, budget_s: float) -> None:
+    def __init__(self, known: Any) -> None:
         self._took_s: dict[str, float] = {name: took_s for name, (took_s, _) in known["tests"].items()}
         self._tests: dict[str, list[str]] = {name: [] for name in known["blocks"]}
         for test, (_, blocks) in known["tests"].items():
             for block in blocks:
                 self._tests[known["blocks"][block]].append(test)
-        self._budget_s = budget_s
 
-    def tests_of(self, bug: Bug) -> list[str]:
-        """The tests that run a block, the shortest first, within the budget."""
-        if is_compiled((ROOT / bug.path).read_text(encoding="utf-8"), bug.path):
-            return list(OF_COMPILED)
-        keys = [f"{bug.path}:{bug.block}"] if bug.block else [key for key in self._tests if key.startswith(bug.path)]
+    def tests_of(self, bug: Bug, budget_s: float) -> list[str]:
+        """The tests that run a block, the shortest first, within a budget of processor time; for a constant those that
+        run anything of its file, or else of its folder.
+        """
+        keys = [f"{bug.path}:{bug.block}"]
+        if not bug.block:
+            near = (bug.path, bug.path.rpartition("/")[0])
+            keys = next(
+                (found for place in near if (found := [key for key in self._tests if key.startswith(place)])), []
+            )
         tests = {test for key in keys for test in self._tests.get(key, ())}
         chosen, spent_s = [], 0.0
         for name in sorted(filter(_is_there, tests), key=lambda test: (self._took_s[test], test)):
             spent_s += self._took_s[name]
-            if spent_s > self._budget_s and len(chosen) >= LEAST:
+            if spent_s > budget_s and len(chosen) >= LEAST:
                 break
             chosen.append(name)
         return chosen
 
+
+class Judge:
+    """Says of bugs what the tests say."""
+
+    def __init__(self, compiled: Coverage, uncompiled: Coverage, *, budget_s: float) -> None:
+        self._coverage, self._uncompiled = compiled, uncompiled
+        self._budget_s = budget_s
+
     def verdict(self, bug: Bug) -> tuple[str, float]:
         """`caught`, `survived`, `never run`, or why it cannot be said; and the time."""
         began_s = time.monotonic()
-        tests = self.tests_of(bug)
-        return self._verdict(bug, tests, began_s) if tests else ("never run", 0.0)
+        uncompiled = is_compiled((ROOT / bug.path).read_text(encoding="utf-8"), bug.path)
+        tests = (self._uncompiled if uncompiled else self._coverage).tests_of(bug, self._budget_s)
+        return self._verdict(bug, tests, began_s, uncompiled=uncompiled) if tests else ("never run", 0.0)
 
-    def _verdict(self, bug: Bug, tests: Sequence[str], began_s: float) -> tuple[str, float]:
+    def _verdict(self, bug: Bug, tests: Sequence[str], began_s: float, *, uncompiled: bool) -> tuple[str, float]:
         module = bug.path.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
         change = json.dumps({"module": module, "begin": bug.begin, "end": bug.end, "new": bug.new})
         environment = {**os.environ, "FANET_MUTANT": change, "PYTHONPATH": str(HERE / "hook")}
         environment["PYTHONDONTWRITEBYTECODE"] = "1"
-        if tests == list(OF_COMPILED):
+        if uncompiled:
             environment["FANET_NO_NUMBA"] = "1"
         command = [sys.executable, "-m", "pytest", "-x", "-q", "-m", "not slow", "-p", "no:cacheprovider"]
-        command += [
-            "--hypothesis-profile=mutants",
-            "--assert=plain",
-            *tests,
-        ]  # pytest would load what it rewrites itself
+        # pytest would load what it rewrites itself
+        command += ["--hypothesis-profile=mutants", "--assert=plain", *tests]
         child = subprocess.Popen(
             command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
             start_new_session=True, text=True,
@@ -243,7 +255,8 @@ class Judge:
         if child.returncode == 0:
             return "survived", took_s
         if child.returncode == USAGE and any("[" in test for test in tests):  # parameters have changed since
-            return self._verdict(bug, sorted({test.partition("[")[0] for test in tests}), began_s)
+            whole = sorted({test.partition("[")[0] for test in tests})
+            return self._verdict(bug, whole, began_s, uncompiled=uncompiled)
         if child.returncode in (1, 2) or "ImportError" in said or "conftest" in said:  # 2: it cannot even be imported
             return "caught", took_s
         return f"not judged: {said[-300:]}", took_s
@@ -267,24 +280,29 @@ def interval(caught: int, of: int) -> tuple[float, float]:
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
-def make_map() -> Any:
-    """Run the default tests once, and note which blocks they run."""
-    subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "tests.mutants.blocks", "--blocks", MAP, "-m",
-         "not slow and not realtime", "-p", "no:cacheprovider", "tests"],
-        cwd=ROOT, check=False,
-    )  # fmt: skip
-    return json.loads(MAP.read_text())
+def coverage(file: Path, tests: Sequence[str], *, uncompiled: bool, again: bool) -> Coverage:
+    """What was noted; if there is nothing, or it is asked for `again`, after a run of tests."""
+    if again or not file.exists():
+        file.unlink(missing_ok=True)
+        subprocess.run(
+            [sys.executable, "-m", "pytest", "-q", "-p", "tests.mutants.blocks", "--blocks", file, "-m",
+             "not slow and not realtime", "-p", "no:cacheprovider", *tests],
+            cwd=ROOT, check=False, env={**os.environ, "FANET_NO_NUMBA": "1" if uncompiled else ""},
+        )  # fmt: skip
+    return Coverage(json.loads(file.read_text()))
 
 
 def run(count: int, seed: int, areas: Sequence[str], *, jobs: int, budget_s: float, again: bool) -> int:
     """Draw bugs, judge them, print the share."""
-    known = json.loads(MAP.read_text()) if MAP.exists() and not again else make_map()
     reasons = tomllib.loads(EQUIVALENT.read_text(encoding="utf-8")) if EQUIVALENT.exists() else {}
     equivalent = {entry["bug"]: entry["why"] for entry in reasons.get("bug", ())}
     candidates = all_bugs(areas)
     drawn = random.Random(f"bugs/{seed}").sample(candidates, min(count, len(candidates)))
-    judge = Judge(known, budget_s=budget_s)
+    judge = Judge(
+        coverage(MAP, ["tests"], uncompiled=False, again=again),
+        coverage(UNCOMPILED_MAP, OF_COMPILED, uncompiled=True, again=again),
+        budget_s=budget_s,
+    )
     tally: dict[str, list[int]] = {area: [0, 0] for area in areas}
     survivors, skipped = [], 0
     with ThreadPoolExecutor(jobs) as pool:

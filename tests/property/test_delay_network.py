@@ -70,10 +70,30 @@ def test_spans_never_fall_and_stay_within_their_token_bucket(flows, server) -> N
 
 
 @given(servers())
-def test_service_and_completion_are_inverse(server) -> None:
-    for n in range(1, 20):
-        assert server.served(server.completion_ns(n)) == n
-        assert server.served(server.completion_ns(n) - 1) == n - 1
+def test_what_is_served_in_a_window_are_the_frames_completed_in_it(server) -> None:
+    """In the rest of a period behind the slot, too."""
+    completions = [server.completion_ns(n) for n in range(1, 20)]
+    for window_ns in range(completions[-1]):
+        assert server.served(window_ns) == sum(completion <= window_ns for completion in completions)
+
+
+@given(st.lists(periodics(5), min_size=1, max_size=3))
+def test_spans_repeat_behind_their_onset(flows) -> None:
+    total = Total(tuple(flows))
+    onset_ns, length_ns = total.repeat()
+    packets = int(total.rate * length_ns)
+    spans = list(islice(total.spans(), 3 * packets + int(total.rate * onset_ns) + 50))
+    for earlier_ns, later_ns in zip(spans, spans[packets:], strict=False):
+        assert later_ns - earlier_ns == length_ns or earlier_ns <= onset_ns
+
+
+def test_what_comes_as_the_frame_before_ends_still_counts_and_a_full_slot_has_no_bound_in_any_order() -> None:
+    """Completions at 11, 21 ..., others at 0, 11, 22 ...: at 121 the twelfth frame ends and the twelfth comes."""
+    server = SlotServer(airtime_ns=1, slot_ns=1, period_ns=10)
+    assert delay_any_order(Periodic(1000), Periodic(11), server) == Bounded(131)
+    full = delay_any_order(Periodic(20), Periodic(20), server)
+    assert isinstance(full, Refused)
+    assert "full" in full.reason
 
 
 @given(servers(), st.data())

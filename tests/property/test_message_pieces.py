@@ -183,6 +183,22 @@ def test_pieces_of_messages_that_never_become_whole_fill_a_receiver_up_to_a_boun
     assert receiver.kept_bytes == 0
 
 
+def test_a_sender_that_has_filled_its_share_leaves_room_for_others() -> None:
+    receiver = Receiver(NodeId(1), lambda _: True, random=random.Random(1))
+
+    def hear(origin: int, number: int, piece: int) -> None:
+        head = Head(0, number, 0, 5000, 5000, 5, 0, 1024, piece, 5, 0)
+        inner = encode_piece(head, bytes(1024), node=origin)
+        receiver.hear(NodeId(origin), decode_piece(HEADER + inner), HEADER, priority=3, now_ns=0)
+
+    for number in range(1, 400):
+        for piece in range(4):
+            hear(2, number, piece)
+    assert receiver.kept_bytes == receiving.MOST_BYTES_EACH
+    hear(3, 1, 0)
+    assert receiver.kept_bytes == receiving.MOST_BYTES_EACH + 1024
+
+
 # --- the format -------------------------------------------------------------------------------------------------------
 
 

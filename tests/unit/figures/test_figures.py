@@ -18,7 +18,7 @@ from sim.cli.app import app
 from sim.figures.all_figures import FIGURES, chosen
 from sim.figures.finished_runs import Runs, differences, max_per_seed, mean_per_seed
 from sim.figures.kept_tables import keep, read_kept
-from sim.figures.paper_claims import Claim, Finding, Reason, Statement, Verdict, above, below
+from sim.figures.paper_claims import Claim, Finding, Reason, Statement, Verdict, above, alike, below
 from sim.figures.recipe import render
 from sim.figures.rescue import confirmed_s, loss_share
 from sim.figures.statistics import DISTANCE, SHARE, interval, quantile_975
@@ -67,10 +67,27 @@ def test_an_interval_of_ten_seeds_holds_nothing_beyond_what_was_seen_and_is_as_s
 
 
 def test_an_interval_of_many_normal_values_is_that_of_student() -> None:
-    values = list(np.random.default_rng(3).normal(5.0, 2.0, 12))
-    half = quantile_975(11) * statistics.stdev(values) / math.sqrt(12)
-    found = interval(values)
-    assert (found.high - found.low) / 2 == pytest.approx(half, rel=0.1)
+    """On either side; of one sample it differs, of many in the mean it hardly does."""
+    ratios = []
+    for values in np.random.default_rng(3).normal(5.0, 2.0, (40, 12)).tolist():
+        half = quantile_975(11) * statistics.stdev(values) / math.sqrt(12)
+        found = interval(values)
+        ratios.append([(found.mean - found.low) / half, (found.high - found.mean) / half])
+    assert np.mean(ratios, axis=0) == pytest.approx([1.0, 1.0], abs=0.04)
+
+
+def test_from_eight_values_on_an_interval_lies_within_them() -> None:
+    assert interval([45.0] * 7 + [0.0]).high == 45.0
+    assert interval([45.0] * 6 + [0.0]).high > 45.0
+
+
+def test_what_is_alike_differs_by_less_than_the_limit_on_either_side() -> None:
+    for values, findings in (
+        ([-0.1, 0.0, 0.1], [Finding.HOLDS, Finding.HOLDS]),
+        ([1.0, 1.0, 1.1], [Finding.HOLDS, Finding.FAILS]),
+        ([-1.0, -1.0, -1.1], [Finding.FAILS, Finding.HOLDS]),
+    ):
+        assert [statement.finding for statement in alike("difference", values, 0.5)] == findings
 
 
 def test_a_rival_that_was_not_flown_leaves_a_claim_open() -> None:

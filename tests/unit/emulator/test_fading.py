@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from kit import examples
 from test_emulator_kernel import Output, medium, run
 
-from emulator.channel.fading import law_of, lift
-from emulator.kernel.state import RICIAN
+from emulator.channel.fading import law_of, lift, random_walk_exponent
+from emulator.kernel.state import RICIAN, WAVES
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import Poses, Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.bus.radio_control import Cut, Degrade, Jam
@@ -103,6 +103,15 @@ def test_the_lift_is_the_gain_that_one_draw_in_a_thousand_exceeds(make_scenario:
         normal = random.normal(size=(2, 400_000)) / math.sqrt(2 * (k + 1))
         drawn = (math.sqrt(k / (k + 1)) + normal[0]) ** 2 + normal[1] ** 2
     assert (drawn > lift(radio)).mean() == pytest.approx(0.001, abs=0.0002)
+
+
+def test_the_sum_of_the_waves_is_mapped_by_its_own_distribution() -> None:
+    """Of so few waves of random phase: how often their sum is longer than this, by 640,000 phases."""
+    phases = np.random.default_rng(1).uniform(0, 2 * np.pi, (20_000, WAVES))
+    length = np.abs(np.exp(1j * phases).sum(axis=1)) / math.sqrt(WAVES)
+    for amplitude in (0.3, 0.8, 1.2, 1.7, 2.1):
+        share = math.exp(-random_walk_exponent(np.array([amplitude]))[0])
+        assert (length > amplitude).mean() == pytest.approx(share, abs=4 * math.sqrt(share / 20_000))
 
 
 def attempts_that_serve(make_scenario: MakeScenario, speed_m_s: float) -> tuple[float, float]:

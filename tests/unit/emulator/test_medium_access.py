@@ -147,6 +147,35 @@ def test_who_does_not_find_the_medium_idle_for_difs_draws_a_backoff(
     assert 0 <= min(drawn) <= max(drawn) <= 31
 
 
+def test_a_slot_that_is_interrupted_is_counted_again_when_the_medium_is_idle(make_scenario: MakeScenario) -> None:
+    """Node 3 begins in the second slot of node 2's backoff: one slot has passed."""
+    first_ns = 1 * MS + FRAME_NS + 500 + DIFS_NS
+    compared = 0
+    for seed in range(1, 9):
+        begins_ns = []
+        for interrupted in (False, True):
+            air = Air(make_scenario(**{"nodes.count": 3, "radio.access": "standard", "seed": seed}), [0, 150, 150])
+            air.send(1, 1 * MS)
+            air.send(2, 1 * MS + 300 * US)
+            if interrupted:
+                air.send(3, first_ns + 30 * US, payload=SHORT)
+            begins_ns += [end_ns - FRAME_NS for node, _, end_ns, _ in statuses(air.run()) if node == 2]
+        slots = slots_behind(begins_ns[0], first_ns)
+        if slots > 2:
+            compared += 1
+            assert slots_behind(begins_ns[1], first_ns + 30 * US + SHORT_NS + DIFS_NS) == slots - 1
+    assert compared > 4
+
+
+@pytest.mark.parametrize(("later_ns", "outcome"), [(0, TxOutcome.LIFETIME), (1, TxOutcome.SENT)])
+def test_a_frame_may_begin_before_its_end_and_not_at_it(
+    make_scenario: MakeScenario, later_ns: int, outcome: TxOutcome
+) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2, "radio.access": "ns3"}), [0, 150])
+    air.send(1, 1 * MS, until_ns=1 * MS + DIFS_NS + later_ns)
+    assert [found for _, found, _, _ in statuses(air.run())] == [outcome]
+
+
 # --- attempts and windows -----------------------------------------------------------------------------------------
 
 

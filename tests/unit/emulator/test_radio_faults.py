@@ -185,10 +185,12 @@ def test_who_flies_into_a_jammed_area_is_jammed_and_who_leaves_it_is_not(make_sc
     air.send(1, 1 * MS)
     air.place([0, 190], 5 * MS)
     air.send(1, 6 * MS, now_ns=5 * MS)
-    air.place([0, 120], 10 * MS)
+    air.place([0, 150], 10 * MS)
     air.send(1, 11 * MS, now_ns=10 * MS)
+    air.place([0, 149], 15 * MS)
+    air.send(1, 16 * MS, now_ns=15 * MS)
     air.run()
-    assert air.medium.report()["copies"] == {"on_air": 3, "received": 2, "lost": {"jammed": 1}, "in_flight": 0}
+    assert air.medium.report()["copies"] == {"on_air": 4, "received": 2, "lost": {"jammed": 2}, "in_flight": 0}
 
 
 @pytest.mark.parametrize(("noise_dbm", "got"), [(-110.0, 1), (-60.0, 0)])

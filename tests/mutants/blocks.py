@@ -15,7 +15,7 @@ import importlib.machinery
 import json
 import os
 import sys
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -36,8 +36,6 @@ AREAS = {
 PACKAGES = ("fanet_mw", "agents", "emulator", "sim")
 _BODIES = ("body", "orelse", "finalbody")
 UNCOMPILED = bool(os.environ.get("FANET_NO_NUMBA"))
-Block = tuple[int, int]
-"""The lines of a block, first and last."""
 
 
 def area_of(path: str) -> str | None:
@@ -50,15 +48,18 @@ def is_compiled(source: str, path: str) -> bool:
     return "from emulator.kernel.jit import" in source or path in ("emulator/kernel/state.py", "emulator/kernel/jit.py")
 
 
-def blocks_of(tree: ast.AST) -> Iterator[tuple[Block, list[ast.stmt]]]:
-    """The blocks inside the functions of a module, outer ones first."""
+def blocks_of(tree: ast.AST) -> Iterator[tuple[str, list[ast.stmt]]]:
+    """The blocks inside the functions of a module, by function and number: lines move with every change of a file."""
+    seen: Counter[str] = Counter()
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-            yield from _inside(node.body)
+            seen[node.name] += 1
+            for number, body in enumerate(_inside(node.body)):
+                yield f"{node.name}.{seen[node.name]}.{number}", body
 
 
-def _inside(body: list[ast.stmt]) -> Iterator[tuple[Block, list[ast.stmt]]]:
-    yield (body[0].lineno, body[-1].end_lineno or body[-1].lineno), body
+def _inside(body: list[ast.stmt]) -> Iterator[list[ast.stmt]]:
+    yield body
     for statement in body:
         if isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
             continue  # has blocks of its own
@@ -76,8 +77,8 @@ class _Notes:
         self.names: list[str] = []
         self.ran = bytearray()
 
-    def add(self, path: str, block: Block) -> int:
-        self.names.append(f"{path}:{block[0]}")
+    def add(self, path: str, block: str) -> int:
+        self.names.append(f"{path}:{block}")
         self.ran.append(0)
         return len(self.names) - 1
 

@@ -55,8 +55,8 @@ class Bug(NamedTuple):
     """One change of one place."""
 
     path: str
-    block: int
-    """The first line of its block; 0 for a constant of a module or class."""
+    block: str
+    """The name of its block; empty for a constant of a module or class."""
     line: int
     begin: int
     end: int
@@ -93,7 +93,7 @@ class Source:
         begin, end = self.span(node)
         return self.text[begin:end]
 
-    def bug(self, block: int, node: Any, new: str) -> Bug:
+    def bug(self, block: str, node: Any, new: str) -> Bug:
         begin, end = self.span(node)
         return Bug(self.path, block, node.lineno, begin, end, self.text[begin:end], new)
 
@@ -105,12 +105,12 @@ class Source:
         for block, body in blocks_of(tree):
             for statement in body:
                 if id(statement) not in hidden and not isinstance(statement, _NOT_LOGIC):
-                    yield from self._of_statement(block[0], statement)
+                    yield from self._of_statement(block, statement)
         for node in tree.body:
             if isinstance(node, ast.AnnAssign) and node.value is not None:  # others name types
-                yield from self._of_expression(0, node.value)
+                yield from self._of_expression("", node.value)
 
-    def _of_statement(self, block: int, statement: ast.stmt) -> Iterator[Bug]:
+    def _of_statement(self, block: str, statement: ast.stmt) -> Iterator[Bug]:
         match statement:
             case ast.If(test=test) | ast.While(test=test):
                 yield self.bug(block, test, f"not ({self.of(test)})")
@@ -133,12 +133,15 @@ class Source:
             case _:
                 return
 
-    def _of_expression(self, block: int, expression: ast.expr) -> Iterator[Bug]:
-        texts = {
-            id(inner) for node in ast.walk(expression) if isinstance(node, ast.JoinedStr) for inner in ast.walk(node)
-        }
+    def _of_expression(self, block: str, expression: ast.expr) -> Iterator[Bug]:
+        told = [
+            node
+            for node in ast.walk(expression)
+            if isinstance(node, ast.JoinedStr) or (isinstance(node, ast.keyword) and node.arg == "strict")
+        ]  # `strict` asserts
+        left_out = {id(inner) for node in told for inner in ast.walk(node)}
         for node in ast.walk(expression):
-            if id(node) in texts:
+            if id(node) in left_out:
                 continue
             match node:
                 case ast.Compare(left=left, ops=[op], comparators=[right]):

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from kit import examples
 from test_emulator_kernel import Output, medium, run
 
-from emulator.channel.fading import law_of, lift, random_walk_exponent
-from emulator.kernel.state import RICIAN, WAVES
+from emulator.channel.fading import Waves, law_of, lift, random_walk_exponent, tables
+from emulator.kernel.fading_gain import gain
+from emulator.kernel.state import FADING, FADING_SHAPE, RICIAN, WAVES
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import Poses, Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.bus.radio_control import Cut, Degrade, Jam
@@ -112,6 +113,23 @@ def test_the_sum_of_the_waves_is_mapped_by_its_own_distribution() -> None:
     for amplitude in (0.3, 0.8, 1.2, 1.7, 2.1):
         share = math.exp(-random_walk_exponent(np.array([amplitude]))[0])
         assert (length > amplitude).mean() == pytest.approx(share, abs=4 * math.sqrt(share / 20_000))
+
+
+@pytest.mark.parametrize("law", ["rayleigh", "rician"])
+def test_between_poses_a_gain_goes_on_along_each_axis_as_if_poses_came(make_scenario: MakeScenario, law: str) -> None:
+    radio = make_scenario(**{"nodes.count": 2, "radio.channel": "friis", **LAWS[law]}).radio
+    waves, table = Waves(radio, seed=1), tables(radio)
+    globals_, ints, reals = np.zeros(100, np.int64), np.zeros(100, np.int64), np.zeros(100)
+    ints[FADING], reals[FADING_SHAPE] = law_of(radio)
+    at = np.array([[0.0, 0.0, 50.0], [40.0, 30.0, 80.0]])
+    velocities = np.array([[3.0, 0.0, 0.0], [0.0, -4.0, 0.0], [0.0, 0.0, 5.0], [2.0, 3.0, -1.0]])
+    for velocity in velocities:
+        moves = np.array([velocity, -0.5 * velocity[::-1]])
+        now = waves.of(at, moves, 0)
+        for t_ms in (7, 40):
+            then = waves.of(at + moves * t_ms / 1000, moves, t_ms * MS)
+            goes_on = gain(globals_, ints, reals, now, table, 0, 1, t_ms * MS)
+            assert goes_on == pytest.approx(gain(globals_, ints, reals, then, table, 1, 0, 0), abs=0.02)
 
 
 def attempts_that_serve(make_scenario: MakeScenario, speed_m_s: float) -> tuple[float, float]:

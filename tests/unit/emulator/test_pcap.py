@@ -210,6 +210,20 @@ def test_receptions_are_records_with_their_rssi_if_they_are_wanted(make_scenario
     assert {r.payload for r in received} == {PAYLOAD}
 
 
+def test_what_is_received_at_the_second_attempt_is_a_retry(make_scenario: MakeScenario) -> None:
+    scenario = make_scenario(**{"nodes.count": 2})
+    air = Air(scenario, [0, 4000])
+    buffer = capture(air, scenario, receptions=True)
+    air.send(1, 1 * MS, dst=2)
+    air.run(until_ns=2100 * US)
+    air.place([0, 150], 2100 * US)
+    air.run()
+    sent = [record for record in buffer.seen() if "antenna" not in record.tap and not record.is_ack]
+    received = [record for record in buffer.seen() if "antenna" in record.tap and not record.is_ack]
+    assert [record.retry for record in sent] == [False, True]
+    assert [record.retry for record in received] == [True]
+
+
 # --- whole runs -------------------------------------------------------------------------------------------------------
 
 

@@ -16,7 +16,7 @@ from sim.world.environment.obstacles import Box, Hills, Obstacles
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors
 from sim.world.sensors.camera import PERSON_M, CameraSensor, recognized_share
-from sim.world.sensors.contract import Sensor, Truth
+from sim.world.sensors.contract import Drift, Sensor, Truth, generator
 from sim.world.sensors.gps import GpsReceiver
 from sim.world.sensors.phone import PhoneSensor
 from sim.world.sensors.radar import MOST_SPEED_M_S, SPEED_CELL_M_S, RadarSensor, detected_share, radar_snr_db
@@ -341,6 +341,13 @@ def test_fixes_have_noise_of_each_fix_and_a_bias_that_stays_a_while(make_scenari
     assert_sigma((soon - first).ravel().tolist(), math.sqrt(2 * 16 * (1 - kept) + 2))
     correlation = np.corrcoef(first.ravel(), late.ravel())[0, 1]
     assert abs(correlation) < SIGMAS / math.sqrt(900)
+
+
+def test_a_drift_keeps_its_spread_at_any_pace_and_forgets_by_its_time() -> None:
+    drift = Drift(generator(1, "drift"), (20_000,), sigma=2.0, tau_s=50.0)
+    values = [drift.at(round(t_s * S)) for t_s in (0, 1, 2, 10, 50, 51, 500)]
+    assert [np.std(value) for value in values] == pytest.approx([2.0] * 7, rel=0.03)
+    assert np.corrcoef(values[0], values[4])[0, 1] == pytest.approx(1 / math.e, abs=0.03)
 
 
 def test_the_default_gps_is_that_of_the_data_sheet_and_the_standard(make_scenario: MakeScenario) -> None:

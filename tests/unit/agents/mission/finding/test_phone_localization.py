@@ -6,7 +6,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from agents.mission.finding.phone_localization import CELL_M, REFERENCE_LOSS_DB, PhoneFilter, PhoneModel
+from agents.mission.finding.phone_localization import CELL_M, REFERENCE_LOSS_DB, Estimate, PhoneFilter, PhoneModel
 from agents.mission.finding.sightings import ground_place
 from fanet_mw.units import Enu
 
@@ -15,6 +15,13 @@ MODEL = PhoneModel(power_dbm=15, exponent=3, shadowing_db=4, offset_db=1, thresh
 
 def rssi_dbm(place: Enu, at: Enu) -> float:
     return MODEL.power_dbm - REFERENCE_LOSS_DB - 30 * math.log10(at.minus(place).norm())
+
+
+def test_an_estimate_lies_on_the_ground_and_errs_most_along_its_longer_axis() -> None:
+    place = Estimate(30.0, -40.0, 25.0, 12.0, 25.0)
+    assert place.at == Enu(30.0, -40.0, 0.0)
+    assert place.sigma_m == pytest.approx(math.sqrt(25.0 + 12.0))
+    assert Estimate(0.0, 0.0, 9.0, 0.0, 16.0).sigma_m == pytest.approx(4.0)
 
 
 def test_two_that_pass_on_either_side_find_the_phone_and_know_how_well() -> None:

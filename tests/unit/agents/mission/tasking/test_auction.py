@@ -30,6 +30,29 @@ def test_exactly_as_many_win_as_the_task_needs_and_ties_go_to_the_lower_id() -> 
     assert not auction.would_win(1, eta_s=9.0, count=2, now_ns=0)
 
 
+def test_who_would_win_comes_sooner_than_the_last_winner_or_as_soon_with_a_lower_id() -> None:
+    auction = Auction(NodeId(5))
+    auction.merge([Bid(1, 2, 40, 1), Bid(1, 6, 90, 1), Bid(2, 4, 40, 1)], now_ns=0)
+    assert auction.would_win(1, eta_s=7.0, count=2, now_ns=0), "later than the first, and sooner than the second"
+    assert auction.would_win(1, eta_s=9.0, count=2, now_ns=0)
+    assert not auction.would_win(2, eta_s=4.0, count=1, now_ns=0)
+
+
+def test_what_is_told_are_the_nodes_own_bid_and_those_that_arrive_first() -> None:
+    auction = Auction(NodeId(50))
+    auction.merge([Bid(1, bidder, 900 - bidder, 1) for bidder in range(1, 21)], now_ns=0)
+    auction.bid(1, eta_s=95.0, now_ns=0)
+    assert [bid.bidder for bid in auction.bids_to_tell([1], now_ns=0)] == [50, *range(20, 9, -1)]
+
+
+def test_a_bid_counts_for_fifteen_seconds_and_a_nodes_own_until_it_is_taken_back() -> None:
+    auction = Auction(NodeId(5))
+    auction.merge([Bid(1, 2, 10, 1, age_s=15), Bid(1, 3, 10, 1, age_s=16)], now_ns=100 * S)
+    auction.bid(1, eta_s=9.0, now_ns=100 * S)
+    assert auction.winners(1, count=3, now_ns=100 * S) == [2, 5]
+    assert auction.winners(1, count=3, now_ns=200 * S) == [5]
+
+
 def test_a_winner_that_falls_silent_makes_room_for_the_next() -> None:
     auction = Auction(NodeId(5))
     auction.merge([Bid(1, 2, 10, 1), Bid(1, 3, 20, 1)], now_ns=0)

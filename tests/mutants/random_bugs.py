@@ -260,7 +260,8 @@ class Judge:
         if child.returncode == USAGE and any("[" in test for test in tests):  # parameters have changed since
             whole = sorted({test.partition("[")[0] for test in tests})
             return self._verdict(bug, whole, began_s, uncompiled=uncompiled)
-        if child.returncode in (1, 2) or "ImportError" in said or "conftest" in said:  # 2: it cannot even be imported
+        cannot_be_imported = any(text in said for text in ("ERROR collecting", "ImportError", "conftest"))
+        if child.returncode in (1, 2) or cannot_be_imported:
             return "caught", took_s
         return f"not judged: {said[-300:]}", took_s
 

@@ -1,6 +1,7 @@
 """May a result be used? Every reason why not, alone, and the limits from both sides."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -243,3 +244,30 @@ def test_a_world_that_was_held_up_says_how_many_ticks_nobody_got(make_scenario: 
     world.wake(5200 * MS)
     assert world.report()["skipped_ticks"] == 49
     assert world.next_wake_ns() == 5200 * MS, "the last of them is still of use"
+
+
+def test_a_limit_itself_is_not_exceeded(scenario: Scenario) -> None:
+    outcome = good(scenario)
+    put(outcome, "world", "ticks", value=980)
+    put(outcome, "world", "skipped_ticks", value=20)
+    assert reasons(outcome) == [], "2 % of a thousand"
+    put(outcome, "world", "skipped_ticks", value=21)
+    assert len(reasons(outcome)) == 1
+
+
+def test_what_a_dead_uav_did_not_receive_was_not_lost_on_the_bus(scenario: Scenario) -> None:
+    outcome = good(scenario)
+    put(outcome, "agent-2", "receptions", value=0)
+    assert any("receptions lost on the bus" in reason for reason in reasons(outcome))
+    outcome = replace(good(scenario), ended=[("agent-2", -9)])
+    put(outcome, "agent-2", "receptions", value=0)
+    found = reasons(outcome)
+    assert any("agent-2" in reason for reason in found)
+    assert not any("receptions lost on the bus" in reason for reason in found)
+
+
+def test_broken_bounds_are_those_that_came_too_late_and_those_that_never_came(scenario: Scenario) -> None:
+    frames = {"unaccounted": 0, "unasked": 0, "closes": True, "sent": 1}
+    bound = {"violations": 7, "never": 2}
+    (reason,) = validity.reasons(good(scenario), frames=frames, copies={}, bound=bound, clock={}, disturbance={})
+    assert "7 (5 too late, 2 never there)" in reason

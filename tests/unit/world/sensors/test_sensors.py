@@ -416,6 +416,31 @@ def test_heights_are_those_of_the_air_and_of_what_is_below(make_scenario: MakeSc
     assert all(reading.above_ground_m is None for reading in told[2]), "beyond the rangefinder's 120 m"
 
 
+def test_the_rangefinder_ends_where_it_says_whatever_its_noise(make_scenario: MakeScenario) -> None:
+    scenario = make_scenario(**{"nodes.count": 2, "sensors.altimeter_hz": 1, "sensors.rangefinder_m": 60})
+    (sensor,) = (s for s in sensors_of(scenario, Survivors(scenario), PLAIN) if s.kind == "altimeter")
+    at = np.array([[0.0, 0, 60.0], [0, 0, 60.01]])
+    for t in range(30):
+        within, beyond = (r for _, r in sensor.read(Truth(t * S, at, at), [0, 1]) if isinstance(r, Altimeter))
+        assert within.above_ground_m is not None
+        assert beyond.above_ground_m is None
+
+
+@pytest.mark.parametrize("kind", ["inertial", "altimeter"])
+def test_a_reading_is_of_its_own_uav_whoever_else_is_read(make_scenario: MakeScenario, kind: str) -> None:
+    keys = {f"sensors.{key}": 0 for key in ("inertial_sigma_m_s", "barometer_sigma_m", "rangefinder_sigma_m")}
+    scenario = make_scenario(**{"nodes.count": 6, "sensors.inertial_hz": 1, "sensors.altimeter_hz": 1, **keys})
+    at = np.arange(18.0).reshape(6, 3) + 40
+
+    def read(rows: list[int]) -> dict[int, Message]:
+        (sensor,) = (s for s in sensors_of(scenario, Survivors(scenario), PLAIN) if s.kind == kind)
+        return dict(sensor.read(Truth(S, at, at - 50), rows))
+
+    every = read([0, 1, 2, 3, 4, 5])
+    assert len({str(reading) for reading in every.values()}) == 6
+    assert read([2, 5]) == {row: every[row] for row in (2, 5)}
+
+
 def test_velocity_without_gps_has_noise_and_a_slow_drift(make_scenario: MakeScenario) -> None:
     scenario = make_scenario(**{"nodes.count": 200, "sensors.inertial_hz": 1})
     (sensor,) = (s for s in sensors_of(scenario, Survivors(scenario), PLAIN) if s.kind == "inertial")

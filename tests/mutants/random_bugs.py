@@ -62,6 +62,8 @@ class Bug(NamedTuple):
     end: int
     old: str
     new: str
+    inside: str = ""
+    """The line in which it stands."""
 
     def __str__(self) -> str:
         return f"{self.path}:{self.line}: {' '.join(self.old.split())[:60]}  ->  {' '.join(self.new.split())[:60]}"
@@ -69,7 +71,7 @@ class Bug(NamedTuple):
     @property
     def key(self) -> str:
         """By what it is known in `equivalent.toml`."""
-        return f"{self.path}: {' '.join(self.old.split())} -> {' '.join(self.new.split())}"
+        return f"{self.path}: {self.inside}: {' '.join(self.old.split())} -> {' '.join(self.new.split())}"
 
 
 class Source:
@@ -95,7 +97,8 @@ class Source:
 
     def bug(self, block: str, node: Any, new: str) -> Bug:
         begin, end = self.span(node)
-        return Bug(self.path, block, node.lineno, begin, end, self.text[begin:end], new)
+        line = self._lines[node.lineno - 1].strip()
+        return Bug(self.path, block, node.lineno, begin, end, self.text[begin:end], new, line)
 
     def bugs(self) -> Iterator[Bug]:
         """Every change that the operators know, in the functions of the file and in its constants."""

@@ -208,6 +208,17 @@ def test_rfc826_a_request_for_another_updates_its_sender_if_we_know_of_it(
     assert sent_to(found, 3) == [], "node 3 was not known before, so its request for another teaches nothing"
 
 
+def test_ns3_a_request_from_whom_we_have_asked_is_no_reply(bench: MakeBench) -> None:
+    found = routed(bench("ns3"))
+    seq = found.send(1, 9)
+    found.say(2, REQUEST, target(1), to=1)
+    found.advance(20 * MS)
+    assert sent_to(found, 2) == []
+    found.say(2, REPLY, target(1), to=1)
+    found.advance(20 * MS)
+    assert sent_to(found, 2) == [seq]
+
+
 def test_ns3_a_reply_that_nobody_waits_for_teaches_nothing(bench: MakeBench) -> None:
     found = routed(bench("ns3"))
     found.say(2, REPLY, target(1), to=1)

@@ -130,6 +130,10 @@ def test_between_poses_a_gain_goes_on_along_each_axis_as_if_poses_came(make_scen
             then = waves.of(at + moves * t_ms / 1000, moves, t_ms * MS)
             goes_on = gain(globals_, ints, reals, now, table, 0, 1, t_ms * MS)
             assert goes_on == pytest.approx(gain(globals_, ints, reals, then, table, 1, 0, 0), abs=0.02)
+    still = np.zeros((3, 3))
+    three = waves.of(np.array([at[0], at[1], at[1] + 7.0]), still, 0)
+    gains = [gain(globals_, ints, reals, three, table, a, b, 0) for a, b in ((0, 1), (0, 2), (1, 2))]
+    assert min(abs(gains[0] - gains[1]), abs(gains[1] - gains[2])) > 0.01, "both ends count"
 
 
 def attempts_that_serve(make_scenario: MakeScenario, speed_m_s: float) -> tuple[float, float]:

@@ -96,3 +96,4 @@ def test_a_line_can_do_without_as_many_as_its_others_can_close_up_for_and_a_late
         assert board.place.can_be_spared(late_ns) == spared, lost
     relay = NodeId(PLAN.nodes[2 * PLAN.lanes + 1])
     assert not Board(relay, lane_of(relay, late_ns)).place.can_be_spared(late_ns)
+    assert not Board(LINE, lane_of(LINE, late_ns)).place.can_be_spared(TAKEN_UP_NS - 1), "nobody sweeps yet"

@@ -71,6 +71,8 @@ def test_the_way_to_a_node_is_the_way_back_of_its_newest_flood_and_of_the_shorte
     assert station.send(FAR) == [OTHER], "an older flood"
     station.flood(FAR, NEAR, born_us=7, hops=1)
     assert station.send(FAR) == [NEAR]
+    station.flood(FAR, OTHER, born_us=7, hops=2)
+    assert station.send(FAR) == [NEAR], "a longer copy of the same"
     station.flood(FAR, OTHER, born_us=8, hops=3)
     assert station.send(FAR) == [OTHER]
 

@@ -53,7 +53,7 @@ that have to be large.
 
 _REALTIME = (
     "test_realtime", "test_host_realtime", "test_hosts", "test_radios", "test_real_radio", "test_time_scale",
-    "test_back_pressure", "test_air_control",
+    "test_back_pressure", "test_air_control", "test_broken_runs",
 )  # fmt: skip
 """Modules whose tests live in real time. They wait more than they work, so four of them go side by side; none of them
 asks how late this machine is: frames are announced long ahead, and what ends soon by itself is waited for."""
@@ -80,6 +80,8 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
+        if item.get_closest_marker("realtime"):  # in a module that is not read for `-m realtime` it would never run
+            raise pytest.UsageError(f"{item.nodeid}: a module whose tests live in real time is named so, not marked")
         if item.path.stem.startswith(_REALTIME):
             item.add_marker(pytest.mark.realtime)
 

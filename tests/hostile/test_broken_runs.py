@@ -19,13 +19,10 @@ MAY_MOUNT = subprocess.run(["unshare", "-rm", "true"], capture_output=True, chec
         pytest.param("disk 7", marks=pytest.mark.skipif(not MAY_MOUNT, reason="no file system can be mounted here")),
         pytest.param(
             "disk 3 launch",
-            marks=[
-                pytest.mark.realtime,
-                pytest.mark.skipif(not MAY_MOUNT, reason="no file system can be mounted here"),
-            ],
+            marks=pytest.mark.skipif(not MAY_MOUNT, reason="no file system can be mounted here"),
         ),
         "kills 8",
-        pytest.param("kills 3 launch", marks=pytest.mark.realtime),
+        "kills 3 launch",
         "memory 400 900 125",
     ],
 )

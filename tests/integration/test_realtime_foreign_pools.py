@@ -47,7 +47,6 @@ def test_a_program_whose_own_processes_live_ends_although_we_were_looked_up(
     ends(tmp_path, "fanet_mw.launch", kind, what)
 
 
-@pytest.mark.realtime
 @pytest.mark.parametrize("kind", ["spawn", "forkserver"])
 def test_a_program_whose_own_processes_live_ends_after_a_launch(tmp_path: Path, kind: str) -> None:
     ends(tmp_path, 'fanet_mw.launch("quick", overrides=["duration_s=1", "drain_s=0", "nodes.count=5"])', kind, "daemon")

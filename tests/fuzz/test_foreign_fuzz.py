@@ -7,7 +7,7 @@ import pytest
 
 from fanet_mw.errors import ConfigError
 
-INPUTS = 90
+INPUTS = 45
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from fanet_mw.errors import MalformedFrameError
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("fanet_mw", "agents", "emulator", "sim")
-INPUTS = 300
+INPUTS = 150
 TELLING = ("rounds", "aodv", "olsr", "dsdv", "geographic", "all", "relay-counter", "measured")
 """Swarms that say, together, every kind of message."""
 

@@ -25,7 +25,7 @@ def flown(
         "crossing",
         [
             f"nodes.count={len(places)}", 'nodes.layout="explicit"', f"nodes.positions_m={places}", "clusters.count=1",
-            'mobility.model="crossing"', "mission.survivors=0", "duration_s=38", "warmup_s=5", "drain_s=1",
+            'mobility.model="crossing"', "mission.survivors=0", "duration_s=32", "warmup_s=5", "drain_s=1",
             "radio.range_m=500", *settings,
         ],
     )  # fmt: skip

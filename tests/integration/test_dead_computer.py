@@ -15,7 +15,7 @@ from sim.run.virtual import simulate
 
 DIES_S = 45
 KEYS = {
-    "nodes.count": 4, "nodes.on_ground": True, "nodes.spacing_m": 15, "nodes.altitude_m": 40, "duration_s": 135,
+    "nodes.count": 4, "nodes.on_ground": True, "nodes.spacing_m": 15, "nodes.altitude_m": 40, "duration_s": 124,
     "warmup_s": 1, "drain_s": 1, "mission.survivors": 1, "mission.search": "spiral", "mobility.model": "onboard",
     "mobility.return_after_s": 5, "mobility.return_height_m": 70, "world.area_m": 600, "world.base_m": [-350, 0],
     "world.crash": "falls", "radio.range_m": 250, "traffic.arrivals": "none", "nodes.telemetry_hz": 0,

@@ -31,7 +31,7 @@ def flown(*settings: str, faults: tuple[dict[str, Any], ...] = ()) -> tuple[Outc
 
 
 def test_load_beyond_the_admissible_rate_is_refused_and_the_rest_meets_the_deadline() -> None:
-    times = ["duration_s=18", "warmup_s=12", "clusters.flooding_period_s=0.2"]
+    times = ["duration_s=15", "warmup_s=11", "drain_s=1", "clusters.flooding_period_s=0.2"]
     fast = [*times, "traffic.interval_s=0.02", "radio.cw_min=1"]
     outcome, free = flown(*fast)
     assert free["delay_ms"]["max"] > 1000, "without a deadline the queues grow"

@@ -25,7 +25,7 @@ POST = 5
 def test_within_reach_the_post_knows_of_a_find_at_once_and_gets_all_load(
     make_scenario: Callable[..., Scenario], place_m: tuple[float, float], gain_dbi: float
 ) -> None:
-    outcome = simulate(make_scenario(**{**KEYS, "duration_s": 60, "ground.at_m": place_m, "ground.gain_dbi": gain_dbi}))
+    outcome = simulate(make_scenario(**{**KEYS, "duration_s": 40, "ground.at_m": place_m, "ground.gain_dbi": gain_dbi}))
     found = next(r for r in outcome.records if isinstance(r, Confirmed))
     known = [r for r in outcome.records if isinstance(r, KnownOnGround)]
     assert [(r.node, r.survivor, r.east_m, r.north_m) for r in known] == [(POST, 1, found.east_m, found.north_m)]

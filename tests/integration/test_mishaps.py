@@ -15,7 +15,7 @@ from sim.run.virtual import simulate
 from sim.scenarios import catalog
 
 SMALL = (
-    "nodes.count=5", "clusters.count=1", "nodes.spacing_m=80", "duration_s=30", "warmup_s=1", "drain_s=1",
+    "nodes.count=5", "clusters.count=1", "nodes.spacing_m=80", "duration_s=28", "warmup_s=1", "drain_s=1",
     "mission.survivors=1", "mission.search=spiral", "world.area_m=600",
 )  # fmt: skip
 
@@ -61,10 +61,10 @@ def test_who_crashes_falls_and_its_radio_dies_on_the_ground() -> None:
 
 def test_a_weak_battery_takes_a_uav_home() -> None:
     fault = {"at_s": 8, "kind": "battery", "node": 3, "charge": 0.16}
-    outcome = flown(fault, keys=("sensors.battery_hz=1", "duration_s=40"))
+    outcome = flown(fault, keys=("sensors.battery_hz=1", "duration_s=26"))
     left_s = {r.node: r.t_ns / S for r in outcome.records if isinstance(r, MissionModeChanged) and r.mode == "return"}
     assert set(left_s) == {3}
-    assert 8 <= left_s[3] <= 38
+    assert 8 <= left_s[3] <= 24
 
 
 def test_a_program_that_ends_says_nothing_and_takes_part_again_when_it_is_started_anew(stopped: Outcome) -> None:

@@ -52,7 +52,7 @@ def test_one_that_is_recalled_and_released_before_it_is_home_takes_part_again(
     make_scenario: Callable[..., Scenario],
 ) -> None:
     orders = {"at_s": AT_S, "order": "recall", "node": 3}, {"at_s": AT_S + 6, "order": "release", "node": 3}
-    records = flown(make_scenario, *orders, **{"world.base_m": (0.0, -220.0), "duration_s": 50})
+    records = flown(make_scenario, *orders, **{"world.base_m": (0.0, -220.0), "duration_s": 40})
     after = [mode for mode, t_s in modes(records, 3) if t_s > AT_S]
     assert after[0] == "recall"
     assert after[-1] in ("search", "respond")
@@ -79,7 +79,7 @@ def test_one_stays_over_a_place_and_the_nearest_that_can_be_spared_is_sent(one_s
 def test_one_searches_around_a_place_up_to_the_radius(make_scenario: Callable[..., Scenario]) -> None:
     order = {"at_s": 15, "order": "search", "node": 2, "place_m": (0.0, 0.0), "radius_m": 80.0}
     records = flown(
-        make_scenario, order, **{"sensors.camera_hz": 2.0, "sensors.camera_fov_deg": 90.0, "duration_s": 80}
+        make_scenario, order, **{"sensors.camera_hz": 2.0, "sensors.camera_fov_deg": 90.0, "duration_s": 70}
     )
     around = [one for t_s, one in track(records, 2).items() if t_s > 35]
     seen = [

@@ -177,7 +177,7 @@ def test_a_load_that_does_not_fit_is_told_with_the_one_that_does(nodes: int, int
 
 @pytest.mark.parametrize(
     ("nodes", "settings", "deadline_s"),
-    [(20, ("clusters.flooding_period_s=0.1",), None), (20, (), 0.2), (9, ("clusters.relay=all",), 0.3)],
+    [(20, ("clusters.flooding_period_s=0.1",), None), *slow((20, (), 0.2)), (9, ("clusters.relay=all",), 0.3)],
 )
 def test_the_change_that_it_proposes_makes_it_feasible(
     nodes: int, settings: tuple[str, ...], deadline_s: float | None
@@ -212,11 +212,14 @@ def test_a_swarm_in_parts_is_told_with_who_is_out_of_reach(relay: str) -> None:
     assert "come nearer" in text
 
 
+TWELVE = ("--set", *all_send(12))
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
     [
-        (("clusters", "--json"), 0, '"feasible": true'),
-        (("clusters", "--deadline", "0.5", "--json"), 1, '"clusters.flooding_period_s='),
+        (("clusters", *TWELVE, "--json"), 0, '"feasible": true'),
+        (("clusters", *TWELVE, "--deadline", "0.1", "--json"), 1, '"clusters.flooding_period_s='),
         (("convoy",), 0, "FEASIBLE  convoy"),
         (("rescue",), 0, "a round of"),
         (("rescue", "--deadline", "0.5"), 1, "not within the deadline of 500 ms"),
@@ -250,7 +253,7 @@ def test_a_lone_node_has_a_plan_though_it_is_heard_by_nobody(sources: str) -> No
     assert "loss" not in plan, "there is no link on which anything could be lost"
 
 
-NINE = ("nodes.count=9", "clusters.count=8", "traffic.sources=8", "duration_s=30", "warmup_s=12", "seed=2")
+NINE = ("nodes.count=9", "clusters.count=8", "traffic.sources=8", "duration_s=20", "warmup_s=12", "seed=2")
 
 
 def with_classes(*classes: dict[str, Any]) -> Scenario:

@@ -12,7 +12,7 @@ from sim.scenarios import catalog
 
 TWELVE = (
     "nodes.count=12", "clusters.count=11", "traffic.sources=11", "routing.protocol=rounds", "routing.lifetime_s=3",
-    "duration_s=10", "drain_s=4", "warmup_s=2",
+    "duration_s=8", "drain_s=3", "warmup_s=2",
 )  # fmt: skip
 
 

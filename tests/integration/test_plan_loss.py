@@ -15,7 +15,7 @@ LINE = ['nodes.layout="line"', "nodes.count=8", "clusters.count=7", "traffic.sou
 @pytest.mark.parametrize("spacing_m", [pytest.param(235, marks=pytest.mark.slow), 245])
 def test_no_more_is_lost_than_stated(spacing_m: float) -> None:
     settings = [*LINE, f"nodes.spacing_m={spacing_m}", "radio.noise_figure_db=10.5", "radio.sensitivity_dbm=-84"]
-    settings += ["duration_s=60", "traffic.interval_s=0.5", "clusters.resume=false"]  # what one flood loses
+    settings += ["duration_s=36", "traffic.interval_s=0.3", "clusters.resume=false"]  # what one flood loses
     scenario = catalog.find("clusters", settings)
     text, plan, _ = judge(scenario, change=False)
     assert "a packet misses a node with probability" in text
@@ -32,7 +32,7 @@ def test_a_timetable_that_counts_on_links_which_the_channel_does_not_carry_is_no
     text, plan, feasible = judge(catalog.find("clusters", far))
     assert not feasible
     assert "counts on links of up to 700 m, and this channel delivers up to" in " ".join(text.split())
-    flight = ["warmup_s=20", "duration_s=30", "drain_s=5"]
+    flight = ["warmup_s=16", "duration_s=22", "drain_s=2"]
     assert finish(simulate(catalog.find("clusters", [*far, *flight])), out=None)["pdr"] < 0.9
     change = plan["change"]["set"]
     assert any(setting.startswith("clusters.link_m=") for setting in change)

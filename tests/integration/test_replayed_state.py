@@ -24,7 +24,7 @@ RUNS = {
     "slots": ("quick", []),
     "turns": ("clusters", ["nodes.count=9", "clusters.count=8", "traffic.sources=9", "warmup_s=4", "drain_s=2"]),
 }
-SECONDS = (4, 8, 10)
+SECONDS = (4, 7, 8)
 
 
 class Witness(Observer):
@@ -72,7 +72,7 @@ def known(state: SwarmState, t_ns: int) -> dict[str, Any]:
 @pytest.mark.parametrize("name", RUNS)
 def test_what_is_replayed_is_what_was_observed(name: str, tmp_path: Path) -> None:
     base, words = RUNS[name]
-    words = [*words, "duration_s=12"]
+    words = [*words, "duration_s=9"]
     scenario = catalog.find(base, words)
     witness = Witness(SwarmState(scenario))
     simulate(scenario, observer=witness)

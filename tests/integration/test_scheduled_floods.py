@@ -41,7 +41,7 @@ def test_a_hello_that_waits_for_its_window_makes_nobody_send_again_what_all_have
     """It is made when it can go, 4 s apart; one that was made when it was due would not know of the last seconds."""
     sixteen = ["nodes.count=16", "traffic.sources=16", "clusters.count=15", "traffic.interval_s=0.2"]
     long = ["clusters.flooding_period_s=4", "clusters.contention_ms=20", "routing.hello_interval_s=2", "radio.cw_min=1"]
-    outcome = simulate(catalog.find("clusters", [*sixteen, *long, "duration_s=18", "warmup_s=4"]))
+    outcome = simulate(catalog.find("clusters", [*sixteen, *long, "duration_s=13", "warmup_s=4"]))
     assert [outcome.reports[f"agent-{node}"]["repaired"] for node in range(1, 17)] == [0] * 16
 
 

@@ -14,10 +14,12 @@ from fanet_mw.trace import Posed
 from sim.cli.app import app
 from sim.results.run_folder import RunFolder
 
+FEW = ("--set", "nodes.count=4", "clusters.count=1")
+
 
 def test_a_launcher_that_is_killed_leaves_no_process_and_a_whole_recording(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    words = ["launch", "quick", "--duration", "60", "--record", str(path), "--view", "--swarm", tmp_path.name]
+    words = ["launch", "quick", *FEW, "--duration", "60", "--record", str(path), "--view", "--swarm", tmp_path.name]
     with subprocess.Popen(
         [sys.executable, "-m", "fanet_mw", *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     ) as process:
@@ -48,7 +50,18 @@ def beside(swarm: str) -> list[str]:
 
 def test_a_swarm_of_processes_is_recorded_beside_it(tmp_path: Path) -> None:
     out = tmp_path / "run"
-    words = ["launch", "quick", "--duration", "9", "--out", str(out), "--record", str(tmp_path / "run.mcap"), "--json"]
+    words = [
+        "launch",
+        "quick",
+        *FEW,
+        "--duration",
+        "9",
+        "--out",
+        str(out),
+        "--record",
+        str(tmp_path / "run.mcap"),
+        "--json",
+    ]
     app(words, result_action="return_value")
     run = RunFolder(out)
     epoch_ns = run.summary["epoch_unix_ns"]
@@ -67,4 +80,4 @@ def test_a_swarm_of_processes_is_recorded_beside_it(tmp_path: Path) -> None:
     for key in both:
         assert seen[key] == pytest.approx(posed[key], abs=0.006)
     assert any("head of cluster" in message.message for topic, _, message in found if topic == "/log")
-    assert {"/metrics", "/links", "/uav/9/state"} <= {topic for topic, _, _ in found}
+    assert {"/metrics", "/links", "/uav/4/state"} <= {topic for topic, _, _ in found}

@@ -30,9 +30,13 @@ from sim.results.outcome import Outcome
 from sim.run.launcher.swarm import SwarmRun, launch
 from sim.scenarios import catalog
 
-FAST = ["duration_s=5", "warmup_s=2", "drain_s=1", "clusters.flooding_period_s=0.5", "radio.lead_ms=150"]
+FAST = [
+    "duration_s=5", "warmup_s=2", "drain_s=1", "clusters.flooding_period_s=0.5", "radio.lead_ms=150", "nodes.count=5",
+    "clusters.count=1",
+]  # fmt: skip
 """The lead is long, because these tests ask what happens and not whether a busy machine is on time."""
 FEW = ("--set", "nodes.count=3", "--set", "clusters.count=1")
+NINE = ("nodes.count=9", "clusters.count=2")
 PATIENCE_S = 90
 """How long to wait for what ends soon by itself: longer than any machine needs, shorter than a test may take."""
 
@@ -116,7 +120,7 @@ def test_links_are_measured_and_a_timetable_made_of_them_by_real_processes() -> 
 @pytest.mark.timeout(LIMIT_S)
 def test_a_swarm_of_processes_delivers_and_accounts_for_every_frame(tmp_path: Path) -> None:
     times = ["duration_s=7", "warmup_s=4"]  # 2 s are too short for the timetable with 7 of 24 seeds
-    outcome, _ = undisturbed(lambda slower: run(scenario(*times, slower))[0])
+    outcome, _ = undisturbed(lambda slower: run(scenario(*times, *NINE, slower))[0])
     summary = finish(outcome, out=tmp_path / "out")
     assert summary["mode"] == "realtime"
     assert summary["frames"]["closes"]
@@ -144,7 +148,7 @@ def test_a_killed_agent_is_named_and_the_others_carry_on() -> None:
 @pytest.mark.timeout(LIMIT_S)
 def test_a_killed_agent_is_started_again_with_respawn_and_takes_part() -> None:
     outcome, events = with_time_enough(
-        lambda slower: run(scenario("duration_s=6.5", slower), at_s=2, act=kill("agent-4"), respawn=True),
+        lambda slower: run(scenario("duration_s=6.5", *NINE, slower), at_s=2, act=kill("agent-4"), respawn=True),
         lambda found: found[0].reports["agent-4"]["role"] != "isolated",
     )
     assert outcome.aborted is None
@@ -194,7 +198,7 @@ def test_a_signal_to_all_processes_of_a_swarm_leaves_a_partial_result_that_close
     """
     out = tmp_path / "out"
     process = subprocess.Popen(
-        command("launch", "quick", "--set", "radio.lead_ms=150", "--out", str(out)), stdout=subprocess.PIPE,
+        command("launch", "quick", *FEW, "--set", "radio.lead_ms=150", "--out", str(out)), stdout=subprocess.PIPE,
         stderr=subprocess.PIPE, process_group=0,
     )  # fmt: skip
     assert process.stdout is not None
@@ -236,7 +240,7 @@ def at_start(number: int, *, services: bool, after_s: float = 0.0) -> tuple[int,
     With `services` that is some time after it has begun to start them, and else after its first moment.
     """
     process = subprocess.Popen(
-        command("launch", "quick"), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, process_group=0
+        command("launch", "quick", *FEW), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, process_group=0
     )
     assert process.stderr is not None
     wait_until_signals_are_handled(process.pid)

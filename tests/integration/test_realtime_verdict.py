@@ -28,7 +28,8 @@ from sim.run.launcher.swarm import SwarmRun, launch
 from sim.scenarios import catalog
 
 SHORT = ["duration_s=4", "warmup_s=1", "drain_s=0.5", "clusters.flooding_period_s=0.5", "world.engine=kinematic",
-         "radio.lead_ms=150"]  # fmt: skip
+         "radio.lead_ms=150", "nodes.count=5", "clusters.count=1"]  # fmt: skip
+NINE = ("nodes.count=9", "clusters.count=2")
 Act = Callable[[SwarmRun], None]
 
 
@@ -69,16 +70,18 @@ def about(summary: dict[str, Any], what: str) -> str:
 
 
 def test_a_run_whose_agents_were_all_killed_is_not_valid() -> None:
-    agents = [f"agent-{node}" for node in range(1, 10)]
+    agents = [f"agent-{node}" for node in range(1, 6)]
     _, summary = run(scenario(), (1.5, send(signal.SIGKILL, *agents)))
-    assert about(summary, "agent-").endswith("ended before the end, with signal SIGKILL: 9, limit 0")
+    assert about(summary, "agent-").endswith("ended before the end, with signal SIGKILL: 5, limit 0")
     assert summary["frames"]["closes"], "what they had asked for is accounted for all the same"
 
 
 @pytest.mark.timeout(LIMIT_S)
 def test_a_run_whose_emulator_was_killed_and_started_again_is_not_valid_and_says_what_is_missing() -> None:
     outcome, summary = with_time_enough(
-        lambda slower: run(scenario("duration_s=6", slower), (1.5, send(signal.SIGKILL, "emulator")), respawn=True),
+        lambda slower: run(
+            scenario("duration_s=6", *NINE, slower), (1.5, send(signal.SIGKILL, "emulator")), respawn=True
+        ),
         lambda found: found[0].reports["emulator"]["frames"]["delivered"] > 20 > found[1]["frames"]["in_flight"],
     )
     assert about(summary, "emulator ended")

@@ -20,8 +20,8 @@ from sim.results.replay import Replay
 from sim.run.virtual import actors_of
 
 KEYS = {
-    "nodes.count": 8, "nodes.spacing_m": 60, "nodes.altitude_m": 65, "duration_s": 30, "warmup_s": 1, "drain_s": 1,
-    "mission.survivors": 3, "mission.search": "lines", "mobility.model": "onboard", "world.area_m": 600,
+    "nodes.count": 5, "nodes.spacing_m": 60, "nodes.altitude_m": 65, "duration_s": 24, "warmup_s": 1, "drain_s": 1,
+    "mission.survivors": 3, "mission.search": "lines", "mobility.model": "onboard", "world.area_m": 400,
     "sensors.camera_hz": 2, "sensors.camera_fov_deg": 90, "clusters.relay": "counter", "radio.range_m": 250,
     "traffic.arrivals": "none",
 }  # fmt: skip
@@ -58,12 +58,12 @@ def test_positions_modes_tasks_and_coverage_come_back_from_the_trace_alone(
     assert mission(replay.scenario, replay.records) == summary["mission"]
     assert summary["mission"]["coverage"] > 0.5
     assert replay.coverage(scenario.duration_ns / S) == pytest.approx(summary["mission"]["coverage"], abs=1e-6)
-    assert replay.coverage(0) < replay.coverage(15) <= replay.coverage(30)
-    first, last = replay.at(0.0), replay.at(29.0)
+    assert replay.coverage(0) < replay.coverage(15) <= replay.coverage(24)
+    first, last = replay.at(0.0), replay.at(23.0)
     assert {state.mission for state in first.values()} == {""}
     assert {state.mission for state in last.values()} <= {"deploy", "search", "respond"}
     assert {state.flight for state in last.values()} == {"velocity"}
-    assert sorted(state.place for state in last.values()) == list(range(8))
+    assert sorted(state.place for state in last.values()) == list(range(5))
     assert {type(r) for r in replay.records} >= {Detected, Sighted}
 
 

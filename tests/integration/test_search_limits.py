@@ -10,7 +10,7 @@ from sim.scenarios import catalog
 
 def test_a_uav_whose_reserve_is_raised_above_its_charge_flies_home() -> None:
     scenario = catalog.find("rescue", [
-        "nodes.count=12", "nodes.spacing_m=60", "world.area_m=700", "mission.survivors=0", "duration_s=25",
+        "nodes.count=6", "nodes.spacing_m=60", "world.area_m=500", "mission.survivors=0", "duration_s=25",
         "traffic.arrivals=none", "sensors.battery_hz=1",
     ])  # fmt: skip
     state = SwarmState(scenario)

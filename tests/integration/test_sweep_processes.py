@@ -22,7 +22,7 @@ from sim.sweep.tasks import tasks_of
 FILE = """
 base = "flooding"
 seeds = 4
-set = {duration_s = 6, drain_s = 0.5, nodes.count = 9, traffic.interval_s = 0.1, traffic.sources = 8}
+set = {duration_s = 3, drain_s = 0.5, nodes.count = 9, traffic.interval_s = 0.1, traffic.sources = 8}
 grid = {routing.protocol = ["flooding", "gossip"]}
 """
 FANET = [sys.executable, "-m", "sim", "sweep"]

@@ -76,7 +76,7 @@ def test_one_file_of_another_run_is_enough_to_refuse(tmp_path: Path, name: str) 
 def test_force_removes_the_pictures_of_the_earlier_page_and_nothing_else_beside_them(tmp_path: Path) -> None:
     for seed in ("1", "2"):
         flags = ("--seed", seed, "--report", "--force", "--out", str(tmp_path))
-        assert fanet("simulate", "quick", "--set", "nodes.count=3", "clusters.count=1", *flags) == 0
+        assert fanet("simulate", "quick", "--set", "nodes.count=3", "clusters.count=1", "duration_s=8", *flags) == 0
         pictures = tmp_path / "pictures"
         assert {path.name.split("-")[1] for path in pictures.iterdir()} == {seed}, (
             "each page has its own pictures alone"

@@ -28,7 +28,7 @@ def flying(make_scenario: MakeScenario, seed: int = 1, **keys: Any) -> Flying:
 
 def misses_m(make_scenario: MakeScenario, **keys: Any) -> np.ndarray:
     """By how much UAVs miss the places to which they were sent [runs, 3]; one UAV of each run."""
-    return np.array([flying(make_scenario, seed, **keys).fly(30).at(1) - [100, 20, 40] for seed in range(12)])
+    return np.array([flying(make_scenario, seed, **keys).fly(22).at(1) - [100, 20, 40] for seed in range(10)])
 
 
 def test_a_uav_flies_to_where_its_gps_says_that_the_place_is(make_scenario: MakeScenario) -> None:
@@ -68,9 +68,9 @@ def test_without_gps_a_uav_lands_after_five_seconds_and_drifts_as_it_does(make_s
 
 def test_without_gps_the_wind_takes_a_uav_along_as_it_sinks(make_scenario: MakeScenario) -> None:
     """FlightTaskDescend of PX4 stays level: the velocity of the air is reached within m / (4 lambda w) = 7 s."""
-    out = {"sensors.gps_outages": ((0, 0, 9000, 25, 9000),)}
+    out = {"sensors.gps_outages": ((0, 0, 9000, 16, 9000),)}
     wind = {"world.engine": "rotors", "world.area_m": 2000.0, "world.wind_m_s": (8.0, 0.0)}
-    made = flying(make_scenario, **out, **wind).fly(30.1)
+    made = flying(make_scenario, **out, **wind).fly(21.1)
     before, sinks_s = made.at(1), 40 / 2 + 2
     made.fly(30)
     assert made.at(1)[2] < 0.5

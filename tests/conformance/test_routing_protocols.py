@@ -42,7 +42,7 @@ def scenario_of(protocol: str, *, destination: int | str, moving: bool = False) 
     times = {"duration_s": 22, "warmup_s": 10, "drain_s": 4} if moving else {}
     return config.build(
         {
-            "name": "small", "duration_s": 31, "warmup_s": 15, "drain_s": 6, **times,
+            "name": "small", "duration_s": 28, "warmup_s": 15, "drain_s": 5, **times,
             "nodes": {"count": 9, "layout": "grid", "columns": 3, "telemetry_hz": 0},
             "traffic": {"destination": destination, "payload_bytes": 300},
             "routing": {"protocol": protocol},

@@ -164,13 +164,15 @@ def test_a_survivor_in_the_open_is_confirmed_by_voice_alone_from_a_uav_that_goes
 
 
 def test_without_a_network_every_uav_searches_a_lane_of_its_own_and_no_two_touch() -> None:
-    cuts = [f"{{kind='degrade', at_s=0, src={a}, dst={b}, loss_share=1}}" for a, b in combinations(range(1, 13), 2)]
-    outcome = flown(lambda uav, _: uav, seconds=45, keys=[f"faults=[{', '.join(cuts)}]"])
+    cuts = [f"{{kind='degrade', at_s=0, src={a}, dst={b}, loss_share=1}}" for a, b in combinations(range(1, 8), 2)]
+    outcome = flown(
+        lambda uav, _: uav, seconds=42, keys=["nodes.count=7", "world.area_m=350", f"faults=[{', '.join(cuts)}]"]
+    )
     places = {record.node: record.place for record in outcome.records if isinstance(record, Planned)}
-    assert sorted(places.values()) == list(range(12))
+    assert sorted(places.values()) == list(range(7))
     found = mission_of(outcome)
     assert not found["collisions"]
-    assert found["coverage"] >= 0.99
+    assert found["coverage"] >= 0.98, "a lane that nobody searched would be a seventh"
 
 
 class Lost(Around):

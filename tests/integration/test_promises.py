@@ -93,7 +93,7 @@ def test_hellos_that_find_no_room_in_their_window_leave_the_first_turn_alone() -
     slow = ("radio.rate_mbps=2", "radio.cw_min=7", "clusters.contention_ms=20", "routing.hello_interval_s=1.57")
     grid = ("nodes.count=24", "nodes.columns=7", "nodes.spacing_m=169", "clusters.count=23", "traffic.sources=21")
     load = ("traffic.payload_bytes=275", "traffic.interval_s=0.146", "clusters.flooding_period_s=2.988")
-    rest = ("clusters.guard_ms=1", "warmup_s=8", "routing.lifetime_s=8", "drain_s=8", "seed=3", "duration_s=22")
+    rest = ("clusters.guard_ms=1", "warmup_s=8", "routing.lifetime_s=8", "drain_s=8", "seed=3", "duration_s=28")
     bound = summary_of(*slow, *grid, *load, *rest)["bound"]
     assert bound["deliveries"] > 5_000
     assert bound["violations"] == 0

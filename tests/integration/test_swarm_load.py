@@ -15,7 +15,7 @@ GRID = [
     "nodes.count=12",
     "clusters.count=11",
     "traffic.sources=11",
-    "duration_s=16",
+    "duration_s=30",
     "warmup_s=5",
     "clusters.reassign_s=0",
 ]
@@ -55,9 +55,9 @@ def test_a_load_that_is_forged_takes_nothing_from_others() -> None:
         )
 
     scenario = air_attacks.scenario(
-        "clusters.relay=scheduled", "clusters.load=heard", "clusters.flooding_period_s=0.5", "duration_s=26"
+        "clusters.relay=scheduled", "clusters.load=heard", "clusters.flooding_period_s=0.5", "duration_s=36"
     )
-    attacker = Attacker(air_attacks.EVIL, scenario.name, air_attacks.every(500, leap, end_s=22))
+    attacker = Attacker(air_attacks.EVIL, scenario.name, air_attacks.every(500, leap, end_s=32))
     reports: dict[str, Any] = {}
     summary = scenario_draws.run(scenario, limit_s=60, instead=[attacker], reports=reports)
     assert summary["frames"]["closes"]

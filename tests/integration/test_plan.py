@@ -219,7 +219,7 @@ TWELVE = ("--set", *all_send(12))
     ("arguments", "code", "said"),
     [
         (("clusters", *TWELVE, "--json"), 0, '"feasible": true'),
-        (("clusters", *TWELVE, "--deadline", "0.1", "--json"), 1, '"clusters.flooding_period_s='),
+        (("clusters", "--deadline", "0.5", "--json"), 1, '"clusters.flooding_period_s='),
         (("convoy",), 0, "FEASIBLE  convoy"),
         (("rescue",), 0, "a round of"),
         (("rescue", "--deadline", "0.5"), 1, "not within the deadline of 500 ms"),

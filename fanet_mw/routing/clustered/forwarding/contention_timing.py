@@ -23,7 +23,7 @@ class ContentionTiming:
         self.turns_at: Callable[[int], Turns | None] | None = None
         """Gives the superframe in force at an instant, or None: frames start at any time. None without turns."""
         self.most_jitter_ns: int | None = None
-        """The longest jitter; None if there is no limit."""
+        """The longest jitter in a window; None if there is no limit."""
         self._used_ns: dict[int, int] = {}
         """The airtime of this node's data in windows, by the starts of their superframes."""
 
@@ -31,7 +31,7 @@ class ContentionTiming:
         """The earliest start of a frame that was to be announced at `due_ns`, with a jitter up to `jitter_ns`. A
         process woken late loses that much of the lead, so that instants drawn apart stay apart.
         """
-        if self.most_jitter_ns is not None:
+        if self.most_jitter_ns is not None and self._turns(due_ns + self._lead_ns) is not None:
             jitter_ns = min(jitter_ns, self.most_jitter_ns)
         start_ns = max(due_ns + self._lead_ns + int(self._jitter() * jitter_ns), now_ns)
         return self.not_before(start_ns)

@@ -34,6 +34,16 @@ def in_windows(*, window: float = 0.0) -> ContentionTiming:
     return contention
 
 
+def test_jitter_is_cut_to_the_window_only_where_there_are_windows() -> None:
+    """Before the first timetable two relays of a join that do not hear each other would meet at the leader."""
+    contention = ContentionTiming(lead_ns=0, jitter=lambda: 0.5, window=lambda: 0.0)
+    contention.most_jitter_ns = 4 * MS
+    contention.turns_at = lambda _: None
+    assert contention.start_ns(due_ns=MS, now_ns=MS, jitter_ns=100 * MS) == 51 * MS
+    contention.turns_at = lambda _: Turns(0, 500 * MS, 20 * MS, 1 * MS, 480)
+    assert contention.start_ns(due_ns=MS, now_ns=MS, jitter_ns=100 * MS) == 3 * MS
+
+
 def test_a_quarter_of_a_window_is_for_one_nodes_data_and_the_rest_goes_later() -> None:
     contention = in_windows()
     assert [contention.with_room(400 * MS, 2 * MS) // MS for _ in range(5)] == [500, 500, 1000, 1000, 1500]

@@ -1894,7 +1894,7 @@ class MAVLink(object):
         hop_limit                 : Transmissions left, this one included. (type:uint8_t)
         hops                      : Transmissions before this one. (type:uint8_t)
         priority                  : 0 control, 1 safety, 2 survivor report, 3 bulk. (type:uint8_t)
-        flags                     : Bit 0: flooding phase. Bit 1: unicast towards a cluster head. Bit 2: another packet follows in the frame. Bit 3: the flood began in a turn of a timetable. (type:uint8_t)
+        flags                     : Bit 0: flooding phase. Bit 1: unicast towards a cluster head. Bit 2: another packet follows in the frame. Bit 3: the flood began in a turn of a timetable. Bit 4: its origin hears nobody. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """
@@ -1914,7 +1914,7 @@ class MAVLink(object):
         hop_limit                 : Transmissions left, this one included. (type:uint8_t)
         hops                      : Transmissions before this one. (type:uint8_t)
         priority                  : 0 control, 1 safety, 2 survivor report, 3 bulk. (type:uint8_t)
-        flags                     : Bit 0: flooding phase. Bit 1: unicast towards a cluster head. Bit 2: another packet follows in the frame. Bit 3: the flood began in a turn of a timetable. (type:uint8_t)
+        flags                     : Bit 0: flooding phase. Bit 1: unicast towards a cluster head. Bit 2: another packet follows in the frame. Bit 3: the flood began in a turn of a timetable. Bit 4: its origin hears nobody. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """

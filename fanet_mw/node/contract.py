@@ -29,6 +29,8 @@ class Port(Protocol):
     """The greatest error of any clock in the swarm, as far as this node knows; 0 if all clocks are exact."""
     velocity: Enu
     """The node's last known velocity [m/s]."""
+    deaf: bool
+    """True while the node hears nobody, which all that it sends then states (`FLAG_DEAF`)."""
 
     def transmit(self, frame: bytes, dst: NodeId, start_ns: int, wants_status: bool = False, until_ns: int = 0) -> int:
         """Announce a transmission to the radio; returns the sequence number of the request.

@@ -200,7 +200,7 @@ class Node:
             inner,
             destination=BROADCAST,
             priority=wire.PRIORITY_CONTROL,
-            flags=0,
+            flags=wire.FLAG_DEAF if self.port.deaf else 0,
             hop_limit=1,
             born_ns=start_ns,
         )

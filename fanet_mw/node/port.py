@@ -39,6 +39,7 @@ class NodePort:
         self.position = position
         self.velocity = STILL
         self.clock_error_ns = 0
+        self.deaf = False
         self.requests: list[TxRequest] = []
         self.records: list[Record] = []
         self.frames_sent = 0
@@ -85,11 +86,17 @@ class NodePort:
         return wire.rewrite(packet.frame, self.node, flags)
 
     def _relayed(self, packet: Packet) -> bytes:
-        return self.forwarded(packet, flags=wire.FLAG_FLOOD | (packet.header.flags & wire.FLAG_TURN))
+        kept = packet.header.flags & (wire.FLAG_TURN | wire.FLAG_DEAF)
+        return self.forwarded(packet, flags=wire.FLAG_FLOOD | kept)
 
     def _begun(self, packet: Packet, flags: int) -> bytes:
         """The bytes of a packet whose phase begins here: an own packet as it is, another node's with one more hop."""
+        flags |= self._deaf_flag if packet.header.origin == self.node else packet.header.flags & wire.FLAG_DEAF
         return wire.rewrite(packet.frame, self.node, flags, hop=0 if packet.header.origin == self.node else 1)
+
+    @property
+    def _deaf_flag(self) -> int:
+        return wire.FLAG_DEAF if self.deaf else 0
 
     def _share(self, packets: Sequence[tuple[int, bytes]], *, until_ns: int = 0) -> None:
         """Broadcast packets in as few frames as possible."""
@@ -123,7 +130,7 @@ class NodePort:
             inner,
             destination=destination,
             priority=wire.PRIORITY_CONTROL,
-            flags=flags,
+            flags=flags | self._deaf_flag,
             hop_limit=hop_limit,
             born_ns=now_ns,
         )

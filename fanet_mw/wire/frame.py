@@ -33,6 +33,8 @@ FLAG_MORE: Final = 4
 """Another packet with its own header follows in the same radio frame."""
 FLAG_TURN: Final = 8
 """The packet's flood began in a turn that its origin has by a timetable."""
+FLAG_DEAF: Final = 16
+"""The packet's origin had heard nobody for some time when it sent the packet."""
 
 PRIORITY_CONTROL: Final = 0
 PRIORITY_SAFETY: Final = 1

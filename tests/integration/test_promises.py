@@ -111,7 +111,7 @@ def test_a_relay_that_falls_mute_ends_promises_to_those_behind_it_and_its_own() 
     mute_s, known_s = 12, 5 * 1.4
     line = ("nodes.columns=1", "nodes.spacing_m=200", "radio.lead_ms=41", "clusters.flooding_period_s=1.4")
     mute = f'faults=[{{kind="mute", node=12, at_s={mute_s}}}]'
-    outcome = simulate(catalog.find("clusters", [*GRID, *line, mute, "traffic.interval_s=3", "duration_s=50"]))
+    outcome = simulate(catalog.find("clusters", [*GRID, *line, mute, "traffic.interval_s=3", "duration_s=54"]))
     given = {(r.origin, r.seq, r.node): r.t_ns for r in outcome.records if type(r) is Delivered}
     gone = {(r.node, r.seq, r.other) for r in outcome.records if type(r) is BoundExcludes}
     stated = [r for r in outcome.records if type(r) is BoundStated if r.t_ns > (mute_s + known_s) * S]
@@ -133,6 +133,25 @@ def test_a_node_that_hears_nothing_ends_promises_to_it() -> None:
     gone = {(r.node, r.seq) for r in outcome.records if type(r) is BoundExcludes and r.other == 8}
     assert any(r.t_ns < deaf_s * S for r in stated)
     assert [r for r in stated if r.t_ns > (deaf_s + known_s) * S and (r.node, r.seq) not in gone] == []
+
+
+def test_the_others_promise_again_without_a_node_that_hears_nothing() -> None:
+    """It was a relay, and went on to send, so that nobody called it lost: no bound was stated again."""
+    deaf_s, again_s = 17, 13
+    deaf = f'faults=[{{kind="deaf", node=8, at_s={deaf_s}}}]'
+    outcome = simulate(catalog.find("clusters", [*GRID, deaf, "duration_s=38", "drain_s=3"]))
+    late = [r for r in outcome.records if type(r) is BoundStated and r.t_ns > (deaf_s + again_s) * S]
+    made = [r for r in outcome.records if type(r) is Generated and r.t_ns > (deaf_s + again_s) * S and r.node != 8]
+    given = {(r.origin, r.seq, r.node): r.t_ns for r in outcome.records if type(r) is Delivered}
+    gone = {(r.node, r.seq, r.other) for r in outcome.records if type(r) is BoundExcludes}
+    broken = [
+        (r.node, r.seq, node) for r in late for node in range(1, 16)
+        if node != r.node and (r.node, r.seq, node) not in gone
+        and given.get((r.node, r.seq, node), math.inf) > r.t_ns + r.bound_ns
+    ]  # fmt: skip
+    assert broken == []
+    assert {node for _, _, node in gone if node != 8} == set(), "nobody else is given up"
+    assert len(late) > 0.9 * len(made)
 
 
 def test_a_node_that_hears_again_keeps_the_timetable_again() -> None:

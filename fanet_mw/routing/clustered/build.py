@@ -25,6 +25,7 @@ from fanet_mw.routing.clustered.relaying.all_and_counter import CounterRule, Rel
 from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
 from fanet_mw.routing.clustered.roles.assigned_roles import AssignedRoles, RoleParts
 from fanet_mw.routing.clustered.roles.contract import NoTimetable, Timetabling
+from fanet_mw.routing.clustered.roles.deafness import Deafness
 from fanet_mw.routing.clustered.roles.failover import Failover
 from fanet_mw.routing.clustered.roles.joining import Joining
 from fanet_mw.routing.clustered.roles.leader import Leader
@@ -193,6 +194,7 @@ def _by_timetable(ground: _Ground) -> Clustered:
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
         floods=ground.floods, roles=_roles(ground, parts, access, timetabling, heard), access=access, relaying=relaying,
         contending=contending, one_way=_way_beside_turns(ground), loads=heard, delays=delays, missing=ground.missing,
+        deafness=Deafness(port, hello_ns=ground.hello_ns),
     )  # fmt: skip
     return _protocol(ground, whole, parts.refresh, calls)
 

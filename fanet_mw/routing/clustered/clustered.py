@@ -28,11 +28,12 @@ from fanet_mw.routing.clustered.forwarding.uplink import MOST_TRIES, Uplink
 from fanet_mw.routing.clustered.links.heard_load import HeardLoads
 from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
 from fanet_mw.routing.clustered.roles.assigned_roles import AssignedRoles
+from fanet_mw.routing.clustered.roles.deafness import Deafness
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.missing_packets import MissingPackets
 from fanet_mw.routing.packet_repair import Repair
 from fanet_mw.units import BROADCAST, US, NodeId
-from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Kind
+from fanet_mw.wire import FLAG_DEAF, FLAG_FLOOD, FLAG_TO_HEAD, Kind
 from fanet_mw.wire.hello.beacon import Beacon
 from fanet_mw.wire.hello.digest import MESSAGE_BYTES as DIGEST_BYTES
 from fanet_mw.wire.hello.digest import Digest, capacity
@@ -58,6 +59,8 @@ class Parts(NamedTuple):
     """The loads of the nodes, as this node hears them; None if timetables are made for what the scenario says."""
     delays: StatedDelays | None = None
     """The delay bounds and likely delays of the node's packets; None if this access states no bound."""
+    deafness: Deafness | None = None
+    """Whether this node hears anybody; None where nobody has to know."""
     missing: MissingPackets | None = None
     """What the node lacks; only then do its hellos state what it has. None if they always do, or never."""
 
@@ -98,14 +101,18 @@ class Clustered(RoutingProtocol):
         parts, header = self.parts, packet.header
         origin_us, seq, origin, destination, _, kind, _, _, _, flags = header
         one_way = destination != BROADCAST and parts.one_way.takes(packet)
-        parts.roles.on_sign_of_life(origin, born_ns=origin_us * US, now_ns=now_ns)
+        self._on_frame(now_ns)
+        if flags & FLAG_DEAF and kind != _DATA:
+            return ()  # only its applications' packets are of use
+        if not flags & FLAG_DEAF:
+            parts.roles.on_sign_of_life(origin, born_ns=origin_us * US, now_ns=now_ns)
+            parts.one_way.learn(header, reception.src)
         if kind == _DATA:
             if parts.loads is not None:
                 parts.loads.on_packet(origin, seq, born_ns=origin_us * US, now_ns=now_ns)
             if parts.missing is not None:
                 parts.missing.receive(origin, seq, now_ns=now_ns)
         parts.floods.keep(packet, flooded=bool(flags & FLAG_FLOOD), now_ns=now_ns)
-        parts.one_way.learn(header, reception.src)
         if flags & FLAG_FLOOD:
             if one_way and parts.one_way.must_show(header, now_ns=now_ns):
                 parts.roles.show(now_ns)
@@ -146,7 +153,12 @@ class Clustered(RoutingProtocol):
     def least_interval_ns(self, deadline_ns: int) -> int | None:
         return None if self.parts.delays is None else self.parts.delays.least_interval_ns(deadline_ns)
 
+    def _on_frame(self, now_ns: int) -> None:
+        if self.parts.deafness is not None:
+            self.parts.deafness.on_frame(now_ns)
+
     def on_copy(self, key: int, src: NodeId, *, now_ns: int) -> None:
+        self._on_frame(now_ns)
         for pending, on_copy in self._hear_copies:
             if key in pending:
                 on_copy(key, now_ns=now_ns)
@@ -191,6 +203,8 @@ class Clustered(RoutingProtocol):
         parts = self.parts
         parts.gradient.advance(now_ns)
         route = parts.gradient.route(now_ns=now_ns)
+        if parts.deafness is not None:
+            parts.deafness.review(now_ns)
         parts.roles.before_hello(now_ns)
         inner = parts.roles.beacon(route, now_ns=now_ns).encode_frame(self._port.node)
         digest = None if parts.repair is None else self._digest(parts.repair, room - len(inner), now_ns)
@@ -210,6 +224,10 @@ class Clustered(RoutingProtocol):
         beacon = decoded(packet.frame, Beacon.decode_frame)
         if beacon.node != reception.src or beacon.head > count or beacon.leader > count:
             raise MalformedFrameError(f"beacon of {beacon.node}, head {beacon.head}, leader {beacon.leader}")
+        self._on_frame(now_ns)
+        if packet.header.flags & FLAG_DEAF:
+            parts.roles.on_deaf(reception.src, now_ns=now_ns)
+            return
         digest = decoded(packet.frame, Digest.decode_frames) if parts.repair else None
         neighbor = Neighbor(reception.src, now_ns, reception.rssi_dbm, beacon)
         parts.neighbors.on_hello(neighbor)

@@ -66,6 +66,10 @@ class Floods:
     def _access_ns(self, packet: Packet) -> int:
         return longest_access_ns(len(packet.frame), self._port.scenario.radio)
 
+    def beside_turns_ns(self, packets: Sequence[Packet], start_ns: int) -> int:
+        """When a frame with these packets may start that has no turn: in a window with room where others have turns."""
+        return self._contention.with_room(start_ns, max(self._access_ns(packet) for packet in packets))
+
     def begin(
         self, packets: Sequence[Packet], *, start_ns: int, again_ns: Sequence[int] = (), flags: int = FLAG_FLOOD
     ) -> None:

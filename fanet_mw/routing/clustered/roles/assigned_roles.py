@@ -127,8 +127,8 @@ class AssignedRoles:
         if join.instead_of:
             if parts.detector is not None:
                 parts.detector.on_report(NodeId(join.instead_of), now_ns=now_ns)
-            if join.instead_of == self._port.node != join.node:
-                self._timetabling.on_called_silent(now_ns)
+            if join.instead_of != join.node:
+                self._timetabling.on_called_silent(NodeId(join.instead_of), now_ns)
             self._do(parts.failover.on_stand_in(join, born_ns=born_ns, now_ns=now_ns), now_ns)
         if join.node == parts.membership.head:
             self._gradient.on_flood_of_head(NodeId(join.node), parent=src, hops=header.hops + 1, now_ns=now_ns)
@@ -173,6 +173,11 @@ class AssignedRoles:
         self.on_sign_of_life(neighbor.node, born_ns=born_ns, now_ns=now_ns)
         if parts.lease.fresh(now_ns):
             parts.refresh.on_beacon(neighbor.beacon, now_ns=now_ns)
+
+    def on_deaf(self, neighbor: NodeId, *, now_ns: int) -> None:
+        """A neighbor's hello states that it hears nobody."""
+        if self.parts.detector is not None:
+            self.parts.detector.on_deaf(neighbor, now_ns=now_ns)
 
     def on_flooding(self, due_ns: int) -> None:
         """An own application's packet will be flooded to all nodes from the instant `due_ns` on."""
@@ -264,6 +269,7 @@ class AssignedRoles:
         detector.on_report(silent, now_ns=now_ns)
         if self._leader is not None:
             self._leader.on_suspicion(silent, self._port.node, self.parts.joining.motion(now_ns), now_ns=now_ns)
+        self._timetabling.on_called_silent(silent, now_ns)
         self._join(now_ns, instead_of=silent)
 
     def beacon(self, route: RouteToHead | None, *, now_ns: int) -> Beacon:

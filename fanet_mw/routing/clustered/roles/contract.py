@@ -45,8 +45,8 @@ class Timetabling(Protocol):
     def must_show(self, now_ns: int) -> bool:
         """True if a flood of this node in its turn is to show the others that it keeps the timetable."""
 
-    def on_called_silent(self, now_ns: int) -> None:
-        """Another node has told all that it does not hear this one."""
+    def on_called_silent(self, node: NodeId, now_ns: int) -> None:
+        """It was told to all that a node, perhaps this one, is silent or hears nobody."""
 
     def notice_ns(self, now_ns: int) -> int:
         """How long ahead the leader must announce another schedule."""
@@ -78,7 +78,7 @@ class NoTimetable:
     def must_show(self, now_ns: int) -> bool:
         return False
 
-    def on_called_silent(self, now_ns: int) -> None: ...
+    def on_called_silent(self, node: NodeId, now_ns: int) -> None: ...
 
     def notice_ns(self, now_ns: int) -> int:
         return 0

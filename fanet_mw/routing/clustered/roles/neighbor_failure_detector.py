@@ -3,6 +3,8 @@
     no hello for 4 intervals, and no packet that the neighbor generated
         -> this node floods a join that reports it, unless another node has done so
         -> the neighbor objects and stays, or the leader makes a new timetable without it
+    a hello that states that the neighbor hears nobody (`deafness.py`)
+        -> the same at once
 
 A neighbor that has flown away objects, too, and is not reported again until a hello of it is heard. Without an
 objection it is reported again every 10 s for a minute, while no packets of it arrive; a node floods at most one report
@@ -31,12 +33,20 @@ class NeighborFailureDetector:
         self._silent_ns = int(SILENT_HELLOS * hello_ns)
         self._heard_ns: dict[NodeId, int] = {}
         self._reported_ns: dict[NodeId, int] = {}
+        self._deaf: set[NodeId] = set()
+        """The neighbors whose latest hello stated that they hear nobody."""
         self._next_ns = 0
         """The instant from which the node may report again."""
 
     def on_hello(self, node: NodeId, *, now_ns: int) -> None:
         self._heard_ns[node] = now_ns
         self._reported_ns.pop(node, None)
+        self._deaf.discard(node)
+
+    def on_deaf(self, node: NodeId, *, now_ns: int) -> None:
+        """A hello of a node was heard that hears nobody."""
+        self._heard_ns.setdefault(node, now_ns)
+        self._deaf.add(node)
 
     def on_report(self, node: NodeId, *, now_ns: int) -> None:
         """Some node, perhaps this one, has reported a node to the leader as silent."""
@@ -57,15 +67,18 @@ class NeighborFailureDetector:
         if self._hears_nobody(now_ns):
             return None
         for node in sorted(self._heard_ns, key=lambda node: (self._reported_ns.get(node, 0), node)):
-            quiet_ns = now_ns - self._heard_ns[node]
-            if quiet_ns < self._silent_ns:
+            quiet_ns, deaf = now_ns - self._heard_ns[node], node in self._deaf
+            if quiet_ns < self._silent_ns and not deaf:
                 continue
             sign_ns, reported_ns = self._liveness.last_ns(node) or 0, self._reported_ns.get(node)
             objected = reported_ns is not None and sign_ns > reported_ns
             if objected or quiet_ns > _FORGOTTEN_NS or not lists(node):
                 del self._heard_ns[node]
                 self._reported_ns.pop(node, None)
-            elif now_ns - sign_ns >= self._silent_ns and (reported_ns is None or now_ns - reported_ns >= _AGAIN_NS):
+                self._deaf.discard(node)
+            elif (deaf or now_ns - sign_ns >= self._silent_ns) and (
+                reported_ns is None or now_ns - reported_ns >= _AGAIN_NS
+            ):
                 if now_ns < self._next_ns:
                     return None
                 self._next_ns = now_ns + _LEAST_NS

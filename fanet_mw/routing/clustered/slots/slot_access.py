@@ -112,7 +112,8 @@ class SlotAccess:
         for packet in self._release.expire(before_us=horizon_us):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         for packet, start_ns in self._release.due(self._tenure, now_ns=now_ns) if self._tenure else ():
-            self._floods.begin([packet, *self._release.more(self._room(packet))], start_ns=start_ns)
+            packets = [packet, *self._release.more(self._room(packet))]
+            self._floods.begin(packets, start_ns=self._floods.beside_turns_ns(packets, start_ns))
 
     def _room(self, packet: Packet) -> int:
         """The number of bytes that are left for other packets in a frame with this one."""

@@ -41,9 +41,14 @@ class Followers:
         known = {self._node: since_ns} | self._known.get(version, {})
         return [node for node in nodes if node not in known or known[node] < since_ns]
 
-    def doubt(self, now_ns: int) -> None:
-        """A neighbor has told all that it does not hear this node."""
-        self._doubted_ns = now_ns
+    def doubt(self, node: NodeId, *, now_ns: int) -> None:
+        """A neighbor has told all that it does not hear a node, or that this hears nobody: it has to show again that it
+        keeps a timetable. If it is this one, it waits.
+        """
+        if node == self._node:
+            self._doubted_ns = now_ns
+        for known in self._known.values():
+            known.pop(node, None)
 
     def have(self, version: Version, nodes: Iterable[NodeId], *, silent_ns: int, now_ns: int) -> bool:
         """True if all these nodes have shown within `silent_ns` that they keep a version."""

@@ -22,7 +22,7 @@ from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesI
 from fanet_mw.routing.missing_packets import MissingPackets
 from fanet_mw.routing.packet_repair import Repair
 from fanet_mw.units import NodeId
-from fanet_mw.wire import FLAG_TURN, Kind
+from fanet_mw.wire import FLAG_DEAF, FLAG_TURN, Kind
 
 _MOST_LATE_TURNS: Final = 8
 """A frame that ends more turns after its own one is taken for none of its flood."""
@@ -108,7 +108,7 @@ class ScheduledRelaying:
     ) -> Sequence[Relay]:
         """The relays of this flood in turns to come; `heard_ns`: in the sender's turn, `end_ns`: of the reception."""
         offset, root, instance = heard
-        if packet.header.origin == root and packet.header.flags & FLAG_TURN:
+        if packet.header.origin == root and packet.header.flags & (FLAG_TURN | FLAG_DEAF) == FLAG_TURN:
             self._followers.hear(timetable.version, root, now_ns=now_ns)
         own = timetable.mine.get((root, instance), ())
         if not own:

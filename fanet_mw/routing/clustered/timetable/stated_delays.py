@@ -196,10 +196,6 @@ class StatedDelays:
     def _shown_ns(self, timetable: NodeTimetable) -> int:
         return max(self._hello_ns, timetable.turns.period_ns)
 
-    def on_called_silent(self, now_ns: int) -> None:
-        """A neighbor has told all that it does not hear this node."""
-        self._followers.doubt(now_ns)
-
     def greatest_bound_ns(self, packet: Packet, *, now_ns: int) -> int | None:
         """The greatest bound of this packet's class by the timetables in force; None if one gives none."""
         priority = packet.header.priority

@@ -9,6 +9,8 @@ class TimetablesInForce:
 
     def __init__(self) -> None:
         self.in_order: list[NodeTimetable] = []
+        self._left: Turns | None = None
+        """The superframe of the timetable that this node has given up, and others keep; None if it has not."""
 
     @property
     def newest(self) -> NodeTimetable | None:
@@ -22,7 +24,7 @@ class TimetablesInForce:
 
     def turns_at(self, t_ns: int) -> Turns | None:
         timetable = self.at(t_ns)
-        return None if timetable is None else timetable.turns
+        return self._left if timetable is None else timetable.turns
 
     def superseded(self, now_ns: int) -> int:
         """The number of timetables, the oldest first, that are no longer in force."""
@@ -33,7 +35,12 @@ class TimetablesInForce:
         of a leader over which another prevails.
         """
         if timetable is None:
-            self.in_order = []
+            self.in_order, self._left = [], None
             return
         before = (older for older in self.in_order[self.superseded(now_ns) :] if older.valid_ns < timetable.valid_ns)
         self.in_order = [*before, timetable]
+
+    def give_up(self) -> None:
+        """Forget all timetables, because this node hears nobody keep them: what it sends keeps out of others' turns."""
+        newest, self.in_order = self.newest, []
+        self._left = None if newest is None else newest.turns

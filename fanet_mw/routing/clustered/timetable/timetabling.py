@@ -90,13 +90,13 @@ class FromPlaces:
         """Who hears nobody in turns keeps no timetable: it would be taken for one that has what others flood."""
         if self._planned is not None and self._delays.hears_nobody(now_ns):
             self._planned = None  # the next announcement that is heard makes it anew
-            self._access.follow(None, now_ns=now_ns)
+            self._access.give_up(now_ns)
 
     def must_show(self, now_ns: int) -> bool:
         return self._access.must_show(now_ns)
 
-    def on_called_silent(self, now_ns: int) -> None:
-        self._delays.on_called_silent(now_ns)
+    def on_called_silent(self, node: NodeId, now_ns: int) -> None:
+        self._followers.doubt(node, now_ns=now_ns)
 
     def notice_ns(self, now_ns: int) -> int:
         return self._delays.notice_ns(now_ns)

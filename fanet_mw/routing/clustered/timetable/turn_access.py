@@ -85,9 +85,17 @@ class TurnAccess:
         if timetable is not None:
             timetable = timetable._replace(valid_ns=max(timetable.valid_ns, self._delays.kept_until_ns(now_ns)))
         self._timetables.follow(timetable, now_ns=now_ns)
+        self._change_turns(now_ns)
+
+    def give_up(self, now_ns: int) -> None:
+        """Keep no timetable, but out of the turns of those who do."""
+        self._timetables.give_up()
+        self._change_turns(now_ns)
+
+    def _change_turns(self, now_ns: int) -> None:
         self._delays.follow(now_ns=now_ns)
         self.use_turns(now_ns)
-        if timetable is None:
+        if self._timetables.newest is None:
             self._calls.drain()  # neighbors will state again what they lack
         stranded = [] if self._roots.has_turn(now_ns=now_ns) else self._stranded(now_ns)
         if not self._spare.has_turn(now_ns=now_ns):

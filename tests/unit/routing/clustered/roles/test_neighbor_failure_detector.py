@@ -90,3 +90,14 @@ def test_who_hears_nobody_any_more_is_deaf_or_alone_and_reports_nobody(
     liveness.on_sign_of_life(NodeId(8), born_ns=70 * S)
     detector.on_hello(OTHER, now_ns=66 * S)
     assert detector.find_suspect(everyone, now_ns=70 * S) == OTHER, "whoever hears somebody can tell who is silent"
+
+
+def test_a_neighbor_that_hears_nobody_is_told_of_at_once_until_it_hears_again(
+    detector: NeighborFailureDetector, liveness: Liveness
+) -> None:
+    """It goes on to send, so that it is never silent."""
+    liveness.on_sign_of_life(OTHER, born_ns=11 * S)
+    detector.on_deaf(OTHER, now_ns=12 * S)
+    assert detector.find_suspect(everyone, now_ns=12 * S) == OTHER
+    detector.on_hello(OTHER, now_ns=13 * S)
+    assert all(detector.find_suspect(everyone, now_ns=second * S) is None for second in range(13, 17))

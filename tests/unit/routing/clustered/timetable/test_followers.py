@@ -50,13 +50,21 @@ def test_a_node_that_falls_silent_is_no_longer_counted_and_counts_again_when_it_
 
 def test_a_node_that_others_call_silent_promises_nothing_for_a_while_or_until_the_next_timetable() -> None:
     followers = all_heard()
-    followers.doubt(1 * S)
+    followers.doubt(US, now_ns=1 * S)
     assert not have(followers, now_s=2)
     for node in (LEADER, OTHER):
         followers.hear(NOW, node, now_ns=16 * S)
     assert have(followers, now_s=16)
-    followers.doubt(17 * S)
+    followers.doubt(US, now_ns=17 * S)
     followers.follow(NEXT)
     for node in (LEADER, OTHER):
         followers.hear(NEXT, node, now_ns=18 * S)
     assert have(followers, NEXT, now_s=18)
+
+
+def test_a_node_that_others_call_silent_has_to_show_again_that_it_keeps_the_timetable() -> None:
+    followers = all_heard()
+    followers.doubt(OTHER, now_ns=1 * S)
+    assert not have(followers, now_s=1)
+    followers.hear(NOW, OTHER, now_ns=2 * S)
+    assert have(followers, now_s=2)

@@ -74,7 +74,7 @@ def test_no_bound_is_stated_where_hellos_do_not_fit_their_window(contention_ms: 
 def test_nobody_promises_by_the_timetable_of_a_leader_that_another_one_has_followed() -> None:
     """Five in a line; the second one falls, and with it the leader is lost. Three of them elect another one later."""
     outcome = flown(
-        seed=649573, duration_s=36,
+        seed=649573, duration_s=46,
         nodes={"count": 5, "layout": "grid", "columns": 5, "spacing_m": 210.0957427813038, "telemetry_hz": 0},
         traffic={"payload_bytes": 451, "interval_s": 2.7141770846806974, "sources": 4, "arrivals": "poisson"},
         radio={"standard": "b", "rate_mbps": 11, "cw_min": 7, "lead_ms": 11, "handover_ms": 11 / 3},

@@ -10,7 +10,7 @@ class TimetablesInForce:
     def __init__(self) -> None:
         self.in_order: list[NodeTimetable] = []
         self._left: Turns | None = None
-        """The superframe of the timetable that this node has given up, and others keep; None if it has not."""
+        """The superframe of the timetable that others may keep and this node does not; None if it would know."""
 
     @property
     def newest(self) -> NodeTimetable | None:
@@ -40,7 +40,9 @@ class TimetablesInForce:
         before = (older for older in self.in_order[self.superseded(now_ns) :] if older.valid_ns < timetable.valid_ns)
         self.in_order = [*before, timetable]
 
-    def give_up(self) -> None:
-        """Forget all timetables, because this node hears nobody keep them: what it sends keeps out of others' turns."""
+    def give_up(self, turns: Turns) -> None:
+        """Forget all timetables, because this node hears nobody keep them: what it sends keeps out of others' turns,
+        which are like `turns` if it has never had any.
+        """
         newest, self.in_order = self.newest, []
-        self._left = None if newest is None else newest.turns
+        self._left = (self._left or turns) if newest is None else newest.turns

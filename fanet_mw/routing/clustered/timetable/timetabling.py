@@ -88,7 +88,7 @@ class FromPlaces:
 
     def review(self, now_ns: int) -> None:
         """Who hears nobody in turns keeps no timetable: it would be taken for one that has what others flood."""
-        if self._planned is not None and self._delays.hears_nobody(now_ns):
+        if self._port.deaf or (self._planned is not None and self._delays.hears_nobody(now_ns)):
             self._planned = None  # the next announcement that is heard makes it anew
             self._access.give_up(now_ns)
 
@@ -151,6 +151,7 @@ class FromPlaces:
         """
         version = self._version
         due = version is not None and version == self._membership.version and version != self._planned
+        due = due and not self._port.deaf  # its own, as it leads in its opinion
         due = due and has_time(self._port.scenario.clock, clock_error_ns=self._port.clock_error_ns)
         if due and self._is_complete():
             self._planned = version

@@ -22,7 +22,7 @@ from fanet_mw.routing.clustered.timetable.resumed_floods import ResumedFloods
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
 from fanet_mw.routing.clustered.timetable.turn_release import CallRelease, RootRelease, TurnsInForce
-from fanet_mw.routing.clustered.timetable.turn_size import most_packet_bytes
+from fanet_mw.routing.clustered.timetable.turn_size import most_packet_bytes, superframe
 from fanet_mw.units import BROADCAST, US, S, earliest, seconds_to_ns
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TURN, PRIORITY_BULK, Kind
 
@@ -89,7 +89,7 @@ class TurnAccess:
 
     def give_up(self, now_ns: int) -> None:
         """Keep no timetable, but out of the turns of those who do."""
-        self._timetables.give_up()
+        self._timetables.give_up(superframe(self._port.scenario))
         self._change_turns(now_ns)
 
     def _change_turns(self, now_ns: int) -> None:

@@ -242,16 +242,16 @@ def test_the_tables_of_ns3_need_less_than_the_bound_of_nist() -> None:
 
 
 def test_short_frames_have_the_table_of_short_frames(make_scenario: MakeScenario) -> None:
-    """At 12 Mb/s and 2.2 dB a frame of 256 + 64 bytes arrives with 0.77^10; by the table of 1,458 bytes never."""
+    """At 12 Mb/s and 1.9 dB 65 bytes arrive with 0.63^2, by the table of 1,458 bytes never; 464 have that table."""
     keys = {"nodes.count": 2, **POWERS, "radio.standard": "g", "radio.rate_mbps": 12, "radio.ofdm_errors": "tables"}
     noise_dbm = -174 + 10 * math.log10(20e6) + 7
-    got = {256: 0, 400: 0}
-    for size in got:
-        air = Air(make_scenario(**keys), [0, metres(noise_dbm + 2.5)])
+    got = {}
+    for size, snr_db in ((1, 1.9), (400, 2.5)):
+        air = Air(make_scenario(**keys), [0, metres(noise_dbm + snr_db)])
         for i in range(300):
             air.send(1, (1 + 2 * i) * MS, payload=bytes(size))
         got[size] = len(receptions(air.run(1000 * MS)))
-    assert got[256] / 300 == pytest.approx((1 - 0.1182) ** 10, abs=0.09)
+    assert got[1] / 300 == pytest.approx((1 - 0.371) ** (65 / 32), abs=0.09)
     assert got[400] / 300 == pytest.approx(0.003 ** (464 / 1458), abs=0.09)
 
 

@@ -26,10 +26,10 @@ from fanet_mw.units import Enu
 
 REFERENCE_LOSS_DB: Final = 40.05
 """Free-space loss at 1 m and 2.4 GHz."""
-CELL_M: Final = 20.0
-_HALF_CELLS: Final = 16
+CELL_M: Final = 25.0
+_HALF_CELLS: Final = 18
 """The grid reaches this many cells to each side of its middle, which is at most `_OFF_CENTER_M` away from the place of
-the strongest received power."""
+the strongest received power: a phone is first received from up to 400 m, where shadowing is kind."""
 _WIDTH: Final = 2 * _HALF_CELLS + 1
 _EVERY_CELL: Final = (True,) * (_WIDTH * _WIDTH)
 _COLUMNS: Final = tuple(float(cell % _WIDTH) for cell in range(_WIDTH * _WIDTH))

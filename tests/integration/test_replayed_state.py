@@ -72,7 +72,7 @@ def known(state: SwarmState, t_ns: int) -> dict[str, Any]:
 @pytest.mark.parametrize("name", RUNS)
 def test_what_is_replayed_is_what_was_observed(name: str, tmp_path: Path) -> None:
     base, words = RUNS[name]
-    words = [*words, "duration_s=9"]
+    words = [*words, "duration_s=10"]
     scenario = catalog.find(base, words)
     witness = Witness(SwarmState(scenario))
     simulate(scenario, observer=witness)

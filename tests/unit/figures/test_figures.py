@@ -354,8 +354,8 @@ def test_a_run_has_a_page_with_its_delays_links_and_mission(scenario: str, tmp_p
     keys = [
         "nodes.count=9",
         "world.engine=kinematic",
-        "duration_s=11",
-        "warmup_s=5",
+        "duration_s=14",
+        "warmup_s=8",
         "drain_s=1",
         "traffic.sources=all",
     ]

@@ -1,13 +1,12 @@
 """Which applications on board are called for each input: those that implement its method, or asked for its port."""
 
 from collections.abc import Iterable, Sequence
-from typing import Final, NamedTuple, Self
+from typing import NamedTuple, Self
 
+from agents.submission import MOST_PORT, is_port
 from fanet_mw.application import ANY, Application
 from fanet_mw.errors import LocalProtocolError
 from fanet_mw.wire import CHUNK
-
-_LAST_PORT: Final = 0xFFFF
 
 
 class Callbacks(NamedTuple):
@@ -45,9 +44,9 @@ class Listeners:
             for message_id in application.listens if application.listens != ANY else ():
                 self._to_message.setdefault(message_id, []).append(application)
             for port in application.ports if application.ports != ANY else ():
-                if not (isinstance(port, int) and 1 <= port <= _LAST_PORT):
+                if not is_port(port):
                     raise LocalProtocolError(
-                        f"application {application.name!r}: ports has {port!r}, must be numbers in [1, {_LAST_PORT}]"
+                        f"application {application.name!r}: ports has {port!r}, must be numbers in [1, {MOST_PORT}]"
                     )
                 self._to_port.setdefault(port, []).append(application)
 

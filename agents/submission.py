@@ -13,10 +13,15 @@ from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.units import BROADCAST, NodeId
 from fanet_mw.wire.application_message import MAVLINK_PORT
 
-_MOST_PORT: Final = 0xFFFF
+MOST_PORT: Final = 0xFFFF
 _PRIORITIES: Final[Mapping[str | int, int]] = {
     key: number for name, number in wire.PRIORITIES.items() for key in (name, number)
 }
+
+
+def is_port(port: object) -> bool:
+    """True for the number of a port of an application."""
+    return isinstance(port, int) and 0 < port <= MOST_PORT
 
 
 class Submission(NamedTuple):
@@ -48,8 +53,8 @@ class Sending(NamedTuple):
             return MAVLINK_PORT, _as_frames(content)
         if isinstance(content, Data):
             port, data = content
-            if not isinstance(port, int) or not 0 < port <= _MOST_PORT:
-                raise LocalProtocolError(f"port = {port!r} must be in [1, {_MOST_PORT}]")
+            if not is_port(port):
+                raise LocalProtocolError(f"port = {port!r} must be in [1, {MOST_PORT}]")
             if not isinstance(data, bytes | bytearray | memoryview):
                 raise LocalProtocolError(f"content for port {port} must be bytes, not {type(data).__name__}")
             return port, bytes(data)

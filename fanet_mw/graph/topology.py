@@ -4,12 +4,15 @@
 """
 
 from collections.abc import Collection, Iterable, Mapping
-from typing import Final
+from typing import Final, TypeVar
 
 from fanet_mw.units import Enu, NodeId
 
 Adjacency = Mapping[NodeId, tuple[NodeId, ...]]
 """The neighbors of each node, ascending. Every node is a key; if b is a neighbor of a, then a is a neighbor of b."""
+
+N = TypeVar("N", bound=int)
+"""A node, or a place of a formation."""
 
 _MIN_CELL_M: Final = 1e-3
 
@@ -65,10 +68,10 @@ def two_hop(adjacency: Adjacency) -> dict[NodeId, tuple[NodeId, ...]]:
     return found
 
 
-def levels(adjacency: Adjacency, root: NodeId) -> dict[NodeId, int]:
-    """The number of hops from the root to each node, breadth first; nodes that cannot be reached are missing."""
-    hops = {root: 0}
-    frontier = [root]
+def levels(adjacency: Mapping[N, Iterable[N]], *roots: N) -> dict[N, int]:
+    """The hops from the nearest root to each node, breadth first; nodes that cannot be reached are missing."""
+    hops = dict.fromkeys(roots, 0)
+    frontier = list(roots)
     while frontier:
         following = []
         for node in frontier:

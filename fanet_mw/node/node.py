@@ -195,15 +195,7 @@ class Node:
         inner += self._protocol.hello_inner(most - len(inner), now_ns=now_ns)
         if time is not None and len(inner) + len(time) <= most:
             inner += time
-        packet = self._own.make(
-            Kind.HELLO,
-            inner,
-            destination=BROADCAST,
-            priority=wire.PRIORITY_CONTROL,
-            flags=wire.FLAG_DEAF if self.port.deaf else 0,
-            hop_limit=1,
-            born_ns=start_ns,
-        )
+        packet = self.port.announce(Kind.HELLO, inner, now_ns=start_ns, flags=0, hop_limit=1)
         request = self._protocol.send_hello(packet, start_ns=start_ns, wants_status=time is not None, now_ns=now_ns)
         return AnnouncedHello(request, packet.header.seq)
 

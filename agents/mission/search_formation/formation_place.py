@@ -114,9 +114,9 @@ class FormationPlace:
     def leads_to_gap(self, node: int, now_ns: int) -> bool:
         """True for a UAV that is fewer ties from those lost last than this one, while the swarm is apart."""
         plan, hops = self.plan, self._hops
-        own = math.inf if self.place is None else hops.get(self.place, math.inf)
         if plan is None or not self._apart or now_ns - self._closing_ns > _APART_S * S:
             return False
+        own = math.inf if self.place is None else hops.get(self.place, math.inf)
         return any(hops.get(place, math.inf) < own for place, holder in enumerate(plan.nodes) if holder == node)
 
     @property

@@ -3,7 +3,6 @@
 The words place, team, lane, relay and follower are explained in `shapes/contract.py`.
 """
 
-from collections import deque
 from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import pairwise
 from typing import Final, assert_never
@@ -16,6 +15,7 @@ from agents.mission.search_formation.shapes.lines import Lines
 from agents.mission.search_formation.shapes.ring import Ring
 from agents.mission.search_formation.shapes.sectors import Sectors
 from agents.mission.search_formation.shapes.spiral import Spiral
+from fanet_mw.graph.topology import levels
 from fanet_mw.units import STILL, Enu
 from fanet_mw.wire.search_plan import MOST_PLACES
 
@@ -121,14 +121,7 @@ class Pattern:
 
     def hops_from(self, gap: Collection[int]) -> dict[int, int]:
         """How many ties lead from each place to the nearest of these; a place that none leads to is not in it."""
-        hops, waiting = dict.fromkeys(gap, 0), deque(sorted(gap))
-        while waiting:
-            place = waiting.popleft()
-            for other in self._whole.tethers(place):
-                if other not in hops:
-                    hops[other] = hops[place] + 1
-                    waiting.append(other)
-        return hops
+        return levels({place: self._whole.tethers(place) for place in range(self.places)}, *gap)
 
     def _tied_to(self, place: int) -> list[int]:
         """The places to which a place is tied, vacant ones, too; where rows meet, whoever flies nearest to there."""

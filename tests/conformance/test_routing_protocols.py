@@ -69,14 +69,15 @@ def _flown(protocol: str, destination: int | str, moving: bool) -> tuple[Outcome
     return outcome, finish(outcome, out=None)
 
 
+LATER = {(protocol, "all") for protocol in ROUTED} | {("rounds", 1)}
 RUNS = [
     pytest.param(
         protocol, destination, moving,
-        marks=[pytest.mark.slow] if protocol in ROUTED and destination == "all" and moving else [],
+        marks=[pytest.mark.slow] if moving and (protocol, destination) in LATER else [],
     )
     for protocol in sorted(PROTOCOLS) for destination in (1, "all") for moving in (False, True)
 ]  # fmt: skip
-"""The routed ones flood what is for all as `flooding` does: moving, too, in the long run alone."""
+"""In the long run alone: the routed ones flood what is for all as `flooding` does, rounds carry all to everybody."""
 
 
 @pytest.mark.parametrize(("protocol", "destination", "moving"), RUNS)

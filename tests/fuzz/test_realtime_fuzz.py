@@ -24,6 +24,7 @@ def agent_or_fuzzer(*, scenario: Scenario, address: SwarmAddress, node: int, **o
     return 0
 
 
+@pytest.mark.slow
 def test_near_misses_off_a_real_time_air_end_no_process_and_close_the_books(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sim.run.launcher.services.run_agent", agent_or_fuzzer)
     times = ["duration_s=5", "warmup_s=1", "drain_s=1"]

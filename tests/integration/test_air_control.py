@@ -98,6 +98,7 @@ async def test_without_a_swarm_or_with_two_the_command_asks_for_the_name() -> No
             await asyncio.to_thread(operator_commands.change, endpoint, None, Restore(""))
 
 
+@pytest.mark.slow
 def test_a_scenarios_faults_are_the_same_in_every_run_of_a_seed() -> None:
     """In virtual time: what they do reaches the application, every frame is accounted for, the trace repeats."""
     changes = ["duration_s=10", "warmup_s=4", "drain_s=1", "mission.survivors=0"]

@@ -56,6 +56,7 @@ def test_with_time_beacons_every_packet_arrives_within_the_bound(offset_ms: int)
     assert summary["valid"], "what a node does not look at before it has the time was received, too"
 
 
+@pytest.mark.slow
 def test_a_plan_says_how_long_time_beacons_take_and_before_that_packets_are_lost() -> None:
     """Six nodes in a line, five hops, a hello every second: the slack of turns is less than clocks differ."""
     line = ["nodes.layout=line", "nodes.count=6", "clusters.count=5", "traffic.sources=5", "clock.sync=beacons",
@@ -70,6 +71,7 @@ def test_a_plan_says_how_long_time_beacons_take_and_before_that_packets_are_lost
         assert (finish(simulate(scenario), out=None)["pdr"] < 1) == told
 
 
+@pytest.mark.slow
 def test_with_gps_too() -> None:
     summary = summary_of(*SOON, "clock.sync=gps", "clock.offset_ms=50", "clock.gps_sigma_ns=1000")
     assert summary["pdr"] >= 0.999
@@ -106,6 +108,7 @@ def test_a_plan_and_the_nodes_state_the_same_bound_for_clocks_that_nothing_synch
     assert planned.bound.delay_ns / MS == pytest.approx(bound["worst_ms"], abs=0.001)
 
 
+@pytest.mark.slow
 def test_delays_in_the_trace_are_true_although_no_two_clocks_agree() -> None:
     """Offsets of up to a second would make delays negative, or seconds long, if nodes measured them."""
     outcome = outcome_of(*SOON, "clock.sync=none", "clusters.turn_slack_us=50", "clock.offset_ms=1000")

@@ -51,6 +51,7 @@ def test_two_that_meet_head_on_hit_without_warnings_and_pass_clear_with_them() -
     assert list(lines(outcome.records)) == list(lines(flown(PAIR)[0].records))
 
 
+@pytest.mark.slow
 def test_who_does_not_hear_the_other_is_told_of_it_over_a_third() -> None:
     deaf = {"at_s": 0, "kind": "degrade", "src": 2, "dst": 1, "both": False, "loss_share": 1.0}
     outcome, summary = flown([*PAIR, ABOVE], faults=(deaf,))

@@ -48,7 +48,8 @@ class Mortal(Actor):
         return self._actor.report()
 
 
-@pytest.mark.parametrize("die", [(2,), pytest.param((2, 3), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("die", [(2,), (2, 3)])
+@pytest.mark.slow
 def test_who_loses_its_computer_flies_home_by_itself_and_the_others_search_on(
     make_scenario: Callable[..., Scenario], monkeypatch: pytest.MonkeyPatch, die: tuple[int, ...]
 ) -> None:

@@ -62,6 +62,7 @@ def test_two_bulk_classes_at_one_node_are_a_problem_because_packets_that_come_to
     assert (refused == 0) == apart
 
 
+@pytest.mark.slow
 def test_nodes_that_join_later_make_the_way_too_long_for_the_deadline() -> None:
     """Of nine in a line two come late: a packet of node 2 then has to go as far as one did in a line of eight."""
     few, many = bound_s(7), bound_s(8)

@@ -72,6 +72,7 @@ class Burst(Application):
         self.told.append(status)
 
 
+@pytest.mark.slow
 def test_whose_bulk_is_refused_is_told_so_and_no_interval_that_is_for_reports() -> None:
     load = ["traffic.arrivals=cbr", "traffic.interval_s=0.02", "traffic.payload_bytes=1000", "traffic.deadline_s=1"]
     burst = Burst()

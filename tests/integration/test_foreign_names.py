@@ -6,7 +6,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from kit import slow
 
 ROOT = Path(__file__).parents[2]
 
@@ -22,13 +21,12 @@ def run(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
     ("package", "kind"),
     [
         ("emulator", "module"),
-        *slow(
-            ("agents", "package"), ("sim", "folder"),
+        ("agents", "package"), ("sim", "folder"),
             ("agents", "folder"), ("agents", "module"), ("sim", "package"), ("sim", "module"), ("emulator", "package"),
             ("emulator", "folder"),
-        ),
     ],
 )  # fmt: skip
+@pytest.mark.slow
 def test_a_package_of_ones_own_with_our_name_fails_the_tests_that_ask_for_a_swarm(
     tmp_path: Path, package: str, kind: str
 ) -> None:

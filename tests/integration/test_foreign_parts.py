@@ -41,24 +41,13 @@ def test_a_protocol_that_breaks_the_contract_is_told(installed: Installed, tmp_p
     assert "TestSilent::test_a_connected_swarm_at_rest_gets_nearly_all[all]" in ended.stdout
 
 
-def test_five_parts_of_another_package_serve_a_run(installed: Installed, tmp_path: Path) -> None:
-    scenario = str(EXAMPLE / "scenario.toml")
-    ended = installed.run(
-        installed.fanet,
-        "simulate",
-        scenario,
-        "--set",
-        "nodes.count=9",
-        "--duration",
-        "14",
-        "--out",
-        "out",
-        "--json",
-        cwd=tmp_path,
-    )
-    assert ended.returncode == 0, ended.stderr
-    summary = json.loads(ended.stdout)
-    assert summary["pdr"] > 0.9
+def test_five_parts_of_another_package_serve_a_run(
+    installed: Installed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(installed.site)
+    extensions.load.cache_clear()
+    scenario = config.load(EXAMPLE / "scenario.toml", ["nodes.count=9", "duration_s=14"])
+    assert finish(simulate(scenario), out=tmp_path / "out")["pdr"] > 0.9
     reports = json.loads((tmp_path / "out" / "reports.json").read_text())
     assert len(reports["agent-1"]["applications"]["roll_call"]["heard"]) >= 7
     resolved = (tmp_path / "out" / "scenario.toml").read_text()

@@ -39,6 +39,7 @@ def test_within_reach_the_post_knows_of_a_find_at_once_and_gets_all_load(
     assert {r.place for r in plans if r.t_ns < 10 * S} == {0, 1, 2, 3}, "it takes no place in the formation"
 
 
+@pytest.mark.slow
 def test_a_post_out_of_reach_learns_of_a_find_from_the_uavs_that_come_home(
     make_scenario: Callable[..., Scenario],
 ) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import pytest
+from kit import slow
 
 from fanet_mw import mavlink
 from fanet_mw.bus.messages import MavlinkTap
@@ -153,7 +154,7 @@ def test_a_mission_uploaded_to_a_uav_two_hops_away_is_flown() -> None:
     assert at == pytest.approx((300, 100, 20), abs=15)
 
 
-@pytest.mark.parametrize("protocol", ["flooding", "rounds"])
+@pytest.mark.parametrize("protocol", [*slow("flooding"), "rounds"])
 def test_telemetry_comes_at_the_stated_pace_from_every_uav_and_stops_with_the_operator(protocol: str) -> None:
     from agents.ground_control.telemetry_pace import pace_of
 
@@ -264,18 +265,14 @@ FAULTS = {
     ],
 }  # fmt: skip
 """`loss`: every link loses a tenth of its frames; `cuts`: each UAV is off the air for 2 of every 10 s."""
-slow = pytest.mark.slow
 
 
 @pytest.mark.timeout(1200)
-@pytest.mark.parametrize("faults", [*FAULTS])
+@pytest.mark.parametrize("faults", ["-", "loss", *slow("cuts")])
 @pytest.mark.parametrize(
     ("protocol", "count"),
-    [
-        ("flooding", 1), pytest.param("flooding", 9, marks=slow), pytest.param("flooding", 45, marks=slow),
-        ("rounds", 1), pytest.param("rounds", 9, marks=slow), pytest.param("rounds", 45, marks=slow),
-    ],
-)  # fmt: skip
+    [("rounds", 1), *slow(("flooding", 1), ("flooding", 9), ("flooding", 45), ("rounds", 9), ("rounds", 45))],
+)
 def test_how_long_commands_take(protocol: str, count: int, faults: str, capsys: pytest.CaptureFixture[str]) -> None:
     """The figures of docs/how-to/ground-stations.md: a row of its table each."""
     side = math.ceil(math.sqrt(count))

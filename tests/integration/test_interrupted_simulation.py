@@ -10,7 +10,6 @@ import time
 from pathlib import Path
 
 import pytest
-from kit import slow
 from rich.console import Console
 
 from fanet_mw.units import MS, S
@@ -39,7 +38,8 @@ def interrupt(out: Path, *arguments: str, number: int = signal.SIGINT) -> tuple[
     return process.returncode, said, err
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, *slow(signal.SIGINT)])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.slow
 def test_an_interrupted_simulation_keeps_its_partial_result(tmp_path: Path, number: signal.Signals) -> None:
     as_json = number is signal.SIGTERM
     code, out, err = interrupt(tmp_path, *(("--json",) if as_json else ()), number=number)

@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+from kit import slow
 
 from fanet_mw.errors import ConfigError
 from sim.run.launcher import limits
@@ -13,7 +14,7 @@ from sim.run.launcher import limits
 @pytest.mark.parametrize(
     ("limit", "what"),
     [
-        ("ulimit -n 40", "11 processes need 81 open files in the launcher; the limit is 40 (ulimit -n)"),
+        *slow(("ulimit -n 40", "11 processes need 81 open files in the launcher; the limit is 40 (ulimit -n)")),
         ("ulimit -v 600000", "needs 760 MB of address space, and may have less (ulimit -v)"),
     ],
 )
@@ -36,6 +37,7 @@ def test_a_soft_limit_of_open_files_is_raised_as_far_as_needed(monkeypatch: pyte
         limits.prepare(processes=48)
 
 
+@pytest.mark.slow
 def test_thousands_of_processes_are_announced_before_they_start() -> None:
     shell = f"ulimit -n 4000; exec {sys.executable} -m sim.cli.app launch quick --set nodes.count=3000"
     done = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, timeout=60, check=False)

@@ -43,6 +43,7 @@ def test_each_packet_over_lossy_links_arrives_within_what_was_stated_for_it(loss
     assert not any(isinstance(record, BoundStated) for record in outcome.records)
 
 
+@pytest.mark.slow
 def test_once_the_leader_plans_without_a_lost_node_likely_delays_are_stated_again() -> None:
     lost = 'faults=[{kind="mute", node=12, at_s=24}]'
     outcome = simulate(scenario(*LOSSY, lost, "duration_s=70"))

@@ -4,7 +4,6 @@ import json
 from collections.abc import Mapping
 
 import pytest
-from kit import slow
 
 from fanet_mw.scenario import config
 from fanet_mw.trace import Delivered, FlightModeChanged, Generated, MissionModeChanged, Posed, RadioFault
@@ -59,6 +58,7 @@ def test_who_crashes_falls_and_its_radio_dies_on_the_ground() -> None:
     assert summary["frames"]["closes"]
 
 
+@pytest.mark.slow
 def test_a_weak_battery_takes_a_uav_home() -> None:
     fault = {"at_s": 8, "kind": "battery", "node": 3, "charge": 0.16}
     outcome = flown(fault, keys=("sensors.battery_hz=1", "duration_s=26"))
@@ -67,6 +67,7 @@ def test_a_weak_battery_takes_a_uav_home() -> None:
     assert 8 <= left_s[3] <= 24
 
 
+@pytest.mark.slow
 def test_a_program_that_ends_says_nothing_and_takes_part_again_when_it_is_started_anew(stopped: Outcome) -> None:
     outcome = stopped
     assert set(begun(outcome)) == {(7.0, 3, "stop", True), (15.0, 3, "stop", False), (15.0, 5, "stop", True)}
@@ -80,7 +81,8 @@ def test_a_program_that_ends_says_nothing_and_takes_part_again_when_it_is_starte
     assert summary["copies"]["closes"]
 
 
-@pytest.mark.parametrize("offset_m", [[30, 0, 0], *slow(None)])
+@pytest.mark.parametrize("offset_m", [[30, 0, 0], None])
+@pytest.mark.slow
 def test_a_receiver_that_is_wrong_leads_astray_and_one_that_is_silent_says_nothing(
     plain: Outcome, offset_m: list[int] | None
 ) -> None:

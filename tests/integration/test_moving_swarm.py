@@ -52,6 +52,7 @@ def test_a_timetable_promises_nothing_to_uavs_that_move_among_each_other() -> No
     assert not bound.get("stated_share")
 
 
+@pytest.mark.slow
 def test_heads_that_change_under_a_timetable_lose_no_account_of_a_frame() -> None:
     flight = Flight("random_waypoint", 4, 6, area_m=600, duration_s=22)
     summary, epochs = flight.summary(count=4, reassign_s=5, contention_ms=150)

@@ -104,6 +104,7 @@ def test_a_result_folder_runs_again_after_it_was_moved_and_its_map_is_gone(tmp_p
         config.load(moved / "scenario.toml")
 
 
+@pytest.mark.slow
 def test_a_sweep_runs_again_what_ran_with_another_plug_in_or_another_helper_of_it(tmp_path: Path) -> None:
     (tmp_path / "talk.py").write_text(PLUG_IN)
     (tmp_path / "s.toml").write_text(

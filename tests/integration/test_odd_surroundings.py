@@ -30,7 +30,8 @@ def fanet(
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("closing", [">&-", *slow("<&- >&- 2>&-")])
+@pytest.mark.parametrize("closing", [">&-", "<&- >&- 2>&-"])
+@pytest.mark.slow
 def test_a_result_is_whole_when_standard_streams_are_closed(tmp_path: Path, closing: str) -> None:
     """The first file that is opened would otherwise be the standard output."""
     done = fanet("simulate", *SHORT, "--out", str(tmp_path / "out"), closing=closing)
@@ -46,8 +47,7 @@ def test_a_result_is_whole_when_standard_streams_are_closed(tmp_path: Path, clos
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
 @pytest.mark.parametrize(
-    "arguments",
-    [("scenarios",), ("simulate", *SHORT, "--json"), pytest.param(("plan", "quick", "--json"), marks=pytest.mark.slow)],
+    "arguments", [("scenarios",), *slow((("simulate", *SHORT, "--json"),), (("plan", "quick", "--json"),))]
 )
 def test_a_full_disk_under_the_standard_output_is_one_sentence(arguments: tuple[str, ...]) -> None:
     done = fanet(*arguments, closing="> /dev/full")
@@ -64,15 +64,20 @@ def test_a_file_that_does_not_fit_is_not_left_behind_cut(tmp_path: Path) -> None
     assert list(tmp_path.iterdir()) == []
 
 
-def test_brackets_in_names_are_no_markup(tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_brackets_in_the_name_of_a_folder_are_no_markup(tmp_path: Path) -> None:
     out = tmp_path / "x[/b]"
     done = fanet("simulate", *SHORT, "--out", str(out))
     assert (done.returncode, done.stderr) == (0, "")
     assert f"written to {out}\n" in done.stdout
+
+
+def test_brackets_in_names_are_no_markup() -> None:
     done = fanet("simulate", "[bold].toml")
     assert done.stderr == "fanet: [bold].toml: cannot be read: No such file or directory\n"
 
 
+@pytest.mark.slow
 def test_a_folder_for_temporary_files_with_too_long_a_name_is_one_sentence(tmp_path: Path) -> None:
     long = tmp_path / ("d" * 100)
     long.mkdir()
@@ -82,6 +87,7 @@ def test_a_folder_for_temporary_files_with_too_long_a_name_is_one_sentence(tmp_p
     assert f"TMPDIR = {long}" in done.stderr
 
 
+@pytest.mark.slow
 def test_without_docstrings_help_says_what_is_missing() -> None:
     assert "python -OO has removed" in fanet("simulate", "--help", flags=("-OO",)).stderr
 

@@ -4,6 +4,7 @@ from functools import lru_cache
 from typing import Any
 
 import pytest
+from kit import slow
 
 from fanet_mw.application import Application, Data
 from fanet_mw.units import S
@@ -20,7 +21,7 @@ def summary_of(*settings: str) -> dict[str, Any]:
     return finish(simulate(catalog.find("clusters", [*GRID, *settings])), out=None)
 
 
-@pytest.mark.parametrize(("relay", "p50_ms", "worst_ms"), [("counter", 2, 30), ("scheduled", 10, 60)])
+@pytest.mark.parametrize(("relay", "p50_ms", "worst_ms"), [("counter", 2, 30), *slow(("scheduled", 10, 60))])
 def test_a_packet_for_a_neighbor_is_one_frame_and_does_not_wait(relay: str, p50_ms: float, worst_ms: float) -> None:
     chosen = f"clusters.relay={relay}"
     silent, found = summary_of(chosen, "traffic.sources=0", "traffic.arrivals=none"), summary_of(chosen, *TO_ONE)
@@ -61,7 +62,7 @@ class Courier(Application):
         self.port.send(Data(1, bytes(12_000)), confirm=self._confirm, lifetime_ns=30 * S)
 
 
-@pytest.mark.parametrize("relay", ["counter", "scheduled"])
+@pytest.mark.parametrize("relay", [*slow("counter"), "scheduled"])
 def test_a_message_that_all_confirm_takes_less_than_twice_the_frames(relay: str) -> None:
     scenario = catalog.find(
         "clusters", [*GRID, f"clusters.relay={relay}", "traffic.sources=0", "traffic.arrivals=none", "duration_s=24"]

@@ -48,6 +48,7 @@ def test_all_fly_home_and_land_when_they_are_recalled(
     assert not [r for r in records if isinstance(r, Collided)]
 
 
+@pytest.mark.slow
 def test_one_that_is_recalled_and_released_before_it_is_home_takes_part_again(
     make_scenario: Callable[..., Scenario],
 ) -> None:
@@ -76,6 +77,7 @@ def test_one_stays_over_a_place_and_the_nearest_that_can_be_spared_is_sent(one_s
     assert [mode for mode, _ in modes(one_stays, chosen)][-1] == "errand"
 
 
+@pytest.mark.slow
 def test_one_searches_around_a_place_up_to_the_radius(make_scenario: Callable[..., Scenario]) -> None:
     order = {"at_s": 15, "order": "search", "node": 2, "place_m": (0.0, 0.0), "radius_m": 80.0}
     records = flown(

@@ -3,6 +3,7 @@
 from typing import Any
 
 import pytest
+from kit import slow
 
 from fanet_mw.scenario import Scenario
 from sim.planner.answer import judge
@@ -22,7 +23,7 @@ def planned(*settings: str) -> tuple[Scenario, dict[str, Any], bool]:
     return scenario, content, feasible
 
 
-@pytest.mark.parametrize(("interval_s", "fits"), [(0.1, True), (0.05, False)])
+@pytest.mark.parametrize(("interval_s", "fits"), [(0.1, True), *slow((0.05, False))])
 def test_bulk_that_the_slots_of_rounds_carry_arrives_and_more_does_not(interval_s: float, *, fits: bool) -> None:
     scenario, content, feasible = planned(*TWELVE, f"traffic.interval_s={interval_s}")
     load = content["bulk"]
@@ -32,7 +33,7 @@ def test_bulk_that_the_slots_of_rounds_carry_arrives_and_more_does_not(interval_
     assert (pdr > 0.999) == fits, (pdr, load)
 
 
-@pytest.mark.parametrize(("interval_s", "fits"), [(0.15, True), (0.09, False)])
+@pytest.mark.parametrize(("interval_s", "fits"), [(0.15, True), *slow((0.09, False))])
 def test_urgent_packets_that_overfill_the_turns_though_their_bytes_do_not_are_no_plan(
     interval_s: float, *, fits: bool
 ) -> None:
@@ -57,6 +58,7 @@ def test_a_timetable_is_no_plan_for_uavs_that_move_among_each_other() -> None:
     assert "change" not in content, "nothing that is searched makes it feasible"
 
 
+@pytest.mark.slow
 def test_for_relays_that_contend_a_change_is_sought_though_they_move() -> None:
     moving = ("nodes.count=12", "clusters.count=4", "mobility.model=random_waypoint", "mobility.speed_m_s=5")
     _, content, feasible = planned(*moving, "clusters.relay=counter", "traffic.sources=11", "traffic.interval_s=0.1")

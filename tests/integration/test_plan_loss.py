@@ -25,6 +25,7 @@ def test_no_more_is_lost_than_stated(spacing_m: float) -> None:
     assert lost > 0.1 * stated
 
 
+@pytest.mark.slow
 def test_a_timetable_that_counts_on_links_which_the_channel_does_not_carry_is_not_feasible() -> None:
     """With such a range floods end where the timetable sends no relay; a shorter `link_m` makes all of them arrive."""
     far = ["nodes.count=9", "nodes.columns=3", "nodes.spacing_m=210", "clusters.count=8", "traffic.sources=8",

@@ -66,6 +66,7 @@ def test_bounds_hold_the_lead_and_the_handover(handover_ms: int) -> None:
     assert 0.7 < bound["observed_max_ms"] / bound["worst_ms"] <= 1 - 30 / bound["worst_ms"], "a lead is for the receipt"
 
 
+@pytest.mark.slow
 def test_load_that_begins_before_the_timetable_keeps_no_bounds_away() -> None:
     """The turns carry just the load: what waited when they began stayed ahead of all that followed."""
     turns = ("clusters.flooding_period_s=2", "clusters.turn_slack_us=20", "clusters.contention_ms=20", "radio.cw_min=1")
@@ -90,6 +91,7 @@ def test_new_timetables_break_no_promise() -> None:
     assert bound["violations"] == 0
 
 
+@pytest.mark.slow
 def test_hellos_that_find_no_room_in_their_window_leave_the_first_turn_alone() -> None:
     """Drawn by the fuzz (seed 110): in some of the windows hellos took longer than their mean."""
     slow = ("radio.rate_mbps=2", "radio.cw_min=7", "clusters.contention_ms=20", "routing.hello_interval_s=1.57")
@@ -101,6 +103,7 @@ def test_hellos_that_find_no_room_in_their_window_leave_the_first_turn_alone() -
     assert bound["violations"] == 0
 
 
+@pytest.mark.slow
 def test_reports_that_are_sent_as_bulk_and_longer_than_the_traffic_are_carried() -> None:
     keys = ['mission.report_priority="bulk"', "mission.report_bytes=1500", "traffic.payload_bytes=128"]
     reports = summary_of("mission.survivors=30", "mission.report_interval_s=2", *keys)["reports"]
@@ -141,6 +144,7 @@ def test_a_node_that_hears_nothing_ends_promises_to_it() -> None:
     assert [r for r in stated if r.t_ns > (deaf_s + known_s) * S and (r.node, r.seq) not in gone] == []
 
 
+@pytest.mark.slow
 def test_the_others_promise_again_without_a_node_that_hears_nothing() -> None:
     """It was a relay, and went on to send, so that nobody called it lost: no bound was stated again."""
     deaf_s, again_s = 17, 13
@@ -170,6 +174,7 @@ def test_a_node_that_never_hears_anybody_keeps_out_of_the_turns_of_others() -> N
     assert bound["violations"] == 0
 
 
+@pytest.mark.slow
 def test_a_node_that_hears_again_keeps_the_timetable_again() -> None:
     """It gives the timetable up after 5 s; after 10 s the leader would make another one without it."""
     deaf = 'faults=[{kind="deaf", node=8, at_s=17, for_s=7}]'
@@ -179,6 +184,7 @@ def test_a_node_that_hears_again_keeps_the_timetable_again() -> None:
     assert outcome.reports["agent-8"]["epoch"] == outcome.reports["agent-3"]["epoch"]
 
 
+@pytest.mark.slow
 def test_nodes_that_beacons_have_not_reached_yet_end_no_promise_of_others() -> None:
     """Drawn by the fuzz (seed 108): two nodes at the end of the way of the time have no timetable for long. What they
     send in contention is heard in their turns at times, and shows nothing.
@@ -192,6 +198,7 @@ def test_nodes_that_beacons_have_not_reached_yet_end_no_promise_of_others() -> N
     assert bound["violations"] == 0
 
 
+@pytest.mark.slow
 def test_nodes_that_have_not_the_time_yet_stay_out_of_the_turns_of_others() -> None:
     """With clocks up to 60 ms apart, nodes at the end of a line would send in turns of others for some 30 s."""
     clock = ("clock.sync=beacons", "clock.offset_ms=30", "clock.drift_ppm=15", "clusters.turn_slack_us=400")

@@ -113,10 +113,12 @@ def test_the_densest_traffic_that_a_scenario_may_ask_for_is_carried_or_counted()
 
 @pytest.mark.parametrize("keys", [
     ("clusters.relay=scheduled", "radio.max_frame_bytes=680", "duration_s=8"),
-    ("clusters.relay=scheduled", "clusters.links=measured", "radio.max_frame_bytes=996"),
-    ("clusters.relay=counter", "clusters.repair_s=5", "radio.max_frame_bytes=385"),
     ("radio.max_frame_bytes=302",),
-    ("clusters.relay=counter", "clusters.repair_s=0", "radio.max_frame_bytes=302", "clock.sync=beacons"),
+    *slow(
+        (("clusters.relay=scheduled", "clusters.links=measured", "radio.max_frame_bytes=996"),),
+        (("clusters.relay=counter", "clusters.repair_s=5", "radio.max_frame_bytes=385"),),
+        (("clusters.relay=counter", "clusters.repair_s=0", "radio.max_frame_bytes=302", "clock.sync=beacons"),),
+    ),
 ])  # fmt: skip
 def test_a_swarm_whose_largest_messages_just_fit_a_frame_works(keys: Sequence[str]) -> None:
     size = (

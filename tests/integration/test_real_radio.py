@@ -209,6 +209,7 @@ async def test_the_same_mission_messages_arrive_over_real_sockets_as_in_emulatio
     assert max(r.delay_ns for r in delivered) < 500 * MS
 
 
+@pytest.mark.slow
 def test_without_a_router_the_swarm_starts_at_the_epoch_that_all_were_given(network: Network, tmp_path: Path) -> None:
     path = tmp_path / "field.toml"
     path.write_text(SCENARIO)

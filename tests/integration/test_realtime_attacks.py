@@ -79,6 +79,7 @@ def attacked(puts: list[tuple[str, list[Message]]], *settings: str) -> Outcome:
         return asyncio.run(launch(scenario, swarm="test", listen=endpoint, on_started=attacker.start))
 
 
+@pytest.mark.slow
 def test_a_forged_clock_that_is_stopped_stops_nobody() -> None:
     """Without an access list anyone may put on the clock's topic, but only its keeper's answer counts."""
     outcome = attacked(FORGED_CLOCKS)
@@ -103,6 +104,7 @@ def test_nonsense_for_the_launcher_is_counted_and_the_result_is_that_of_the_swar
     assert {record.node for record in outcome.records} <= {0, 1, 2, 3, 4}
 
 
+@pytest.mark.slow
 def test_attacks_over_the_air_end_no_process_and_are_refused_and_the_books_close() -> None:
     """Four at once; each alone, in both modes, is a row of docs/results/attacks.md."""
     names = [

@@ -86,6 +86,7 @@ def _router(endpoint: str) -> Bus:
     return Bus.join(endpoint, patience_s=60)
 
 
+@pytest.mark.slow
 def test_a_router_names_who_is_wrong_and_writes_what_the_right_ones_did(processes: Processes, tmp_path: Path) -> None:
     endpoint = free_endpoint()
     join = ("--connect", endpoint)

@@ -6,10 +6,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "swarm-parts"
 
 
+@pytest.mark.slow
 def test_every_process_of_a_swarm_finds_the_parts(tmp_path: Path) -> None:
     path = os.pathsep.join((str(EXAMPLE / "src"), str(ROOT)))
     changes = ["routing.protocol=swarm_parts.gossip3:Gossip3", "mobility.model=swarm_parts.orbit:Orbit",

@@ -39,14 +39,15 @@ def ends(tmp_path: Path, call: str, kind: str, what: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "what"), [("forkserver", "pool"), *slow(("spawn", "daemon"), ("spawn", "pool"), ("forkserver", "daemon"))]
+    ("kind", "what"), [("forkserver", "pool"), ("spawn", "daemon"), ("spawn", "pool"), ("forkserver", "daemon")]
 )
+@pytest.mark.slow
 def test_a_program_whose_own_processes_live_ends_although_we_were_looked_up(
     tmp_path: Path, kind: str, what: str
 ) -> None:
     ends(tmp_path, "fanet_mw.launch", kind, what)
 
 
-@pytest.mark.parametrize("kind", ["spawn", "forkserver"])
+@pytest.mark.parametrize("kind", ["forkserver", *slow("spawn")])
 def test_a_program_whose_own_processes_live_ends_after_a_launch(tmp_path: Path, kind: str) -> None:
     ends(tmp_path, 'fanet_mw.launch("quick", overrides=["duration_s=1", "drain_s=0", "nodes.count=5"])', kind, "daemon")

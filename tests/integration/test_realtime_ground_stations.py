@@ -25,11 +25,13 @@ import pytest
 from fanet_mw.autopilot.link import AutopilotLink
 from fanet_mw.autopilot.serving import Autopilot
 from fanet_mw.bus.messages import Battery, FlightState, Gps
+from fanet_mw.errors import ConfigError
 from fanet_mw.flavors import Flavor
 from fanet_mw.gateway.connections import Address
 from fanet_mw.mavlink import ORIGIN
 from fanet_mw.results import records
 from fanet_mw.trace import Posed
+from sim.cli.app import app
 
 HERE = Path(__file__).resolve().parent
 TRANSCRIPTS = HERE.parent.parent / "docs" / "how-to" / "transcripts"
@@ -297,6 +299,7 @@ class Terminal:
 
 
 @pytest.mark.skipif(MAVPROXY is None, reason="MAVProxy is not installed (pip install --no-deps MAVProxy)")
+@pytest.mark.slow
 def test_mavproxy_links_arms_loads_waypoints_and_flies_them(field: Field, tmp_path: Path) -> None:
     assert MAVPROXY is not None
     (tmp_path / "plan.txt").write_text(PLAN, encoding="utf-8")
@@ -386,17 +389,24 @@ def test_topics_of_a_running_swarm_are_listed_and_measured(field: Field) -> None
     until(r"average rate: (2[5-9]|3\d|4[0-4])\.\d+", "hz", "world/pose", "--count", "2")
 
 
-def test_a_connection_that_cannot_be_is_one_message(capsys: pytest.CaptureFixture[str]) -> None:
-    for words, why in (
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
         (["--mavlink", "udp"], "must be udpout:HOST:PORT"),
         (["--mavlink", "tcpin:0.0.0.0:99999"], "port 99999 must be in"),
         (["--mavlink", "serial:/dev/ttyS0:1234"], "1234 is no baud rate"),
         (["--mavlink-per-uav", "udpin:127.0.0.1:14540"], "must end with +"),
         (["--mavlink-key", "/nowhere"], "No such file"),
-    ):
-        ended = subprocess.run(
-            [sys.executable, "-m", "fanet_mw", "gateway", "nobody", *words], capture_output=True, text=True, check=False
-        )
-        assert ended.returncode == 2
-        assert why in ended.stderr.replace("\n", " ")
-        assert "Traceback" not in ended.stderr
+    ],
+)
+def test_a_connection_that_cannot_be_is_named(words: list[str], why: str) -> None:
+    with pytest.raises(ConfigError, match=re.escape(why)):
+        app(["gateway", "nobody", *words], result_action="return_value")
+
+
+def test_a_connection_that_cannot_be_is_one_message() -> None:
+    command = [sys.executable, "-m", "fanet_mw", "gateway", "nobody", "--mavlink", "udp"]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ended.returncode == 2
+    assert "must be udpout:HOST:PORT" in ended.stderr.replace("\n", " ")
+    assert "Traceback" not in ended.stderr

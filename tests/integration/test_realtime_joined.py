@@ -99,6 +99,7 @@ def test_the_same_messages_arrive_in_virtual_time_over_zenoh_and_over_udp(tmp_pa
     assert asyncio.run(over_zenoh(path)) == expected
 
 
+@pytest.mark.slow
 def test_the_example_of_a_node_joins_from_its_wheel_and_is_answered_and_leaves_with_the_swarm(
     tmp_path: Path, installed: Installed, real_swarm: LaunchSwarm
 ) -> None:

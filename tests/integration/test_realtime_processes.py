@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from kit import slow
 
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError
@@ -254,9 +255,10 @@ def last_words(err: str) -> str:
     ("number", "deaf"),
     [
         pytest.param(signal.SIGINT, True, id="SIGINT, ignored before"),
-        pytest.param(signal.SIGTERM, False, id="SIGTERM", marks=pytest.mark.slow),
+        pytest.param(signal.SIGTERM, False, id="SIGTERM"),
     ],
 )
+@pytest.mark.slow
 def test_a_router_that_is_interrupted_stops_the_services_it_kept_time_for(
     mark: str, tmp_path: Path, number: int, deaf: bool
 ) -> None:
@@ -304,7 +306,7 @@ def cpu_s(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, *slow(signal.SIGTERM)])
 def test_a_router_or_service_that_still_waits_for_the_others_ends_when_interrupted(
     mark: str, tmp_path: Path, number: int
 ) -> None:
@@ -345,6 +347,7 @@ def test_a_wrong_request_to_a_service_is_one_message_and_exit_code_2(mark: str, 
     assert err == "--id 9: must be in [1, nodes.count = 2]\n"
 
 
+@pytest.mark.slow
 def test_a_program_that_launches_whenever_it_is_imported_is_told_so_once(tmp_path: Path) -> None:
     program = tmp_path / "unguarded.py"
     program.write_text(

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from kit import slow
 from undisturbed import LIMIT_S, undisturbed, with_time_enough
 
 from agents.__main__ import run as run_agent
@@ -146,6 +147,7 @@ def test_a_killed_agent_is_named_and_the_others_carry_on() -> None:
 
 
 @pytest.mark.timeout(LIMIT_S)
+@pytest.mark.slow
 def test_a_killed_agent_is_started_again_with_respawn_and_takes_part() -> None:
     outcome, events = with_time_enough(
         lambda slower: run(scenario("duration_s=6.5", *NINE, slower), at_s=2, act=kill("agent-4"), respawn=True),
@@ -191,7 +193,7 @@ def test_ctrl_c_ends_everything_cleanly_with_a_partial_result() -> None:
     assert 1 < summary["simulated_s"] < summary["duration_s"]
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGTERM, *slow(signal.SIGHUP)])
 def test_a_signal_to_all_processes_of_a_swarm_leaves_a_partial_result_that_closes(number: int, tmp_path: Path) -> None:
     """As `timeout`, systemd and `docker stop` send it; and as a terminal does that is closed, where nothing more can be
     said.
@@ -254,6 +256,7 @@ def at_start(number: int, *, services: bool, after_s: float = 0.0) -> tuple[int,
     return process.returncode, begun + err
 
 
+@pytest.mark.slow
 def test_ctrl_c_while_a_swarm_starts_ends_it_without_a_traceback() -> None:
     """Wherever it comes: in the imports, when the server of children starts, between children, before the clock."""
     moments = ((False, 0.0), (False, 0.4), (True, 0.0), (True, 0.2))
@@ -362,6 +365,7 @@ def test_a_port_in_use_is_one_message() -> None:
         assert f"cannot serve on {endpoint}: it is already in use" in refused("launch", "quick", "--listen", endpoint)
 
 
+@pytest.mark.slow
 def test_no_router_is_one_message_that_names_the_endpoint() -> None:
     services = [["emulator"], ["world"], ["agent", "--id", "3"], ["launch"]]
     with ThreadPoolExecutor() as pool:  # each waits 2.5 s for an answer

@@ -4,6 +4,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+import pytest
+
 from fanet_mw.results import read
 from sim.sweep import spec
 from sim.sweep.one_run import Finished, carry_out
@@ -50,6 +52,7 @@ def swept(folder: Path) -> tuple[list[int], list[str], list[dict[str, Any]]]:
     return counts, workers.ran, read(folder).to_pylist()
 
 
+@pytest.mark.slow
 def test_runs_in_real_time_are_rows_beside_those_in_virtual_time_and_are_not_repeated(tmp_path: Path) -> None:
     for attempt in range(_ATTEMPTS):
         counts, ran, (real, late, virtual) = swept(tmp_path / str(attempt))

@@ -77,6 +77,7 @@ def test_a_run_whose_agents_were_all_killed_is_not_valid() -> None:
 
 
 @pytest.mark.timeout(LIMIT_S)
+@pytest.mark.slow
 def test_a_run_whose_emulator_was_killed_and_started_again_is_not_valid_and_says_what_is_missing() -> None:
     outcome, summary = with_time_enough(
         lambda slower: run(
@@ -130,6 +131,7 @@ class Watch:
         return float(max(np.linalg.norm(b - a, axis=1).max() for a, b in pairwise(places)))
 
 
+@pytest.mark.slow
 def test_a_world_that_is_started_again_goes_on_where_it_was_and_the_run_is_not_valid() -> None:
     watch = Watch()
     fast = scenario("duration_s=6", "mobility.model=formation", "mobility.speed_m_s=15")
@@ -162,7 +164,8 @@ def test_a_launcher_that_is_stopped_until_after_the_end_does_not_exit_with_0() -
     assert "(the launcher), limit 500 ms" in about(json.loads(out), "longest standstill")
 
 
-@pytest.mark.parametrize("step_s", [pytest.param(-10.0, marks=pytest.mark.slow), 10.0])
+@pytest.mark.parametrize("step_s", [-10.0, 10.0])
+@pytest.mark.slow
 def test_an_agent_that_is_started_again_after_a_step_of_the_clock_takes_part(
     step_s: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -4,6 +4,8 @@ import asyncio
 import threading
 import time
 
+import pytest
+
 from fanet_mw.units import S
 from sim.observation.bus_feed import BusFeed
 from sim.observation.swarm_state import SwarmState
@@ -79,6 +81,7 @@ def stands(state: SwarmState) -> str:
     return f"{uavs}, faults {sorted(state.faults)}"
 
 
+@pytest.mark.slow
 def test_a_head_that_is_cut_in_a_view_costs_deliveries_and_the_clock_obeys() -> None:
     async def run() -> Watcher:
         async with launch("quick", overrides=["duration_s=24"]) as launched:

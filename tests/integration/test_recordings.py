@@ -24,6 +24,7 @@ from foxglove_schemas_protobuf import (
     SceneUpdate_pb2,
 )
 from google.protobuf import descriptor_pb2, unknown_fields
+from kit import slow
 from mcap.reader import make_reader
 from mcap.writer import Writer
 from mcap_protobuf.decoder import DecoderFactory
@@ -291,7 +292,7 @@ def test_a_gpx_per_uav_and_a_kml_have_the_tracks_on_earth(folder: Path, tmp_path
     assert up == posed[7].up_m
 
 
-@pytest.mark.parametrize("to", ["parquet", "csv", "mcap", "gpx", "kml"])
+@pytest.mark.parametrize("to", ["parquet", *slow("mcap", "csv", "gpx", "kml")])
 def test_an_export_that_does_not_fit_leaves_no_file_that_is_cut(folder: Path, tmp_path: Path, to: str) -> None:
     """A table that ends early looks like one that is whole; files may have 1 KiB here."""
     done = subprocess.run(
@@ -375,6 +376,7 @@ def test_a_recording_that_cannot_be_written_is_said_before_the_run(tmp_path: Pat
         app(["simulate", "quick", "--record", str(tmp_path / path)], result_action="return_value", exit_on_error=False)
 
 
+@pytest.mark.slow
 def test_a_recording_that_ends_early_costs_no_result(tmp_path: Path) -> None:
     """The file may have 8 KiB: the recording says why it ends there, and the summary names it."""
     flown = "simulate quick --json --record x.mcap --set duration_s=5 warmup_s=2 drain_s=1 nodes.count=4"
@@ -422,6 +424,7 @@ def test_the_programs_of_the_page_run(
     assert "1.0 " in said
 
 
+@pytest.mark.slow
 def test_the_notebook_of_tables_runs() -> None:
     notebook = nbformat.read(ROOT / "examples" / "run" / "tables.ipynb", as_version=4)
     names: dict[str, Any] = {}

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from kit import slow
 
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import Poses
@@ -69,7 +70,7 @@ def known(state: SwarmState, t_ns: int) -> dict[str, Any]:
     }
 
 
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("name", ["slots", "turns", *slow("rounds")])
 def test_what_is_replayed_is_what_was_observed(name: str, tmp_path: Path) -> None:
     base, words = RUNS[name]
     words = [*words, "duration_s=10"]

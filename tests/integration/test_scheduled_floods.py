@@ -29,6 +29,7 @@ def test_on_the_grid_every_packet_reaches_everyone_within_the_bound(period_s: fl
     assert summary["frames"]["closes"]
 
 
+@pytest.mark.slow
 def test_a_swarm_that_was_silent_for_half_a_minute_has_lost_nobody() -> None:
     """All 45 nodes must tell at once that they live; in seed 2 the first words of three of them got lost."""
     summary = summary_of("duration_s=33.5", "warmup_s=30", "seed=2")
@@ -37,6 +38,7 @@ def test_a_swarm_that_was_silent_for_half_a_minute_has_lost_nobody() -> None:
     assert summary["bound"]["violations"] == 0
 
 
+@pytest.mark.slow
 def test_a_hello_that_waits_for_its_window_makes_nobody_send_again_what_all_have() -> None:
     """It is made when it can go, 4 s apart; one that was made when it was due would not know of the last seconds."""
     sixteen = ["nodes.count=16", "traffic.sources=16", "clusters.count=15", "traffic.interval_s=0.2"]
@@ -51,6 +53,7 @@ def test_with_interference_beyond_the_range_too() -> None:
     assert summary["bound"]["violations"] == 0
 
 
+@pytest.mark.slow
 def test_a_lead_costs_turns_but_no_packets() -> None:
     """As in real time: a relay announces itself 20 ms ahead, so hops are 17 turns apart."""
     summary = summary_of("clusters.flooding_period_s=1", "radio.lead_ms=20", "radio.handover_ms=2")
@@ -58,6 +61,7 @@ def test_a_lead_costs_turns_but_no_packets() -> None:
     assert_only_the_last_to_join_is_missed(summary["bound"])
 
 
+@pytest.mark.slow
 def test_floods_that_reach_into_the_next_superframe_keep_their_bound() -> None:
     """A lead of 40 ms: twelve hops take longer than one superframe, and cross a contention window or two."""
     summary = summary_of("clusters.flooding_period_s=0.5", "radio.lead_ms=40")
@@ -101,6 +105,7 @@ def test_packets_share_frames_when_turns_are_scarce_and_keep_their_bound() -> No
     assert summary["frames"]["sent"] < 3 * summary["generated"], "five transmissions for two packets"
 
 
+@pytest.mark.slow
 def test_where_turns_suffice_for_heads_only_members_bring_them_their_packets_in_the_contention_window() -> None:
     summary = summary_of("clusters.count=8", "clusters.flooding_period_s=0.15")
     assert summary["bound"] == {}

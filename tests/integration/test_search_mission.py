@@ -150,6 +150,7 @@ def test_three_uavs_search_all_by_a_spiral_and_confirm_everybody() -> None:
     assert not found["mistaken"] + found["collisions"]
 
 
+@pytest.mark.slow
 def test_a_survivor_in_the_open_is_confirmed_by_voice_alone_from_a_uav_that_goes_down_to_listen() -> None:
     by_ear = ["sensors.camera_hz=0", "sensors.voice_hz=2", "duration_s=78"]
     outcome = simulate(find("rescue", [*KEYS, *FEW, *by_ear]))
@@ -163,6 +164,7 @@ def test_a_survivor_in_the_open_is_confirmed_by_voice_alone_from_a_uav_that_goes
     assert max(pose.up_m for pose in poses if pose.t_ns > confirmed.t_ns) > 30
 
 
+@pytest.mark.slow
 def test_without_a_network_every_uav_searches_a_lane_of_its_own_and_no_two_touch() -> None:
     cuts = [f"{{kind='degrade', at_s=0, src={a}, dst={b}, loss_share=1}}" for a, b in combinations(range(1, 8), 2)]
     outcome = flown(

@@ -5,6 +5,7 @@ from collections import defaultdict
 from collections.abc import Callable
 
 import pytest
+from kit import slow
 
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Collided, FlightModeChanged, MissionModeChanged, Posed
@@ -19,7 +20,7 @@ KEYS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("spacing_m", "terrain_m"), [pytest.param(15, 0, marks=pytest.mark.slow), (15, 30), (6, 0)])
+@pytest.mark.parametrize(("spacing_m", "terrain_m"), [(6, 0), *slow((15, 0), (15, 30))])
 def test_who_stands_at_the_base_climbs_straight_up_and_only_then_flies_to_its_place(
     make_scenario: Callable[..., Scenario], spacing_m: float, terrain_m: float
 ) -> None:

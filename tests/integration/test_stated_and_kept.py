@@ -3,6 +3,7 @@
 from typing import Any
 
 import pytest
+from kit import slow
 
 from fanet_mw.scenario import config
 from fanet_mw.trace import BoundExcludes, BoundStated
@@ -43,7 +44,9 @@ def test_a_timetable_does_not_count_on_a_link_that_errors_of_positions_made() ->
     assert bound["stated_share"] == 1.0
 
 
-@pytest.mark.parametrize(("count", "columns", "spacing_m", "seed"), [(9, 4, 227.04, 886227), (13, 6, 189.3, 185840)])
+@pytest.mark.parametrize(
+    ("count", "columns", "spacing_m", "seed"), [*slow((9, 4, 227.04, 886227)), (13, 6, 189.3, 185840)]
+)
 def test_nobody_promises_while_the_timetable_has_not_reached_everybody(
     count: int, columns: int, spacing_m: float, seed: int
 ) -> None:

@@ -68,6 +68,7 @@ def test_bulk_beyond_what_the_air_carries_leaves_the_bounds_alone() -> None:
     assert summary["frames"]["closes"]
 
 
+@pytest.mark.slow
 def test_bulk_with_a_deadline_is_refused_at_its_origin_or_arrives_in_time() -> None:
     traffic = {"payload_bytes": 1000, "priority": "bulk", "interval_s": 0.12, "deadline_s": 2}
     tables = {"mobility": {"model": "formation", "speed_m_s": 10}, "rounds": {"turn_bytes": 600}, "duration_s": 12}
@@ -105,6 +106,7 @@ def test_a_partition_that_ends_leaves_nobody_without_a_packet() -> None:
     assert summary["pdr"] >= 0.999
 
 
+@pytest.mark.slow
 def test_receivers_tell_soon_enough_what_they_hold_where_many_hear_each_other() -> None:
     """Who is not told in time sends again: 16 nodes in reach of each other, 400 packets of bulk a second."""
     tree = {
@@ -132,7 +134,7 @@ def test_bounds_are_whole_again_a_second_after_the_air_is() -> None:
 
 @pytest.mark.parametrize(
     ("clock", "slack_us"),
-    [({"offset_ms": 12_000}, 50), ({"sync": "gps", "offset_ms": 50}, 20), *slow(({"offset_ms": 0.1}, 200))],
+    [({"offset_ms": 12_000}, 50), *slow(({"sync": "gps", "offset_ms": 50}, 20), ({"offset_ms": 0.1}, 200))],
 )
 def test_no_bound_is_stated_while_clocks_may_be_further_apart_than_the_slack_of_turns(
     clock: Mapping[str, Any], slack_us: float
@@ -199,6 +201,7 @@ def test_bulk_for_one_of_whom_nothing_is_known_yet_is_flooded() -> None:
     assert summary["pdr"] == 1.0
 
 
+@pytest.mark.slow
 def test_a_uav_that_hears_nothing_does_not_delay_the_bulk_of_others() -> None:
     """All its neighbors sent each packet sixteen times for it."""
     bulk = {"payload_bytes": 1024, "interval_s": 0.4, "priority": "bulk", "sources": 15}
@@ -225,6 +228,7 @@ class WokenLate(Uav):
         return None if asked_ns is None else asked_ns + self.slack_ns
 
 
+@pytest.mark.slow
 def test_a_late_wake_up_of_a_process_costs_no_turn(monkeypatch: pytest.MonkeyPatch) -> None:
     often = {
         "traffic": {"interval_s": 0.25, "payload_bytes": 64},
@@ -239,6 +243,7 @@ def test_a_late_wake_up_of_a_process_costs_no_turn(monkeypatch: pytest.MonkeyPat
     assert late["bound"]["stated_share"] == late["bound"]["within_share"] == 1.0
 
 
+@pytest.mark.slow
 def test_bounds_of_reports_hold_though_warnings_overtake_them_at_each_hop() -> None:
     """Two nodes of a line of 12 warn so often that they use half of the turns. What was promised in the second in
     which they begin is left out: nobody could know.
@@ -265,6 +270,7 @@ def test_bounds_of_reports_hold_though_warnings_overtake_them_at_each_hop() -> N
     assert all(kept)
 
 
+@pytest.mark.slow
 def test_over_lossy_links_a_likely_delay_is_stated_again_soon_after_a_uav_is_lost() -> None:
     """Since one was lost, nobody stated any: the likely delay was meant for all or for nobody."""
     tree = {
@@ -280,6 +286,7 @@ def test_over_lossy_links_a_likely_delay_is_stated_again_soon_after_a_uav_is_los
     assert finish(outcome, out=None)["likely"]["within_share"] > 0.98
 
 
+@pytest.mark.slow
 def test_over_shadowed_and_fading_links_a_likely_delay_is_stated_and_kept_in_motion() -> None:
     """A packet that one neighbor was not heard to pass on was sent again by all: some came 9 s late."""
     summary = flown(

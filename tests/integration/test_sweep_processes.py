@@ -75,6 +75,7 @@ def test_a_run_whose_worker_is_killed_is_carried_out_by_another() -> None:
     }
 
 
+@pytest.mark.slow
 def test_a_run_that_kills_every_worker_is_a_failed_one(monkeypatch) -> None:
     monkeypatch.setattr("sim.sweep.pool._work", _dying)
     task = tasks_of(spec.parse(FILE, source="test"))[0]

@@ -8,6 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from kit import slow
 from test_air_control import emulator
 
 from fanet_mw.bus import codecs
@@ -79,7 +80,7 @@ async def test_a_swarm_of_processes_lives_by_its_clock(tmp_path: Path, time_scal
     assert began_ns // S <= seconds <= began_ns // S + 60, "stamped with the epoch"
 
 
-@pytest.mark.parametrize("slow_down_to", [None, 5.0])
+@pytest.mark.parametrize("slow_down_to", [*slow(None), 5.0])
 async def test_a_machine_that_cannot_keep_up_slows_the_clock_if_it_may(slow_down_to: float | None) -> None:
     """At 80 times real time no machine wakes ten processes in time."""
     said: list[str] = []

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import viser
+from kit import slow
 
 from fanet_mw.bus import codecs
 from fanet_mw.errors import ConfigError
@@ -66,7 +67,7 @@ def instants(seed: int) -> list[int]:
     return [draw.randrange(1, 20) * S if draw.random() < 0.5 else draw.randrange(1, 20 * S) for _ in range(14)]
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, *slow(2)])
 def test_replayed_positions_are_those_of_the_trace(folder: Path, timeline: Timeline, seed: int) -> None:
     tracks: dict[int, list[tuple[int, tuple[float, ...]]]] = defaultdict(list)
     for t_ns, node, *at in lines(folder, "posed"):
@@ -82,7 +83,7 @@ def test_replayed_positions_are_those_of_the_trace(folder: Path, timeline: Timel
             assert tuple(state.uavs[node].position) == pytest.approx(flown, abs=1e-6)
 
 
-@pytest.mark.parametrize("seed", [3, 4])
+@pytest.mark.parametrize("seed", [3, *slow(4)])
 def test_replayed_roles_drops_faults_and_packets_are_those_of_the_trace(
     folder: Path, timeline: Timeline, seed: int
 ) -> None:
@@ -217,6 +218,7 @@ def test_a_post_on_the_ground_is_no_uav_that_covers_anything(server: viser.Viser
     assert "9, 2" in panels.texts["_figures"]
 
 
+@pytest.mark.slow
 def test_a_packets_spreading_ends_with_all_who_have_it(server: viser.ViserServer, timeline: Timeline) -> None:
     state = timeline.at(15 * S)
     scene = Scene(server, state, on_select=lambda _: None)
@@ -286,6 +288,7 @@ class VirtualFeed:
             self._host.put(topic, message)
 
 
+@pytest.mark.slow
 def test_a_uav_is_sent_to_the_mark_without_a_post_and_released_again() -> None:
     scenario = catalog.find("rescue", [
         "nodes.count=6", "nodes.spacing_m=60", "world.area_m=700", "mission.survivors=0", "duration_s=46",

@@ -31,14 +31,14 @@ def quick() -> Outcome:
     return simulate(catalog.find("quick"))
 
 
-_KEPT = {settings[0] for settings in FLIGHTS.values()}
-"""The scenarios of which `test_kept_flights.py` flies variants and closes the ledgers."""
+_LATER = {settings[0] for settings in FLIGHTS.values()} | {"hills", "night"}
+"""The scenarios of which `test_kept_flights.py` flies variants and closes the ledgers, and two that take a second."""
 
 
 @pytest.mark.parametrize("duration_s", [1.5, pytest.param(8, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(entry.name, marks=pytest.mark.slow if entry.name in _KEPT else ()) for entry in catalog.shipped()],
+    [pytest.param(entry.name, marks=pytest.mark.slow if entry.name in _LATER else ()) for entry in catalog.shipped()],
 )
 def test_the_ledger_closes_and_copies_add_up_in_every_shipped_scenario(name: str, duration_s: float) -> None:
     summary = summary_of(catalog.find(name, [f"duration_s={duration_s}", "warmup_s=0", "drain_s=0.5"]))
@@ -58,6 +58,7 @@ def test_the_same_seed_gives_the_same_trace_and_another_seed_another() -> None:
     assert first["trace_sha256"] != other["trace_sha256"]
 
 
+@pytest.mark.slow
 def test_runs_in_threads_of_one_process_do_not_touch_each_other(make_scenario: MakeScenario) -> None:
     keys = {"duration_s": 6, "drain_s": 1, "nodes.count": 6, "traffic.interval_s": 0.1, "world.engine": "kinematic"}
     scenarios = [make_scenario(**{**keys, "seed": seed}) for seed in (1, 2, 3)]
@@ -165,6 +166,7 @@ def test_floods_leave_their_head_only_in_its_slot(make_scenario: MakeScenario) -
     assert releases > 50
 
 
+@pytest.mark.slow
 def test_a_simulation_of_a_thousand_nodes_closes_its_ledger(make_scenario: MakeScenario) -> None:
     scenario = make_scenario(
         **{

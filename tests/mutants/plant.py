@@ -1,6 +1,8 @@
-"""Plants one-line bugs, one at a time, in a copy of this tree, and says which of them the default tests do not notice.
+"""Plants one-line bugs, one at a time, in a copy of this tree, and says which of them no test notices.
 
     *.toml here -> a piece of a line becomes another -> the tests that should notice -> caught | survived
+
+What the default tests let pass is tried by the long ones among those that are named, and said to be caught by them.
 
 The list is written by hand: each bug is a mistake that somebody could make, that a user would feel, and that
 `random_bugs.py` does not make by itself, as it turns conditions and comparisons and leaves out calls. Kernel and tests
@@ -33,8 +35,14 @@ LIMIT_S = 180.0
 """For the tests of one bug; beyond that it counts as caught: the suite's own limits would end it."""
 ALL_LIMIT_S = 1800.0
 """For all of the tests without any bug."""
-NOTICED, PASSED = 1, 0
+LONG_LIMIT_S = 900.0
+"""For the long tests of one bug; beyond that nothing is said of it."""
+NOTICED, PASSED, NONE_CHOSEN = 1, 0, 5
 """What pytest's exit code says; any other means that the tests could not be run."""
+DEFAULT, LONG = "not slow", "slow"
+"""What pytest chooses by marks."""
+BY_LONG = "caught by long tests"
+"""The status of a bug that the default tests let pass."""
 
 
 class Mutant(NamedTuple):
@@ -72,7 +80,7 @@ class Verdict(NamedTuple):
 
     mutant: Mutant
     status: str
-    """`caught`, `survived`, or why it cannot be said."""
+    """`caught`, `caught by long tests`, `survived`, or why it cannot be said."""
     took_s: float
 
 
@@ -117,9 +125,11 @@ def copy_of_the_tree(folder: Path) -> Path:
     return folder
 
 
-def pytest_in(tree: Path, tests: Sequence[str], *further: str, limit_s: float = LIMIT_S) -> tuple[int | None, str]:
-    """Run some of the default tests in a tree; the exit code, None beyond the limit, and the end of what was said."""
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-m", "not slow", "-p", "no:cacheprovider"]
+def pytest_in(
+    tree: Path, tests: Sequence[str], *further: str, chosen: str = DEFAULT, limit_s: float = LIMIT_S
+) -> tuple[int | None, str]:
+    """Run some tests in a tree; the exit code, None beyond the limit, and the end of what was said."""
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-m", chosen, "-p", "no:cacheprovider"]
     command += ["--hypothesis-profile=mutants", *further, *(f"tests/{test}" for test in tests)]
     environment = {**os.environ, "PYTHONPATH": str(tree), "FANET_NO_NUMBA": "1", "PYTHONDONTWRITEBYTECODE": "1"}
     with tempfile.TemporaryFile("w+") as said:
@@ -146,12 +156,28 @@ def judge(mutant: Mutant, tree: Path) -> Verdict:
     # Compiled files are told apart by whole seconds and sizes, and the bug may be as long as what it replaces.
     os.utime(path, ns=(kept.st_atime_ns, kept.st_mtime_ns + 10_000_000_000))
     try:
-        code, said = pytest_in(tree, mutant.tests)
+        status = verdict_of(tree, mutant.tests)
     finally:
         path.write_text(source, encoding="utf-8")
         os.utime(path, ns=(kept.st_atime_ns, kept.st_mtime_ns))  # the compiled file is that of this source again
-    status = "caught" if code in (NOTICED, None) else "survived" if code == PASSED else f"not judged:\n{said}"
+    if status == BY_LONG and pytest_in(tree, mutant.tests, chosen=LONG, limit_s=LONG_LIMIT_S)[0] != PASSED:
+        status = "not judged: its long tests do not pass without it either"
     return Verdict(mutant, status, time.monotonic() - began_s)
+
+
+def verdict_of(tree: Path, tests: Sequence[str]) -> str:
+    """The status of the bug that is in a tree: the default tests first, then the long ones."""
+    code, said = pytest_in(tree, tests)
+    if code in (NOTICED, None):
+        return "caught"
+    if code not in (PASSED, NONE_CHOSEN):
+        return f"not judged:\n{said}"
+    long_code, said = pytest_in(tree, tests, chosen=LONG, limit_s=LONG_LIMIT_S)
+    if long_code == NOTICED:
+        return BY_LONG
+    if PASSED in (code, long_code) and long_code in (PASSED, NONE_CHOSEN):
+        return "survived"
+    return f"not judged:\n{said or 'the long tests took too long'}"
 
 
 def fails_in(tree: Path, mutants: Sequence[Mutant], *, jobs: int) -> str:
@@ -160,7 +186,7 @@ def fails_in(tree: Path, mutants: Sequence[Mutant], *, jobs: int) -> str:
     files = {test for test in named if "::" not in test}
     named = [test for test in named if test in files or test.partition("::")[0] not in files]
     code, said = pytest_in(tree, named, *([f"-n{jobs}"] if jobs > 1 else ()), limit_s=ALL_LIMIT_S)
-    return "" if code == PASSED else said or "took too long"
+    return "" if code in (PASSED, NONE_CHOSEN) else said or "took too long"
 
 
 def plant(mutants: Sequence[Mutant], *, jobs: int, pass_without: bool = True) -> int:
@@ -188,8 +214,10 @@ def plant(mutants: Sequence[Mutant], *, jobs: int, pass_without: bool = True) ->
                 verdicts.append(verdict)
                 print(f"{verdict.took_s:6.1f} s  {verdict.mutant}: {verdict.status}", flush=True)
     survivors = [verdict.mutant for verdict in verdicts if verdict.status == "survived"]
-    unjudged = sum(verdict.status not in ("caught", "survived") for verdict in verdicts)
-    print(f"{len(verdicts)} bugs: {len(verdicts) - len(survivors) - unjudged} caught, {len(survivors)} survived")
+    by_long = sum(verdict.status == BY_LONG for verdict in verdicts)
+    caught = sum(verdict.status == "caught" for verdict in verdicts) + by_long
+    unjudged = len(verdicts) - len(survivors) - caught
+    print(f"{len(verdicts)} bugs: {caught} caught ({by_long} by long tests only), {len(survivors)} survived")
     for mutant in survivors:
         print(f"survived  {mutant}\n    - {mutant.old}\n    + {mutant.new}\n    {' '.join(mutant.tests)}")
     return int(unjudged > 0 or len(survivors) > MOST_SURVIVORS * len(verdicts))

@@ -78,7 +78,7 @@ def engine_of(name: str, solid: Obstacles) -> Engine:
     return Kinematic(Solids(solid)) if name == "kinematic" else Rotors(IRIS, solids=Solids(solid))
 
 
-@pytest.mark.parametrize("name", ["kinematic", "rotors", "pybullet"])
+@pytest.mark.parametrize("name", ["kinematic", "pybullet", *slow("rotors")])
 @pytest.mark.parametrize("terrain_m", [40, *slow(15)])
 def test_uavs_land_on_hills_and_beyond_them_and_their_motors_stop(name: str, terrain_m: float) -> None:
     keys = [f"world.terrain_m={terrain_m}", "world.area_m=400", "world.terrain_scale_m=120", "nodes.count=9",
@@ -95,7 +95,7 @@ def test_uavs_land_on_hills_and_beyond_them_and_their_motors_stop(name: str, ter
     assert landed.all(), "all of them have noticed that they stand on the ground"
 
 
-@pytest.mark.parametrize("name", ["kinematic", "rotors", *slow("pybullet")])
+@pytest.mark.parametrize("name", ["kinematic", *slow("rotors", "pybullet")])
 def test_a_uav_that_lands_on_a_roof_stops_its_motors(name: str) -> None:
     solid = Obstacles(None, (Box(0, 0, 20, 20, 12, 0.3),))
     scenario = catalog.find("quick", ["nodes.count=3", 'mobility.model="onboard"'])

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import pytest
+from kit import slow
 from medium_driver import contention, disc
 from reference import bianchi
 
@@ -81,7 +82,7 @@ def test_stations_in_a_disc_that_all_broadcast_lose_as_many_copies_to_collisions
     compare(table, f"{case}: busy", [report["busy"] for report in reports], Reference(busy))
 
 
-@pytest.mark.parametrize("access", ["ns3", "standard"])
+@pytest.mark.parametrize("access", ["ns3", *slow("standard")])
 @pytest.mark.parametrize(
     ("sources", "interval_s", "mbps", "failure", "retries"),
     [

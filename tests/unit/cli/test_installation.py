@@ -8,6 +8,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from kit import slow
 
 from fanet_mw import installation
 from fanet_mw.scenario import Scenario, config
@@ -78,7 +79,7 @@ def test_a_package_of_ours_that_is_gone_is_named(tmp_path: Path) -> None:
     assert "the package 'agents' of fanet-mw is not there" in said.stdout
 
 
-@pytest.mark.parametrize("arguments", [("scenarios",), ("plan", "clusters")])
+@pytest.mark.parametrize("arguments", [("scenarios",), *slow((("plan", "clusters"),))])
 def test_a_command_that_needs_no_extra_runs_without_any(core_only: Path, arguments: tuple[str, ...]) -> None:
     ended = fanet(*arguments, path=(core_only,))
 

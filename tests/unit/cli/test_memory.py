@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import pytest
+from kit import slow
 
 LIMITED = """
 import resource, sys
@@ -19,7 +20,7 @@ def fanet(limit_mb: int, *words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
 
 
-@pytest.mark.parametrize("limit_mb", [120, 400])
+@pytest.mark.parametrize("limit_mb", [120, *slow(400)])
 @pytest.mark.parametrize("command", ["simulate", "sweep", "report", "replay", "launch", "log export", "record", "view"])
 def test_a_command_that_has_too_little_says_how_much_it_needs(command: str, limit_mb: int) -> None:
     done = fanet(limit_mb, *command.split(), "quick")
@@ -28,6 +29,7 @@ def test_a_command_that_has_too_little_says_how_much_it_needs(command: str, limi
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_a_run_has_enough_where_the_line_ends_and_small_commands_need_little() -> None:
     need_mb = int(fanet(400, "simulate", "quick").stderr.split("needs ")[1].split(" MB")[0])
     short = ("--duration", "1", "--set", "warmup_s=0", "drain_s=0", "--json")

@@ -73,15 +73,19 @@ def test_one_file_of_another_run_is_enough_to_refuse(tmp_path: Path, name: str) 
     assert list(tmp_path.iterdir()) == []
 
 
-def test_force_removes_the_pictures_of_the_earlier_page_and_nothing_else_beside_them(tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_each_page_that_replaces_another_has_its_own_pictures_alone(tmp_path: Path) -> None:
     for seed in ("1", "2"):
         flags = ("--seed", seed, "--report", "--force", "--out", str(tmp_path))
         assert fanet("simulate", "quick", "--set", "nodes.count=3", "clusters.count=1", "duration_s=8", *flags) == 0
-        pictures = tmp_path / "pictures"
-        assert {path.name.split("-")[1] for path in pictures.iterdir()} == {seed}, (
-            "each page has its own pictures alone"
-        )
-    (pictures / "mine.png").touch()
+        assert {path.name.split("-")[1] for path in (tmp_path / "pictures").iterdir()} == {seed}
+
+
+def test_force_removes_the_pictures_of_the_earlier_page_and_nothing_else_beside_them(tmp_path: Path) -> None:
+    pictures = tmp_path / "pictures"
+    pictures.mkdir()
+    for name in ("quick-1-delays.svg", "mine.png"):
+        (pictures / name).touch()
     prepare(tmp_path, force=True)
     assert [path.name for path in pictures.iterdir()] == ["mine.png"]
     (pictures / "mine.png").unlink()

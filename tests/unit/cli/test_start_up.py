@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from kit import slow
 
 ROOT = Path(__file__).parents[3]
 COMPUTE = ("numpy", "numba", "pybullet", "matplotlib", "pyarrow", "distributed", "emulator", "agents")
@@ -40,15 +41,17 @@ def imported_by(*arguments: str) -> tuple[set[str], str]:
 @pytest.mark.parametrize(
     ("arguments", "says", "without"),
     [
-        (("--version",), "0.", (*COMPUTE, *NETWORK, *MODELS, "rich.markdown")),
         (("--help",), "simulate", (*COMPUTE, *NETWORK, *MODELS)),
         (("simulate", "--help"), "deterministic", (*COMPUTE, *NETWORK, *MODELS)),
-        (("__complete", "simulate", "fl"), "flooding", (*COMPUTE, *NETWORK, *MODELS)),
-        (("scenarios",), "rescue", (*COMPUTE, *NETWORK, *MODELS)),
-        (("swarms",), "swarm", (*COMPUTE, *NETWORK, *MODELS)),
         (("check", "quick"), "is right", (*COMPUTE, *NETWORK)),
         (("show", "quick"), "[nodes]", (*COMPUTE, *NETWORK)),
-        (("simulate", "flooding", "--duration", "1", "--set", "drain_s=0"), "delivered", RIVALS),
+        *slow(
+            (("--version",), "0.", (*COMPUTE, *NETWORK, *MODELS, "rich.markdown")),
+            (("__complete", "simulate", "fl"), "flooding", (*COMPUTE, *NETWORK, *MODELS)),
+            (("scenarios",), "rescue", (*COMPUTE, *NETWORK, *MODELS)),
+            (("swarms",), "swarm", (*COMPUTE, *NETWORK, *MODELS)),
+            (("simulate", "flooding", "--duration", "1", "--set", "drain_s=0"), "delivered", RIVALS),
+        ),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) and len(value) < 4 else None,
 )

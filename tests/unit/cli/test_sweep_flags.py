@@ -27,6 +27,7 @@ def test_keys_are_set_one_by_one_or_together_before_or_behind_the_name(
     assert "24 runs (6 settings x 4 seeds)" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_cpu_that_a_sweep_took_is_that_of_its_workers_too(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -164,6 +164,7 @@ def test_a_link_that_has_faded_stays_so_while_nobody_moves_and_both_directions_f
     assert delivered == pytest.approx(0.607, abs=0.09)
 
 
+@pytest.mark.slow
 def test_attempts_meet_other_fades_the_faster_a_station_moves(make_scenario: MakeScenario) -> None:
     """Jakes' model at such instants gives 0.61, 0.85 and 0.99; it changes by half a wavelength in 62 or 6.2 ms."""
     slow, fast = (attempts_that_serve(make_scenario, speed)[0] for speed in (1.0, 10.0))

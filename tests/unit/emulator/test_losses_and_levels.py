@@ -85,6 +85,7 @@ def test_preamble_and_header_have_the_error_rate_of_their_own_rate(make_scenario
     assert len(receptions(air.run(2000 * MS))) / 800 == pytest.approx(0.5, abs=0.07)
 
 
+@pytest.mark.slow
 def test_with_a_signal_as_strong_as_noise_both_reasons_are_met_as_often_as_their_rates_say(
     make_scenario: MakeScenario,
 ) -> None:
@@ -109,6 +110,7 @@ def test_with_a_signal_as_strong_as_noise_both_reasons_are_met_as_often_as_their
     assert counts["collision"] / runs == pytest.approx(alone - both, abs=0.08)
 
 
+@pytest.mark.slow
 def test_no_frame_has_more_retries_than_attempts_allow_also_when_most_expire() -> None:
     """Seven attempts are at most six retries (802.11-2020, 10.3.4.4); here most frames expire after some attempts."""
     settings = ["nodes.count=30", "traffic.arrivals=cbr", "traffic.interval_s=0.005", "duration_s=4",

@@ -6,6 +6,7 @@ from array import array
 from collections.abc import Callable
 
 import pytest
+from kit import slow
 from test_medium_timelines import ACK_NS, FRAME_NS, NAMES, PAYLOAD, SIFS_NS, Air, receptions, statuses
 
 from emulator import faults
@@ -372,7 +373,7 @@ def test_a_fault_that_takes_nothing_changes_nothing(make_scenario: MakeScenario,
 # --- the books ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("channel", ["range", "log_distance"])
+@pytest.mark.parametrize("channel", [*slow("range"), "log_distance"])
 def test_the_books_close_and_repeat_under_random_faults_moves_and_loads(
     make_scenario: MakeScenario, channel: str
 ) -> None:

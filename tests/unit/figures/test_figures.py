@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kit import slow
 
 from emulator.pcap_file import PcapFile
 from fanet_mw.errors import ConfigError
@@ -98,6 +97,7 @@ def test_a_rival_that_was_not_flown_leaves_a_claim_open() -> None:
     assert "no run" in claim.statements[1].text()
 
 
+@pytest.mark.slow
 def test_figure_12_with_two_rates_and_two_methods_counts_its_panels_and_names_no_other_method() -> None:
     kept = read_kept(Path(__file__).parents[3] / "docs/results/sweeps", "fig12", "full")
     assert kept is not None
@@ -349,7 +349,8 @@ def test_a_page_needs_nothing_else_and_has_every_verdict(nine, tmp_path) -> None
         write([folder / "sweeps"], folder)
 
 
-@pytest.mark.parametrize("scenario", ["clusters", *slow("quick")])
+@pytest.mark.parametrize("scenario", ["clusters", "quick"])
+@pytest.mark.slow
 def test_a_run_has_a_page_with_its_delays_links_and_mission(scenario: str, tmp_path: Path) -> None:
     keys = [
         "nodes.count=9",

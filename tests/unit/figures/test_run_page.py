@@ -172,6 +172,7 @@ def test_packets_are_held_against_the_slots_of_their_heads_in_the_whole_run(make
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_packets_in_rounds_are_let_out_in_the_turn_of_their_origin_or_in_a_bulk_slot(
     make_scenario: MakeScenario,
 ) -> None:

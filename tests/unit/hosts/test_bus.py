@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
+from kit import slow
 
 from fanet_mw.errors import BusError, ConfigError
 from fanet_mw.hosts.bus import Bus, exposure, with_port
@@ -34,7 +35,7 @@ pytestmark = pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="on
 
 @pytest.mark.parametrize(
     ("environment", "runtimes"),
-    [({}, "app"), ({"ZENOH_RUNTIME": "(tx: (handover: app), net: (handover: app))"}, "app rx")],
+    [({}, "app"), *slow(({"ZENOH_RUNTIME": "(tx: (handover: app), net: (handover: app))"}, "app rx"))],
 )
 def test_a_client_does_not_switch_between_threads_unless_the_user_asks_for_it(
     environment: Mapping[str, str], runtimes: str

@@ -192,6 +192,7 @@ async def test_a_tick_of_the_timer_after_the_widgets_have_gone_is_none(folder: P
         app.tick()
 
 
+@pytest.mark.slow
 def test_sigterm_ends_it_at_once(folder: Path) -> None:
     ours, terminal = pty.openpty()
     command = [sys.executable, "-m", "fanet_mw", "inspect", str(folder)]

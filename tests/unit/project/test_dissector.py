@@ -29,6 +29,7 @@ def test_the_dissector_checked_in_is_what_the_xml_gives(generate: Callable[..., 
     assert generate(["--check"]) == 0
 
 
+@pytest.mark.slow
 def test_a_changed_xml_fails_the_check_until_it_is_generated_again(
     generate: Callable[..., int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -35,13 +35,51 @@ def test_a_bug_is_caught_by_a_test_that_fails_survives_one_that_does_not_or_keep
     noticed, unnoticed, nonsense = bug("n // 2", "n // 3"), bug("n * 2", "n * 3"), bug("def half(n):", "def half(n")
     assert plant.plant([noticed, unnoticed, nonsense], jobs=1) == 1
     said = capsys.readouterr().out
-    assert "3 bugs: 1 caught, 1 survived" in said
+    assert "3 bugs: 1 caught (0 by long tests only), 1 survived" in said
     assert "- n * 2\n    + n * 3" in said
     assert "not judged" in said
     assert (tree / "numbers_of.py").read_text() == SOURCE, "bugs are planted in a copy"
     assert plant.plant([noticed], jobs=1) == 0
 
 
+@pytest.mark.slow  # four times pytest in a process of its own
+@pytest.mark.parametrize(("also", "status"), [("", "1 caught (1 by"), ("    assert half(8) == 5\n", "0 caught (0 by")])
+def test_a_bug_that_only_a_long_test_notices_is_said_to_be_and_a_long_test_that_fails_anyway_shows_none(
+    tree: Path, capsys: pytest.CaptureFixture[str], also: str, status: str
+) -> None:
+    long_test = "\n\n@pytest.mark.slow\ndef test_twice():\n    assert twice(2) == 4\n"
+    text = TEST.replace("import half", "import half, twice") + long_test + also
+    (tree / "tests" / "test_numbers.py").write_text("import pytest\n" + text)
+    plant.plant([bug("n * 2", "n * 3")], jobs=1)
+    assert status in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("default", "long", "status"),
+    [
+        (plant.NOTICED, plant.PASSED, "caught"),
+        (None, plant.PASSED, "caught"),
+        (plant.PASSED, plant.NOTICED, plant.BY_LONG),
+        (plant.NONE_CHOSEN, plant.NOTICED, plant.BY_LONG),
+        (plant.PASSED, plant.PASSED, "survived"),
+        (plant.PASSED, plant.NONE_CHOSEN, "survived"),
+        (plant.NONE_CHOSEN, plant.PASSED, "survived"),
+        (plant.NONE_CHOSEN, plant.NONE_CHOSEN, "not judged"),
+        (plant.PASSED, None, "not judged"),
+        (2, plant.NOTICED, "not judged"),
+    ],
+)
+def test_a_bug_is_tried_by_the_default_tests_first(
+    monkeypatch: pytest.MonkeyPatch, default: int | None, long: int | None, status: str
+) -> None:
+    def answer(*_: object, chosen: str = plant.DEFAULT, **__: object) -> tuple[int | None, str]:
+        return (long if chosen == plant.LONG else default), ""
+
+    monkeypatch.setattr(plant, "pytest_in", answer)
+    assert plant.verdict_of(Path(), ["test_numbers.py"]).startswith(status)
+
+
+@pytest.mark.slow
 def test_without_any_bug_the_tests_must_pass(tree: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tree / "tests" / "test_numbers.py").write_text(TEST.replace("== 3", "== 4"))
     assert plant.plant([bug("n // 2", "n // 3")], jobs=1) == 1

@@ -3,6 +3,8 @@
 import ast
 import random
 
+import pytest
+
 from tests.mutants.blocks import blocks_of
 from tests.mutants.random_bugs import LEAST, ROOT, Bug, Coverage, all_bugs, interval
 
@@ -18,6 +20,7 @@ def second(x):
 """
 
 
+@pytest.mark.slow
 def test_each_bug_is_another_program() -> None:
     for bug in random.Random(1).sample(all_bugs(["bounds", "world"]), 60):
         source = (ROOT / bug.path).read_text(encoding="utf-8")

@@ -142,6 +142,7 @@ main()
 """
 
 
+@pytest.mark.slow
 def test_a_limit_of_the_size_of_files_costs_the_long_ones_only(tmp_path: Path) -> None:
     """The operating system refuses the writes here, as it does on a full disk, and no disk of one's own is needed."""
     command = [

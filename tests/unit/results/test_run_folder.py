@@ -158,6 +158,7 @@ def test_content_that_is_none_is_one_line(folder: Path, name: str, content: byte
     refused(folder, by=report)
 
 
+@pytest.mark.slow
 def test_a_run_of_which_nobody_has_reported_has_a_page(folder: Path) -> None:
     for name, content in EMPTY:
         forge(folder, name, content)
@@ -277,6 +278,7 @@ def test_a_run_of_before_keys_were_removed_is_read_if_they_had_no_effect_in_it(f
         Replay.read(folder)
 
 
+@pytest.mark.slow
 def test_a_description_is_text_in_every_page(folder: Path) -> None:
     hostile = (
         "x</p><script>alert(1)</script>\n# A heading\n[a](javascript:alert(3)) ![p](http://127.0.0.1/b) | a |\n- b `c`"

@@ -7,6 +7,7 @@ from fanet_mw.errors import HostError
 distributed = pytest.importorskip("distributed")
 
 
+@pytest.mark.slow
 def test_a_scheduler_without_workers_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     from sim.sweep import dask_cluster
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from kit import slow
 
 from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import Message, Poses, Setpoint, SetpointKind
@@ -36,7 +37,7 @@ class Ear:
         self._hears[expression](topic, payload)
 
 
-@pytest.fixture(params=["kinematic", "pybullet"])
+@pytest.fixture(params=["kinematic", *slow("pybullet")])
 def scenario(request: pytest.FixtureRequest, make_scenario: Any) -> Scenario:
     scenario: Scenario = make_scenario(
         **{"nodes.count": 4, "nodes.spacing_m": 30, "mobility.model": "formation", "mobility.speed_m_s": 8,

@@ -211,6 +211,7 @@ def places(content: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]
         yield from places(value, (*path, key))
 
 
+@pytest.mark.slow
 def test_no_report_that_gets_through_can_keep_the_result_from_being_computed(genuine: Outcome) -> None:
     """Every value of a genuine report of each kind of actor is left out, and put in place of it what it is not.
 
@@ -319,6 +320,7 @@ def test_who_is_not_of_the_swarm_is_not_heard(ear: Ear, topic: str) -> None:
     assert ear.collector._puts == 10
 
 
+@pytest.mark.slow
 def test_a_flood_of_one_actor_stops_at_its_allowance_and_leaves_the_others_theirs(ear: Ear) -> None:
     flood = codecs.encode([TraceBatch(tuple(Generated(S, 3, i, "traffic" * 20, 5) for i in range(4_000)))])
     for _ in range(60):  # 42 MB

@@ -84,6 +84,7 @@ def test_more_lateness_in_a_few_seconds_than_is_allowed_in_20_slows_it(late: dic
     assert [Swarm().second(late=0.5) for _ in range(3)] == [1.0, 1.0, 1.0], "one second alone may be a pause"
 
 
+@pytest.mark.slow
 def test_pauses_that_the_limit_allows_on_average_do_not() -> None:
     swarm = Swarm()
     assert {swarm.second(late=0.03 if second % 5 == 0 else 0.0) for second in range(300)} == {1.0}
@@ -195,6 +196,7 @@ def test_under_a_load_the_pace_settles_near_what_it_allows_and_returns_within_30
 
 @settings(deadline=None, max_examples=20)
 @given(st.lists(st.tuples(st.floats(10.5, 30), st.floats(0.02, 0.145)), max_size=12), st.floats(2.0, 4.0))
+@pytest.mark.slow
 def test_pauses_of_which_the_lead_covers_most_pass(pauses: list[tuple[float, float]], capacity: float) -> None:
     """Pauses of: the seconds since the one before, and its length."""
     starts: list[tuple[float, float]] = []

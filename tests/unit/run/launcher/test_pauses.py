@@ -33,6 +33,7 @@ async def test_what_holds_up_the_launcher_is_counted() -> None:
     assert watch.summary() == found, "it is closed"
 
 
+@pytest.mark.slow
 def test_a_pause_of_the_process_is_measured_on_whichever_processor() -> None:
     command = (
         "from sim.run.launcher.pauses import longest_pause_ns; print('on', flush=True); print(longest_pause_ns(1.0))"

@@ -201,6 +201,7 @@ def test_a_crazyflie_falls_at_the_speed_at_which_its_drag_carries_it() -> None:
     assert -engine.velocities()[0, 2] == pytest.approx(terminal, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_cruising_uav_keeps_its_speed_and_brakes_at_once() -> None:
     """Its drag at 15 m/s takes 4.5 m/s2; at 35 degrees of tilt it stops within v^2 / (2 g tan 35) + 0.5 s."""
     engine = hovering(IRIS)
@@ -213,7 +214,8 @@ def test_a_cruising_uav_keeps_its_speed_and_brakes_at_once() -> None:
     assert stop[:, 3].min() > -0.5, "and does not fly back"
 
 
-@pytest.mark.parametrize("wind_m_s", [15, *slow(8)])
+@pytest.mark.parametrize("wind_m_s", [15, 8])
+@pytest.mark.slow
 def test_uavs_that_stand_on_their_pads_stay_there_in_wind(make_scenario: MakeScenario, wind_m_s: float) -> None:
     keys = {"world.engine": "rotors", "world.wind_m_s": (wind_m_s, 0.0), "world.gusts_m_s": wind_m_s,
             "mobility.model": "onboard", "nodes.on_ground": True, "nodes.count": 4}  # fmt: skip
@@ -235,6 +237,7 @@ def test_uavs_that_stand_on_their_pads_stay_there_in_wind(make_scenario: MakeSce
     assert up[6:12] == first.states[6:12], "the others still stand"
 
 
+@pytest.mark.slow
 def test_fast_and_full_model_fly_a_figure_of_eight_alike() -> None:
     """A lemniscate of 40 m x 20 m at up to 11 m/s: the point masses of `kinematic` stay within 2.5 m of the rotors."""
     rate = 2 * math.pi / 32
@@ -341,6 +344,7 @@ def test_a_uav_whose_battery_is_empty_falls(make_scenario: MakeScenario, engine:
     assert world.report()["least_charge"] == 0.0
 
 
+@pytest.mark.slow
 def test_the_fast_engines_batteries_are_drained_as_the_full_ones(make_scenario: MakeScenario) -> None:
     """15 s at 5 m/s: the table of steady flight against the rotors' own power."""
     left = {}

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from kit import slow
 
 from fanet_mw.bus.messages import SetpointKind
 from fanet_mw.scenario import Scenario
@@ -31,12 +32,12 @@ def at_wall(engine: Engine, up_m_s: float, seconds: float) -> np.ndarray:
     return engine.positions()[0]
 
 
-@pytest.mark.parametrize("engine", [Kinematic(WALL), Rotors(IRIS, solids=WALL)])
+@pytest.mark.parametrize("engine", [Kinematic(WALL), *slow(Rotors(IRIS, solids=WALL))])
 def test_a_body_at_a_wall_sinks_beside_it(engine: Engine) -> None:
     assert at_wall(engine, -3.0, 7)[2] < 0.5
 
 
-@pytest.mark.parametrize("engine", [Kinematic(WALL), Rotors(IRIS, solids=WALL)])
+@pytest.mark.parametrize("engine", [Kinematic(WALL), *slow(Rotors(IRIS, solids=WALL))])
 def test_a_wreck_falls_from_a_wall(engine: Engine) -> None:
     at_wall(engine, 0.0, 0)
     engine.fall(0)
@@ -45,6 +46,7 @@ def test_a_wreck_falls_from_a_wall(engine: Engine) -> None:
     assert engine.positions()[0, 2] < 0.5
 
 
+@pytest.mark.slow
 def test_who_is_blown_against_a_wall_while_it_lands_has_not_landed(make_scenario: MakeScenario) -> None:
     keys: dict[str, Any] = {
         "nodes.count": 1, "nodes.altitude_m": 40, "world.area_m": 2000.0, "world.navigation": "estimated",

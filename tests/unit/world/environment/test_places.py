@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from kit import slow
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.mavlink import Geodetic, to_geodetic
@@ -234,7 +235,7 @@ def test_a_building_is_the_smallest_rectangle_about_its_outline(tmp_path: Path) 
     assert (first.height, second.height, third.height) == (12.0, 12.0, 19.0)
 
 
-@pytest.mark.parametrize("engine", ["kinematic", "pybullet", "rotors"])
+@pytest.mark.parametrize("engine", ["kinematic", "pybullet", *slow("rotors")])
 def test_a_turned_building_hides_and_is_hit_where_it_stands(
     make_scenario: MakeScenario, tmp_path: Path, engine: str
 ) -> None:

@@ -66,6 +66,7 @@ def test_without_gps_a_uav_lands_after_five_seconds_and_drifts_as_it_does(make_s
     assert made.velocity(1) == pytest.approx([0, 0, 0], abs=0.01)
 
 
+@pytest.mark.slow
 def test_without_gps_the_wind_takes_a_uav_along_as_it_sinks(make_scenario: MakeScenario) -> None:
     """FlightTaskDescend of PX4 stays level: the velocity of the air is reached within m / (4 lambda w) = 7 s."""
     out = {"sensors.gps_outages": ((0, 0, 9000, 16, 9000),)}
@@ -100,6 +101,7 @@ def test_dead_reckoning_drifts_as_integrals_of_gauss_markov_processes_do(
     assert spread == pytest.approx(law, rel=0.08 if not flow else 0.15)
 
 
+@pytest.mark.slow
 def test_a_return_and_the_geofence_go_by_the_estimate(make_scenario: MakeScenario) -> None:
     keys = {"sensors.gps_common_m": 40.0, "mobility.geofence": "return", "mobility.return_height_m": 30.0}
     off = []

@@ -9,7 +9,7 @@ from typing import Final
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from kit import examples
+from kit import examples, slow
 
 from agents.mission.finding.calibration import common_offset, likelihood
 from agents.mission.finding.known_survivors import KnownSurvivors
@@ -87,13 +87,14 @@ def median_error_m(confirmed: int, *, offset_db: float) -> float:
     return statistics.median(errors)
 
 
+@pytest.mark.slow
 def test_weak_phones_are_placed_as_well_as_others_once_some_survivors_are_confirmed() -> None:
     assert median_error_m(0, offset_db=-6) > 100, "a weak phone is taken for one far away"
     assert median_error_m(1, offset_db=-6) < 80
     assert median_error_m(4, offset_db=-6) < 45
 
 
-@pytest.mark.parametrize("confirmed", [1, 4])
+@pytest.mark.parametrize("confirmed", [1, *slow(4)])
 def test_phones_that_are_as_assumed_are_placed_as_before(confirmed: int) -> None:
     assert median_error_m(confirmed, offset_db=0) < 1.15 * median_error_m(0, offset_db=0)
 

@@ -13,9 +13,11 @@ NORTHERN, SOUTHERN = 8, 23
 @pytest.mark.parametrize(
     ("from_s", "lost", "why"),
     [
-        (12.7, [1, 39, 3, 7], "four of one line: who is beyond a gap has moved before"),
         (153.3, [16, 26, 38, 28], "three of a line that turns back"),
-        *slow((115.5, [SOUTHERN, 14, 25, 6], "where the chain ends, and others of both lines")),
+        *slow(
+            (12.7, [1, 39, 3, 7], "four of one line: who is beyond a gap has moved before"),
+            (115.5, [SOUTHERN, 14, 25, 6], "where the chain ends, and others of both lines"),
+        ),
         (139.6, [32], "the second relay: the first one cannot come nearer, and may not go away again"),
     ],
 )
@@ -31,7 +33,7 @@ def test_two_relays_beside_each_other_are_missed_by_both_sides() -> None:
 
 
 @pytest.mark.parametrize(
-    ("from_s", "lost", "within_s"), [(110.0, [33, 34], 16.0), (140.0, [32], 12.0), (140.0, [33, 37], 18.0)]
+    ("from_s", "lost", "within_s"), [(110.0, [33, 34], 16.0), *slow((140.0, [32], 12.0), (140.0, [33, 37], 18.0))]
 )
 def test_a_line_waits_for_its_chain_that_closes_a_gap_near_it(from_s: float, lost: list[int], within_s: float) -> None:
     """A line that flies on pulls the end of the chain away: 22.4, 17.2 and 23.4 s. Who is between two gaps follows
@@ -40,14 +42,14 @@ def test_a_line_waits_for_its_chain_that_closes_a_gap_near_it(from_s: float, los
     assert ClosingSwarm(from_s).heal_s(*lost, within_s=25.0) < within_s
 
 
+@pytest.mark.slow
 def test_of_two_lost_at_once_the_second_one_that_is_noticed_makes_nobody_seek_others_where_they_are_not_yet() -> None:
     first, second = 45, 32  # a follower, and a relay, which is missed later
     assert 4.0 < ClosingSwarm(102.5).heal_s(first, second, within_s=15.0) < 7.0
 
 
-@pytest.mark.parametrize(
-    ("from_s", "along", "off_m"), [(60.2, 1.71, -187.0), *slow((77.3, 2.12, 226.0), (184.0, 1.52, -3.0))]
-)
+@pytest.mark.parametrize(("from_s", "along", "off_m"), [(60.2, 1.71, -187.0), (77.3, 2.12, 226.0), (184.0, 1.52, -3.0)])
+@pytest.mark.slow
 def test_parts_that_take_each_other_for_lost_and_close_the_same_gap_keep_clear(
     from_s: float, along: float, off_m: float
 ) -> None:

@@ -31,6 +31,9 @@ _HASTE: Final = 0.95
 _HURRIES: Final = 0.9
 _SETS_OUT_S: Final = 2.0
 """Who is beyond a gap has noticed the loss after this time, and flies here at this share of the speed for that."""
+_UNSURE: Final = 0.7
+"""Who is on the way may be late: it is sought up to this share of the reach from where it should be, until it is heard.
+"""
 
 _KEPT_M_S: Final = 1e-6
 """A velocity keeps to a limit up to this rounding error."""
@@ -106,7 +109,18 @@ class ConnectivityMaintenance:
                 ties |= {node: motion for node, motion in motions.items() if motion is not None}
                 if not places and pattern.kind(place) != "follower":
                     return ties  # as in a circuit, where nobody keeps in reach of others
-        return ties or self._nearest_motions(now_ns)
+        return (ties or self._nearest_motions(now_ns)) | self._across(now_ns)
+
+    def _across(self, now_ns: int) -> dict[NodeId, Motion]:
+        """The nearest neighbor in another part of the swarm: the only link to it that this UAV has, and would lose."""
+        here, present = self._own_motion.position, self._present(now_ns)
+        others = {
+            node: motion.offset_from(here, now_ns).norm()
+            for node, motion in present.items()
+            if node in self._formation.sought
+        }
+        near = [(left_m, node) for node, left_m in others.items() if left_m <= self._reach_m]
+        return {min(near)[1]: present[min(near)[1]]} if near else {}
 
     def held(self, velocity: Enu) -> list[NodeId]:
         """Those who stay in reach because the velocity that was chosen keeps to their limits."""
@@ -115,7 +129,7 @@ class ConnectivityMaintenance:
     def beyond_gap(self, now_ns: int) -> Motion | None:
         """The likely motion of a UAV beyond a lost one, which hurries here; None once this UAV would hear it there."""
         away = [(left_m, motion) for left_m, _, motion in self._unheard(now_ns) if left_m > _CLOSING * self._reach_m]
-        return min(away)[1] if away else None
+        return min(away)[1] if away else self._parted(now_ns)
 
     def missed(self, now_ns: int) -> int | None:
         """A UAV beyond a lost one that this one would hear by now if it had hurried here, too: it is lost as well."""
@@ -142,6 +156,37 @@ class ConnectivityMaintenance:
                 left_m = self._own_motion.position.minus(at).horizontal()
                 unheard.append((left_m, plan.nodes[other], Motion(at, velocity, now_ns)))
         return unheard
+
+    def _parted(self, now_ns: int) -> Motion | None:
+        """The motion of a UAV of another part that this one seeks on the way to the places: the places are in reach of
+        each other, so a link lasts, and no neighbor is nearer to any such UAV. None once it is heard in reach.
+        """
+        place, pattern, plan = self._formation.place, self._formation.pattern, self._formation.plan
+        ways = {} if place is None or self._bidding.is_absent(now_ns) else self._formation.parted_ways(now_ns)
+        if not ways or plan is None or pattern is None or place is None:
+            return None
+        ends = {other: pattern.at(other, 0.0) for other in ways}
+        heard = {other: self._neighbors.motion(plan.nodes[other], now_ns=now_ns) for other in ways}
+
+        def nearest(end: Enu, at: Enu) -> tuple[float, int]:
+            found = [(math.inf, -1)]
+            for other, way in ways.items():
+                left_m = (heard[other] or way).offset_from(at, now_ns).horizontal()
+                is_there = heard[other] is not None or left_m > _UNSURE * self._reach_m
+                if is_there and ends[other].minus(end).horizontal() <= LASTING * self._reach_m:
+                    found.append((left_m, other))
+            return min(found)
+
+        near_m, sought = nearest(pattern.at(place, 0.0), self._own_motion.position)
+        if sought < 0 or (heard[sought] is not None and near_m <= _CLOSING * self._reach_m):
+            return None
+        place_of = {node: at for at, node in enumerate(plan.nodes) if at not in pattern.vacant and at not in ways}
+        for node, motion in self._present(now_ns).items():
+            if node in place_of:
+                other_m, _ = nearest(pattern.at(place_of[node], 0.0), motion.position_at(now_ns))
+                if other_m < near_m:
+                    return None
+        return heard[sought] or ways[sought]
 
     def _lasting(self, plan: Search, pattern: Pattern, place: int, now_ns: int) -> dict[NodeId, Motion]:
         """Neighbors whose places are in reach of this UAV's; not one with whom a third has strong links to both, each

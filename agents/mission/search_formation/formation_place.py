@@ -12,6 +12,7 @@ from agents.mission.finding.phone_localization import Estimate
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.search_formation.formation_planner import pattern_of
 from agents.mission.search_formation.pattern import Pattern
+from fanet_mw.motion import Motion
 from fanet_mw.units import MS, STILL, US, Enu, NodeId, S
 from fanet_mw.wire.search_plan import Search
 
@@ -54,14 +55,16 @@ class FormationPlace:
         self._left_ns = 0
         """The instant at which it leaves that position."""
         self._gaps: frozenset[int] = frozenset()
-        self._apart = False
-        """True while a part of the swarm that is not lost is out of reach."""
+        self._parted: Collection[int] = ()
+        """The UAVs of another part of the swarm, out of reach and not lost."""
+        self.sought: Collection[int] = ()
+        """The same, or who was that lately, while ranks are closed: by chance links parts meet, and lose each other."""
+        self._seen: dict[int, tuple[Enu, int]] = {}
+        """Where each other UAV was, by its latest hello or status, and when."""
         self._closing_ns = 0
         """The instant at which the last of them was lost."""
-        self._last: frozenset[int] = frozenset()
-        """Those lost since ranks were closed over others, or had been."""
         self._hops: Mapping[int, int] = {}
-        """How many ties lead from each place to the nearest of these."""
+        """How many ties lead from each place to the nearest one of another part."""
         self._before: Pattern | None = None
         """The formation until then, if all had time to take it up."""
         self._changed_ns = -_FLOWN_NS
@@ -77,9 +80,9 @@ class FormationPlace:
             self.depart(now_ns)
 
     def close_ranks(
-        self, lost: Collection[int], now_ns: int, *, away: Collection[int] = (), apart: bool = False
+        self, lost: Collection[int], now_ns: int, *, away: Collection[int] = (), parted: Collection[int] = ()
     ) -> None:
-        """Fly on without these: `away` left without urgency, `apart` are in another part of the swarm, and not lost."""
+        """Fly on without these: `away` left without urgency; `parted` are in another part, and not lost."""
         if self.plan is None or self.pattern is None:
             return
         vacant = frozenset(
@@ -89,14 +92,15 @@ class FormationPlace:
         )
         if len(vacant) >= len(self.plan.nodes) - 1:
             vacant = frozenset()  # it is alone, and waits for the others at its place
+        if parted or now_ns - self._closing_ns > _CLOSES_S * S:
+            self.sought = parted
         gaps = frozenset(
             place for place in vacant if self.plan.nodes[place] in lost and self.plan.nodes[place] not in away
         )
-        self._apart = apart
+        if parted != self._parted:
+            self._parted = parted
+            self._hops = self.pattern.hops_from([at for at, node in enumerate(self.plan.nodes) if node in parted])
         if not gaps <= self._gaps:
-            is_another = (now_ns - self._closing_ns) / S > _CLOSES_S
-            self._last = (frozenset() if is_another else self._last) | (gaps - self._gaps)
-            self._hops = self.pattern.hops_from(self._last)
             self._closing_ns = now_ns
             if now_ns - self._changed_ns >= _FLOWN_NS:
                 self._before = self.pattern
@@ -112,9 +116,9 @@ class FormationPlace:
         return since_s if self.pattern.has_beside(self.place, self._gaps) else None
 
     def leads_to_gap(self, node: int, now_ns: int) -> bool:
-        """True for a UAV that is fewer ties from those lost last than this one, while the swarm is apart."""
+        """True for a UAV that is fewer ties from another part than this one, while ranks are closed."""
         plan, hops = self.plan, self._hops
-        if plan is None or not self._apart or now_ns - self._closing_ns > _APART_S * S:
+        if plan is None or now_ns - self._closing_ns > _APART_S * S:
             return False
         own = math.inf if self.place is None else hops.get(self.place, math.inf)
         return any(hops.get(place, math.inf) < own for place, holder in enumerate(plan.nodes) if holder == node)
@@ -127,13 +131,31 @@ class FormationPlace:
         if self.pattern is None or self.place is None or not self._gaps:
             return False
         size, is_above = self.pattern.gap_beside(self.place, self._gaps)
-        return is_above and size > (0 if self._apart else 1)
+        return is_above and size > (0 if self._parted else 1)
 
     def known_at(self, place: int, swept_s: float) -> tuple[Enu, Enu]:
         """Where the UAV of a place would fly if the last one were not lost, and how: there it is sought."""
         pattern = self._before or self.pattern
         assert pattern is not None, "who seeks others has a plan"
         return pattern.at(place, swept_s), pattern.velocity(place, swept_s)
+
+    def see(self, node: int, position: Enu, at_ns: int) -> None:
+        """Another UAV was here then, by what it says."""
+        if at_ns >= self._seen.get(node, (position, at_ns))[1]:
+            self._seen[node] = position, at_ns
+
+    def parted_ways(self, now_ns: int) -> dict[int, Motion]:
+        """The places of the UAVs of another part before the sweep, and where these are likely to be on their way."""
+        plan, pattern, ways = self.plan, self.pattern, dict[int, Motion]()
+        if plan is None or pattern is None or self.is_taken_up(now_ns):
+            return ways
+        for place, node in enumerate(plan.nodes):
+            if node in self.sought and node in self._seen:
+                start, seen_ns = self._seen[node]
+                from_ns, goal = max(seen_ns, plan.start_us * US), pattern.at(place, 0.0)
+                at, velocity = _on_way(start, goal, from_ns=from_ns, to_ns=_taken_up_ns(plan), now_ns=now_ns)
+                ways[place] = Motion(at, velocity, now_ns)
+        return ways
 
     def depart(self, now_ns: int) -> None:
         begins_ns = now_ns if self.plan is None else self.plan.start_us * US
@@ -168,15 +190,7 @@ class FormationPlace:
         if now_ns >= arrival_ns or self._left_from is None:
             swept_s = (now_ns - arrival_ns) / S
             return pattern.at(place, swept_s), pattern.velocity(place, swept_s)
-        goal, start, span_ns = pattern.at(place, 0.0), self._left_from, arrival_ns - self._left_ns
-        if now_ns <= self._left_ns or span_ns <= 0:
-            return start, STILL
-        share, per_s = (now_ns - self._left_ns) / span_ns, S / span_ns
-        way = goal.minus(start)
-        return (
-            Enu(start.east + share * way.east, start.north + share * way.north, start.up + share * way.up),
-            Enu(way.east * per_s, way.north * per_s, way.up * per_s),
-        )
+        return _on_way(self._left_from, pattern.at(place, 0.0), from_ns=self._left_ns, to_ns=arrival_ns, now_ns=now_ns)
 
     # --- how far it may go from there -----------------------------------------------------------------------------
 
@@ -285,6 +299,18 @@ def _beside(lane: Enu, moves: Enu, ahead_m: float, aside_m: float) -> Enu:
     """The position this far ahead and to the right of a place (`along`)."""
     east, north = _heading(moves)
     return Enu(lane.east + ahead_m * east + aside_m * north, lane.north + ahead_m * north - aside_m * east, lane.up)
+
+
+def _on_way(start: Enu, goal: Enu, *, from_ns: int, to_ns: int, now_ns: int) -> tuple[Enu, Enu]:
+    """The position and velocity of who flies straight to a place, so as to be there at an instant."""
+    span_ns = to_ns - from_ns
+    if now_ns <= from_ns or span_ns <= 0:
+        return start, STILL
+    share, per_s, way = (now_ns - from_ns) / span_ns, S / span_ns, goal.minus(start)
+    return (
+        Enu(start.east + share * way.east, start.north + share * way.north, start.up + share * way.up),
+        Enu(way.east * per_s, way.north * per_s, way.up * per_s),
+    )
 
 
 def _taken_up_ns(plan: Search) -> int:

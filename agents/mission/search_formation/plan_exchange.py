@@ -80,8 +80,8 @@ class PlanExchange:
                 self.alarm_ns = max(now_ns, self._next_alarm_ns) + round(waits * _SPREAD_NS)
             self.tell_losses(now_ns)
             away = {*self._planner.leavers, *self._planner.absent}
-            apart = not self._roll_call.lost.keys() >= set(self._roll_call.parted)
-            self._place.close_ranks(self._roll_call.lost, now_ns, away=away, apart=apart)
+            parted = set(self._roll_call.parted) - self._roll_call.lost.keys()
+            self._place.close_ranks(self._roll_call.lost, now_ns, away=away, parted=parted)
 
     def tell_losses(self, now_ns: int) -> None:
         """If it is time to tell all who is lost, or back, flood it unless another UAV has done so."""
@@ -126,6 +126,7 @@ class PlanExchange:
     def on_hello(self, node: int, motion: Motion, *, now_ns: int) -> bool:
         """A neighbor's hello states how it flies; returns True if it was lost."""
         self._planner.on_neighbor(node, motion.position, now_ns=now_ns)
+        self._place.see(node, motion.position, now_ns)
         returned, falls = node in self._roll_call.lost, _falls(motion.velocity)
         self._roll_call.on_hello(node, now_ns=now_ns, falls=falls)
         return returned and not falls
@@ -141,6 +142,7 @@ class PlanExchange:
 
     def on_status(self, status: SearchStatus, *, now_ns: int) -> None:
         self._planner.status(status, now_ns=now_ns)
+        self._place.see(status.node, status.position, min(now_ns, status.t_us * US))
 
     def on_plan(self, plan: Search, *, now_ns: int) -> None:
         """A plan was received; this UAV follows it if it is newer than the plan in force."""

@@ -4,12 +4,14 @@ Its UAVs decide as in a mission, and hear each other within reach: hellos once a
 once. Whom one UAV misses all of its part miss at the next step; there is no radio.
 """
 
+import itertools
 import math
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from search_board import COUNT, OPEN, REACH_M, SCENARIO, TAKEN_UP_NS, Board
+from search_board import COUNT, OPEN, PLAN, REACH_M, SCENARIO, UP_M, Board
 
 from agents.mission.flight.connectivity_maintenance import ConnectivityMaintenance
 from agents.mission.flight.flight import Flight
@@ -19,7 +21,8 @@ from agents.mission.flight.search_limits import SearchLimits
 from agents.mission.flight.velocity_choice import VelocityChoice
 from agents.mission.search_formation.roll_call import RollCall
 from fanet_mw.motion import Motion
-from fanet_mw.units import Enu, NodeId, S
+from fanet_mw.units import MS, US, Enu, NodeId, S
+from fanet_mw.wire.search_plan import Search
 from sim.results.connectivity import parts
 
 _STEP_NS: Final = S // 5
@@ -30,6 +33,7 @@ _SILENT_NS: Final = (1_200_000_000, 2_000_000_000, 2_800_000_000)
 _KNOWN_NS: Final = 15 * S
 _NEAR_M: Final = 0.96 * REACH_M
 """Missed is only who was heard so lately, and would be so near had it flown on."""
+_MIDDLE: Final = COUNT * (Enu(0, 0, UP_M),)
 _ACQUAINTED_NS: Final = 2 * S
 """So long before anybody is lost all fly at their places, and hear each other."""
 
@@ -37,12 +41,12 @@ _ACQUAINTED_NS: Final = 2 * S
 class _Uav:
     """One UAV of the swarm."""
 
-    def __init__(self, node: NodeId, at: Enu) -> None:
-        self.board = board = Board(node, at)
+    def __init__(self, node: NodeId, at: Enu, plan: Search) -> None:
+        self.board = board = Board(node, at, plan=plan)
         own, neighbors = board.own_motion, board.neighbors
         self.lost: set[int] = set()
-        self.apart = False
-        """True while it knows of others, who are not lost, in another part."""
+        self.parted: set[int] = set()
+        """The others of another part, who are not lost."""
         tied = ConnectivityMaintenance(own, neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=_SPEED_M_S)
         choice = VelocityChoice(
             own, OPEN, most_m_s=_SPEED_M_S, hard=[ReciprocalAvoidance(own, neighbors, OPEN)], soft=[tied]
@@ -57,7 +61,7 @@ class _Uav:
         )
 
     def fly(self, at: Enu, velocity: Enu, now_ns: int) -> Enu:
-        self.board.place.close_ranks(self.lost, now_ns, apart=self.apart)
+        self.board.place.close_ranks(self.lost, now_ns, parted=self.parted)
         self._flight.fix(at, velocity, None, now_ns=now_ns)
         self.lost |= self._roll_call.lost.keys()
         assert self._flight.velocity is not None
@@ -65,14 +69,19 @@ class _Uav:
 
 
 class ClosingSwarm:
-    """The swarm from an instant of its sweep on, when all are at their places."""
+    """The swarm from an instant of its sweep on, when all are at their places; negative: on the way there from
+    `starts`, where all stood.
+    """
 
-    def __init__(self, from_s: float) -> None:
-        self._now_ns = TAKEN_UP_NS + round(from_s * S) - _ACQUAINTED_NS
-        places = [Board(NodeId(node), Enu(0, 0, 0)).place.lane(self._now_ns) for node in range(1, COUNT + 1)]
+    def __init__(self, from_s: float, *, plan: Search = PLAN, starts: Sequence[Enu] = _MIDDLE) -> None:
+        taken_up_ns = plan.start_us * US + plan.deploy_ds * 100 * MS
+        self._now_ns = taken_up_ns + round(from_s * S) - _ACQUAINTED_NS
+        self._uavs = [_Uav(NodeId(node), at, plan) for node, at in enumerate(starts, 1)]
+        for uav, (node, at) in itertools.product(self._uavs, enumerate(starts, 1)):
+            uav.board.place.see(node, at, 0)  # by its status
+        places = [uav.board.place.lane(self._now_ns) for uav in self._uavs]
         self._at = np.array([at for at, _ in places], dtype=float)
         self._flown = np.array([velocity for _, velocity in places], dtype=float)
-        self._uavs = [_Uav(NodeId(node), at) for node, (at, _) in enumerate(places, 1)]
         self._lost = np.zeros(COUNT, dtype=bool)
         self._noticed_ns = np.resize(_SILENT_NS, COUNT)
         self._line: tuple[npt.NDArray[np.float64], float] | None = None
@@ -134,6 +143,7 @@ class ClosingSwarm:
                 for other in np.flatnonzero(hears[index]):
                     if other != index:
                         self._uavs[other].board.neighbors.on_hello(index + 1, motion)
+                        self._uavs[other].board.place.see(index + 1, motion.position, now_ns)
             silent_ns = now_ns - self._heard_ns[index]
             for other in np.flatnonzero((silent_ns >= self._noticed_ns) & (silent_ns < _KNOWN_NS)):
                 known = uav.board.neighbors.motion(other + 1, now_ns=now_ns)
@@ -146,4 +156,4 @@ class ClosingSwarm:
             missed = set[int]().union(*(self._uavs[member].lost for member in members)) - here
             for member in members:
                 self._uavs[member].lost = missed
-                self._uavs[member].apart = len(here) + len(missed) < COUNT
+                self._uavs[member].parted = set(range(1, COUNT + 1)) - here - missed

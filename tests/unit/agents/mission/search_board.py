@@ -47,13 +47,13 @@ FOLLOWER, LINE = NodeId(COUNT), NodeId(5)
 class Board:
     """The parts of one UAV, wired as in a search."""
 
-    def __init__(self, node: NodeId, at: Enu, *, planned: bool = True, connection: Connection = "always") -> None:
+    def __init__(self, node: NodeId, at: Enu, *, plan: Search | None = PLAN, connection: Connection = "always") -> None:
         self.out = Outbox()
         self.survivors = KnownSurvivors(MODEL)
         self.own_motion, self.neighbors = OwnMotion(at, OPEN), NeighborMotions()
         self.place = FormationPlace(node, self.own_motion, reach_m=REACH_M)
-        if planned:
-            self.place.adopt(PLAN, 0)
+        if plan is not None:
+            self.place.adopt(plan, 0)
         self.approach = Approach(
             node, self.survivors, self.own_motion, self.neighbors, self.out, arrival_m=30, speed_m_s=10.0
         )

@@ -33,7 +33,7 @@ def test_a_uav_of_a_line_is_tied_to_those_beside_it_and_a_follower_to_the_neares
 
 def test_who_waits_for_a_plan_stays_within_reach_of_the_two_nearest() -> None:
     now_ns = 20 * S
-    board = Board(LINE, Enu(0.0, 0.0, 65.0), planned=False)
+    board = Board(LINE, Enu(0.0, 0.0, 65.0), plan=None)
     tied = ConnectivityMaintenance(
         board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
     )
@@ -162,6 +162,60 @@ def test_the_two_beside_a_gap_fly_to_where_the_other_one_was_until_they_would_he
             beyond.append(None if mate is None else mate.position)
         there = NodeId(node + 2 * way)
         assert beyond == [lane_of(there, TAKEN_UP_NS + 60 * S), lane_of(there, TAKEN_UP_NS + 68 * S), None]
+
+
+@pytest.mark.parametrize(
+    ("parted", "east_m", "nearer", "lost", "sought"),
+    [
+        (LINE + 1, 300.0, None, 29, True),
+        (LINE + 1, 200.0, None, 29, True),  # it is not heard there: it may be late
+        (LINE + 1, 170.0, None, 29, False),
+        (LINE + 3, 300.0, None, 29, False),  # the places are out of reach of each other: the link would not last
+        (LINE + 1, 300.0, LINE + 2, 29, False),  # a neighbor is nearer to it
+        (LINE + 1, 300.0, LINE + 4, 29, True),  # whose place is out of its reach
+        (LINE + 1, 300.0, LINE + 2, LINE + 2, True),  # which is lost
+    ],
+)
+def test_on_the_way_whoever_is_nearest_to_another_part_flies_to_meet_it(
+    parted: int, east_m: float, nearer: int | None, lost: int, sought: bool
+) -> None:
+    now_ns, here = 35 * S, Enu(0, 0, UP_M)
+    board = Board(LINE, here)
+    there = here._replace(east=east_m)
+    board.place.see(parted, there, now_ns)
+    board.place.close_ranks({lost}, now_ns, parted={parted})
+    if nearer is not None:
+        board.neighbors.on_hello(nearer, Motion(Enu(100.0, 0, UP_M), STILL, now_ns))
+    tied = ConnectivityMaintenance(
+        board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
+    )
+    motion = tied.beyond_gap(now_ns)
+    assert (motion is not None and motion.position == there) is sought
+    for apart_m in (240.0, 244.0) if sought else ():
+        board.neighbors.on_hello(parted, Motion(here._replace(east=apart_m), STILL, now_ns))
+        assert (tied.beyond_gap(now_ns) is not None) is (apart_m > 0.97 * REACH_M), "it is heard"
+    assert tied.missed(now_ns) is None
+
+
+def test_who_hears_one_of_another_part_keeps_in_reach_of_it_and_of_several_of_the_nearest() -> None:
+    now_ns = TAKEN_UP_NS + 40 * S
+    here = lane_of(LINE, now_ns)
+    for parted, ways in ((set[int](), [(1, 0)]), ({30, 31}, [(1, 0), (0, -1)]), ({31}, [(1, 0), (-1, 0)])):
+        board = Board(LINE, here)
+        for node, off in (
+            (LINE + 1, Enu(-170, 0, 0)),
+            (30, Enu(0, 150, 0)),
+            (31, Enu(200, 0, 0)),
+            (32, Enu(0, -260, 0)),
+        ):
+            board.neighbors.on_hello(node, Motion(here.minus(off), STILL, now_ns))
+        board.place.close_ranks({29}, now_ns, parted=parted)
+        tied = ConnectivityMaintenance(
+            board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
+        )
+        assert [(plane.east, plane.north) for plane in tied.planes(now_ns)] == ways
+    board.place.close_ranks({29}, now_ns, parted={32})
+    assert len(tied.planes(now_ns)) == 1, "out of reach"
 
 
 def test_who_does_not_come_to_meet_this_uav_over_a_gap_is_lost_as_well() -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Collection
 
 import pytest
-from search_board import FOLLOWER, LINE, PLAN, TAKEN_UP_NS, UP_M, Board
+from search_board import FOLLOWER, LINE, PLAN, TAKEN_UP_NS, UP_M, Board, lane_of
 
 from agents.mission.finding.phone_localization import Estimate
 from agents.mission.search_formation.formation_planner import plan_of
@@ -13,7 +13,7 @@ from fanet_mw.units import STILL, US, Enu, NodeId, S
 
 
 def test_who_has_no_plan_waits_where_it_is() -> None:
-    board = Board(LINE, Enu(7, 8, UP_M), planned=False)
+    board = Board(LINE, Enu(7, 8, UP_M), plan=None)
     assert board.place.lane(5 * S) == (Enu(7, 8, UP_M), Enu(0, 0, 0))
     assert board.goal.at(None, 5 * S) == (Enu(7, 8, UP_M), Enu(0, 0, 0))
 
@@ -78,16 +78,42 @@ def test_who_has_left_a_ring_for_somebody_strays_until_it_is_back_and_nobody_of_
 def test_of_two_parts_of_a_row_that_take_each_other_for_lost_one_passes_above_the_other() -> None:
     chain, below, beyond = range(31, 41), NodeId(35), NodeId(36)
 
-    def above(node: NodeId, lost: Collection[int], *, apart: bool = True) -> bool:
+    def above(node: NodeId, lost: Collection[int], *, parted: Collection[int] = (1,)) -> bool:
         place = Board(node, Enu(0, 0, UP_M)).place
-        place.close_ranks(lost, TAKEN_UP_NS, apart=apart)
+        place.close_ranks(lost, TAKEN_UP_NS, parted=parted)
         return place.passes_above
 
     assert above(below, {36, 37})
     assert above(below, {36}), "those behind it are out of reach, and not lost"
     assert not above(beyond, {35, 34})
     assert all(above(NodeId(node), {36, 37}) for node in chain if node < 36), "those behind follow"
-    assert not above(below, {36}, apart=False), "one UAV is lost, and nobody else is missed"
-    assert above(below, {36, 37}, apart=False), "two beside each other may be another part for long"
+    assert not above(below, {36}, parted=()), "one UAV is lost, and nobody else is missed"
+    assert above(below, {36, 37}, parted=()), "two beside each other may be another part for long"
     assert not above(LINE, {36, 37}), "another row"
     assert not above(below, set())
+
+
+def test_where_those_of_another_part_are_on_the_way_follows_from_where_they_were_and_from_their_places() -> None:
+    board, parted, lost = Board(LINE, Enu(0, 0, UP_M)), 30, 29
+    goal = lane_of(parted, TAKEN_UP_NS)
+    board.place.see(parted, goal._replace(east=goal.east - 400.0), PLAN.start_us * US - 5 * S)  # before all set out
+    for share, off_m in ((0.0, 400.0), (0.5, 200.0), (0.75, 100.0)):
+        now_ns = PLAN.start_us * US + round(share * PLAN.deploy_ds * S / 10)
+        board.place.close_ranks({lost}, now_ns, parted={parted})
+        (motion,) = board.place.parted_ways(now_ns).values()
+        assert goal.east - motion.position.east == pytest.approx(off_m)
+        assert motion.velocity.east == pytest.approx(0.0 if not share else 400.0 / (PLAN.deploy_ds / 10))
+    board.place.see(parted, goal._replace(east=goal.east - 150.0), now_ns)  # it is late
+    board.place.see(parted, goal, now_ns - S)
+    (motion,) = board.place.parted_ways(now_ns).values()
+    assert goal.east - motion.position.east == pytest.approx(150.0), "the latest one counts"
+    assert board.place.parted_ways(TAKEN_UP_NS) == {}, "in the sweep who is tied to whom says where they are"
+
+
+def test_another_part_is_sought_until_ranks_are_closed_also_while_a_link_by_chance_leads_there() -> None:
+    place, now_ns = Board(LINE, Enu(0, 0, UP_M)).place, 30 * S
+    sought = []
+    for after_s, parted in ((0, {30}), (5, set()), (14, set()), (16, set()), (17, {31})):
+        place.close_ranks({29}, now_ns + after_s * S, parted=parted)
+        sought.append(set(place.sought))
+    assert sought == [{30}, {30}, {30}, set(), {31}]

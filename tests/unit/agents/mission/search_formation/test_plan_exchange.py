@@ -1,9 +1,12 @@
 """Who is out for a survivor says so, and the others close ranks until it is back."""
 
+from collections.abc import Collection
+
 import pytest
 from search_board import COUNT, LINE, OPEN, PLAN, REACH_M, TAKEN_UP_NS, lane_of
 
 from agents.mission.navigation.own_motion import OwnMotion
+from agents.mission.navigation.silent_neighbors import SilentNeighbors
 from agents.mission.outbox import Outbox
 from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.formation_planner import FormationPlanner
@@ -11,9 +14,9 @@ from agents.mission.search_formation.plan_exchange import PlanExchange
 from agents.mission.search_formation.roll_call import RollCall
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.motion import Motion
-from fanet_mw.units import MS, Enu, NodeId, S
+from fanet_mw.units import MS, STILL, US, Enu, NodeId, S
 from fanet_mw.wire import HEADER_BYTES
-from fanet_mw.wire.roll import Roll
+from fanet_mw.wire.roll import ROLL_NS, Roll
 from fanet_mw.wire.search_plan import SearchStatus
 
 NOW_NS = TAKEN_UP_NS + 40 * S
@@ -22,11 +25,11 @@ NOW_NS = TAKEN_UP_NS + 40 * S
 class Exchange:
     """One UAV's part in the exchange, with the plan."""
 
-    def __init__(self, node: NodeId, *, waits: float = 0.5) -> None:
+    def __init__(self, node: NodeId, *, waits: float = 0.5, silent: SilentNeighbors | None = None) -> None:
         """`waits`: all its random numbers."""
         self.out, self.motion = Outbox(), OwnMotion(lane_of(node, NOW_NS), OPEN)
         self.place = FormationPlace(node, self.motion, reach_m=REACH_M)
-        roll_call = RollCall(node, hello_interval_s=1.0)
+        roll_call = RollCall(node, hello_interval_s=1.0, silent=silent)
         planner = FormationPlanner(
             node, roll_call, expected=COUNT, deploy_speed_m_s=9.0,
             of_few=lambda *_: None, random=lambda: 0.5,
@@ -70,6 +73,27 @@ def test_who_is_absent_keeps_its_own_place_in_its_plan() -> None:
     exchange.plans.close_ranks(NOW_NS)
     assert exchange.place.pattern is not None
     assert exchange.place.pattern.vacant == frozenset()
+
+
+def test_where_those_of_another_part_are_follows_from_their_statuses_and_hellos() -> None:
+    class Radio(SilentNeighbors):
+        def __init__(self) -> None: ...
+
+        def parted(self, lost: Collection[int], *, now_ns: int) -> Collection[NodeId]:
+            return [NodeId(20), NodeId(21), NodeId(29)]
+
+    now_ns = PLAN.start_us * US - S
+    exchange = Exchange(LINE, silent=Radio())
+    exchange.plans.on_status(SearchStatus(now_ns // US, Enu(70, 80, 65), 20, 1, 80), now_ns=now_ns)
+    exchange.plans.on_hello(21, Motion(Enu(90, 60, 65), STILL, now_ns), now_ns=now_ns)
+    exchange.plans.on_roll(
+        Roll(now_ns // ROLL_NS, PLAN.planner, PLAN.revision, COUNT * (0,), frozenset({PLAN.nodes.index(29)})),
+        flooded=True, now_ns=now_ns,
+    )  # fmt: skip
+    exchange.plans.close_ranks(now_ns)
+    assert set(exchange.place.sought) == {20, 21}, "29 is lost"
+    ways = exchange.place.parted_ways(now_ns)
+    assert [motion.position for motion in ways.values()] == [Enu(70, 80, 65), Enu(90, 60, 65)]
 
 
 def who_lost(node: NodeId, out: NodeId, *, waits: float) -> Exchange:

@@ -53,7 +53,7 @@ def test_where_reporters_are_too_few_the_nearest_uav_goes_at_once_and_later_a_se
 
 def test_who_has_no_plan_yet_goes_to_a_survivor_nearby_and_not_far_from_the_swarm() -> None:
     for east_m, task in ((60, 1), (170, None)):
-        board = Board(LINE, Enu(0, 0, UP_M), planned=False)
+        board = Board(LINE, Enu(0, 0, UP_M), plan=None)
         board.hear(1, Enu(east_m, 0, 0), range(1, 5), now_ns=0)
         board.tasks.bid(0)
         board.tasks.choose(0)
@@ -99,7 +99,7 @@ def test_before_the_sweep_a_uav_goes_as_far_aside_of_its_way_as_it_is_back_in_ti
 
 
 def test_who_still_takes_off_comes_later_than_who_is_in_the_air() -> None:
-    board = Board(LINE, Enu(0, 0, UP_M), planned=False)
+    board = Board(LINE, Enu(0, 0, UP_M), plan=None)
     board.hear(1, Enu(60, 0, 0), range(1, 5), now_ns=0)
     board.tasks.bid(0, delay_s=20.0)
     assert board.tasks.bids_to_tell(now_ns=0)[0].eta_ds == pytest.approx(260, abs=25)
@@ -130,7 +130,7 @@ def test_a_responder_whose_lane_leaves_a_survivor_behind_takes_its_bid_back() ->
 
 
 def test_a_responder_that_does_not_come_in_time_takes_its_bid_back() -> None:
-    board = Board(LINE, Enu(0, 0, UP_M), planned=False)
+    board = Board(LINE, Enu(0, 0, UP_M), plan=None)
     board.hear(1, Enu(60, 0, 0), range(1, 5), now_ns=NOW_NS)
     board.tasks.bid(NOW_NS)
     board.tasks.choose(NOW_NS)

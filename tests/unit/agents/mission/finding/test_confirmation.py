@@ -1,12 +1,16 @@
 """When a survivor may be confirmed: enough sightings, enough received powers, and nobody else whose phone it may be."""
 
+from types import SimpleNamespace
+from typing import cast
+
 import pytest
 from seeing_uav import UP_M, Uav, mean_dbm
 
-from agents.mission.finding.confirmation import required_margin
+from agents.mission.finding.confirmation import is_confirmable, required_margin
 from agents.mission.finding.identities import Sighting
+from agents.mission.finding.known_survivors import KnownSurvivor
 from agents.mission.finding.person_track import PersonTrack
-from agents.mission.finding.phone_localization import Estimate
+from agents.mission.finding.phone_localization import Estimate, PhoneFilter
 from fanet_mw.units import Enu, S
 
 
@@ -41,8 +45,8 @@ def test_while_two_phones_fit_one_person_nobody_is_named_until_waiting_longer_is
 
 @pytest.mark.parametrize(("second", "margin"), [(0, 9.0), (15, 9.0), (32.5, 5.5), (50, 2.0), (500, 2.0)])
 def test_a_uav_is_content_with_less_certainty_the_longer_it_waits(second: float, margin: float) -> None:
-    person = PersonTrack(Estimate(0, 0, 1, 0, 1), 0, 0, Enu(0, 0, 0), 9.0)
-    assert required_margin(person, round(second * S)) == margin
+    person = PersonTrack(Estimate(0, 0, 1, 0, 1), 7 * S, 8 * S, Enu(0, 0, 0), 9.0)
+    assert required_margin(person, round((7 + second) * S)) == margin
 
 
 def test_only_a_person_seen_from_close_by_is_confirmed() -> None:
@@ -57,3 +61,29 @@ def test_only_a_person_seen_from_close_by_is_confirmed() -> None:
         assert uav.identities.review(second * S) == []
     assert uav.see(Enu(0, 0, 0), now_ns=11 * S) == [], "once is not enough"
     assert uav.see(Enu(0, 0, 0), now_ns=12 * S) == [1]
+
+
+def seen_often(*, close: int = 2, sigma_m: float = 3.5, evidence: float = 18.0) -> PersonTrack:
+    place = Estimate(0.0, 0.0, sigma_m**2, 0.0, 1.0)
+    return PersonTrack(place, 0, 0, Enu(0, 0, 60), evidence, sightings=2, close_sightings=close)
+
+
+def heard(*, powers: int, reporters: int, sigma_m: float = 80.0) -> KnownSurvivor:
+    place = Estimate(0.0, 0.0, sigma_m**2, 0.0, 1.0)
+    received = SimpleNamespace(included_powers=powers, estimate_by_power=lambda: place)
+    return KnownSurvivor(cast("PhoneFilter", received), set(range(reporters)))
+
+
+@pytest.mark.parametrize(("reporters", "least"), [(1, 8), (2, 6), (5, 6)])
+def test_six_powers_by_two_nodes_or_eight_by_one_are_enough(reporters: int, least: int) -> None:
+    assert is_confirmable(seen_often(), heard(powers=least, reporters=reporters))
+    assert not is_confirmable(seen_often(), heard(powers=least - 1, reporters=reporters))
+
+
+def test_each_condition_of_a_confirmation_is_needed_and_holds_at_its_bound() -> None:
+    phone = heard(powers=6, reporters=2)
+    assert is_confirmable(seen_often(), phone)
+    assert not is_confirmable(seen_often(close=1), phone), "seen from close by once only"
+    assert not is_confirmable(seen_often(evidence=17.9), phone), "not proven"
+    assert not is_confirmable(seen_often(sigma_m=3.51), phone), "the place of the person is vague"
+    assert not is_confirmable(seen_often(), heard(powers=6, reporters=2, sigma_m=80.1)), "that of the phone is"

@@ -1,9 +1,14 @@
 """A confirmation that was mistaken is contradicted by what is heard and seen later; a right one is not."""
 
 from collections.abc import Iterable
+from types import SimpleNamespace
+from typing import cast
 
 from seeing_uav import UP_M, Uav, mean_dbm
 
+from agents.mission.finding.identities import Identities
+from agents.mission.finding.known_survivors import KnownSurvivor, KnownSurvivors
+from agents.mission.finding.phone_localization import Estimate, PhoneFilter
 from agents.mission.finding.sightings import Contradictions
 from fanet_mw.units import US, Enu, S
 from fanet_mw.wire.survivors import Found, Standing
@@ -82,3 +87,49 @@ def test_a_right_confirmation_that_was_taken_back_holds_in_the_end_though_anothe
     place = uav.survivors.by_id[1].confirmed
     assert place is not None
     assert (round(place.east_m), round(place.north_m)) == (right.east, right.north)
+
+
+def judged(
+    received: Iterable[int], *, margin: float = 6.0, sigma_m: float = 45.0, included: int = 12, confirmed: bool = True
+) -> list[bool]:
+    """Whether a confirmation is contradicted, each time that so many powers of the phone have been received."""
+    found = Found(0, 1, 0.0, 0.0, 4.0, 0.0, 4.0, 9, Standing.CONFIRMED) if confirmed else None
+    place = Estimate(0.0, 0.0, sigma_m**2, 0.0, 1.0)
+    powers = SimpleNamespace(received_powers=0, included_powers=included, estimate_by_power=lambda: place)
+    known = KnownSurvivor(cast("PhoneFilter", powers), confirmed=found)
+    contradictions = Contradictions(
+        cast("KnownSurvivors", SimpleNamespace(by_id={1: known})),
+        cast("Identities", SimpleNamespace(against=lambda _: margin)),
+    )
+    verdicts = []
+    for powers.received_powers in received:
+        verdicts.append(contradictions.review() == [1])
+    return verdicts
+
+
+def test_a_confirmation_is_judged_each_time_that_four_more_powers_were_received() -> None:
+    assert judged([10, 13, 14, 15, 17, 18]) == [False, False, True, False, False, True]
+
+
+def test_only_enough_powers_of_a_phone_whose_place_they_tell_refute_and_only_by_a_clear_margin() -> None:
+    assert judged([10, 14]) == [False, True]
+    assert not any(judged([10, 14], margin=5.99))
+    assert not any(judged([10, 14], sigma_m=45.1))
+    assert not any(judged([10, 14], included=11))
+    assert not any(judged([10, 14], confirmed=False))
+
+
+def test_a_survivor_who_is_confirmed_again_is_judged_by_what_is_received_from_then_on() -> None:
+    found = Found(0, 1, 0.0, 0.0, 4.0, 0.0, 4.0, 9, Standing.CONFIRMED)
+    place = Estimate(0.0, 0.0, 1.0, 0.0, 1.0)
+    powers = SimpleNamespace(received_powers=10, included_powers=20, estimate_by_power=lambda: place)
+    by_id = {number: KnownSurvivor(cast("PhoneFilter", powers), confirmed=found) for number in (9, 1)}
+    contradictions = Contradictions(
+        cast("KnownSurvivors", SimpleNamespace(by_id=by_id)), cast("Identities", SimpleNamespace(against=lambda _: 9.0))
+    )
+    verdicts = []
+    for powers.received_powers, by_id[1].confirmed in ((10, found), (12, None), (13, found), (16, found), (17, found)):
+        verdicts.append(contradictions.review())
+    assert verdicts == [[], [], [], [9], [1]]
+    powers.received_powers = 30
+    assert contradictions.review() == [1, 9], "in order of id"

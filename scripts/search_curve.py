@@ -74,7 +74,7 @@ def row(count: int, search: str, start: Sequence[str]) -> tuple[float, float] | 
     assert pattern is not None, "the catalog refuses a search that cannot be flown"
     if search in ("ring", "fan") and pattern.dimensions.shape.name.lower() != search:
         return None
-    pattern = pattern.begun_around([Enu(*at) for at in positions(made)])
+    pattern = pattern.begun_around([Enu(*at) for at in positions(made)])[0]
     there_s = way_s(made, pattern)
     lane_m = 1.35 * math.sqrt(cells_range_m(made) ** 2 - made.nodes.altitude_m**2)
     bound_s = made.world.area_m**2 / (count * lane_m * made.mobility.speed_m_s)

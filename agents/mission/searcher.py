@@ -40,7 +40,7 @@ from agents.mission.navigation.silent_neighbors import HeardByRadio, SilentNeigh
 from agents.mission.orders import KnownOrders, record_of
 from agents.mission.outbox import Outbox
 from agents.mission.search_formation.formation_place import FormationPlace
-from agents.mission.search_formation.formation_planner import FormationPlanner
+from agents.mission.search_formation.formation_planner import NOTICE_IN_ROUNDS_NS, NOTICE_NS, FormationPlanner
 from agents.mission.search_formation.pattern import Pattern, fastest, fitted, of_few
 from agents.mission.search_formation.plan_exchange import PlanExchange
 from agents.mission.search_formation.roll_call import RollCall
@@ -120,6 +120,7 @@ class Searcher:
         roll_call = RollCall(node, hello_interval_s=scenario.routing.hello_interval_s, silent=silent)
         planner = FormationPlanner(
             node, roll_call, expected=nodes.count, deploy_speed_m_s=_DEPLOY * least_m_s,
+            notice_ns=NOTICE_IN_ROUNDS_NS if scenario.routing.protocol == "rounds" else NOTICE_NS,
             take_off_ns=take_off_ns(nodes.altitude_m) if nodes.on_ground else 0, turns_ns=turns_ns,
             random=stream(scenario.seed, "plan", node).random,
             of_few=lambda count, now_ns: None if self._is_swept(now_ns) else _of_few(scenario, count),

@@ -1185,22 +1185,22 @@ class MAVLink_fanet_search_message(MAVLink_message):
 
     id = MAVLINK_MSG_ID_FANET_SEARCH
     msgname = "FANET_SEARCH"
-    fieldnames = ["start_us", "half_width", "first", "last", "height", "speed", "deploy_ds", "revision", "planner", "nodes", "lanes", "relays", "followers", "shape", "teams", "version"]
-    ordered_fieldnames = ["start_us", "half_width", "first", "last", "height", "speed", "deploy_ds", "revision", "planner", "nodes", "lanes", "relays", "followers", "shape", "teams", "version"]
-    fieldtypes = ["uint64_t", "float", "float", "float", "float", "float", "uint16_t", "uint16_t", "uint16_t", "uint16_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t"]
+    fieldnames = ["start_us", "half_width", "first", "last", "height", "speed", "narrower", "deploy_ds", "revision", "planner", "nodes", "lanes", "relays", "followers", "shape", "teams", "version"]
+    ordered_fieldnames = ["start_us", "half_width", "first", "last", "height", "speed", "narrower", "deploy_ds", "revision", "planner", "nodes", "lanes", "relays", "followers", "shape", "teams", "version"]
+    fieldtypes = ["uint64_t", "float", "float", "float", "float", "float", "float", "uint16_t", "uint16_t", "uint16_t", "uint16_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t"]
     fielddisplays_by_name: Dict[str, str] = {}
     fieldenums_by_name: Dict[str, str] = {}
-    fieldunits_by_name: Dict[str, str] = {"start_us": "us", "half_width": "m", "first": "m", "last": "m", "height": "m", "speed": "m/s", "deploy_ds": "ds"}
-    native_format = bytearray(b"<QfffffHHHHBBBBBB")
-    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]
-    lengths = [1, 1, 1, 1, 1, 1, 1, 1, 1, 79, 1, 1, 1, 1, 1, 1]
-    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0, 0, 79, 0, 0, 0, 0, 0, 0]
-    crc_extra = 44
-    unpacker = struct.Struct("<QfffffHHH79HBBBBBB")
+    fieldunits_by_name: Dict[str, str] = {"start_us": "us", "half_width": "m", "first": "m", "last": "m", "height": "m", "speed": "m/s", "narrower": "m", "deploy_ds": "ds"}
+    native_format = bytearray(b"<QffffffHHHHBBBBBB")
+    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16]
+    lengths = [1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 79, 1, 1, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 79, 0, 0, 0, 0, 0, 0]
+    crc_extra = 197
+    unpacker = struct.Struct("<QffffffHHH79HBBBBBB")
     instance_field = None
     instance_offset = -1
 
-    def __init__(self, start_us: int, half_width: float, first: float, last: float, height: float, speed: float, deploy_ds: int, revision: int, planner: int, nodes: Sequence[int], lanes: int, relays: int, followers: int, shape: int, teams: int, version: int):
+    def __init__(self, start_us: int, half_width: float, first: float, last: float, height: float, speed: float, narrower: float, deploy_ds: int, revision: int, planner: int, nodes: Sequence[int], lanes: int, relays: int, followers: int, shape: int, teams: int, version: int):
         MAVLink_message.__init__(self, MAVLink_fanet_search_message.id, MAVLink_fanet_search_message.msgname)
         self._fieldnames = MAVLink_fanet_search_message.fieldnames
         self._instance_field = MAVLink_fanet_search_message.instance_field
@@ -1211,6 +1211,7 @@ class MAVLink_fanet_search_message(MAVLink_message):
         self.last = last
         self.height = height
         self.speed = speed
+        self.narrower = narrower
         self.deploy_ds = deploy_ds
         self.revision = revision
         self.planner = planner
@@ -1223,7 +1224,7 @@ class MAVLink_fanet_search_message(MAVLink_message):
         self.version = version
 
     def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
-        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.start_us, self.half_width, self.first, self.last, self.height, self.speed, self.deploy_ds, self.revision, self.planner, self.nodes[0], self.nodes[1], self.nodes[2], self.nodes[3], self.nodes[4], self.nodes[5], self.nodes[6], self.nodes[7], self.nodes[8], self.nodes[9], self.nodes[10], self.nodes[11], self.nodes[12], self.nodes[13], self.nodes[14], self.nodes[15], self.nodes[16], self.nodes[17], self.nodes[18], self.nodes[19], self.nodes[20], self.nodes[21], self.nodes[22], self.nodes[23], self.nodes[24], self.nodes[25], self.nodes[26], self.nodes[27], self.nodes[28], self.nodes[29], self.nodes[30], self.nodes[31], self.nodes[32], self.nodes[33], self.nodes[34], self.nodes[35], self.nodes[36], self.nodes[37], self.nodes[38], self.nodes[39], self.nodes[40], self.nodes[41], self.nodes[42], self.nodes[43], self.nodes[44], self.nodes[45], self.nodes[46], self.nodes[47], self.nodes[48], self.nodes[49], self.nodes[50], self.nodes[51], self.nodes[52], self.nodes[53], self.nodes[54], self.nodes[55], self.nodes[56], self.nodes[57], self.nodes[58], self.nodes[59], self.nodes[60], self.nodes[61], self.nodes[62], self.nodes[63], self.nodes[64], self.nodes[65], self.nodes[66], self.nodes[67], self.nodes[68], self.nodes[69], self.nodes[70], self.nodes[71], self.nodes[72], self.nodes[73], self.nodes[74], self.nodes[75], self.nodes[76], self.nodes[77], self.nodes[78], self.lanes, self.relays, self.followers, self.shape, self.teams, self.version), force_mavlink1=force_mavlink1)
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.start_us, self.half_width, self.first, self.last, self.height, self.speed, self.narrower, self.deploy_ds, self.revision, self.planner, self.nodes[0], self.nodes[1], self.nodes[2], self.nodes[3], self.nodes[4], self.nodes[5], self.nodes[6], self.nodes[7], self.nodes[8], self.nodes[9], self.nodes[10], self.nodes[11], self.nodes[12], self.nodes[13], self.nodes[14], self.nodes[15], self.nodes[16], self.nodes[17], self.nodes[18], self.nodes[19], self.nodes[20], self.nodes[21], self.nodes[22], self.nodes[23], self.nodes[24], self.nodes[25], self.nodes[26], self.nodes[27], self.nodes[28], self.nodes[29], self.nodes[30], self.nodes[31], self.nodes[32], self.nodes[33], self.nodes[34], self.nodes[35], self.nodes[36], self.nodes[37], self.nodes[38], self.nodes[39], self.nodes[40], self.nodes[41], self.nodes[42], self.nodes[43], self.nodes[44], self.nodes[45], self.nodes[46], self.nodes[47], self.nodes[48], self.nodes[49], self.nodes[50], self.nodes[51], self.nodes[52], self.nodes[53], self.nodes[54], self.nodes[55], self.nodes[56], self.nodes[57], self.nodes[58], self.nodes[59], self.nodes[60], self.nodes[61], self.nodes[62], self.nodes[63], self.nodes[64], self.nodes[65], self.nodes[66], self.nodes[67], self.nodes[68], self.nodes[69], self.nodes[70], self.nodes[71], self.nodes[72], self.nodes[73], self.nodes[74], self.nodes[75], self.nodes[76], self.nodes[77], self.nodes[78], self.lanes, self.relays, self.followers, self.shape, self.teams, self.version), force_mavlink1=force_mavlink1)
 
 
 # Define name on the class for backwards compatibility (it is now msgname).
@@ -2466,7 +2467,7 @@ class MAVLink(object):
         """
         self.send(self.fanet_held_encode(seqs, origins, count, version), force_mavlink1=force_mavlink1)
 
-    def fanet_search_encode(self, start_us: int, half_width: float, first: float, last: float, height: float, speed: float, deploy_ds: int, revision: int, planner: int, nodes: Sequence[int], lanes: int, relays: int, followers: int, shape: int, teams: int, version: int) -> MAVLink_fanet_search_message:
+    def fanet_search_encode(self, start_us: int, half_width: float, first: float, last: float, height: float, speed: float, narrower: float, deploy_ds: int, revision: int, planner: int, nodes: Sequence[int], lanes: int, relays: int, followers: int, shape: int, teams: int, version: int) -> MAVLink_fanet_search_message:
         """
         The plan of a search: a formation, when it sweeps, and which node
         takes which place of it. Lines: two teams abreast begin beside
@@ -2483,6 +2484,7 @@ class MAVLink(object):
         last                      : How far it is where it turns; spiral: how far the outermost lane is at last; fan: how far the base is to the north of the middle. [m] (type:float)
         height                    : At which the lines fly. [m] (type:float)
         speed                     : Of the sweep. [m/s] (type:float)
+        narrower                  : Lines: by how much nearer to the middle the outermost lanes are when the first sweep begins. [m] (type:float)
         deploy_ds                 : How long everyone has to reach its place. [ds] (type:uint16_t)
         revision                  : A higher one replaces a lower one; of equal ones the planner with the lower id prevails. (type:uint16_t)
         planner                   : The node that made it. (type:uint16_t)
@@ -2495,9 +2497,9 @@ class MAVLink(object):
         version                   : 1. (type:uint8_t)
 
         """
-        return MAVLink_fanet_search_message(start_us, half_width, first, last, height, speed, deploy_ds, revision, planner, nodes, lanes, relays, followers, shape, teams, version)
+        return MAVLink_fanet_search_message(start_us, half_width, first, last, height, speed, narrower, deploy_ds, revision, planner, nodes, lanes, relays, followers, shape, teams, version)
 
-    def fanet_search_send(self, start_us: int, half_width: float, first: float, last: float, height: float, speed: float, deploy_ds: int, revision: int, planner: int, nodes: Sequence[int], lanes: int, relays: int, followers: int, shape: int, teams: int, version: int, force_mavlink1: bool = False) -> None:
+    def fanet_search_send(self, start_us: int, half_width: float, first: float, last: float, height: float, speed: float, narrower: float, deploy_ds: int, revision: int, planner: int, nodes: Sequence[int], lanes: int, relays: int, followers: int, shape: int, teams: int, version: int, force_mavlink1: bool = False) -> None:
         """
         The plan of a search: a formation, when it sweeps, and which node
         takes which place of it. Lines: two teams abreast begin beside
@@ -2514,6 +2516,7 @@ class MAVLink(object):
         last                      : How far it is where it turns; spiral: how far the outermost lane is at last; fan: how far the base is to the north of the middle. [m] (type:float)
         height                    : At which the lines fly. [m] (type:float)
         speed                     : Of the sweep. [m/s] (type:float)
+        narrower                  : Lines: by how much nearer to the middle the outermost lanes are when the first sweep begins. [m] (type:float)
         deploy_ds                 : How long everyone has to reach its place. [ds] (type:uint16_t)
         revision                  : A higher one replaces a lower one; of equal ones the planner with the lower id prevails. (type:uint16_t)
         planner                   : The node that made it. (type:uint16_t)
@@ -2526,7 +2529,7 @@ class MAVLink(object):
         version                   : 1. (type:uint8_t)
 
         """
-        self.send(self.fanet_search_encode(start_us, half_width, first, last, height, speed, deploy_ds, revision, planner, nodes, lanes, relays, followers, shape, teams, version), force_mavlink1=force_mavlink1)
+        self.send(self.fanet_search_encode(start_us, half_width, first, last, height, speed, narrower, deploy_ds, revision, planner, nodes, lanes, relays, followers, shape, teams, version), force_mavlink1=force_mavlink1)
 
     def fanet_status_encode(self, t_us: int, east: float, north: float, up: float, node: int, revision: int, charge: int, absent: int, version: int) -> MAVLink_fanet_status_message:
         """

@@ -38,12 +38,15 @@ class Search(NamedTuple):
     shape: int = 0
     """0: lines, 1: spiral, 2: sectors, 3: ring, 4: circuit, 5: fan."""
     teams: int = 2
+    narrower_m: float = 0.0
 
     def encode_frame(self, node: int) -> bytes:
         if len(self.nodes) > MOST_PLACES:
             raise LocalProtocolError(f"a plan of {len(self.nodes)} places must have <= {MOST_PLACES}")
         unused = (0,) * (MOST_PLACES - len(self.nodes))
-        return encode_inner(SEARCH, SEARCH.layout.pack(*self[:9], *self.nodes, *unused, *self[10:], VERSION), node=node)
+        counts = self.lanes, self.relays, self.followers, self.shape, self.teams
+        packed = SEARCH.layout.pack(*self[:6], self.narrower_m, *self[6:9], *self.nodes, *unused, *counts, VERSION)
+        return encode_inner(SEARCH, packed, node=node)
 
     @classmethod
     def decode_frame(cls, packed: Packed) -> Self:
@@ -60,8 +63,8 @@ class Search(NamedTuple):
             version == VERSION and (in_lines or other) and places <= MOST_PLACES,
             f"a plan of {places} places in {teams} teams, shape {shape}",
         )
-        nodes = fields[9 : 9 + places]
-        plan = cls._make((*fields[:9], nodes, lanes, relays, followers, shape, teams))
+        nodes, narrower_m = fields[10 : 10 + places], fields[6]
+        plan = cls._make((*fields[:6], *fields[7:10], nodes, lanes, relays, followers, shape, teams, narrower_m))
         named = [node for node in nodes if node]
         refuse_unless(
             plan.start_us <= LATEST_US
@@ -71,9 +74,9 @@ class Search(NamedTuple):
             and len(set(named)) == len(named),
             f"plan {plan.revision} of {plan.planner}",
         )
-        lengths = (plan.half_width_m, plan.first_m, plan.last_m, plan.height_m)
+        lengths = (plan.half_width_m, narrower_m, plan.first_m, plan.last_m, plan.height_m)
         refuse_unless(
-            0 <= plan.half_width_m <= FARTHEST_M
+            0 <= narrower_m <= plan.half_width_m <= FARTHEST_M
             and 0 <= plan.height_m <= FARTHEST_M
             and (_has_far_sides(plan) if shape == _FAN else _sweeps(plan))
             and 0.1 <= plan.speed_m_s <= _FASTEST_M_S,

@@ -60,7 +60,7 @@ class Goal:
             look = self._listening.goal(survivor, place, look, seen=seen, misses_m=misses_m, now_ns=now_ns)
         if leaves:
             return look, STILL
-        goal, feed = formation.bounded(look.east, look.north, lane, moves, now_ns)
+        goal, feed = formation.bounded(look.east, look.north, lane, moves, now_ns, leads=survivor == task)
         return goal._replace(up=look.up), feed
 
     def _in_lane(self, lane: Enu, moves: Enu, now_ns: int) -> int | None:

@@ -22,8 +22,10 @@ _ASIDE_M: Final = 70.0
 """A UAV of a team examines a survivor at most so far aside of what `_LEASH_M` permits, or less far by its camera."""
 _LOOK_SHARE: Final = 0.9
 """The share of its view to the side that a UAV relies on."""
-_AHEAD_M: Final = 250.0
+_AHEAD_M: Final = 350.0
 """A UAV of a team examines a survivor who is at most this far ahead of its place."""
+_LEAD_M: Final = 120.0
+"""A UAV of a team flies at most this far ahead of its place for a survivor to whom it was sent."""
 _LEASH_M: Final = 58.0
 """The greatest distance to the side at which a UAV of a team, or a relay, may be from its place."""
 _LAG_M: Final = 140.0
@@ -233,13 +235,19 @@ class FormationPlace:
             beyond_m = ahead_m
         return math.hypot(beyond_m, max(0.0, abs(aside_m) - _LEASH_M))
 
-    def bounded(self, east: float, north: float, lane: Enu, moves: Enu, now_ns: int) -> tuple[Enu, Enu]:
+    def bounded(
+        self, east: float, north: float, lane: Enu, moves: Enu, now_ns: int, *, leads: bool = False
+    ) -> tuple[Enu, Enu]:
+        """The position nearest to a point at which this UAV may be, and the velocity of that position; `leads`: it may
+        be ahead of its place.
+        """
         if self.is_free(now_ns):
             return Enu(east, north, lane.up), STILL
         ahead_m, aside_m = along(moves, east - lane.east, north - lane.north)
         aside_m = max(-_LEASH_M, min(_LEASH_M, aside_m))
-        if ahead_m >= 0:  # still ahead: the line will bring the UAV there
-            return _beside(lane, moves, 0.0, aside_m), moves
+        most_m = _LEAD_M if leads else 0.0
+        if ahead_m >= most_m:  # still ahead: the line will bring the UAV there
+            return _beside(lane, moves, most_m, aside_m), moves
         if ahead_m < -_LAG_M:
             return _beside(lane, moves, -_LAG_M, aside_m), moves
         return _beside(lane, moves, ahead_m, aside_m), STILL

@@ -15,7 +15,7 @@
                 that follow the newest plan, the one with the lowest id stands in as the planner until then
 
 The first assignment nearly minimizes the sum of squared distances, and keeps the swarm in one piece on the way where it
-can (`lasting_links.py`). UAVs that are out for survivors become followers, on whom nothing depends.
+can (`lasting_links.py`). UAVs that are out for survivors become followers, on whom nothing depends, where ways allow.
 `shapes/contract.py` explains place, team, relay and follower.
 """
 
@@ -38,8 +38,12 @@ _SETTLED_NS: Final = 10 * S
 """How long a plan is followed, at least, before it is mended."""
 _PATIENCE_NS: Final = 14 * S
 """How long the first plan waits for UAVs that have not been received."""
-_NOTICE_NS: Final = 7 * S
+NOTICE_NS: Final = 7 * S
 """From the first flood of a plan to its beginning: enough for a flood through the slots of all clusters."""
+NOTICE_IN_ROUNDS_NS: Final = 3 * S
+"""The same where floods go in rounds, and reach all within about a second."""
+_REMINDS_NS: Final = 1 * S
+"""A plan is flooded again so long before it begins, for those whom the first flood did not reach."""
 _REPEAT_NS: Final = 6 * S
 """The interval at which a new plan is flooded again."""
 _REPEATS: Final = 3
@@ -79,16 +83,18 @@ class FormationPlanner:
         expected: int,
         deploy_speed_m_s: float,
         of_few: Callable[[int, int], Pattern | None],
+        notice_ns: int = NOTICE_NS,
         take_off_ns: int = 0,
         turns_ns: Callable[[Mapping[int, Enu]], int] = lambda _: 0,
         random: Callable[[], float],
     ) -> None:
         """`of_few`: the formation for so many UAVs when others have flown home; None: the search is over.
-        `take_off_ns`: the time of a take-off, before which no first plan begins; `turns_ns`: how much longer it takes
-        those who take turns.
+        `notice_ns`: from the first flood of a plan to its beginning; `take_off_ns`: the time of a take-off, before
+        which no first plan begins; `turns_ns`: how much longer it takes those who take turns.
         """
         self._node = node
         self._roll_call = roll_call
+        self._notice_ns = notice_ns
         self._take_off_ns, self._turns_ns, self._of_few = take_off_ns, turns_ns, of_few
         self._expected = expected
         self._deploy_speed = deploy_speed_m_s
@@ -200,7 +206,11 @@ class FormationPlanner:
     def _tell_again(self, now_ns: int) -> None:
         """Flood a plan several times, and later again for any node whose status names an older one."""
         since_ns = 3 * _REPEAT_NS if self._told_ns is None else now_ns - self._told_ns
-        if self.plan is None or since_ns < _REPEAT_NS:
+        if self.plan is None:
+            return
+        begins_soon_ns = self.plan.start_us * US - _REMINDS_NS
+        reminds = self._told_ns is not None and self._told_ns < begins_soon_ns <= now_ns
+        if since_ns < _REPEAT_NS and not reminds:
             return
         behind = any(
             self._is_behind(member) and now_ns - member.heard_ns < _REPEAT_NS
@@ -228,7 +238,7 @@ class FormationPlanner:
         off_ns = self._began_ns + self._take_off_ns
         if self._take_off_ns:
             off_ns += self._turns_ns({node: self._members[node].position for node in nodes})
-        start_ns = max(now_ns + _NOTICE_NS, off_ns)
+        start_ns = max(now_ns + self._notice_ns, off_ns)
         return plan_of(
             pattern,
             tuple(holders),
@@ -324,7 +334,7 @@ def plan_of(pattern: Pattern, nodes: tuple[int, ...], *, planner: int, start_us:
     made = pattern.dimensions
     return Search(
         start_us, made.half_width_m, made.first_m, made.last_m, made.height_m, made.speed_m_s, deploy_ds, 1, planner,
-        nodes, made.lanes, made.relays, made.followers, made.shape, made.teams,
+        nodes, made.lanes, made.relays, made.followers, made.shape, made.teams, made.narrower_m,
     )  # fmt: skip
 
 
@@ -333,7 +343,7 @@ def pattern_of(plan: Search, *, reach_m: float) -> Pattern:
     return Pattern(
         Dimensions(
             plan.lanes, plan.relays, plan.followers, plan.half_width_m, plan.first_m, plan.last_m, plan.height_m,
-            plan.speed_m_s, ShapeName(plan.shape), plan.teams,
+            plan.speed_m_s, ShapeName(plan.shape), plan.teams, plan.narrower_m,
         ),
         reach_m=reach_m,
     )  # fmt: skip

@@ -4,7 +4,7 @@
     UAVs is a convex function of time, and a link between them lasts if it exists at both ends of the way. The
     assignment with the least sum of squared distances keeps many links; then pairs exchange their places, at first
     also if that is for the worse (simulated annealing; Kirkpatrick, Gelatt and Vecchi, Science 220, 1983), until links
-    that last join all UAVs. If none of so many tries joins them, the first assignment remains.
+    that last join all UAVs, and then only to shorten ways. If no try joins them, the first assignment remains.
 
 Links are bit masks, one for each UAV: a thousand exchanges are tried within 50 ms.
 """
@@ -18,9 +18,11 @@ from fanet_mw.units import Enu
 
 LASTING: Final = 0.97
 """A link is relied on that is at most this share of the radio's reach long."""
-_TRIES: Final = 20_000
+_TRIES: Final = 60_000
 """So many exchanges are tried at most."""
-_PART_M2: Final = 300.0**2
+_SHORTENED: Final = 10_000
+"""Once links join all, so many exchanges are tried that make ways shorter and leave all joined."""
+_PART_M2: Final = 425.0**2
 """Squared ways may be longer by so much in sum if the UAVs fall into one part less."""
 _HEAT: Final = 0.6
 """The first temperature of the annealing, as a multiple of `_PART_M2`; it falls to 0 linearly."""
@@ -41,45 +43,66 @@ def keep_together(
     there [m2].
     """
     ways = [[start.minus(goal).horizontal() for goal in goals] for start in starts]
-    costs = [[way * way + dearer_m2(uav, goal) for goal, way in enumerate(row)] for uav, row in enumerate(ways)]
-    chosen = assign(costs)
-    longest_m = _LONGEST * max((ways[uav][goal] for uav, goal in enumerate(chosen)), default=0.0)
-    least, links = list(chosen), _Links(starts, goals, chosen, LASTING * reach_m)
-    if not links.may_join:
+    dearer = [[dearer_m2(uav, goal) for goal in range(len(goals))] for uav in range(len(starts))]
+    costs = [[way * way + dearer[uav][goal] for goal, way in enumerate(row)] for uav, row in enumerate(ways)]
+    least = assign(costs)
+    if not _Links(starts, goals, least, LASTING * reach_m).may_join:
         return least, False
-    parts = links.parts()
+    longest_m = _LONGEST * max((ways[uav][goal] for uav, goal in enumerate(least)), default=0.0)
+    near = [[way <= longest_m for way in row] for row in ways]
+    no_dearer = [
+        [is_near and dearer[uav][goal] <= dearer[uav][least[uav]] for goal, is_near in enumerate(row)]
+        for uav, row in enumerate(near)
+    ]
+    for allowed in (no_dearer, near):
+        links = _Links(starts, goals, list(least), LASTING * reach_m)
+        if _join(links, costs, allowed, random):
+            return links.chosen, True
+    return least, False
+
+
+def _join(
+    links: "_Links", costs: Sequence[Sequence[float]], allowed: Sequence[Sequence[bool]], random: Callable[[], float]
+) -> bool:
+    """Exchange allowed goals until all UAVs are joined, and then to shorten ways; False if they cannot be joined."""
+    chosen, parts, left = links.chosen, links.parts(), _SHORTENED
     for tried in range(_TRIES):
-        if parts <= 1:
-            return chosen, True
+        joined = parts <= 1
+        left -= joined
+        if not left:
+            break
         a, b = int(random() * len(chosen)), int(random() * len(chosen))
-        if a == b or max(ways[a][chosen[b]], ways[b][chosen[a]]) > longest_m:
+        if a == b or not (allowed[a][chosen[b]] and allowed[b][chosen[a]]):
             continue
         longer_m2 = costs[a][chosen[b]] + costs[b][chosen[a]] - costs[a][chosen[a]] - costs[b][chosen[b]]
+        if joined and longer_m2 >= 0:
+            continue
         links.exchange(a, b)
         after = links.parts()
         worse_m2 = (after - parts) * _PART_M2 + longer_m2
-        if worse_m2 <= 0 or random() < math.exp(-worse_m2 / (_HEAT * _PART_M2 * (1 - tried / _TRIES))):
+        heat_m2 = _HEAT * _PART_M2 * (1 - tried / _TRIES)
+        if after <= 1 or (not joined and (worse_m2 <= 0 or random() < math.exp(-worse_m2 / heat_m2))):
             parts = after
         else:
             links.exchange(a, b)
-    return (chosen, True) if parts <= 1 else (least, False)
+    return parts <= 1
 
 
 class _Links:
     """The links that last while each UAV flies to the goal that is `chosen` for it."""
 
     def __init__(self, starts: Sequence[Enu], goals: Sequence[Enu], chosen: list[int], reach_m: float) -> None:
-        self._chosen = chosen
+        self.chosen = chosen
         self._near = _near(starts, reach_m)
         self._goals_near = [set(row) for row in _near(goals, reach_m)]
         self._masks = [self._mask(uav) for uav in range(len(chosen))]
 
     def _mask(self, uav: int) -> int:
-        near = self._goals_near[self._chosen[uav]]
-        return sum(1 << other for other in self._near[uav] if self._chosen[other] in near)
+        near = self._goals_near[self.chosen[uav]]
+        return sum(1 << other for other in self._near[uav] if self.chosen[other] in near)
 
     def exchange(self, a: int, b: int) -> None:
-        chosen, masks = self._chosen, self._masks
+        chosen, masks = self.chosen, self._masks
         chosen[a], chosen[b] = chosen[b], chosen[a]
         for uav in (a, b):
             after = self._mask(uav)

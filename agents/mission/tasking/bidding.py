@@ -43,7 +43,7 @@ _HANDOVER_S: Final = 15.0
 """The time that a responder is assumed to need at its present survivor."""
 _ASTRAY_M: Final = 100.0
 """How far a UAV may be from its way before the sweep, or farther if it will be at its place in time."""
-_LATE_S: Final = 6.0
+_LATE_S: Final = 12.0
 """A UAV is in time if it is at its place at most so long after the sweep has begun: it catches up then."""
 _GLANCE_S: Final = 8.0
 """How long a UAV is assumed to look at the place of a survivor on the way to its own."""
@@ -187,7 +187,14 @@ class Bidding:
             return near or self._is_in_time(here, now_ns)
         if formation.is_free(now_ns):
             return formation.holds_together(place, now_ns, within_s=-5.0)
-        return formation.leads_by(place, *formation.lane(now_ns))
+        return self._may_look(place, *formation.lane(now_ns))
+
+    def _may_look(self, place: Estimate | None, lane: Enu, moves: Enu) -> bool:
+        """True if a UAV of a team may examine a place without leaving the formation: a vague one while it is ahead."""
+        if place is None or not self._formation.leads_by(place, lane, moves):
+            return False
+        ahead_m, _ = along(moves, place.east_m - lane.east, place.north_m - lane.north)
+        return place.sigma_m <= VAGUE_M or ahead_m > 0
 
     def _is_in_time(self, at: Enu, now_ns: int, *, after_s: float = 0.0) -> bool:
         """True if this UAV has a plan, and is at its place in time (`_LATE_S`) if it leaves a position then."""
@@ -266,7 +273,7 @@ class Bidding:
             return eta_s if leaves or formation.holds_together(place, now_ns, within_s=eta_s) else None
         lane, moves = formation.lane(now_ns)
         ahead_m, _ = along(moves, place.east_m - lane.east, place.north_m - lane.north)
-        if place.sigma_m <= VAGUE_M and formation.leads_by(place, lane, moves):
+        if self._may_look(place, lane, moves):
             ahead_m, _ = along(moves, place.east_m - here.east, place.north_m - here.north)
             return max(eta_s, abs(ahead_m) / self._cruise_m_s) if moves.norm() else eta_s
         if leaves and formation.searches and ahead_m < -_PASSED_M and formation.can_be_spared(now_ns):

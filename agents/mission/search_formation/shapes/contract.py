@@ -162,6 +162,8 @@ class Dimensions(NamedTuple):
     speed_m_s: float
     shape: ShapeName = ShapeName.LINES
     teams: int = 2
+    narrower_m: float = 0.0
+    """Lines: by how much nearer to the middle than `half_width_m` the outermost lanes begin the first sweep."""
 
     @property
     def fixed(self) -> int:

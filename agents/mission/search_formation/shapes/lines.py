@@ -11,19 +11,22 @@ where the next one began, and chains join neighboring ones unless these are with
 
 The teams are the lines, from the northernmost to the southernmost (`contract.py`).
 
-Lines of a swarm that stands spread over the middle of the area begin where it stands, bent back at both ends:
+Lines of a swarm that stands spread over the middle of the area begin where it stands, little wider than it, bent back
+at both ends:
 
              .-o--o--o--o--o-.        what is between them was heard by those who stood there; beside that the
-            o                 o       outermost lanes begin near the middle, and catch up by the edge of the area;
-                 (heard)              on the way back all fly to the middle
-            o                 o
+       <--  o                 o  -->  outermost lanes first fly to the sides, and then catch up, while the middle
+                 (heard)              sweeps at once, and waits at the edge of the area; on the way back all fly to
+       <--  o                 o  -->  the middle
              '-o--o--o--o--o-'
+
+The chain between them is folded to an S, so that its relays have a short way to their places.
 
 On its way back each UAV flies between the lanes of its way out.
 
-Between two turns a place of a line moves straight at constant speed, a relay but for one change when the lines have
-flown `_STRAIGHT_M`. Distances are convex in between, so a pair within radio reach at these three instants is so all the
-time.
+Between two turns a place of other lines moves straight at constant speed, a relay but for one change when the lines
+have flown `_STRAIGHT_M`. Distances are convex in between, so a pair within radio reach at these three instants is so
+all the time; for lines that begin around the swarm it is checked (`bends_within`).
 """
 
 import itertools
@@ -51,8 +54,11 @@ _CHAIN_HIGHER_M: Final = 6.0
 """Relays fly this much higher than the lines."""
 _BUNCHED_M: Final = 280.0
 """While the lines are near each other, relays due north and south of each other would be too close together. They are
-therefore displaced to the east and the west as well, at first by up to this distance; by half of it between lines that
-begin around the swarm, whose relays must have a short way to their places."""
+therefore displaced to the east and the west as well, at first by up to this distance."""
+_FOLDED_M: Final = 32.0
+"""Relays between lines that begin around the swarm are displaced by up to this much for each relay: an S, in which they
+are near where they stand.
+"""
 _STRAIGHT_M: Final = 300.0
 """Once the lines have flown this far, the relays are no longer displaced: the chain is a straight line to the north."""
 _SIDE_M: Final = 65.0
@@ -61,16 +67,25 @@ _LEAST_LANES: Final = 2
 """The least number of lanes of a line, which has one at each end."""
 _LEAST_APART_M: Final = 60.0
 """The least distance of two lines on the same side of the middle."""
-_BENT: Final = 3
-"""Of lines that begin around the swarm, so many lanes at each end are bent back to the middle."""
+_ENDS_APART: Final = 1.3
+"""Of lines that begin around the swarm, the outermost lanes of both are so many lanes apart at most, as they fly to the
+sides: what is between them is seen from there."""
+_LEAST_BENT: Final = 5
+"""Lines that begin around the swarm have so many lanes, at least."""
+_BENT: Final = 4
+"""Of lines that begin around the swarm, so many lanes at each end are bent back, or all to the middle one."""
 _BENT_HOP: Final = 0.91
-"""Neighbors in the bent part are at most this share of the radio's reach apart: less than elsewhere, because the
-outermost are the fastest, and have the farthest way to their places."""
-_AROUND: Final = 1.2
+"""Neighbors of bent lines are at most this share of the radio's reach apart: less than elsewhere, because the outermost
+are the fastest, and have the farthest way."""
+_AROUND: Final = 1.6
 """Lines that begin around the swarm do so at this share of the radio's reach from the middle at most: whoever is nearer
 and was not found on the way out is found on the way back only."""
+_WIDER: Final = 1.3
+"""Lines that begin around the swarm are this much wider than it at first, if neighbors stay in reach."""
 _STEPS: Final = 8
 """Lines to which the swarm would not stay together begin nearer, by one of so many steps each time."""
+_CHECKS: Final = 40
+"""The number of steps of a sweep at which neighbors of bent lines are checked."""
 _DENSE: Final = 0.85
 """UAVs in a square grid at this share of the radio's reach, or nearer to each other, hear all between them."""
 _FREE: Final = 4
@@ -85,21 +100,26 @@ class Lines(Shape):
         formation: Dimensions,
         *,
         most_m: float = math.inf,
+        widest_m: float = math.inf,
         gaps_m: tuple[float, ...] = (),
         joints: tuple[float, ...] = (),
     ) -> None:
         """`most_m`: the farthest innermost lines, and `gaps_m`: distances of lines from the north, that the relays left
-        span; `joints`: the lane of each line at which chains end, by default the middle one.
+        span; `widest_m`: half of the width that the UAVs left of a line span; `joints`: the lane of each line at which
+        chains end, by default the middle one.
         """
         self._formation = formation
         self._joints = joints or (formation.lanes // 2,) * formation.teams
-        self._most_m = most_m
+        self._most_m, self._widest_m = most_m, widest_m
         self._half = half = formation.teams // 2
         self._apart_m = formation.last_m - formation.first_m
         straight_s = self._apart_m / formation.speed_m_s
-        back_s = (formation.last_m - min(FIRST_M, formation.first_m)) / (BACK * formation.speed_m_s)
-        """The time of the way back to the middle, and of the outermost lanes of bent lines from there."""
-        self._sweep_s = max(straight_s, back_s) if _is_bent(formation) else straight_s
+        self._fastest_m_s = BACK * formation.speed_m_s
+        back_s = (formation.last_m - min(FIRST_M, formation.first_m)) / self._fastest_m_s
+        self._aside_s = formation.narrower_m / self._fastest_m_s
+        """The time in which the outermost lanes of bent lines reach the sides of the area."""
+        bent_s = max(self._arrives_s(lane) for lane in range(formation.lanes // 2))
+        self._sweep_s = max(straight_s, bent_s) if _is_bent(formation) else straight_s
         self._faster_back = self._sweep_s / back_s
         gaps_m = gaps_m or (self._apart_m,) * (formation.teams - 1)
         northern, southern = gaps_m[: half - 1][::-1], gaps_m[half:]
@@ -122,7 +142,7 @@ class Lines(Shape):
 
     @property
     def lane_m(self) -> float:
-        return 2 * self._formation.half_width_m / (self._formation.lanes - 1)
+        return 2 * min(self._widest_m, self._formation.half_width_m) / (self._formation.lanes - 1)
 
     def at(self, place: float, swept_s: float) -> Enu:
         formation = self._formation
@@ -130,25 +150,27 @@ class Lines(Shape):
         if place <= formation.teams * lanes - 1:
             line, lane = divmod(place, lanes)
             inner_m = self._inner_m(swept_s, lane)
-            return Enu(self._lane(lane), self._north_m(int(line), inner_m), formation.height_m)
+            return Enu(self._lane(lane, swept_s), self._north_m(int(line), inner_m), formation.height_m)
         if place < formation.fixed:
             inner_m = self._inner_m(swept_s, lanes // 2)
             chain, row = next((c, row) for c, row in enumerate(self._chains) if place < row.first + row.size)
             share = 1 - 2 * (place - row.first + 1) / (row.size + 1)
-            north, south = self._lane(self._joints[chain]), self._lane(self._joints[chain + 1])
+            north, south = self._lane(self._joints[chain], swept_s), self._lane(self._joints[chain + 1], swept_s)
             up_m, middle = formation.height_m + _CHAIN_HIGHER_M, (north + south + share * (north - south)) / 2
             if chain != self._half - 1:
                 ends = self._north_m(chain, inner_m), self._north_m(chain + 1, inner_m)
                 return Enu(middle, (sum(ends) + share * (ends[0] - ends[1])) / 2, up_m)
-            begins_m = self._begins_m(swept_s, lanes // 2)
-            bunched_m = _BUNCHED_M / 2 if begins_m > FIRST_M else _BUNCHED_M
-            east = -bunched_m * share * max(0.0, 1 - (inner_m - begins_m) / _STRAIGHT_M)
+            begins_m = formation.first_m if swept_s <= self.sweep_s else min(FIRST_M, formation.first_m)
+            folded = max(0.0, 1 - (inner_m - begins_m) / _STRAIGHT_M)
+            east = -_BUNCHED_M * share * folded
+            if begins_m > FIRST_M:
+                east = -_FOLDED_M * formation.relays * math.sin(math.pi * share) * folded
             return Enu(middle + east, share * inner_m, up_m)
         line, share = formation.follower(round(place))
         outward_m, lane = self._outward_m[line], share * (lanes - 1)
         behind_m = FOLLOW_M if not outward_m else min(FOLLOW_M, self._apart_m / 2)
         behind = max(self._inner_m(swept_s, lane) + outward_m - behind_m, self._starts_m(lane) * 0.5)
-        east = formation.half_width_m * (2 * share - 1)
+        east = self._half_width_m(swept_s) * (2 * share - 1)
         return Enu(east, behind if line < self._half else -behind, formation.height_m + FOLLOWER_HIGHER_M)
 
     def flown_at(self, place: float, swept_s: float) -> Enu:
@@ -193,40 +215,58 @@ class Lines(Shape):
         formation, rows = self._formation, self.rows()
         left = [row.left(vacant) for row in rows]
         lines, relays = rows[: formation.teams], left[formation.teams :]
-        half_width_m = min(formation.half_width_m, max(1, min(left[: formation.teams]) - 1) * hop_m / 2)
+        widest_m = min(formation.half_width_m, max(1, min(left[: formation.teams]) - 1) * hop_m / 2)
         joints = tuple(row.nearest(row.first + row.size // 2, vacant)[1] - row.first for row in lines)
-        lane_m = 2 * half_width_m / (formation.lanes - 1)
+        lane_m = 2 * widest_m / (formation.lanes - 1)
         aside_m = [lane_m * (a - b) for a, b in itertools.pairwise(joints)]
         spans_m = [
             math.sqrt(max(0.0, ((count + 1) * hop_m) ** 2 - off_m**2))
             for count, off_m in zip(relays, aside_m, strict=True)
         ]
         gaps_m = tuple(min(self._apart_m, span_m) for span_m in spans_m)
-        narrow = formation._replace(half_width_m=half_width_m)
-        return Lines(narrow, most_m=spans_m[self._half - 1] / 2, gaps_m=gaps_m, joints=joints)
+        most_m = spans_m[self._half - 1] / 2
+        return Lines(formation, most_m=most_m, widest_m=widest_m, gaps_m=gaps_m, joints=joints)
 
     def begun_around(self, swarm: Swarm) -> tuple[Dimensions, ...]:
         """Two lines that begin where the swarm stands or nearer, the farthest first; none unless it stands densely
-        enough to hear everybody between, and widely enough for all lanes but the bent ones.
+        enough to hear everybody between.
         """
         made = self._formation
         east_m, west_m, north_m, south_m = swarm.sides_m
-        aside_m, beyond_m = min(east_m, west_m), min(north_m, south_m)
-        if made.teams != 2 or made.lanes <= 2 * _BENT or beyond_m <= FIRST_M:
+        aside_m, beyond_m = (east_m + west_m) / 2, min(north_m, south_m)
+        if made.teams != 2 or made.lanes < _LEAST_BENT or beyond_m <= FIRST_M:
             return ()
-        lane_m = 2 * made.half_width_m / (made.lanes - 1)
-        is_dense = (east_m + west_m) * (north_m + south_m) <= swarm.uavs * (_DENSE * swarm.reach_m) ** 2
-        if not is_dense or made.half_width_m - _BENT * lane_m > aside_m:
+        if (east_m + west_m) * (north_m + south_m) > swarm.uavs * (_DENSE * swarm.reach_m) ** 2:
             return ()
-        step_m = math.sqrt(max(0.0, (_BENT_HOP * swarm.reach_m) ** 2 - lane_m**2))
-        most_m = max(made.first_m, min(beyond_m, made.last_m / 2, FIRST_M + _BENT * step_m, _AROUND * swarm.reach_m))
-        shares = (step / _STEPS for step in range(_STEPS, 0, -1))
-        return tuple(made._replace(first_m=made.first_m + share * (most_m - made.first_m)) for share in shares)
+        most_m = max(made.first_m, min(beyond_m, made.last_m / 2, _AROUND * swarm.reach_m))
+        narrower_m = max(0.0, made.half_width_m - _WIDER * aside_m)
+        shares = [step / _STEPS for step in range(_STEPS, 0, -1)]
+        found = []
+        for share in shares:
+            first_m = made.first_m + share * (most_m - made.first_m)
+            for narrow in (*shares, 0.0):
+                begun = made._replace(first_m=first_m, narrower_m=narrow * narrower_m)
+                if Lines(begun).bends_within(_BENT_HOP * swarm.reach_m):
+                    found.append(begun)
+                    break
+        return tuple(found)
+
+    def bends_within(self, hop_m: float) -> bool:
+        """True if neighbors in the first sweep are always this near to each other."""
+        lanes, steps = self._formation.lanes, _CHECKS
+        return all(
+            self.at(lane, step * self.sweep_s / steps)
+            .minus(self.at(lane + 1, step * self.sweep_s / steps))
+            .horizontal()
+            <= hop_m
+            for step in range(steps + 1)
+            for lane in range(lanes // 2)
+        )
 
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
         """The distance of a point from a line to the north or south; a line is taken to be as wide as the area."""
         last = self._formation.lanes - 1
-        lane = max(0.0, min(1.0, (east_m / self._formation.half_width_m + 1) / 2)) * last
+        lane = max(0.0, min(1.0, (east_m / self._half_width_m(swept_s) + 1) / 2)) * last
         return abs(north_m - self._north_m(team, self._inner_m(swept_s, lane)))
 
     def _inner_m(self, swept_s: float, lane: float) -> float:
@@ -234,26 +274,52 @@ class Lines(Shape):
         formation = self._formation
         if not _is_bent(formation):
             return min(self._most_m, swept_m(formation, swept_s))
-        first_m = self._begins_m(swept_s, lane)
-        flown = formation._replace(first_m=first_m, speed_m_s=(formation.last_m - first_m) / self.sweep_s)
-        return min(self._most_m, swept_m(flown, swept_s, faster_back=self._faster_back))
+        if swept_s > self.sweep_s:
+            back = formation._replace(first_m=min(FIRST_M, formation.first_m))
+            back = back._replace(speed_m_s=(back.last_m - back.first_m) / self.sweep_s)
+            return min(self._most_m, swept_m(back, swept_s, faster_back=self._faster_back))
+        waits_s, slow_m_s, fast_m_s = self._pace(lane)
+        slow_m = max(0.0, min(swept_s, self._aside_s) - waits_s) * slow_m_s
+        out_m = self._starts_m(lane) + slow_m + max(0.0, swept_s - self._aside_s) * fast_m_s
+        return min(self._most_m, formation.last_m, out_m)
 
-    def _begins_m(self, swept_s: float, lane: float) -> float:
-        return self._starts_m(lane) if swept_s <= self.sweep_s else min(FIRST_M, self._formation.first_m)
+    def _pace(self, lane: float) -> tuple[float, float, float]:
+        """How long a lane of bent lines waits, and its speeds away from the middle: while it goes aside, and then."""
+        straight = self._straight(lane)
+        fast_m_s = self._formation.speed_m_s * (BACK + straight * (1 - BACK))
+        aside_m_s = self._fastest_m_s * abs(2 * lane / (self._formation.lanes - 1) - 1)
+        slow_m_s = min(fast_m_s, math.sqrt(self._fastest_m_s**2 - aside_m_s**2))
+        return (1 - straight) * self._aside_s, slow_m_s, fast_m_s
+
+    def _arrives_s(self, lane: float) -> float:
+        """When a lane of bent lines is where they turn."""
+        waits_s, slow_m_s, fast_m_s = self._pace(lane)
+        slow_m = (self._aside_s - waits_s) * slow_m_s
+        return self._aside_s + (self._formation.last_m - self._starts_m(lane) - slow_m) / fast_m_s
 
     def _starts_m(self, lane: float) -> float:
         first_m = self._formation.first_m
+        ends_m = min(first_m, _ENDS_APART * self._formation.half_width_m / (self._formation.lanes - 1))
+        return ends_m + self._straight(lane) * (first_m - ends_m)
+
+    def _straight(self, lane: float) -> float:
+        """1 for the lanes in the middle of lines that begin around the swarm, and for others; 0 for the outermost."""
         if not _is_bent(self._formation):
-            return first_m
-        from_end = min(lane, self._formation.lanes - 1 - lane)
-        return FIRST_M + min(1.0, from_end / _BENT) * (first_m - FIRST_M)
+            return 1.0
+        last = self._formation.lanes - 1
+        return min(1.0, min(lane, last - lane) / min(_BENT, last // 2))
 
     def _north_m(self, line: int, inner_m: float) -> float:
         out_m = inner_m + self._outward_m[line]
         return out_m if line < self._half else -out_m
 
-    def _lane(self, lane: float) -> float:
-        return self._formation.half_width_m * (2 * lane / (self._formation.lanes - 1) - 1)
+    def _half_width_m(self, swept_s: float) -> float:
+        narrower_m = self._formation.narrower_m
+        left = 1 - min(1.0, max(0.0, swept_s) / self._aside_s) if narrower_m else 0.0
+        return min(self._widest_m, self._formation.half_width_m - left * narrower_m)
+
+    def _lane(self, lane: float, swept_s: float) -> float:
+        return self._half_width_m(swept_s) * (2 * lane / (self._formation.lanes - 1) - 1)
 
 
 def _is_bent(formation: Dimensions) -> bool:

@@ -8,7 +8,13 @@ from random import Random
 import pytest
 
 from agents.mission.flight.take_off import turns_ns
-from agents.mission.search_formation.formation_planner import FormationPlanner, pattern_of, plan_of
+from agents.mission.search_formation.formation_planner import (
+    NOTICE_IN_ROUNDS_NS,
+    NOTICE_NS,
+    FormationPlanner,
+    pattern_of,
+    plan_of,
+)
 from agents.mission.search_formation.pattern import Pattern, fitted, of_few
 from agents.mission.search_formation.roll_call import RollCall
 from agents.mission.search_formation.shapes.contract import Demands, ShapeName
@@ -70,14 +76,20 @@ def test_too_few_have_no_formation() -> None:
 
 
 def planner_of(
-    node: int, *, expected: int, lost: Collection[int] = (), parted: Collection[int] = (), take_off_ns: int = 0
+    node: int,
+    *,
+    expected: int,
+    lost: Collection[int] = (),
+    parted: Collection[int] = (),
+    take_off_ns: int = 0,
+    notice_ns: int = NOTICE_NS,
 ) -> FormationPlanner:
     roll_call = RollCall(NodeId(node), hello_interval_s=1.0)
     roll_call.parted = parted
     roll_call.lost.update(dict.fromkeys(lost, 0))
     return FormationPlanner(
         NodeId(node), roll_call, expected=expected, deploy_speed_m_s=9, take_off_ns=take_off_ns, turns_ns=turns_ns,
-        random=Random(1).random,
+        random=Random(1).random, notice_ns=notice_ns,
         of_few=lambda count, now_ns: of_few(count, DEMANDS) if now_ns < 300 * S else None,
     )  # fmt: skip
 
@@ -105,7 +117,7 @@ def test_a_plan_gives_everyone_a_place_and_the_swarm_stays_in_one_piece_on_the_w
     assert plan is not None
     assert sorted(plan.nodes) == list(range(1, 46))
     begun = pattern_of(plan, reach_m=REACH_M)
-    assert begun.dimensions.first_m == 300.0, "the lines begin around the swarm"
+    assert begun.dimensions.first_m >= 300.0, "the lines begin around the swarm"
     for share in (step / 40 for step in range(41)):
         places = []
         for place, node in enumerate(plan.nodes):
@@ -140,18 +152,32 @@ def test_the_first_plan_begins_when_all_have_had_time_to_take_off() -> None:
     assert begins_s == [10, 10, 31, 68], "from the notice of 7 s, or from the first review; in turns, for 37 s at most"
 
 
+def test_a_plan_with_a_short_notice_is_told_again_a_second_before_it_begins() -> None:
+    planner = planner_of(1, expected=2, notice_ns=NOTICE_IN_ROUNDS_NS)
+    for node, east_m in ((1, 0.0), (2, 100.0)):
+        planner.status(SearchStatus(0, Enu(east_m, 0.0, 50), node, 0, 100), now_ns=0)
+    told_s = []
+    for second in range(1, 10):
+        planner.review(of_few(2, DEMANDS), now_ns=second * S)
+        told_s += [second] * len(planner.to_tell)
+        planner.to_tell.clear()
+    assert planner.plan is not None
+    assert planner.plan.start_us * US == 4 * S
+    assert told_s == [1, 3, 9], "at once, before it begins, and 6 s later"
+
+
 def test_who_is_out_for_a_survivor_becomes_a_follower_and_until_it_is_back_others_close_ranks() -> None:
     planner, pattern = planner_with(45), formation()
-    planner.status(SearchStatus(1, Enu(0.0, 0.0, 50), 23, 0, 100, absent=True), now_ns=0)
-    assert planner.absent == {23}
+    planner.status(SearchStatus(1, Enu(-200.0, 0.0, 50), 22, 0, 100, absent=True), now_ns=0)
+    assert planner.absent == {22}
     assert planner.review(pattern, now_ns=S)
     assert planner.plan is not None
-    assert planner.plan.nodes.index(23) in pattern.followers
+    assert planner.plan.nodes.index(22) in pattern.followers
     undisturbed = planner_with(45)
     undisturbed.review(pattern, now_ns=S)
     assert undisturbed.plan is not None
-    assert undisturbed.plan.nodes.index(23) not in pattern.followers
-    planner.status(SearchStatus(2, Enu(0.0, 0.0, 50), 23, 1, 100), now_ns=2 * S)
+    assert undisturbed.plan.nodes.index(22) not in pattern.followers
+    planner.status(SearchStatus(2, Enu(-200.0, 0.0, 50), 22, 1, 100), now_ns=2 * S)
     assert planner.absent == set()
 
 
@@ -230,9 +256,8 @@ def test_when_those_who_stay_cannot_span_the_area_they_fly_a_formation_that_they
     assert plan.revision == before.revision + (1 if whole else 2)
     assert sorted(node for node in plan.nodes if node) == list(range(1, 46 - leavers))
     made = pattern_of(plan, reach_m=REACH_M)
-    places = [made.at(place, 0.0) for place in range(made.places)]
-    assert is_one(places)
-    assert max(place.east for place in places) > 1100
+    assert is_one([made.at(place, 0.0) for place in range(made.places)])
+    assert max(made.at(place, made.shape.sweep_s).east for place in range(made.places)) > 1100
     assert not planner.review(pattern, now_ns=90 * S), "it is not made anew while it can be flown"
 
 

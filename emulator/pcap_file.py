@@ -11,8 +11,8 @@ from types import TracebackType
 from typing import BinaryIO, Final, Self
 
 from emulator.pcap import Pcap
-from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Radio
+from fanet_mw.whole_file import writing
 
 NAME: Final = "air.pcap"
 _BUFFER: Final = 1 << 18
@@ -38,11 +38,9 @@ class PcapFile:
     """A `Pcap` that writes to a file; raises ConfigError when the file cannot be opened."""
 
     def __init__(self, path: Path, radio: Radio, *, receptions: bool = False) -> None:
-        try:
+        with writing(f"--pcap: {path}"):
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file: BinaryIO | None = path.open("wb", buffering=_BUFFER)
-        except OSError as error:
-            raise ConfigError(f"--pcap: {path}: cannot be written: {error.strerror}") from error
         self._path = path
         self._failure: str | None = None
         self.pcap = Pcap(self._write, radio, receptions=receptions, flush=self._flush)

@@ -9,6 +9,8 @@ from itertools import accumulate
 from pathlib import Path
 from typing import BinaryIO, Final
 
+from fanet_mw.errors import ConfigError
+
 _BATCH_BYTES: Final = 1 << 18
 
 
@@ -45,6 +47,15 @@ def write_items(path: Path, items: Iterable[bytes], held: Written | None = None)
                 held.add(memoryview(data)[:kept])
                 raise
             held.add(data)
+
+
+@contextlib.contextmanager
+def writing(what: object) -> Iterator[None]:
+    """Turn what hinders the writing of a file or a folder, which messages call `what`, into a ConfigError."""
+    try:
+        yield
+    except OSError as error:
+        raise ConfigError(f"{what}: cannot be written: {error.strerror}") from error
 
 
 @contextlib.contextmanager

@@ -18,7 +18,7 @@ from typing import Any, Final
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
-from fanet_mw.whole_file import replacing
+from fanet_mw.whole_file import replacing, writing
 from sim.bus.rights import ROUTER, access_control, rights
 
 _NEW_KEY: Final = ("req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes")
@@ -29,7 +29,7 @@ def make(scenario: Scenario, out: Path, *, swarm: str, hosts: Iterable[str] = ()
     """Write NAME.json5 for each participant into a folder; returns how many. Raises ConfigError when that fails."""
     participants = rights(scenario, Topics(swarm))
     names = ",".join((*_AT_HOME, *(_subject(host) for host in hosts)))
-    try:
+    with writing(f"--out {out}"):
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor() as pool:
             authority = _CertificateAuthority(Path(folder), days=days)
@@ -37,8 +37,6 @@ def make(scenario: Scenario, out: Path, *, swarm: str, hosts: Iterable[str] = ()
         settings[0]["access_control"] = access_control(participants)
         for name, content in zip([ROUTER, *participants], settings, strict=True):
             _write_secret(out / f"{name}.json5", json.dumps(content, indent=1) + "\n")
-    except OSError as error:
-        raise ConfigError(f"--out {out}: cannot be written: {error.strerror}") from error
     return len(settings)
 
 

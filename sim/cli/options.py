@@ -15,6 +15,7 @@ from cyclopts import Group, Parameter, Token
 from cyclopts.completion import CompletionContext
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.whole_file import writing
 from sim.bus.running_swarms import DEFAULT_ENDPOINT, locate
 from sim.console import Console, tell
 from sim.scenarios.shipped import shipped
@@ -153,11 +154,9 @@ class OutputFlags:
         if os.path.lexists(path) and not self.force:
             raise ConfigError(f"--record {path}: exists; choose another file, or replace it with --force")
         require_file_or_nothing(path)
-        try:
+        with writing(f"--record {path}"):
             path.parent.mkdir(parents=True, exist_ok=True)
             path.open("wb").close()
-        except OSError as error:
-            raise ConfigError(f"--record {path}: cannot be written: {error.strerror}") from error
 
     def capture_path(self) -> Path | None:
         from emulator.pcap_file import NAME

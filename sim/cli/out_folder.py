@@ -13,6 +13,7 @@ from typing import Final
 from emulator.pcap_file import NAME as CAPTURE
 from emulator.pcap_file import captures
 from fanet_mw.errors import ConfigError
+from fanet_mw.whole_file import writing
 from sim.results.file_names import PAGES, PICTURES, RESERVED, RUN_FILES, pictures
 
 _MOST_SAID: Final = 8
@@ -20,7 +21,7 @@ _MOST_SAID: Final = 8
 
 def prepare(out: Path, *, force: bool) -> None:
     """Make the folder, or raise ConfigError; with `force`, remove what an earlier run has left, and nothing else."""
-    try:
+    with writing(f"--out {out}"):
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=out) as file:
             file.write(b"a run would be lost")
@@ -35,8 +36,6 @@ def prepare(out: Path, *, force: bool) -> None:
             path.unlink()
         with contextlib.suppress(OSError):  # the file is missing, or belongs to another program
             (out / PICTURES).rmdir()
-    except OSError as error:
-        raise ConfigError(f"--out {out}: cannot be written: {error.strerror}") from error
 
 
 def _said(paths: Sequence[Path]) -> str:

@@ -153,9 +153,7 @@ def _schema_text() -> str:
 
 
 def _write(path: Path, text: str) -> None:
-    from fanet_mw.whole_file import replace_file
+    from fanet_mw.whole_file import replace_file, writing
 
-    try:
+    with writing(path):
         replace_file(path.resolve(), text.encode())
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error

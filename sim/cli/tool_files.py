@@ -73,13 +73,11 @@ def dissector(folder: Path) -> int:
     import gzip
     from importlib.resources import files
 
-    from fanet_mw.whole_file import replace_file
+    from fanet_mw.whole_file import replace_file, writing
 
     path = folder / "mavlink.lua"
-    try:
+    with writing(path):
         folder.mkdir(parents=True, exist_ok=True)
         replace_file(path, gzip.decompress(files("emulator.wireshark").joinpath("mavlink.lua.gz").read_bytes()))
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
     Console().print(f"written to {path}; restart Wireshark", highlight=False, soft_wrap=True)
     return 0

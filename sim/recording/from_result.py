@@ -13,7 +13,7 @@ from fanet_mw.bus.messages import Poses
 from fanet_mw.errors import BusError, ConfigError
 from fanet_mw.trace import Posed, Record
 from fanet_mw.units import S
-from fanet_mw.whole_file import replacing
+from fanet_mw.whole_file import replacing, writing
 from sim.observation.bus_feed import BusFeed, Paced
 from sim.recording.mcap_recording import McapRecording
 from sim.results.outcome import Outcome
@@ -51,15 +51,13 @@ def record(
 
 def write_mcap(outcome: Outcome, path: Path) -> int:
     """Write the recording; returns its number of messages. A trace has no links and airtime per second."""
-    try:
+    with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         with (
             replacing(path) as file,
             McapRecording(path, outcome.scenario, epoch_unix_ns=outcome.epoch_unix_ns, file=file) as recording,
         ):
             _retell(outcome, recording)
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
     return recording.count
 
 

@@ -26,11 +26,11 @@ from mcap_protobuf.writer import Writer
 
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import Poses
-from fanet_mw.errors import ConfigError
 from fanet_mw.geodesy import Geodetic, to_geodetic
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record, RoleChanged
 from fanet_mw.units import Enu, S
+from fanet_mw.whole_file import writing
 from sim.figures import colors
 from sim.observation.observer import Observer
 from sim.observation.surroundings import Surroundings, surroundings
@@ -106,11 +106,9 @@ class McapRecording(Observer):
         """Why the file ends early; the swarm flies on."""
         self._events = 0
         self._gives_up = file is None
-        try:
+        with writing(f"--record {path}"):
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file: BinaryIO = file or path.open("wb")
-        except OSError as error:
-            raise ConfigError(f"--record {path}: cannot be written: {error.strerror}") from error
         self._writer = Writer(self._file, chunk_size=_CHUNK_BYTES)
         self._put("/scene/world", _world(scenario, self._around, self.state.places, self._stamp(0)), 0)
 

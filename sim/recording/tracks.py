@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Final
 from xml.etree import ElementTree as Xml
 
-from fanet_mw.errors import ConfigError
 from fanet_mw.geodesy import Geodetic, to_geodetic
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Confirmed, PlacedInside, Posed
 from fanet_mw.units import Enu, S
-from fanet_mw.whole_file import replacing
+from fanet_mw.whole_file import replacing, writing
 from sim.records.record_kinds import records_of
 from sim.results.outcome import Outcome
 
@@ -123,9 +122,7 @@ def _text(parent: Xml.Element, name: str, text: str) -> None:
 
 
 def _write(root: Xml.Element, path: Path) -> None:
-    try:
+    with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as file:
             Xml.ElementTree(root).write(file, encoding="utf-8", xml_declaration=True)
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error

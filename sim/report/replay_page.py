@@ -32,7 +32,7 @@ from fanet_mw.trace import (
     RoleChanged,
 )
 from fanet_mw.units import NodeId, S
-from fanet_mw.whole_file import replace_file
+from fanet_mw.whole_file import replace_file, writing
 from fanet_mw.wire.survivors import person_id
 from sim.figures import colors
 from sim.observation.event_text import event_text
@@ -61,10 +61,8 @@ def write(replay: Replay, path: Path) -> None:
     text = json.dumps(content(replay), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     for name, value in _COLORS.items():
         template = template.replace(f"%{name}%", value)
-    try:
+    with writing(path):
         replace_file(path, template.replace("%CONTENT%", text).encode())
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
 
 
 def content(replay: Replay) -> dict[str, Any]:

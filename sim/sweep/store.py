@@ -21,7 +21,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.foreign_file import json_of
-from fanet_mw.whole_file import require_folder
+from fanet_mw.whole_file import require_folder, writing
 from sim.results.run_folder import checked
 from sim.results.run_table import read_parquet
 from sim.sweep.one_run import Finished
@@ -121,11 +121,9 @@ class Store:
     @contextlib.contextmanager
     def alone(self) -> Iterator[None]:
         """Lock the folder against other processes; raises ConfigError if another one has locked it."""
-        try:
+        with writing(f"--out {self.folder}"):
             self.folder.mkdir(parents=True, exist_ok=True)
             lock = os.open(self.folder / ".lock", os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK)
-        except OSError as error:
-            raise ConfigError(f"--out {self.folder}: cannot be written: {error.strerror}") from error
         try:
             self._lock(lock)
             yield

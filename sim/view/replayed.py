@@ -8,10 +8,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, S
-from fanet_mw.whole_file import replace_file
+from fanet_mw.whole_file import replace_file, writing
 from sim.observation.bus_feed import Paced
 from sim.observation.timeline import Timeline
 from sim.view.air import CapturedAir
@@ -162,8 +161,6 @@ def write_html(folder: Path, path: Path, *, tell: Callable[[str], None]) -> None
         page = serializer.as_html().replace("<head>", f"<head><script>{_step_back(sight(scene))}</script>", 1)
         caption = _caption(timeline.scenario, scene)
     content = page.replace('<div id="root"></div>', f'<div id="root"></div>{caption}', 1)
-    try:
+    with writing(path):
         replace_file(path, content.encode())
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
     tell(f"written to {path}, {path.stat().st_size / 1e6:.1f} MB; it plays {FILE_SPEED:g} swarm seconds per second")

@@ -14,9 +14,7 @@ class Motion(NamedTuple):
 
     def position_at(self, t_ns: int) -> Enu:
         """The position at another instant, by dead reckoning: straight on with the same velocity."""
-        seconds = (t_ns - self.at_ns) / S
-        here, v = self.position, self.velocity
-        return Enu(here.east + v.east * seconds, here.north + v.north * seconds, here.up + v.up * seconds)
+        return self.position.plus(self.velocity, (t_ns - self.at_ns) / S)
 
     def offset_from(self, place: Enu, t_ns: int) -> Enu:
         """The vector from a place to the position at another instant."""

@@ -39,6 +39,10 @@ class Enu(NamedTuple):
         """The vector from another one to this one."""
         return Enu(self.east - other.east, self.north - other.north, self.up - other.up)
 
+    def plus(self, other: "Enu", times: float = 1.0) -> "Enu":
+        """The sum of this vector and so many times another one."""
+        return Enu(self.east + times * other.east, self.north + times * other.north, self.up + times * other.up)
+
     def norm(self) -> float:
         """Euclidean length [m or m/s]."""
         return math.hypot(self.east, self.north, self.up)

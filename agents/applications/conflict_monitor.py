@@ -69,14 +69,7 @@ def closest(position: Enu, velocity: Enu, *, within_s: float) -> ClosestApproach
     speed2 = velocity.east**2 + velocity.north**2 + velocity.up**2
     closing = -(position.east * velocity.east + position.north * velocity.north + position.up * velocity.up)
     at_s = min(max(0.0, closing / speed2), within_s) if speed2 > 0 else 0.0
-    return ClosestApproach(
-        at_s,
-        Enu(
-            position.east + velocity.east * at_s,
-            position.north + velocity.north * at_s,
-            position.up + velocity.up * at_s,
-        ),
-    )
+    return ClosestApproach(at_s, position.plus(velocity, at_s))
 
 
 class Alert(NamedTuple):

@@ -340,8 +340,7 @@ class GroundControl(Application):
         if message.coordinate_frame == common.MAV_FRAME_LOCAL_NED:
             place = from_ned(Ned(message.x, message.y, message.z))
         elif message.coordinate_frame == common.MAV_FRAME_LOCAL_OFFSET_NED:
-            offset = from_ned(Ned(message.x, message.y, message.z))
-            place = Enu(here.east + offset.east, here.north + offset.north, here.up + offset.up)
+            place = here.plus(from_ned(Ned(message.x, message.y, message.z)))
         self._on_setpoint(message, place, now_ns)
 
     def _on_global_setpoint(self, message: Any, _peer: Peer, now_ns: int) -> None:  # noqa: ANN401

@@ -29,8 +29,7 @@ class DeadReckoning:
             self._at = fix.position
         else:
             here = self._moved(fix.velocity, fix.t_ns)
-            off = fix.position.minus(here)
-            self._at = Enu(here.east + _SETTLE * off.east, here.north + _SETTLE * off.north, here.up + _SETTLE * off.up)
+            self._at = here.plus(fix.position.minus(here), _SETTLE)
         self._t_ns = self._fix_ns = fix.t_ns
 
     def velocity(self, reading: Inertial) -> Gps | None:
@@ -42,9 +41,4 @@ class DeadReckoning:
 
     def _moved(self, velocity: Enu, now_ns: int) -> Enu:
         assert self._at is not None, "there is a position to move on from"
-        seconds = (now_ns - self._t_ns) / S
-        return Enu(
-            self._at.east + velocity.east * seconds,
-            self._at.north + velocity.north * seconds,
-            self._at.up + velocity.up * seconds,
-        )
+        return self._at.plus(velocity, (now_ns - self._t_ns) / S)

@@ -33,14 +33,9 @@ class SteadyFix:
         if self._at is None or self._gain == 1.0:
             self._at = fix.position
         else:
-            seconds, v = (fix.t_ns - self._t_ns) / S, fix.velocity
-            here = Enu(
-                self._at.east + v.east * seconds, self._at.north + v.north * seconds, self._at.up + v.up * seconds
-            )
-            off = fix.position.minus(here)
+            here = self._at.plus(fix.velocity, (fix.t_ns - self._t_ns) / S)
             self._count += 1
-            k = max(self._gain, 1 / self._count)
-            self._at = Enu(here.east + k * off.east, here.north + k * off.north, here.up + k * off.up)
+            self._at = here.plus(fix.position.minus(here), max(self._gain, 1 / self._count))
         self._t_ns = fix.t_ns
         return self._at
 

@@ -37,7 +37,7 @@ from fanet_mw.routing.hop_by_hop import HopByHop
 from fanet_mw.routing.rival_control_messages import Family
 from fanet_mw.routing.send_buffer import SendBuffer
 from fanet_mw.serial_number import following, later, newer
-from fanet_mw.units import BROADCAST, MS, NodeId, earliest, seconds_to_ns
+from fanet_mw.units import BROADCAST, MS, NodeId, earliest
 
 
 class Aodv(HopByHop):
@@ -47,12 +47,11 @@ class Aodv(HopByHop):
 
     def __init__(self, port: Port) -> None:
         super().__init__(port)
-        routing = port.scenario.routing
         self._table = AodvTable()
         self._discovery = Discovery()
         self._requests = SeenRequests()
         self._hellos = HelloNeighbors()
-        self._room = SendBuffer(capacity=routing.queue_frames, hold_ns=seconds_to_ns(routing.lifetime_s))
+        self._room = SendBuffer(port)
         self._rreq_limit = RateLimit(p.RREQ_RATELIMIT)
         self._rerr_limit = RateLimit(p.RERR_RATELIMIT)
         self._blacklist: dict[NodeId, int] = {}
@@ -77,9 +76,7 @@ class Aodv(HopByHop):
             self._use(route, now_ns=now_ns)
             self._send(packet, route.next_hop, start_ns=start_ns, now_ns=now_ns)
             return
-        evicted = self._room.push(packet, now_ns=now_ns)
-        if evicted is not None:
-            self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
+        self._room.push(packet, now_ns=now_ns)
         self._search(destination, now_ns=now_ns)
 
     def _route_transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None:
@@ -366,8 +363,7 @@ class Aodv(HopByHop):
         return earliest(self._hello_ns, self._discovery.next_ns(), self._hellos.next_ns(), self._room.next_end_ns())
 
     def _on_wake(self, now_ns: int) -> None:
-        for packet in self._room.expire(now_ns=now_ns):
-            self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+        self._room.expire(now_ns=now_ns)
         for neighbor in self._hellos.lost(now_ns):
             self._link_broke(neighbor, now_ns=now_ns)
         self._release(now_ns)

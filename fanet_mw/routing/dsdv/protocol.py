@@ -24,7 +24,7 @@ from fanet_mw.routing.dsdv.table import PERIODIC_UPDATE_NS, DsdvTable
 from fanet_mw.routing.hop_by_hop import HopByHop
 from fanet_mw.routing.rival_control_messages import Family
 from fanet_mw.routing.send_buffer import SendBuffer
-from fanet_mw.units import NodeId, S, earliest, seconds_to_ns
+from fanet_mw.units import NodeId, S, earliest
 
 _GATHER_NS: Final = 1 * S
 """A change is advertised after U(0, this time), with all changes that have come by then (ns-3's triggered updates)."""
@@ -37,9 +37,8 @@ class Dsdv(HopByHop):
 
     def __init__(self, port: Port) -> None:
         super().__init__(port)
-        routing = port.scenario.routing
         self._table = DsdvTable(port.node)
-        self._room = SendBuffer(capacity=routing.queue_frames, hold_ns=seconds_to_ns(routing.lifetime_s))
+        self._room = SendBuffer(port)
         self._most = control.capacity(port.scenario.radio.max_frame_bytes) // PER_ENTRY
         self._full_ns: int | None = None
         self._news_ns: int | None = None
@@ -54,9 +53,7 @@ class Dsdv(HopByHop):
         if next_hop is not None:
             self._send(packet, next_hop, start_ns=start_ns, now_ns=now_ns)
             return
-        evicted = self._room.push(packet, now_ns=now_ns)
-        if evicted is not None:
-            self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
+        self._room.push(packet, now_ns=now_ns)
 
     def _route_transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None:
         next_hop = self._table.next_hop(NodeId(packet.header.destination))
@@ -103,8 +100,7 @@ class Dsdv(HopByHop):
         return earliest(self._full_ns, self._news_ns, self._room.next_end_ns())
 
     def _on_wake(self, now_ns: int) -> None:
-        for packet in self._room.expire(now_ns=now_ns):
-            self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+        self._room.expire(now_ns=now_ns)
         if self._full_ns is not None and now_ns >= self._full_ns:
             self._table.tidy(now_ns)
             self._advertise(FULL, self._table.full(), now_ns=now_ns)

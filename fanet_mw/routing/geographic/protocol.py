@@ -26,7 +26,7 @@ from fanet_mw.routing.geographic.messages import BEACON, LOCATION, QUERY, Fix, L
 from fanet_mw.routing.hop_by_hop import HopByHop
 from fanet_mw.routing.rival_control_messages import Family
 from fanet_mw.routing.send_buffer import SendBuffer
-from fanet_mw.units import BROADCAST, MS, US, NodeId, S, earliest, seconds_to_ns
+from fanet_mw.units import BROADCAST, MS, US, NodeId, S, earliest
 
 LOCATION_INTERVAL_NS: Final = 5 * S
 LOCATION_AGE_NS: Final = 10 * S
@@ -43,10 +43,9 @@ class Geographic(HopByHop):
 
     def __init__(self, port: Port) -> None:
         super().__init__(port)
-        routing = port.scenario.routing
         self._locations = LocationTable()
-        self._room = SendBuffer(capacity=routing.queue_frames, hold_ns=seconds_to_ns(routing.lifetime_s))
-        self._hops = routing.hop_limit
+        self._room = SendBuffer(port)
+        self._hops = port.scenario.routing.hop_limit
         self._beacon_ns: int | None = None
         self._retry_ns: int | None = None
         self._located_ns = -LOCATION_INTERVAL_NS
@@ -75,17 +74,14 @@ class Geographic(HopByHop):
             self._send(packet, next_hop, start_ns=start_ns, now_ns=now_ns)
 
     def _carry(self, packet: Packet, *, now_ns: int) -> None:
-        evicted = self._room.push(packet, now_ns=now_ns)
-        if evicted is not None:
-            self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
+        self._room.push(packet, now_ns=now_ns)
         if self._retry_ns is None:
             self._retry_ns = now_ns + LOOK_INTERVAL_NS
 
     def _retry_carried(self, now_ns: int) -> None:
         """Try to forward what is carried. A packet older than its lifetime is dropped, however short its stay here."""
         self._retry_ns = None
-        for packet in self._room.expire(now_ns=now_ns):
-            self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+        self._room.expire(now_ns=now_ns)
         oldest_us = now_ns // US - round(self._port.scenario.routing.lifetime_s * 1_000_000)
         for destination in self._room.destinations():
             for packet in self._room.take(destination):

@@ -143,7 +143,7 @@ def launch(
         if not no_world:
             raise ConfigError("--autopilots: needs --no-world, because flight controllers are the world then")
         beside.append(["autopilots", autopilots, "--flavor", doors.flavor])
-    with begun(output.out), Companions(beside) as companions, _watched(chosen, quiet=output.json) as tell:
+    with begun(output.out), Companions(beside) as companions, _watched(chosen, bar=not output.json) as tell:
         outcome = asyncio.run(
             run(
                 chosen,
@@ -206,12 +206,13 @@ def _together(*observers: "Observer | None") -> "Observer | None":
 
 @contextmanager
 def _simulated(scenario: "Scenario", *, quiet: bool) -> "Iterator[tuple[Callable[[float], None], Observer | None]]":
-    """A progress bar that says how the swarm fares, for a person who is watching; else a line every ten seconds."""
+    """As `_watched`, for a run that tells no more than its time; a bar says how the swarm fares, too."""
     from sim.run.collecting.running_tally import Progress, RunningTally
 
-    began_s = said_s = monotonic()
+    began_s = monotonic()
+    tally = RunningTally(scenario) if _err.is_terminal and not quiet else None
 
-    def figures(seconds: float, tally: RunningTally | None) -> Progress:
+    def progress(seconds: float) -> Progress:
         pace = seconds / max(1e-3, monotonic() - began_s)
         survivors = scenario.mission.survivors
         if tally is None:
@@ -219,41 +220,24 @@ def _simulated(scenario: "Scenario", *, quiet: bool) -> "Iterator[tuple[Callable
         found = len(tally.confirmed), len(tally.without_phone)
         return Progress(seconds, scenario.duration_s, pace, tally.delivered_share(), None, *found, survivors)
 
-    if _err.is_terminal and not quiet:
-        tally = RunningTally(scenario)
-        with _progress(scenario, quiet=quiet) as tell:
-            yield lambda s: tell(s, f"{scenario.name}: {figures(s, tally).in_words()}"), tally
-        return
-
-    def say(seconds: float) -> None:
-        nonlocal said_s
-        if not quiet and monotonic() >= said_s + _WORD_EVERY_S:
-            said_s += _WORD_EVERY_S
-            _say(figures(seconds, None).sentence())
-
-    yield say, None
+    with _watched(scenario, bar=not quiet, lines=not quiet) as tell:
+        yield lambda seconds: tell(progress(seconds)), tally
 
 
 @contextmanager
-def _progress(scenario: "Scenario", *, quiet: bool) -> Iterator[Callable[..., None]]:
-    """A progress bar of simulated seconds on standard error, if a person is watching."""
-    if quiet or not _err.is_terminal:
-        yield lambda _seconds, _what="": None
-        return
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f}/{task.total:.0f} s"))
-    with Progress(*columns, TimeElapsedColumn(), console=_err, transient=True) as progress:
-        task = progress.add_task(scenario.name, total=scenario.duration_s)
-        yield lambda seconds, what=scenario.name: progress.update(task, completed=seconds, description=what)
-
-
-@contextmanager
-def _watched(scenario: "Scenario", *, quiet: bool) -> Iterator[Callable[["Progress"], None]]:
+def _watched(scenario: "Scenario", *, bar: bool, lines: bool = True) -> Iterator[Callable[["Progress"], None]]:
     """A progress bar for a person who is watching, and else a line every ten seconds, both on standard error."""
+    if not (bar if _err.is_terminal else lines):
+        yield lambda _: None
+        return
     if _err.is_terminal:
-        with _progress(scenario, quiet=quiet) as tell:
-            yield lambda progress: tell(progress.swarm_s, f"{scenario.name}: {progress.in_words()}")
+        from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+        from rich.progress import Progress as Bar
+
+        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f}/{task.total:.0f} s"))
+        with Bar(*columns, TimeElapsedColumn(), console=_err, transient=True) as shown:
+            task = shown.add_task(scenario.name, total=scenario.duration_s)
+            yield lambda at: shown.update(task, completed=at.swarm_s, description=f"{scenario.name}: {at.in_words()}")
         return
     said_s = monotonic()
 

@@ -16,7 +16,7 @@ def test_a_line_every_ten_seconds_says_how_the_swarm_fares(
 ) -> None:
     now_s = 100.0
     monkeypatch.setattr(runs, "monotonic", lambda: now_s)
-    with runs._watched(make_scenario(), quiet=True) as tell:
+    with runs._watched(make_scenario(), bar=False) as tell:
         for quarter in range(4 * 35):
             now_s = 100 + quarter / 4
             tell(state(quarter / 4))

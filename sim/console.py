@@ -2,10 +2,14 @@
 
 import os
 import sys
-from typing import Any, Final, NoReturn
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 from rich.console import Console as RichConsole
 from rich.text import Text
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 CLOSED: Final = 128 + 13
 """The exit code that a shell shows for a process that SIGPIPE ended."""
@@ -48,6 +52,16 @@ class Console(RichConsole):
 def tell(text: str) -> None:
     """Say something on standard error, as it is."""
     Console(stderr=True).print(text, highlight=False, soft_wrap=True)
+
+
+def table(headings: Sequence[str], rows: Iterable[Sequence[str]] = ()) -> "Table":
+    """A table as commands print them."""
+    from rich.table import Table
+
+    made = Table(*headings, box=None, header_style="bold", padding=(0, 2, 0, 0))
+    for row in rows:
+        made.add_row(*row)
+    return made
 
 
 def printable(text: str) -> str:

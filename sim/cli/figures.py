@@ -9,12 +9,11 @@ from typing import Annotated
 
 from cyclopts import Parameter
 from cyclopts.validators import Number
-from rich.table import Table
 from rich.text import Text
 
 from fanet_mw.errors import ConfigError
 from sim.cli.sweep import carry_out, runs_of_other_code
-from sim.console import Console
+from sim.console import Console, table
 
 
 def figures(
@@ -73,20 +72,20 @@ def figures(
                 recipe.sweep, found, out=runs, jobs=jobs, scheduler=scheduler, retry=retry,
                 rerun_older=rerun_older,
             )  # fmt: skip
-        table = read(runs) if kept is None else read_kept(kept, recipe.sweep, variant)
-        if table is None:
+        results = read(runs) if kept is None else read_kept(kept, recipe.sweep, variant)
+        if results is None:
             missing.append(recipe.sweep)
             continue
-        if draw_only and (others := runs_of_other_code(Counter(table.column("code").to_pylist()))):
+        if draw_only and (others := runs_of_other_code(Counter(results.column("code").to_pylist()))):
             notices.append(f"{recipe.name}: {others}")
-        verdicts += [(recipe.name, claim) for claim in render(recipe, table, out, variant=variant)]
+        verdicts += [(recipe.name, claim) for claim in render(recipe, results, out, variant=variant)]
     console = Console()
-    table = Table("figure", "claim", "verdict", box=None, header_style="bold", padding=(0, 2, 0, 0))
+    shown = table(("figure", "claim", "verdict"))
     for name, claim in verdicts:
-        table.add_row(name, claim.claim if claim.figure else f"{BEYOND}{claim.claim}", claim.verdict.value)
+        shown.add_row(name, claim.claim if claim.figure else f"{BEYOND}{claim.claim}", claim.verdict.value)
         for statement in claim.statements:
-            table.add_row("", Text(statement.text(), style="dim"), "")
-    console.print(table)
+            shown.add_row("", Text(statement.text(), style="dim"), "")
+    console.print(shown)
     for notice in notices:
         console.print(notice, highlight=False, soft_wrap=True)
     if missing:

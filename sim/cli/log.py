@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import App, Parameter
-from rich.table import Table
 
 from fanet_mw.errors import ConfigError
 from sim.cli.options import TOOLS, SwarmFlags, require_file_or_nothing
-from sim.console import Console
+from sim.console import Console, table
 
 if TYPE_CHECKING:
     from sim.results.result import Result
@@ -69,10 +68,7 @@ def info(path: Path) -> int:
     console = Console(highlight=False)
     for line in content.lines:
         console.print(line)
-    table = Table(*content.columns, box=None, header_style="bold", padding=(0, 2, 0, 0))
-    for row in content.rows:
-        table.add_row(*row)
-    console.print(table)
+    console.print(table(content.columns, content.rows))
     return 0
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from fanet_mw.errors import ConfigError
-from sim.console import Console
+from sim.console import Console, table
 
 if TYPE_CHECKING:
     from sim.results.replay import Replay
@@ -68,25 +68,21 @@ def _in_3d(folder: Path, *, html: Path | None, start_s: float, port: int | None)
 
 
 def _show(run: "Replay", t_s: float) -> None:
-    from rich.table import Table
-
     from fanet_mw.units import S
 
     uavs = run.at(t_s)
     console = Console()
     console.print(f"{run.scenario.name}, seed {run.scenario.seed}, at {t_s:g} s: {len(uavs)} UAVs, "
                   f"{run.coverage(t_s):.1%} of the area covered", highlight=False)  # fmt: skip
-    table = Table("UAV", "east [m]", "north [m]", "up [m]", "flight", "mission", "survivor", "role", "head", box=None,
-                  header_style="bold", padding=(0, 2, 0, 0))  # fmt: skip
+    swarm = table(("UAV", "east [m]", "north [m]", "up [m]", "flight", "mission", "survivor", "role", "head"))
     for node, state in uavs.items():
         place = (f"{value:.0f}" for value in state.position)
-        table.add_row(str(node), *place, state.flight, state.mission, str(state.survivor or ""), state.role,
+        swarm.add_row(str(node), *place, state.flight, state.mission, str(state.survivor or ""), state.role,
                       str(state.head or ""))  # fmt: skip
-    console.print(table)
+    console.print(swarm)
     if not run.survivors:
         return
-    people = Table("survivor", "east [m]", "north [m]", "state", "since [s]", "by UAV", box=None, header_style="bold",
-                   padding=(0, 2, 0, 0))  # fmt: skip
+    people = table(("survivor", "east [m]", "north [m]", "state", "since [s]", "by UAV"))
     for (survivor, found), at in zip(run.found(t_s).items(), run.survivors, strict=True):
         since = f"{found.t_ns / S:.1f}" if found.node else ""
         people.add_row(str(survivor), f"{at.east:.0f}", f"{at.north:.0f}", found.status, since, str(found.node or ""))

@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
-from rich.table import Table
 
 from fanet_mw.errors import ConfigError
 from sim.cli.options import ScenarioFlags, ScenarioName, print_notes
-from sim.console import Console
+from sim.console import Console, table, tell
 from sim.scenarios.shipped import shipped
 
 if TYPE_CHECKING:
@@ -31,10 +30,7 @@ def scenarios(*, json_: Annotated[bool, Parameter(name="--json", negative="")] =
     if json_:
         sys.stdout.write(json.dumps([{"name": e.name, "description": e.description} for e in entries], indent=2) + "\n")
         return 0
-    table = Table("scenario", "what it is", box=None, header_style="bold", padding=(0, 2, 0, 0))
-    for entry in entries:
-        table.add_row(entry.name, entry.description)
-    Console().print(table)
+    Console().print(table(("scenario", "what it is"), ((entry.name, entry.description) for entry in entries)))
     return 0
 
 
@@ -71,11 +67,8 @@ def init(
     _write(file, content)
     if schema:
         _write(file.parent / SCHEMA_NAME, _schema_text())
-    console = Console(stderr=True)
     word = shlex.quote(str(file))
-    console.print(
-        f"written to {file}; next: fanet check {word}, fanet simulate {word}", highlight=False, soft_wrap=True
-    )
+    tell(f"written to {file}; next: fanet check {word}, fanet simulate {word}")
     return 0
 
 
@@ -133,7 +126,7 @@ def schema(file: Path | None = None) -> int:
         sys.stdout.write(_schema_text())
     else:
         _write(file, _schema_text())
-        Console(stderr=True).print(f"written to {file}", highlight=False, soft_wrap=True, markup=False)
+        tell(f"written to {file}")
     return 0
 
 

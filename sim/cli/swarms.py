@@ -7,11 +7,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 from cyclopts.validators import Number
-from rich.table import Table
 
 from sim.bus.running_swarms import running
 from sim.cli.options import DoorFlags, SwarmFlags
-from sim.console import Console, tell
+from sim.console import Console, table, tell
 
 
 def links(
@@ -44,10 +43,8 @@ def swarms(*, json_: Annotated[bool, Parameter(name="--json", negative="")] = Fa
         rows = [{"swarm": e.swarm, "endpoint": e.endpoint, "pid": e.pid} for e in entries]
         sys.stdout.write(json.dumps(rows, indent=2) + "\n")
         return 0
-    table = Table("swarm", "endpoint", "process", box=None, header_style="bold", padding=(0, 2, 0, 0))
-    for entry in entries:
-        table.add_row(entry.swarm, entry.endpoint, str(entry.pid))
-    Console().print(table if entries else "no swarm runs on this machine")
+    shown = table(("swarm", "endpoint", "process"), ((one.swarm, one.endpoint, str(one.pid)) for one in entries))
+    Console().print(shown if entries else "no swarm runs on this machine")
     return 0
 
 

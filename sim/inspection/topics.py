@@ -13,8 +13,6 @@ from pathlib import Path
 from statistics import fmean, pstdev
 from typing import Any, Final
 
-from rich.table import Table
-
 from fanet_mw import wire
 from fanet_mw.bus import codecs
 from fanet_mw.bus.topics import ROOT, Topics
@@ -22,7 +20,7 @@ from fanet_mw.errors import MalformedFrameError
 from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.mavlink import decode
 from sim.bus.operator_commands import OPERATOR, find_swarm
-from sim.console import Console
+from sim.console import Console, table
 
 _LOOK_S: Final = 0.5
 _MOST_WAITING: Final = 50_000
@@ -77,13 +75,13 @@ def show_list(endpoint: str, swarm: str | None, *, seconds: float, zenoh_config:
         size[topic] += len(payload)
         if len(kinds.setdefault(topic, set())) < 4:
             kinds[topic] |= {type(message).__name__ for message in _decoded(payload)}
-    table = Table("topic", "messages", "Hz", "B/s", box=None, header_style="bold", padding=(0, 2, 0, 0))
+    shown = table(("topic", "messages", "Hz", "B/s"))
     for topic in sorted(counts, key=_by_number):
         name = topic.removeprefix(heard.base)
-        table.add_row(
+        shown.add_row(
             name, " ".join(sorted(kinds[topic])), f"{counts[topic] / seconds:.1f}", f"{size[topic] / seconds:.0f}"
         )
-    Console().print(table if counts else f"nothing was said on {heard.base}** within {seconds:g} s")
+    Console().print(shown if counts else f"nothing was said on {heard.base}** within {seconds:g} s")
     return 0
 
 

@@ -6,31 +6,36 @@ a second.
 """
 
 from bisect import bisect_left, insort
-from collections.abc import Callable, Mapping
-from types import MappingProxyType
-from typing import Final
+from collections.abc import Callable
+from typing import Protocol
 
+from fanet_mw.errors import DropReason
 from fanet_mw.node.duplicates import key_of_packet
 from fanet_mw.node.packet import Packet
 from fanet_mw.scenario import Routing
 from fanet_mw.units import US
 from fanet_mw.wire import PRIORITY_REPORT, PRIORITY_SAFETY
 
-_ALIKE: Final[Mapping[int, int]] = MappingProxyType({})
+
+class Drop(Protocol):
+    """Takes a packet that is evicted or expired, as `Port.drop` does."""
+
+    def __call__(self, reason: DropReason, packet: Packet, *, now_ns: int) -> None: ...
 
 
-def sooner_us(routing: Routing) -> Mapping[int, int]:
-    """How much earlier than `routing.lifetime_s` each priority class expires, for the classes that do."""
-    whole_ns = routing.lifetime_ns(-1)
-    return {p: (whole_ns - routing.lifetime_ns(p)) // US for p in (PRIORITY_SAFETY, PRIORITY_REPORT)}
+def _unsaid(reason: DropReason, packet: Packet, *, now_ns: int) -> None:
+    """Say nothing about a packet that is one of several copies."""
 
 
 class TxQueue:
     """Packets that wait for a slot or a route."""
 
-    def __init__(self, *, capacity: int, sooner_us: Mapping[int, int] = _ALIKE) -> None:
-        self._capacity = capacity
-        self._sooner_us = sooner_us
+    def __init__(self, routing: Routing, drop: Drop = _unsaid) -> None:
+        self._drop = drop
+        self._capacity = routing.queue_frames
+        self._lifetime_ns = whole_ns = routing.lifetime_ns(-1)
+        self._sooner_us = {p: (whole_ns - routing.lifetime_ns(p)) // US for p in (PRIORITY_SAFETY, PRIORITY_REPORT)}
+        """How much earlier than the others each priority class expires, for the classes that do."""
         self._entries: list[tuple[int, int, Packet]] = []
         self._order = 0
         self._fresh_us = 0
@@ -46,8 +51,8 @@ class TxQueue:
     def remove(self, key: int) -> None:
         self._entries = [entry for entry in self._entries if key_of_packet(entry[2]) != key]
 
-    def push(self, packet: Packet, *, rank: int | None = None) -> Packet | None:
-        """Add a packet; returns that evicted for it, perhaps itself. `rank`: its priority here, by default its own."""
+    def push(self, packet: Packet, *, rank: int | None = None, now_ns: int) -> None:
+        """Add a packet, or drop it or another one. `rank`: its priority here, by default its own."""
         self._order += 1
         if rank is None:
             rank = packet.header.priority
@@ -55,7 +60,8 @@ class TxQueue:
         if not self._entries or fresh_us < self._fresh_us:
             self._fresh_us = fresh_us
         insort(self._entries, (rank, self._order, packet))
-        return self._entries.pop()[2] if len(self._entries) > self._capacity else None
+        if len(self._entries) > self._capacity:
+            self._drop(DropReason.QUEUE_FULL, self._entries.pop()[2], now_ns=now_ns)
 
     def pop(self) -> Packet:
         """Remove the most urgent packet."""
@@ -102,10 +108,13 @@ class TxQueue:
     def _of(self, rank: int) -> list[tuple[int, int, Packet]]:
         return self._entries[bisect_left(self._entries, (rank,)) : bisect_left(self._entries, (rank + 1,))]
 
-    def expire(self, *, before_us: int) -> list[Packet]:
-        """Remove all packets generated before an instant [swarm us], or a later one if their class expires sooner."""
-        if not self._entries or before_us <= self._fresh_us:
-            return []  # otherwise each wake-up would examine the whole queue
+    def expire(self, *, now_ns: int) -> None:
+        """Drop all packets that are older than the lifetime of their class."""
+        if not self._entries:
+            return  # as at most wake-ups
+        before_us = (now_ns - self._lifetime_ns) // US
+        if before_us <= self._fresh_us:
+            return  # otherwise each wake-up would examine the whole queue
         stale: list[tuple[int, int, Packet]] = []
         kept: list[tuple[int, int, Packet]] = []
         for entry in self._entries:
@@ -113,7 +122,8 @@ class TxQueue:
             (stale if entry[2].header.origin_us < late_us else kept).append(entry)
         self._entries = kept
         self._fresh_us = min((p.header.origin_us - self._sooner_us.get(rank, 0) for rank, _, p in kept), default=0)
-        return [entry[2] for entry in stale]
+        for _, _, packet in stale:
+            self._drop(DropReason.EXPIRED, packet, now_ns=now_ns)
 
     def drain(self) -> list[Packet]:
         """Remove all packets, the most urgent first."""

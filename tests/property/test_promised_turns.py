@@ -14,6 +14,7 @@ from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.own_bound import BURST, RootTurns
 from fanet_mw.routing.clustered.timetable.turn_release import RootRelease, TurnsInForce
+from fanet_mw.scenario import Routing
 from fanet_mw.units import MS, NodeId
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_CONTROL, PRIORITY_REPORT, PRIORITY_SAFETY, Header, Kind
 
@@ -66,7 +67,7 @@ class Run(NamedTuple):
 
 
 def drive(case: Case) -> Run:
-    release = RootRelease(ME, TxQueue(capacity=1000), reserved=ROOMS, lead_ns=case.lead_ns)
+    release = RootRelease(ME, TxQueue(Routing(queue_frames=1000)), reserved=ROOMS, lead_ns=case.lead_ns)
     release.follow(case.plans, now_ns=0)
     run = Run({}, {}, {})
 
@@ -85,7 +86,7 @@ def drive(case: Case) -> Run:
         let_out(now_ns)
         run.born_ns[seq] = now_ns
         taken = packet(seq, priority, now_ns)
-        assert release.push(taken, now_ns=now_ns) is None
+        release.push(taken, now_ns=now_ns)
         said_ns = release.through_ns(taken, now_ns=now_ns)
         assert said_ns is not None
         run.said_ns[seq] = said_ns

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 from fanet_mw.node.contract import Port
 from fanet_mw.node.neighbors import Neighbors, neighbor_lifetime_ns
-from fanet_mw.node.queue import TxQueue, sooner_us
+from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.clustered import Clustered, Parts
 from fanet_mw.routing.clustered.contract import HearsCopies, ScheduledAccess
 from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTiming
@@ -88,8 +88,7 @@ class _Ground(NamedTuple):
         return neighbor_lifetime_ns(self.port.scenario.routing.hello_interval_s)
 
     def queue(self) -> TxQueue:
-        routing = self.port.scenario.routing
-        return TxQueue(capacity=routing.queue_frames, sooner_us=sooner_us(routing))
+        return TxQueue(self.port.scenario.routing, self.port.drop)
 
 
 def make_clustered(port: Port) -> Clustered:
@@ -164,7 +163,7 @@ def _by_timetable(ground: _Ground) -> Clustered:
     parts = _role_parts(ground, takes_slot=False)
     lead_ns = scenario.radio.lead_ns
     roots = RootRelease(port.node, ground.queue(), reserved=reserved(scenario), lead_ns=lead_ns)
-    calls = CallRelease(TxQueue(capacity=scenario.routing.queue_frames), lead_ns=lead_ns)
+    calls = CallRelease(TxQueue(scenario.routing), lead_ns=lead_ns)
     spare = CallRelease(ground.queue(), lead_ns=lead_ns)
     followers = Followers(port.node)
     delays = StatedDelays(

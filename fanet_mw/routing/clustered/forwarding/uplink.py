@@ -8,12 +8,11 @@ again.
 from typing import Final, NamedTuple
 
 from fanet_mw.bus.messages import TxOutcome, TxStatus
-from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
-from fanet_mw.node.queue import TxQueue, sooner_us
+from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
-from fanet_mw.units import US, NodeId
+from fanet_mw.units import NodeId
 from fanet_mw.wire import FLAG_TO_HEAD
 
 MOST_TRIES: Final = 3
@@ -35,10 +34,9 @@ class Uplink:
     def __init__(self, port: Port, gradient: Gradient) -> None:
         self._port = port
         self._gradient = gradient
-        routing = port.scenario.routing
-        self._held = TxQueue(capacity=routing.queue_frames, sooner_us=sooner_us(routing))
-        self._lifetime_ns = routing.lifetime_ns(-1)
-        """The longest lifetime of all priority classes; packets that expire sooner are known to the queue."""
+        self._held = TxQueue(port.scenario.routing, port.drop)
+        self.expire = self._held.expire
+        """The method that drops expired packets; it is called at every wake-up."""
         self._under_way: dict[int, Attempt] = {}
 
     def __len__(self) -> int:
@@ -47,15 +45,10 @@ class Uplink:
     def send(self, packet: Packet, *, start_ns: int, now_ns: int, tries: int) -> None:
         route = self._gradient.route(now_ns=now_ns)
         if route is None:
-            self._hold(packet, now_ns=now_ns)
+            self._held.push(packet, now_ns=now_ns)
             return
         seq = self._port.transmit_to(packet, route.parent, flags=FLAG_TO_HEAD, start_ns=start_ns)
         self._under_way[seq] = Attempt(packet, route.parent, tries + 1)
-
-    def _hold(self, packet: Packet, *, now_ns: int) -> None:
-        evicted = self._held.push(packet)
-        if evicted is not None:
-            self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
 
     def on_status(self, status: TxStatus) -> Attempt | None:
         """A transmission has ended; returns the attempt if it was one that failed, whose parent is then given up."""
@@ -70,12 +63,6 @@ class Uplink:
         """Take out the held packets that have not expired, if there is a route now."""
         self.expire(now_ns=now_ns)
         return self.drain() if len(self._held) and self._gradient.route(now_ns=now_ns) is not None else []
-
-    def expire(self, *, now_ns: int) -> None:
-        if not len(self._held):
-            return  # as at most wake-ups
-        for packet in self._held.expire(before_us=(now_ns - self._lifetime_ns) // US):
-            self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
 
     def drain(self) -> list[Packet]:
         """Take out all held packets, because they will go another way."""

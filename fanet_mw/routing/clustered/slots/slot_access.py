@@ -8,14 +8,12 @@ on the way to a head.
 from collections.abc import Mapping
 from typing import Final
 
-from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.uplink import Uplink
 from fanet_mw.routing.clustered.roles.membership import Membership
 from fanet_mw.routing.clustered.slots.slot_release import SlotRelease, Tenure
-from fanet_mw.units import US
 from fanet_mw.wire import Kind
 
 _NOTHING: Final[Mapping[str, object]] = {}
@@ -34,7 +32,6 @@ class SlotAccess:
         self._membership = membership
         self._uplink = uplink
         self._floods = floods
-        self._lifetime_us = round(port.scenario.routing.lifetime_s * 1_000_000)
         self._tenure: Tenure | None = None
         """The slot of this node, or the one that it had when it last was head; None if it has never been head."""
 
@@ -57,9 +54,7 @@ class SlotAccess:
 
     def enqueue(self, packet: Packet, *, now_ns: int) -> None:
         assert self._tenure is not None, "a node queues packets only once it has become head"
-        evicted = self._release.push(packet, self._tenure, now_ns=now_ns)
-        if evicted is not None:
-            self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
+        self._release.push(packet, self._tenure, now_ns=now_ns)
 
     def flood_control(
         self, kind: Kind, inner: bytes, *, now_ns: int, urgent: bool = False, patient: bool = False
@@ -108,9 +103,7 @@ class SlotAccess:
     def wake(self, now_ns: int) -> None:
         if self._release.next_wake_ns() is None:
             return  # nothing is queued
-        horizon_us = now_ns // US - self._lifetime_us
-        for packet in self._release.expire(before_us=horizon_us):
-            self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+        self._release.expire(now_ns=now_ns)
         for packet, start_ns in self._release.due(self._tenure, now_ns=now_ns) if self._tenure else ():
             packets = [packet, *self._release.more(self._room(packet))]
             self._floods.begin(packets, start_ns=self._floods.beside_turns_ns(packets, start_ns))

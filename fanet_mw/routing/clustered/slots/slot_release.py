@@ -46,12 +46,10 @@ class SlotRelease:
     def __len__(self) -> int:
         return len(self._queue)
 
-    def push(self, packet: Packet, tenure: Tenure, *, now_ns: int) -> Packet | None:
-        """Queue a packet; returns the packet that was evicted for it, if any."""
-        evicted = self._queue.push(packet)
+    def push(self, packet: Packet, tenure: Tenure, *, now_ns: int) -> None:
+        self._queue.push(packet, now_ns=now_ns)
         if self._next_ns is None:
             self.arm(tenure, now_ns=now_ns)
-        return evicted
 
     def more(self, size: int) -> list[Packet]:
         """Take out packets that fit into the remaining `size` bytes of a frame that is released now."""

@@ -23,7 +23,7 @@ from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
 from fanet_mw.routing.clustered.timetable.turn_release import CallRelease, RootRelease, TurnsInForce
 from fanet_mw.routing.clustered.timetable.turn_size import most_packet_bytes, superframe
-from fanet_mw.units import BROADCAST, US, S, earliest, seconds_to_ns
+from fanet_mw.units import BROADCAST, S, earliest, seconds_to_ns
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TURN, PRIORITY_BULK, Kind
 
 _MOST_ANSWERS: Final = 2
@@ -69,7 +69,6 @@ class TurnAccess:
         """The timetable in whose turns the node has last begun a flood."""
         self._shown_ns = 0
         self._hello_ns = seconds_to_ns(port.scenario.routing.hello_interval_s)
-        self._lifetime_ns = seconds_to_ns(port.scenario.routing.lifetime_s)
         self._hello_sent_ns = self._hello_waits_ns = 0
         """The instant of the node's latest hello, and the time by which that was put off until a window."""
 
@@ -188,9 +187,7 @@ class TurnAccess:
         newest = self._timetables.newest
         assert newest is not None, "a node without a timetable has no turn"
         if self._is_for_neighbor(packet, now_ns):
-            evicted = self._spare.push(packet, now_ns=now_ns)
-            if evicted is not None:
-                self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
+            self._spare.push(packet, now_ns=now_ns)
             return
         size = newest.frame_bytes
         if packet.header.kind == Kind.DATA:
@@ -199,9 +196,7 @@ class TurnAccess:
         if len(packet.frame) > size:
             self._port.drop(DropReason.TOO_LARGE, packet, now_ns=now_ns)
             return
-        evicted = self._roots.push(packet, last=last, now_ns=now_ns)
-        if evicted is not None:
-            self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
+        self._roots.push(packet, last=last, now_ns=now_ns)
 
     def _is_for_neighbor(self, packet: Packet, now_ns: int) -> bool:
         """True for bulk to one neighbor, which hears it in a turn that floods leave, as all keep the same timetable."""
@@ -280,8 +275,7 @@ class TurnAccess:
         if self._resumed is not None:
             self._resumed.wake(now_ns)
         for release in (self._roots, self._spare):
-            for packet in release.expire(before_us=(now_ns - self._lifetime_ns) // US):
-                self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+            release.expire(now_ns=now_ns)
         for packets, start_ns in self._roots.due(now_ns=now_ns):
             kept = self._kept(packets, through_ns=self._through_ns(start_ns), now_ns=now_ns)
             if kept:

@@ -56,6 +56,8 @@ class TurnRelease(ABC):
 
     def __init__(self, queue: TxQueue, *, lead_ns: int) -> None:
         self._queue = queue
+        self.expire = queue.expire
+        """The method that drops expired packets; it is called at every wake-up."""
         self._lead_ns = lead_ns
         self._free_ns = 0
         """The first instant after the start of the last turn that was used or reserved."""
@@ -79,22 +81,17 @@ class TurnRelease(ABC):
     def __len__(self) -> int:
         return len(self._queue)
 
-    def push(self, packet: Packet, *, now_ns: int) -> Packet | None:
-        """Queue a packet; returns the packet that was evicted for it, if any."""
-        return self._push(packet, packet.header.priority, now_ns)
+    def push(self, packet: Packet, *, now_ns: int) -> None:
+        self._push(packet, packet.header.priority, now_ns)
 
-    def _push(self, packet: Packet, rank: int, now_ns: int) -> Packet | None:
-        evicted = self._queue.push(packet, rank=rank)
+    def _push(self, packet: Packet, rank: int, now_ns: int) -> None:
+        self._queue.push(packet, rank=rank, now_ns=now_ns)
         if self.planned is None:
             self._arm(now_ns)
-        return evicted
 
     def holds(self, key: int) -> bool:
         """True if the packet with this key (`duplicates.key_of`) is queued."""
         return key in self._queue
-
-    def expire(self, *, before_us: int) -> list[Packet]:
-        return self._queue.expire(before_us=before_us)
 
     def drain(self) -> list[Packet]:
         self.planned = None
@@ -133,9 +130,9 @@ class RootRelease(TurnRelease):
         self.reserved: Mapping[int, int] = dict(sorted(reserved.items()))
         """The number of bytes of each turn that bulk must leave free, by priority."""
 
-    def push(self, packet: Packet, *, now_ns: int, last: bool = False) -> Packet | None:
-        """Queue a packet; returns the packet that was evicted for it, if any. With `last` it goes behind all others."""
-        return self._push(packet, _LAST if last else self._rank(packet), now_ns)
+    def push(self, packet: Packet, *, now_ns: int, last: bool = False) -> None:
+        """Queue a packet, with `last` behind all others."""
+        self._push(packet, _LAST if last else self._rank(packet), now_ns)
 
     def outdated(self, *, before_us: int) -> list[Packet]:
         """Take out waiting announcements of this node that were made before an instant [swarm us]."""

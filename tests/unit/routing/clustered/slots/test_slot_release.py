@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fanet_mw.errors import DropReason
 from fanet_mw.node.packet import Packet
-from fanet_mw.node.queue import TxQueue, sooner_us
+from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.slots.slot_release import SlotRelease, Tenure
 from fanet_mw.routing.clustered.tdma.slot_timing import Superframe
 from fanet_mw.scenario import Clusters, Routing
@@ -34,7 +35,7 @@ def test_every_packet_leaves_once_in_its_own_slot_at_least_a_gap_apart(
     arrivals_ms: list[int], cluster: int, pacing: str
 ) -> None:
     clusters = Clusters(pacing=pacing, flooding_period_s=1)
-    release, membership = SlotRelease(TxQueue(capacity=100), clusters, lead_ns=LEAD_NS), member_of(cluster)
+    release, membership = SlotRelease(TxQueue(Routing()), clusters, lead_ns=LEAD_NS), member_of(cluster)
     out: list[tuple[Packet, int]] = []
 
     def run(until_ns: int) -> None:
@@ -43,7 +44,7 @@ def test_every_packet_leaves_once_in_its_own_slot_at_least_a_gap_apart(
 
     for seq, at_ms in enumerate(arrivals_ms):
         run(at_ms * MS)
-        assert release.push(packet(seq), membership, now_ns=at_ms * MS) is None
+        release.push(packet(seq), membership, now_ns=at_ms * MS)
     run(60 * S)
     assert sorted(p.header.seq for p, _ in out) == list(range(len(arrivals_ms)))
     starts = [start for _, start in out]
@@ -58,7 +59,7 @@ def test_every_packet_leaves_once_in_its_own_slot_at_least_a_gap_apart(
 )
 def test_a_slot_is_divided_among_what_is_queued_or_used_at_once(pacing: str, count: int, gap_us: int) -> None:
     """A slot of 248 ms; floods farther apart than 40 ms do not meet anyway."""
-    release = SlotRelease(TxQueue(capacity=100), Clusters(pacing=pacing, flooding_period_s=1), lead_ns=LEAD_NS)
+    release = SlotRelease(TxQueue(Routing()), Clusters(pacing=pacing, flooding_period_s=1), lead_ns=LEAD_NS)
     tenure = member_of(1)
     for seq in range(count):
         release.push(packet(seq), tenure, now_ns=0)
@@ -70,34 +71,47 @@ def test_a_slot_is_divided_among_what_is_queued_or_used_at_once(pacing: str, cou
     assert {b - a for a, b in pairwise(starts)} == {gap_us * US}
 
 
+class Drops(list[tuple[DropReason, int]]):
+    """Why a queue drops, and the number of what it drops."""
+
+    def __call__(self, reason: DropReason, packet: Packet, *, now_ns: int) -> None:
+        self.append((reason, packet.header.seq))
+
+
 def test_the_most_urgent_goes_first_and_the_least_important_is_evicted() -> None:
-    queue = TxQueue(capacity=3)
-    assert queue.push(packet(0, priority=3)) is None
-    assert queue.push(packet(1, priority=2)) is None
-    assert queue.push(packet(2, priority=0)) is None
-    evicted = queue.push(packet(3, priority=2))
-    assert evicted is not None
-    assert evicted.header.seq == 0
-    assert queue.push(packet(4, priority=3)) == packet(4, priority=3), "it was the least important itself"
+    drops = Drops()
+    queue = TxQueue(Routing(queue_frames=3), drops)
+    for seq, priority in enumerate((3, 2, 0)):
+        queue.push(packet(seq, priority=priority), now_ns=0)
+    assert drops == []
+    queue.push(packet(3, priority=2), now_ns=0)
+    assert drops == [(DropReason.QUEUE_FULL, 0)]
+    queue.push(packet(4, priority=3), now_ns=0)
+    assert drops[1:] == [(DropReason.QUEUE_FULL, 4)], "it was the least important itself"
     assert [queue.pop().header.seq for _ in range(3)] == [2, 1, 3]
 
 
 def test_expired_packets_are_taken_out_and_named() -> None:
-    queue = TxQueue(capacity=9)
+    drops = Drops()
+    queue = TxQueue(Routing(lifetime_s=10), drops)
     for seq in range(4):
-        queue.push(packet(seq, born_us=seq * 1000))
-    assert [p.header.seq for p in queue.expire(before_us=2000)] == [0, 1]
+        queue.push(packet(seq, born_us=seq * 1000), now_ns=0)
+    queue.expire(now_ns=10 * S + 2 * MS)
+    assert drops == [(DropReason.EXPIRED, 0), (DropReason.EXPIRED, 1)]
     assert len(queue) == 2
 
 
 def test_each_class_expires_by_its_own_lifetime() -> None:
     routing = Routing(lifetime_s=10, safety_lifetime_s=1, report_lifetime_s=4)
-    queue = TxQueue(capacity=9, sooner_us=sooner_us(routing))
+    drops = Drops()
+    queue = TxQueue(routing, drops)
     for priority in (PRIORITY_CONTROL, PRIORITY_SAFETY, PRIORITY_REPORT, PRIORITY_BULK):
-        queue.push(packet(priority, priority=priority, born_us=0))
+        queue.push(packet(priority, priority=priority, born_us=0), now_ns=0)
 
     def expired_at(now_us: int) -> list[int]:
-        return [p.header.seq for p in queue.expire(before_us=now_us - 10_000_000)]
+        drops.clear()
+        queue.expire(now_ns=now_us * US)
+        return [seq for _, seq in drops]
 
     assert expired_at(1_000_000) == []
     assert expired_at(1_000_001) == [PRIORITY_SAFETY]
@@ -111,9 +125,9 @@ def test_a_class_without_a_lifetime_of_its_own_lives_as_long_as_the_others() -> 
 
 
 def test_what_fits_beside_the_first_is_taken_in_order_and_nothing_overtakes() -> None:
-    queue = TxQueue(capacity=9)
+    queue = TxQueue(Routing())
     for seq, size in enumerate((10, 20, 40, 5)):
-        queue.push(packet(seq)._replace(frame=bytes(size)))
+        queue.push(packet(seq)._replace(frame=bytes(size)), now_ns=0)
     assert [p.header.seq for p in queue.pop_fitting(35)] == [0, 1]
     assert [p.header.seq for p in queue.pop_fitting(35)] == []
     assert [p.header.seq for p in queue.pop_fitting(45)] == [2, 3]

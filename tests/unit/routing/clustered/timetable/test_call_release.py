@@ -3,20 +3,21 @@
 from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.turn_release import CallRelease, TurnsInForce
+from fanet_mw.scenario import Routing
 from fanet_mw.units import MS
 
 TURNS = Turns(origin_ns=0, period_ns=100 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_superframe=29)
 
 
 def test_each_call_is_reserved_once() -> None:
-    calls = CallRelease(TxQueue(capacity=10), lead_ns=5 * MS)
+    calls = CallRelease(TxQueue(Routing()), lead_ns=5 * MS)
     calls.follow([TurnsInForce(0, TURNS, (0, 10), 500, 1)], now_ns=0)
     assert [calls.reserve(not_before_ns=0, now_ns=0) for _ in range(4)] == [40 * MS, 60 * MS, 140 * MS, 160 * MS]
     assert calls.has_turn(now_ns=0)
 
 
 def test_without_calls_none_is_reserved() -> None:
-    calls = CallRelease(TxQueue(capacity=10), lead_ns=5 * MS)
+    calls = CallRelease(TxQueue(Routing()), lead_ns=5 * MS)
     calls.follow([TurnsInForce(0, TURNS, (), 500, 1)], now_ns=0)
     assert calls.reserve(not_before_ns=0, now_ns=0) is None
     assert not calls.has_turn(now_ns=0)

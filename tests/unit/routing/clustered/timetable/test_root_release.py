@@ -6,6 +6,7 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.turn_release import RootRelease, TurnsInForce
+from fanet_mw.scenario import Routing
 from fanet_mw.units import MS, NodeId
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_CONTROL, PRIORITY_REPORT, PRIORITY_SAFETY, Header, Kind
 
@@ -19,7 +20,7 @@ def packet(seq: int, size: int = 100, *, priority: int = PRIORITY_BULK, kind: Ki
 
 
 def root(*plans: TurnsInForce, reserved: dict[int, int] | None = None) -> RootRelease:
-    release = RootRelease(ME, TxQueue(capacity=100), reserved=reserved or {}, lead_ns=LEAD_NS)
+    release = RootRelease(ME, TxQueue(Routing()), reserved=reserved or {}, lead_ns=LEAD_NS)
     release.follow(plans, now_ns=0)
     return release
 

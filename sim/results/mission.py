@@ -303,10 +303,8 @@ class OverflownCells(_Cells):
                 continue
             near_e = np.flatnonzero(np.abs(self._axis - east) <= math.sqrt(ground2))
             near_n = np.flatnonzero(np.abs(self._axis - north) <= math.sqrt(ground2))
-            if len(near_e) and len(near_n):
-                within = (self._axis[near_n, None] - north) ** 2 + (self._axis[None, near_e] - east) ** 2 <= ground2
-                block = np.ix_(near_n, near_e)
-                self._seen[block] |= within
+            within = (self._axis[near_n, None] - north) ** 2 + (self._axis[None, near_e] - east) ** 2 <= ground2
+            self._seen[np.ix_(near_n, near_e)] |= within
 
 
 class PhotographedCells(_Cells):

@@ -272,3 +272,51 @@ def test_a_battery_is_empty_only_when_nothing_is_left(charge: float, percent: in
     streams.on_battery(Battery(0, voltage_v=70.0, current_a=400.0, charge=charge))
     told = told_of_the_battery(streams, S)
     assert (told["battery_remaining"], told["voltage_battery"], told["current_battery"]) == (percent, 65534, 32767)
+
+
+# --- an operator ------------------------------------------------------------------------------------------------------
+
+
+def times_of(streams: TelemetryStreams, name: str, *, until_ns: int) -> list[int]:
+    return [t_ns for t_ns, message in run(streams, until_ns=until_ns) if message.get_type() == name]
+
+
+def test_an_operator_gets_what_comes_seldom_within_its_own_interval_and_what_is_due_sooner_no_later() -> None:
+    slow = make(telemetry_hz=0.1)
+    first_ns = times_of(slow, "ATTITUDE", until_ns=20 * S)[-1]
+    slow.operator(first_ns + S // 4)
+    after = times_of(slow, "ATTITUDE", until_ns=first_ns + 4 * S)
+    assert after == [first_ns + S // 4 + k * S for k in (1, 2, 3)]
+    soon = make(telemetry_hz=0.1)
+    due_ns = times_of(soon, "ATTITUDE", until_ns=5 * S)[0] + 10 * S
+    soon.operator(due_ns - S // 10)
+    assert times_of(soon, "ATTITUDE", until_ns=due_ns + S)[0] == due_ns, "it was due before"
+    fast = make(telemetry_hz=5.0)
+    before = times_of(make(telemetry_hz=5.0), "GLOBAL_POSITION_INT", until_ns=3 * S)
+    fast.operator(0)
+    assert times_of(fast, "GLOBAL_POSITION_INT", until_ns=3 * S) == before, "nothing comes less often"
+
+
+def test_an_interval_is_set_bounded_and_given_back() -> None:
+    streams = make(telemetry_hz=1.0)
+    attitude = common.MAVLINK_MSG_ID_ATTITUDE
+    usual_ns = streams.interval_ns(attitude)
+    assert usual_ns == S
+    for wanted_ns, given_ns in ((S // 4, S // 4), (-1, 0), (None, S), (1, 20 * MS)):
+        assert streams.set_interval(attitude, wanted_ns, S)
+        assert streams.interval_ns(attitude) == given_ns
+        due_ns = streams.next_due_ns()
+        assert due_ns is not None
+        assert due_ns < S + max(given_ns, S)
+    assert streams.set_interval(attitude, None, S)
+    assert streams.interval_ns(attitude) == S, "as usual"
+    assert not streams.set_interval(1_000_000, S, 0)
+    assert streams.interval_ns(1_000_000) is None
+
+
+def test_what_is_not_sent_as_usual_begins_when_asked_for_at_the_phase_of_the_node() -> None:
+    phase_ns = NODE * 7_919_000
+    for ask in (lambda one: one.operator(5 * S), lambda one: one.set_interval(common.MAVLINK_MSG_ID_VFR_HUD, S, 5 * S)):
+        streams = make(telemetry_hz=0)
+        ask(streams)
+        assert times_of(streams, "VFR_HUD", until_ns=8 * S) == [5 * S + phase_ns + k * S for k in range(3)]

@@ -8,6 +8,7 @@ purpose: within them, the delivery ratio is within 0.015 of that of the undistur
 from collections.abc import Iterator, Mapping
 from typing import Any, Final, NamedTuple
 
+from fanet_mw.scenario import Scenario
 from sim.results.outcome import Outcome, described
 
 LOST_LIMIT: Final = 0.0025
@@ -110,9 +111,16 @@ def _broken(outcome: Outcome) -> Iterator[str]:
         yield f"{_named(dead)} ended before the end, with {described(code)}: {len(dead)}, limit 0"
     for name, why in outcome.absent.items():
         yield f"no report of {name} ({why}); all must report"
-    unfinished = [name for name, report in outcome.reports.items() if not report.get("final")]
+    gone = {f"agent-{node}" for node in outcome.scenario.node_ids if _is_stopped_for_good(outcome.scenario, node)}
+    unfinished = [name for name, report in outcome.reports.items() if not report.get("final") and name not in gone]
     if unfinished and outcome.mode == "realtime":
         yield f"no last report of {_named(unfinished)}: {len(unfinished)}, limit 0"
+
+
+def _is_stopped_for_good(scenario: Scenario, node: int) -> bool:
+    """True if a fault ends the program of a node, and nothing starts it again."""
+    stops = scenario.planned_stops(node)
+    return bool(stops) and stops[-1][1] is None
 
 
 def _incomplete(outcome: Outcome) -> Iterator[str]:
@@ -157,8 +165,11 @@ def _named(names: list[str]) -> str:
 
 
 def _copies_lost(outcome: Outcome) -> float:
-    """The share of receptions that the emulator sent and that never arrived; not of nodes whose process died."""
+    """The share of receptions that the emulator sent and that never arrived; not of nodes whose process died, or was
+    stopped by a fault: what it had counted until then is lost.
+    """
     dead = {name for name, _ in outcome.ended}
+    dead |= {f"agent-{node}" for node in outcome.scenario.node_ids if outcome.scenario.planned_stops(node)}
     handed = lost = 0
     for node, count in outcome.reports.get("emulator", {}).get("handed", {}).items():
         report = outcome.reports.get(f"agent-{node}")

@@ -266,6 +266,26 @@ def test_what_a_dead_uav_did_not_receive_was_not_lost_on_the_bus(scenario: Scena
     assert not any("receptions lost on the bus" in reason for reason in found)
 
 
+def test_what_a_uav_did_not_count_whose_program_was_started_again_was_not_lost_on_the_bus(make_scenario: Any) -> None:
+    stop = {"kind": "stop", "node": 2, "at_s": 4, "for_s": 1}
+    outcome = good(make_scenario(**{"nodes.count": 2, "faults": [stop]}))
+    put(outcome, "agent-2", "receptions", value=HEARD // 2)  # since then
+    assert reasons(outcome) == []
+    put(outcome, "agent-1", "receptions", value=HEARD // 2)
+    assert any("receptions lost on the bus" in reason for reason in reasons(outcome)), "another one's count"
+
+
+def test_who_is_stopped_for_good_by_a_fault_owes_no_last_report(make_scenario: Any) -> None:
+    stop = {"kind": "stop", "node": 2, "at_s": 4}
+    for faults, owes in (([stop], False), ([stop, {**stop, "at_s": 2, "for_s": 1}], False), ([], True)):
+        outcome = good(make_scenario(**{"nodes.count": 2, "faults": faults}))
+        put(outcome, "agent-2", "final", value=False)
+        assert any("no last report of agent-2" in reason for reason in reasons(outcome)) == owes, faults
+    outcome = good(make_scenario(**{"nodes.count": 2, "faults": [{**stop, "for_s": 1}]}))
+    put(outcome, "agent-2", "final", value=False)
+    assert any("no last report of agent-2" in reason for reason in reasons(outcome)), "it was started again"
+
+
 def test_broken_bounds_are_those_that_came_too_late_and_those_that_never_came(scenario: Scenario) -> None:
     frames = {"unaccounted": 0, "unasked": 0, "closes": True, "sent": 1}
     bound = {"violations": 7, "never": 2}

@@ -134,23 +134,35 @@ def curve() -> Rows:
 
 def partitions() -> Rows:
     """What a partition of the air does, from the lines that `scripts/partitions.py` has printed."""
-    found = _lines("partitions")
     head = [
-        "times (flights)", "one planner in each part after 3 s", "later, until again so: median / worst [s]",
-        "one for all 3 s after the air is whole", "who found what is known to all by then", "least distance [m]",
+        "flown", "times (flights)", "one planner in each part after 3 s",
+        "later, until again so: median / worst [s]", "one for all 3 s after the air is whole",
+        "who found what is known to all by then", "least distance [m]",
     ]  # fmt: skip
-    planned = sum(all(planners == 1 for _, planners in one["parts"]["3"]) for one in found)
-    later_s = [until_s - from_s for one in found for from_s, until_s in one["wrong"] if from_s >= _PLANNED_S]
+    groups: dict[str, list[Copy]] = {}
+    for line in _lines("partitions"):
+        groups.setdefault(_how_flown(line), []).append(line)
+    return [head, *(_partition_row(how, lines) for how, lines in groups.items())]
+
+
+def _how_flown(line: Copy) -> str:
+    if "processes" not in line:
+        return f"{line['scenario']}, virtual time"
+    killed = f", {_WORDS[len(line['killed'])]} killed and started again" if line["killed"] else ""
+    return f"{line['processes']} UAVs as processes{killed}"
+
+
+def _partition_row(how: str, lines: Sequence[Copy]) -> list[str]:
+    planned = sum(all(planners == 1 for _, planners in one["parts"]["3"]) for one in lines)
+    later_s = [until_s - from_s for one in lines for from_s, until_s in one["wrong"] if from_s >= _PLANNED_S]
     return [
-        head,
-        [
-            f"{len(found)} ({len({one['seed'] for one in found})})",
-            f"{planned}",
-            f"{statistics.median(later_s):.1f} / {max(later_s):.1f}",
-            f"{sum(_has_one_planner(one['merged']['3']) for one in found)}",
-            f"{sum(not one['unknown']['3'] for one in found)}",
-            f"{min(one['least_m'] for one in found)}",
-        ],
+        how,
+        f"{len(lines)} ({len({one['seed'] for one in lines})})",
+        f"{planned}",
+        f"{statistics.median(later_s):.1f} / {max(later_s):.1f}" if later_s else "-",
+        f"{sum(_has_one_planner(one['merged']['3']) for one in lines)}",
+        f"{sum(not one['unknown']['3'] for one in lines)}",
+        f"{min(one['least_m'] for one in lines)}",
     ]
 
 

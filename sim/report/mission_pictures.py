@@ -1,7 +1,6 @@
 """The pictures of one run's mission: what was achieved over time, and where the UAVs flew."""
 
 from collections.abc import Iterator, Sequence
-from itertools import groupby
 from typing import Final
 
 from matplotlib.artist import Artist
@@ -18,7 +17,7 @@ from sim.figures.colors import BLUE, DARK, GREEN, ORANGE, PINK, RED
 from sim.figures.style import canvas, legend_above
 from sim.report.run_pictures import RunPicture, map_canvas
 from sim.report.run_records import RunRecords
-from sim.results.mission import Confirmations, OverflownCells
+from sim.results.mission import Confirmations, OverflownCells, overflown
 
 _STEPS: Final = ((Detected, "detected", ORANGE, "o", "-"), (Approaching, "approached", BLUE, "s", "--"),
                  (Arrived, "reached", PINK, "^", "-."))  # fmt: skip
@@ -33,7 +32,7 @@ def progress(run: RunRecords) -> RunPicture | None:
     """Survivors detected, approached, reached and confirmed, and the area covered, over time."""
     people = run.scenario.mission.survivors
     lines = [line for line in _lines(run) if line[1]] if people else []
-    covered = list(_coverage(run))
+    covered = [(t_ns / S, cells.share) for t_ns, cells in overflown(run.scenario, run.tracks.values())]
     if not lines and not covered:
         return None
     panels = [bool(lines), bool(covered)].count(True)
@@ -94,14 +93,6 @@ def _draw_counts(axes: Axes, lines: Sequence[tuple[str, list[Step], str, str, st
         whole = [(0.0, 0.0), *steps, (end_s, steps[-1][1])]
         axes.plot(*zip(*whole, strict=True), color=color, marker=marker, markersize=3.5, label=label, linestyle=dash,
                   drawstyle="steps-post", markevery=range(1, len(steps) + 1))  # fmt: skip
-
-
-def _coverage(run: RunRecords) -> Iterator[Step]:
-    cells = OverflownCells(run.scenario)
-    posed = sorted((one for track in run.tracks.values() for one in track), key=lambda one: one.t_ns)
-    for t_ns, together in groupby(posed, key=lambda one: one.t_ns):
-        cells.add([(one.east_m, one.north_m, one.up_m) for one in together])
-        yield t_ns / S, cells.share
 
 
 def waits(run: RunRecords) -> RunPicture | None:

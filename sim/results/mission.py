@@ -5,6 +5,7 @@ swarm. `summary_figures.toml` defines each figure; positions are the true ones, 
 import math
 import statistics
 from collections.abc import Collection, Iterable, Iterator, Sequence
+from itertools import groupby
 from typing import Any, Final
 
 import numpy as np
@@ -305,6 +306,15 @@ class OverflownCells(_Cells):
             near_n = np.flatnonzero(np.abs(self._axis - north) <= math.sqrt(ground2))
             within = (self._axis[near_n, None] - north) ** 2 + (self._axis[None, near_e] - east) ** 2 <= ground2
             self._seen[np.ix_(near_n, near_e)] |= within
+
+
+def overflown(scenario: Scenario, tracks: Iterable[Iterable[Posed]]) -> Iterator[tuple[int, OverflownCells]]:
+    """Each instant of the UAVs' tracks, with the cells that they have flown over by then."""
+    cells = OverflownCells(scenario)
+    posed = sorted((one for track in tracks for one in track), key=lambda one: one.t_ns)
+    for t_ns, together in groupby(posed, key=lambda one: one.t_ns):
+        cells.add([(one.east_m, one.north_m, one.up_m) for one in together])
+        yield t_ns, cells
 
 
 class PhotographedCells(_Cells):

@@ -7,7 +7,6 @@ from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple, Self, TypeVar
 
@@ -18,7 +17,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import FlightModeChanged, MissionModeChanged, Planned, Posed, Record, RoleChanged
 from fanet_mw.units import Enu, NodeId, S
-from sim.results.mission import OverflownCells
+from sim.results.mission import OverflownCells, overflown
 from sim.results.run_folder import RunFolder
 from sim.results.survivor_states import SurvivorState, SurvivorStates
 from sim.world.environment.layout import positions
@@ -126,11 +125,8 @@ class Replay:
     @cached_property
     def covered_ns(self) -> npt.NDArray[np.int64]:
         """The instant at which each cell was covered first, -1: never; rows from south to north."""
-        cells = OverflownCells(self.scenario)
-        first = np.full(cells.seen.shape, -1, np.int64)
-        posed = sorted((one for track in self._posed.values() for one in track), key=lambda one: one.t_ns)
-        for t_ns, together in groupby(posed, key=lambda one: one.t_ns):
-            cells.add([(one.east_m, one.north_m, one.up_m) for one in together])
+        first = np.full(OverflownCells(self.scenario).seen.shape, -1, np.int64)
+        for t_ns, cells in overflown(self.scenario, self._posed.values()):
             first[cells.seen & (first < 0)] = t_ns
         return first
 

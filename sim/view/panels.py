@@ -42,7 +42,7 @@ class Panels:
         """Without `actions` there is nothing to do, because the swarm flew some time ago; `air`: who sends when."""
         self.jobs: queue.SimpleQueue[Job] = queue.SimpleQueue()
         self._server, self._scene, self.state = server, scene, scene.state
-        self._actions, self._air, self._watches_air = actions, air, False
+        self._air, self._watches_air = air, False
         self._second = self._image_ns = -1
         self._t_ns = 0
         self._history: dict[str, list[tuple[float, ...]]] = {}

@@ -19,6 +19,7 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.routing.address_resolution import Knowledge, Outgoing, Resolver
 from fanet_mw.routing.rival_control_messages import Family, check_node, type_of, unpack
+from fanet_mw.routing.send_buffer import SendBuffer
 from fanet_mw.units import BROADCAST, NodeId, earliest
 from fanet_mw.wire import Kind
 
@@ -57,6 +58,8 @@ class HopByHop(RoutingProtocol):
             if rules != "none"
             else None
         )
+        self._room = SendBuffer(port)
+        """The packets that wait for a route, in the protocols that let packets wait."""
         self.control_sent = 0
 
     # --- what a protocol defines ----------------------------------------------------------------------------------
@@ -93,10 +96,6 @@ class HopByHop(RoutingProtocol):
         return None
 
     def _on_wake(self, now_ns: int) -> None: ...
-
-    def _held(self) -> int:
-        """The packets that wait in this protocol for a route."""
-        return 0
 
     # --- the contract ---------------------------------------------------------------------------------------------
 
@@ -151,7 +150,7 @@ class HopByHop(RoutingProtocol):
 
     def waiting(self) -> int:
         unresolved = 0 if self._addresses is None else self._addresses.waiting()
-        return len(self._unicasts) + unresolved + self._held()
+        return len(self._unicasts) + unresolved + len(self._room)
 
     # --- what a protocol uses -------------------------------------------------------------------------------------
 

@@ -35,7 +35,6 @@ from fanet_mw.routing.aodv.neighbors import HelloNeighbors
 from fanet_mw.routing.aodv.table import AodvRoute, AodvTable
 from fanet_mw.routing.hop_by_hop import HopByHop
 from fanet_mw.routing.rival_control_messages import Family
-from fanet_mw.routing.send_buffer import SendBuffer
 from fanet_mw.serial_number import following, later, newer
 from fanet_mw.units import BROADCAST, MS, NodeId, earliest
 
@@ -51,7 +50,6 @@ class Aodv(HopByHop):
         self._discovery = Discovery()
         self._requests = SeenRequests()
         self._hellos = HelloNeighbors()
-        self._room = SendBuffer(port)
         self._rreq_limit = RateLimit(p.RREQ_RATELIMIT)
         self._rerr_limit = RateLimit(p.RERR_RATELIMIT)
         self._blacklist: dict[NodeId, int] = {}
@@ -373,9 +371,6 @@ class Aodv(HopByHop):
             self._send_hello(now_ns)
 
     # --- reporting ------------------------------------------------------------------------------------------------
-
-    def _held(self) -> int:
-        return len(self._room)
 
     def report(self) -> Mapping[str, object]:
         return {"control_sent": self.control_sent, "waiting": self.waiting(), "sequence": self._seq}

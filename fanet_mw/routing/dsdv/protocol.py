@@ -23,7 +23,6 @@ from fanet_mw.routing.dsdv.messages import FULL, INCREMENTAL, PER_ENTRY, Adverti
 from fanet_mw.routing.dsdv.table import PERIODIC_UPDATE_NS, DsdvTable
 from fanet_mw.routing.hop_by_hop import HopByHop
 from fanet_mw.routing.rival_control_messages import Family
-from fanet_mw.routing.send_buffer import SendBuffer
 from fanet_mw.units import NodeId, S, earliest
 
 _GATHER_NS: Final = 1 * S
@@ -38,7 +37,6 @@ class Dsdv(HopByHop):
     def __init__(self, port: Port) -> None:
         super().__init__(port)
         self._table = DsdvTable(port.node)
-        self._room = SendBuffer(port)
         self._most = control.capacity(port.scenario.radio.max_frame_bytes) // PER_ENTRY
         self._full_ns: int | None = None
         self._news_ns: int | None = None
@@ -112,9 +110,6 @@ class Dsdv(HopByHop):
         self._plan(now_ns)
 
     # --- reporting --------------------------------------------------------------------------------------------------
-
-    def _held(self) -> int:
-        return len(self._room)
 
     def report(self) -> Mapping[str, object]:
         return {"control_sent": self.control_sent, "waiting": self.waiting(), "routes": self._table.count()}

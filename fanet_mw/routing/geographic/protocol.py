@@ -25,7 +25,6 @@ from fanet_mw.routing.geographic.locations import HELLO_INTERVAL_NS, LocationTab
 from fanet_mw.routing.geographic.messages import BEACON, LOCATION, QUERY, Fix, Location, PositionBeacon, Query
 from fanet_mw.routing.hop_by_hop import HopByHop
 from fanet_mw.routing.rival_control_messages import Family
-from fanet_mw.routing.send_buffer import SendBuffer
 from fanet_mw.units import BROADCAST, MS, US, NodeId, S, earliest
 
 LOCATION_INTERVAL_NS: Final = 5 * S
@@ -44,7 +43,6 @@ class Geographic(HopByHop):
     def __init__(self, port: Port) -> None:
         super().__init__(port)
         self._locations = LocationTable()
-        self._room = SendBuffer(port)
         self._hops = port.scenario.routing.hop_limit
         self._beacon_ns: int | None = None
         self._retry_ns: int | None = None
@@ -165,9 +163,6 @@ class Geographic(HopByHop):
             self._retry_carried(now_ns)
 
     # --- reporting --------------------------------------------------------------------------------------------------
-
-    def _held(self) -> int:
-        return len(self._room)
 
     def report(self) -> Mapping[str, object]:
         return {"control_sent": self.control_sent, "waiting": self.waiting(), "carried": len(self._room)}

@@ -55,7 +55,7 @@ class Olsr(HopByHop):
     def __init__(self, port: Port) -> None:
         super().__init__(port)
         self._state = Repositories(port.node)
-        self._room = control.capacity(port.scenario.radio.max_frame_bytes)
+        self._capacity = control.capacity(port.scenario.radio.max_frame_bytes)
         self._hello_ns: int | None = None
         self._tc_ns: int | None = None
         self._ansn = 0
@@ -143,7 +143,7 @@ class Olsr(HopByHop):
                 else NeighborType.SYM
             )  # fmt: skip
             neighbors.append(HelloNeighbor(link_type, neighbor_type, node))
-        most = min(255, (self._room - HELLO_HEAD) // PER_NODE)
+        most = min(255, (self._capacity - HELLO_HEAD) // PER_NODE)
         for at in range(0, max(1, len(neighbors)), most):
             hello = Hello(_HELLO_VTIME, _HELLO_HTIME, self.willingness, tuple(neighbors[at : at + most]))
             self._send_control(HELLO, hello.encode(), start_ns=now_ns + self._lead_ns, now_ns=now_ns)
@@ -158,7 +158,7 @@ class Olsr(HopByHop):
             self._tc_until_ns = now_ns + p.TOP_HOLD_TIME_NS
         elif now_ns > self._tc_until_ns:
             return
-        most = (self._room - TC_HEAD) // PER_NODE
+        most = (self._capacity - TC_HEAD) // PER_NODE
         for at in range(0, max(1, len(advertised)), most):
             tc = TopologyControl(_TC_VTIME, self._ansn, tuple(advertised[at : at + most]))
             self._send_control(TC, tc.encode(), start_ns=now_ns + self._lead_ns, now_ns=now_ns, ttl=255)

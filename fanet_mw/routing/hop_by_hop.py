@@ -68,8 +68,9 @@ class HopByHop(RoutingProtocol):
     def _route_own(self, packet: Packet, *, start_ns: int, now_ns: int) -> None:
         """Find a next hop for a unicast data packet of this node."""
 
-    @abstractmethod
-    def _route_transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None: ...
+    def _route_transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None:
+        """The same for a packet of another node."""
+        self._route_own(packet, start_ns=start_ns, now_ns=now_ns)
 
     @abstractmethod
     def _on_control(self, number: int, body: bytes, packet: Packet, reception: Reception, *, now_ns: int) -> None: ...

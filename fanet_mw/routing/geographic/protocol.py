@@ -55,12 +55,6 @@ class Geographic(HopByHop):
     # --- data -------------------------------------------------------------------------------------------------------
 
     def _route_own(self, packet: Packet, *, start_ns: int, now_ns: int) -> None:
-        self._forward(packet, start_ns=start_ns, now_ns=now_ns)
-
-    def _route_transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None:
-        self._forward(packet, start_ns=start_ns, now_ns=now_ns)
-
-    def _forward(self, packet: Packet, *, start_ns: int, now_ns: int) -> None:
         destination = NodeId(packet.header.destination)
         self._locations.use(destination)
         self._query(destination, now_ns=now_ns)
@@ -86,7 +80,7 @@ class Geographic(HopByHop):
                 if packet.header.origin_us < oldest_us:
                     self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
                 else:
-                    self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
+                    self._route_own(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
 
     def _on_failure(self, packet: Packet, next_hop: NodeId, outcome: TxOutcome, *, now_ns: int) -> None:
         """Keep custody of a packet: the neighbor is gone, or the MAC queue is full."""

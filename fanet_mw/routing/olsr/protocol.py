@@ -79,9 +79,6 @@ class Olsr(HopByHop):
         else:
             self._send(packet, route.next_hop, start_ns=start_ns, now_ns=now_ns)
 
-    def _route_transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None:
-        self._route_own(packet, start_ns=start_ns, now_ns=now_ns)
-
     def _relays(self, packet: Packet, reception: Reception, *, now_ns: int) -> bool:
         return self.willingness != p.WILL_NEVER and self._state.is_selector(reception.src, now_ns=now_ns)
 

@@ -73,26 +73,31 @@ class ConnectivityMaintenance:
         formation = self._formation
         if (formation.plan is not None and formation.place is None) or self._bidding.is_absent(now_ns):
             return []
-        planes, closes = [], formation.closing_s(now_ns) is not None
+        planes, closer, closes = [], [], formation.closing_s(now_ns) is not None
         ties = self._tied(now_ns)
         leading = [node for node in ties if formation.leads_to_gap(node, now_ns)]
         for node, motion in ties.items():
-            share, within_s = (_CLOSING, _CLOSING_S) if closes else (_TETHER, _TETHER_S)
-            if leading == [node]:  # between two gaps it would draw the sides together
-                share, within_s = _FOLLOWS, _CLOSING_S
-            offset = motion.offset_from(self._own_motion.position, now_ns)
-            plane = tether_plane(
-                offset,
-                (motion.velocity.east, motion.velocity.north),
-                tether_m=share * self._reach_m,
-                within_s=within_s,
-                haste_m_s=self._haste_m_s,
-            )
+            follows = leading == [node]  # between two gaps it would draw the sides together
+            share, within_s = (_CLOSING, _CLOSING_S) if closes or follows else (_TETHER, _TETHER_S)
+            plane = self._plane(motion, share, within_s, now_ns)
             if plane is not None:
                 planes.append(plane)
-                if offset.norm() <= _CLOSING * self._reach_m:
+                if motion.offset_from(self._own_motion.position, now_ns).norm() <= _CLOSING * self._reach_m:
                     self._ties.append((node, plane))
-        return planes
+            if follows:
+                nearer = self._plane(motion, _FOLLOWS, _CLOSING_S, now_ns)
+                closer += [] if nearer is None else [nearer]
+        return planes + closer  # who cannot follow so close stays in reach
+
+    def _plane(self, motion: Motion, share: float, within_s: float, now_ns: int) -> HalfPlane | None:
+        """The limit that keeps this UAV within a share of the reach of another one."""
+        return tether_plane(
+            motion.offset_from(self._own_motion.position, now_ns),
+            (motion.velocity.east, motion.velocity.north),
+            tether_m=share * self._reach_m,
+            within_s=within_s,
+            haste_m_s=self._haste_m_s,
+        )
 
     def _tied(self, now_ns: int) -> dict[NodeId, Motion]:
         """Those within whose reach this UAV stays."""

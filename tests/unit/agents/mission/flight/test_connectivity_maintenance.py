@@ -215,7 +215,7 @@ def test_who_hears_one_of_another_part_keeps_in_reach_of_it_and_of_several_of_th
         )
         assert [(plane.east, plane.north) for plane in tied.planes(now_ns)] == ways
     board.place.close_ranks({29}, now_ns, parted={32})
-    assert len(tied.planes(now_ns)) == 1, "out of reach"
+    assert {(plane.east, plane.north) for plane in tied.planes(now_ns)} == {(1, 0)}, "out of reach"
 
 
 def test_who_does_not_come_to_meet_this_uav_over_a_gap_is_lost_as_well() -> None:
@@ -270,3 +270,19 @@ def test_who_flies_within_its_limits_keeps_those_to_whom_it_is_tied_and_are_in_r
         (plane,) = tied.planes(now_ns)
         assert (tied.held(Enu(plane.east * plane.least, 7.5, 0.0)) == [LINE + 1]) is held
         assert tied.held(Enu(plane.east * (plane.least - 0.5), 7.5, 0.0)) == [], "a limit was dropped for another one"
+
+
+def test_who_cannot_follow_as_close_as_a_gap_asks_stays_in_reach_all_the_same() -> None:
+    now_ns = TAKEN_UP_NS + 60 * S
+    here = lane_of(LINE, now_ns)
+    board = Board(LINE, here)
+    tied = ConnectivityMaintenance(
+        board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
+    )
+    board.place.close_ranks({LINE + 2}, now_ns, parted=range(LINE + 3, COUNT + 1))
+    board.neighbors.on_hello(LINE - 1, Motion(here.minus(Enu(230, 0, 0)), STILL, now_ns))
+    board.neighbors.on_hello(LINE + 1, Motion(here.minus(Enu(-235, 0, 0)), Enu(3, 0, 0), now_ns))  # leads to the gap
+    planes = tied.planes(now_ns)
+    assert max(plane.least for plane in planes) > 9, "nearer than 88 % of the reach: not without leaving the other one"
+    velocity = nearest((-5.0, 0.0), planes, limit=10.0, hard=0)
+    assert tied.held(Enu(*velocity, 0.0)) == [LINE - 1, LINE + 1]

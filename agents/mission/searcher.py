@@ -261,6 +261,7 @@ class Searcher:
         if now_ns >= self._next_roll_ns:
             self._next_roll_ns = now_ns + _ROLL_NS
             self._plans.close_ranks(now_ns)
+            self._approach.look_around.pass_over(position, now_ns)
         self._flight.fix(position, velocity, self._bidding.survivor, now_ns=now_ns)
         if self._radio is not None:
             self._radio.hold(self._flight.held)
@@ -323,7 +324,11 @@ class Searcher:
         known = self._survivors.by_id[survivor]
         if known.filter.is_seen:
             return
-        place = place_in_building(known, self._map, self._approach.look_around.has_looked_at)
+        place = place_in_building(
+            known,
+            self._map,
+            lambda east_m, north_m: self._approach.look_around.sides_looked_from(east_m, north_m, now_ns),
+        )
         if place is not None:
             self._announcing.place_inside(survivor, place, now_ns)
             self._bidding.close(survivor, now_ns=now_ns)

@@ -14,8 +14,8 @@ from agents.mission.navigation.onboard_map import Building, OnboardMap
 
 _LIKELY: Final = 12.0
 """Places less probable than the most probable one by more than this count for nothing (twice a log-likelihood)."""
-_SEEN: Final = 0.03
-"""The probability that the camera has not shown a person at a place at which it looked."""
+_MISSED: Final = (1.0, 0.03, 0.01)
+"""The probability that the camera has not shown a person at a place at which it looked from no side, one, or more."""
 _SURE: Final = 0.7
 _HEARD_M: Final = 40.0
 """There is no verdict on a phone whose place, by received powers, has a greater standard deviation than this."""
@@ -24,9 +24,11 @@ _STEPS: Final = 4
 
 
 def place_in_building(
-    known: KnownSurvivor, onboard_map: OnboardMap, looked_at: Callable[[float, float], bool]
+    known: KnownSurvivor, onboard_map: OnboardMap, looked_at: Callable[[float, float], int]
 ) -> Estimate | None:
-    """A survivor's place in the most probable building; None if not certain enough to be in one."""
+    """A survivor's place in the most probable building; None if not certain enough to be in one. `looked_at`: from how
+    many sides the camera has shown a place.
+    """
     if not onboard_map.buildings or not known.is_heard_within(_HEARD_M):
         return None
     inside: dict[Building, list[tuple[float, float, float]]] = {}
@@ -34,7 +36,7 @@ def place_in_building(
     for east, north, deficit in known.filter.likely_cells(_LIKELY):
         weight = math.exp(-deficit / 2) / (_STEPS * _STEPS)
         near = [one for one in onboard_map.buildings if one.outside(east, north)[0] <= CELL_M]
-        outside_weight = weight * (_SEEN if looked_at(east, north) else 1.0)
+        outside_weight = weight * _MISSED[min(looked_at(east, north), len(_MISSED) - 1)]
         for step in range(_STEPS * _STEPS):
             at_east = east + CELL_M * ((step % _STEPS + 0.5) / _STEPS - 0.5)
             at_north = north + CELL_M * ((step // _STEPS + 0.5) / _STEPS - 0.5)

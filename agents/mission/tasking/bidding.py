@@ -43,7 +43,7 @@ _HANDOVER_S: Final = 15.0
 """The time that a responder is assumed to need at its present survivor."""
 _ASTRAY_M: Final = 100.0
 """How far a UAV may be from its way before the sweep, or farther if it will be at its place in time."""
-_LATE_S: Final = 12.0
+_LATE_S: Final = 20.0
 """A UAV is in time if it is at its place at most so long after the sweep has begun: it catches up then."""
 _GLANCE_S: Final = 8.0
 """How long a UAV is assumed to look at the place of a survivor on the way to its own."""

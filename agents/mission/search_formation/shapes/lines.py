@@ -67,16 +67,16 @@ _LEAST_LANES: Final = 2
 """The least number of lanes of a line, which has one at each end."""
 _LEAST_APART_M: Final = 60.0
 """The least distance of two lines on the same side of the middle."""
-_ENDS_APART: Final = 1.3
+_ENDS_APART: Final = 1.0
 """Of lines that begin around the swarm, the outermost lanes of both are so many lanes apart at most, as they fly to the
 sides: what is between them is seen from there."""
 _LEAST_BENT: Final = 5
 """Lines that begin around the swarm have so many lanes, at least."""
 _BENT: Final = 4
 """Of lines that begin around the swarm, so many lanes at each end are bent back, or all to the middle one."""
-_BENT_HOP: Final = 0.91
+_BENT_HOP: Final = 0.85
 """Neighbors of bent lines are at most this share of the radio's reach apart: less than elsewhere, because the outermost
-are the fastest, and have the farthest way."""
+are the fastest and have the farthest way, and so that a line from which two are lost holds together."""
 _AROUND: Final = 1.6
 """Lines that begin around the swarm do so at this share of the radio's reach from the middle at most: whoever is nearer
 and was not found on the way out is found on the way back only."""

@@ -26,7 +26,7 @@ def heard_around(truth: Enu, *, angles: range = range(0, 360, 40)) -> KnownSurvi
 
 
 def test_a_survivor_around_whom_nobody_is_seen_is_in_the_building_that_the_phone_is_in() -> None:
-    place = place_in_building(heard_around(Enu(8, 6, 0)), MAP, lambda *_: True)
+    place = place_in_building(heard_around(Enu(8, 6, 0)), MAP, lambda *_: 2)
     assert place is not None
     assert HOUSE.outside(place.east_m, place.north_m)[0] < 0
     assert place.distance_m(Enu(8, 6, 0)) < 10
@@ -35,14 +35,22 @@ def test_a_survivor_around_whom_nobody_is_seen_is_in_the_building_that_the_phone
 
 def test_before_it_was_looked_all_around_nobody_says_so() -> None:
     known = heard_around(Enu(8, 6, 0))
-    assert place_in_building(known, MAP, lambda *_: False) is None
-    assert place_in_building(known, MAP, lambda east, _: east > 5) is None
+    assert place_in_building(known, MAP, lambda *_: 0) is None
+    assert place_in_building(known, MAP, lambda east, _: 2 * (east > 5)) is None
+
+
+def test_who_was_not_seen_from_two_sides_is_more_surely_inside_than_from_one() -> None:
+    known, small = heard_around(Enu(6, 6, 0)), OnboardMap((Building(5, 5, 16, 16, 12.0),))
+    assert place_in_building(known, small, lambda *_: 1) is None
+    twice = place_in_building(known, small, lambda *_: 2)
+    assert twice is not None
+    assert place_in_building(known, small, lambda *_: 4) == twice
 
 
 def test_a_phone_beside_a_building_or_heard_too_little_is_in_none() -> None:
-    assert place_in_building(heard_around(Enu(48, -40, 0)), MAP, lambda *_: True) is None
-    assert place_in_building(heard_around(Enu(8, 6, 0), angles=range(0, 80, 40)), MAP, lambda *_: True) is None
-    assert place_in_building(heard_around(Enu(8, 6, 0)), NO_MAP, lambda *_: True) is None
+    assert place_in_building(heard_around(Enu(48, -40, 0)), MAP, lambda *_: 2) is None
+    assert place_in_building(heard_around(Enu(8, 6, 0), angles=range(0, 80, 40)), MAP, lambda *_: 2) is None
+    assert place_in_building(heard_around(Enu(8, 6, 0)), NO_MAP, lambda *_: 2) is None
 
 
 def test_who_is_inside_a_building_is_sought_no_more_and_is_confirmed_if_seen_after_all() -> None:

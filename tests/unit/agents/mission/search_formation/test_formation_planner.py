@@ -168,16 +168,16 @@ def test_a_plan_with_a_short_notice_is_told_again_a_second_before_it_begins() ->
 
 def test_who_is_out_for_a_survivor_becomes_a_follower_and_until_it_is_back_others_close_ranks() -> None:
     planner, pattern = planner_with(45), formation()
-    planner.status(SearchStatus(1, Enu(-200.0, 0.0, 50), 22, 0, 100, absent=True), now_ns=0)
-    assert planner.absent == {22}
+    planner.status(SearchStatus(1, Enu(-400.0, -200.0, 50), 12, 0, 100, absent=True), now_ns=0)
+    assert planner.absent == {12}
     assert planner.review(pattern, now_ns=S)
     assert planner.plan is not None
-    assert planner.plan.nodes.index(22) in pattern.followers
+    assert planner.plan.nodes.index(12) in pattern.followers
     undisturbed = planner_with(45)
     undisturbed.review(pattern, now_ns=S)
     assert undisturbed.plan is not None
-    assert undisturbed.plan.nodes.index(22) not in pattern.followers
-    planner.status(SearchStatus(2, Enu(-200.0, 0.0, 50), 22, 1, 100), now_ns=2 * S)
+    assert undisturbed.plan.nodes.index(12) not in pattern.followers
+    planner.status(SearchStatus(2, Enu(-400.0, -200.0, 50), 12, 1, 100), now_ns=2 * S)
     assert planner.absent == set()
 
 

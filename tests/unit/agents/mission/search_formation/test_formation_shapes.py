@@ -294,9 +294,8 @@ def test_lines_begin_where_the_swarm_stands_and_leave_out_only_what_it_has_heard
 
 
 def test_the_outermost_lanes_fly_to_the_sides_while_the_middle_sweeps_and_waits_at_the_edge() -> None:
-    narrow = [at._replace(east=at.east * 0.9) for at in AROUND]
-    begun = formed(ShapeName.LINES).begun_around(narrow)[0]
-    assert begun.dimensions.narrower_m == pytest.approx(1185 - 1.3 * 720)
+    begun = formed(ShapeName.LINES).begun_around(AROUND)[0]
+    assert begun.dimensions.narrower_m == pytest.approx(1185 - 1.3 * 800)
     aside_s = begun.dimensions.narrower_m / 9
     east_m, north_m = (
         [
@@ -305,8 +304,8 @@ def test_the_outermost_lanes_fly_to_the_sides_while_the_middle_sweeps_and_waits_
         ]
         for axis in ("east", "north")
     )
-    assert [east for _, east in east_m] == pytest.approx([936, 1185, 1185, 1185])
-    assert [north for _, north in north_m] == pytest.approx([110, 110, 110 + 9 * (125 - aside_s), 1225], abs=1)
+    assert [east for _, east in east_m] == pytest.approx([1040, 1185, 1185, 1185])
+    assert [north for _, north in north_m] == pytest.approx([85, 85, 85 + 9 * (125 - aside_s), 1225], abs=1)
     assert [north for north, _ in north_m] == pytest.approx([400, 400 + 7.5 * aside_s, 1225, 1225], abs=1)
 
 

@@ -34,13 +34,23 @@ def test_a_uav_that_has_heard_a_phone_once_passes_all_places_where_it_may_be_and
     assert passed >= 20, "within a minute at 8 m/s, without any further power, of 24 places around it"
 
 
-def test_what_was_looked_at_for_one_survivor_is_looked_at_again_for_another() -> None:
+def test_what_was_looked_at_for_one_survivor_or_in_passing_is_empty_for_another_for_two_minutes() -> None:
     phone, look = heard_once(Enu(0, 0, 0), Enu(0, 0, UP_M)), LookAround(LOOK_M)
     first = look.next_place(1, phone, Enu(300, 0, UP_M), 0)
     assert first is not None
-    here = Enu(*first, UP_M)
-    assert look.next_place(1, phone, here, S) != first
-    assert look.next_place(2, phone, Enu(300, 0, UP_M), 2 * S) == first
+    look.pass_over(Enu(*first, UP_M), S)
+    assert look.next_place(2, phone, Enu(300, 0, UP_M), 3 * S) != first
+    assert look.next_place(1, phone, Enu(300, 0, UP_M), 122 * S) == first, "whoever walks may be there now"
+
+
+def test_a_place_is_looked_at_from_as_many_sides_as_it_was_passed_on_and_sides_are_forgotten() -> None:
+    look = LookAround(LOOK_M)
+    for second, (north_m, sides) in enumerate(((-15, 1), (-12, 1), (15, 2), (18, 2)), 1):
+        look.pass_over(Enu(10, north_m, UP_M), second * S)
+        assert look.sides_looked_from(0, 0, second * S) == sides, north_m
+    assert look.sides_looked_from(0, 0, 124 * S) == look.sides_looked_from(200, 0, 5 * S) == 0
+    look.pass_over(Enu(10, -15, UP_M), 200 * S)
+    assert look.sides_looked_from(0, 0, 200 * S) == 1
 
 
 def test_without_a_camera_there_is_nothing_to_look_at() -> None:
@@ -57,5 +67,5 @@ def test_where_another_uav_has_looked_nobody_looks_again_and_each_takes_the_plac
         assert next_theirs is not None
         if step < 4:
             assert next_mine[0] > next_theirs[0], "east and west"
-        assert not theirs.has_looked_at(*next_mine) or step == 0
+        assert not theirs.sides_looked_from(*next_mine, step * 2 * S) or step == 0
         here, other = Enu(*next_mine, UP_M), Enu(*next_theirs, UP_M)

@@ -377,3 +377,23 @@ def test_6_7_a_reply_without_a_reverse_route_ends_here(bench: MakeBench) -> None
     found.advance(20 * MS)
     assert not replies(found)
     assert active(found, 1, 9) == (3, 1)
+
+
+@pytest.mark.parametrize("kept", [8, 2])
+def test_6_7_a_late_reply_keeps_the_way_back_to_the_originator_as_long_as_data_would(
+    bench: MakeBench, kept: int
+) -> None:
+    found = bench(2)
+    found.say(2, ASK, ask(), to=1, ttl=5)
+    found.advance(4 * S)
+    known = route(found, 1, 8)
+    assert known is not None
+    assert known.active
+    assert known.ends_ns - found.now_ns < p.ACTIVE_ROUTE_TIMEOUT_NS - S
+    found.say(3, ANSWER, answer(originator=8, hop_count=3), to=1, ttl=5)
+    found.advance(10 * MS)
+    assert (2, 8) in [(dst, reply.originator) for dst, reply in replies(found, node=1)]
+    way = route(found, 1, kept)
+    assert way is not None
+    assert way.active
+    assert way.ends_ns - found.now_ns >= p.ACTIVE_ROUTE_TIMEOUT_NS - 20 * MS

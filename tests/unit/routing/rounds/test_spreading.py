@@ -1,5 +1,6 @@
 """What one node passes on, as timelines: urgent packets in turns, bulk where a neighbor is not known to have it."""
 
+import math
 from collections.abc import Iterable, Mapping
 
 from fanet_mw import wire
@@ -325,3 +326,94 @@ def test_a_neighbor_that_is_seldom_heard_is_left_to_those_that_hear_it() -> None
         made.take(packet(60), src=2, now_ns=0)
         found = [sent_in_turn(made, turn) for turn in range(600, 604)]
         assert (len([one for one in found if 60 in one]) > 1) is again
+
+
+def bulk_turns(made: Spreading, turns: Iterable[int], *, neighbors: tuple[int, ...] = (2, 3)) -> list[int]:
+    """The rounds in which bulk is sent, by a host that looks again a round after each."""
+    found = []
+    for turn in turns:
+        chosen = made.next_bulk(nodes(neighbors), start_ns=turn * ROUND)
+        if chosen is not None:
+            made.sent(chosen, start_ns=turn * ROUND)
+            made.look_again(chosen, from_ns=(turn + 1) * ROUND)
+            found.append(turn)
+    return found
+
+
+def test_bulk_that_a_neighbor_lacks_is_sent_once_and_repeated_as_often_as_was_asked_for() -> None:
+    for repeats in (0, 1, 3):
+        made = spreading(repeats=repeats)
+        made.take(bulk(1), src=2, now_ns=0, bulk_from_ns=ROUND)
+        assert bulk_turns(made, range(1, 12)) == list(range(1, 2 + repeats))
+        assert key_of_packet(bulk(1)) not in made, "then it is forgotten"
+
+
+def test_bulk_has_its_instant_and_the_host_is_told_of_it() -> None:
+    made = spreading()
+    assert made.bulk_due_ns(nodes((2, 3))) is None
+    made.take(bulk(1), src=2, now_ns=0, bulk_from_ns=5 * ROUND)
+    assert made.bulk_due_ns(nodes((2, 3))) == 5 * ROUND
+    assert made.next_bulk(nodes((2, 3)), start_ns=5 * ROUND - 1) is None
+    assert made.next_bulk(nodes((2, 3)), start_ns=5 * ROUND) == bulk(1)
+
+
+def test_what_waits_is_what_was_never_sent() -> None:
+    made = spreading()
+    made.take(packet(1), src=2, now_ns=0)
+    made.take(bulk(2), src=2, now_ns=0, bulk_from_ns=ROUND)
+    made.take(bulk(3), src=2, now_ns=0, bulk_from_ns=90 * ROUND)
+    assert made.waiting() == 3
+    assert sent_in_turn(made, 1) == [1]
+    assert made.waiting() == 2
+    assert bulk_turns(made, [1]) == [1]
+    assert (made.waiting(), made.repeated) == (1, 0)
+    assert bulk_turns(made, [2]) == [2]
+    assert (made.waiting(), made.repeated) == (1, 1)
+
+
+def test_in_a_bulk_slot_go_the_urgent_packets_that_fit_and_they_go_in_the_turn_as_well() -> None:
+    made = spreading()
+    for seq, priority in ((1, wire.PRIORITY_REPORT), (2, wire.PRIORITY_SAFETY), (3, wire.PRIORITY_REPORT)):
+        made.take(packet(seq, priority=priority, origin_us=seq), src=None, now_ns=0)
+    size = len(packet(1).frame)
+    assert [one.header.seq for one in made.take_hasty(2 * size)] == [2, 1]
+    assert made.bulk_due_ns(nodes((2, 3))) == 0
+    assert [one.header.seq for one in made.take_hasty(size - 1)] == []
+    assert [one.header.seq for one in made.take_hasty(size)] == [3]
+    assert made.take_hasty(10 * size) == []
+    assert made.bulk_due_ns(nodes((2, 3))) is None
+    assert sent_in_turn(made, 1) == [2, 1, 3]
+    made.take(packet(4), src=None, now_ns=0)
+    made.went_ahead(packet(4))
+    assert made.take_hasty(10 * size) == []
+    assert sent_in_turn(made, 2, neighbors=(2,)) == [2, 4, 1, 3], "new before again, if as urgent"
+
+
+def test_a_packet_that_expires_is_forgotten_and_it_is_said_whether_it_was_ever_sent() -> None:
+    made = spreading()
+    for seq in (1, 2):
+        made.take(packet(seq), src=2, now_ns=0)
+    sent_in_turn(made, 1)
+    made.take(packet(3), src=2, now_ns=0)
+    assert [made.forget(packet(seq)) for seq in (1, 3)] == [False, True]
+    assert [key_of_packet(packet(seq)) in made for seq in (1, 2, 3)] == [False, True, False]
+    assert made.waiting() == 0
+
+
+def test_what_was_taken_lately_is_told_whether_it_is_kept_or_done() -> None:
+    made = spreading()
+    made.take(packet(1), src=2, now_ns=5 * MS)
+    made.take(packet(2), src=2, now_ns=6 * MS)
+    made.on_copy(key_of_packet(packet(1)), 3, neighbors=nodes((2, 3)), now_ns=7 * MS)
+    sent_in_turn(made, 1)
+    sent_in_turn(made, 2)
+    keys = [key_of_packet(packet(seq)) for seq in (1, 2)]
+    assert [key in made for key in keys] == [False, True]
+    assert sorted(made.recent(4 * MS)) == sorted(keys)
+    assert made.recent(5 * MS) == [keys[1]]
+    assert made.recent(6 * MS) == []
+    old = packet(9, origin_us=7)
+    made.take(old, src=2, now_ns=0)
+    assert made.made_ns(key_of_packet(old)) == 7000
+    assert made.made_ns(keys[0]) == 0
+    assert made.made_ns(12345) == -math.inf

@@ -8,7 +8,7 @@ The frames are those of the application. For the quality no other node transmits
 import math
 from collections.abc import Mapping
 from functools import cache
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from fanet_mw.airtime import OVERHEAD_BYTES, Timing
 from fanet_mw.rng import stream, stream_seed
@@ -19,6 +19,9 @@ from fanet_mw.units import Enu, NodeId
 from fanet_mw.wire.links import Link, grade_of, power_of
 from sim.planner.flood_loss import Chance
 
+if TYPE_CHECKING:
+    from emulator.channel.error_rate import Reals
+
 _GAINS: Final = 400
 _LEAST: Final = 0.02
 """Links with a smaller share are received too rarely to be known."""
@@ -28,7 +31,6 @@ def expected_links(scenario: Scenario, at: Mapping[NodeId, Enu], *, draw: int) -
     """One entry per pair of nodes that receive each other; `draw` is the number of the draw of shadowing."""
     import numpy as np
 
-    from emulator.channel.error_rate import header_rates, log_success_per_bit
     from emulator.channel.link_budget import noise_mw, received_dbm
     from emulator.channel.shadowing import Shadowing
     from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
@@ -47,14 +49,9 @@ def expected_links(scenario: Scenario, at: Mapping[NodeId, Enu], *, draw: int) -
     else:
         power_dbm = mean_dbm[:, None] + 10 * np.log10(np.array(_gains(radio)))[None, :]
         snr_db = power_dbm - 10 * math.log10(noise_mw(radio))
-        header_rate, bits_per_ns = header_rates(radio.rate_mbps)
-        frame_bits = 8 * (scenario.traffic.payload_bytes + OVERHEAD_BYTES)
         logs = sum(
             bits * table[np.clip(((snr_db - ERROR_FLOOR_DB) * ERROR_STEPS_PER_DB).astype(int), 0, len(table) - 1)]
-            for bits, table in (
-                (Timing.of(radio).header_ns * bits_per_ns, log_success_per_bit(header_rate)),
-                (frame_bits, log_success_per_bit(radio.rate_mbps)),
-            )
+            for bits, table in _parts_of_frame(scenario)
         )
         heard = (power_dbm >= radio.sensitivity_dbm) & (snr_db >= radio.preamble_snr_db)
         success = np.where(heard, np.exp(logs), 0.0).mean(axis=1)
@@ -62,6 +59,18 @@ def expected_links(scenario: Scenario, at: Mapping[NodeId, Enu], *, draw: int) -
         Link(nodes[a], nodes[b], grade_of(min(STEADY, float(share))), power_of(float(dbm)))
         for (a, b), share, dbm in zip(pairs.tolist(), success, mean_dbm, strict=True)
         if share >= _LEAST
+    )
+
+
+def _parts_of_frame(scenario: Scenario) -> "tuple[tuple[float, Reals], ...]":
+    """The bits of a frame's header and of its rest, each with ln(1 - bit error rate) by SINR as in the emulator."""
+    from emulator.channel.error_rate import SHORT_BYTES, header_rates, log_success_per_bit
+
+    radio, frame_bytes = scenario.radio, scenario.traffic.payload_bytes + OVERHEAD_BYTES
+    header_rate, bits_per_ns = header_rates(radio.rate_mbps)
+    return (
+        (Timing.of(radio).header_ns * bits_per_ns, log_success_per_bit(header_rate, radio.ofdm_errors, short=True)),
+        (8 * frame_bytes, log_success_per_bit(radio.rate_mbps, radio.ofdm_errors, short=frame_bytes < SHORT_BYTES)),
     )
 
 
@@ -93,15 +102,11 @@ def _by_error_rate(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance:
     """The error rates at the signal to interference and noise ratio; numpy is imported for these channels only."""
     import numpy as np
 
-    from emulator.channel.error_rate import header_rates, log_success_per_bit
     from emulator.channel.link_budget import milliwatt, noise_mw, received_dbm
     from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
 
     radio = scenario.radio
-    header_rate, bits_per_ns = header_rates(radio.rate_mbps)
-    tables = log_success_per_bit(header_rate), log_success_per_bit(radio.rate_mbps)
-    bits = Timing.of(radio).header_ns * bits_per_ns, 8 * (scenario.traffic.payload_bytes + OVERHEAD_BYTES)
-    noise = noise_mw(radio)
+    parts, noise = _parts_of_frame(scenario), noise_mw(radio)
 
     @cache
     def power_dbm(sender: NodeId, receiver: NodeId) -> float:
@@ -117,9 +122,7 @@ def _by_error_rate(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance:
         if wanted_dbm < radio.sensitivity_dbm or sinr_db < radio.preamble_snr_db or receiver in others:
             return 0.0
         row = int((sinr_db - ERROR_FLOOR_DB) * ERROR_STEPS_PER_DB)
-        return math.exp(
-            sum(count * float(table[min(row, len(table) - 1)]) for count, table in zip(bits, tables, strict=True))
-        )
+        return math.exp(sum(bits * float(table[min(row, len(table) - 1)]) for bits, table in parts))
 
     return chance
 

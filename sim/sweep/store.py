@@ -44,6 +44,15 @@ _MERGE_AT: Final = 200
 """The number of files with single runs that are merged into one, because a folder with thousands is slow to read."""
 
 
+def _rows(path: Path) -> list[dict[str, Any]]:
+    """The rows of one file of finished runs."""
+    try:
+        rows: list[dict[str, Any]] = read_parquet(path).to_pylist()
+        return rows
+    except ConfigError as error:
+        raise ConfigError(f"{str(error).rstrip('.')}; remove it, and its runs are repeated") from error
+
+
 class Store:
     """The finished runs in one folder."""
 
@@ -63,7 +72,7 @@ class Store:
                 (self._parts / left).unlink()
             self._files = [self._parts / name for name in names if _PART.fullmatch(name)]
             for path in self._files:
-                for row in read_parquet(path).to_pylist():
+                for row in _rows(path):
                     done = _ROW.validate_python(row)
                     for text in (done.summary or "{}", done.measured):
                         checked(_TABLE, json_of(text.encode(), source=str(path)), path)

@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Self
 
+from fanet_mw.errors import HostError
+
 if TYPE_CHECKING:
     from fanet_mw.hosts.realtime import SwarmAddress
     from fanet_mw.scenario import Scenario
@@ -28,6 +30,7 @@ class Companions:
         self._commands = commands
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._running: list[subprocess.Popen[bytes]] = []
+        self._checked = False
 
     def __enter__(self) -> Self:
         return self
@@ -51,6 +54,13 @@ class Companions:
                     command, env=found, start_new_session=True, stdin=subprocess.DEVNULL, preexec_fn=_give_way
                 )
             )
+
+    def check(self) -> None:
+        """Raise HostError if one has failed by the first call, as the swarm takes off; later the flight goes before."""
+        for words, process in zip(self._commands, () if self._checked else self._running, strict=False):
+            if process.poll():
+                raise HostError(f"fanet {' '.join(words)}: ended with code {process.returncode}, so nobody takes off")
+        self._checked = True
 
     def end(self) -> None:
         """End them; a recording closes its file first."""

@@ -144,6 +144,11 @@ def launch(
             raise ConfigError("--autopilots: needs --no-world, because flight controllers are the world then")
         beside.append(["autopilots", autopilots, "--flavor", doors.flavor])
     with begun(output.out), Companions(beside) as companions, _watched(chosen, bar=not output.json) as tell:
+
+        def on_progress(progress: "Progress") -> None:
+            companions.check()
+            tell(progress)
+
         outcome = asyncio.run(
             run(
                 chosen,
@@ -156,7 +161,7 @@ def launch(
                 zenoh_config=zenoh_config,
                 emulator_options={"pcap": output.capture_path(), "receptions": output.pcap_receptions},
                 spool_folder=output.out,
-                on_progress=tell,
+                on_progress=on_progress,
                 on_event=_say,
                 leads=leads,
                 on_started=lambda run: companions.start(run.address, chosen),

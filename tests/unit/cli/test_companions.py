@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from fanet_mw.errors import HostError
 from fanet_mw.hosts.realtime import SwarmAddress
 from sim.cli.companions import Companions
 from sim.scenarios import catalog
@@ -20,3 +21,16 @@ def test_a_file_in_the_folder_of_whoever_launches_is_no_module_of_theirs(
         for running in companions._running:
             assert running.wait(60) == 2
     assert "--nonsense" in capfd.readouterr().err
+
+
+def test_one_that_fails_as_the_swarm_comes_up_keeps_it_on_the_ground_and_one_that_ends_later_does_not() -> None:
+    with Companions([["record", "x.mcap", "--nonsense"]]) as companions:
+        companions.start(SwarmAddress("tcp/127.0.0.1:1", "s"), catalog.find("quick"))
+        companions._running[0].wait(60)
+        with pytest.raises(HostError, match=r"fanet record x\.mcap --nonsense: ended with code 2, so nobody takes off"):
+            companions.check()
+    with Companions([["record", "x.mcap", "--nonsense"]]) as companions:
+        companions.check()
+        companions.start(SwarmAddress("tcp/127.0.0.1:1", "s"), catalog.find("quick"))
+        companions._running[0].wait(60)
+        companions.check()

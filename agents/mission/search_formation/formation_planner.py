@@ -19,6 +19,7 @@ can (`lasting_links.py`). UAVs that are out for survivors become followers, on w
 `shapes/contract.py` explains place, team, relay and follower.
 """
 
+import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Final, NamedTuple
 
@@ -54,6 +55,9 @@ _ASKS_NS: Final = 60 * S
 """How long a node without a plan waits to be told that of the others before it makes one that replaces theirs."""
 _BUSY_M2: Final = 500.0**2
 """By how much longer a way, squared, a UAV may have that becomes a follower because it is out for a survivor."""
+_AMONG_M_S: Final = 3.7
+"""Before lines begin around the swarm, it stays until each could have flown as far as neighbors are apart at this speed:
+who is among them is found meanwhile, and passed by nobody for long after."""
 _LEAVE_NS: Final = 6 * S
 """Once a UAV has left, those who leave with it have said so within this time: all do at the end of a search."""
 _REVISION_BITS: Final = 16
@@ -226,7 +230,9 @@ class FormationPlanner:
         staying = (node for node, member in self._members.items() if not member.leaves and node not in but)
         nodes = sorted(staying)[: pattern.places]
         starts = [self._members[node].position for node in nodes]
+        given = pattern
         pattern, chosen = self._shared_out(pattern, nodes, starts)
+        among_s = 0.0 if pattern.dimensions == given.dimensions else _apart_m(starts) / _AMONG_M_S
         farthest_m = max(
             pattern.at(place, 0.0).minus(start).horizontal() for place, start in zip(chosen, starts, strict=True)
         )
@@ -244,7 +250,7 @@ class FormationPlanner:
             tuple(holders),
             planner=self._node,
             start_us=start_ns // US,
-            deploy_ds=round(10 * max(1.0, farthest_m / self._deploy_speed)),
+            deploy_ds=round(10 * max(1.0, farthest_m / self._deploy_speed, among_s)),
         )._replace(revision=_next(self._newest_revision()))
 
     def _shared_out(
@@ -315,6 +321,12 @@ class FormationPlanner:
             if member.revision and (not newest or newer(member.revision, newest, bits=_REVISION_BITS)):
                 newest = member.revision
         return newest
+
+
+def _apart_m(starts: Sequence[Enu]) -> float:
+    """How far neighbors are apart where a swarm stands, as in a square grid of the same size."""
+    east, north = [at.east for at in starts], [at.north for at in starts]
+    return math.sqrt((max(east) - min(east)) * (max(north) - min(north)) / len(starts))
 
 
 def _replaces(plan: Search, mine: Search) -> bool:

@@ -56,7 +56,7 @@ _ASKS_NS: Final = 60 * S
 _BUSY_M2: Final = 500.0**2
 """By how much longer a way, squared, a UAV may have that becomes a follower because it is out for a survivor."""
 _AMONG_M_S: Final = 3.7
-"""Before lines begin around the swarm, it stays until each could have flown as far as neighbors are apart at this speed:
+"""Before lines begin around the swarm, it stays until each could fly at this speed as far as neighbors are apart:
 who is among them is found meanwhile, and passed by nobody for long after."""
 _LEAVE_NS: Final = 6 * S
 """Once a UAV has left, those who leave with it have said so within this time: all do at the end of a search."""

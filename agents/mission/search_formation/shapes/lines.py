@@ -265,8 +265,9 @@ class Lines(Shape):
 
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
         """The distance of a point from a line to the north or south; a line is taken to be as wide as the area."""
-        last = self._formation.lanes - 1
-        lane = max(0.0, min(1.0, (east_m / self._half_width_m(swept_s) + 1) / 2)) * last
+        half_width_m = self._half_width_m(swept_s)
+        aside = max(-1.0, min(1.0, east_m / half_width_m)) if half_width_m else 0.0
+        lane = (aside + 1) / 2 * (self._formation.lanes - 1)
         return abs(north_m - self._north_m(team, self._inner_m(swept_s, lane)))
 
     def _inner_m(self, swept_s: float, lane: float) -> float:
@@ -307,7 +308,7 @@ class Lines(Shape):
         if not _is_bent(self._formation):
             return 1.0
         last = self._formation.lanes - 1
-        return min(1.0, min(lane, last - lane) / min(_BENT, last // 2))
+        return min(1.0, min(lane, last - lane) / max(1, min(_BENT, last // 2)))
 
     def _north_m(self, line: int, inner_m: float) -> float:
         out_m = inner_m + self._outward_m[line]

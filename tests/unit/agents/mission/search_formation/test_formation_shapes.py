@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from agents.mission.search_formation.formation_planner import pattern_of, plan_of
@@ -514,3 +514,25 @@ def test_a_formation_that_nobody_could_fly_is_refused(impossible: dict[str, floa
         assert Search.decode_frame(bytes(HEADER_BYTES) + possible.encode_frame(1)) == possible
     with pytest.raises(MalformedFrameError):
         Search.decode_frame(bytes(HEADER_BYTES) + plan._replace(**impossible).encode_frame(1))  # type: ignore[arg-type]
+
+
+@given(
+    st.integers(2, 9), st.floats(0, 600), st.floats(0, 1), st.floats(0, 400), st.floats(1, 900), st.integers(1, 3),
+    st.sets(st.integers(0, 40)),
+)  # fmt: skip
+@example(2, 100.0, 0.0, 50.0, 400.0, 1, set())
+@example(3, 100.0, 1.0, 50.0, 400.0, 1, set())
+@example(3, 0.0, 0.0, 50.0, 400.0, 1, {1})
+def test_whatever_lines_a_plan_off_the_air_may_name_each_place_is_somewhere(
+    lanes: int, half_width_m: float, narrower: float, first_m: float, more_m: float, pairs: int, vacant: set[int]
+) -> None:
+    named = Search(
+        7, half_width_m, first_m, first_m + more_m, 65.0, 7.5, 30, 1, 1, tuple(range(1, 2 * pairs * lanes + 9)),
+        lanes, 6, 2, 0, 2 * pairs, narrower * half_width_m,
+    )  # fmt: skip
+    plan = Search.decode_frame(bytes(HEADER_BYTES) + named.encode_frame(1))
+    whole = pattern_of(plan, reach_m=REACH_M)
+    for pattern in (whole, whole.closed(frozenset(vacant.intersection(range(whole.places - 3))))):
+        for swept_s in (0.0, 7.0, 0.5 * pattern.shape.sweep_s, pattern.shape.sweep_s, 1.5 * pattern.shape.sweep_s):
+            assert all(math.isfinite(pattern.at(place, swept_s).norm()) for place in range(pattern.places))
+            assert math.isfinite(pattern.shape.apart_m(0, 10.0, 20.0, swept_s))

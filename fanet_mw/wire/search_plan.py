@@ -39,6 +39,7 @@ class Search(NamedTuple):
     """0: lines, 1: spiral, 2: sectors, 3: ring, 4: circuit, 5: fan."""
     teams: int = 2
     narrower_m: float = 0.0
+    """Lines: by how much nearer to the middle the outermost lanes begin the first sweep."""
 
     def encode_frame(self, node: int) -> bytes:
         if len(self.nodes) > MOST_PLACES:

@@ -79,21 +79,22 @@ class ConnectivityMaintenance:
         for node, motion in ties.items():
             follows = leading == [node]  # between two gaps it would draw the sides together
             share, within_s = (_CLOSING, _CLOSING_S) if closes or follows else (_TETHER, _TETHER_S)
-            plane = self._plane(motion, share, within_s, now_ns)
+            offset = motion.offset_from(self._own_motion.position, now_ns)
+            plane = self._plane(offset, motion.velocity, share, within_s)
             if plane is not None:
                 planes.append(plane)
-                if motion.offset_from(self._own_motion.position, now_ns).norm() <= _CLOSING * self._reach_m:
+                if offset.norm() <= _CLOSING * self._reach_m:
                     self._ties.append((node, plane))
             if follows:
-                nearer = self._plane(motion, _FOLLOWS, _CLOSING_S, now_ns)
+                nearer = self._plane(offset, motion.velocity, _FOLLOWS, _CLOSING_S)
                 closer += [] if nearer is None else [nearer]
         return planes + closer  # who cannot follow so close stays in reach
 
-    def _plane(self, motion: Motion, share: float, within_s: float, now_ns: int) -> HalfPlane | None:
+    def _plane(self, offset: Enu, velocity: Enu, share: float, within_s: float) -> HalfPlane | None:
         """The limit that keeps this UAV within a share of the reach of another one."""
         return tether_plane(
-            motion.offset_from(self._own_motion.position, now_ns),
-            (motion.velocity.east, motion.velocity.north),
+            offset,
+            (velocity.east, velocity.north),
             tether_m=share * self._reach_m,
             within_s=within_s,
             haste_m_s=self._haste_m_s,

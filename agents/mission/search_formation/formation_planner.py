@@ -56,8 +56,8 @@ _ASKS_NS: Final = 60 * S
 _BUSY_M2: Final = 500.0**2
 """By how much longer a way, squared, a UAV may have that becomes a follower because it is out for a survivor."""
 _AMONG_M_S: Final = 3.7
-"""Before lines begin around the swarm, it stays until each could fly at this speed as far as neighbors are apart:
-who is among them is found meanwhile, and passed by nobody for long after."""
+"""Before a formation begins around the swarm, it stays until each could fly at this speed as far as neighbors are
+apart: who is among them is found meanwhile, and passed by nobody for long after."""
 _LEAVE_NS: Final = 6 * S
 """Once a UAV has left, those who leave with it have said so within this time: all do at the end of a search."""
 _REVISION_BITS: Final = 16
@@ -230,9 +230,9 @@ class FormationPlanner:
         staying = (node for node, member in self._members.items() if not member.leaves and node not in but)
         nodes = sorted(staying)[: pattern.places]
         starts = [self._members[node].position for node in nodes]
-        given = pattern
+        from_middle = pattern.dimensions
         pattern, chosen = self._shared_out(pattern, nodes, starts)
-        among_s = 0.0 if pattern.dimensions == given.dimensions else _apart_m(starts) / _AMONG_M_S
+        among_s = 0.0 if pattern.dimensions == from_middle else _apart_m(starts) / _AMONG_M_S
         farthest_m = max(
             pattern.at(place, 0.0).minus(start).horizontal() for place, start in zip(chosen, starts, strict=True)
         )

@@ -118,9 +118,13 @@ class Lines(Shape):
         back_s = (formation.last_m - min(FIRST_M, formation.first_m)) / self._fastest_m_s
         self._aside_s = formation.narrower_m / self._fastest_m_s
         """The time in which the outermost lanes of bent lines reach the sides of the area."""
-        bent_s = max(self._arrives_s(lane) for lane in range(formation.lanes // 2))
-        self._sweep_s = max(straight_s, bent_s) if _is_bent(formation) else straight_s
+        self._sweep_s = straight_s
+        if _is_bent(formation):
+            self._sweep_s = max(straight_s, *(self._arrives_s(lane) for lane in range(formation.lanes // 2)))
         self._faster_back = self._sweep_s / back_s
+        first_m = min(FIRST_M, formation.first_m)
+        self._back = formation._replace(first_m=first_m, speed_m_s=(formation.last_m - first_m) / self._sweep_s)
+        """How bent lines fly once they have turned: straight, and as long between middle and edge as the first time."""
         gaps_m = gaps_m or (self._apart_m,) * (formation.teams - 1)
         northern, southern = gaps_m[: half - 1][::-1], gaps_m[half:]
         self._outward_m = tuple(
@@ -252,16 +256,11 @@ class Lines(Shape):
         return tuple(found)
 
     def bends_within(self, hop_m: float) -> bool:
-        """True if neighbors in the first sweep are always this near to each other."""
-        lanes, steps = self._formation.lanes, _CHECKS
-        return all(
-            self.at(lane, step * self.sweep_s / steps)
-            .minus(self.at(lane + 1, step * self.sweep_s / steps))
-            .horizontal()
-            <= hop_m
-            for step in range(steps + 1)
-            for lane in range(lanes // 2)
-        )
+        """True if neighbors in the first sweep are always this near to each other; both ends of a line are alike."""
+        to_middle = range(self._formation.lanes // 2 + 1)
+        instants = (step * self.sweep_s / _CHECKS for step in range(_CHECKS + 1))
+        rows = ([self.at(lane, swept_s) for lane in to_middle] for swept_s in instants)
+        return all(a.minus(b).horizontal() <= hop_m for row in rows for a, b in itertools.pairwise(row))
 
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
         """The distance of a point from a line to the north or south; a line is taken to be as wide as the area."""
@@ -276,9 +275,7 @@ class Lines(Shape):
         if not _is_bent(formation):
             return min(self._most_m, swept_m(formation, swept_s))
         if swept_s > self.sweep_s:
-            back = formation._replace(first_m=min(FIRST_M, formation.first_m))
-            back = back._replace(speed_m_s=(back.last_m - back.first_m) / self.sweep_s)
-            return min(self._most_m, swept_m(back, swept_s, faster_back=self._faster_back))
+            return min(self._most_m, swept_m(self._back, swept_s, faster_back=self._faster_back))
         waits_s, slow_m_s, fast_m_s = self._pace(lane)
         slow_m = max(0.0, min(swept_s, self._aside_s) - waits_s) * slow_m_s
         out_m = self._starts_m(lane) + slow_m + max(0.0, swept_s - self._aside_s) * fast_m_s

@@ -117,7 +117,7 @@ class Searcher:
         least_m_s, _ = mission.approach_speeds_m_s
         nodes = scenario.nodes
         silent = None if radio is None else SilentNeighbors(radio, neighbors, own_motion, obstacles, reach_m=reach_m)
-        roll_call = RollCall(node, hello_interval_s=scenario.routing.hello_interval_s, silent=silent)
+        self._roll_call = roll_call = RollCall(node, hello_interval_s=scenario.routing.hello_interval_s, silent=silent)
         planner = FormationPlanner(
             node, roll_call, expected=nodes.count, deploy_speed_m_s=_DEPLOY * least_m_s,
             notice_ns=NOTICE_IN_ROUNDS_NS if scenario.routing.protocol == "rounds" else NOTICE_NS,
@@ -261,6 +261,7 @@ class Searcher:
         if now_ns >= self._next_roll_ns:
             self._next_roll_ns = now_ns + _ROLL_NS
             self._plans.close_ranks(now_ns)
+            self._obstacles.hovering = self._neighbors.hovering(self._roll_call.lost)
             self._approach.look_around.pass_over(position, now_ns)
         self._flight.fix(position, velocity, self._bidding.survivor, now_ns=now_ns)
         if self._radio is not None:

@@ -1,6 +1,7 @@
 """The obstacles that one UAV knows from its map and its radar, and how it flies around them.
 
     map            buildings whose roofs are not well below the UAV; no-fly areas, at any height
+    lost UAVs      where neighbors that fell silent may hover
     radar          echoes that neither the map nor a neighbor explains, kept for a while; what moves is a UAV
     way            straight, if that is clear; else the next corner of the shortest way over a grid
     half-planes    the nearer an obstacle is, the slower a UAV may fly towards it
@@ -79,6 +80,8 @@ class KnownObstacles:
         self._taken: dict[Cell, _Echoed] = {}
         """The cells with echoes, and those within the margin around them."""
         self._movers: list[Mover] = []
+        self.hovering: Sequence[tuple[Enu, float]] = ()
+        """Where lost UAVs may be in the way, each with a radius, as `NeighborMotions.hovering` says."""
         self._corner: Place | None = None
         self._planned_ns: int | None = None
         self._any = bool(onboard_map.buildings or no_fly_m)
@@ -185,6 +188,11 @@ class KnownObstacles:
             off_east, off_north = at.east - east, at.north - north
             distance = max(1e-6, math.hypot(off_east, off_north))
             found.append((distance - radius, off_east / distance, off_north / distance))
+        for place, radius in self.hovering:
+            if abs(place.up - at.up) <= OVER_M:
+                distance = max(1e-6, math.hypot(at.east - place.east, at.north - place.north))
+                east, north = (at.east - place.east) / distance, (at.north - place.north) / distance
+                found.append((distance - radius, east, north))
         for cell, echoed in self._echoes.items():
             middle = middle_of(cell)
             off_east, off_north = at.east - middle[0], at.north - middle[1]
@@ -198,7 +206,7 @@ class KnownObstacles:
 
     def way_to(self, at: Enu, goal: Enu, moves: Enu, *, now_ns: int) -> Enu | None:
         """The place to fly to on the way to a moving goal; None if the straight way is clear, or none was found."""
-        if not self._any and not self._taken:
+        if not self._any and not self._taken and not self.hovering:
             return None
 
         def taken(cell: Cell) -> bool:
@@ -244,6 +252,13 @@ class KnownObstacles:
         if self._no_fly:
             east, north = middle_of(cell)
             if any(math.hypot(east - e, north - n) <= radius + _MARGIN_M for e, n, radius in self._no_fly):
+                return True
+        for place, radius in self.hovering:
+            east, north = middle_of(cell)
+            if (
+                abs(place.up - up_m) <= OVER_M
+                and math.hypot(east - place.east, north - place.north) <= radius + _MARGIN_M
+            ):
                 return True
         echoed = self._taken.get(cell)
         return echoed is not None and echoed.until_ns > now_ns and echoed.top_m + OVER_M > up_m

@@ -1,6 +1,6 @@
 """The positions and velocities of a UAV's neighbors, from their hellos."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from agents.mission.navigation.known_obstacles import KnownObstacles
@@ -8,11 +8,25 @@ from agents.mission.navigation.own_motion import OwnMotion
 from fanet_mw.bus.messages import Echo
 from fanet_mw.motion import Motion
 from fanet_mw.node.neighbors import neighbor_lifetime_ns
-from fanet_mw.units import seconds_to_ns
+from fanet_mw.units import Enu, seconds_to_ns
 
 _LEAST_LIFETIME_NS: Final = seconds_to_ns(6.0)
 """How long after a neighbor's last hello its motion counts as known, at least: a UAV that is near and not heard is
 still there. Where hellos are rare it is as long as a neighbor lasts (`fanet_mw/node/neighbors.py`)."""
+_STOPS_S: Final = 2.0
+"""A flight controller without a program flies on for a second and then brakes (`VELOCITY_LASTS_NS`), so it stops where
+it would have been so long after its last hello."""
+_STOPS_BUT_S: Final = 1.0
+"""The hello may have been sent so long before the program stopped."""
+_UNTIL_LOST_NS: Final = seconds_to_ns(5.0)
+"""A UAV not heard for longer when it was lost had left this one's reach, and may be anywhere."""
+_FALLS_M_S: Final = 6.0
+"""Nobody sinks this fast on purpose."""
+
+
+def falls(velocity: Enu) -> bool:
+    """True for a UAV that falls from the sky."""
+    return velocity.up <= -_FALLS_M_S
 
 
 class NeighborMotions:
@@ -29,6 +43,18 @@ class NeighborMotions:
         """The last known motion of a neighbor; None if its last hello is too old."""
         motion = self._motions.get(node)
         return None if motion is None or now_ns - motion.at_ns > self._lifetime_ns else motion
+
+    def hovering(self, lost: Mapping[int, int]) -> list[tuple[Enu, float]]:
+        """Where those who fell silent may hover, and how far from there; `lost`: since when each is lost. No place for
+        who said that it fell, or had left this UAV's reach before.
+        """
+        found = []
+        for node, lost_ns in lost.items():
+            last = self._motions.get(node)
+            if last is not None and lost_ns - last.at_ns <= _UNTIL_LOST_NS and not falls(last.velocity):
+                flown = last.velocity._replace(up=0.0)
+                found.append((last.position.plus(flown, _STOPS_S), _STOPS_BUT_S * flown.horizontal()))
+        return found
 
     def all(self, *, now_ns: int) -> list[Motion]:
         """The motions of the neighbors that were received recently, by id."""

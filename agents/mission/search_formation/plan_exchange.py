@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Final
 
+from agents.mission.navigation.neighbor_motions import falls
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox, OutgoingPacket
 from agents.mission.search_formation.formation_place import FormationPlace
@@ -11,7 +12,7 @@ from agents.mission.search_formation.pattern import Pattern
 from agents.mission.search_formation.roll_call import RollCall
 from fanet_mw.motion import Motion
 from fanet_mw.trace import Planned
-from fanet_mw.units import MS, US, Enu, NodeId, S
+from fanet_mw.units import MS, US, NodeId, S
 from fanet_mw.wire.roll import Roll
 from fanet_mw.wire.search_plan import Search, SearchStatus
 
@@ -22,8 +23,6 @@ _ALARM_NS: Final = 2 * S
 _SPREAD_NS: Final = 400 * MS
 """All in reach find a loss at about the same instant. Each tells it at a random one within this time, unless another
 has told the same by then: 45 floods at once are more than bounds allow for."""
-_FALLS_M_S: Final = 6.0
-"""Nobody sinks this fast on purpose."""
 
 
 class PlanExchange:
@@ -73,10 +72,10 @@ class PlanExchange:
     def close_ranks(self, now_ns: int) -> None:
         """Find who is lost, and fly on without them."""
         if self._place.plan is not None:
-            falls = _falls(self._own_motion.velocity)
-            self._roll_call.review(self._place.plan, since_ns=self._adopted_ns, falls=falls, now_ns=now_ns)
+            own_falls = falls(self._own_motion.velocity)
+            self._roll_call.review(self._place.plan, since_ns=self._adopted_ns, falls=own_falls, now_ns=now_ns)
             if self._roll_call.has_news and self.alarm_ns is None:
-                waits = 0.0 if falls else self._random()  # who falls has no time
+                waits = 0.0 if own_falls else self._random()  # who falls has no time
                 self.alarm_ns = max(now_ns, self._next_alarm_ns) + round(waits * _SPREAD_NS)
             self.tell_losses(now_ns)
             away = {*self._planner.leavers, *self._planner.absent}
@@ -127,9 +126,9 @@ class PlanExchange:
         """A neighbor's hello states how it flies; returns True if it was lost."""
         self._planner.on_neighbor(node, motion.position, now_ns=now_ns)
         self._place.see(node, motion.position, now_ns)
-        returned, falls = node in self._roll_call.lost, _falls(motion.velocity)
-        self._roll_call.on_hello(node, now_ns=now_ns, falls=falls)
-        return returned and not falls
+        returned, it_falls = node in self._roll_call.lost, falls(motion.velocity)
+        self._roll_call.on_hello(node, now_ns=now_ns, falls=it_falls)
+        return returned and not it_falls
 
     def on_roll(self, roll: Roll, *, flooded: bool, now_ns: int) -> None:
         """Another UAV tells its neighbors, or all, who was heard when."""
@@ -158,7 +157,3 @@ class PlanExchange:
             self._place.leave()
         place = self._place.place
         self._outbox.records.append(Planned(now_ns, self._node, plan.revision, -1 if place is None else place))
-
-
-def _falls(velocity: Enu) -> bool:
-    return velocity.up <= -_FALLS_M_S

@@ -1,7 +1,8 @@
 """A whole swarm of `search_board.py` in flight, of which UAVs are lost, or between whose parts no frame gets through.
 
 Its UAVs decide as in a mission, and hear each other within reach: hellos once a second, and that somebody is silent at
-once. Whom one UAV misses all of its part miss at the next step; there is no radio.
+once. Whom one UAV misses all of its part miss at the next step; there is no radio. Those who are lost hover, as their
+flight controllers do when a program has stopped.
 """
 
 import itertools
@@ -11,7 +12,7 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from search_board import COUNT, OPEN, PLAN, REACH_M, SCENARIO, UP_M, Board
+from search_board import COUNT, PLAN, REACH_M, SCENARIO, UP_M, Board
 
 from agents.mission.flight.connectivity_maintenance import ConnectivityMaintenance
 from agents.mission.flight.flight import Flight
@@ -19,7 +20,10 @@ from agents.mission.flight.reciprocal_avoidance import ReciprocalAvoidance
 from agents.mission.flight.return_home import ReturnHome
 from agents.mission.flight.search_limits import SearchLimits
 from agents.mission.flight.velocity_choice import VelocityChoice
+from agents.mission.navigation.known_obstacles import KnownObstacles
+from agents.mission.navigation.onboard_map import NO_MAP
 from agents.mission.search_formation.roll_call import RollCall
+from fanet_mw.bus.messages import VELOCITY_LASTS_NS
 from fanet_mw.motion import Motion
 from fanet_mw.units import MS, US, Enu, NodeId, S
 from fanet_mw.wire.search_plan import Search
@@ -44,12 +48,13 @@ class _Uav:
     def __init__(self, node: NodeId, at: Enu, plan: Search) -> None:
         self.board = board = Board(node, at, plan=plan)
         own, neighbors = board.own_motion, board.neighbors
-        self.lost: set[int] = set()
+        self.lost: dict[int, int] = {}
         self.parted: set[int] = set()
         """The others of another part, who are not lost."""
         tied = ConnectivityMaintenance(own, neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=_SPEED_M_S)
+        self._obstacles = obstacles = KnownObstacles(NO_MAP)
         choice = VelocityChoice(
-            own, OPEN, most_m_s=_SPEED_M_S, hard=[ReciprocalAvoidance(own, neighbors, OPEN)], soft=[tied]
+            own, obstacles, most_m_s=_SPEED_M_S, hard=[ReciprocalAvoidance(own, neighbors, obstacles)], soft=[tied]
         )
         home = ReturnHome(
             node, at, own, neighbors, board.out,
@@ -62,8 +67,9 @@ class _Uav:
 
     def fly(self, at: Enu, velocity: Enu, now_ns: int) -> Enu:
         self.board.place.close_ranks(self.lost, now_ns, parted=self.parted)
+        self._obstacles.hovering = self.board.neighbors.hovering(self.lost)
         self._flight.fix(at, velocity, None, now_ns=now_ns)
-        self.lost |= self._roll_call.lost.keys()
+        self.lost |= {node: now_ns for node in self._roll_call.lost if node not in self.lost}
         assert self._flight.velocity is not None
         return self._flight.velocity
 
@@ -83,6 +89,8 @@ class ClosingSwarm:
         self._at = np.array([at for at, _ in places], dtype=float)
         self._flown = np.array([velocity for _, velocity in places], dtype=float)
         self._lost = np.zeros(COUNT, dtype=bool)
+        self._stops_ns = np.zeros(COUNT, dtype=np.int64)
+        """When each of them begins to brake."""
         self._noticed_ns = np.resize(_SILENT_NS, COUNT)
         self._line: tuple[npt.NDArray[np.float64], float] | None = None
         """No frame gets across this line: its normal, and how far from the middle it is."""
@@ -103,12 +111,26 @@ class ClosingSwarm:
     def heal_s(self, *nodes: int, within_s: float) -> float:
         """Lose UAVs at once, fly on for so long, and say when the others were apart for the last time."""
         begin_ns = end_ns = self._now_ns
-        self._lost[[node - 1 for node in nodes]] = True
+        for node in nodes:
+            self._lose(node)
         while self._now_ns < begin_ns + round(within_s * S):
             if len(set(parts(self._hears())[~self._lost])) > 1:
                 end_ns = self._now_ns + _STEP_NS
             self.step()
         return (end_ns - begin_ns) / S
+
+    def _lose(self, node: int) -> None:
+        self._lost[node - 1], self._stops_ns[node - 1] = True, self._now_ns + VELOCITY_LASTS_NS
+
+    def nearest_to_m(self, node: int, *, for_s: float) -> float:
+        """Lose a UAV, fly on, and say how near any other one comes to it."""
+        self._lose(node)
+        end_ns, found = self._now_ns + for_s * S, []
+        while self._now_ns < end_ns:
+            apart_m = np.linalg.norm(self._at - self._at[node - 1], axis=1)
+            found.append(float(np.delete(apart_m, node - 1).min()))
+            self.step()
+        return min(found)
 
     def nearest_m(self, *, along: float, off_m: float, for_s: float) -> float:
         """Part the air along a line whose normal has this angle, and say how near any two UAVs come to each other."""
@@ -123,6 +145,7 @@ class ClosingSwarm:
     def step(self) -> None:
         self._hear()
         wanted = self._flown.copy()
+        wanted[self._lost & (self._now_ns >= self._stops_ns)] = 0.0
         for index in np.flatnonzero(~self._lost):
             uav = self._uavs[index]
             wanted[index] = uav.fly(Enu(*self._at[index]), Enu(*self._flown[index]), self._now_ns)
@@ -148,12 +171,15 @@ class ClosingSwarm:
             for other in np.flatnonzero((silent_ns >= self._noticed_ns) & (silent_ns < _KNOWN_NS)):
                 known = uav.board.neighbors.motion(other + 1, now_ns=now_ns)
                 if known is not None and known.offset_from(uav.board.own_motion.position, now_ns).norm() <= _NEAR_M:
-                    uav.lost.add(int(other) + 1)
+                    uav.lost.setdefault(int(other) + 1, now_ns)
         part = parts(hears)
         for one in set(part[~self._lost].tolist()):
             members = np.flatnonzero((part == one) & ~self._lost)
             here = {int(member) + 1 for member in members}
             missed = set[int]().union(*(self._uavs[member].lost for member in members)) - here
             for member in members:
-                self._uavs[member].lost = missed
+                lost = self._uavs[member].lost
+                for back in lost.keys() - missed:
+                    del lost[back]
+                lost |= {node: now_ns for node in missed if node not in lost}
                 self._uavs[member].parted = set(range(1, COUNT + 1)) - here - missed

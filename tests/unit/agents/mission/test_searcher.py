@@ -284,6 +284,19 @@ def test_another_uav_is_avoided_by_its_hellos_and_by_radar(make_scenario: Callab
     assert (met.searcher.velocity or STILL).minus(alone.searcher.velocity or STILL).norm() > 0.5
 
 
+def test_a_uav_that_fell_silent_in_the_way_is_flown_around_long_after(make_scenario: Callable[..., Scenario]) -> None:
+    met, alone = (Flight(make_scenario) for _ in range(2))
+    for flight in (met, alone):
+        flight.fly(12)
+    alone.fly(12)
+    met.searcher.hello(3, Motion(alone.at, STILL, met.now_ns), now_ns=met.now_ns)
+    nearest_m = 1e9
+    for _ in range(20):
+        met.fly(1)
+        nearest_m = min(nearest_m, met.at.minus(alone.at).norm())
+    assert 5.0 < nearest_m < 50.0
+
+
 @pytest.mark.parametrize(
     ("planned", "seconds", "highest_m"), [(False, 12, 66.0), (True, 40, 72.0)], ids=["waiting", "in its place"]
 )

@@ -107,6 +107,18 @@ def test_nobody_flies_into_an_area_that_is_forbidden_however_high() -> None:
     assert places[-1].minus(Enu(150, 0, 500)).norm() < 5.0
 
 
+def test_a_lost_uav_that_hovers_is_flown_around_at_its_height_only() -> None:
+    obstacles, place = KnownObstacles(NO_MAP), Enu(0.0, 0.0, 65.0)
+    obstacles.hovering = [(place, 7.5)]
+    for up_m, passes in ((65.0, False), (71.0, False), (77.0, True)):
+        places = flown(obstacles, Enu(-150, 0, up_m), Enu(150, 0, up_m), seconds=45)
+        assert places[-1].minus(Enu(150, 0, up_m)).norm() < 5.0
+        nearest_m = min(at.minus(place).horizontal() for at in places)
+        assert nearest_m < 2.0 if passes else nearest_m > 7.5 + 6.0
+    obstacles.hovering = ()
+    assert obstacles.way_to(Enu(-50, 0, 65), Enu(50, 0, 65), STILL, now_ns=60 * S) is None
+
+
 def test_a_goal_within_a_tower_is_awaited_where_it_comes_out() -> None:
     obstacles = KnownObstacles(OnboardMap((TOWER,)))
     there = obstacles.way_to(Enu(60, 0, 60), Enu(0, 0, 60), Enu(5.0, 0.0, 0.0), now_ns=0)

@@ -19,6 +19,7 @@ from agents.mission.finding.announcing import Announcing
 from agents.mission.finding.camera_view import CameraView
 from agents.mission.finding.in_building import place_in_building
 from agents.mission.finding.known_survivors import KnownSurvivors
+from agents.mission.finding.looked_at import LookedAt
 from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, PhoneModel
 from agents.mission.finding.phone_reception import PhoneReception
 from agents.mission.finding.sightings import Sightings
@@ -105,7 +106,8 @@ class Searcher:
         mission, reach_m, speed_m_s = scenario.mission, scenario.radio.range_m, approach_speed_m_s(scenario, node)
         self._random = stream(scenario.seed, "mission", node).random
         self._radio = radio
-        self._survivors = survivors = KnownSurvivors(phone_model(scenario))
+        self._looked_at = looked_at = LookedAt(min(_view_m(scenario)), height_m=scenario.nodes.altitude_m)
+        self._survivors = survivors = KnownSurvivors(phone_model(scenario), looked_at)
         obstacles = KnownObstacles(onboard_map, scenario.world.no_fly_m)
         self._own_motion = own_motion = OwnMotion(position, obstacles)
         self._neighbors = neighbors = NeighborMotions(hello_interval_s=scenario.routing.hello_interval_s)
@@ -135,7 +137,7 @@ class Searcher:
         self._map = onboard_map
         self._approach = approach = Approach(
             node, survivors, own_motion, neighbors, outbox,
-            arrival_m=mission.arrival_m, speed_m_s=speed_m_s, look_m=min(_view_m(scenario)),
+            arrival_m=mission.arrival_m, speed_m_s=speed_m_s, looked_at=looked_at,
         )  # fmt: skip
         absence = Absence(place, mission.connection, speed_m_s=speed_m_s)
         self._bidding = Bidding(
@@ -203,6 +205,7 @@ class Searcher:
         if not self._return_home.leaves and self._orders.errand is None and self._is_over(now_ns):
             self._return_home.end()
             self._give_up(now_ns)
+        self._note_looks(now_ns)
         self._reception.review(now_ns)
         for survivor in self._sightings.contradicted():
             self._announcing.keep_person(survivor, now_ns, steady_m2=self._sightings.steady_m2)
@@ -222,6 +225,14 @@ class Searcher:
             goes = goes or (self._place.plan is None and self._bidding.survivor is not None)
             self._plans.be_absent(self._percent, now_ns, goes=goes)
         self._review_mode(now_ns)
+
+    def _note_looks(self, now_ns: int) -> None:
+        """Note what the own camera shows now, and those of neighbors: the ground is taken to be level between them."""
+        here, position = self._own_motion.over_ground(now_ns), self._own_motion.position
+        self._looked_at.note(here, now_ns)
+        for motion in self._neighbors.all(now_ns=now_ns):
+            at = motion.position_at(now_ns)
+            self._looked_at.note(at._replace(up=at.up + here.up - position.up), now_ns)
 
     @property
     def velocity(self) -> Enu | None:
@@ -262,7 +273,6 @@ class Searcher:
             self._next_roll_ns = now_ns + _ROLL_NS
             self._plans.close_ranks(now_ns)
             self._obstacles.hovering = self._neighbors.hovering(self._roll_call.lost)
-            self._approach.look_around.pass_over(position, now_ns)
         self._flight.fix(position, velocity, self._bidding.survivor, now_ns=now_ns)
         if self._radio is not None:
             self._radio.hold(self._flight.held)
@@ -325,11 +335,7 @@ class Searcher:
         known = self._survivors.by_id[survivor]
         if known.filter.is_seen:
             return
-        place = place_in_building(
-            known,
-            self._map,
-            lambda east_m, north_m: self._approach.look_around.sides_looked_from(east_m, north_m, now_ns),
-        )
+        place = place_in_building(known, self._map, self._looked_at.sides)
         if place is not None:
             self._announcing.place_inside(survivor, place, now_ns)
             self._bidding.close(survivor, now_ns=now_ns)

@@ -7,7 +7,6 @@ another UAV does not seem to know of a verdict   -> some of those that know it f
 a UAV that was lost is heard again               -> whoever hears it floods all verdicts that were not flooded lately
 """
 
-import math
 from typing import Final
 
 from agents.mission.finding.identities import paired
@@ -26,6 +25,8 @@ _IMPROVEMENT: Final = 0.8
 """A UAV floods its estimate again when the standard deviation has decreased to at most this share."""
 _USEFUL_M: Final = 60.0
 """An estimate with a greater standard deviation is not flooded."""
+_WRONG_SIGMAS: Final = 2.0
+"""A UAV that no longer holds its estimate likely floods another one, however vague: so far from it."""
 _PASSED_ON_NS: Final = 12 * S
 """How long hellos pass on a verdict."""
 _POST_NS: Final = 5 * S
@@ -50,7 +51,8 @@ class Announcing:
         self._persons = 0
         self._took_over: set[int] = set()
         """The finds in whose favor this UAV has given up a person."""
-        self._told_sigma_m: dict[int, float] = {}
+        self._told: dict[int, Estimate] = {}
+        """The estimate of each survivor's place that this UAV flooded last."""
         self._tellings: dict[int, tuple[int, int]] = {}
         """For each survivor that this UAV has confirmed or refuted: how often that is still flooded, and when next."""
         self._heard_ns: dict[int, int] = {}
@@ -133,7 +135,7 @@ class Announcing:
 
     def decided(self, survivor: int, now_ns: int) -> None:
         self._heard_ns[survivor] = now_ns
-        self._told_sigma_m.pop(survivor, None)
+        self._told.pop(survivor, None)
 
     def tell(self, task: int | None, now_ns: int) -> None:
         """Flood the verdicts that are due, and the estimate of the survivor to whom this UAV flies."""
@@ -193,12 +195,15 @@ class Announcing:
                 self._flood(verdict)
 
     def _tell_estimate(self, survivor: int, now_ns: int) -> None:
-        """Flood the estimate of a responder if it has become clearly better."""
-        place = self._survivors.by_id[survivor].filter.estimate()
-        before_m = self._told_sigma_m.get(survivor, math.inf)
-        if place is None or place.sigma_m > _IMPROVEMENT * before_m or place.sigma_m > _USEFUL_M:
+        """Flood the estimate of a responder if it has become clearly better, or the one that it has told is wrong."""
+        place, told = self._survivors.by_id[survivor].own_place(), self._told.get(survivor)
+        if place is None or (told is None and place.sigma_m > _USEFUL_M):
             return
-        self._told_sigma_m[survivor] = place.sigma_m
+        if told is not None:
+            better = place.sigma_m <= min(_IMPROVEMENT * told.sigma_m, _USEFUL_M)
+            if not better and place.distance_m(told.at) <= _WRONG_SIGMAS * told.sigma_m:
+                return
+        self._told[survivor] = place
         self._flood(Found(now_ns // US, survivor, *place, self._node, Standing.ESTIMATED))
 
     def _flood(self, found: Found) -> None:

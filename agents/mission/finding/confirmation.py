@@ -28,7 +28,7 @@ _SIGHTINGS: Final = 2
 """A person is not confirmed before this number of sightings by a camera, or calls from close by."""
 _SURE_M: Final = 3.5
 """The greatest standard deviation of a confirmed place."""
-_VAGUE_M: Final = 80.0
+_VAGUE_M: Final = 120.0
 """No owner is confirmed for a phone whose place, by received powers, has a greater standard deviation than this."""
 _SAMPLES: Final = 6
 """The least number of received powers of a phone for confirming its owner, if `_REPORTERS` nodes have received it."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple, assert_never
 
 from agents.mission.finding.calibration import common_offset, likelihood
+from agents.mission.finding.looked_at import LookedAt
 from agents.mission.finding.phone_localization import AS_ASSUMED, Estimate, PhoneFilter, PhoneModel, PhoneOffset
 from fanet_mw.units import US, Enu, S
 from fanet_mw.wire.survivors import Found, Standing, Survivor, is_person
@@ -42,8 +43,11 @@ class KnownSurvivor:
     inside: Found | None = None
     """The most exact verdict that the survivor is inside a building; nobody need fly there any more."""
     confirmed: Found | None = None
+    looked_at: LookedAt = field(default_factory=LookedAt)
     refuted: list[Found] = field(default_factory=list)
     """The refutations of this survivor, each with the place that was confirmed by mistake, oldest first."""
+    _elsewhere: tuple[tuple[Estimate, int], Estimate] | None = None
+    """The place where cameras have not looked, by which estimate and by what they had shown when it was computed."""
 
     @property
     def verdict(self) -> Found | None:
@@ -67,14 +71,29 @@ class KnownSurvivor:
         return heard is not None and heard.sigma_m <= sigma_m
 
     def place(self) -> Estimate | None:
-        """The confirmed place, otherwise the more exact of the filter's and the announced one; None without any."""
+        """The confirmed place, otherwise the more exact of the own and the announced one, which counts for nothing once
+        cameras have looked there; None without any.
+        """
         if self.confirmed is not None:
             return estimate_of(self.confirmed)
-        own = self.filter.estimate()
+        own = self.own_place()
         if self.announced is None:
             return own
         announced = estimate_of(self.announced)
+        if own is not None and self.looked_at.has_shown(announced.east_m, announced.north_m):
+            return own
         return announced if own is None or announced.sigma_m < own.sigma_m else own
+
+    def own_place(self) -> Estimate | None:
+        """The filter's place; if cameras have looked there and nobody was recognized, where else the phone may be."""
+        own = self.filter.estimate()
+        if own is None or self.filter.is_seen or not self.looked_at.has_shown(own.east_m, own.north_m):
+            return own
+        if self._elsewhere is None or self._elsewhere[0] != (own, self.looked_at.second):
+            at = self.filter.estimate_elsewhere(self.looked_at.has_shown)
+            assert at is not None, "a phone that has a place has probable ones"
+            self._elsewhere = (own, self.looked_at.second), at
+        return self._elsewhere[1]
 
 
 class PhoneLikelihood(NamedTuple):
@@ -88,8 +107,9 @@ class PhoneLikelihood(NamedTuple):
 class KnownSurvivors:
     """All survivors that one UAV has heard of, by id."""
 
-    def __init__(self, model: PhoneModel) -> None:
-        self._model = model
+    def __init__(self, model: PhoneModel, looked_at: LookedAt | None = None) -> None:
+        """`looked_at`: where cameras have looked; None for a node without any."""
+        self._model, self._looked_at = model, looked_at or LookedAt()
         self.by_id: dict[int, KnownSurvivor] = {}
         self.persons: dict[int, Found] = {}
         """The latest verdict on each person who was found without a phone: found, or given up."""
@@ -138,7 +158,7 @@ class KnownSurvivors:
             case Standing.ESTIMATED:
                 outdated = any(found.t_us <= refuted.t_us for refuted in known.refuted)
                 best = known.announced
-                if not outdated and (best is None or estimate_of(found).sigma_m < estimate_of(best).sigma_m):
+                if not outdated and (best is None or _is_better(found, best)):
                     known.announced = found
                 return False
             case _:
@@ -213,7 +233,9 @@ class KnownSurvivors:
         return fresh[:_PASSED_ON]
 
     def _first_heard(self, survivor: int, now_ns: int) -> KnownSurvivor:
-        known = self.by_id[survivor] = KnownSurvivor(PhoneFilter(self._model, self.offset), first_ns=now_ns)
+        known = self.by_id[survivor] = KnownSurvivor(
+            PhoneFilter(self._model, self.offset), looked_at=self._looked_at, first_ns=now_ns
+        )
         return known
 
     def _calibrate(self) -> None:
@@ -244,6 +266,12 @@ def _refute(known: KnownSurvivor, refuted: Found) -> bool:
     known.confirmed = None
     known.filter.on_sighting(None)
     return True
+
+
+def _is_better(found: Found, best: Found) -> bool:
+    """True for a more exact estimate, or for what the same node has learned since."""
+    learned = found.node == best.node and found.t_us > best.t_us
+    return learned or estimate_of(found).sigma_m < estimate_of(best).sigma_m
 
 
 def _refutes(refuted: Found, found: Found) -> bool:

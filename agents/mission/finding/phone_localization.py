@@ -16,7 +16,7 @@ replaces the estimate.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache, reduce
 from itertools import compress
 from operator import add, and_, mul, sub
@@ -50,6 +50,10 @@ _SILENCE_M: Final = 450.0
 """A place without reception is ignored if it is farther than this from the middle of the grid."""
 _NEVER: Final = 0.02
 """The least probability that a phone is not received, however near: missed, or under rubble."""
+_OVERLOOKED: Final = 0.03
+"""The probability that cameras that have looked at a place have not seen who lies there."""
+_CONSIDERED: Final = 16.0
+"""Places less probable than the most probable one by more than this are not considered elsewhere (twice a log)."""
 _STEP_M: Final = 5.0
 """The step of distance in the table of probabilities without reception."""
 _SAME_PLACE_M: Final = 25.0
@@ -195,6 +199,16 @@ class PhoneFilter:
         self._catch_up()
         return self._estimate
 
+    def estimate_elsewhere(self, has_shown: Callable[[float, float], bool]) -> Estimate | None:
+        """The estimate by power if cameras have seen nobody at some places, which they rarely miss (`_OVERLOOKED`)."""
+        if self._seen or not self._middle:
+            return self.estimate()
+        points = [
+            (math.exp(-deficit / 2) * (_OVERLOOKED if has_shown(east_m, north_m) else 1.0), east_m, north_m)
+            for east_m, north_m, deficit in self.likely_cells(_CONSIDERED)
+        ]
+        return weighted(points, grain_m=CELL_M)
+
     def _catch_up(self) -> None:
         """Add the pending samples, in a new grid if the model or the place of the strongest power has changed."""
         if not self._pending and (self._sums or not self._samples):
@@ -300,6 +314,21 @@ class PhoneFilter:
             (ij / total - mean_i * mean_j) * cell2,
             (max(0.0, jj / total - mean_j * mean_j) + quantized) * cell2,
         )
+
+
+def weighted(points: Sequence[tuple[float, float, float]], *, grain_m: float) -> Estimate:
+    """The mean and the covariance of points on the ground, each with its weight, east and north, in a grid."""
+    total = math.fsum(weight for weight, _, _ in points)
+    east = math.fsum(weight * e for weight, e, _ in points) / total
+    north = math.fsum(weight * n for weight, _, n in points) / total
+    grain_m2 = grain_m * grain_m / 12
+    return Estimate(
+        east,
+        north,
+        math.fsum(weight * (e - east) ** 2 for weight, e, _ in points) / total + grain_m2,
+        math.fsum(weight * (e - east) * (n - north) for weight, e, n in points) / total,
+        math.fsum(weight * (n - north) ** 2 for weight, _, n in points) / total + grain_m2,
+    )
 
 
 @lru_cache(maxsize=64)

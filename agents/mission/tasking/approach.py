@@ -6,9 +6,11 @@ the person. The UAV then flies on a circle around it, until the survivor is conf
 """
 
 import math
+from collections.abc import Collection
 from typing import Final
 
 from agents.mission.finding.known_survivors import KnownSurvivors
+from agents.mission.finding.looked_at import LookedAt
 from agents.mission.finding.phone_localization import Estimate, PhoneFilter
 from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.own_motion import OwnMotion
@@ -28,8 +30,6 @@ _IN_VIEW_M: Final = 40.0
 """The greatest radius of the circle around a person: from there a camera still sees the person in its middle."""
 _FIRST_RADIUS_M: Final = 14.0
 """The radius at which spiral and circle begin."""
-_BESIDE_M: Final = 350.0
-"""Others at most this far from the middle of a phone's probable places look there, too."""
 _MEASURED_M: Final = 200.0
 """A responder that is this near to the mean of a vague estimate goes round from one probable place to the next, which
 tells the powers there as well; it has come to no place yet."""
@@ -50,20 +50,24 @@ class Approach:
         *,
         arrival_m: float,
         speed_m_s: float,
-        look_m: float = math.inf,
+        looked_at: LookedAt,
     ) -> None:
-        """`look_m`: how far its camera surely shows people to all sides; infinite without a camera."""
         self._node = node
         self._survivors, self._own_motion, self._neighbors = survivors, own_motion, neighbors
         self._outbox = outbox
         self._arrival_m = arrival_m
         self._along_m_s = _SPEED_SHARE * speed_m_s
-        self.look_around = LookAround(look_m)
+        self._look_around = LookAround(looked_at)
+        self._others: Collection[int] = ()
         self.arrived_ns: dict[int, int] = {}
 
     def forget(self, survivor: int) -> None:
         """Begin an approach anew: the place has proved wrong, or was reached in passing or for an earlier task."""
         self.arrived_ns.pop(survivor, None)
+
+    def share(self, others: Collection[int]) -> None:
+        """These UAVs respond to the same survivor: each looks at the places nearer to it."""
+        self._others = others
 
     def next_point(self, survivor: int, place: Estimate, now_ns: int, *, responding: bool) -> tuple[float, float]:
         """East and north of the point to fly to: the estimated `place`, another probable one, then a point on spiral or
@@ -95,9 +99,9 @@ class Approach:
 
     def _place_to_look_at(self, survivor: int, phone: PhoneFilter, now_ns: int) -> tuple[float, float] | None:
         """East and north of the next place at which nobody has looked yet; None if there is none."""
-        motions = self._neighbors.all(now_ns=now_ns)
-        others = [at for motion in motions if phone.near(at := motion.position_at(now_ns), within_m=_BESIDE_M)]
-        return self.look_around.next_place(survivor, phone, self._own_motion.position, now_ns, others=others)
+        motions = self._neighbors.by_node(now_ns=now_ns)
+        others = [motion.position_at(now_ns) for node, motion in motions if node in self._others]
+        return self._look_around.next_place(survivor, phone, self._own_motion.position, now_ns, others=others)
 
     def _turned_rad(self, radius: float) -> float:
         """The spiral's angle at a radius: at `_TURN_PER_S` while the UAV keeps up, farther out as fast as it flies."""

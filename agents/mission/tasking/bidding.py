@@ -151,8 +151,12 @@ class Bidding:
                 measures_ns = _MEASURES_NS if place is not None and place.sigma_m > VAGUE_M else 0
                 self._due_ns = now_ns + measures_ns
                 self._due_ns += round(distance_m / self._cruise_m_s * S) if math.isfinite(distance_m) else 0
-        if self.survivor is not None and not self._announced:
-            self._announce(self.survivor, now_ns)
+        if self.survivor is not None:
+            known = self._survivors.by_id[self.survivor]
+            others = self._auction.winners(self.survivor, count=self._wanted(known, now_ns), now_ns=now_ns)
+            self._approach.share([node for node in others if node != self._node])
+            if not self._announced:
+                self._announce(self.survivor, now_ns)
 
     def _reconsider(self, survivor: int, now_ns: int) -> None:
         """Give up the present survivor if the auction is lost, it takes too long, or it is not permitted any more; but

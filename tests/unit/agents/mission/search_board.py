@@ -4,6 +4,7 @@ import math
 
 from agents.mission.finding.announcing import Announcing
 from agents.mission.finding.known_survivors import KnownSurvivors
+from agents.mission.finding.looked_at import LookedAt
 from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, PhoneModel
 from agents.mission.flight.goal import Goal
 from agents.mission.navigation.known_obstacles import KnownObstacles
@@ -47,7 +48,15 @@ FOLLOWER, LINE = NodeId(COUNT), NodeId(5)
 class Board:
     """The parts of one UAV, wired as in a search."""
 
-    def __init__(self, node: NodeId, at: Enu, *, plan: Search | None = PLAN, connection: Connection = "always") -> None:
+    def __init__(
+        self,
+        node: NodeId,
+        at: Enu,
+        *,
+        plan: Search | None = PLAN,
+        connection: Connection = "always",
+        looked_at: LookedAt | None = None,
+    ) -> None:
         self.out = Outbox()
         self.survivors = KnownSurvivors(MODEL)
         self.own_motion, self.neighbors = OwnMotion(at, OPEN), NeighborMotions()
@@ -55,8 +64,9 @@ class Board:
         if plan is not None:
             self.place.adopt(plan, 0)
         self.approach = Approach(
-            node, self.survivors, self.own_motion, self.neighbors, self.out, arrival_m=30, speed_m_s=10.0
-        )
+            node, self.survivors, self.own_motion, self.neighbors, self.out,
+            arrival_m=30, speed_m_s=10.0, looked_at=looked_at or LookedAt(),
+        )  # fmt: skip
         absence = Absence(self.place, connection, speed_m_s=10.0)
         self.tasks = Bidding(
             SCENARIO, node, survivors=self.survivors, own_motion=self.own_motion, formation=self.place,

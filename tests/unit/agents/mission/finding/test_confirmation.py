@@ -86,4 +86,4 @@ def test_each_condition_of_a_confirmation_is_needed_and_holds_at_its_bound() -> 
     assert not is_confirmable(seen_often(close=1), phone), "seen from close by once only"
     assert not is_confirmable(seen_often(evidence=17.9), phone), "not proven"
     assert not is_confirmable(seen_often(sigma_m=3.51), phone), "the place of the person is vague"
-    assert not is_confirmable(seen_often(), heard(powers=6, reporters=2, sigma_m=80.1)), "that of the phone is"
+    assert not is_confirmable(seen_often(), heard(powers=6, reporters=2, sigma_m=120.1)), "that of the phone is"

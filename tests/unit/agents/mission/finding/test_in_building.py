@@ -48,9 +48,16 @@ def test_who_was_not_seen_from_two_sides_is_more_surely_inside_than_from_one() -
 
 
 def test_a_phone_beside_a_building_or_heard_too_little_is_in_none() -> None:
-    assert place_in_building(heard_around(Enu(48, -40, 0)), MAP, lambda *_: 2) is None
+    assert place_in_building(heard_around(Enu(48, -40, 0)), MAP, lambda *_: 1) is None
     assert place_in_building(heard_around(Enu(8, 6, 0), angles=range(0, 80, 40)), MAP, lambda *_: 2) is None
     assert place_in_building(heard_around(Enu(8, 6, 0)), NO_MAP, lambda *_: 2) is None
+
+
+def test_where_nobody_was_seen_from_two_sides_is_a_building_that_the_map_lacks() -> None:
+    place = place_in_building(heard_around(Enu(48, -40, 0)), MAP, lambda *_: 2)
+    assert place is not None
+    assert place.distance_m(Enu(48, -40, 0)) < 15
+    assert place_in_building(heard_around(Enu(48, -40, 0)), MAP, lambda east, _: 2 * (east < 60)) is None
 
 
 def test_who_is_inside_a_building_is_sought_no_more_and_is_confirmed_if_seen_after_all() -> None:

@@ -49,7 +49,7 @@ class Uav:
     def estimate(self, sigma_m: float) -> None:
         place = Estimate(0.0, 0.0, sigma_m**2, 0.0, 0.0)
         heard = SimpleNamespace(
-            estimate=lambda: place, on_sighting=lambda _: None, calibrate=lambda _: None, readings=[]
+            estimate=lambda: place, is_seen=False, on_sighting=lambda _: None, calibrate=lambda _: None, readings=[]
         )
         self.survivors.by_id[1] = KnownSurvivor(cast("PhoneFilter", heard))
 

@@ -5,8 +5,12 @@ from itertools import pairwise
 
 from search_board import FOLLOWER, UP_M, Board
 
+from agents.mission.finding.looked_at import LookedAt
 from agents.mission.finding.phone_localization import Estimate
-from fanet_mw.units import Enu, S
+from fanet_mw.motion import Motion
+from fanet_mw.units import STILL, Enu, S
+from fanet_mw.wire.bids import Bid
+from fanet_mw.wire.survivors import Survivor
 
 
 def test_around_an_estimate_the_spiral_widens_until_somebody_is_seen() -> None:
@@ -35,3 +39,28 @@ def test_a_uav_can_keep_up_with_the_spiral_that_it_is_to_fly() -> None:
     around = [math.atan2(north - place.north_m, east - place.east_m) for east, north in way]
     turned = sum((after - before) % (2 * math.pi) for before, after in pairwise(around))
     assert turned > 2 * math.pi, "it has looked in every direction before it gives up"
+
+
+def test_a_responder_leaves_places_to_another_responder_and_not_to_a_passer_by() -> None:
+    here, later_ns = Enu(0, 0, UP_M), 5 * S
+
+    def looks_at(other: Enu | None, bids: list[Bid]) -> tuple[float, float]:
+        looked_at = LookedAt(36.0, height_m=UP_M)
+        looked_at.note(here, 0)
+        board = Board(FOLLOWER, here, plan=None, looked_at=looked_at)
+        if other is not None:
+            board.neighbors.on_hello(3, Motion(other, STILL, later_ns))
+        board.survivors.take_report(Survivor(0, 1, FOLLOWER, here, -88.0), now_ns=0)
+        board.tasks.merge(bids, now_ns=later_ns)
+        board.tasks.bid(later_ns)
+        board.tasks.choose(later_ns)
+        place = board.survivors.by_id[1].place()
+        assert board.tasks.survivor == 1
+        assert place is not None
+        return board.approach.next_point(1, place, later_ns, responding=True)
+
+    alone = looks_at(None, [])
+    beside = Enu(alone[0] / 2, alone[1] / 2, UP_M)
+    assert looks_at(beside, []) == alone
+    shared = looks_at(beside, [Bid(1, 3, 10, 1, 0)])
+    assert math.dist(shared, alone) > math.hypot(*alone)

@@ -1,0 +1,68 @@
+"""Where the cameras of the swarm have looked lately: whoever was not seen there is probably somewhere else.
+
+Each UAV notes what its own camera shows and, by their hellos, what those of its neighbors show. A place counts as shown
+after some seconds of images, which together hardly miss anybody who lies in the open, and for two minutes: whoever
+walks may be there later. From how many sides it was shown tells whether a wall may hide somebody (`in_building.py`).
+"""
+
+import math
+from typing import Final
+
+from fanet_mw.units import Enu, S
+
+_CELL_M: Final = 20.0
+"""The side of the cells in which it is noted where cameras have looked."""
+_REMEMBERED_NS: Final = 120 * S
+_LOOKS: Final = 3
+"""A place is shown after this number of looks, which are noted once a second."""
+
+
+class LookedAt:
+    """The places that cameras have shown, by cell."""
+
+    def __init__(self, look_m: float = math.inf, *, height_m: float = 1.0) -> None:
+        """`look_m`: how far a camera at `height_m` above ground surely shows people to all sides; infinite: none."""
+        self._look_m, self._per_m = look_m, look_m / max(1.0, height_m)
+        self._cells: dict[tuple[int, int], tuple[int, int, int]] = {}
+        """Of each cell, when a camera showed it last, how often lately, and from which of four sides, as bits."""
+        self._now_ns = 0
+
+    @property
+    def has_camera(self) -> bool:
+        return math.isfinite(self._look_m)
+
+    @property
+    def second(self) -> int:
+        """Grows as cameras show more."""
+        return self._now_ns // S
+
+    def note(self, at: Enu, now_ns: int) -> None:
+        """A camera is at this position, its height above ground, and shows what is below."""
+        self._now_ns = max(self._now_ns, now_ns)
+        if not self.has_camera:
+            return
+        look_m = min(self._look_m, at.up * self._per_m)
+        column, row, reach = *_cell(at.east, at.north), math.ceil(look_m / _CELL_M)
+        for i in range(column - reach, column + reach + 1):
+            east_m = i * _CELL_M - at.east
+            for j in range(row - reach, row + reach + 1):
+                north_m = j * _CELL_M - at.north
+                if east_m * east_m + north_m * north_m <= look_m * look_m:
+                    _, looks, sides = self._lately((i, j))
+                    self._cells[i, j] = now_ns, looks + 1, sides | 1 << (2 * (east_m > 0) + (north_m > 0))
+
+    def has_shown(self, east_m: float, north_m: float) -> bool:
+        """True if a person in the open there would have been seen lately."""
+        return self._lately(_cell(east_m, north_m))[1] >= _LOOKS
+
+    def sides(self, east_m: float, north_m: float) -> int:
+        """From how many of four sides cameras have shown a place lately."""
+        return self._lately(_cell(east_m, north_m))[2].bit_count()
+
+    def _lately(self, cell: tuple[int, int]) -> tuple[int, int, int]:
+        looked_ns, looks, sides = self._cells.get(cell, (self._now_ns - _REMEMBERED_NS, 0, 0))
+        return (looked_ns, looks, sides) if self._now_ns - looked_ns < _REMEMBERED_NS else (self._now_ns, 0, 0)
+
+
+def _cell(east_m: float, north_m: float) -> tuple[int, int]:
+    return round(east_m / _CELL_M), round(north_m / _CELL_M)

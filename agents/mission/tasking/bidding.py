@@ -3,7 +3,7 @@
 the survivor is heard                    an auction for one responder, the nearest UAV that may leave
 enough UAVs have reported the survivor   an auction for as many responders as the scenario wants
 too few have, after a while              an auction for one more UAV that has not, to get another bearing
-before the sweep                         any UAV may respond that is at its place nearly in time
+before the sweep                         any UAV may respond that is at its place nearly in time, to a vague place more
 a responder does not find the survivor   it withdraws its bid after a while
 a responder does not come to the place   it withdraws its bid, a while after it should have been there
 """
@@ -55,6 +55,9 @@ _LEAVES_S: Final = 10.0
 """By how much later a UAV that would leave its team bids, so that one goes that is free."""
 _ABSENT: Final = 1
 """The number of UAVs that may leave the formation for a survivor."""
+_BEFORE_SWEEP: Final = 2
+"""So many times the responders may go to a vague place before the sweep, when UAVs have nothing else to do: powers from
+more places tell where it is."""
 _ABSENT_VAGUE: Final = 2
 """The same where the powers do not tell the place yet: two that look on different sides need half the time."""
 
@@ -244,6 +247,9 @@ class Bidding:
 
     def _wanted(self, known: KnownSurvivor, now_ns: int) -> int:
         """The number of UAVs that a survivor needs now."""
+        place = known.place()
+        if not self._formation.is_taken_up(now_ns) and (place is None or place.sigma_m > VAGUE_M):
+            return _BEFORE_SWEEP * self._config.responders
         if len(known.reporters) >= self._config.reports_to_approach:
             return self._config.responders
         if now_ns - known.first_ns < _SCOUT_AFTER_NS:

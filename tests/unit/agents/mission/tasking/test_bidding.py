@@ -4,8 +4,9 @@ import pytest
 from search_board import FOLLOWER, LINE, TAKEN_UP_NS, UP_M, Board, lane_of
 
 from fanet_mw.trace import Approaching, Arrived, Located
-from fanet_mw.units import Enu, S
+from fanet_mw.units import US, Enu, S
 from fanet_mw.wire.bids import Bid
+from fanet_mw.wire.survivors import Survivor
 
 NOW_NS = TAKEN_UP_NS + 20 * S
 
@@ -154,6 +155,24 @@ def test_a_responder_that_does_not_come_in_time_takes_its_bid_back() -> None:
     board.tasks.bid(later_ns)
     assert board.tasks.survivor is None
     assert [bid.eta_ds for bid in board.tasks.bids_to_tell(now_ns=later_ns)] == [0xFFFF]
+
+
+@pytest.mark.parametrize(("plan", "located", "most"), [(False, False, 6), (False, True, 3), (True, False, 3)])
+def test_before_the_sweep_twice_as_many_go_to_a_vague_place(plan: bool, located: bool, most: int) -> None:
+    at, now_ns = lane_of(FOLLOWER, NOW_NS), NOW_NS if plan else 0
+    for others in (most - 1, most):
+        board = Board(FOLLOWER, at) if plan else Board(FOLLOWER, at, plan=None)
+        for reporter, east_m in ((2, -60), (3, 60), (4, 20), (5, -20)) if located else ((2, 0), (3, 0), (4, 0)):
+            board.survivors.take_report(
+                Survivor(now_ns // US, 1, reporter, Enu(at.east + east_m, at.north + 5 * reporter, UP_M), -79.0),
+                now_ns=now_ns,
+            )
+        place = board.survivors.by_id[1].place()
+        assert place is not None
+        assert (place.sigma_m <= 50) == located
+        board.tasks.merge([Bid(1, 30 + other, 1, 1) for other in range(others)], now_ns=now_ns)
+        board.tasks.bid(now_ns)
+        assert (FOLLOWER in {bid.bidder for bid in board.tasks.bids_to_tell(now_ns=now_ns)}) == (others < most)
 
 
 TURNED_NS = TAKEN_UP_NS + 200 * S

@@ -40,6 +40,8 @@ LEAST: Final = 8
 LIMIT_S: Final = 300.0
 USAGE: Final = 4
 """The exit code of pytest for a test that is not there."""
+_CRASHES: Final = (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT)
+"""The signals that a process gets for what it has done itself."""
 OF_COMPILED: Final = ("tests/unit/emulator", "tests/integration/test_medium_fuzz.py")
 _COMPARED: Final = {ast.Lt: "<=", ast.LtE: "<", ast.Gt: ">=", ast.GtE: ">", ast.Eq: "!=", ast.NotEq: "==",
                     ast.Is: "is not", ast.IsNot: "is", ast.In: "not in", ast.NotIn: "in"}  # fmt: skip
@@ -222,6 +224,10 @@ class Coverage:
             chosen.append(name)
         return chosen
 
+    def longest_s(self, tests: Sequence[str]) -> float:
+        """After this time a test has not only been slow, but hangs."""
+        return 30.0 + 8.0 * max(map(self._took_s.__getitem__, tests))
+
 
 class Judge:
     """Says of bugs what the tests say."""
@@ -234,10 +240,15 @@ class Judge:
         """`caught`, `survived`, `never run`, or why it cannot be said; and the time."""
         began_s = time.monotonic()
         uncompiled = is_compiled((ROOT / bug.path).read_text(encoding="utf-8"), bug.path)
-        tests = (self._uncompiled if uncompiled else self._coverage).tests_of(bug, self._budget_s)
-        return self._verdict(bug, tests, began_s, uncompiled=uncompiled) if tests else ("never run", 0.0)
+        coverage = self._uncompiled if uncompiled else self._coverage
+        tests = coverage.tests_of(bug, self._budget_s)
+        if not tests:
+            return "never run", 0.0
+        return self._verdict(bug, tests, began_s, longest_s=coverage.longest_s(tests), uncompiled=uncompiled)
 
-    def _verdict(self, bug: Bug, tests: Sequence[str], began_s: float, *, uncompiled: bool) -> tuple[str, float]:
+    def _verdict(
+        self, bug: Bug, tests: Sequence[str], began_s: float, *, longest_s: float, uncompiled: bool
+    ) -> tuple[str, float]:
         module = bug.path.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
         change = json.dumps({"module": module, "begin": bug.begin, "end": bug.end, "new": bug.new})
         environment = {**os.environ, "FANET_MUTANT": change, "PYTHONPATH": str(HERE / "hook")}
@@ -245,6 +256,8 @@ class Judge:
         if uncompiled:
             environment["FANET_NO_NUMBA"] = "1"
         command = [sys.executable, "-m", "pytest", "-x", "-q", "-m", "not slow", "-p", "no:cacheprovider"]
+        # an exception in a loop without end would only end the test if nothing catches it
+        command += [f"--timeout={longest_s:.0f}", "--timeout-method=thread"]
         # pytest would load what it rewrites itself
         command += ["--hypothesis-profile=mutants", "--assert=plain", *tests]
         child = subprocess.Popen(
@@ -262,11 +275,17 @@ class Judge:
             return "survived", took_s
         if child.returncode == USAGE and any("[" in test for test in tests):  # parameters have changed since
             whole = sorted({test.partition("[")[0] for test in tests})
-            return self._verdict(bug, whole, began_s, uncompiled=uncompiled)
-        cannot_be_imported = any(text in said for text in ("ERROR collecting", "ImportError", "conftest"))
-        if child.returncode in (1, 2) or cannot_be_imported:
-            return "caught", took_s
-        return f"not judged: {said[-300:]}", took_s
+            return self._verdict(bug, whole, began_s, longest_s=longest_s, uncompiled=uncompiled)
+        return ("caught" if is_noticed(child.returncode, said) else f"not judged: {said[-300:]}"), took_s
+
+
+def is_noticed(returncode: int, said: str) -> bool:
+    """True for a run of tests that has failed, could not begin, or has crashed, as compiled code with a bug may."""
+    return (
+        -returncode in _CRASHES
+        or returncode in (1, 2)
+        or any(text in said for text in ("ERROR collecting", "ImportError", "conftest"))
+    )
 
 
 @cache

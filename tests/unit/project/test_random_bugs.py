@@ -2,11 +2,12 @@
 
 import ast
 import random
+import signal
 
 import pytest
 
 from tests.mutants.blocks import blocks_of
-from tests.mutants.random_bugs import LEAST, ROOT, Bug, Coverage, all_bugs, interval
+from tests.mutants.random_bugs import LEAST, ROOT, USAGE, Bug, Coverage, all_bugs, interval, is_noticed
 
 SOURCE = """
 def first(x):
@@ -44,6 +45,15 @@ def test_the_shortest_tests_that_run_a_block_try_its_bugs_until_the_budget_is_sp
     assert len(coverage.tests_of(bug, 1.0)) == LEAST
     assert coverage.tests_of(bug._replace(block=""), 10.0)[0] == f"{here}[1]", "a constant: all of its file"
     assert coverage.tests_of(bug._replace(block="h.1.0"), 10.0) == []
+
+
+def test_a_run_of_tests_that_crashes_has_noticed_the_bug() -> None:
+    assert is_noticed(-signal.SIGSEGV, "")
+    assert is_noticed(1, "1 failed")
+    assert is_noticed(USAGE, "ImportError while loading conftest")
+    assert not is_noticed(0, "1 passed")
+    assert not is_noticed(-signal.SIGKILL, ""), "somebody else has ended it"
+    assert not is_noticed(USAGE, "no such test")
 
 
 def test_a_share_has_wilsons_interval() -> None:

@@ -4,9 +4,12 @@ from collections.abc import Callable
 
 import pytest
 from aodv_bench import ANSWER, ASK, ERROR, MakeBench, active, answer, ask, benches, errors, hellos, replies, route
+from hypothesis import given
+from hypothesis import strategies as st
 
 from fanet_mw.routing.aodv import parameters as p
 from fanet_mw.routing.aodv.messages import RouteError, RouteReply, Unreachable
+from fanet_mw.routing.aodv.neighbors import HelloNeighbors
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, S
 
@@ -78,6 +81,37 @@ def test_6_9_a_neighbor_whose_hellos_stop_is_lost_after_the_allowed_loss(bench: 
     assert active(found, 1, 9) == (7, 3)
     found.advance(200 * MS)
     assert active(found, 1, 9) is None
+
+
+@given(
+    st.lists(
+        st.tuples(st.sampled_from(["hello", "packet", "forget", "look"]), st.integers(1, 2), st.integers(0, 3)),
+        min_size=20,
+    )
+)
+def test_6_9_only_hellos_make_neighbors_and_silence_ends_them(events: list[tuple[str, int, int]]) -> None:
+    """As by looking at all of them at each instant; `next_ns` never lets a loss pass."""
+    known, ends_ns, now_ns = HelloNeighbors(), dict[int, int](), 0
+    for event, node, steps in events:
+        now_ns += steps * p.NEIGHBOR_LIFETIME_NS // 4
+        gone = {node for node, end_ns in ends_ns.items() if end_ns <= now_ns}
+        due_ns = known.next_ns()
+        assert not gone or (due_ns is not None and due_ns <= now_ns)
+        assert known.lost(now_ns) == sorted(gone)
+        ends_ns = {node: end_ns for node, end_ns in ends_ns.items() if node not in gone}
+        match event:
+            case "hello":
+                known.on_hello(node, now_ns=now_ns)
+                ends_ns[node] = now_ns + p.NEIGHBOR_LIFETIME_NS
+            case "packet":
+                known.on_packet(node, now_ns=now_ns)
+                if node in ends_ns:
+                    ends_ns[node] = now_ns + p.NEIGHBOR_LIFETIME_NS
+            case "forget":
+                known.forget(node)
+                ends_ns.pop(node, None)
+        due_ns = known.next_ns()
+        assert due_ns is None or due_ns > now_ns, "all that were due have been looked at"
 
 
 # --- 6.11 errors ------------------------------------------------------------------------------------------------------

@@ -57,6 +57,19 @@ def test_rays_maps_and_the_mesh_meet_the_ground_where_it_is(hills: Hills, seed: 
 
 
 @quick
+@given(terrains)
+def test_the_mesh_covers_everything_once_and_faces_up(hills: Hills) -> None:
+    corners, triangles = hills.mesh()
+    assert set(triangles.ravel().tolist()) == set(range(len(corners)))
+    a, b, c = (corners[triangles[:, n]] for n in range(3))
+    up = np.cross(b - a, c - a)[:, 2] / 2
+    assert (up > 0).all()
+    east_m, north_m = np.ptp(corners[:, 0]), np.ptp(corners[:, 1])
+    assert up.sum() == pytest.approx(east_m * north_m, rel=1e-9)
+    assert min(east_m, north_m) > 2000, "and goes on beyond the map"
+
+
+@quick
 @given(terrains, st.integers(0, 99))
 def test_a_slanting_ray_is_blocked_where_a_fine_scan_of_it_is_below_the_ground(hills: Hills, seed: int) -> None:
     solids = Solids(Obstacles(hills, ()))

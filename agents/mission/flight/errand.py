@@ -27,7 +27,10 @@ class Errand:
     ) -> None:
         self._orders, self._own_motion = orders, own_motion
         self._height_m, self._speed_m_s = height_m, speed_m_s
-        self._pitch_m = _PITCH * (_BLIND_M if math.isinf(look_m) else look_m)
+        sees_m = _BLIND_M if math.isinf(look_m) else look_m
+        self._pitch_m = _PITCH * sees_m
+        self._beyond_m = self._pitch_m - sees_m
+        """How far the spiral leads beyond the ordered radius: the turn before its last must see as far as there."""
         self._order: Order | None = None
         self._there_ns: int | None = None
 
@@ -44,8 +47,8 @@ class Errand:
             self._there_ns = now_ns
         if order.kind is OrderKind.STAY or self._there_ns is None:
             return middle
-        whole_s = math.pi * order.radius_m**2 / (self._pitch_m * self._speed_m_s)
-        searched_s = ((now_ns - self._there_ns) / S) % max(1.0, whole_s)
+        whole_s = math.pi * (order.radius_m + self._beyond_m) ** 2 / (self._pitch_m * self._speed_m_s)
+        searched_s = ((now_ns - self._there_ns) / S) % whole_s
         radius_m = math.sqrt(self._pitch_m * self._speed_m_s * searched_s / math.pi)
         angle = math.tau * radius_m / self._pitch_m
         return Enu(middle.east + radius_m * math.sin(angle), middle.north + radius_m * math.cos(angle), middle.up)

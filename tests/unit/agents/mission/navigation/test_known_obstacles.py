@@ -158,6 +158,55 @@ def test_a_way_leads_over_free_cells_only_from_each_to_one_beside_it(walls: set[
     assert all(max(abs(a[0] - b[0]), abs(a[1] - b[1])) == 1 for a, b in itertools.pairwise(way))
 
 
+def shortest_m(walls: set[tuple[int, int]], start: tuple[int, int], goal: tuple[int, int]) -> float:
+    """The length of the shortest way over free cells, found by looking until nothing changes (Bellman-Ford)."""
+    far = {start: 0.0}
+    changed = [start]
+    while changed:
+        here = changed.pop(0)
+        for east, north in itertools.product((-1, 0, 1), repeat=2):
+            there = here[0] + east, here[1] + north
+            if there in walls or max(abs(there[0]), abs(there[1])) > 13:
+                continue
+            if far[here] + math.hypot(east, north) < far.get(there, math.inf) - 1e-9:
+                far[there] = far[here] + math.hypot(east, north)
+                changed.append(there)
+    return far[goal]
+
+
+@examples(20)
+@given(st.sets(st.tuples(st.integers(-6, 6), st.integers(-6, 6)), max_size=100), st.integers(0, 3))
+def test_no_way_over_free_cells_is_shorter(walls: set[tuple[int, int]], quarter: int) -> None:
+    """From each of the four sides, so that ways lead in all directions."""
+    start, goal = [((-12, 1), (12, 0)), ((1, -12), (0, 12)), ((12, 3), (-12, 0)), ((0, 12), (4, -12))][quarter]
+    way = way_around(middle_of(start), goal, walls.__contains__, most_cells=5000)
+    length = sum(math.dist(a, b) for a, b in itertools.pairwise(way))
+    assert length == pytest.approx(shortest_m(walls, start, goal))
+
+
+def room(size: int) -> set[tuple[int, int]]:
+    """Walls so far from the start on all sides, which stands at (20, -30)."""
+    cells = itertools.product(range(-size, size + 1), repeat=2)
+    return {(20 + c, r - 30) for c, r in cells if max(abs(c), abs(r)) == size}
+
+
+def test_walls_around_the_start_are_left_where_that_is_shortest() -> None:
+    """Wherever the start is; a cell of a wall costs as much as four free ones."""
+    for size in (1, 3, 4):
+        for goal in ((32, -30), (8, -30), (20, -18), (20, -42)):
+            way = way_around(middle_of((20, -30)), goal, room(size).__contains__, most_cells=5000)
+            assert len(room(size).intersection(way)) == 1, (size, goal)
+            assert sum(math.dist(a, b) for a, b in itertools.pairwise(way)) == pytest.approx(12)
+    with_door = room(3) - {(20, -27)}
+    way = way_around(middle_of((20, -30)), (24, -26), with_door.__contains__, most_cells=5000)
+    assert not with_door.intersection(way), "through the door, which costs less than the wall"
+
+
+def test_nobody_flies_through_walls_five_cells_off() -> None:
+    for goal in ((32, -30), (8, -30), (20, -18), (20, -42)):
+        assert way_around(middle_of((20, -30)), goal, room(5).__contains__, most_cells=5000) == []
+
+
 def test_of_two_ways_the_shorter_one_is_taken() -> None:
     wall = {(0, row) for row in range(-2, 9)}
     way = way_around(middle_of((-5, 0)), (5, 0), wall.__contains__, most_cells=5000)

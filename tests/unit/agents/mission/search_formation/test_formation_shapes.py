@@ -88,6 +88,15 @@ def test_nobody_jumps_and_whoever_sweeps_flies_no_faster_than_a_way_back(pattern
 
 
 @given(anyone, st.floats(0, 2000))
+def test_a_place_has_the_velocity_at_which_its_lane_just_moved(pattern: Pattern, swept_s: float) -> None:
+    begun_s = max(swept_s, 0.05)
+    for place in range(pattern.places):
+        moved = pattern.shape.at(place, begun_s).minus(pattern.shape.at(place, begun_s - 0.05))
+        assert pattern.velocity(place, swept_s).minus(Enu(*(20 * part for part in moved))).norm() < 1e-6, place
+        assert pattern.velocity(place, -0.01) == Enu(0, 0, 0), "nobody moves before the sweep"
+
+
+@given(anyone, st.floats(0, 2000))
 def test_neighbors_of_a_line_stay_in_reach_of_each_other(pattern: Pattern, swept_s: float) -> None:
     for place in range(pattern.dimensions.fixed - pattern.dimensions.relays):
         for other in set(pattern.shape.tethers(place)) & set(pattern.line(place)):

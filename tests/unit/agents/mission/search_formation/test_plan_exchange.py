@@ -9,7 +9,7 @@ from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.navigation.silent_neighbors import SilentNeighbors
 from agents.mission.outbox import Outbox
 from agents.mission.search_formation.formation_place import FormationPlace
-from agents.mission.search_formation.formation_planner import FormationPlanner
+from agents.mission.search_formation.formation_planner import STATUS_S, FormationPlanner
 from agents.mission.search_formation.plan_exchange import PlanExchange
 from agents.mission.search_formation.roll_call import RollCall
 from fanet_mw.errors import MalformedFrameError
@@ -55,6 +55,17 @@ def test_it_is_absent_from_when_it_goes_until_it_is_near_its_place_again() -> No
     exchange.motion.position = there._replace(north=there.north - 130)
     exchange.plans.be_absent(80, NOW_NS, goes=False)
     assert [status.absent for status in exchange.said()] == [True, False]
+
+
+def test_a_status_goes_out_the_instant_it_is_due() -> None:
+    exchange = Exchange(LINE, waits=0.25)
+    exchange.plans.start(NOW_NS)
+    for due_ns in (NOW_NS + S // 2, NOW_NS + S // 2 + round(0.9 * STATUS_S * S)):
+        exchange.plans.review(80, due_ns - 1)
+        assert exchange.said() == []
+        exchange.plans.review(80, due_ns)
+        (status,) = exchange.said()
+        assert (status.t_us, status.node, status.charge) == (due_ns // US, LINE, 80)
 
 
 def test_the_others_close_ranks_while_it_is_absent() -> None:

@@ -50,6 +50,20 @@ def test_a_uav_of_a_line_turns_back_for_a_survivor_where_no_connection_is_asked(
         assert (bids_of(board, behind(LINE, 300), NOW_NS).survivor == 1) == goes
 
 
+@pytest.mark.parametrize("connection", ["always", 30, "none"])
+def test_who_goes_to_nobody_is_not_absent_wherever_it_is(connection: Connection) -> None:
+    board = Board(LINE, behind(LINE, 400), connection=connection)
+    assert board.tasks.survivor is None
+    assert not board.tasks.is_absent(NOW_NS)
+
+
+def test_who_may_not_be_absent_never_is_even_out_of_bounds() -> None:
+    board = Board(LINE, lane_of(LINE, NOW_NS), connection="always")
+    tasks = bids_of(board, behind(LINE, 60), NOW_NS)
+    assert tasks.survivor == 1
+    assert not tasks.is_absent(NOW_NS + 60 * S), "the line is 450 m farther, and it has not yet reconsidered"
+
+
 def test_whom_the_line_will_pass_nobody_leaves_it_for() -> None:
     board = Board(LINE, lane_of(LINE, NOW_NS), connection="none")
     tasks = bids_of(board, behind(LINE, -300), NOW_NS)

@@ -18,6 +18,7 @@ _HAS_SIGNAL: Final = 1 << 5
 _HAS_POWER: Final = 1 << 10
 _ACK_BITS: Final = 0xD4
 _FCS_BYTES: Final = 4
+_ACK_BYTES: Final = 10 + _FCS_BYTES
 _BEFORE_FRAME: Final = 24 + 8 + 20 + 8
 """The headers of 802.11, LLC, IP and UDP before a frame of the swarm."""
 _MOST_BYTES: Final = 1 << 16
@@ -65,9 +66,19 @@ def _records(file: BinaryIO, path: Path, epoch_unix_ns: int) -> Iterator[AirFram
             raise ConfigError(f"{path}: is cut off at byte {at}")
         seconds, rest_ns, size, _ = _RECORD.unpack(head)
         data = file.read(size) if size <= _MOST_BYTES else b""
-        if len(data) < size or size < _TAP.size + 10:
+        if len(data) < size or not _is_whole(data):
             raise ConfigError(f"{path}: is cut off, or no capture of this program, at byte {at}")
         yield _frame(data, seconds * S + rest_ns - epoch_unix_ns)
+
+
+def _is_whole(data: bytes) -> bool:
+    """True if an ACK, or a frame with all the headers before it, follows radiotap's fields."""
+    if len(data) < _TAP.size:
+        return False
+    length = _TAP.unpack_from(data)[2]
+    mac = data[length:]
+    least = _ACK_BYTES if mac[:1] == bytes([_ACK_BITS]) else _BEFORE_FRAME + _FCS_BYTES
+    return length > _TAP.size and len(mac) >= least
 
 
 def _frame(data: bytes, t_ns: int) -> AirFrame:

@@ -20,6 +20,7 @@ from test_medium_timelines import ACK_NS, DIFS_NS, FRAME_NS, PAYLOAD, SIFS_NS, A
 from emulator.medium import Medium
 from emulator.pcap import Pcap, checksum
 from emulator.pcap_file import PcapFile, unused
+from emulator.pcap_reader import AirFrame, frames_of
 from fanet_mw import mavlink, wire
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import ConfigError
@@ -354,3 +355,77 @@ def test_sequence_numbers_are_given_at_the_first_transmission_and_kept_by_retrie
     numbers = [int.from_bytes(frame[22:24], "little") >> 4 for frame in frames]
     assert numbers == [0, 0, 0, 1, 0]
     assert [bool(frame[1] & 0x08) for frame in frames] == [False, True, True, False, False]
+
+
+# --- read back --------------------------------------------------------------------------------------------------------
+
+EPOCH_NS = 1_700_000_000 * S
+nodes = st.integers(1, 0xFFFE)
+records = st.one_of(
+    st.tuples(
+        st.just("sent"), nodes, st.one_of(nodes, st.just(BROADCAST)), st.integers(1, 7),
+        st.one_of(st.binary(max_size=40), st.just(bytes(2304))),
+    ),
+    st.tuples(st.just("ack"), nodes, nodes),
+    st.tuples(st.just("received"), nodes, st.one_of(nodes, st.just(BROADCAST)), nodes, st.integers(-120, 20)),
+)  # fmt: skip
+
+
+@given(st.lists(st.tuples(st.integers(0, 10**10), records), max_size=8), st.booleans())
+def test_the_reader_finds_what_was_captured(
+    tmp_path_factory: pytest.TempPathFactory, happened: list[tuple[int, tuple]], has_powers: bool
+) -> None:
+    """Sequence numbers are left out: nobody reads them."""
+    path = tmp_path_factory.mktemp("capture") / "air.pcap"
+    expected = []
+    with path.open("wb") as file:
+        radio = Radio(channel="log_distance" if has_powers else "range")
+        pcap = Pcap(file.write, radio, receptions=True)
+        pcap.epoch_unix_ns = EPOCH_NS
+        for t_ns, (what, *of) in happened:
+            match what:
+                case "sent":
+                    src, dst, attempt, payload = of
+                    pcap.transmitted(t_ns, src, dst, 7, payload, attempt)
+                    to = None if dst == BROADCAST else dst
+                    expected.append(AirFrame(t_ns, "sent", src, to, None, len(payload), attempt, None, payload))
+                case "ack":
+                    src, dst = of
+                    pcap.acknowledged(t_ns, src, dst)
+                    expected.append(AirFrame(t_ns, "ack", None, dst, None, 0, None, None))
+                case "received":
+                    src, dst, station, rssi_dbm = of
+                    pcap.received(t_ns, station, src, dst, 7, PAYLOAD, float(rssi_dbm))
+                    to, heard = None if dst == BROADCAST else dst, rssi_dbm if has_powers else None
+                    expected.append(AirFrame(t_ns, "received", src, to, station % 256, len(PAYLOAD), None, heard))
+    assert list(frames_of(path, epoch_unix_ns=EPOCH_NS)) == expected
+
+
+def test_a_capture_is_read_up_to_where_it_is_cut_off_or_foreign(tmp_path: Path) -> None:
+    """A record may be as long as pcap lets it be; a length beyond that is no length."""
+    parts: list[bytes] = []
+    Pcap(parts.append, Radio()).transmitted(5, 1, 2, 7, PAYLOAD, 1)
+    head, record = parts
+    path = tmp_path / "air.pcap"
+
+    def read_back(*written: bytes) -> int:
+        path.write_bytes(b"".join(written))
+        return sum(1 for _ in frames_of(path, epoch_unix_ns=0))
+
+    def of_length(size: int) -> bytes:
+        return struct.pack("<IIII", 0, 0, size, size) + record[16:].ljust(size, b"\0")
+
+    assert read_back(head) == 0
+    assert read_back(head, record, of_length(1 << 16)) == 2
+
+    def of_bytes(data: bytes) -> bytes:
+        return struct.pack("<IIII", 0, 0, len(data), len(data)) + data
+
+    beyond = struct.pack("<BBHI", 0, 0, 100, 0) + bytes(70)
+    no_frame = struct.pack("<BBHI", 0, 0, 15, 0) + bytes(7) + b"\x08" + bytes(62)
+    for wrong in (record[:10], record[:-1], of_length((1 << 16) + 1), *map(of_bytes, (b"", beyond, no_frame))):
+        with pytest.raises(ConfigError, match=r"is cut off.* at byte \d+"):
+            read_back(head, record, wrong)
+    for no_head in (b"", head[:-1], bytes(4) + head[4:], head[:-4] + struct.pack("<I", 105)):
+        with pytest.raises(ConfigError, match="is no capture of radiotap frames"):
+            read_back(no_head)

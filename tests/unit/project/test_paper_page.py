@@ -82,7 +82,10 @@ def test_every_kept_picture_is_of_the_kept_table(name: str, tmp_path: Path) -> N
 def test_bars_of_few_seeds_end_where_a_quantity_does(name: str) -> None:
     """The interval of two shares reaches far beyond 1, and below 0."""
     recipe, runs = kept(name, seeds=2)
-    for axes in recipe.draw(runs).figure.axes:
+    drawing = recipe.draw(runs)
+    with (PICTURES / f"{name}.csv").open() as file:
+        assert len(drawing.data) == sum(1 for _ in csv.DictReader(file))
+    for axes in drawing.figure.axes:
         low, high = axes.get_ylim()
         lines = [lines for lines in axes.containers if isinstance(lines, ErrorbarContainer)]
         bars = [bar.tolist() for found in lines for all_bars in found.lines[2] for bar in all_bars.get_segments()]

@@ -581,6 +581,16 @@ def test_hellos_keep_out_of_the_turns(node: Node, due_ms: int, earliest_ms: int,
     assert earliest_ms * MS <= request.start_ns <= latest_ms * MS
 
 
+@pytest.mark.parametrize(("copy", "missed"), [(BEFORE, 1), (AFTER, 0)])
+def test_over_lossy_links_a_copy_from_after_our_turn_misses_nothing(node: Node, copy: NodeId, missed: int) -> None:
+    """The one of turn 6 came so late that ours, 8, is over; that of turn 10 is the first that has arrived."""
+    turns = (Turn(5, ROOT, ROOT, 0), Turn(6, BEFORE, ROOT, 0), Turn(8, US, ROOT, 0), Turn(10, AFTER, ROOT, 0))
+    access_of(node)._timetables.in_order = [planned(turns)._replace(odds=Odds({US: (0.0,)}))]
+    hear_in_turn(node, copy, 6 if copy == BEFORE else 10, told_ns=30 * MS)
+    assert relays(node) == []
+    assert node.report()["missed_turns"] == missed
+
+
 def test_a_join_does_not_take_the_place_of_an_announcement_that_waits(node: Node) -> None:
     """Over lossy links a leader says in its turns which neighbor has fallen silent, too."""
     access = access_of(node)

@@ -278,6 +278,17 @@ def test_gusts_over_a_hill_are_those_of_the_height_above_it() -> None:
     assert strength(300.0) == pytest.approx(strength(0.0)), "20 m above the ground either way"
 
 
+@pytest.mark.parametrize("degrees", [30, 135, 200, 290])
+def test_gusts_turn_with_the_mean_wind(degrees: int) -> None:
+    """Seen along it, the same random numbers give the same gusts from wherever it blows."""
+    cos, sin = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    high, flown = np.full(50, 30.0), np.random.default_rng(1).normal(0, 5, (50, 3))
+    turn = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
+    winds = [Wind(np.random.default_rng(5), 50, mean_m_s=mean, w20_m_s=9.0) for mean in ((6, 0), (6 * cos, 6 * sin))]
+    for _ in range(3):
+        assert winds[1].advance(0.5, high, flown @ turn) == pytest.approx(winds[0].advance(0.5, high, flown) @ turn)
+
+
 @pytest.mark.parametrize("dt_s", [0.05, 2.0])
 def test_gusts_vary_and_last_as_the_dryden_spectra_say_whatever_the_step(dt_s: float) -> None:
     count = 4000

@@ -7,7 +7,7 @@ from fanet_mw.motion import Motion
 from fanet_mw.node.node import Node
 from fanet_mw.routing import make_protocol
 from fanet_mw.routing.clustered.roles.joining import Joining
-from fanet_mw.routing.clustered.roles.position_updates import PositionUpdates, lost_ns
+from fanet_mw.routing.clustered.roles.position_updates import PositionUpdates, lost_ns, settled_ns
 from fanet_mw.units import MS, Enu, NodeId, S
 
 HERE, STILL = Enu(0.0, 0.0, 50.0), Enu(0.0, 0.0, 0.0)
@@ -47,6 +47,27 @@ def test_an_idle_node_has_told_twice_before_it_is_forgotten_however_large_the_sw
             joining.join(instead_of=0, again=False, now_ns=joining.due_ns)
         joining.update_if_outdated(listed=count, now_ns=hello_ns)
     assert told[1] + scenario.clusters.period_ns < lost_ns(scenario) < told[2]
+
+
+@pytest.mark.parametrize("count", [5, 45, 200])
+@pytest.mark.parametrize("speed_m_s", [0, 2, 7.5, 20])
+def test_after_a_turn_all_have_told_before_the_swarm_counts_as_settled(
+    make_scenario: MakeScenario, count: int, speed_m_s: float
+) -> None:
+    """Whoever has told just before the turn tells again 5 s later at the earliest; its hello is as late as can be."""
+    scenario = make_scenario(**{"nodes.count": count, "mobility.speed_m_s": speed_m_s})
+    speed_m_s = max(speed_m_s, 1.0)
+    port = Node(NodeId(2), scenario, make_protocol, position=HERE).port
+    updates = PositionUpdates(range_m=scenario.radio.range_m)
+    joining = Joining(port, updates, None, lambda: 0.999)
+    updates.on_update(Motion(HERE, Enu(speed_m_s, 0, 0), 0))
+    strays_ns = round(0.1 * scenario.radio.range_m / speed_m_s * S)
+    hello_ns = max(5 * S, strays_ns) - 1
+    while joining.due_ns is None:
+        joining.update_if_outdated(listed=count, now_ns=hello_ns)
+        hello_ns += round(1.1 * scenario.routing.hello_interval_s * S)
+    told_ns = joining.due_ns + scenario.clusters.period_ns
+    assert told_ns <= settled_ns(scenario) <= told_ns + min(5 * S, strays_ns) + 2 * S
 
 
 def test_two_tellings_are_some_seconds_apart() -> None:

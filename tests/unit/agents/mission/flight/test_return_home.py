@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Final
 
+import pytest
 from kit import MakeScenario
 
-from agents.mission.flight.return_home import ReturnHome
+from agents.mission.flight.return_home import ReturnHome, ReturnReason
 from agents.mission.flight.search_limits import SearchLimits
 from agents.mission.navigation.known_obstacles import KnownObstacles
 from agents.mission.navigation.neighbor_motions import NeighborMotions
@@ -90,3 +91,133 @@ def test_who_hears_nobody_beside_its_pad_lands_at_once(make_scenario: MakeScenar
     swarm = Homecoming(make_scenario, pads=[Enu(0, 0, 0)], starts=[Enu(80, 0, 83)])
     swarm.fly(15)
     assert swarm.landed_s[1] < 12.0
+
+
+# --- rules of one return, at their bounds -----------------------------------------------------------------------------
+
+
+class Alone:
+    """A UAV above its base, or off it, and who it hears beside its pad."""
+
+    def __init__(self, make_scenario: MakeScenario, *, node: int = 4, beside: frozenset[int] = frozenset()) -> None:
+        self.limits, self.heard, self.out = SearchLimits(make_scenario()), NeighborMotions(), Outbox()
+        self.own = OwnMotion(HOME, KnownObstacles(NO_MAP))
+        self.back = ReturnHome(
+            NodeId(node), HOME._replace(up=0.0), self.own, self.heard, self.out, speed_m_s=10.0, airspeed_m_s=19.0,
+            height_m=65.0, limits=self.limits, beside=beside,
+        )  # fmt: skip
+
+    def lands(self, east_m: float, north_m: float, velocity: Enu = STILL) -> bool:
+        self.own.position, self.own.velocity = Enu(HOME.east + east_m, HOME.north + north_m, HOME.up), velocity
+        return self.back.land_if_there(0)
+
+    def off_home_m(self, east_m: float, north_m: float, **others: tuple[Enu, Enu]) -> float:
+        """How far from its base the goal is; `others`: where who is beside it is from its base, and its velocity."""
+        self.own.position = Enu(HOME.east + east_m, HOME.north + north_m, HOME.up)
+        for name, (off, velocity) in others.items():
+            at = Enu(HOME.east + off.east, HOME.north + off.north, HOME.up + off.up)
+            self.heard.on_hello(int(name[1:]), Motion(at, velocity, 0))
+        return self.back.goal(0).minus(HOME).horizontal()
+
+
+HOME: Final = Enu(20.0, -30.0, 83.0)
+"""The point above the base at which a UAV comes home."""
+
+
+def test_a_uav_lands_within_a_metre_and_a_half_and_nearly_standing(make_scenario: MakeScenario) -> None:
+    for east_m, north_m in ((1.5, 0.0), (0.0, -1.5), (-1.0, 1.0)):
+        assert Alone(make_scenario).lands(east_m, north_m, Enu(0.3, 0.4, -2.0))
+        assert not Alone(make_scenario).lands(1.01 * east_m, 1.1 * north_m, Enu(0.3, 0.41, 0.0))
+    for off in (1.51, -1.51):
+        assert not Alone(make_scenario).lands(off, 0.0)
+        assert not Alone(make_scenario).lands(0.0, off)
+    assert not Alone(make_scenario).lands(0.0, 0.0, Enu(0.3, 0.41, 0.0))
+
+
+def test_who_lands_says_so_again_wherever_it_drifts(make_scenario: MakeScenario) -> None:
+    one = Alone(make_scenario)
+    assert one.lands(0.5, 0.5)
+    assert one.lands(5.0, 0.0, Enu(1.0, 0.0, 0.0))
+    assert one.out.course is not None
+    assert one.out.course.land
+
+
+def test_the_base_is_where_the_uav_says_that_it_stood(make_scenario: MakeScenario) -> None:
+    one = Alone(make_scenario)
+    one.own.position = Enu(23.0, -34.0, 0.2)
+    one.back.stands_on_pad()
+    assert one.back.goal(0) == Enu(23.0, -34.0, 83.0)
+    assert not one.lands(0.0, 0.0)
+    assert one.lands(3.0, -4.0)
+
+
+def test_a_link_is_lost_after_the_silence_the_scenario_names(make_scenario: MakeScenario) -> None:
+    one = Alone(make_scenario)
+    one.limits.lost_link_ns = 20 * S
+    assert not one.back.loses_link(100 * S), "who has heard nobody has no link"
+    one.back.on_heard(100 * S)
+    assert not one.back.loses_link(120 * S - 1)
+    assert one.back.loses_link(120 * S)
+    assert (one.back.leaves, one.back.percent) == (True, 0)
+    assert not one.back.loses_link(121 * S), "it has gone"
+    assert one.back.on_heard(130 * S)
+    assert not one.back.leaves
+    assert not one.back.on_heard(131 * S), "it is there"
+    assert one.back.loses_link(151 * S)
+    one.lands(0.0, 0.0)
+    assert not one.back.on_heard(152 * S), "who lands lands"
+
+
+def test_only_the_recalled_are_released_before_they_land(make_scenario: MakeScenario) -> None:
+    for reason, released in ((ReturnReason.RECALLED, True), (ReturnReason.DONE, False)):
+        one = Alone(make_scenario)
+        assert not one.back.release()
+        one.back.end(reason)
+        assert one.back.release() == released
+        assert one.back.leaves != released
+    one.back.end(ReturnReason.RECALLED)
+    assert one.back.reason is ReturnReason.DONE, "the first reason stays"
+    late = Alone(make_scenario)
+    late.back.end(ReturnReason.RECALLED)
+    late.lands(0.0, 0.0)
+    assert not late.back.release()
+
+
+@pytest.mark.parametrize(
+    ("here_m", "other", "off", "velocity", "waits"),
+    [
+        (60.0, 3, Enu(10, 0, 0), STILL, True),  # who is over the pads has its turn
+        (60.0, 5, Enu(10, 0, 0), STILL, True),
+        (10.0, 3, Enu(10, 0, 0), STILL, True),  # of two over the pads that with the lower id
+        (10.0, 5, Enu(10, 0, 0), STILL, False),
+        (15.0, 5, Enu(10, 0, 0), STILL, False),
+        (15.1, 5, Enu(10, 0, 0), STILL, True),
+        (60.0, 3, Enu(0, 80, 0), STILL, True),  # who waits with a lower id goes first
+        (60.0, 3, Enu(0, 80.1, 0), STILL, False),
+        (60.0, 5, Enu(0, 80, 0), STILL, False),
+        (10.0, 3, Enu(0, 80, 0), STILL, False),
+        (60.0, 5, Enu(0, 0, -3.1), Enu(0, 0, -0.7), False),  # the one before has sunk
+        (60.0, 5, Enu(0, 0, -3.0), Enu(0, 0, -0.7), True),
+        (60.0, 5, Enu(0, 0, -20), Enu(0, 0, -0.69), True),  # is on its way up, or stands
+        (60.0, 5, Enu(0, 0, -25), STILL, True),
+        (60.0, 5, Enu(0, 0, -25.1), STILL, False),  # stands at home
+    ],
+)
+def test_a_uav_waits_beside_its_pad_for_the_turn_of_others(
+    make_scenario: MakeScenario, here_m: float, other: int, off: Enu, velocity: Enu, waits: bool
+) -> None:
+    one = Alone(make_scenario, beside=frozenset({other}))
+    found = one.off_home_m(0.6 * here_m, -0.8 * here_m, **{f"n{other}": (off, velocity)})
+    assert found == pytest.approx(40.0 if waits else 0.0)
+    if waits:
+        assert one.back.goal(0).minus(Enu(HOME.east + 24, HOME.north - 32, HOME.up)).norm() < 1e-6, "on its side"
+
+
+def test_who_waits_over_its_own_pad_flies_aside_and_does_not_land(make_scenario: MakeScenario) -> None:
+    one = Alone(make_scenario, beside=frozenset({3}))
+    assert one.off_home_m(0.0, 0.9, n3=(Enu(5, 0, 0), STILL)) == pytest.approx(40.0)
+    assert not one.lands(0.0, 0.9)
+
+
+def test_for_those_whose_pads_are_elsewhere_nobody_waits(make_scenario: MakeScenario) -> None:
+    assert Alone(make_scenario).off_home_m(60.0, 0.0, n3=(Enu(5, 0, 0), STILL)) == 0.0

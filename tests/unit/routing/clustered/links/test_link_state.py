@@ -294,6 +294,14 @@ def test_who_sends_at_the_same_time_is_not_heard_and_who_disturbs_spoils_the_fra
     assert spoiled > 0.9
 
 
+def test_whom_nobody_hears_no_round_of_repair_helps() -> None:
+    links = (Link(NodeId(1), NodeId(2), grade_of(0.8), -79),)
+    network = InterferenceByPower(LINE[:3], Geometry(250, 500, 50, 1), links, margin_db=3)
+    missed = odds(network, [(NodeId(1), [(0, 0)])] * 40, turns=50, hop_turns=1).missed[NodeId(1)]
+    assert missed[0] == pytest.approx((0.2 + 1) / 2, abs=0.02)
+    assert missed[-1] == pytest.approx(1 / 2, abs=0.001), "one of the two others, for ever"
+
+
 def test_a_wave_repeats_its_frames_over_lossy_links_and_not_over_good_ones() -> None:
     def frames(chance: float) -> int:
         links = tuple(Link(NodeId(a), NodeId(a + 1), grade_of(chance), -79) for a in range(1, 4))

@@ -144,6 +144,32 @@ def test_a_spiral_of_a_few_winds_outward_until_all_is_seen_and_is_one_piece_all_
     assert all(max(abs(at.east), abs(at.north)) <= 500 for at in flown)
 
 
+@given(anyone, st.floats(0, 1000), st.floats(-1500, 1500), st.floats(-1500, 1500))
+def test_a_place_is_as_far_from_a_team_as_from_its_nearest(
+    pattern: Pattern, swept_s: float, east_m: float, north_m: float
+) -> None:
+    """Lines and rings are taken to be whole; of the others each UAV counts."""
+    for team in range(pattern.dimensions.teams):
+        places = [pattern.shape.at(place, swept_s) for place in pattern.dimensions.line(team)]
+        nearest_m = min(math.hypot(at.east - east_m, at.north - north_m) for at in places)
+        found_m = pattern.shape.apart_m(team, east_m, north_m, swept_s)
+        if pattern.dimensions.shape in (ShapeName.LINES, ShapeName.RING):
+            assert found_m <= nearest_m + 1e-6
+        else:
+            assert found_m == pytest.approx(nearest_m)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_a_winding_spiral_flies_back_the_way_it_came_and_out_again(count: int) -> None:
+    pattern = formed(ShapeName.SPIRAL, count, 1000)
+    sweep_s = pattern.shape.sweep_s
+    for share in (0.0, 0.02, 0.3, 0.77, 0.999):
+        for place in range(pattern.dimensions.fixed):
+            there = pattern.at(place, share * sweep_s)
+            for way in (2 - share, 2 + share, 4 - share, 4 + share):
+                assert pattern.at(place, way * sweep_s).minus(there).norm() < 0.01, (place, share, way)
+
+
 def test_the_outermost_lane_of_a_spiral_flies_at_the_speed_of_the_sweep_and_no_lane_faster() -> None:
     pattern = formed(ShapeName.SPIRAL, 2, 1000)
     fastest = [

@@ -9,7 +9,7 @@ from search_board import OPEN, UP_M
 from agents.mission.finding.phone_localization import Estimate
 from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.own_motion import OwnMotion
-from agents.mission.tasking.voice_descent import VoiceDescent, descent_ns, listening_height_m
+from agents.mission.tasking.voice_descent import VoiceDescent, descent_ns, listening_height_m, turned_rad
 from fanet_mw.motion import Motion
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import STILL, Enu, NodeId, S
@@ -134,3 +134,19 @@ def test_a_uav_goes_down_only_if_that_brings_the_ground_within_hearing(
     scenario = make_scenario(**{"nodes.altitude_m": UP_M, "sensors.voice_hz": 2, **keys})
     assert listening_height_m(scenario) == (None if height_m is None else pytest.approx(height_m))
     assert (descent_ns(scenario) > 0) == (height_m is not None)
+
+
+@pytest.mark.parametrize(("growth_m_s", "speed_m_s"), [(0.5, 3.0), (0.9, 10.0), (2.0, 5.0)])
+def test_a_spiral_turns_no_faster_than_its_uav_can_fly(growth_m_s: float, speed_m_s: float) -> None:
+    """At full angular speed as long as that is slower, and then at the speed of the UAV."""
+    turns_rad_s = 0.35
+
+    def angle(t_s: float) -> float:
+        return turned_rad(turns_rad_s * t_s, growth_m_s * t_s, growth_m_s, widest_m=speed_m_s / turns_rad_s)
+
+    wide_s = speed_m_s / turns_rad_s / growth_m_s
+    assert angle(1.001 * wide_s) == pytest.approx(angle(wide_s), rel=2e-3), "it does not jump there"
+    for second in range(1, 100):
+        turned = (angle(second + 0.001) - angle(second - 0.001)) / 0.002
+        fastest = min(turns_rad_s, speed_m_s / (growth_m_s * second))
+        assert turned == pytest.approx(fastest, rel=1e-3), second

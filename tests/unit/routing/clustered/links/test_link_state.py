@@ -284,6 +284,24 @@ def test_the_odds_of_a_line_are_those_of_its_hops_and_each_round_of_repair_mends
     assert first[1] == pytest.approx(first[0] * (1 - 0.8**2), rel=0.05)
 
 
+@pytest.mark.parametrize(("off_m", "disturbs"), [(135, True), (137, False), (-135, True), (-137, False)])
+def test_who_is_not_heard_disturbs_a_strong_link_from_less_far(off_m: float, disturbs: bool) -> None:
+    """17 dB stronger than the weakest with its margin: 10^(17 / 30) times less far than 500 m, that is 135.6 m."""
+    at = ((1, 0.0, 0.0), (2, 100.0, 0.0), (3, 100.0, off_m), (4, 9000.0, 0.0), (5, 9200.0, 0.0))
+    places = tuple((NodeId(node), Enu(east_m, north_m, 0.0)) for node, east_m, north_m in at)
+    links = (Link(NodeId(1), NodeId(2), grade_of(0.99), -59), Link(NodeId(4), NodeId(5), grade_of(0.99), -79))
+    network = InterferenceByPower(places, Geometry(250, 500, 50, 1), links, margin_db=3)
+    assert network.disturbing(0, 1) == 0b00100 * disturbs
+    assert network.disturbing(3, 4) == 0
+
+
+@pytest.mark.parametrize(("heard_dbm", "disturbs"), [(-69, True), (-70, False)])
+def test_who_is_heard_disturbs_what_is_less_than_eleven_db_stronger(heard_dbm: int, disturbs: bool) -> None:
+    links = (Link(NodeId(1), NodeId(2), grade_of(0.99), -59), Link(NodeId(2), NodeId(3), grade_of(0.99), heard_dbm))
+    network = InterferenceByPower(LINE[:3], Geometry(250, 500, 50, 1), links, margin_db=3)
+    assert network.disturbing(0, 1) == 0b100 * disturbs
+
+
 def test_who_sends_at_the_same_time_is_not_heard_and_who_disturbs_spoils_the_frame() -> None:
     links = tuple(Link(NodeId(a), NodeId(a + 1), grade_of(0.995), -79) for a in range(1, 4))
     network = InterferenceByPower(LINE, Geometry(250, 500, 50, 1), links, margin_db=3)

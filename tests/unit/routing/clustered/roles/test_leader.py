@@ -70,6 +70,10 @@ def test_who_joined_before_a_formation_set_out_is_beside_the_leader_though_it_he
     assert desk.leader.place(2).minus(desk.leader.place(1)).norm() == pytest.approx(100, abs=3)
 
 
+def test_the_first_leader_waits_five_seconds_for_joins_before_it_calls(scenario: Scenario) -> None:
+    assert Desk(scenario).announce()[0] == 5 * S
+
+
 def test_clusters_are_made_when_no_join_has_come_for_a_moment(scenario: Scenario) -> None:
     desk = Desk(scenario)
     desk.join(2, 100, born_ns=1000 * MS)

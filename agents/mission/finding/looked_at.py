@@ -13,6 +13,7 @@ from fanet_mw.units import Enu, S
 _CELL_M: Final = 20.0
 """The side of the cells in which it is noted where cameras have looked."""
 _REMEMBERED_NS: Final = 120 * S
+_NEVER: Final = (-_REMEMBERED_NS, 0, 0)
 _LOOKS: Final = 3
 """A place is shown after this number of looks, which are noted once a second."""
 
@@ -41,27 +42,30 @@ class LookedAt:
         self._now_ns = max(self._now_ns, now_ns)
         if not self.has_camera:
             return
-        look_m = min(self._look_m, at.up * self._per_m)
+        look_m, cells, before_ns = min(self._look_m, at.up * self._per_m), self._cells, now_ns - _REMEMBERED_NS
         column, row, reach = *_cell(at.east, at.north), math.ceil(look_m / _CELL_M)
         for i in range(column - reach, column + reach + 1):
             east_m = i * _CELL_M - at.east
             for j in range(row - reach, row + reach + 1):
                 north_m = j * _CELL_M - at.north
                 if east_m * east_m + north_m * north_m <= look_m * look_m:
-                    _, looks, sides = self._lately((i, j))
-                    self._cells[i, j] = now_ns, looks + 1, sides | 1 << (2 * (east_m > 0) + (north_m > 0))
+                    looked_ns, looks, sides = cells.get((i, j), _NEVER)
+                    if looked_ns <= before_ns:
+                        looks, sides = 0, 0
+                    cells[i, j] = now_ns, looks + 1, sides | 1 << (2 * (east_m > 0) + (north_m > 0))
 
     def has_shown(self, east_m: float, north_m: float) -> bool:
         """True if a person in the open there would have been seen lately."""
-        return self._lately(_cell(east_m, north_m))[1] >= _LOOKS
+        return self._lately(_cell(east_m, north_m))[0] >= _LOOKS
 
     def sides(self, east_m: float, north_m: float) -> int:
         """From how many of four sides cameras have shown a place lately."""
-        return self._lately(_cell(east_m, north_m))[2].bit_count()
+        return self._lately(_cell(east_m, north_m))[1].bit_count()
 
-    def _lately(self, cell: tuple[int, int]) -> tuple[int, int, int]:
-        looked_ns, looks, sides = self._cells.get(cell, (self._now_ns - _REMEMBERED_NS, 0, 0))
-        return (looked_ns, looks, sides) if self._now_ns - looked_ns < _REMEMBERED_NS else (self._now_ns, 0, 0)
+    def _lately(self, cell: tuple[int, int]) -> tuple[int, int]:
+        """How often a cell was shown lately, and from which sides."""
+        looked_ns, looks, sides = self._cells.get(cell, _NEVER)
+        return (looks, sides) if self._now_ns - looked_ns < _REMEMBERED_NS else (0, 0)
 
 
 def _cell(east_m: float, north_m: float) -> tuple[int, int]:

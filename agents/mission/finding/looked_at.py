@@ -13,6 +13,11 @@ from fanet_mw.units import Enu, S
 _CELL_M: Final = 20.0
 """The side of the cells in which it is noted where cameras have looked."""
 _REMEMBERED_NS: Final = 120 * S
+_CLEARED_NS: Final = 30 * S
+_MANY: Final = 2_000
+"""With so many cells or more, those that are old are removed at this interval."""
+_MOST: Final = 50_000
+"""The greatest number of cells that are remembered: 20 km2."""
 _NEVER: Final = (-_REMEMBERED_NS, 0, 0)
 _LOOKS: Final = 3
 """A place is shown after this number of looks, which are noted once a second."""
@@ -26,7 +31,7 @@ class LookedAt:
         self._look_m, self._per_m = look_m, look_m / max(1.0, height_m)
         self._cells: dict[tuple[int, int], tuple[int, int, int]] = {}
         """Of each cell, when a camera showed it last, how often lately, and from which of four sides, as bits."""
-        self._now_ns = 0
+        self._now_ns = self._cleared_ns = 0
 
     @property
     def has_camera(self) -> bool:
@@ -40,7 +45,7 @@ class LookedAt:
     def note(self, at: Enu, now_ns: int) -> None:
         """A camera is at this position, its height above ground, and shows what is below."""
         self._now_ns = max(self._now_ns, now_ns)
-        if not self.has_camera:
+        if not self.has_camera or not self._has_room():
             return
         look_m, cells, before_ns = min(self._look_m, at.up * self._per_m), self._cells, now_ns - _REMEMBERED_NS
         column, row, reach = *_cell(at.east, at.north), math.ceil(look_m / _CELL_M)
@@ -53,6 +58,14 @@ class LookedAt:
                     if looked_ns <= before_ns:
                         looks, sides = 0, 0
                     cells[i, j] = now_ns, looks + 1, sides | 1 << (2 * (east_m > 0) + (north_m > 0))
+
+    def _has_room(self) -> bool:
+        """Forget now and then what is old; False if too much is left all the same, as after forged hellos."""
+        if len(self._cells) >= _MANY and self._now_ns - self._cleared_ns >= _CLEARED_NS:
+            self._cleared_ns = self._now_ns
+            old_ns = self._now_ns - _REMEMBERED_NS
+            self._cells = {cell: look for cell, look in self._cells.items() if look[0] > old_ns}
+        return len(self._cells) < _MOST
 
     def has_shown(self, east_m: float, north_m: float) -> bool:
         """True if a person in the open there would have been seen lately."""

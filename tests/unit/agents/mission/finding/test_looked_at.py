@@ -53,6 +53,19 @@ def test_a_place_is_shown_after_three_looks_and_for_two_minutes() -> None:
     assert not looked_at.has_shown(0, 0), "one look"
 
 
+def test_what_is_remembered_is_bounded_whatever_hellos_say() -> None:
+    looked_at = LookedAt(LOOK_M, height_m=UP_M)
+    for second in range(301):
+        for other in range(20):
+            looked_at.note(Enu(1000 * second, 1000 * other, UP_M), second * S)
+    assert looked_at.sides(299_000, 19_000)
+    assert len(looked_at._cells) <= 20 * 150 * 13, "of two minutes and a half"
+    for other in range(5_000):
+        looked_at.note(Enu(1000 * other, -5000, UP_M), 300 * S)
+    assert len(looked_at._cells) < 50_020
+    assert looked_at.sides(299_000, 19_000), "what was seen before is not pushed out"
+
+
 @pytest.mark.parametrize(("up_m", "shown_m"), [(UP_M, 20), (2 * UP_M, 20), (UP_M / 2, 0), (0.0, -20)])
 def test_a_camera_shows_less_from_below_and_nothing_on_the_ground(up_m: float, shown_m: float) -> None:
     looked_at = looks(*[Enu(1, 1, up_m)] * 3)

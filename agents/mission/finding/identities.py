@@ -46,6 +46,8 @@ _IMPOSSIBLE: Final = 1e6
 """The cost of a pair that is excluded."""
 _REFUTED_COST: Final = 9.0
 """An additional cost at a place where the same survivor was confirmed by mistake, because other UAVs know better."""
+_ALONE_M: Final = 20.0
+"""Within this distance of a person seen alone nobody else was seen; errors of two UAVs' positions add up to that."""
 _DOUBTED_NS: Final = 30 * S
 """For how long: whatever was received since then tells more than the refutation."""
 
@@ -164,6 +166,17 @@ class Identities:
             chosen = paired([person.place for person in left], list(finds.values()), steady_m2=self._steady_m2)
             for person, column in zip(left, chosen, strict=True):
                 person.find = None if column is None else list(finds)[column]
+        self._recognize_the_lonely()
+
+    def _recognize_the_lonely(self) -> None:
+        """Who is seen with nobody beside is whom a find a little farther away means, where nobody is seen."""
+        taken = {person.find for person in self._people}
+        finds = {find: place for find, place in self._survivors.person_places().items() if find not in taken}
+        for person in self._people if finds else ():
+            others = (other for other in self._people if other is not person)
+            if person.find is None and all(other.place.distance_m(person.place.at) > _ALONE_M for other in others):
+                near = paired([person.place], list(finds.values()), steady_m2=self._steady_m2, within_m=_ALONE_M)[0]
+                person.find = None if near is None else list(finds)[near]
 
     def against(self, confirmed: Found) -> float:
         """How much less likely a confirmed pair is than the best assignment nearby without it; <= 0 if part of it."""
@@ -237,13 +250,15 @@ class Identities:
         return min(_IMPOSSIBLE, known.filter.deficit(at.east, at.north) + doubt)
 
 
-def paired(seen: Sequence[Estimate], found: Sequence[Estimate], *, steady_m2: float) -> list[int | None]:
+def paired(
+    seen: Sequence[Estimate], found: Sequence[Estimate], *, steady_m2: float, within_m: float = SAME_PLACE_M
+) -> list[int | None]:
     """For each of these places, which of those of finds is of the same person, if any; one find is of one person."""
     costs = [
         [
             one.distance_m(other.at) ** 2
             / (one.east_variance_m2 + other.east_variance_m2 + other.north_variance_m2 + 2 * steady_m2)
-            if one.distance_m(other.at) <= SAME_PLACE_M
+            if one.distance_m(other.at) <= within_m
             else _IMPOSSIBLE
             for other in found
         ]

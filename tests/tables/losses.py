@@ -6,6 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
+from agents.mission.search_formation.pattern import Pattern, fitted
+from agents.mission.search_formation.shapes.contract import Demands, ShapeName
+from fanet_mw.units import Enu
+from sim.results.connectivity import parts
 from tests.tables.markdown import Rows
 
 _DATA: Final = Path(__file__).parents[2] / "docs" / "results" / "data"
@@ -19,6 +25,14 @@ _STEP: Final = 2
 _PLANNED_S: Final = 3.0
 _SEEN_S: Final = 17.0
 """So long after its last loss a copy is looked at that is not flown to the end."""
+_REACH_M: Final = 250.0
+_NOTICES_S: Final = 0.9
+"""In flight the two beside a gap notice it 0.7 to 1 s after the loss."""
+_CLOSES_M_S: Final = 10.0
+_SPEEDS_UP_S: Final = 2.0
+"""They reach this speed so long after that, at 5 m/s2."""
+_FLIGHT_S: Final = 300.0
+_TAKEN_UP_S: Final = 50.0
 Copy = dict[str, Any]
 
 
@@ -82,6 +96,47 @@ def _worst(copies: Sequence[Copy]) -> str:
     longest = max(copies, key=lambda copy: max(copy["heal_s"]))
     heal_s = max(longest["heal_s"])
     return f"> {_SEEN_S:.0f}" if heal_s >= _SEEN_S and "found" not in longest else f"{heal_s:.1f}"
+
+
+def by_geometry() -> Rows:
+    """What one drawn loss does to a formation flown exactly, if those beside the gap fly towards each other at once."""
+    demands = Demands(area_m=2500.0, seen_m=131.0, reach_m=_REACH_M, height_m=65.0, speed_m_s=7.5)
+    lines, ring = fitted(45, demands), fitted(45, demands, shape=ShapeName.RING)
+    assert lines is not None, "45 UAVs are enough for both"
+    assert ring is not None, "45 UAVs are enough for both"
+    grid = [Enu(200.0 * (one % 7 - 3), 200.0 * (one // 7 - 3), 65.0) for one in range(45)]
+    begun = lines.begun_around(grid)[0].dimensions
+    flown = {
+        "lines, as flown": begun,
+        "lines, two followers as lanes": begun._replace(lanes=begun.lanes + 1, followers=begun.followers - 2),
+        "lines, all followers as relays": begun._replace(relays=begun.relays + begun.followers, followers=0),
+        "ring": ring.dimensions,
+    }
+    head = ["45 UAVs, 2.5 x 2.5 km", "never apart", "median / worst [s]", "connected since"]
+    return [head, *([name, *_row_by_geometry(Pattern(made, reach_m=_REACH_M))] for name, made in flown.items())]
+
+
+def _row_by_geometry(pattern: Pattern) -> list[str]:
+    heal_s, connected = list[float](), list[float]()
+    for swept_s in range(0, 190, 10):
+        at = np.array([pattern.at(place, float(swept_s)) for place in range(pattern.places)])
+        follows = np.array([pattern.kind(place) == "follower" for place in range(pattern.places)])
+        for lost in range(pattern.places):
+            left = np.arange(pattern.places) != lost
+            apart_m = np.linalg.norm(at[left, None] - at[None, left], axis=2)
+            part = parts(apart_m <= _REACH_M)
+            one = 0.0
+            if part.any():
+                may_close = (part[:, None] != part[None]) & ~follows[left, None] & ~follows[None, left]
+                one = _NOTICES_S + _SPEEDS_UP_S / 2 + (apart_m[may_close].min() - _REACH_M) / (2 * _CLOSES_M_S)
+            heal_s.append(one)
+            connected.append(1 - one / (_FLIGHT_S - _TAKEN_UP_S - swept_s))
+    never = sum(not one for one in heal_s) / len(heal_s)
+    return [
+        f"{100 * never:.0f} %",
+        f"{statistics.median(heal_s):.1f} / {max(heal_s):.1f}",
+        f"{statistics.fmean(connected):.3f}",
+    ]
 
 
 def to_the_end() -> Rows:

@@ -87,6 +87,7 @@ TABLES: Final[Mapping[str, Table]] = {
     "formation-flight": Table("explanation/formation-flight.md", formation_flight.measured, Tolerance(relative=0.05)),
     "whole-missions": Table("results/missions.md", missions.whole, Tolerance(absolute=0.05, relative=0.02)),
     "losses": Table("explanation/search.md", losses.healing, Tolerance()),
+    "losses-by-geometry": Table("explanation/search.md", losses.by_geometry, Tolerance()),
     "losses-in-a-row": Table("explanation/search.md", losses.curve, Tolerance()),
     "flown-on": Table("explanation/search.md", losses.to_the_end, Tolerance()),
     "partitions": Table("explanation/search.md", losses.partitions, Tolerance()),

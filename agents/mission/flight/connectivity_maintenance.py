@@ -69,6 +69,9 @@ class ConnectivityMaintenance:
         """The UAVs in reach to which this one is tied, and the limits that keep it there."""
 
     def planes(self, now_ns: int) -> list[HalfPlane]:
+        """The limits of the longest links first: of those that contradict each other the last are dropped, and a
+        neighbor that goes away must not draw this UAV off one that stays.
+        """
         self._ties = []
         formation = self._formation
         if (formation.plan is not None and formation.place is None) or self._bidding.is_absent(now_ns):
@@ -76,10 +79,11 @@ class ConnectivityMaintenance:
         planes, closer, closes = [], [], formation.closing_s(now_ns) is not None
         ties = self._tied(now_ns)
         leading = [node for node in ties if formation.leads_to_gap(node, now_ns)]
-        for node, motion in ties.items():
+        offsets = {node: motion.offset_from(self._own_motion.position, now_ns) for node, motion in ties.items()}
+        for node, offset in sorted(offsets.items(), key=lambda tie: -tie[1].norm()):
+            motion = ties[node]
             follows = leading == [node]  # between two gaps it would draw the sides together
             share, within_s = (_CLOSING, _CLOSING_S) if closes or follows else (_TETHER, _TETHER_S)
-            offset = motion.offset_from(self._own_motion.position, now_ns)
             plane = self._plane(offset, motion.velocity, share, within_s)
             if plane is not None:
                 planes.append(plane)

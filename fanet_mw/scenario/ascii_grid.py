@@ -24,6 +24,8 @@ COMMENTS: Final = ("#", "//", "!")
 VOIDS: Final = frozenset({"*", "-", "null", "nodata", "n/a", "na", "none", "void"})
 """Words for a cell without a height; GRASS writes `*`, and databases `null`."""
 _CONVERT: Final = "other formats are converted by gdal_translate -of AAIGrid"
+_LARGEST: Final = 1e7
+"""A cell of so many metres is a quarter of the earth."""
 _COARSEST_DEG: Final = 0.02
 """A grid with places in degrees has cells of at most this; cells of less than 2 cm there are none."""
 
@@ -126,8 +128,10 @@ def _side(found: dict[str, float], key: str) -> float:
     value = found.get(key, found.get("cellsize"))
     if value is None:
         raise ValueError("its header has no cellsize, nor dx and dy")
-    if not 0 < value < math.inf:
-        raise ValueError(f"{'cellsize' if key not in found else key} = {value:g} must be a cell size > 0")
+    if not 0 < value <= _LARGEST:
+        raise ValueError(
+            f"{'cellsize' if key not in found else key} = {value:g} must be a cell size in (0, {_LARGEST:g}]"
+        )
     return value
 
 

@@ -1,5 +1,6 @@
 """Heights from a GeoTIFF of whatever reference system, by rasterio (GDAL): the extra `maps` of the package."""
 
+import math
 import re
 import warnings
 from collections.abc import Sequence
@@ -45,6 +46,8 @@ def read(
             color, kind = file.colorinterp[0], file.dtypes[0]
             if color in (ColorInterp.red, ColorInterp.palette) or kind.startswith("complex"):
                 raise ValueError(f"its first band holds {color.name} of {kind}, and no heights")
+            if file.scales[0] == 0:
+                raise ValueError("its first band has scale = 0, which makes all heights alike")
             band = file.read(1, masked=True).astype(np.float64)
             metres = band.filled(np.nan) * file.scales[0] + file.offsets[0]
             vertical = _VERTICAL_UNIT.search(file.crs.to_wkt())
@@ -53,13 +56,16 @@ def read(
             lons, lats = [place.lon_deg for place in places], [place.lat_deg for place in places]
             x, y = transform("EPSG:4326", file.crs, lons, lats)
             to_cell, to_place = ~file.transform, file.transform
+            across, down = file.width / 2, file.height / 2
+            middle_x = to_place.a * across + to_place.b * down + to_place.c
+            middle_y = to_place.d * across + to_place.e * down + to_place.f
+            if file.crs.is_geographic:  # beside 180 degrees a place has two longitudes
+                turn = math.tau / file.crs.units_factor[1]
+                x = [px + turn * round((middle_x - px) / turn) for px in x]
             cells = [
                 (to_cell.a * px + to_cell.b * py + to_cell.c, to_cell.d * px + to_cell.e * py + to_cell.f)
                 for px, py in zip(x, y, strict=True)
             ]
-            across, down = file.width / 2, file.height / 2
-            middle_x = to_place.a * across + to_place.b * down + to_place.c
-            middle_y = to_place.d * across + to_place.e * down + to_place.f
             (lon,), (lat,) = transform(file.crs, "EPSG:4326", [middle_x], [middle_y])
             middle_deg = float(lat), float(lon)
     except (RasterioError, CPLE_BaseError) as error:

@@ -276,7 +276,7 @@ def _numbers(grid: ascii_grid.AsciiGrid) -> Rows:
     count = grid.columns * grid.rows
     if count > _MOST_CELLS:
         raise ValueError(f"{grid.columns} x {grid.rows} cells must be at most {_MOST_CELLS}")
-    lines = [line for line in grid.lines if not line.lstrip().startswith(ascii_grid.COMMENTS)]
+    lines = ["" if line.lstrip().startswith(ascii_grid.COMMENTS) else line for line in grid.lines]
     text = "\n".join(lines).replace(";", " ").replace("\t", " ")
     if "," in text:  # between two heights, unless each of them may have one as its decimal comma
         words = text.split()
@@ -298,11 +298,20 @@ def _numbers(grid: ascii_grid.AsciiGrid) -> Rows:
                 if word.lower() not in ascii_grid.VOIDS:
                     ascii_grid.number(word, line=grid.first_line + at)
         raise
-    if len(heights) != count:
-        widths = [len(line.split()) for line in text.split("\n")]
-        odd = next((at for at, width in enumerate(widths) if width != grid.columns), None)
-        where = (
-            f"; line {grid.first_line + odd} has {widths[odd]}" if odd is not None and len(lines) == grid.rows else ""
-        )
-        raise ValueError(f"{len(heights)} heights, not {grid.columns} x {grid.rows}{where}")
+    _require_lines(grid, text, count=len(heights))
     return heights.reshape(grid.rows, grid.columns)
+
+
+def _require_lines(grid: ascii_grid.AsciiGrid, text: str, *, count: int) -> None:
+    """Raises ValueError unless there are as many heights as the header says, in lines that do not contradict it."""
+    widths = {at: len(line.split()) for at, line in enumerate(text.split("\n"), start=grid.first_line) if line.strip()}
+    columns, rows = grid.columns, grid.rows
+    odd = next((at for at, width in widths.items() if width != columns), None) if len(widths) == rows else None
+    if count != columns * rows:
+        raise ValueError(
+            f"{count} heights, not {columns} x {rows}" + ("" if odd is None else f"; line {odd} has {widths[odd]}")
+        )
+    if odd is not None:  # one too many here and one too few there would move all between them
+        raise ValueError(f"line {odd} has {widths[odd]} heights, not ncols = {columns}")
+    if len(widths) == columns != rows and set(widths.values()) == {rows}:
+        raise ValueError(f"{columns} lines of {rows} heights each, but ncols = {columns} and nrows = {rows}: swapped?")

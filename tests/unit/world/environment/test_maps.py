@@ -146,6 +146,9 @@ def test_a_declared_void_is_recognized_in_other_digits_and_counts_for_nothing_ou
         (grid(f"{CORNER}\ndx 20\ndy 20", hill()), r"dx = 20 contradicts cellsize = 10"),
         (grid(CORNER, hill()).replace("cellsize 10", "cellsize 1,000"), r"line 5: 1,000 may be thousands or"),
         (grid(CORNER, [[f"1,{i:03}" for i in range(j, j + 11)] for j in range(11)]), r"comma in 1,000, .* thousands"),
+        (grid(CORNER, hill()).replace(" 210.0\n", "\n210.0 ", 1), r"line 6 has 10 heights, not ncols = 11"),
+        (grid(CORNER, hill()[:9]).replace("ncols 11\nnrows 9", "ncols 9\nnrows 11"), r"11 heights each, .* swapped\?"),
+        (grid(CORNER, hill()).replace("cellsize 10", "cellsize 1e300"), r"1e\+300 must be .* in \(0, 1e\+07"),
         ("\0\1\2" * 99, "it is binary"),
     ],
 )
@@ -270,6 +273,26 @@ def test_a_geotiff_whose_reference_system_has_heights_in_feet_is_read_in_metres(
     for crs, unit_m in (("EPSG:32631+6360", 1200 / 3937), ("EPSG:32631+5773", 1.0)):  # NAVD 88 in feet, EGM96 in metres
         west, east = ground(tiff(tmp_path / "hill.tif", rows, crs), (-50, 0), (50, 0), origin_deg=PARIS[:2])
         assert east - west == pytest.approx(20 * unit_m, abs=0.1)
+
+
+def test_a_geotiff_across_180_degrees_lies_where_it_belongs(tmp_path: Path) -> None:
+    rasterio = pytest.importorskip("rasterio")
+    path, rows = tmp_path / "hill.tif", np.add.outer(np.zeros(41), np.arange(41.0))
+    place = rasterio.Affine(1e-3, 0, 180 - 20.5e-3, 0, -1e-3, 10 + 20.5e-3)
+    shape = {"width": 41, "height": 41, "dtype": rows.dtype, "count": 1}
+    with rasterio.open(path, "w", "GTiff", crs="EPSG:4326", transform=place, **shape) as file:
+        file.write(rows, 1)
+    for lon in (179.999, -179.999):
+        west, east = ground(path, (-100, 0), (100, 0), origin_deg=[10, lon], area_m=400)
+        assert east - west == pytest.approx(200 / 109.6, abs=0.05)
+
+
+def test_a_geotiff_whose_scale_makes_all_alike_is_refused(tmp_path: Path) -> None:
+    path = tiff(tmp_path / "hill.tif", np.ones((21, 21)))
+    with pytest.importorskip("rasterio").open(path, "r+") as file:
+        file.scales = (0.0,)
+    with pytest.raises(ConfigError, match="its first band has scale = 0"):
+        ground(path, (0, 0), origin_deg=PARIS[:2])
 
 
 def test_a_geotiff_of_colors_is_no_map_of_heights(tmp_path: Path) -> None:

@@ -170,7 +170,7 @@ def test_a_path_is_taken_from_the_scenario_files_folder(tmp_path: Path) -> None:
             "ncols 2\nnrows 2\ncellsize 790\nNODATA_value -9\n1 2\n-9 3\n",
             r"1 cell within .* = 800 has no data, or .*: the first has the value of a void \(line 6, column 1\)",
         ),
-        ("ncols 2\nnrows 2\ncellsize 0\n1 2 3 4\n", "cell size > 0"),
+        ("ncols 2\nnrows 2\ncellsize 0\n1 2 3 4\n", "cell size in"),
         ("ncols 2\nnrows 2\ncellsize 790\n1 2\n3 nan\n", "1 cell within .* has no data"),
         ("ncols 2\nnrows 2\ncellsize 790\n1 2\n3 *\n", r"1 cell within .* no data.* \(line 5, column 2\)"),
         ("ncols 2\nnrows 2\ncellsize 790\nNODATA_value null\nnull 2\n3 4\n", r"1 cell .* \(line 5, column 1\)"),

@@ -6,13 +6,15 @@
 
 Read are GeoJSON (RFC 7946), KML and KMZ (OGC 12-007r2), plans of QGroundControl (.plan) and lists of waypoints
 (QGC WPL 110). In a plan the area is its surveys and the fences to stay inside, the no-fly areas are the fences to stay
-outside, and the points are its rally points, or its waypoints if there are none.
+outside, and the points are its rally points, or its waypoints if there are none. Lists of waypoints may hold the same,
+as Mission Planner saves fences and rally points.
 """
 
 import io
 import json
 import math
 import zipfile
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -21,12 +23,21 @@ from xml.etree import ElementTree
 from fanet_mw.errors import ConfigError
 from fanet_mw.foreign_file import read_regular
 from fanet_mw.geodesy import Geodetic, to_enu, to_geodetic
+from fanet_mw.scenario.outlines import require_degrees
+from fanet_mw.scenario.text_files import decoded
 from fanet_mw.units import Enu
 
 _MOST_BYTES: Final = 16 << 20
 _MOST_SHAPES: Final = 10_000
+_FARTHEST_M: Final = 1e6
 _Point = tuple[float, float]
 _WAYPOINT: Final = 16
+_FENCE_VERTICES: Final = {5001: True, 5002: False}
+_FENCE_CIRCLES: Final = {5003: True, 5004: False}
+"""Commands of MAVLink; True: to stay inside."""
+_RALLY: Final = 5100
+_IN_DEGREES: Final = frozenset({0, 3, 5, 6, 10, 11})
+"""The frames of MAVLink that hold latitude and longitude."""
 _KEYS: Final = (("mission", "area"), ("world", "no_fly"), ("mission", "survivors_at"))
 
 
@@ -67,12 +78,17 @@ def take_in(tree: dict[str, Any], folder: Path) -> None:
         ]
         if not circles:
             raise ConfigError(f"{said}: it holds no area to stay out of")
+        for east, north, _ in circles:
+            _require_near(said, (east, north), origin)
         world["no_fly_m"] = [*world.get("no_fly_m", ()), *circles]
     if "survivors_at" in found:
         said, shapes = found["survivors_at"]
         if not shapes.points:
             raise ConfigError(f"{said}: it holds no points")
-        mission["survivor_positions_m"] = [[round(part, 2) for part in _flat(point, origin)] for point in shapes.points]
+        places = [_flat(point, origin) for point in shapes.points]
+        for place in places:
+            _require_near(said, place, origin)
+        mission["survivor_positions_m"] = [[round(part, 2) for part in place] for place in places]
         mission.setdefault("survivors", len(shapes.points))
 
 
@@ -88,7 +104,17 @@ def _take_area(world: dict[str, Any], said: str, shapes: Shapes) -> None:
     middle = (min(lats) + max(lats)) / 2, (min(lons) + max(lons)) / 2
     world.setdefault("origin_deg", [round(part, 7) for part in middle])
     reach_m = max(abs(part) for point in points for part in _flat(point, world["origin_deg"]))
+    if 2 * reach_m > _FARTHEST_M and "area_m" not in world:
+        raise ConfigError(f"{said}: the square around its polygons has {2 * reach_m:.0f} m, must be <= {_FARTHEST_M:g}")
     world.setdefault("area_m", math.ceil(2 * reach_m))
+
+
+def _require_near(said: str, place: tuple[float, float], origin: Any) -> None:  # noqa: ANN401  (of TOML)
+    if math.hypot(*place) > _FARTHEST_M:
+        raise ConfigError(
+            f"{said}: a place is {math.hypot(*place):.0f} m from world.origin_deg = [{origin[0]:g}, {origin[1]:g}], "
+            f"must be <= {_FARTHEST_M:g}"
+        )
 
 
 def _flat(point: _Point, origin: Any) -> tuple[float, float]:  # noqa: ANN401  (of TOML)
@@ -125,17 +151,12 @@ def read(path: Path, *, key: str = "file") -> Shapes:
     data = read_regular(path, most_bytes=_MOST_BYTES)
     try:
         shapes = reader(data)
-    except (
-        ValueError,
-        TypeError,
-        KeyError,
-        IndexError,
-        AttributeError,
-        RecursionError,
-        ElementTree.ParseError,
-    ) as error:
+    except (ValueError, ElementTree.ParseError, RecursionError) as error:
         raise ConfigError(f"{key} = {path}: cannot be read as {path.suffix}: {error}") from error
-    except (zipfile.BadZipFile, NotImplementedError, EOFError, OSError) as error:
+    except (TypeError, LookupError, AttributeError) as error:
+        built = "" if type(error) is LookupError else "it is built otherwise: "  # that of its own is an encoding
+        raise ConfigError(f"{key} = {path}: cannot be read as {path.suffix}: {built}{error}") from error
+    except (zipfile.BadZipFile, EOFError, OSError, zlib.error, RuntimeError) as error:
         raise ConfigError(f"{key} = {path}: is no KMZ: {error}") from error
     return shapes
 
@@ -147,10 +168,28 @@ def _shapes(polygons: list[list[_Point]], points: list[_Point]) -> Shapes:
 
 
 def _place(lat: Any, lon: Any) -> _Point:  # noqa: ANN401  (of a file)
-    found = float(lat), float(lon)
+    numbers = all(isinstance(part, int | float | str) and not isinstance(part, bool) for part in (lat, lon))
+    found = (float(lat), float(lon)) if numbers else (math.nan, math.nan)
     if not (abs(found[0]) <= 90 and abs(found[1]) <= 180):
         raise ValueError(f"latitude {lat!r:.20} and longitude {lon!r:.20} must be within 90 and 180 degrees")
     return found
+
+
+def _flown(frame: Any, lat: Any, lon: Any) -> _Point:  # noqa: ANN401
+    """The place of an item of a mission; flight controllers take two zeros for the place where they are."""
+    if frame not in _IN_DEGREES:
+        raise ValueError(f"frame {frame!r:.20} has no latitude and longitude")
+    found = _place(lat, lon)
+    if found == (0.0, 0.0):
+        raise ValueError("an item has latitude and longitude 0, which is no place")
+    return found
+
+
+def _circle_of(place: _Point, radius: Any) -> tuple[float, float, float]:  # noqa: ANN401
+    radius_m = float(radius)
+    if not 0 < radius_m < _FARTHEST_M:
+        raise ValueError(f"a circle has a radius of {radius_m:g} m, must be in (0, {_FARTHEST_M:g})")
+    return (*place, radius_m)
 
 
 def _ring(points: list[_Point]) -> list[_Point]:
@@ -181,7 +220,10 @@ def _geojson(data: bytes) -> Shapes:
             for lon, lat, *_ in [node["coordinates"]] if kind == "Point" else node["coordinates"]:
                 points.append(_place(lat, lon))
 
-    look(json.loads(data.decode("utf-8-sig")))
+    tree = json.loads(decoded(data))
+    if isinstance(tree, dict):
+        require_degrees(tree)
+    look(tree)
     return _shapes(polygons, points)
 
 
@@ -204,64 +246,110 @@ def _coordinates(element: ElementTree.Element) -> Iterator[_Point]:
     for one in element.iter():
         if one.tag.rpartition("}")[2] == "coordinates":
             for triple in (one.text or "").split():
-                lon, lat, *_ = triple.split(",")
+                lon, lat, *_ = [*triple.split(","), ""]
+                if not lat:
+                    raise ValueError(f"{triple[:40]!r} must be longitude,latitude,height without blanks between them")
                 yield _place(lat, lon)
 
 
 def _kmz(data: bytes) -> Shapes:
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        names = [entry for entry in archive.infolist() if entry.filename.lower().endswith(".kml")]
-        if not names:
+        entries = [entry for entry in archive.infolist() if entry.filename.lower().endswith(".kml")]
+        if not entries:
             raise ValueError("it holds no .kml")
-        with archive.open(names[0]) as file:
+        root = min(entries, key=lambda entry: (entry.filename.lower() != "doc.kml", "/" in entry.filename))
+        if root.flag_bits & 1:
+            raise ValueError(f"{root.filename} is encrypted")
+        if root.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise ValueError(f"{root.filename} is compressed by method {root.compress_type}")
+        with archive.open(root) as file:
             content = file.read(_MOST_BYTES + 1)
     if len(content) > _MOST_BYTES:
-        raise ValueError(f"{names[0].filename} is longer than {_MOST_BYTES} bytes")
+        raise ValueError(f"{root.filename} is longer than {_MOST_BYTES} bytes")
     return _kml(content)
 
 
 def _plan(data: bytes) -> Shapes:
-    tree = json.loads(data.decode("utf-8-sig"))
+    tree = json.loads(decoded(data))
     if tree.get("fileType") != "Plan":
         raise ValueError('its fileType is not "Plan"')
-    fence = tree.get("geoFence", {})
+    fence = tree.get("geoFence") or {}
     inside, outside = list[list[_Point]](), list[list[_Point]]()
     circles = []
     for polygon in fence.get("polygons", ()):
         ring = _ring([_place(lat, lon) for lat, lon, *_ in polygon["polygon"]])
-        (inside if polygon.get("inclusion", True) else outside).append(ring)
+        (inside if _included(polygon) else outside).append(ring)
     for entry in fence.get("circles", ()):
-        lat, lon = _place(*entry["circle"]["center"][:2])
-        radius_m = float(entry["circle"]["radius"])
-        if not 0 < radius_m < 1e6:
-            raise ValueError(f"a circle has a radius of {radius_m:g} m, must be in (0, 1e6)")
-        if entry.get("inclusion", True):
-            inside.append(_extremes(Geodetic(lat, lon, 0.0), radius_m))
+        circle = _circle_of(_place(*entry["circle"]["center"][:2]), entry["circle"]["radius"])
+        if _included(entry):
+            inside.append(_extremes(circle))
         else:
-            circles.append((lat, lon, radius_m))
+            circles.append(circle)
     flown = []
-    for item in tree.get("mission", {}).get("items", ()):
+    for item in (tree.get("mission") or {}).get("items", ()):
         if isinstance(item.get("polygon"), list):
             inside.append(_ring([_place(lat, lon) for lat, lon, *_ in item["polygon"]]))
         elif item.get("command") == _WAYPOINT:
-            flown.append(_place(*item["params"][4:6]))
-    rally = [_place(*point[:2]) for point in tree.get("rallyPoints", {}).get("points", ())]
+            flown.append(_flown(item.get("frame", 3), *item["params"][4:6]))
+    rally = [_place(*point[:2]) for point in (tree.get("rallyPoints") or {}).get("points", ())]
     if len(inside) + len(outside) + len(rally) + len(flown) > _MOST_SHAPES:
         raise ValueError(f"more than {_MOST_SHAPES} shapes")
     return Shapes(inside, outside, circles, rally or flown)
 
 
-def _extremes(center: Geodetic, radius_m: float) -> list[_Point]:
+def _included(entry: Any) -> bool:  # noqa: ANN401  (JSON)
+    said = entry.get("inclusion", True)
+    if said is not True and said is not False:  # the text "false" would be taken for true
+        raise ValueError(f"inclusion = {said!r:.20} must be true or false")
+    return bool(said)
+
+
+def _extremes(circle: tuple[float, float, float]) -> list[_Point]:
     """The points of a circle farthest to the east, north, west and south."""
+    lat, lon, radius_m = circle
     ways = ((radius_m, 0.0), (0.0, radius_m), (-radius_m, 0.0), (0.0, -radius_m))
-    places = [to_geodetic(Enu(east, north, 0.0), center) for east, north in ways]
+    places = [to_geodetic(Enu(east, north, 0.0), Geodetic(lat, lon, 0.0)) for east, north in ways]
     return [_place(place.lat_deg, place.lon_deg) for place in places]
 
 
 def _waypoints(data: bytes) -> Shapes:
-    lines = data.decode("utf-8-sig").split("\n")
-    if not lines[0].startswith("QGC WPL"):
+    inside, outside = list[list[_Point]](), list[list[_Point]]()
+    circles, points = [], dict[int, list[_Point]](((_WAYPOINT, []), (_RALLY, [])))
+    vertices: dict[int, list[_Point]] = {command: [] for command in _FENCE_VERTICES}
+    for command, parameter, place in _items(decoded(data).splitlines()):
+        if command in _FENCE_VERTICES:
+            vertices[command].append(place)
+            if len(vertices[command]) >= parameter:
+                (inside if _FENCE_VERTICES[command] else outside).append(_ring(vertices[command]))
+                vertices[command] = []
+        elif command not in _FENCE_CIRCLES:
+            points[command].append(place)
+        elif _FENCE_CIRCLES[command]:
+            inside.append(_extremes(_circle_of(place, parameter)))
+        else:
+            circles.append(_circle_of(place, parameter))
+    if left := sum(map(len, vertices.values())):
+        raise ValueError(f"a fence ends after {left} of its corners")
+    flown, rally = points[_WAYPOINT], points[_RALLY]
+    if not (inside or outside or circles) and len(set(flown)) >= 3:
+        inside = outside = [flown]
+    if len(inside) + len(outside) + len(circles) + len(rally) + len(flown) > _MOST_SHAPES:
+        raise ValueError(f"more than {_MOST_SHAPES} shapes")
+    return Shapes(inside, outside, circles, rally or flown)
+
+
+def _items(lines: list[str]) -> Iterator[tuple[int, float, _Point]]:
+    """Command, first parameter and place of each item of a list of waypoints that has a meaning here."""
+    if not lines or not lines[0].startswith("QGC WPL"):
         raise ValueError("its first line is not QGC WPL 110")
-    rows = [line.split("\t") if "\t" in line else line.split() for line in lines[1:] if line.strip()]
-    points = [_place(row[8], row[9]) for row in rows[1:] if int(row[3]) == _WAYPOINT]  # the first row is home
-    return _shapes([points] if len(set(points)) >= 3 else [], points)
+    known = {_WAYPOINT, _RALLY, *_FENCE_VERTICES, *_FENCE_CIRCLES}
+    rows = [(n, line) for n, line in enumerate(lines[1:], start=2) if line.strip()]
+    for number, line in rows:
+        row = line.split("\t") if "\t" in line else line.split()
+        try:
+            command = int(row[3])
+            is_home = command == _WAYPOINT and number == rows[0][0]
+            if command in known and not is_home:
+                yield command, float(row[4]), _flown(int(row[2]), *row[8:10])
+        except (ValueError, IndexError, TypeError) as error:
+            raise ValueError(f"line {number}: {line[:60]!r}: {error}") from error

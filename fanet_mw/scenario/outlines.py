@@ -100,15 +100,20 @@ def _tree(data: bytes) -> Any:  # noqa: ANN401  (JSON)
         raise ValueError(f"it is {kind}; convert it: ogr2ogr -f GeoJSON -t_srs EPSG:4326 town.geojson in.json")
     if not isinstance(tree, dict) or "type" not in tree:
         raise ValueError("it is no object with a type")
+    require_degrees(tree)
+    return tree
+
+
+def require_degrees(tree: Mapping[str, Any]) -> None:
+    """Raises ValueError if GeoJSON names a reference system other than longitude and latitude."""
     crs = tree.get("crs") or "WGS84"
     if isinstance(crs, dict) and isinstance(crs.get("properties"), dict):
         crs = crs["properties"].get("name", crs)
     if not _WGS84.search(str(crs)):
         raise ValueError(
             f"its crs is {str(crs)[:80]}; convert the file to EPSG:4326: "
-            "ogr2ogr -t_srs EPSG:4326 town.geojson in.geojson"
+            "ogr2ogr -t_srs EPSG:4326 out.geojson in.geojson"
         )
-    return tree
 
 
 def _polygons(tree: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any], Any]]:

@@ -78,6 +78,19 @@ def waypoints() -> str:
     return "QGC WPL 110\n" + "".join(f"{n}\t0\t3\t{c}\t0\t0\t0\t0\t{lat}\t{lon}\t50\t1\n" for n, c, lat, lon in rows)
 
 
+def wpl(*rows: tuple[float, ...], home: bool = True) -> str:
+    """A list of waypoints: index, frame, command, first parameter, latitude, longitude."""
+    every = [(0, 0, 16, 0, 47.3, 8.5), *rows] if home else rows
+    lines = (
+        f"{n}\t0\t{frame}\t{command}\t{p}\t0\t0\t0\t{lat}\t{lon}\t50\t1\n" for n, frame, command, p, lat, lon in every
+    )
+    return "QGC WPL 110\n" + "".join(lines)
+
+
+def items(**item: object) -> str:
+    return json.dumps({"fileType": "Plan", "geoFence": None, "mission": {"items": [item]}})
+
+
 def scenario(folder: Path, text: str) -> Scenario:
     path = folder / "search.toml"
     path.write_text(f"[nodes]\ncount = 9\n{text}", encoding="utf-8")
@@ -141,6 +154,29 @@ def test_points_are_people(files: Path, name: str) -> None:
         ("x.plan", '{"fileType": "Mission"}', 'fileType is not "Plan"'),
         ("x.plan", "[]", "cannot be read"),
         ("x.waypoints", "hello", "first line is not QGC WPL"),
+        ("x.kml", '<?xml version="1.0" encoding="klingon"?><kml/>', "cannot be read as .kml: unknown encoding"),
+        ("x.kml", "<kml><Point><coordinates>8.5, 47.3, 0</coordinates></Point></kml>", "'8.5,' must be longitude,lat"),
+        ("x.geojson", "null", "cannot be read as .geojson"),
+        ("x.geojson", json.dumps({"crs": {"properties": {"name": "EPSG:2056"}}, **json.loads(geojson())}), "EPSG:2056"),
+        ("x.geojson", '{"type": "Polygon", "coordinates": [[[true, 1], [2, 3], [4, 5]]]}', "1 and longitude True must"),
+        (
+            "x.plan",
+            plan().replace('"inclusion": true', '"inclusion": "false"'),
+            "inclusion = 'false' must be true or f",
+        ),
+        ("x.plan", items(command=16, params=[0, 0, 0, None, None, None, 50]), "latitude None and longitude None must"),
+        ("x.plan", items(command=16, params=[0, 0, 0, None, 0, 0, 50]), "latitude and longitude 0"),
+        ("x.plan", items(command=16, frame=1, params=[0, 0, 0, None, 47.3, 8.5, 50]), "frame 1 has no latitude"),
+        ("x.waypoints", wpl((1, 3, 16, 0, 0.0, 0.0)), "line 3: '1\\t0\\t3\\t16"),
+        ("x.waypoints", wpl((1, 3, 16, 0, 0.0, 0.0)), "latitude and longitude 0"),
+        ("x.waypoints", wpl((1, 1, 16, 0, 10.0, 20.0)), "frame 1 has no latitude"),
+        ("x.waypoints", "QGC WPL 110\n0\t1\t0\t16\n1\t0", "line 3: '1\\t0'"),
+        ("x.waypoints", "QGC WPL 110\n" + "0 " * 12 + "\n1 0 3 16 0 0 0 0 47,3 8,5 50 1", "line 3: '1 0 3 16"),
+        (
+            "x.waypoints",
+            wpl((1, 3, 16, 0, 47.0, 8.0), (2, 3, 16, 0, 47, 8.1), (3, 3, 16, 0, 71, 9)),
+            "must be <= 1e+06",
+        ),
         ("x.kmz", "no zip", "is no KMZ"),
         ("x.shp", "", "must be a .geojson"),
     ],
@@ -163,6 +199,57 @@ def test_a_circle_to_stay_inside_is_area_alone_and_beside_polygons(
     (tmp_path / "round.plan").write_text(json.dumps(tree))
     area_m = scenario(tmp_path, '[mission]\narea = "round.plan"').world.area_m
     assert area_m == pytest.approx(side_m, abs=2) if side_m else area_m > 2300
+
+
+@pytest.mark.parametrize("home", [True, False])
+def test_fences_and_rally_points_of_mission_planner_are_read(tmp_path: Path, home: bool) -> None:
+    inside, outside = ([(command, 4, *degrees(at)) for at in ring] for command, ring in ((5001, SQUARE), (5002, TOWER)))
+    rest = [(5004, 25, *degrees((0.0, -100.0))), *((5100, 0, *degrees(point)) for point in PEOPLE)]
+    rows = [(n, 3, *row) for n, row in enumerate([*inside, *outside, *rest], start=int(home))]
+    (tmp_path / "fence.waypoints").write_text(wpl(*rows, home=home))
+    names = 'area = "fence.waypoints"\nsurvivors_at = "fence.waypoints"\n[world]\nno_fly = "fence.waypoints"'
+    found = scenario(tmp_path, f"[mission]\n{names}")
+    assert found.world.area_m == pytest.approx(600, abs=1.5)
+    assert found.world.no_fly_m[0] == pytest.approx((100, 100, 14.15), abs=0.1)
+    assert found.world.no_fly_m[1] == pytest.approx((0, -100, 25), abs=0.1)
+    assert found.mission.survivor_positions_m[1] == pytest.approx(PEOPLE[1], abs=0.1)
+
+
+@pytest.mark.parametrize(("encoding", "end"), [("utf-16", "\n"), ("utf-8-sig", "\r"), ("ascii", "\r\n")])
+def test_text_of_any_system_is_read(tmp_path: Path, encoding: str, end: str) -> None:
+    (tmp_path / "area.waypoints").write_bytes(waypoints().replace("\n", end).encode(encoding))
+    assert scenario(tmp_path, '[mission]\narea = "area.waypoints"').world.area_m == pytest.approx(600, abs=1.5)
+
+
+@pytest.mark.parametrize(
+    ("at", "value", "why"),
+    [(6, b"\1", "doc.kml is encrypted"), (8, b"\x0e", "compressed by method 14"), (60, b"\xff" * 9, "is no KMZ: ")],
+)
+def test_an_archive_that_cannot_be_unpacked_is_one_line(tmp_path: Path, at: int, value: bytes, why: str) -> None:
+    path = tmp_path / "x.kmz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("doc.kml", kml([SQUARE], PEOPLE))
+    data = bytearray(path.read_bytes())
+    for start in (at, data.index(b"PK\1\2") + at + 2) if at < 60 else (at,):
+        data[start : start + len(value)] = value
+    path.write_bytes(data)
+    with pytest.raises(ConfigError, match=why):
+        scenario(tmp_path, '[mission]\narea = "x.kmz"')
+
+
+def test_the_root_of_an_archive_is_read_whatever_comes_first(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "x.kmz", "w") as archive:
+        archive.writestr("files/overlay.kml", kml([TOWER]))
+        archive.writestr("doc.kml", kml([SQUARE]))
+    assert scenario(tmp_path, '[mission]\narea = "x.kmz"').world.area_m == pytest.approx(600, abs=1.5)
+
+
+def test_places_far_from_the_origin_are_told_with_their_file(files: Path) -> None:
+    for key in ('[mission]\nsurvivors_at = "people.kml"\n[world]', '[world]\nno_fly = "towers.kml"'):
+        with pytest.raises(
+            ConfigError, match=r"(people|towers)\.kml: a place is .* m from world.origin_deg = \[0, 0\]"
+        ):
+            scenario(files, f"{key}\norigin_deg = [0, 0]")
 
 
 def test_what_needs_an_origin_says_so_and_what_is_not_there_is_named(files: Path) -> None:

@@ -8,6 +8,7 @@ goes.
 The last command of each application counts, and no other application may object to it, unless it avoids a collision.
 """
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from random import Random
@@ -255,8 +256,10 @@ class _ApplicationPort:
         return self._onboard.send(self._application, submission)
 
     def fly(self, course: Course) -> None:
-        if not isinstance(course, Course):
-            raise LocalProtocolError(f"course = {course!r} must be a Course")
+        if not isinstance(course, Course) or not _is_flyable(course):
+            raise LocalProtocolError(
+                f"application {self._application.name!r}: course = {course!r} must be a Course of finite numbers"
+            )
         self._onboard.command(self._application, course)
 
     def tap(self, frames: bytes) -> None:
@@ -264,3 +267,13 @@ class _ApplicationPort:
 
     def stream(self, use: str) -> Random:
         return stream(self.scenario.seed, use, self.node)
+
+
+def _is_flyable(course: Course) -> bool:
+    places = [course.position] if course.velocity is None else [course.position, course.velocity]
+    if not all(isinstance(place, Enu) for place in places):
+        return False
+    try:
+        return all(map(math.isfinite, (*places[0], *places[-1], course.speed_m_s)))
+    except TypeError:
+        return False

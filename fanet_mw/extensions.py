@@ -38,6 +38,18 @@ GROUPS: Final[Mapping[str, str]] = {
 }
 """The keys of a scenario that may name a part of another package, and the group of entry points for each."""
 _OURS: Final = ("fanet_mw", "agents", "emulator", "sim")
+_DEEPEST: Final = 16
+"""The depth of a report; one that holds itself has none."""
+_TOLD: Final[Mapping[str, tuple[type, ...]]] = {
+    **dict.fromkeys(
+        ("kind", "node", "generated", "bus_malformed", "heard_late", "messages", "applications", "frames_sent",
+         "receptions", "dropped", "final", "host", "clock"), ()
+    ),
+    **dict.fromkeys(("missed_turns", "waiting", "leader", "term", "epoch"), (int,)),
+    "bound_ms": (int, float, type(None)),
+    "state": (str,),
+}  # fmt: skip
+"""What results read of a node's report: what a protocol must not tell at all, or as values of which types."""
 _SUFFIXES: Final = frozenset(Path(f"_{suffix}").suffix for suffix in (*SOURCE_SUFFIXES, *EXTENSION_SUFFIXES))
 _INSTALLED: Final = ("site-packages", "dist-packages")
 """Folders of packages that were installed: of this environment, of another on its path, of the user, of Debian."""
@@ -181,22 +193,40 @@ def report_of(part: Any) -> dict[str, Any]:  # noqa: ANN401  (an application or 
     """The counters of a part. Those of another package are told in values of JSON, numbers that are none and whatever
     else as text, so that no run is lost for its last report.
     """
-    report = part.report()
     if type(part).__module__.partition(".")[0] in _OURS:
-        return dict(report)
-    told = _plain(report)
+        return dict(part.report())
+    try:
+        told = _plain(part.report(), _DEEPEST)
+    except Exception as error:  # noqa: BLE001  (whatever the code of another package raises)
+        told = {"report_failed": f"{type(error).__name__}: {error}"}
     return told if isinstance(told, dict) else {} if told is None else {"report": told}
 
 
-def _plain(value: Any) -> Any:  # noqa: ANN401
+def protocol_report_of(protocol: Any) -> dict[str, Any]:  # noqa: ANN401
+    """The counters of a protocol. What one of another package calls as results call something else is renamed."""
+    told = report_of(protocol)
+    if type(protocol).__module__.partition(".")[0] in _OURS:
+        return told
+    return {key if _may_tell(key, value) else f"protocol.{key}": value for key, value in told.items()}
+
+
+def _may_tell(key: str, value: object) -> bool:
+    if key not in _TOLD:
+        return True
+    return isinstance(value, _TOLD[key]) and (not isinstance(value, int | float) or value >= 0)
+
+
+def _plain(value: Any, depth: int) -> Any:  # noqa: ANN401
+    if depth < 0:
+        raise ValueError(f"deeper than {_DEEPEST}")
     if isinstance(value, Mapping):
-        return {str(key): _plain(held) for key, held in value.items()}
+        return {str(key): _plain(held, depth - 1) for key, held in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(held) for held in value]
+        return [_plain(held, depth - 1) for held in value]
     if isinstance(value, set | frozenset):
-        return sorted((_plain(held) for held in value), key=str)
+        return sorted((_plain(held, depth - 1) for held in value), key=str)
     if hasattr(value, "tolist"):  # of numpy
-        return _plain(value.tolist())
+        return _plain(value.tolist(), depth - 1)
     if isinstance(value, float):
         return value if math.isfinite(value) else str(value)
     if isinstance(value, int):

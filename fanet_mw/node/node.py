@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 from fanet_mw import wire
 from fanet_mw.bus.messages import Reception, TxStatus
 from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
-from fanet_mw.extensions import report_of
+from fanet_mw.extensions import protocol_report_of
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.duplicates import DELIVERED, DuplicateSet
 from fanet_mw.node.header_check import HeaderCheck
@@ -313,7 +313,7 @@ class Node:
             "receptions": self.receptions,
             "dropped": self._drops(),
             **_LEADERLESS,
-            **report_of(self._protocol),
+            **protocol_report_of(self._protocol),
         }
 
     def _drops(self) -> dict[str, int]:

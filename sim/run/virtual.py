@@ -15,6 +15,7 @@ from fanet_mw.application import Application
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import MavlinkTap, Message, Poses
 from fanet_mw.bus.topics import Topics, node_of_tap
+from fanet_mw.errors import HostError
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.node.reader import Reader
 from fanet_mw.scenario import Scenario
@@ -93,7 +94,12 @@ def simulate(
             scenario, capture=capture, applications=applications, folder=spool_folder, observer=observer
         )
         began = time.perf_counter()
-        _run(observed, on_progress, signals)
+        try:
+            _run(observed, on_progress, signals)
+        except SystemExit as error:  # exit code 0 would say that there is a result, and that it is valid
+            raise HostError(
+                f"a part of another package has called sys.exit({error.code!r}) at {observed.host.now_ns / S:g} s"
+            ) from error
     interrupted = f"interrupted by {Signals(signals[0]).name}" if signals else ""
     return observed.outcome(wall_s=time.perf_counter() - began, cut_short=interrupted)
 

@@ -249,6 +249,25 @@ def test_a_report_with_values_that_json_does_not_know_is_told_as_far_as_it_does(
     assert json.loads(json.dumps(told, allow_nan=False)) == told
 
 
+class Looping(Diary):
+    def report(self) -> Any:
+        told: dict[str, Any] = {"lines": 1}
+        return told | {"again": [told, told.setdefault("self", told)]}
+
+
+class Failing(Diary):
+    def report(self) -> Any:
+        raise OSError("no such sensor")
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"), [(Looping, "ValueError: deeper than 16"), (Failing, "OSError: no such sensor")]
+)
+def test_no_run_is_lost_for_a_report_that_fails(make_scenario: MakeScenario, kind: type[Diary], said: str) -> None:
+    told = uav(make_scenario, kind("odd"), Diary("even")).report()["applications"]
+    assert told == {"odd": {"report_failed": said}, "even": {"lines": 0}}
+
+
 class Post(Application):
     """Sends what it is told to at second 1, and writes down what becomes of it."""
 
@@ -434,10 +453,25 @@ def test_a_message_of_pymavlink_is_sent_as_its_frame_and_a_priority_by_its_name(
     assert (heard.get_type(), heard.get_srcSystem(), heard.text) == ("STATUSTEXT", OWN, "found")
 
 
-def test_a_course_is_a_course(make_scenario: MakeScenario) -> None:
+@pytest.mark.parametrize(
+    "course",
+    [
+        (1, 2, 3),
+        Course((1, 2, 3), 5.0),  # type: ignore[arg-type]
+        Course(Enu(math.nan, 0.0, 0.0), 5.0),
+        Course(Enu(0.0, 0.0, 0.0), "fast"),  # type: ignore[arg-type]
+        Course(Enu(0.0, 0.0, 0.0), math.inf),
+        Course(Enu(0.0, 0.0, 0.0), 5.0, Enu(0.0, None, 0.0)),  # type: ignore[arg-type]
+    ],
+)
+def test_a_course_is_a_course(make_scenario: MakeScenario, course: Any) -> None:
     class Pilot(Application):
-        def start(self, port: AppPort, now_ns: int) -> None:
-            port.fly((1, 2, 3))  # type: ignore[arg-type]
+        name = "pilot"
 
-    with pytest.raises(LocalProtocolError, match=r"course = \(1, 2, 3\) must be a Course"):
+        def start(self, port: AppPort, now_ns: int) -> None:
+            port.fly(course)
+
+    with pytest.raises(
+        LocalProtocolError, match=r"application 'pilot': course = .* must be a Course of finite numbers"
+    ):
         uav(make_scenario, Pilot())

@@ -1,11 +1,13 @@
 """What a new user tries and what cannot be: a sentence with the value and its bound, at once."""
 
+import sys
 from pathlib import Path
 
 import pytest
 
+from fanet_mw.application import Application
 from fanet_mw.bus.topics import Topics
-from fanet_mw.errors import ConfigError
+from fanet_mw.errors import ConfigError, HostError
 from fanet_mw.scenario import config
 from sim.cli.app import app
 from sim.results.files import finish
@@ -64,3 +66,19 @@ def test_an_instant_beyond_the_end_of_a_run_is_refused(tmp_path: Path) -> None:
             "mobility": {"model": "random_waypoint"}}  # fmt: skip
     finish(simulate(config.build(tree)), out=tmp_path)
     assert refusal("replay", str(tmp_path), "--at", "99") == "--at 99: must be within 0 and duration_s = 2"
+
+
+@pytest.mark.parametrize("code", [0, None, "done"])
+def test_a_part_that_calls_exit_does_not_end_a_run_as_if_it_were_right(code: object) -> None:
+    class Leaving(Application):
+        name = "leaving"
+
+        def next_wake_ns(self) -> int:
+            return 1_000_000_000
+
+        def wake(self, now_ns: int) -> None:
+            sys.exit(code)  # type: ignore[arg-type]
+
+    scenario = config.build({"nodes": {"count": 1}, "duration_s": 2, "routing": {"protocol": "flooding"}})
+    with pytest.raises(HostError, match=rf"has called sys.exit\({code!r}\) at 1 s"):
+        simulate(scenario, applications=lambda _: [Leaving()])

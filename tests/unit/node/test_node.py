@@ -11,6 +11,7 @@ from fanet_mw.node.node import Node
 from fanet_mw.node.packet import Packet
 from fanet_mw.node.packet_watch import RadioStage
 from fanet_mw.routing import make_protocol
+from fanet_mw.routing.flooding import Flooding
 from fanet_mw.trace import Delivered, Dropped
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, PRIORITY_BULK, PRIORITY_REPORT, Header, Kind, filler
@@ -173,6 +174,35 @@ def test_packets_of_one_origin_are_numbered_without_gaps_whatever_control_goes_i
         numbers.append(send(node))
         node.port.announce(Kind.ROUTING, b"", now_ns=0, flags=0, hop_limit=1)
     assert numbers == [numbers[0], numbers[0] + 1, numbers[0] + 2]
+
+
+class Boastful(Flooding):
+    """Reports under names that the node and results have."""
+
+    def report(self) -> dict[str, object]:
+        return {
+            "receptions": 0,
+            "kind": "emulator",
+            "messages": 3,
+            "waiting": "a",
+            "missed_turns": -1,
+            "epoch": 7,
+            "own": 1,
+        }
+
+
+def test_a_protocol_of_another_package_reports_under_no_name_of_ours(make_scenario: MakeScenario) -> None:
+    node = Node(
+        OURS,
+        make_scenario(**{"routing.protocol": "flooding"}),
+        Boastful,
+        position=Enu(0.0, 0.0, 0.0),
+    )
+    told = dict(node.report())
+    assert (told["receptions"], told["epoch"], told["own"]) == (0, 7, 1)
+    strange = {"receptions": 0, "kind": "emulator", "messages": 3, "waiting": "a", "missed_turns": -1}
+    assert {key: told[f"protocol.{key}"] for key in strange} == strange
+    assert not strange.keys() & told.keys() - {"receptions"}
 
 
 @pytest.mark.parametrize(("woken_ms", "start_ms"), [(100, 120), (115, 120), (120, 120), (150, 150)])

@@ -72,7 +72,7 @@ class Timeline:
         self._links, self._told = _recorded(folder, epoch_ns, found.scenario)
         self.has_links = bool(self._links)
         """True if the folder has a recording, which tells what links carried and actors reported each second."""
-        self.end_ns = max(one.t_ns for one in records)
+        self.end_ns = max((one.t_ns for one in records), default=self.scenario.duration_ns)
         self.events: Sequence[Event] = sorted([*_notable(self._records), *_broken(self._records)])
         self._start = SwarmState(self.scenario)
         for node, report in found.agents().items() if not self._told else ():

@@ -83,7 +83,7 @@ def write(folders: Sequence[Path], out: Path) -> list[Path]:
         title, blocks = _blocks(folders, out)
         pages = {out / "report.html": as_html(title, blocks), out / "report.md": as_markdown(title, blocks, out)}
         for path, text in pages.items():
-            replace_file(path, text.encode())
+            replace_file(path, text.encode(errors="backslashreplace"))  # a path may be no text
     except OSError as error:
         raise ConfigError(f"{error.filename or out}: {error.strerror}") from error
     return list(pages)

@@ -82,12 +82,13 @@ def _mission(found: Mapping[str, Any], *, confirms: bool) -> Iterator[tuple[str,
         yield "time until 95 % of the area were covered", "not within the run" if late is None else f"{number(late)} s"
     if found["connected"] is not None:
         yield "time in which all searching UAVs were connected", percent(found["connected"])
-        yield "time in which they would have been without any one of them", percent(found["biconnected"])
+        yield "time in which they would have been without any one of them", percent(found.get("biconnected"))
         for key, what in (
             ("cut_vertices", "UAVs whose loss would separate others: median, most"),
             ("diameter", "hops between two UAVs, at most: median, most"),
         ):
-            yield what, f"{found[key]['p50']:g}, {found[key]['most']}"
+            if (usual := found.get(key)) is not None:
+                yield what, f"{usual['p50']:g}, {usual['most']}"
     if found["nearest_m"]:
         yield (
             "distance to the nearest other UAV: least, 1st percentile, median",

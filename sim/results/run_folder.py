@@ -86,6 +86,11 @@ class _ShownNearest(_ShownShape):
     p50: Measured
 
 
+class _ShownUsual(_ShownShape):
+    p50: Number
+    most: Number
+
+
 class _ShownMission(_ShownShape):
     survivors: Count
     detected: Count
@@ -99,7 +104,11 @@ class _ShownMission(_ShownShape):
     collisions: Count
     coverage: Share | None
     covered_95_s: Measured
+    photographed: Share | None = None
     connected: Share | None
+    biconnected: Share | None = None
+    cut_vertices: _ShownUsual | None = None
+    diameter: _ShownUsual | None = None
     nearest_m: _ShownNearest | dict[str, None] | None
 
 

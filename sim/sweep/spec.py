@@ -28,7 +28,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.foreign_file import toml_of
@@ -125,6 +125,15 @@ class Sweep(_Table):
     """The measures that are taken in addition to the summary (`sim/sweep/measures.py`)."""
     quick: SweepVariant | None = None
     full: SweepVariant | None = None
+
+    @field_validator("case")
+    @classmethod
+    def _every_case_has_a_name_of_its_own(cls, cases: tuple[Case, ...]) -> tuple[Case, ...]:
+        names = [case.name for case in cases]
+        twice = next((name for at, name in enumerate(names) if name in names[:at]), None)
+        if twice is not None:  # rows and figures know a case by its name
+            raise ValueError(f"two cases have the name {twice!r}")
+        return cases
 
     def variant(self, name: str | None) -> "Sweep":
         """The sweep with the changes of a variant; None: without any."""

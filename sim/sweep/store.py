@@ -25,7 +25,7 @@ from fanet_mw.whole_file import require_folder, writing
 from sim.results.run_folder import checked
 from sim.results.run_table import read_parquet
 from sim.sweep.one_run import Finished
-from sim.sweep.table import table_of
+from sim.sweep.table import table_of, told
 from sim.sweep.tasks import Task
 
 TABLE: Final = "runs.parquet"
@@ -51,6 +51,10 @@ def _rows(path: Path) -> list[dict[str, Any]]:
         return rows
     except ConfigError as error:
         raise ConfigError(f"{str(error).rstrip('.')}; remove it, and its runs are repeated") from error
+
+
+def _storable(row: Finished) -> dict[str, Any]:
+    return {name: told(value) if isinstance(value, str) else value for name, value in asdict(row).items()}
 
 
 class Store:
@@ -83,7 +87,10 @@ class Store:
             raise ConfigError(f"--out {self.folder}: cannot be written: {error.strerror}") from error
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
-            raise ConfigError(f"{path}: {'.'.join(map(str, first['loc']))}: {first['msg'].lower()}") from error
+            raise ConfigError(
+                f"{path}: {'.'.join(map(str, first['loc']))}: {first['msg'].lower()}; it is of another program or "
+                "version: remove it, and its runs are repeated"
+            ) from error
         self._next = max((int(path.stem) for path in self._files), default=0) + 1
 
     def get(self, key: str) -> Finished | None:
@@ -106,7 +113,7 @@ class Store:
     def _write(self, rows: Iterable[Finished]) -> Path:
         path = self._parts / f"{self._next:06}.parquet"
         self._next += 1
-        write_whole(path, pa.Table.from_pylist([asdict(row) for row in rows], schema=_SCHEMA))
+        write_whole(path, pa.Table.from_pylist([_storable(row) for row in rows], schema=_SCHEMA))
         return path
 
     def publish(self, tasks: Sequence[Task], columns: Sequence[str]) -> pa.Table:

@@ -4,6 +4,7 @@ Each number of the summary is a column of floats, with names such as `delay_ms.p
 lists. The whole summary is in the column `summary` as JSON, and the resolved scenario in `scenario`.
 """
 
+import contextlib
 import json
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -25,31 +26,42 @@ def table_of(rows: Sequence[tuple[Task, Finished]], varied: Sequence[str]) -> pa
         figures.append(row)
         names.update(dict.fromkeys(row))
     columns: dict[str, pa.Array] = {
-        "run": pa.array([task.key for task, _ in rows], pa.string()),
-        "case": pa.array([task.case for task, _ in rows], pa.string()),
+        "run": _texts([task.key for task, _ in rows]),
+        "case": _texts([task.case for task, _ in rows]),
         **{key: _settings([task.value(key) for task, _ in rows]) for key in varied},
         "seed": pa.array([task.seed for task, _ in rows], pa.int64()),
-        "status": pa.array(["failed" if done.failed else "ok" for _, done in rows], pa.string()),
-        "error": pa.array([done.error for _, done in rows], pa.string()),
+        "status": _texts(["failed" if done.failed else "ok" for _, done in rows]),
+        "error": _texts([done.error for _, done in rows]),
     }
     for name in sorted(names):
         if name not in columns:
             columns[name] = _figures([row.get(name) for row in figures])
-    columns["code"] = pa.array([done.code for _, done in rows], pa.string())
-    columns["command"] = pa.array([task.command for task, _ in rows], pa.string())
-    columns["scenario"] = pa.array([json.dumps(task.tree) for task, _ in rows], pa.string())
-    columns["summary"] = pa.array([done.summary for _, done in rows], pa.string())
+    columns["code"] = _texts([done.code for _, done in rows])
+    columns["command"] = _texts([task.command for task, _ in rows])
+    columns["scenario"] = _texts([json.dumps(task.tree) for task, _ in rows])
+    columns["summary"] = _texts([done.summary for _, done in rows])
     return pa.table(columns)
+
+
+def _texts(values: Sequence[str | None]) -> pa.Array:
+    return pa.array([None if each is None else told(each) for each in values], pa.string())
+
+
+def told(text: str) -> str:
+    """Text that UTF-8 can hold: half of a pair of surrogates, as for a byte in the name of a file, as its code."""
+    return text if text.isascii() else text.encode(errors="backslashreplace").decode()
 
 
 def _settings(values: list[object]) -> pa.Array:
     """A column of one type if all values are numbers, texts or truth values; otherwise their TOML text."""
     kinds = {type(value) for value in values if value is not None}
-    if kinds <= {bool} or kinds <= {int} or kinds <= {str}:
-        return pa.array(values, type=None if kinds else pa.string())
+    if kinds <= {str}:
+        return _texts([None if value is None else str(value) for value in values])
+    if kinds <= {bool} or kinds <= {int}:
+        return pa.array(values)
     if kinds <= {int, float}:
         return pa.array(values, pa.float64())
-    return pa.array([None if value is None else toml_value(value) for value in values], pa.string())
+    return _texts([None if value is None else toml_value(value) for value in values])
 
 
 def _figures(values: list[object]) -> pa.Array:
@@ -61,5 +73,6 @@ def _figures(values: list[object]) -> pa.Array:
     if kinds <= {int, float}:
         return pa.array(values, pa.float64())
     if kinds <= {list}:
-        return pa.array(values, pa.list_(pa.float64()))
-    return pa.array([None if value is None else str(value) for value in values], pa.string())
+        with contextlib.suppress(pa.ArrowInvalid, TypeError):  # not of numbers
+            return pa.array(values, pa.list_(pa.float64()))
+    return _texts([None if value is None else str(value) for value in values])

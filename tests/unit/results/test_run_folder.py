@@ -99,6 +99,12 @@ def test_a_folder_of_ones_own_makes_a_page_a_replay_and_a_row(folder: Path) -> N
     assert read(folder).num_rows == 1
 
 
+def test_a_folder_whose_name_is_no_text_has_a_page(folder: Path) -> None:
+    odd = folder.rename(folder.with_name("r\udcff"))
+    report(odd)
+    assert "r\\udcff" in (odd / "report.html").read_text()
+
+
 @pytest.mark.parametrize(
     ("keys", "said"),
     [
@@ -123,6 +129,10 @@ def test_a_folder_of_ones_own_makes_a_page_a_replay_and_a_row(folder: Path) -> N
         ({"delay_ms__p50": math.inf}, "inf, which must be finite"),
         ({"mission": None}, "mission = "),
         ({"mission__nearest_m": 7}, "nearest_m"),
+        ({"mission__cut_vertices": "many"}, "cut_vertices"),
+        ({"mission__diameter": {"p50": "a", "most": 3}}, "diameter"),
+        ({"mission__photographed": "x"}, "photographed"),
+        ({"mission__connected": 1.0, "mission__biconnected": 7}, "biconnected"),
         ({"files": {}}, "does not say that it was written"),
         ({"files": {"trace.jsonl": 1}}, "files"),
         ({"invalid_because": {}}, "invalid_because"),

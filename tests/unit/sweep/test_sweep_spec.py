@@ -108,6 +108,10 @@ def test_a_run_in_real_time_may_be_slowed_down_and_stays_the_same_run() -> None:
         ('base = "quick"\n[grid]\nnodes.count = []', r"grid.nodes.count = \[\]"),
         ('base = "quick"\n[[case]]\nset.nodes.count = 5', "case.0.name: is missing"),
         ('base = "quick"\n[[case]]\nname = "a"\nslow_down_to = 0.1', "case.0.*slow_down_to is for runs with realtime"),
+        (
+            'base = "quick"\ncase = [{name = "a"}, {name = "b"}, {name = "a", set.nodes.count = 5}]',
+            "case.*two cases have the name 'a'",
+        ),
         ("base = ", "not valid TOML"),
     ],
 )

@@ -280,3 +280,23 @@ def test_a_file_system_that_cannot_lock_is_one_sentence_and_nothing_of_it_stays_
 def test_an_error_in_a_sweep_is_not_taken_for_one_of_its_lock(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="disk"), Store(tmp_path).alone():
         raise OSError(errno.ENOSPC, "disk")
+
+
+def test_what_no_text_can_hold_stands_in_the_table_by_its_code(sweep, whole, tmp_path: Path) -> None:
+    """The name of a file may be any bytes, of which Python makes halves of pairs of surrogates."""
+    store = Store(shutil.copytree(whole, tmp_path / "store"))
+    store.read()
+    task = tasks_of(sweep)[0]
+    done = store.get(task.key)
+    assert done is not None
+    summary = json.dumps({**json.loads(done.summary or ""), "odd": "\udcff", "list": ["\ud800"]})
+    store.add(replace(done, summary=summary, error="b\udcff.toml: é"))
+    table = store.publish([replace(task, case="b\udcff")], sweep.varied())
+    assert [table[name][0].as_py() for name in ("case", "error", "odd")] == ["b\\udcff", "b\\udcff.toml: é", "\\udcff"]
+
+
+def test_a_file_of_another_program_among_finished_runs_may_be_removed(whole, tmp_path: Path) -> None:
+    store = Store(shutil.copytree(whole, tmp_path / "store"))
+    pq.write_table(pa.table({"a": [1]}), store.folder / "finished" / "000009.parquet")
+    with pytest.raises(ConfigError, match=r"000009.parquet: key: .*: remove it, and its runs are repeated"):
+        store.read()

@@ -3,10 +3,13 @@
 The timelines are those that `tests/ns3/eifs_timelines.py` puts before a live ns-3.
 """
 
+import numpy as np
 import pytest
 from hand_driven import Air, statuses
 from kit import MakeScenario
 
+from emulator.kernel import state as k
+from emulator.kernel.channel_access import on_busy
 from fanet_mw.units import US
 from tests.ns3.eifs_timelines import DIFS_US, LISTENER, PLACES_M, TIMELINES, Timeline, asked_of
 
@@ -55,3 +58,15 @@ def test_the_standards_eifs_goes_with_every_other_habit_of_ns3(make_scenario: Ma
     """In ns-3 who finds the medium idle waits for DIFS from then on, and draws no backoff."""
     began = began_us(make_scenario, timeline, access=["difs", "sums", "onset"])
     assert began == pytest.approx(max(timeline.standard_us, timeline.asked_us + DIFS_US), abs=0.001)
+
+
+@pytest.mark.parametrize(("busy_us", "passed"), [(149, False), (150, True), (151, True)])
+def test_eifs_has_passed_when_difs_has_followed_it_without_a_break(busy_us: int, passed: bool) -> None:
+    """A medium that becomes busy in the last instant of DIFS interrupts nothing any more."""
+    p, st = np.zeros(k.PARAMETERS, dtype=np.int64), np.zeros((k.STATION_ROWS, 1), dtype=np.int64)
+    p[k.DIFS_NS], p[k.SLOT_NS] = DIFS_US * US, SLOT_US * US
+    st[[k.BUSY_SINCE, k.SCHEDULED], 0] = -1
+    st[k.BAD_UNTIL, 0] = (150 - DIFS_US) * US
+    on_busy(p, st, 0, busy_us * US)
+    assert (st[k.BAD_UNTIL, 0] == 0) == passed
+    assert st[k.BUSY_SINCE, 0] == busy_us * US

@@ -8,7 +8,7 @@ import pytest
 from hand_driven import Air, receptions, statuses
 
 from emulator.channel.error_rate import log_success_per_bit
-from emulator.channel.ofdm_error_rate import bit_error
+from emulator.channel.ofdm_error_rate import bit_error, log_success
 from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
 from fanet_mw.airtime import Timing, ofdm_frame_ns
 from fanet_mw.bus.messages import TxOutcome
@@ -220,6 +220,17 @@ def test_more_sinr_never_hurts_and_enough_is_enough(rate_mbps: float) -> None:
     assert (np.diff(success) >= -1e-12).all()
     assert success[-1] > -1e-9
     assert success[0] < -1
+
+
+@pytest.mark.parametrize("short", [True, False])
+@pytest.mark.parametrize("rate_mbps", [rate for rate in RATES if rate != 9.0])
+def test_between_two_entries_of_a_table_the_loss_is_their_mean(rate_mbps: float, short: bool) -> None:
+    """From where all is lost to where nothing is, in steps of half a decibel; all are probabilities, so none is cut."""
+    sinr_db = np.arange(-8, 30, 0.25)
+    lost = -np.expm1(8 * (32 if short else 1458) * log_success(sinr_db, rate_mbps, short=short))
+    assert lost[1:-1:2] == pytest.approx((lost[:-2:2] + lost[2::2]) / 2, abs=1e-9)
+    assert (lost[0], lost[-1]) == (1.0, 0.0)
+    assert (np.diff(lost) <= 1e-12).all()
 
 
 def test_an_ack_is_spoilt_as_often_as_its_own_rate_says(make_scenario: MakeScenario) -> None:

@@ -87,6 +87,18 @@ def test_without_a_leader_the_lowest_id_becomes_the_reference() -> None:
     assert network.worst_us(reference=2) < 20
 
 
+def test_whoever_becomes_the_reference_is_right_by_definition_for_ever() -> None:
+    sync, oscillator = follower(), Oscillator(40e-6, 0.0, US)
+    follow(sync, ahead_ns=25 * MS, hellos=8, error_ns=5 * US)
+    assert sync.line.error_ns(8 * S, oscillator) >= 5 * US
+    sync.pass_time(200 * S)
+    assert sync.is_reference
+    for second in (200, 201, 900):
+        assert sync.line.error_ns(second * S, oscillator) == 0
+    assert sync.line.rate_error(oscillator) == 0
+    assert sync.hops(201 * S) == 0
+
+
 def test_in_a_long_chain_nobody_takes_its_own_time_before_the_leader_s_has_come() -> None:
     """Two times would meet in the middle of the chain, and one of them would have to step."""
     network = Network(line(16), CRYSTAL, seed=4)

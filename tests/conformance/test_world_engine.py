@@ -79,6 +79,13 @@ def test_acceleration_is_limited_as_thrust_is(engine: Engine) -> None:
     assert 2 < engine.velocities()[0, 0] < 20
 
 
+def test_nobody_is_told_to_fall_as_fast_as_without_power(engine: Engine) -> None:
+    """Rotors go on turning, so that a UAV can be tilted: the thrust is never nothing."""
+    engine.reset(np.array([[0.0, 0, 500]]))
+    fly(engine, np.array([[0.0, 0, -100]]), 1)
+    assert -8.5 < engine.velocities()[0, 2] < -2
+
+
 def test_the_ground_stops_a_fall_and_is_noticed_once(engine: Engine) -> None:
     engine.reset(np.array([[0.0, 0, 5]]))
     fly(engine, np.array([[0.0, 0, -4]]), 5)

@@ -26,10 +26,13 @@ from fanet_mw.wire.application_message import (
     encode_piece,
     encode_receipts,
 )
+from fanet_mw.wire.frame import VERSION
 
 NODES: Final = tuple(NodeId(n) for n in (1, 2, 3, 4))
 HEADER: Final = wire.Header(5, 1, 3, 0xFFFF, 3, 0, 32, 0, 3, 0).encode()
 DEAF_PORT: Final = 9
+TARGETS_EACH: Final = 32
+"""Targets in a frame that names them."""
 ROOM: Final = 400
 """Of inner frames in a packet."""
 
@@ -244,6 +247,28 @@ def test_pieces_that_contradict_each_other_are_malformed() -> None:
                 receiver.hear(NodeId(3), piece, HEADER, priority=3, now_ns=0)
         else:
             receiver.hear(NodeId(3), piece, HEADER, priority=3, now_ns=0)
+
+
+@pytest.mark.parametrize(
+    ("nodes", "count", "version", "is_read"),
+    [
+        ((5, 0xFFFE), 2, VERSION, True),
+        ((5, 0xFFFE), 1, VERSION, True),
+        ((5, 7), 0, VERSION, False),
+        ((5, 7), TARGETS_EACH + 1, VERSION, False),
+        ((5, 7), 3, VERSION, False),  # the third is node 0
+        ((5, 0xFFFF), 2, VERSION, False),
+        ((5, 7), 2, VERSION + 1, False),
+    ],
+)
+def test_targets_are_nodes_as_many_as_stated(nodes: tuple[int, ...], count: int, version: int, is_read: bool) -> None:
+    payload = wire.TARGETS.layout.pack(*nodes, *[0] * (TARGETS_EACH - len(nodes)), count, version)
+    frame = HEADER + wire.encode_inner(wire.TARGETS, payload, node=3) + encode_piece(GOOD, bytes(500), node=3)
+    if is_read:
+        assert decode_piece(frame).targets == {*nodes[:count]}
+    else:
+        with pytest.raises(MalformedFrameError, match="targets, version"):
+            decode_piece(frame)
 
 
 @given(st.binary(max_size=300), st.sampled_from([wire.MESSAGE, wire.TARGETS, wire.RECEIPT, wire.CHUNK]))

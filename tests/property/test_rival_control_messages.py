@@ -11,6 +11,8 @@ from fanet_mw import wire
 from fanet_mw.dialect import fanet
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.routing import rival_control_messages as control
+from fanet_mw.routing.aodv import messages as aodv
+from fanet_mw.routing.olsr import messages as olsr
 
 HEADER = wire.Header(12, 1, 3, 0xFFFF, 3, wire.Kind.ROUTING, 1, 0, 0, 0).encode()
 BODY = bytes(range(256)) + bytes(44)
@@ -28,6 +30,12 @@ def test_pymavlink_reads_a_piece_and_its_length_on_the_air_is_known(body: bytes)
     (theirs,) = fanet.MAVLink(None).parse_buffer(bytearray(inner))
     assert (theirs.length, theirs.type, theirs.part, theirs.parts) == (len(body), 0x12, 0, 1)
     assert bytes(theirs.data[: len(body) + 1]) == body + b"\x01"
+
+
+def test_messages_have_the_numbers_of_their_standards() -> None:
+    """RFC 3561, 5.1 to 5.3, and RFC 3626, 18.4: the low half of the type on the air, the protocol is the high one."""
+    assert [control.type_of(control.Family.AODV, n) for n in (aodv.RREQ, aodv.RREP, aodv.RERR)] == [0x11, 0x12, 0x13]
+    assert [control.type_of(control.Family.OLSR, n) for n in (olsr.HELLO, olsr.TC)] == [0x21, 0x22]
 
 
 @pytest.mark.parametrize("bound", [64, 300, 2304])

@@ -2,7 +2,7 @@
 
 import pytest
 
-from fanet_mw.timesync.clock_fit import PAIRS, ClockFit, Oscillator, Pair
+from fanet_mw.timesync.clock_fit import EXACT, PAIRS, ClockFit, Oscillator, Pair
 from fanet_mw.units import MS, US, S
 
 OSCILLATOR = Oscillator(rate=40e-6, wander=0.0, stamp_ns=US)
@@ -18,6 +18,13 @@ def fit_of(*pairs: Pair) -> ClockFit:
     for one in pairs:
         fit.add(one)
     return fit
+
+
+def test_who_is_the_reference_has_an_exact_line() -> None:
+    for local_ns in (0, S, 10**15):
+        assert EXACT.swarm_ns(local_ns) == EXACT.local_ns(local_ns) == local_ns
+        assert EXACT.error_ns(local_ns, OSCILLATOR) == 0
+    assert EXACT.rate_error(OSCILLATOR) == 0
 
 
 def test_one_pair_gives_the_offset_and_leaves_the_rate_open() -> None:

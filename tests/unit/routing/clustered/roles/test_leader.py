@@ -6,7 +6,7 @@ from itertools import pairwise
 import pytest
 
 from fanet_mw.motion import Motion
-from fanet_mw.routing.clustered.roles.leader import OBJECTION_NS, SETTLE_NS, Leader
+from fanet_mw.routing.clustered.roles.leader import ANSWER_NS, OBJECTION_NS, SETTLE_NS, Leader
 from fanet_mw.routing.clustered.roles.leader_election import Authority, silence_ns
 from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.position_updates import lost_ns
@@ -23,10 +23,10 @@ MakeScenario = Callable[..., Scenario]
 class Desk:
     """A leader and its signs of life."""
 
-    def __init__(self, scenario: Scenario, *, epoch: int = 0) -> None:
+    def __init__(self, scenario: Scenario, *, epoch: int = 0, elected: bool = False) -> None:
         self.liveness = Liveness()
         self.leader = Leader(
-            Authority(0, 1), scenario=scenario, liveness=self.liveness, epoch=epoch, elected=False, now_ns=0,
+            Authority(0, 1), scenario=scenario, liveness=self.liveness, epoch=epoch, elected=elected, now_ns=0,
             needs_every_link=scenario.clusters.relay == "scheduled", measured_period_ns=scenario.clusters.period_ns,
         )  # fmt: skip
 
@@ -72,6 +72,18 @@ def test_who_joined_before_a_formation_set_out_is_beside_the_leader_though_it_he
 
 def test_the_first_leader_waits_five_seconds_for_joins_before_it_calls(scenario: Scenario) -> None:
     assert Desk(scenario).announce()[0] == 5 * S
+
+
+def test_who_was_elected_calls_at_once_and_assigns_when_answers_are_in(make_scenario: MakeScenario) -> None:
+    """In a period of 4 s it does not wait for its next announcement."""
+    keys = {"nodes.count": 6, "clusters.count": 1, "clusters.flooding_period_s": 4}
+    desk = Desk(make_scenario(**keys), elected=True)
+    now_ns, (call,) = desk.announce()
+    assert (now_ns, call.members) == (0, ())
+    desk.join(2, 100, born_ns=500 * MS)
+    now_ns, (schedule,) = desk.announce()
+    assert now_ns == ANSWER_NS
+    assert [member.node for member in schedule.members] == [2]
 
 
 def test_clusters_are_made_when_no_join_has_come_for_a_moment(scenario: Scenario) -> None:

@@ -21,3 +21,15 @@ def test_without_calls_none_is_reserved() -> None:
     calls.follow([TurnsInForce(0, TURNS, (), 500, 1)], now_ns=0)
     assert calls.reserve(not_before_ns=0, now_ns=0) is None
     assert not calls.has_turn(now_ns=0)
+
+
+def test_a_call_after_the_end_of_a_plan_goes_by_the_next_one() -> None:
+    calls = CallRelease(TxQueue(Routing()), lead_ns=5 * MS)
+    calls.follow([TurnsInForce(0, TURNS, (0, 10), 500, 1), TurnsInForce(100 * MS, TURNS, (5,), 500, 1)], now_ns=0)
+    assert [calls.reserve(not_before_ns=0, now_ns=0) for _ in range(4)] == [40 * MS, 60 * MS, 150 * MS, 250 * MS]
+
+
+def test_a_plan_without_calls_ends_those_of_the_plan_before() -> None:
+    calls = CallRelease(TxQueue(Routing()), lead_ns=5 * MS)
+    calls.follow([TurnsInForce(0, TURNS, (0,), 500, 1), TurnsInForce(100 * MS, TURNS, (), 500, 1)], now_ns=0)
+    assert [calls.reserve(not_before_ns=0, now_ns=0) for _ in range(2)] == [40 * MS, None]

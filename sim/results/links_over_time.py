@@ -63,10 +63,10 @@ def _places(outcome: Outcome, count: int) -> list[Rows]:
     def fill(until: int) -> None:
         nonlocal changed
         while len(found) < min(count, until):
-            if changed or not found:
+            if changed:
                 now = at.copy()
                 now[[node - 1 for node in dead | set(faults.values()) if 1 <= node <= len(at)]] = np.nan
-            found.append(now if changed or not found else found[-1])
+            found.append(now if changed else found[-1])
             changed = False
 
     for record in records_of(outcome.records, Posed, ProcessEnded, RadioFault):

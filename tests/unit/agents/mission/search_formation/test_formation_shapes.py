@@ -132,6 +132,13 @@ def test_one_sweep_brings_a_lane_near_every_spot_of_the_area(shape: ShapeName, c
         assert any(math.hypot(at.east - east, at.north - north) <= SEEN_M for at in tracks), (east, north)
 
 
+@given(st.integers(2, 120), st.floats(50, 3000))
+def test_a_circuit_has_as_many_lanes_out_as_back(count: int, area_m: float) -> None:
+    pattern = formed(ShapeName.CIRCUIT, count, area_m)
+    lanes = area_m / 2 / pattern.dimensions.first_m
+    assert lanes / 2 == pytest.approx(round(lanes / 2)), "else it would end at the other side"
+
+
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 8])
 def test_a_spiral_of_a_few_winds_outward_until_all_is_seen_and_is_one_piece_all_the_time(count: int) -> None:
     pattern = formed(ShapeName.SPIRAL, count, 1000)

@@ -131,8 +131,9 @@ class OutputFlags:
     report: Annotated[bool, Parameter(negative="")] = False
     """Write a page of the run with pictures into that folder, report.html and report.md."""
 
-    def prepare(self) -> None:
-        """Check before a run that its result can be written; raises ConfigError."""
+    @contextmanager
+    def prepared(self) -> Iterator[None]:
+        """Check before a run that its result can be written, and keep its folder; raises ConfigError."""
         if self.out is None and self.report:
             raise ConfigError("--report: needs --out DIR, the folder that report.html goes to")
         if self.report:
@@ -141,10 +142,12 @@ class OutputFlags:
             raise ConfigError("--pcap: needs --out DIR, the folder that air.pcap goes to")
         if self.record is not None:
             self._prepare_recording(self.record)
-        if self.out is not None:
-            from sim.cli.out_folder import prepare
+        from sim.cli.out_folder import alone, prepare
 
-            prepare(self.out, force=self.force)
+        with alone(self.out):
+            if self.out is not None:
+                prepare(self.out, force=self.force)
+            yield
 
     def _prepare_recording(self, path: Path) -> None:
         import sim.recording.mcap_recording  # noqa: F401  what is missing is said before the run, not after it

@@ -1,12 +1,14 @@
 """Prepares the folder of `--out` before a run: it must be writable, and must not contain the result of another run.
 
-It is checked first, because a run may take an hour, and its result has nowhere else to go.
+It is checked first, because a run may take an hour, and its result has nowhere else to go. The folder is locked as long
+as the run lasts: another one would otherwise take it between the check and the first file, or by --force.
 """
 
 import contextlib
+import fcntl
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -17,6 +19,26 @@ from fanet_mw.whole_file import writing
 from sim.results.file_names import PAGES, PICTURES, RESERVED, RUN_FILES, pictures
 
 _MOST_SAID: Final = 8
+
+
+@contextlib.contextmanager
+def alone(out: Path | None) -> Iterator[None]:
+    """Make a folder and keep it from other runs, unless its file system locks nothing; raises ConfigError."""
+    if out is None:
+        yield
+        return
+    with writing(f"--out {out}"):
+        out.mkdir(parents=True, exist_ok=True)
+        folder = os.open(out, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        with contextlib.suppress(OSError):
+            try:
+                fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                raise ConfigError(f"--out {out}: another run writes there now; choose another folder") from error
+        yield
+    finally:
+        os.close(folder)
 
 
 def prepare(out: Path, *, force: bool) -> None:

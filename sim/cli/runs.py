@@ -51,34 +51,34 @@ def simulate(
     from sim.run.virtual import simulate as run
 
     chosen = choice.scenario(scenario)
-    output.prepare()
-    print_notes(chosen)
-    if must_compile():
-        require(COMPILING_MB, what="compiling the kernel")
-        _err.print(COMPILING_NOTICE, highlight=False)
-        warm_up()
-    signals: list[int] = []
-    path = output.capture_path()
-    capture = PcapFile(path, chosen.radio, receptions=output.pcap_receptions) if path else nullcontext()
-    with (
-        begun(output.out),
-        _simulated(chosen, quiet=output.json) as (tell, watcher),
-        capture as file,
-        _recording(chosen, output.record, epoch_unix_ns=EPOCH_UNIX_NS) as recording,
-        interrupts.handed_to(signals.append),
-    ):
-        if file is not None:
-            file.pcap.epoch_unix_ns = EPOCH_UNIX_NS
-        outcome = run(
-            chosen,
-            on_progress=tell,
-            capture=file.pcap if file else None,
-            signals=signals,
-            spool_folder=output.out,
-            observer=_together(watcher, recording),
-        )
-    why = None if recording is None else recording.failure
-    return _finish(outcome, output, {} if why is None else {str(output.record): why})
+    with output.prepared():
+        print_notes(chosen)
+        if must_compile():
+            require(COMPILING_MB, what="compiling the kernel")
+            _err.print(COMPILING_NOTICE, highlight=False)
+            warm_up()
+        signals: list[int] = []
+        path = output.capture_path()
+        capture = PcapFile(path, chosen.radio, receptions=output.pcap_receptions) if path else nullcontext()
+        with (
+            begun(output.out),
+            _simulated(chosen, quiet=output.json) as (tell, watcher),
+            capture as file,
+            _recording(chosen, output.record, epoch_unix_ns=EPOCH_UNIX_NS) as recording,
+            interrupts.handed_to(signals.append),
+        ):
+            if file is not None:
+                file.pcap.epoch_unix_ns = EPOCH_UNIX_NS
+            outcome = run(
+                chosen,
+                on_progress=tell,
+                capture=file.pcap if file else None,
+                signals=signals,
+                spool_folder=output.out,
+                observer=_together(watcher, recording),
+            )
+        why = None if recording is None else recording.failure
+        return _finish(outcome, output, {} if why is None else {str(output.record): why})
 
 
 def launch(
@@ -126,48 +126,50 @@ def launch(
 
     chosen = choice.realtime_scenario(scenario) if no_world else choice.scenario(scenario)
     name = Topics(swarm or chosen.name).swarm
-    output.prepare()
-    doors.doors()
-    chosen, leads = (chosen, None) if no_world else fitted(chosen, _say)  # another's world has the scenario as it is
-    print_notes(chosen)
-    warn_of(listen, listens=True)
-    warn_of(connect, listens=False)
-    beside = [record_command(output.record)] if output.record is not None else []
-    if view or view_port is not None:
-        import viser  # noqa: F401  what is missing is said before the run
+    with output.prepared():
+        doors.doors()
+        chosen, leads = (
+            (chosen, None) if no_world else fitted(chosen, _say)
+        )  # another's world has the scenario as it is
+        print_notes(chosen)
+        warn_of(listen, listens=True)
+        warn_of(connect, listens=False)
+        beside = [record_command(output.record)] if output.record is not None else []
+        if view or view_port is not None:
+            import viser  # noqa: F401  what is missing is said before the run
 
-        beside.append(view_command(view_port))
-    if (words := doors.command()) is not None:
-        beside.append(words)
-    if autopilots is not None:
-        if not no_world:
-            raise ConfigError("--autopilots: needs --no-world, because flight controllers are the world then")
-        beside.append(["autopilots", autopilots, "--flavor", doors.flavor])
-    with begun(output.out), Companions(beside) as companions, _watched(chosen, bar=not output.json) as tell:
+            beside.append(view_command(view_port))
+        if (words := doors.command()) is not None:
+            beside.append(words)
+        if autopilots is not None:
+            if not no_world:
+                raise ConfigError("--autopilots: needs --no-world, because flight controllers are the world then")
+            beside.append(["autopilots", autopilots, "--flavor", doors.flavor])
+        with begun(output.out), Companions(beside) as companions, _watched(chosen, bar=not output.json) as tell:
 
-        def on_progress(progress: "Progress") -> None:
-            companions.check()
-            tell(progress)
+            def on_progress(progress: "Progress") -> None:
+                companions.check()
+                tell(progress)
 
-        outcome = asyncio.run(
-            run(
-                chosen,
-                swarm=name,
-                listen=listen,
-                connect=connect,
-                respawn=respawn,
-                slow_down_to=slow_down_to,
-                own_world=not no_world,
-                zenoh_config=zenoh_config,
-                emulator_options={"pcap": output.capture_path(), "receptions": output.pcap_receptions},
-                spool_folder=output.out,
-                on_progress=on_progress,
-                on_event=_say,
-                leads=leads,
-                on_started=lambda run: companions.start(run.address, chosen),
+            outcome = asyncio.run(
+                run(
+                    chosen,
+                    swarm=name,
+                    listen=listen,
+                    connect=connect,
+                    respawn=respawn,
+                    slow_down_to=slow_down_to,
+                    own_world=not no_world,
+                    zenoh_config=zenoh_config,
+                    emulator_options={"pcap": output.capture_path(), "receptions": output.pcap_receptions},
+                    spool_folder=output.out,
+                    on_progress=on_progress,
+                    on_event=_say,
+                    leads=leads,
+                    on_started=lambda run: companions.start(run.address, chosen),
+                )
             )
-        )
-    return _finish(outcome, output)
+        return _finish(outcome, output)
 
 
 def plan(

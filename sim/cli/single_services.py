@@ -40,26 +40,26 @@ def router(
     from sim.run.router import serve
 
     chosen = choice.realtime_scenario(scenario)
-    OutputFlags(out=out, force=force).prepare()
-    warn_of(listen, listens=True)
-    code: int = loop.run(
-        serve(
-            chosen,
-            swarm=swarm or chosen.name,
-            listen=listen,
-            out=out,
-            zenoh_config=zenoh_config,
-            on_event=tell,
+    with OutputFlags(out=out, force=force).prepared():
+        warn_of(listen, listens=True)
+        code: int = loop.run(
+            serve(
+                chosen,
+                swarm=swarm or chosen.name,
+                listen=listen,
+                out=out,
+                zenoh_config=zenoh_config,
+                on_event=tell,
+            )
         )
-    )
-    if out is not None:
-        import json
+        if out is not None:
+            import json
 
-        from sim.results import printed_summary
-        from sim.results.file_names import SUMMARY_FILE
+            from sim.results import printed_summary
+            from sim.results.file_names import SUMMARY_FILE
 
-        printed_summary.show(json.loads((out / SUMMARY_FILE).read_text(encoding="utf-8")), Console())
-    return code
+            printed_summary.show(json.loads((out / SUMMARY_FILE).read_text(encoding="utf-8")), Console())
+        return code
 
 
 def emulator(

@@ -1,5 +1,6 @@
 """The folder of `--out` is looked at before the run: writable, and nobody else's result."""
 
+import contextlib
 import json
 import os
 import struct
@@ -10,7 +11,7 @@ import pytest
 from fanet_mw import tlog
 from fanet_mw.errors import ConfigError
 from sim.cli.app import app
-from sim.cli.out_folder import prepare
+from sim.cli.out_folder import alone, prepare
 from sim.results.file_names import PAGES, RUN_FILES
 
 SHORT = ("--set", "duration_s=1", "--set", "warmup_s=0", "--set", "drain_s=0", "--json")
@@ -94,3 +95,27 @@ def test_force_removes_the_pictures_of_the_earlier_page_and_nothing_else_beside_
         prepare(tmp_path, force=False)
     prepare(tmp_path, force=True)
     assert not pictures.exists()
+
+
+@pytest.mark.parametrize("command", ["simulate", "launch"])
+def test_a_folder_in_which_another_run_writes_is_left_alone(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def run(*_: object, **__: object) -> None:
+        pytest.fail("the run has begun")
+
+    monkeypatch.setattr("sim.run.virtual.simulate", run)
+    monkeypatch.setattr("sim.run.launcher.swarm.launch", run)
+    (tmp_path / "summary.json").write_text("theirs")
+    with alone(tmp_path), pytest.raises(ConfigError, match=f"--out {tmp_path}: another run writes there now"):
+        fanet(command, "quick", "--out", str(tmp_path), "--force")
+    assert (tmp_path / "summary.json").read_text() == "theirs"
+
+
+def test_a_folder_is_free_when_its_run_is_over(tmp_path: Path) -> None:
+    for _ in range(2):
+        assert fanet("simulate", "quick", "--out", str(tmp_path), "--force") == 0
+    with alone(tmp_path), contextlib.suppress(ConfigError), alone(tmp_path):
+        pytest.fail("two have one folder")
+    with alone(None), alone(None):
+        pass

@@ -37,6 +37,8 @@ _LEAST_PART_M2: Final = 0.01
 _MOST_PARTS: Final = 16
 _MOST_CUTS: Final = 24
 """The number of cuts that are tried on a part, along each axis."""
+_MOST_ANGLES: Final = 400
+"""Of a round outline of thousands of corners not each side is tried."""
 _KEYS: Final = (
     ("height", 1.0), ("building:height", 1.0), ("est_height", 1.0), ("building:levels", LEVEL_M),
     ("building_levels", LEVEL_M), ("levels", LEVEL_M), ("num_floors", LEVEL_M),
@@ -171,11 +173,12 @@ def _turn(yaw: float) -> Rows:
 
 def _rectangle(ring: Rows, height: float) -> Footprint:
     """The smallest rectangle around a ring has a side along one of its hull (Freeman and Shapira, 1975)."""
-    edges = np.diff(_hull(ring), axis=0)
+    hull = _hull(ring)
+    edges = np.diff(hull, axis=0)
     angles = np.unique(np.round(np.arctan2(edges[:, 1], edges[:, 0]) % (math.pi / 2), 9))
     best: tuple[float, Footprint] | None = None
-    for yaw in angles.tolist():
-        box = _around(ring, yaw, height)
+    for yaw in angles[:: -(-len(angles) // _MOST_ANGLES)].tolist():
+        box = _around(hull, yaw, height)
         if best is None or box.width * box.depth < best[0] - 1e-9:
             best = box.width * box.depth, box
     assert best is not None, "a ring has edges"

@@ -7,6 +7,7 @@ import json
 import math
 import struct
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from random import Random
@@ -507,6 +508,14 @@ def covers(box: footprints.Footprint, east: float, north: float) -> bool:
     cos, sin = math.cos(box.yaw), math.sin(box.yaw)
     x, y = east - box.east, north - box.north
     return abs(cos * x + sin * y) < box.width / 2 + 0.05 and abs(cos * y - sin * x) < box.depth / 2 + 0.05
+
+
+def test_a_round_outline_of_thousands_of_corners_takes_no_minute(tmp_path: Path) -> None:
+    corners = [(20 * math.cos(i / 3000 * math.tau), 20 * math.sin(i / 3000 * math.tau)) for i in range(3000)]
+    began_s = time.perf_counter()
+    (box,) = town(geojson(tmp_path / "round.geojson", (corners, {"building": "yes"}))).boxes
+    assert time.perf_counter() - began_s < 1.0
+    assert (box.width, box.depth) == pytest.approx((40, 40), abs=0.01)
 
 
 def test_the_smallest_rectangle_may_lie_along_a_side_of_the_hull_alone(tmp_path: Path) -> None:

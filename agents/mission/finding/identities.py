@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
 from agents.mission.finding.confirmation import GREATEST_MARGIN, is_confirmable, is_seen_enough, required_margin
+from agents.mission.finding.height_error import NOTHING_TOLD, HeightError
 from agents.mission.finding.known_survivors import SAME_PLACE_M, KnownSurvivors, estimate_of
 from agents.mission.finding.person_track import PersonTrack
 from agents.mission.finding.phone_localization import Estimate
@@ -64,11 +65,18 @@ class Sighting(NamedTuple):
 class Identities:
     """The people whom one UAV has seen, and the phones that they carry."""
 
-    def __init__(self, survivors: KnownSurvivors, *, bias_m: float = 0.0) -> None:
-        """`bias_m`: the standard deviation of the slow error of position fixes along each axis."""
+    def __init__(
+        self, survivors: KnownSurvivors, *, bias_m: float = 0.0, height_error: HeightError | None = None
+    ) -> None:
+        """`bias_m`: the standard deviation of the slow error of position fixes along each axis; `height_error`: of the
+        UAV, as far as known so far; None: heights are right.
+        """
         self._survivors = survivors
+        self._height_error = height_error or HeightError()
         self._steady_m2 = _STEADY_M * _STEADY_M + bias_m * bias_m
         self._people: list[PersonTrack] = []
+        self._raised_m = 0.0
+        """The error of the height by which the places of all people are corrected."""
         self._now_ns = 0
 
     def on_reading(
@@ -76,6 +84,8 @@ class Identities:
     ) -> list[PersonTrack]:
         """A reading shows people; `evidence`: of one sighting. Returns the person of each, known or new."""
         people = self._people
+        leans = [_lean(sighting.at, here) for sighting in sightings]
+        sightings = [self._corrected(sighting, lean) for sighting, lean in zip(sightings, leans, strict=True)]
         costs = [
             [person.distance2(sighting.at, sighting.sigma_m**2 + self._steady_m2) for person in people]
             for sighting in sightings
@@ -86,17 +96,46 @@ class Identities:
             column, variance = chosen[row] if chosen else None, sigma_m * sigma_m
             if column is None:
                 place = Estimate(at.east, at.north, variance, 0.0, variance)
-                shown.append(PersonTrack(place, now_ns, now_ns, here, evidence))
+                shown.append(PersonTrack(place, now_ns, now_ns, here, evidence, leans[row]))
             else:
-                shown.append(people[column])
-                people[column].on_sighting(at, variance, here=here, evidence=evidence, now_ns=now_ns)
+                shown.append(person := people[column])
+                lean = _lean(person.place.at, here)  # the sighting's own would hold its error
+                self._learn_height(person, at, variance, lean)
+                person.on_sighting(at, variance, here=here, evidence=evidence, now_ns=now_ns, lean=lean)
             shown[-1].close_sightings += close
         self._people = [*people, *(person for person in shown if person not in people)]
+        self._correct_places()
         for person in shown:
             person.together += any(
                 other is not person and other.place.distance_m(person.place.at) <= SAME_PLACE_M for other in shown
             )
         return shown
+
+    def _corrected(self, sighting: Sighting, lean: tuple[float, float]) -> Sighting:
+        """The sighting from the height at which the UAV is by all it knows so far."""
+        at, up_m = sighting.at, self._height_error.m
+        return sighting._replace(at=at._replace(east=at.east + up_m * lean[0], north=at.north + up_m * lean[1]))
+
+    def _learn_height(self, person: PersonTrack, at: Enu, variance_m2: float, lean: tuple[float, float]) -> None:
+        """Learn from a person seen again, with another lean, which error puts both sightings in one place."""
+        up_m, place = self._height_error.m, person.place
+        leaned = lean[0] - person.lean[0], lean[1] - person.lean[1]
+        moved_m = at.east - place.east_m - up_m * leaned[0], at.north - place.north_m - up_m * leaned[1]
+        of_both_m2 = place.east_variance_m2 + variance_m2 + self._steady_m2
+        person.parallax = person.parallax.seen_again(leaned, moved_m, variance_m2=of_both_m2)
+        if person.is_proven:
+            self._height_error.learn(person.parallax)
+            person.parallax = NOTHING_TOLD
+
+    def _correct_places(self) -> None:
+        """Put all people where the error of the height, as it is known now, has them."""
+        up_m = self._height_error.m - self._raised_m
+        self._raised_m += up_m
+        for person in self._people if up_m else ():
+            person.raise_by(up_m)
+
+    def _told(self, person: PersonTrack) -> Estimate:
+        return person.told(self._height_error.variance_m2)
 
     def on_images(
         self, count: int, shows: Callable[[Enu], bool], *, evidence: float, but: Sequence[PersonTrack] = ()
@@ -131,7 +170,7 @@ class Identities:
                 continue
             survivor = phones[column]
             known = self._survivors.by_id[survivor]
-            known.filter.on_sighting(person.place)
+            known.filter.on_sighting(self._told(person))
             if is_confirmable(person, known):
                 margin = self._next_best(costs, nobody, people, column, person) - least
                 if margin >= required_margin(person, now_ns):
@@ -141,7 +180,7 @@ class Identities:
     def unreported(self, now_ns: int) -> list[Estimate]:
         """The places of the people who are certainly there, seen from two places, and of whom there is no find."""
         return [
-            person.place
+            self._told(person)
             for person in self._people
             if person.find is None
             and self._is_unnamed(person)
@@ -248,6 +287,12 @@ class Identities:
         known, at = self._survivors.by_id[survivor], place.at
         doubt = _REFUTED_COST if known.was_mistaken_at(at, since_ns=self._now_ns - _DOUBTED_NS) else 0.0
         return min(_IMPOSSIBLE, known.filter.deficit(at.east, at.north) + doubt)
+
+
+def _lean(at: Enu, here: Enu) -> tuple[float, float]:
+    """How far east and north of a position a place on the ground is, for each metre of height."""
+    up_m = max(1.0, here.up)
+    return (at.east - here.east) / up_m, (at.north - here.north) / up_m
 
 
 def paired(

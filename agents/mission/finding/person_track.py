@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Final
 
+from agents.mission.finding.height_error import NOTHING_TOLD, Parallax
 from agents.mission.finding.phone_localization import Estimate
 from fanet_mw.units import Enu, S
 
@@ -31,6 +32,10 @@ class PersonTrack:
     seen_from: Enu
     """The position of the UAV at the first sighting."""
     evidence: float
+    lean: tuple[float, float] = (0.0, 0.0)
+    """The mean direction of the sightings: how far east and north for each metre down (`height_error.py`)."""
+    parallax: Parallax = NOTHING_TOLD
+    """What the sightings tell of the UAV's height that has not been taken in yet."""
     sightings: int = 1
     close_sightings: int = 0
     base_m: float = 0.0
@@ -46,10 +51,21 @@ class PersonTrack:
     proven_ns: int | None = None
     """The instant from which it was certain that somebody is there."""
 
-    def on_sighting(self, at: Enu, variance_m2: float, *, here: Enu, evidence: float, now_ns: int) -> None:
+    def on_sighting(
+        self,
+        at: Enu,
+        variance_m2: float,
+        *,
+        here: Enu,
+        evidence: float,
+        now_ns: int,
+        lean: tuple[float, float] = (0.0, 0.0),
+    ) -> None:
         """Add a sighting from a position of the UAV, by a Kalman filter with the same variance along each axis."""
         before = self.place
         gain = before.east_variance_m2 / (before.east_variance_m2 + variance_m2)
+        east, north = self.lean
+        self.lean = east + gain * (lean[0] - east), north + gain * (lean[1] - north)
         self.place = Estimate(
             before.east_m + gain * (at.east - before.east_m),
             before.north_m + gain * (at.north - before.north_m),
@@ -61,6 +77,20 @@ class PersonTrack:
         self.last_ns = now_ns
         self.evidence = min(_MOST_EVIDENCE, self.evidence + evidence)
         self.base_m = max(self.base_m, here.minus(self.seen_from).horizontal())
+
+    def raise_by(self, up_m: float) -> None:
+        """The UAV has been so much higher than was taken at the sightings so far."""
+        east_m, north_m = self.place.east_m + up_m * self.lean[0], self.place.north_m + up_m * self.lean[1]
+        self.place = self.place._replace(east_m=east_m, north_m=north_m)
+
+    def told(self, height_variance_m2: float) -> Estimate:
+        """The place, with the uncertainty of the UAV's height."""
+        (east, north), place = self.lean, self.place
+        return place._replace(
+            east_variance_m2=place.east_variance_m2 + height_variance_m2 * east * east,
+            covariance_m2=place.covariance_m2 + height_variance_m2 * east * north,
+            north_variance_m2=place.north_variance_m2 + height_variance_m2 * north * north,
+        )
 
     def distance2(self, at: Enu, variance_m2: float) -> float:
         """The squared distance of a sighting from this person, in variances of both."""

@@ -6,6 +6,7 @@ from typing import Final
 
 from agents.mission.finding.camera_view import CameraView
 from agents.mission.finding.confirmation import CLOSE_M
+from agents.mission.finding.height_error import HeightError
 from agents.mission.finding.identities import Identities, Sighting
 from agents.mission.finding.known_survivors import KnownSurvivor, KnownSurvivors
 from agents.mission.finding.person_track import PersonTrack
@@ -81,8 +82,9 @@ class Sightings:
         self, scenario: Scenario, node: NodeId, survivors: KnownSurvivors, own_motion: OwnMotion, outbox: Outbox
     ) -> None:
         self._node = node
-        bias_m = scenario.sensors.gps_bias_m
-        self._identities = Identities(survivors, bias_m=bias_m)
+        sensors, bias_m = scenario.sensors, scenario.sensors.gps_bias_m
+        up_m = 0.0 if sensors.altimeter_hz else sensors.gps_vertical * math.hypot(sensors.gps_common_m, bias_m)
+        self._identities = Identities(survivors, bias_m=bias_m, height_error=HeightError(up_m))
         self.steady_m2 = 1.0 + bias_m * bias_m
         """The variance of the part of the error of positions that lasts, along each axis."""
         self._contradictions = Contradictions(survivors, self._identities)

@@ -51,15 +51,16 @@ def test_of_whom_there_is_a_find_nobody_reports_again() -> None:
         assert len(other.identities.unreported(9 * S)) == 1
 
 
-@pytest.mark.parametrize(("apart_m", "both", "reported"), [(15.0, False, 0), (15.0, True, 1), (21.0, False, 1)])
-def test_who_is_seen_alone_is_of_a_find_a_little_farther_away(apart_m: float, both: bool, reported: int) -> None:
+@pytest.mark.parametrize(
+    ("find_m", "others_m", "reported"), [(15.0, (), 0), (15.0, (15.0,), 1), (21.0, (), 1), (15.0, (-15.0,), 2)]
+)
+def test_who_is_seen_alone_is_of_a_find_a_little_farther_away(
+    find_m: float, others_m: tuple[float, ...], reported: int
+) -> None:
     uav = Uav()
-    uav.survivors.on_found(
-        told_person(9, 3.0 + apart_m, 4.0)._replace(east_variance_m2=8, north_variance_m2=8), now_ns=0
-    )
+    uav.survivors.on_found(told_person(9, find_m, 4.0)._replace(east_variance_m2=8, north_variance_m2=8), now_ns=0)
     for second in range(9):
-        people = (Enu(3, 4, 0), Enu(3 + apart_m, 4, 0)) if both else (Enu(3, 4, 0),)
-        see(uav, *people, second=second, north_m=7.5 * second)
+        see(uav, *(Enu(east_m, 4, 0) for east_m in (0, *others_m)), second=second, north_m=7.5 * second)
     assert len(uav.identities.unreported(9 * S)) == reported
 
 

@@ -38,6 +38,18 @@ def test_messages_have_the_numbers_of_their_standards() -> None:
     assert [control.type_of(control.Family.OLSR, n) for n in (olsr.HELLO, olsr.TC)] == [0x21, 0x22]
 
 
+@pytest.mark.parametrize("capacity", [*range(7, 40), 1400, 1537, 3000])
+def test_an_error_names_as_many_destinations_as_fit(capacity: int) -> None:
+    """And no more than its count can say, 255 (RFC 3561, 5.3)."""
+    most = aodv.most_unreachable(capacity)
+
+    def size(count: int) -> int:
+        return len(aodv.RouteError(tuple(aodv.Unreachable(n + 1, 7) for n in range(count))).encode())
+
+    assert size(most) <= capacity
+    assert most == 255 or size(most + 1) > capacity
+
+
 @pytest.mark.parametrize("bound", [64, 300, 2304])
 def test_the_capacity_of_a_frame_is_what_just_fits(bound: int) -> None:
     most = control.capacity(bound)

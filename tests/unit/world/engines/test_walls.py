@@ -46,6 +46,22 @@ def test_a_wreck_falls_from_a_wall(engine: Engine) -> None:
     assert engine.positions()[0, 2] < 0.5
 
 
+@pytest.mark.parametrize("solids", [None, Solids(Obstacles(None, (Box(80.0, 0.0, 10.0, 10.0, 20.0),)))])
+def test_whoever_has_come_down_lies_level_and_still(solids: Solids | None) -> None:
+    """It lost its power while it turned to the side."""
+    engine = Rotors(IRIS, solids=solids)
+    engine.reset(np.array([[0.0, 0.0, 3.0]]))
+    for _ in range(4):
+        engine.advance(0.05, np.array([[8.0, 3.0, 0.0]]))
+    assert abs(engine._attitude[1:, 0]).max() > 0.05
+    engine.fall(0)
+    for _ in range(60):
+        engine.advance(0.05, np.zeros((1, 3)))
+    assert engine.positions()[0, 2] == pytest.approx(0.0, abs=0.05)
+    assert engine._attitude[:, 0].tolist() == pytest.approx([1, 0, 0, 0], abs=1e-3)
+    assert abs(engine._rates).max() < 0.1
+
+
 @pytest.mark.slow
 def test_who_is_blown_against_a_wall_while_it_lands_has_not_landed(make_scenario: MakeScenario) -> None:
     keys: dict[str, Any] = {

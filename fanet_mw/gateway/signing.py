@@ -3,6 +3,7 @@
 A time stamp counts as heard only once its signature was found right, so that a forged frame locks nobody out.
 """
 
+import codecs
 import hashlib
 import hmac
 from collections import Counter
@@ -10,10 +11,12 @@ from pathlib import Path
 from typing import Final
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.foreign_file import read_regular
 from fanet_mw.gateway.framing import SIGNATURE, Frame, layout, with_crc
 from fanet_mw.wire import OVERHEAD
 
 _KEY_BYTES: Final = 32
+_MOST_FILE_BYTES: Final = 4096
 _EPOCH_UNIX_S: Final = 1_420_070_400
 """2015-01-01, from which signatures count."""
 _UNIT_NS: Final = 10_000
@@ -25,13 +28,11 @@ _LINK: Final = 0
 
 def read_key(path: Path) -> bytes:
     """The key in a file: 32 bytes, or as many in hexadecimal; any other text is a passphrase, as MAVProxy hashes it."""
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise ConfigError(f"--mavlink-key {path}: {error.strerror}") from error
-    if len(content) == _KEY_BYTES:
+    content = read_regular(path, what=f"--mavlink-key {path}", most_bytes=_MOST_FILE_BYTES)
+    text = content.removeprefix(codecs.BOM_UTF8).strip()
+    is_line = content.endswith(b"\n") and text.isascii() and text.decode("ascii").isprintable()
+    if len(content) == _KEY_BYTES and not is_line:  # else a passphrase of 31 characters, as an editor saves it
         return content
-    text = content.strip()
     if not text or len(text) > 1024:
         raise ConfigError(
             f"--mavlink-key {path}: {len(content)} bytes, must be 32, 64 hexadecimal digits or a passphrase"

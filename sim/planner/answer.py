@@ -18,6 +18,7 @@ from fanet_mw.graph.topology import within_range
 from fanet_mw.rng import stream
 from fanet_mw.routing.clustered.timetable.turn_size import links
 from fanet_mw.scenario import Scenario
+from fanet_mw.scenario.tables.sections import MOST_S
 from fanet_mw.trace import LIKELY_SHARE
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.places import rounded
@@ -107,8 +108,8 @@ def judge(
 
 
 def _deadline_ns(scenario: Scenario, deadline_s: float | None) -> int | None:
-    if deadline_s is not None and not (math.isfinite(deadline_s) and deadline_s > 0):
-        raise ConfigError(f"--deadline {deadline_s:g}: must be > 0 [s]")
+    if deadline_s is not None and not 0 < deadline_s <= MOST_S:
+        raise ConfigError(f"--deadline {deadline_s:g}: must be > 0 and <= {MOST_S:g} [s]")
     wanted_s = scenario.traffic.deadline_s if deadline_s is None else deadline_s
     return None if wanted_s is None else seconds_to_ns(wanted_s)
 

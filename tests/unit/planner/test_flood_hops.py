@@ -1,9 +1,11 @@
 """Floods that the hop limit ends, or that rely on links that do not exist: no such plan is feasible."""
 
+import math
 from typing import Any
 
 import pytest
 
+from fanet_mw.errors import ConfigError
 from fanet_mw.graph.topology import within_range
 from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
@@ -119,3 +121,9 @@ def test_two_frames_in_one_turn_that_meet_at_a_node_are_not_received() -> None:
     assert flood_hops(meeting, adjacency, geometry)[ONE] == (0, (TWO, THREE)), "turn 10 is turn 0 of the next one"
     late = Timetable((Turn(0, ONE, ONE, 0), Turn(1, TWO, ONE, 0)), {}, {}, 2)
     assert flood_hops(late, adjacency, geometry._replace(hop_turns=2))[ONE].missed == (THREE,), "too soon to relay"
+
+
+@pytest.mark.parametrize("deadline_s", [0.0, -1.0, 1e7, 1e308, math.inf, math.nan])
+def test_a_deadline_beyond_any_run_is_refused(deadline_s: float) -> None:
+    with pytest.raises(ConfigError, match=r"--deadline .*: must be > 0 and <= 1e\+06 \[s\]"):
+        judge(catalog.find("clusters", LINE), deadline_s=deadline_s, change=False)

@@ -4,6 +4,8 @@ import pytest
 from kit import MakeScenario
 
 from sim.results.connectivity import connectivity
+from sim.results.links_over_time import LinksOverTime
+from sim.results.outcome import Outcome
 
 
 @pytest.mark.parametrize(("spacing_m", "share"), [(240, 1.0), (260, 0.0)])
@@ -14,3 +16,10 @@ def test_at_rest_a_row_is_connected_always_or_never_however_short_the_window(
     keys = {"nodes.count": 3, "nodes.spacing_m": spacing_m, "nodes.layout": "line", "radio.range_m": 250}
     window = {"warmup_s": 1.1, "drain_s": 1, "duration_s": 2.1 + window_s}
     assert connectivity(make_scenario(**keys, **window)) == share
+
+
+def test_who_never_says_where_it_is_stays_where_it_was_put(make_scenario: MakeScenario) -> None:
+    keys = {"nodes.count": 3, "nodes.spacing_m": 240, "nodes.layout": "line", "radio.range_m": 250}
+    links = LinksOverTime(Outcome(make_scenario(**keys), "virtual", 1.0, [], {}))
+    assert links.at(0).tolist() == [[True, True, False], [True, True, True], [False, True, True]]
+    assert links.at(0) is links.at(0)

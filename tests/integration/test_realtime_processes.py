@@ -18,6 +18,7 @@ from kit import slow
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError
 from fanet_mw.hosts.bus import Bus
+from sim.run.launcher import child_processes
 from sim.run.launcher.child_processes import Processes, end_servers
 from sim.run.launcher.swarm import free_endpoint
 
@@ -44,6 +45,10 @@ def marked(mark: str) -> list[int]:
 def ignores(pid: int, number: int) -> bool:
     (mask,) = re.findall(r"^SigIgn:\s*(\w+)$", Path(f"/proc/{pid}/status").read_text(), re.MULTILINE)
     return bool(int(mask, 16) >> (number - 1) & 1)
+
+
+def parent(pid: int) -> int:
+    return int(Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[1])
 
 
 def exists(pid: int) -> bool:
@@ -147,6 +152,22 @@ async def test_every_end_is_told_with_its_name_and_exit_code() -> None:
     assert await processes.wait(PATIENCE_S)
     assert ended == {"good": 0, "bad": 1, "busless": 3, "victim": -signal.SIGKILL}
     assert processes.names() == []
+
+
+async def test_a_server_that_was_stopped_keeps_no_launcher_from_ending(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(child_processes, "_KILLED_S", 0.2)
+    ended: dict[str, int] = {}
+    processes = Processes(ended.__setitem__)
+    processes.start("sleeper", sleeper, {"seconds": 300})
+    pid = processes.pid("sleeper")
+    server = parent(pid)
+    os.kill(server, signal.SIGSTOP)
+    try:
+        await processes.end_all()
+        assert await processes.wait(PATIENCE_S)
+    finally:
+        os.kill(server, signal.SIGCONT)
+    assert ended == {"sleeper": -signal.SIGKILL}
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

@@ -37,6 +37,8 @@ Entry = Callable[..., int]
 
 
 _PR_SET_NAME: Final = 15
+_KILLED_S: Final = 5.0
+"""How long a killed child may take to be seen dead."""
 _NAME_BYTES: Final = 15
 _ARG_START, _ARG_END = 48 - 3, 49 - 3
 """Indices of fields of /proc/PID/stat (proc_pid_stat(5)), from the one after the closing parenthesis."""
@@ -137,6 +139,16 @@ def _start_server() -> None:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
+def _wake_server() -> None:
+    """Let a server that was stopped (SIGSTOP) go on: only it can say that children are dead, for which the launcher
+    would wait at its exit for ever.
+    """
+    pid = forkserver._forkserver._forkserver_pid  # type: ignore[attr-defined]  # noqa: SLF001
+    if pid is not None:
+        with contextlib.suppress(OSError):
+            os.kill(pid, signal.SIGCONT)
+
+
 class Processes:
     """The children by name; each of them can be started again."""
 
@@ -225,8 +237,9 @@ class Processes:
     async def end_all(self) -> None:
         for process in list(self._running.values()):
             process.kill()
-        if self._running:
-            await self.wait(5.0)
+        if self._running and not await self.wait(_KILLED_S):
+            _wake_server()
+            await self.wait(_KILLED_S)
 
 
 @atexit.register

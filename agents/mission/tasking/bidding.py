@@ -194,10 +194,12 @@ class Bidding:
             return near or self._is_in_time(here, now_ns)
         if formation.is_free(now_ns):
             return formation.holds_together(place, now_ns, within_s=-5.0)
-        return self._may_look(place, *formation.lane(now_ns))
+        return formation.leads_by(place, *formation.lane(now_ns))
 
     def _may_look(self, place: Estimate | None, lane: Enu, moves: Enu) -> bool:
-        """True if a UAV of a team may examine a place without leaving the formation: a vague one while it is ahead."""
+        """True if a UAV of a team may go to a place without leaving the formation: to a vague one while it is ahead.
+        Who is on the way there may look around behind, too.
+        """
         if place is None or not self._formation.leads_by(place, lane, moves):
             return False
         ahead_m, _ = along(moves, place.east_m - lane.east, place.north_m - lane.north)

@@ -3,6 +3,7 @@
 import pytest
 from search_board import FOLLOWER, LINE, TAKEN_UP_NS, UP_M, Board, lane_of
 
+from agents.mission.finding.phone_localization import Estimate
 from fanet_mw.trace import Approaching, Arrived, Located
 from fanet_mw.units import US, Enu, S
 from fanet_mw.wire.bids import Bid
@@ -140,6 +141,21 @@ def test_a_uav_of_a_line_looks_for_who_is_vaguely_placed_ahead_and_not_for_who_i
         assert place.sigma_m > 50, "one bearing is vague"
         board.tasks.bid(NOW_NS)
         assert bool(board.tasks.bids_to_tell(now_ns=NOW_NS)) == bids
+
+
+def test_who_looks_for_somebody_goes_on_behind_as_its_lane_permits() -> None:
+    at = lane_of(LINE, NOW_NS)
+    board = Board(LINE, at)
+    board.hear(1, Enu(at.east + 40, at.north + 20, 0), range(1, 5), now_ns=NOW_NS)
+    board.tasks.bid(NOW_NS)
+    board.tasks.choose(NOW_NS)
+    assert board.tasks.survivor == 1
+    for second in range(0, 30, 3):
+        lane = lane_of(LINE, NOW_NS + second * S)
+        vague = Estimate(at.east + 40, at.north + 20, 70.0**2, 0.0, 70.0**2)
+        board.survivors.by_id[1].filter.on_sighting(vague)
+        board.tasks.choose(NOW_NS + second * S)
+        assert (board.tasks.survivor == 1) == (lane.north - at.north - 20 <= 140), second
 
 
 def test_a_responder_that_does_not_come_in_time_takes_its_bid_back() -> None:

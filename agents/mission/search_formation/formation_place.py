@@ -245,7 +245,7 @@ class FormationPlace:
             return Enu(east, north, lane.up), STILL
         ahead_m, aside_m = along(moves, east - lane.east, north - lane.north)
         aside_m = max(-_LEASH_M, min(_LEASH_M, aside_m))
-        most_m = _LEAD_M if leads else 0.0
+        most_m = _LEAD_M if leads and moves != STILL else 0.0  # a place at rest brings nobody, and has no "ahead"
         if ahead_m >= most_m:  # still ahead: the line will bring the UAV there
             return _beside(lane, moves, most_m, aside_m), moves
         if ahead_m < -_LAG_M:

@@ -47,6 +47,7 @@ def test_a_uav_of_a_line_stays_near_its_lane_and_a_follower_goes_anywhere() -> N
     assert line.bounded(20, 700, lane, moves, 0) == (Enu(20, 500, UP_M), moves), "ahead: the line brings it there"
     assert line.bounded(20, 560, lane, moves, 0, leads=True) == (Enu(20, 560, UP_M), STILL), "who was sent flies ahead"
     assert line.bounded(20, 700, lane, moves, 0, leads=True) == (Enu(20, 620, UP_M), moves), "by 120 m at most"
+    assert line.bounded(20, 560, lane, STILL, 0, leads=True) == (Enu(20, 500, UP_M), STILL), "north is not ahead"
 
 
 def test_a_uav_knows_how_far_its_place_keeps_it_from_a_survivor_for_good() -> None:

@@ -11,27 +11,32 @@ receiver. Weights are inverse variances [1 / m2].
 import math
 from typing import Final, NamedTuple
 
+from fanet_mw.units import S
+
 
 class HeightError:
-    """The estimated error, and its variance."""
+    """The estimated error now, and its variance."""
 
-    def __init__(self, sigma_m: float = 0.0) -> None:
-        """`sigma_m`: the standard deviation before anybody is seen; 0: heights are right."""
-        self._weight = math.inf if sigma_m <= 0.0 else 1.0 / (sigma_m * sigma_m)
-        self._weighted_m = 0.0
+    def __init__(self, sigma_m: float = 0.0, *, tau_s: float = math.inf) -> None:
+        """`sigma_m`: the standard deviation before anybody is seen, 0: heights are right; `tau_s`: the time over which
+        the error's correlation falls to 1 / e (a Gauss-Markov process).
+        """
+        self._prior_m2, self._tau_s = sigma_m * sigma_m, tau_s
+        self.m, self.variance_m2 = 0.0, self._prior_m2
+        self._at_ns = 0
 
-    @property
-    def m(self) -> float:
-        return self._weighted_m / self._weight
-
-    @property
-    def variance_m2(self) -> float:
-        return 1.0 / self._weight
+    def advance(self, now_ns: int) -> None:
+        """Time passes, and the error changes."""
+        left = math.exp(-max(0, now_ns - self._at_ns) / S / self._tau_s)
+        self._at_ns = max(self._at_ns, now_ns)
+        self.m *= left
+        self.variance_m2 = self._prior_m2 + left * left * (self.variance_m2 - self._prior_m2)
 
     def learn(self, parallax: "Parallax") -> None:
         """Take in what one person tells."""
-        self._weighted_m += parallax.weighted_m
-        self._weight += parallax.weight
+        share = 1.0 / (1.0 + self.variance_m2 * parallax.weight)
+        self.m = share * (self.m + self.variance_m2 * parallax.weighted_m)
+        self.variance_m2 *= share
 
 
 class Parallax(NamedTuple):

@@ -83,6 +83,7 @@ class Identities:
         self, sightings: Sequence[Sighting], *, here: Enu, evidence: float, now_ns: int
     ) -> list[PersonTrack]:
         """A reading shows people; `evidence`: of one sighting. Returns the person of each, known or new."""
+        self._height_error.advance(now_ns)
         people = self._people
         leans = [_lean(sighting.at, here) for sighting in sightings]
         sightings = [self._corrected(sighting, lean) for sighting, lean in zip(sightings, leans, strict=True)]

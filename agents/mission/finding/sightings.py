@@ -84,7 +84,9 @@ class Sightings:
         self._node = node
         sensors, bias_m = scenario.sensors, scenario.sensors.gps_bias_m
         up_m = 0.0 if sensors.altimeter_hz else sensors.gps_vertical * math.hypot(sensors.gps_common_m, bias_m)
-        self._identities = Identities(survivors, bias_m=bias_m, height_error=HeightError(up_m))
+        self._identities = Identities(
+            survivors, bias_m=bias_m, height_error=HeightError(up_m, tau_s=sensors.gps_common_time_s)
+        )
         self.steady_m2 = 1.0 + bias_m * bias_m
         """The variance of the part of the error of positions that lasts, along each axis."""
         self._contradictions = Contradictions(survivors, self._identities)

@@ -6,7 +6,7 @@ import random
 import pytest
 from seeing_uav import MODEL, UP_M
 
-from agents.mission.finding.height_error import HeightError
+from agents.mission.finding.height_error import HeightError, Parallax
 from agents.mission.finding.identities import Identities, Sighting
 from agents.mission.finding.known_survivors import KnownSurvivors
 from agents.mission.finding.phone_localization import Estimate
@@ -74,6 +74,19 @@ def test_where_nobody_was_seen_from_two_places_the_height_says_how_sure_a_place_
     told = person.told(flight.height.variance_m2)
     assert told.east_variance_m2 > 12 > 2 > told.north_variance_m2, "along the line of sight"
     assert math.hypot(told.east_m - 60, told.north_m) < 3 * told.sigma_m
+
+
+def test_what_was_learned_is_forgotten_as_the_error_changes() -> None:
+    height = HeightError(SIGMA_M, tau_s=1800)
+    height.learn(Parallax(weighted_m=6.0, weight=1.0))
+    assert height.m == pytest.approx(6.0 * 16 / 17)
+    assert height.variance_m2 == pytest.approx(16 / 17)
+    for minute in range(1, 31):
+        height.advance(minute * 60 * S)
+    assert height.m == pytest.approx(6.0 * 16 / 17 / math.e)
+    assert height.variance_m2 == pytest.approx(16 - (16 - 16 / 17) / math.e**2)
+    height.advance(0)
+    assert height.m == pytest.approx(6.0 * 16 / 17 / math.e), "time does not run backwards"
 
 
 def test_false_alarms_tell_nothing_of_the_height() -> None:

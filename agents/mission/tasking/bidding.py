@@ -249,9 +249,11 @@ class Bidding:
 
     def _wanted(self, known: KnownSurvivor, now_ns: int) -> int:
         """The number of UAVs that a survivor needs now."""
-        place = known.place()
-        if not self._formation.is_taken_up(now_ns) and (place is None or place.sigma_m > VAGUE_M):
-            return _BEFORE_SWEEP * self._config.responders
+        is_near = known.filter.near(self._own_motion.position, within_m=FAR_M)  # who is far need not know the place
+        if is_near and not self._formation.is_taken_up(now_ns):
+            place = known.place()
+            if place is None or place.sigma_m > VAGUE_M:
+                return _BEFORE_SWEEP * self._config.responders
         if len(known.reporters) >= self._config.reports_to_approach:
             return self._config.responders
         if now_ns - known.first_ns < _SCOUT_AFTER_NS:

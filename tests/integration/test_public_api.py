@@ -260,11 +260,23 @@ async def test_a_node_that_there_is_not_cannot_be_left_out() -> None:
 
 @pytest.mark.parametrize("page", ["README.md", "docs/how-to/send-messages.md"])
 def test_the_program_on_a_page_runs_as_it_stands(page: str, capsys: pytest.CaptureFixture[str]) -> None:
-    [program] = re.findall(
-        r"^```python\n(.*?)^```", (ROOT / page).read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE
-    )
+    [program] = [code for code in python_on(page) if "def test_" not in code]
     exec(compile(program, page, "exec"), {})
     assert capsys.readouterr().out.strip()
+
+
+async def test_the_test_on_a_page_passes_as_it_stands(swarm: MakeSwarm) -> None:
+    page = "docs/how-to/send-messages.md"
+    [code] = [code for code in python_on(page) if "def test_" in code]
+    names: dict[str, Any] = {}
+    exec(compile(code, page, "exec"), names)
+    [test] = [value for name, value in names.items() if name.startswith("test_")]
+    await test(swarm)
+
+
+def python_on(page: str) -> list[str]:
+    """The pieces of Python on a page."""
+    return re.findall(r"^```python\n(.*?)^```", (ROOT / page).read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
 
 
 def test_importing_fanet_mw_loads_nothing_else_and_all_names_are_there() -> None:

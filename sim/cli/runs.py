@@ -128,9 +128,8 @@ def launch(
     name = Topics(swarm or chosen.name).swarm
     with output.prepared():
         doors.doors()
-        chosen, leads = (
-            (chosen, None) if no_world else fitted(chosen, _say)
-        )  # another's world has the scenario as it is
+        # another's world has the scenario as it is
+        chosen, leads = (chosen, None) if no_world else fitted(chosen, _say)
         print_notes(chosen)
         warn_of(listen, listens=True)
         warn_of(connect, listens=False)

@@ -44,6 +44,7 @@ class KnownSurvivor:
     """The most exact verdict that the survivor is inside a building; nobody need fly there any more."""
     confirmed: Found | None = None
     looked_at: LookedAt = field(default_factory=LookedAt)
+    """Where cameras have looked for whomever."""
     refuted: list[Found] = field(default_factory=list)
     """The refutations of this survivor, each with the place that was confirmed by mistake, oldest first."""
     _elsewhere: tuple[tuple[Estimate, int], Estimate] | None = None
@@ -90,9 +91,7 @@ class KnownSurvivor:
         if own is None or self.filter.is_seen or not self.looked_at.has_shown(own.east_m, own.north_m):
             return own
         if self._elsewhere is None or self._elsewhere[0] != (own, self.looked_at.second):
-            at = self.filter.estimate_elsewhere(self.looked_at.has_shown)
-            assert at is not None, "a phone that has a place has probable ones"
-            self._elsewhere = (own, self.looked_at.second), at
+            self._elsewhere = (own, self.looked_at.second), self.filter.estimate_elsewhere(self.looked_at.has_shown)
         return self._elsewhere[1]
 
 

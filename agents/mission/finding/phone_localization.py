@@ -199,10 +199,8 @@ class PhoneFilter:
         self._catch_up()
         return self._estimate
 
-    def estimate_elsewhere(self, has_shown: Callable[[float, float], bool]) -> Estimate | None:
-        """The estimate by power if cameras have seen nobody at some places, which they rarely miss (`_OVERLOOKED`)."""
-        if self._seen or not self._middle:
-            return self.estimate()
+    def estimate_elsewhere(self, has_shown: Callable[[float, float], bool]) -> Estimate:
+        """The estimate by power, which there must be, if cameras have seen nobody at some places (`_OVERLOOKED`)."""
         points = [
             (math.exp(-deficit / 2) * (_OVERLOOKED if has_shown(east_m, north_m) else 1.0), east_m, north_m)
             for east_m, north_m, deficit in self.likely_cells(_CONSIDERED)

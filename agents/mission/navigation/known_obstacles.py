@@ -184,15 +184,10 @@ class KnownObstacles:
             for building in self._index.near.get(cell_of(at.east, at.north, TILE_M), ())
             if building.roof_m + OVER_M > at.up
         ]
-        for east, north, radius in self._no_fly:
+        for east, north, radius in self._circles(at.up):
             off_east, off_north = at.east - east, at.north - north
             distance = max(1e-6, math.hypot(off_east, off_north))
             found.append((distance - radius, off_east / distance, off_north / distance))
-        for place, radius in self.hovering:
-            if abs(place.up - at.up) <= OVER_M:
-                distance = max(1e-6, math.hypot(at.east - place.east, at.north - place.north))
-                east, north = (at.east - place.east) / distance, (at.north - place.north) / distance
-                found.append((distance - radius, east, north))
         for cell, echoed in self._echoes.items():
             middle = middle_of(cell)
             off_east, off_north = at.east - middle[0], at.north - middle[1]
@@ -245,20 +240,21 @@ class KnownObstacles:
         cell = nearest_free((goal.east, goal.north), lambda cell: self._is_taken(cell, up_m, now_ns), within=_RINGS)
         return None if cell is None else middle_of(cell)
 
+    def _circles(self, up_m: float) -> Sequence[tuple[float, float, float]]:
+        """East, north and radius of what must be flown around at a height: no-fly areas, and lost UAVs near it."""
+        if not self.hovering:
+            return self._no_fly
+        at_height = ((at.east, at.north, radius) for at, radius in self.hovering if abs(at.up - up_m) <= OVER_M)
+        return [*self._no_fly, *at_height]
+
     def _is_taken(self, cell: Cell, up_m: float, now_ns: int) -> bool:
         roof_m = self._index.roofs_m.get(cell)
         if roof_m is not None and roof_m + OVER_M > up_m:
             return True
-        if self._no_fly:
+        circles = self._circles(up_m)
+        if circles:
             east, north = middle_of(cell)
-            if any(math.hypot(east - e, north - n) <= radius + _MARGIN_M for e, n, radius in self._no_fly):
-                return True
-        for place, radius in self.hovering:
-            east, north = middle_of(cell)
-            if (
-                abs(place.up - up_m) <= OVER_M
-                and math.hypot(east - place.east, north - place.north) <= radius + _MARGIN_M
-            ):
+            if any(math.hypot(east - e, north - n) <= radius + _MARGIN_M for e, n, radius in circles):
                 return True
         echoed = self._taken.get(cell)
         return echoed is not None and echoed.until_ns > now_ns and echoed.top_m + OVER_M > up_m

@@ -19,14 +19,13 @@ can (`lasting_links.py`). UAVs that are out for survivors become followers, on w
 `shapes/contract.py` explains place, team, relay and follower.
 """
 
-import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from agents.mission.search_formation.lasting_links import keep_together
 from agents.mission.search_formation.pattern import Pattern
 from agents.mission.search_formation.roll_call import RollCall
-from agents.mission.search_formation.shapes.contract import Dimensions, ShapeName
+from agents.mission.search_formation.shapes.contract import Dimensions, ShapeName, swarm_at
 from fanet_mw.serial_number import following, newer
 from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire.search_plan import Search, SearchStatus
@@ -232,7 +231,8 @@ class FormationPlanner:
         starts = [self._members[node].position for node in nodes]
         from_middle = pattern.dimensions
         pattern, chosen = self._shared_out(pattern, nodes, starts)
-        among_s = 0.0 if pattern.dimensions == from_middle else _apart_m(starts) / _AMONG_M_S
+        begins_around = pattern.dimensions != from_middle
+        among_s = swarm_at(starts, reach_m=pattern.reach_m).apart_m / _AMONG_M_S if begins_around else 0.0
         farthest_m = max(
             pattern.at(place, 0.0).minus(start).horizontal() for place, start in zip(chosen, starts, strict=True)
         )
@@ -321,12 +321,6 @@ class FormationPlanner:
             if member.revision and (not newest or newer(member.revision, newest, bits=_REVISION_BITS)):
                 newest = member.revision
         return newest
-
-
-def _apart_m(starts: Sequence[Enu]) -> float:
-    """How far neighbors are apart where a swarm stands, as in a square grid of the same size."""
-    east, north = [at.east for at in starts], [at.north for at in starts]
-    return math.sqrt((max(east) - min(east)) * (max(north) - min(north)) / len(starts))
 
 
 def _replaces(plan: Search, mine: Search) -> bool:

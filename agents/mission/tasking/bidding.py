@@ -143,7 +143,7 @@ class Bidding:
             won = [
                 (self._distance_m(survivor), survivor)
                 for survivor in self._survivors.sought()
-                if self._wins(survivor, self._survivors.by_id[survivor], now_ns)
+                if self._node in self._winners(survivor, now_ns)
             ]
             if won:
                 distance_m, self.survivor = min(won)
@@ -155,9 +155,7 @@ class Bidding:
                 self._due_ns = now_ns + measures_ns
                 self._due_ns += round(distance_m / self._cruise_m_s * S) if math.isfinite(distance_m) else 0
         if self.survivor is not None:
-            known = self._survivors.by_id[self.survivor]
-            others = self._auction.winners(self.survivor, count=self._wanted(known, now_ns), now_ns=now_ns)
-            self._approach.share([node for node in others if node != self._node])
+            self._approach.share([node for node in self._winners(self.survivor, now_ns) if node != self._node])
             if not self._announced:
                 self._announce(self.survivor, now_ns)
 
@@ -165,8 +163,7 @@ class Bidding:
         """Give up the present survivor if the auction is lost, it takes too long, or it is not permitted any more; but
         for a lost auction the bid is withdrawn.
         """
-        known = self._survivors.by_id[survivor]
-        lost = not self._wins(survivor, known, now_ns)
+        lost = self._node not in self._winners(survivor, now_ns)
         arrived_ns, patience_ns = self._approach.arrived_ns.get(survivor), self._patience_ns
         if arrived_ns is None and self._formation.plan is not None and not self._formation.is_taken_up(now_ns):
             patience_ns = _OVERDUE_NS
@@ -223,13 +220,7 @@ class Bidding:
 
     def responders(self, now_ns: int) -> set[int]:
         """The UAVs that have won a task, as far as this one knows."""
-        return {
-            node
-            for survivor in self._survivors.sought()
-            for node in self._auction.winners(
-                survivor, count=self._wanted(self._survivors.by_id[survivor], now_ns), now_ns=now_ns
-            )
-        }
+        return {node for survivor in self._survivors.sought() for node in self._winners(survivor, now_ns)}
 
     def _announce(self, survivor: int, now_ns: int) -> None:
         known = self._survivors.by_id[survivor]
@@ -260,8 +251,9 @@ class Bidding:
             return 1
         return self._config.responders if self._absence.is_permitted else min(self._config.responders, 2)
 
-    def _wins(self, survivor: int, known: KnownSurvivor, now_ns: int) -> bool:
-        return self._node in self._auction.winners(survivor, count=self._wanted(known, now_ns), now_ns=now_ns)
+    def _winners(self, survivor: int, now_ns: int) -> list[int]:
+        wanted = self._wanted(self._survivors.by_id[survivor], now_ns)
+        return self._auction.winners(survivor, count=wanted, now_ns=now_ns)
 
     def _distance_m(self, survivor: int) -> float:
         place = self._survivors.by_id[survivor].place()

@@ -22,15 +22,19 @@ def fanet(*arguments: str) -> int:
     return code
 
 
-@pytest.mark.parametrize("command", ["simulate", "launch"])
-def test_a_folder_that_cannot_be_written_is_found_before_the_run(
-    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def never_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     def run(*_: object, **__: object) -> None:
         pytest.fail("the run has begun")
 
     monkeypatch.setattr("sim.run.virtual.simulate", run)
     monkeypatch.setattr("sim.run.launcher.swarm.launch", run)
+
+
+@pytest.mark.parametrize("command", ["simulate", "launch"])
+def test_a_folder_that_cannot_be_written_is_found_before_the_run(
+    command: str, tmp_path: Path, never_runs: None
+) -> None:
     (tmp_path / "file").touch()
     for out in (tmp_path / "file", tmp_path / "file" / "below", Path("/proc/nowhere")):
         with pytest.raises(ConfigError, match=f"--out {out}: cannot be written: "):
@@ -98,14 +102,7 @@ def test_force_removes_the_pictures_of_the_earlier_page_and_nothing_else_beside_
 
 
 @pytest.mark.parametrize("command", ["simulate", "launch"])
-def test_a_folder_in_which_another_run_writes_is_left_alone(
-    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def run(*_: object, **__: object) -> None:
-        pytest.fail("the run has begun")
-
-    monkeypatch.setattr("sim.run.virtual.simulate", run)
-    monkeypatch.setattr("sim.run.launcher.swarm.launch", run)
+def test_a_folder_in_which_another_run_writes_is_left_alone(command: str, tmp_path: Path, never_runs: None) -> None:
     (tmp_path / "summary.json").write_text("theirs")
     with alone(tmp_path), pytest.raises(ConfigError, match=f"--out {tmp_path}: another run writes there now"):
         fanet(command, "quick", "--out", str(tmp_path), "--force")

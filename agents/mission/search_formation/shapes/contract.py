@@ -210,6 +210,12 @@ class Swarm(NamedTuple):
     reach_m: float
     """The reach of their radios."""
 
+    @property
+    def apart_m(self) -> float:
+        """How far neighbors are apart, as in a square grid of the same size."""
+        east_m, west_m, north_m, south_m = self.sides_m
+        return math.sqrt((east_m + west_m) * (north_m + south_m) / self.uavs)
+
 
 def swarm_at(positions: Sequence[Enu], *, reach_m: float) -> Swarm:
     east, north = [at.east for at in positions], [at.north for at in positions]

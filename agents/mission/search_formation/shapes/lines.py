@@ -240,7 +240,7 @@ class Lines(Shape):
         aside_m, beyond_m = (east_m + west_m) / 2, min(north_m, south_m)
         if made.teams != 2 or made.lanes < _LEAST_BENT or beyond_m <= FIRST_M:
             return ()
-        if (east_m + west_m) * (north_m + south_m) > swarm.uavs * (_DENSE * swarm.reach_m) ** 2:
+        if swarm.apart_m > _DENSE * swarm.reach_m:
             return ()
         most_m = max(made.first_m, min(beyond_m, made.last_m / 2, _AROUND * swarm.reach_m))
         narrower_m = max(0.0, made.half_width_m - _WIDER * aside_m)

@@ -43,13 +43,13 @@ _DEEPEST: Final = 16
 _TOLD: Final[Mapping[str, tuple[type, ...]]] = {
     **dict.fromkeys(
         ("kind", "node", "generated", "bus_malformed", "heard_late", "messages", "applications", "frames_sent",
-         "receptions", "dropped", "final", "host", "clock"), ()
+         "receptions", "dropped", "final", "host", "clock", "slots", "turns", "head", "cluster"), ()
     ),
     **dict.fromkeys(("missed_turns", "waiting", "leader", "term", "epoch"), (int,)),
     "bound_ms": (int, float, type(None)),
-    "state": (str,),
+    **dict.fromkeys(("state", "role"), (str,)),
 }  # fmt: skip
-"""What results read of a node's report: what a protocol must not tell at all, or as values of which types."""
+"""What results and views read of a node's report: what a protocol must not tell at all, or as values of which types."""
 _SUFFIXES: Final = frozenset(Path(f"_{suffix}").suffix for suffix in (*SOURCE_SUFFIXES, *EXTENSION_SUFFIXES))
 _INSTALLED: Final = ("site-packages", "dist-packages")
 """Folders of packages that were installed: of this environment, of another on its path, of the user, of Debian."""

@@ -6,7 +6,8 @@ set.
 """
 
 import heapq
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from typing import Final
 
 from fanet_mw.actor import Actor, require_instant
@@ -74,6 +75,8 @@ class VirtualHost:
         for order, (expression, listener) in enumerate(listeners, start=len(self._actors)):
             self._subscribe(expression, order, _NOBODY, _without_time(listener))
         self._routes: dict[str, Route] = {}
+        self.failed: list[str] = []
+        """The actors that have raised, by name; they are not called again but for their end."""
         self._latest: tuple[int, int, int] | None = None
         """The wake-up that was requested last, outside of the heap, because it is often the next one."""
         self._stalled = 0
@@ -112,6 +115,33 @@ class VirtualHost:
         self._flush({})
         self._hand_over()
 
+    def stop_after_failure(self) -> None:
+        """`stop`, after an actor has raised: the others get what is on its way to them, and who raises is left out."""
+        self._flush_what_can_be()
+        for actor in self._actors:
+            with suppress(Exception, SystemExit):  # the one that has raised may not be whole
+                actor.stop(self.now_ns)
+        self._flush_what_can_be()
+        self._hand_over()
+
+    def _flush_what_can_be(self) -> None:
+        before = -1
+        while before < len(self.failed):  # each that raises is one less
+            before = len(self.failed)
+            with suppress(Exception, SystemExit):
+                self._flush({})
+
+    def _leave_out(self, index: int, left: Iterator[tuple[str, Message]]) -> None:
+        """An actor has raised: what was not handed over yet stays queued, and nothing of that is for this actor."""
+        self._queue[:] = list(left)
+        if index == _NOBODY:
+            return
+        self.failed.append(self._actors[index].name)
+        self._armed[index] = None
+        self._routes.clear()
+        for receivers in self._receivers.values():
+            receivers[:] = [one for one in receivers if one[2] != index]
+
     def _watch(self, index: int) -> None:
         """Count wake-ups that do not advance time: a few are normal, an endless series is a bug in an actor."""
         self._stalled += 1
@@ -136,8 +166,10 @@ class VirtualHost:
         queue, routes, now_ns = self._queue, self._routes, self.now_ns
         latest, seq = self._latest, self._seq
         push_and_pop, pop, push = heapq.heappushpop, heapq.heappop, heapq.heappush
+        index = _NOBODY
         try:
             while True:
+                left = iter(queue)
                 if awake is None:
                     if latest is not None:
                         latest = push_and_pop(heap, latest)
@@ -159,7 +191,7 @@ class VirtualHost:
                         self._watch(index)
                     wakes[index](now_ns)
                     awake = {index: None}
-                for topic, message in queue:  # deliveries may append further messages to the queue
+                for topic, message in left:  # deliveries may append further messages to the queue
                     try:
                         route = routes[topic]
                     except KeyError:
@@ -182,6 +214,9 @@ class VirtualHost:
                                 push(heap, latest)
                             latest = wake_ns, seq, index
                 awake = None
+        except (Exception, SystemExit):
+            self._leave_out(index, left)
+            raise
         finally:
             self._latest, self._seq = latest, seq
 

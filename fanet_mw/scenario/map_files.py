@@ -51,6 +51,8 @@ class Shapes(NamedTuple):
     circles: list[tuple[float, float, float]]
     """Circles to stay out of: latitude, longitude, radius [m]."""
     points: list[_Point]
+    no_points: str = ""
+    """Why what stands for points is none; who asks for no points need not care."""
 
 
 def take_in(tree: dict[str, Any], folder: Path) -> None:
@@ -83,8 +85,8 @@ def take_in(tree: dict[str, Any], folder: Path) -> None:
         world["no_fly_m"] = [*world.get("no_fly_m", ()), *circles]
     if "survivors_at" in found:
         said, shapes = found["survivors_at"]
-        if not shapes.points:
-            raise ConfigError(f"{said}: it holds no points")
+        if shapes.no_points or not shapes.points:
+            raise ConfigError(f"{said}: {shapes.no_points or 'it holds no points'}")
         places = [_flat(point, origin) for point in shapes.points]
         for place in places:
             _require_near(said, place, origin)
@@ -285,16 +287,19 @@ def _plan(data: bytes) -> Shapes:
             inside.append(_extremes(circle))
         else:
             circles.append(circle)
-    flown = []
+    flown, no_points = [], ""
     for item in (tree.get("mission") or {}).get("items", ()):
         if isinstance(item.get("polygon"), list):
             inside.append(_ring([_place(lat, lon) for lat, lon, *_ in item["polygon"]]))
         elif item.get("command") == _WAYPOINT:
-            flown.append(_flown(item.get("frame", 3), *item["params"][4:6]))
+            try:
+                flown.append(_flown(item.get("frame", 3), *item["params"][4:6]))
+            except ValueError as error:
+                no_points = no_points or str(error)
     rally = [_place(*point[:2]) for point in (tree.get("rallyPoints") or {}).get("points", ())]
     if len(inside) + len(outside) + len(rally) + len(flown) > _MOST_SHAPES:
         raise ValueError(f"more than {_MOST_SHAPES} shapes")
-    return Shapes(inside, outside, circles, rally or flown)
+    return Shapes(inside, outside, circles, rally or flown, "" if rally else no_points)
 
 
 def _included(entry: Any) -> bool:  # noqa: ANN401  (JSON)

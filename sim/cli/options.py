@@ -54,6 +54,19 @@ ScenarioName: TypeAlias = Annotated[str, Parameter(completer=scenario_names)]
 """A shipped scenario's name, or a .toml file."""
 
 
+def key_of(override: str) -> str:
+    return override.partition("=")[0].strip()
+
+
+def require_said_once(overrides: Sequence[str]) -> None:
+    """Raise ConfigError where one key is given two values: the last would silently be in force."""
+    known: dict[str, str] = {}
+    for override in overrides:
+        before = known.setdefault(key_of(override), override)
+        if before.replace(" ", "") != override.replace(" ", ""):
+            raise ConfigError(f"--set {before} and {override}: one key has one value")
+
+
 def _seconds(_type: object, tokens: Sequence[Token]) -> float:
     """A number of seconds, or a time with a unit."""
     from fanet_mw.scenario.quantities import in_unit_of
@@ -94,6 +107,7 @@ class ScenarioFlags:
             overrides.append(f"seed={self.seed}")
         if self.duration is not None:
             overrides.append(f"duration_s={self.duration}")
+        require_said_once(overrides)
         found = catalog.find(name, overrides)
         if self.faults is None:
             return found
@@ -107,7 +121,8 @@ class ScenarioFlags:
         if chosen.radio.lead_ms:
             return chosen
         _err.print(f"radio.lead_ms = 0 is for virtual time; {_LEAD_MS} here, --set radio.lead_ms to choose")
-        return replace(self, set=(*self.set, f"radio.lead_ms={_LEAD_MS}")).scenario(name)
+        others = [one for one in self.set if key_of(one) != "radio.lead_ms"]
+        return replace(self, set=(*others, f"radio.lead_ms={_LEAD_MS}")).scenario(name)
 
 
 @Parameter(name="*")

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 from cyclopts.validators import Number
 
-from fanet_mw.errors import ConfigError
+from fanet_mw.errors import ConfigError, FanetError
 from sim.cli.companions import Companions, record_command, view_command
 from sim.cli.memory import COMPILING_MB, require
 from sim.cli.options import DoorFlags, OutputFlags, ScenarioFlags, ScenarioName, print_notes, warn_of
@@ -76,6 +76,7 @@ def simulate(
                 signals=signals,
                 spool_folder=output.out,
                 observer=_together(watcher, recording),
+                on_failure=_say_failure,
             )
         why = None if recording is None else recording.failure
         return _finish(outcome, output, {} if why is None else {str(output.record): why})
@@ -260,6 +261,15 @@ def _say(text: str) -> None:
     """Say something to whoever watches; a terminal that has gone must not cost the result."""
     with suppress(OSError):
         _err.print(text, highlight=False, soft_wrap=True)  # above the bar, if there is one
+
+
+def _say_failure(error: BaseException, what: str) -> None:
+    """Say what a part of another package has raised, with the traceback from there on that its author needs."""
+    from traceback import format_exception
+
+    if not isinstance(error, FanetError):
+        _say("".join(format_exception(error)).rstrip())
+    _say(f"ended early: {what}")
 
 
 def _finish(outcome: "Outcome", output: OutputFlags, cut: dict[str, str] | None = None) -> int:

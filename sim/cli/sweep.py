@@ -15,6 +15,7 @@ from cyclopts.validators import Number
 
 from fanet_mw.errors import ConfigError
 from sim.cli.memory import COMPILING_MB, require
+from sim.cli.options import require_said_once
 from sim.console import Console
 
 if TYPE_CHECKING:
@@ -136,6 +137,7 @@ def asked(what: str, sets: tuple[str, ...], seeds: int | None, variant: str | No
         raise ConfigError(f"--variant {variant}: {what} is a scenario; only a sweep file has variants")
     else:
         found = Sweep(base=what)
+    require_said_once(sets)
     axes = dict(axis(text) for text in sets)
     fixed = {key: values[0] for key, values in axes.items() if len(values) == 1}
     grid = {key: values for key, values in axes.items() if len(values) > 1}

@@ -79,5 +79,6 @@ def copies(outcome: Outcome) -> dict[str, Any]:
     heard = sum(report["receptions"] for report in agents)
     counted, handed = emulator["copies"], sum(emulator["handed"].values())
     ended = counted["received"] + sum(counted["lost"].values()) + counted["in_flight"]
-    closes = counted["on_air"] == ended and (outcome.mode == "realtime" or handed == heard)
+    all_lived = outcome.mode == "virtual" and not outcome.ended
+    closes = counted["on_air"] == ended and (not all_lived or handed == heard)
     return {**counted, "handed": handed, "heard": heard, "closes": closes}

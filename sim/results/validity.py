@@ -106,7 +106,7 @@ def reasons(
 def _broken(outcome: Outcome) -> Iterator[str]:
     if outcome.aborted is not None:
         yield f"partial result: {outcome.aborted}"
-    for code in dict.fromkeys(code for _, code in outcome.ended):
+    for code in dict.fromkeys(code for _, code in outcome.ended if outcome.mode == "realtime"):
         dead = [name for name, ended in outcome.ended if ended == code]
         yield f"{_named(dead)} ended before the end, with {described(code)}: {len(dead)}, limit 0"
     for name, why in outcome.absent.items():

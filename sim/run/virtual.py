@@ -28,6 +28,7 @@ from sim.results.links import LinkTotals
 from sim.results.outcome import Outcome
 from sim.run.collecting.taps import TapLog
 from sim.run.garbage import GARBAGE
+from sim.run.part_failure import said_of
 from sim.run.stoppable_uav import StoppableUav
 from sim.world.environment.layout import positions
 from sim.world.environment.map_on_board import map_on_board
@@ -84,24 +85,29 @@ def simulate(
     applications: Applications = no_applications,
     spool_folder: Path | None = None,
     observer: Observer | None = None,
+    on_failure: Callable[[BaseException, str], None] | None = None,
 ) -> Outcome:
     """Run a scenario to its end, or until `signals` holds the number of a signal; then the outcome is partial, or
-    KeyboardInterrupt is raised before anything was simulated. `on_progress` is told the simulated seconds; a long run
-    keeps what it collects in a nameless file in `spool_folder`.
+    KeyboardInterrupt is raised before anything was simulated. `on_progress` is told the simulated seconds, `on_failure`
+    what a part has raised, which ends a run early, and else is raised; a long run keeps what it collects in a nameless
+    file in `spool_folder`.
     """
     with GARBAGE.not_collected():
         observed = Observed(
             scenario, capture=capture, applications=applications, folder=spool_folder, observer=observer
         )
         began = time.perf_counter()
+        failure = None
         try:
             _run(observed, on_progress, signals)
-        except SystemExit as error:  # exit code 0 would say that there is a result, and that it is valid
-            raise HostError(
-                f"a part of another package has called sys.exit({error.code!r}) at {observed.host.now_ns / S:g} s"
-            ) from error
+        except Exception as error:
+            if on_failure is None or not observed.host.now_ns or not observed.host.failed:
+                raise
+            failure = said_of(error, scenario, observed.host.failed, now_ns=observed.host.now_ns)
+            on_failure(error, failure)
+            observed.host.stop_after_failure()
     interrupted = f"interrupted by {Signals(signals[0]).name}" if signals else ""
-    return observed.outcome(wall_s=time.perf_counter() - began, cut_short=interrupted)
+    return observed.outcome(wall_s=time.perf_counter() - began, cut_short=interrupted, failure=failure)
 
 
 class Observed:
@@ -169,9 +175,11 @@ class Observed:
             for actor in self.actors:
                 self._observer.take_report(actor.name, actor.report(), t_ns=now_ns)
 
-    def outcome(self, *, wall_s: float, cut_short: str) -> Outcome:
-        """The outcome, once the host was stopped; `cut_short` says why if that was before the end of the scenario."""
-        cut = self.host.now_ns < self.scenario.duration_ns
+    def outcome(self, *, wall_s: float, cut_short: str, failure: str | None = None) -> Outcome:
+        """The outcome, once the host was stopped; `cut_short` says why if that was before the end of the scenario, and
+        `failure` what has ended it.
+        """
+        cut = failure is not None or self.host.now_ns < self.scenario.duration_ns
         return Outcome(
             scenario=self.scenario,
             mode="virtual",
@@ -181,7 +189,8 @@ class Observed:
             taps=self._taps,
             links=self._links,
             epoch_unix_ns=EPOCH_UNIX_NS,
-            aborted=cut_short if cut else None,
+            ended=[(name, 1) for name in self.host.failed],
+            aborted=(failure or cut_short) if cut else None,
             ended_ns=self.host.now_ns if cut else None,
         )
 
@@ -190,11 +199,16 @@ def _run(observed: Observed, on_progress: Callable[[float], None], signals: Sequ
     host, scenario = observed.host, observed.scenario
     if signals:
         raise KeyboardInterrupt(signals[0])
-    host.start()
-    for until_ns in range(_STEP_NS, scenario.duration_ns + _STEP_NS, _STEP_NS):
-        host.run(min(until_ns, scenario.duration_ns))
-        observed.tell_reports()
-        on_progress(host.now_ns / S)
-        if signals:
-            break
-    host.stop()
+    try:
+        host.start()
+        for until_ns in range(_STEP_NS, scenario.duration_ns + _STEP_NS, _STEP_NS):
+            host.run(min(until_ns, scenario.duration_ns))
+            observed.tell_reports()
+            on_progress(host.now_ns / S)
+            if signals:
+                break
+        host.stop()
+    except SystemExit as error:  # exit code 0 would say that there is a result, and that it is valid
+        raise HostError(
+            f"a part of another package has called sys.exit({error.code!r}) at {host.now_ns / S:g} s"
+        ) from error

@@ -216,7 +216,7 @@ class VirtualSwarm:
         """End the run where it is, and what came of it; time does not pass any more."""
         if self._result is None:
             observed = self._time.start()
-            observed.host.stop()
+            observed.host.stop_after_failure() if observed.host.failed else observed.host.stop()
             self._time.ended = True
             wall_s = time.perf_counter() - self._began_s
             self._result = Result(observed.outcome(wall_s=wall_s, cut_short="ended by its program"))

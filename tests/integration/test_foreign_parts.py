@@ -11,6 +11,7 @@ from fanet_mw import extensions
 from fanet_mw.errors import ConfigError, LocalProtocolError
 from fanet_mw.extensions import Options
 from fanet_mw.scenario import config
+from sim.cli.app import app
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
@@ -174,3 +175,67 @@ def test_what_a_part_computes_is_checked_where_it_enters(
         simulate(scenario)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+RAISING = """
+import sys
+from fanet_mw.application import Application
+from fanet_mw.routing.flooding import Flooding
+from sim.world.mobility.formation import Formation as Static
+class Finder(Application):
+    name = "finder"
+    def __init__(self, scenario, node, options): pass
+    def next_wake_ns(self): return 2_600_000_000
+    def wake(self, now_ns): self.look()
+    def look(self): return {}[7]
+class Leaver(Finder):
+    def look(self): sys.exit(0)
+class Proto(Flooding):
+    def receive(self, packet, reception, *, now_ns):
+        assert now_ns < 2_600_000_000, "what\\nis this"
+        super().receive(packet, reception, now_ns=now_ns)
+class Course(Static):
+    def track(self, t_s): return super().track(t_s) if t_s < 2.6 else 1 / 0
+"""
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            'applications=[{use="raising:Finder",nodes=[3]}]',
+            "raising:Finder.wake (agent-3, at 2.6 s) has raised KeyError: 7",
+        ),
+        ('applications=[{use="raising:Leaver",nodes=[3]}]', "has called sys.exit(0) at 2.6 s (agent-3, at 2.6 s)"),
+        ("routing.protocol=raising:Proto", " s) has raised AssertionError: what is this"),
+        ("mobility.model=raising:Course", "raising:Course.track (world, at 2.7 s) has raised ZeroDivisionError: div"),
+    ],
+)
+def test_what_was_flown_until_a_part_raises_is_kept_and_said_to_have_been_ended_by_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], change: str, said: str
+) -> None:
+    (tmp_path / "raising.py").write_text(RAISING)
+    monkeypatch.syspath_prepend(tmp_path)
+    keys = ["warmup_s=1", "drain_s=1", "traffic.interval_s=0.2", "mission.survivors=0", change]
+    words = [
+        "simulate",
+        "quick",
+        "--duration",
+        "9",
+        "--out",
+        str(tmp_path / "out"),
+        "--record",
+        str(tmp_path / "r.mcap"),
+        "--set",
+        *keys,
+    ]
+    assert app(words, result_action="return_value", exit_on_error=False, print_error=False) == 1
+    err = capsys.readouterr().err
+    assert "ended early: " in err
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    (why,) = summary["invalid_because"]
+    assert why.startswith("partial result: ")
+    assert said in why
+    assert 2 < summary["simulated_s"] < 9
+    assert summary["frames"]["delivered"] > 5
+    assert (tmp_path / "out" / "trace.jsonl").stat().st_size > 1000

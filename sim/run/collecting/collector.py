@@ -108,6 +108,10 @@ class Collector:
         if name not in self._checks.node_of:
             return "unknown actor"
         if not self._allowance.take(f"{what}/{name}", len(payload), now_ns=self._now_ns()):
+            if what == "report":
+                self._why_no_report[name] = (
+                    f"of {len(payload):,} bytes; must be <= {BURST_BYTES:,} at once, {BYTES_PER_S:,} a second"
+                )
             return "excess"
         try:
             messages = codecs.decode(payload)

@@ -82,7 +82,7 @@ def test_one_file_of_another_run_is_enough_to_refuse(tmp_path: Path, name: str) 
 def test_each_page_that_replaces_another_has_its_own_pictures_alone(tmp_path: Path) -> None:
     for seed in ("1", "2"):
         flags = ("--seed", seed, "--report", "--force", "--out", str(tmp_path))
-        assert fanet("simulate", "quick", "--set", "nodes.count=3", "clusters.count=1", "duration_s=8", *flags) == 0
+        assert fanet("simulate", "quick", "--set", "nodes.count=3", "clusters.count=1", *flags) == 0
         assert {path.name.split("-")[1] for path in (tmp_path / "pictures").iterdir()} == {seed}
 
 

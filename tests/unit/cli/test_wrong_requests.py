@@ -9,7 +9,7 @@ from fanet_mw.application import Application
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError, HostError
 from fanet_mw.scenario import config
-from sim.cli.app import app
+from sim.cli.app import app, changes_last
 from sim.results.files import finish
 from sim.run.virtual import simulate
 
@@ -29,6 +29,21 @@ def test_a_name_of_a_swarm_that_would_be_another_topic_is_refused(name: str) -> 
 def test_launch_refuses_it_before_it_says_anything_else(capsys: pytest.CaptureFixture[str]) -> None:
     assert refusal("launch", "flooding", "--swarm", "a/b c").startswith("the name of a swarm, 'a/b c', is part of")
     assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            "show quick --set nodes.count=4 nodes.count=6",
+            "--set nodes.count=4 and nodes.count=6: one key has",
+        ),
+        ("simulate quick --set seed=4 --seed 6", "--set seed=4 and seed=6: one key has one value"),
+        ("sweep quick --set nodes.count=4,5 nodes.count=6,7", "--set nodes.count=4,5 and nodes.count=6,7: one key has"),
+    ],
+)
+def test_two_values_of_one_key_are_refused_and_both_are_named(words: str, said: str) -> None:
+    assert refusal(*changes_last(words.split())).startswith(said)
 
 
 def test_a_link_from_a_node_to_itself_is_refused_in_words() -> None:

@@ -203,3 +203,42 @@ def test_a_wake_up_at_no_instant_is_refused_before_it_breaks_the_order_of_others
 
     with pytest.raises(LocalProtocolError, match=r"odd: next_wake_ns\(\) = .* must be a whole number of ns"):
         live()
+
+
+class Fragile(Script):
+    """Raises when it hears something."""
+
+    def receive(self, topic: str, message: Message, now_ns: int) -> None:
+        raise ZeroDivisionError
+
+    def stop(self, now_ns: int) -> None:
+        raise ZeroDivisionError
+
+
+def test_after_an_actor_has_raised_the_others_get_once_what_is_on_its_way_to_them_and_it_nothing() -> None:
+    heard: list[tuple[str, Message]] = []
+    ear = Script("ear", [], hears=("t/*",))
+    broken = [Fragile(name, [9 * MS], hears=("t/x",)) for name in ("first", "second")]
+    host = VirtualHost(
+        [Script("early", [MS]), ear, *broken, Script("late", [MS])], listeners=[("t/*", lambda *it: heard.append(it))]
+    )
+    host.start()
+    with pytest.raises(ZeroDivisionError):
+        host.run(2 * MS)
+    host.stop_after_failure()
+    assert host.failed == ["first"]
+    assert [name for _, name in ear.log[1:]] == ["early"], "late was not woken any more"
+    assert host.now_ns == MS
+
+
+def test_whoever_raises_at_the_end_too_is_left_out_then() -> None:
+    puts = [Script("loud", []), Fragile("first", [], hears=("t/x",)), Fragile("second", [], hears=("t/x",))]
+    ear = Script("ear", [], hears=("t/*",))
+    host = VirtualHost([*puts, ear])
+    host.start()
+    with pytest.raises(ZeroDivisionError):
+        host.put("t/x", MavlinkTap(0, b"one"))
+    puts[0].outbox += [("t/x", MavlinkTap(0, b"two")), ("t/y", MavlinkTap(0, b"three"))]
+    host.stop_after_failure()
+    assert host.failed == ["first", "second"]
+    assert [name for _, name in ear.log[1:]] == ["three"], "what was handed over is not handed over again"

@@ -186,6 +186,11 @@ class Boastful(Flooding):
             "messages": 3,
             "waiting": "a",
             "missed_turns": -1,
+            "slots": 16,
+            "turns": [1, 2],
+            "role": 5,
+            "head": "x",
+            "cluster": 1e9,
             "epoch": 7,
             "own": 1,
         }
@@ -200,7 +205,8 @@ def test_a_protocol_of_another_package_reports_under_no_name_of_ours(make_scenar
     )
     told = dict(node.report())
     assert (told["receptions"], told["epoch"], told["own"]) == (0, 7, 1)
-    strange = {"receptions": 0, "kind": "emulator", "messages": 3, "waiting": "a", "missed_turns": -1}
+    strange = {"receptions": 0, "kind": "emulator", "messages": 3, "waiting": "a", "missed_turns": -1,
+               "slots": 16, "turns": [1, 2], "role": 5, "head": "x", "cluster": 1e9}  # fmt: skip
     assert {key: told[f"protocol.{key}"] for key in strange} == strange
     assert not strange.keys() & told.keys() - {"receptions"}
 

@@ -87,10 +87,6 @@ def wpl(*rows: tuple[float, ...], home: bool = True) -> str:
     return "QGC WPL 110\n" + "".join(lines)
 
 
-def items(**item: object) -> str:
-    return json.dumps({"fileType": "Plan", "geoFence": None, "mission": {"items": [item]}})
-
-
 def scenario(folder: Path, text: str) -> Scenario:
     path = folder / "search.toml"
     path.write_text(f"[nodes]\ncount = 9\n{text}", encoding="utf-8")
@@ -164,9 +160,6 @@ def test_points_are_people(files: Path, name: str) -> None:
             plan().replace('"inclusion": true', '"inclusion": "false"'),
             "inclusion = 'false' must be true or f",
         ),
-        ("x.plan", items(command=16, params=[0, 0, 0, None, None, None, 50]), "latitude None and longitude None must"),
-        ("x.plan", items(command=16, params=[0, 0, 0, None, 0, 0, 50]), "latitude and longitude 0"),
-        ("x.plan", items(command=16, frame=1, params=[0, 0, 0, None, 47.3, 8.5, 50]), "frame 1 has no latitude"),
         ("x.waypoints", wpl((1, 3, 16, 0, 0.0, 0.0)), "line 3: '1\\t0\\t3\\t16"),
         ("x.waypoints", wpl((1, 3, 16, 0, 0.0, 0.0)), "latitude and longitude 0"),
         ("x.waypoints", wpl((1, 1, 16, 0, 10.0, 20.0)), "frame 1 has no latitude"),
@@ -187,6 +180,27 @@ def test_what_cannot_be_used_is_one_line_with_the_file(tmp_path: Path, name: str
         scenario(tmp_path, f'[mission]\narea = "{name}"')
     assert why in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("item", "why"),
+    [
+        ({"params": [0, 0, 0, None, None, None, 50]}, "latitude None and longitude None must"),
+        ({"params": [0, 0, 0, None, 0, 0, 50]}, "latitude and longitude 0"),
+        ({"frame": 1, "params": [0, 0, 0, None, 47.3, 8.5, 50]}, "frame 1 has no latitude"),
+    ],
+)
+def test_a_waypoint_at_no_place_is_nobody_s_place_and_matters_to_no_area(
+    tmp_path: Path, item: dict[str, object], why: str
+) -> None:
+    fence = {"inclusion": True, "polygon": [list(degrees(point)) for point in SQUARE]}
+    tree = {"fileType": "Plan", "geoFence": {"polygons": [fence]}, "mission": {"items": [{"command": 16, **item}]}}
+    (tmp_path / "x.plan").write_text(json.dumps(tree))
+    assert scenario(tmp_path, '[mission]\narea = "x.plan"').world.area_m == 600
+    with pytest.raises(ConfigError) as caught:
+        scenario(tmp_path, '[mission]\narea = "x.plan"\nsurvivors_at = "x.plan"')
+    assert "mission.survivors_at = " in str(caught.value)
+    assert why in str(caught.value)
 
 
 @pytest.mark.parametrize(("polygons", "side_m"), [((), 600), ((SQUARE,), None)])

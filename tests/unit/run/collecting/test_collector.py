@@ -5,6 +5,7 @@ import errno
 import gc
 import json
 import os
+import re
 import struct
 import tracemalloc
 from array import array
@@ -333,6 +334,13 @@ def test_a_flood_of_one_actor_stops_at_its_allowance_and_leaves_the_others_their
     ear.put(NAMES.trace("agent-3"), flood)
     assert ear.why == {"trace: excess": excess}, "what was said slowly enough is heard again"
     assert list(ear.outcome().records)[-1].node == 4
+
+
+def test_a_report_beyond_the_allowance_is_named_with_its_size(ear: Ear) -> None:
+    ear.say(NAMES.report("agent-3"), Report("agent-3", S, json.dumps({"own": "x" * (BURST_BYTES + 1)})))
+    assert ear.why == {"report: excess": 1}
+    why = ear.outcome().absent["agent-3"]
+    assert re.fullmatch(r"of 16,777,2\d\d bytes; must be <= 16,777,216 at once, 1,048,576 a second", why)
 
 
 def test_silence_saves_up_no_more_than_a_burst() -> None:

@@ -1,7 +1,10 @@
 """Bugs that a machine draws: places and operators by chance, the tests that run the place, and the share that notices.
 
     a block of the product, drawn by the number of its changes  ->  one change of it  ->  planted in memory
-    ->  the tests that run that block, the shortest first  ->  caught | survived | never run
+    ->  the tests that run that block, the nearest first, then the kept flights  ->  caught | survived | never run
+
+A constant of a module is tried by the tests that run what uses it (`uses.py`). What crashes the interpreter is caught,
+and so is what takes longer than half a minute and eight times as long as without a bug.
 
 Which tests run which block is measured once (`blocks.py`) and kept in `tests/mutants/blocks.json` until it is asked
 for anew; where numba compiles, in `uncompiled.json`: bugs are planted there in the uncompiled code, and tried by the
@@ -15,6 +18,7 @@ import json
 import math
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -30,16 +34,21 @@ HERE: Final = Path(__file__).resolve().parent
 ROOT: Final = HERE.parents[1]
 sys.path.insert(0, str(ROOT))
 from tests.mutants.blocks import AREAS, PACKAGES, area_of, blocks_of, is_compiled  # noqa: E402
+from tests.mutants.uses import Uses, module_of  # noqa: E402
 
 MAP: Final = HERE / "blocks.json"
 UNCOMPILED_MAP: Final = HERE / "uncompiled.json"
 EQUIVALENT: Final = HERE / "equivalent.toml"
 BUDGET_S: Final = 60.0
-"""The most processor time of the tests for one bug; at least `LEAST` of them."""
+"""The most processor time of the tests for one bug, but for kept flights; at least `LEAST` of them."""
 LEAST: Final = 8
-LIMIT_S: Final = 300.0
+_SLOW: Final = 30.0, 8.0
+"""A test may take this time, and so many times what it took when the map was made; all tests of one bug the same."""
+KEPT: Final = "tests/integration/test_kept_flights.py"
+"""What notices any change of what a swarm does: tried when nothing nearer has noticed."""
 USAGE: Final = 4
 """The exit code of pytest for a test that is not there."""
+BY_FLIGHT: Final = "caught by a kept flight"
 _CRASHES: Final = (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT)
 """The signals that a process gets for what it has done itself."""
 OF_COMPILED: Final = ("tests/unit/emulator", "tests/integration/test_medium_fuzz.py")
@@ -66,6 +75,8 @@ class Bug(NamedTuple):
     new: str
     inside: str = ""
     """The line in which it stands."""
+    constant: str = ""
+    """Its name, for a constant."""
 
     def __str__(self) -> str:
         return f"{self.path}:{self.line}: {' '.join(self.old.split())[:60]}  ->  {' '.join(self.new.split())[:60]}"
@@ -113,7 +124,7 @@ class Source:
                     yield from self._of_statement(block, statement)
         for node in tree.body:
             if isinstance(node, ast.AnnAssign) and node.value is not None:  # others name types
-                yield from self._of_expression("", node.value)
+                yield from (bug._replace(constant=self.of(node.target)) for bug in self._of_expression("", node.value))
 
     def _of_statement(self, block: str, statement: ast.stmt) -> Iterator[Bug]:
         match statement:
@@ -198,7 +209,8 @@ def all_bugs(areas: Sequence[str]) -> list[Bug]:
 class Coverage:
     """Which tests run which blocks, as `blocks.py` has noted it."""
 
-    def __init__(self, known: Any) -> None:
+    def __init__(self, known: Any, uses: Uses) -> None:
+        self._uses = uses
         self._took_s: dict[str, float] = {name: took_s for name, (took_s, _) in known["tests"].items()}
         self._tests: dict[str, list[str]] = {name: [] for name in known["blocks"]}
         for test, (_, blocks) in known["tests"].items():
@@ -206,27 +218,39 @@ class Coverage:
                 self._tests[known["blocks"][block]].append(test)
 
     def tests_of(self, bug: Bug, budget_s: float) -> list[str]:
-        """The tests that run a block, the shortest first, within a budget of processor time; for a constant those that
-        run anything of its file, or else of its folder.
+        """The tests that run a block, or what uses a constant: those whose file imports the bug's module first, then
+        the shortest, within a budget of processor time; at last the kept flights.
         """
-        keys = [f"{bug.path}:{bug.block}"]
+        running = self._running(bug)
+        flights = {test for test in running if test.startswith(KEPT)}
+        near = self._within(budget_s, running - flights, bug.path)
+        return near + sorted(flights, key=self._took_s.__getitem__)
+
+    def _running(self, bug: Bug) -> set[str]:
+        keys, tests = {f"{bug.path}:{bug.block}"}, set[str]()
         if not bug.block:
-            near = (bug.path, bug.path.rpartition("/")[0])
-            keys = next(
-                (found for place in near if (found := [key for key in self._tests if key.startswith(place)])), []
-            )
-        tests = {test for key in keys for test in self._tests.get(key, ())}
-        chosen, spent_s = [], 0.0
-        for name in sorted(filter(_is_there, tests), key=lambda test: (self._took_s[test], test)):
+            keys = self._uses.blocks(bug.path, bug.constant)
+            tests = {test for test in self._took_s if f"{_function_of(test)}.1.0" in keys}  # those that say it
+            if not tests and not keys & self._tests.keys():  # used where no blocks are noted
+                paths = {key.partition(":")[0] for key in keys}
+                tests = {
+                    test for test in self._took_s if _is_there(test) and any(_is_near(test, path) for path in paths)
+                }
+        return {test for test in tests.union(*(self._tests.get(key, ()) for key in keys)) if _is_there(test)}
+
+    def _within(self, budget_s: float, tests: set[str], path: str) -> list[str]:
+        chosen, spent_s = list[str](), 0.0
+        for name in sorted(tests, key=lambda test: (not _is_near(test, path), self._took_s[test], test)):
             spent_s += self._took_s[name]
             if spent_s > budget_s and len(chosen) >= LEAST:
                 break
             chosen.append(name)
         return chosen
 
-    def longest_s(self, tests: Sequence[str]) -> float:
-        """After this time a test has not only been slow, but hangs."""
-        return 30.0 + 8.0 * max(map(self._took_s.__getitem__, tests))
+    def limits_s(self, tests: Sequence[str]) -> tuple[float, float]:
+        """After this time one of some tests, or all of them, have not only been slow, but hang."""
+        took_s = [self._took_s[test] for test in tests]
+        return _SLOW[0] + _SLOW[1] * max(took_s), _SLOW[0] + _SLOW[1] * sum(took_s)
 
 
 class Judge:
@@ -244,20 +268,18 @@ class Judge:
         tests = coverage.tests_of(bug, self._budget_s)
         if not tests:
             return "never run", 0.0
-        return self._verdict(bug, tests, began_s, longest_s=coverage.longest_s(tests), uncompiled=uncompiled)
+        verdict = self._verdict(bug, tests, limits_s=coverage.limits_s(tests), uncompiled=uncompiled)
+        return verdict, time.monotonic() - began_s
 
-    def _verdict(
-        self, bug: Bug, tests: Sequence[str], began_s: float, *, longest_s: float, uncompiled: bool
-    ) -> tuple[str, float]:
-        module = bug.path.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
-        change = json.dumps({"module": module, "begin": bug.begin, "end": bug.end, "new": bug.new})
+    def _verdict(self, bug: Bug, tests: Sequence[str], *, limits_s: tuple[float, float], uncompiled: bool) -> str:
+        change = json.dumps({"module": module_of(bug.path), "begin": bug.begin, "end": bug.end, "new": bug.new})
         environment = {**os.environ, "FANET_MUTANT": change, "PYTHONPATH": str(HERE / "hook")}
         environment["PYTHONDONTWRITEBYTECODE"] = "1"
         if uncompiled:
             environment["FANET_NO_NUMBA"] = "1"
         command = [sys.executable, "-m", "pytest", "-x", "-q", "-m", "not slow", "-p", "no:cacheprovider"]
         # an exception in a loop without end would only end the test if nothing catches it
-        command += [f"--timeout={longest_s:.0f}", "--timeout-method=thread"]
+        command += [f"--timeout={limits_s[0]:.0f}", "--timeout-method=thread"]
         # pytest would load what it rewrites itself
         command += ["--hypothesis-profile=mutants", "--assert=plain", *tests]
         child = subprocess.Popen(
@@ -265,18 +287,19 @@ class Judge:
             start_new_session=True, text=True,
         )  # fmt: skip
         try:
-            said, _ = child.communicate(timeout=LIMIT_S)
+            said, _ = child.communicate(timeout=limits_s[1])
         except subprocess.TimeoutExpired:
             os.killpg(child.pid, signal.SIGKILL)
             child.communicate()
-            return "caught", time.monotonic() - began_s
-        took_s = time.monotonic() - began_s
+            return "caught"
         if child.returncode == 0:
-            return "survived", took_s
+            return "survived"
         if child.returncode == USAGE and any("[" in test for test in tests):  # parameters have changed since
             whole = sorted({test.partition("[")[0] for test in tests})
-            return self._verdict(bug, whole, began_s, longest_s=longest_s, uncompiled=uncompiled)
-        return ("caught" if is_noticed(child.returncode, said) else f"not judged: {said[-300:]}"), took_s
+            return self._verdict(bug, whole, limits_s=limits_s, uncompiled=uncompiled)
+        if not is_noticed(child.returncode, said):
+            return f"not judged: {said[-300:]}"
+        return BY_FLIGHT if f"FAILED {KEPT}" in said else "caught"
 
 
 def is_noticed(returncode: int, said: str) -> bool:
@@ -288,12 +311,32 @@ def is_noticed(returncode: int, said: str) -> bool:
     )
 
 
+def _function_of(test: str) -> str:
+    """The function of a test as `uses.py` names it."""
+    file, _, name = test.partition("::")
+    return f"{file}:{name.rpartition('::')[2].partition('[')[0]}"
+
+
+def all_uses() -> Uses:
+    """The uses of what the product's modules and the tests define."""
+    files = (file for folder in (*PACKAGES, "tests") for file in sorted((ROOT / folder).rglob("*.py")))
+    return Uses({file.relative_to(ROOT).as_posix(): file.read_text(encoding="utf-8") for file in files})
+
+
+@cache
+def _is_near(test: str, path: str) -> bool:
+    """True if the file of a test imports the module at a path."""
+    package, _, name = module_of(path).rpartition(".")
+    said = (ROOT / test.partition("::")[0]).read_text(encoding="utf-8")
+    return f"{package}.{name} import" in said or re.search(rf"from {package} import .*\b{name}\b", said) is not None
+
+
 @cache
 def _is_there(test: str) -> bool:
     """False for a test that has gone since the map was made."""
-    file, _, name = test.partition("::")
+    file, _, name = _function_of(test).partition(":")
     path = ROOT / file
-    return path.exists() and f"def {name.rpartition('::')[2].partition('[')[0]}(" in path.read_text(encoding="utf-8")
+    return path.exists() and f"def {name}(" in path.read_text(encoding="utf-8")
 
 
 def interval(caught: int, of: int) -> tuple[float, float]:
@@ -306,7 +349,7 @@ def interval(caught: int, of: int) -> tuple[float, float]:
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
-def coverage(file: Path, tests: Sequence[str], *, uncompiled: bool, again: bool) -> Coverage:
+def coverage(file: Path, tests: Sequence[str], uses: Uses, *, uncompiled: bool, again: bool) -> Coverage:
     """What was noted; if there is nothing, or it is asked for `again`, after a run of tests."""
     if again or not file.exists():
         file.unlink(missing_ok=True)
@@ -315,7 +358,7 @@ def coverage(file: Path, tests: Sequence[str], *, uncompiled: bool, again: bool)
              "not slow and not realtime", "-p", "no:cacheprovider", *tests],
             cwd=ROOT, check=False, env={**os.environ, "FANET_NO_NUMBA": "1" if uncompiled else ""},
         )  # fmt: skip
-    return Coverage(json.loads(file.read_text()))
+    return Coverage(json.loads(file.read_text()), uses)
 
 
 def run(count: int, seed: int, areas: Sequence[str], *, jobs: int, budget_s: float, again: bool) -> int:
@@ -324,13 +367,14 @@ def run(count: int, seed: int, areas: Sequence[str], *, jobs: int, budget_s: flo
     equivalent = {entry["bug"]: entry["why"] for entry in reasons.get("bug", ())}
     candidates = all_bugs(areas)
     drawn = random.Random(f"bugs/{seed}").sample(candidates, min(count, len(candidates)))
+    uses = all_uses()
     judge = Judge(
-        coverage(MAP, ["tests"], uncompiled=False, again=again),
-        coverage(UNCOMPILED_MAP, OF_COMPILED, uncompiled=True, again=again),
+        coverage(MAP, ["tests"], uses, uncompiled=False, again=again),
+        coverage(UNCOMPILED_MAP, OF_COMPILED, uses, uncompiled=True, again=again),
         budget_s=budget_s,
     )
     tally: dict[str, list[int]] = {area: [0, 0] for area in areas}
-    survivors, skipped = [], 0
+    survivors, skipped, by_flight = [], 0, 0
     with ThreadPoolExecutor(jobs) as pool:
         judged = pool.map(lambda bug: ("equivalent", 0.0) if bug.key in equivalent else judge.verdict(bug), drawn)
         for bug, (verdict, took_s) in zip(drawn, judged, strict=True):
@@ -340,16 +384,17 @@ def run(count: int, seed: int, areas: Sequence[str], *, jobs: int, budget_s: flo
                 continue
             area = area_of(bug.path)
             assert area is not None, "bugs are drawn in areas only"
-            tally[area][0] += verdict == "caught"
+            caught = verdict in ("caught", BY_FLIGHT)
+            tally[area][0] += caught
             tally[area][1] += 1
-            if verdict != "caught":
+            by_flight += verdict == BY_FLIGHT
+            if not caught:
                 survivors.append(bug)
-    for area, (caught, of) in [*tally.items(), ("all", [sum(part) for part in zip(*tally.values(), strict=True)])]:
-        low, high = interval(caught, of)
-        print(
-            f"{area:10} {caught:4} of {of:4} caught" + (f": {caught / of:.0%} ({low:.0%} to {high:.0%})" if of else "")
-        )
-    print(f"{len(candidates)} bugs can be drawn, {skipped} drawn ones are equivalent; survivors:")
+    for area, (found, of) in [*tally.items(), ("all", [sum(part) for part in zip(*tally.values(), strict=True)])]:
+        low, high = interval(found, of)
+        print(f"{area:10} {found:4} of {of:4} caught" + (f": {found / of:.0%} ({low:.0%} to {high:.0%})" if of else ""))
+    print(f"{by_flight} by kept flights only; {len(candidates)} bugs can be drawn, {skipped} drawn ones are equivalent")
+    print("survivors:")
     for bug in survivors:
         print(f"  {bug.key}")
     return 0

@@ -4,13 +4,9 @@ import json
 
 import pytest
 from kept_flights import FILE, FLIGHTS, parts
-from kit import slow
-
-LONG = ("crossing", "spiral", "sectors", "circuit", "town", "convoy")
-"""Flown by `scripts/test --all`; one of these takes as long as all protocols."""
 
 
-@pytest.mark.parametrize("name", [*(name for name in FLIGHTS if name not in LONG), *slow(*LONG)])
+@pytest.mark.parametrize("name", FLIGHTS)
 def test_a_flight_comes_to_what_it_came_to_before(name: str) -> None:
     kept, found = json.loads(FILE.read_text())[name], dict(parts(name))
     changed = {part: (kept.get(part), found.get(part)) for part in {*kept, *found} if kept.get(part) != found.get(part)}

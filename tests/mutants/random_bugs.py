@@ -8,7 +8,7 @@ and so is what takes longer than half a minute and eight times as long as withou
 
 Which tests run which block is measured once (`blocks.py`) and kept in `tests/mutants/blocks.json` until it is asked
 for anew; where numba compiles, in `uncompiled.json`: bugs are planted there in the uncompiled code, and tried by the
-tests of the emulator.
+tests of the emulator and the kept flights.
 What changes nothing that anybody could observe is named in `equivalent.toml`, each with its reason.
 """
 
@@ -51,7 +51,7 @@ USAGE: Final = 4
 BY_FLIGHT: Final = "caught by a kept flight"
 _CRASHES: Final = (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT)
 """The signals that a process gets for what it has done itself."""
-OF_COMPILED: Final = ("tests/unit/emulator", "tests/integration/test_medium_fuzz.py")
+OF_COMPILED: Final = ("tests/unit/emulator", "tests/integration/test_medium_fuzz.py", KEPT)
 _COMPARED: Final = {ast.Lt: "<=", ast.LtE: "<", ast.Gt: ">=", ast.GtE: ">", ast.Eq: "!=", ast.NotEq: "==",
                     ast.Is: "is not", ast.IsNot: "is", ast.In: "not in", ast.NotIn: "in"}  # fmt: skip
 _COMPUTED: Final = {ast.Add: "-", ast.Sub: "+", ast.Mult: "/", ast.Div: "*", ast.FloorDiv: "*", ast.Mod: "*",

@@ -48,7 +48,7 @@ def way_s(made: Scenario, pattern: Pattern) -> float:
     """The time of the take-off and of the longest way to a place."""
     starts = [Enu(*at) for at in positions(made)][: pattern.places]
     goals = [pattern.at(place, 0.0) for place in range(pattern.places)]
-    ways = [[start.minus(goal).horizontal() for goal in goals] for start in starts]
+    ways = [[start.horizontal_to(goal) for goal in goals] for start in starts]
     chosen = assign([[way * way for way in row] for row in ways])
     longest_m = max(ways[row][column] for row, column in enumerate(chosen))
     climb_s = take_off_ns(made.nodes.altitude_m) / S if made.nodes.on_ground else 0.0

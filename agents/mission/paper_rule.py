@@ -86,7 +86,7 @@ class PaperRule:
         if self._target is None:
             return
         if self._dwell_until_ns is None:
-            if position.minus(self._target_at).horizontal() <= self._config.arrival_m + _RING_M:
+            if position.horizontal_to(self._target_at) <= self._config.arrival_m + _RING_M:
                 self._dwell_until_ns = now_ns + round(self._config.dwell_s * S)
                 self._outbox.records.append(Arrived(now_ns, self._node, self._target))
         elif now_ns >= self._dwell_until_ns:
@@ -107,7 +107,7 @@ class PaperRule:
         ]
         if not candidates:
             return
-        self._target_at, self._target = min(candidates, key=lambda c: (c[0].minus(position).horizontal(), c[1]))
+        self._target_at, self._target = min(candidates, key=lambda c: (c[0].horizontal_to(position), c[1]))
         reporters = len(self._readings[self._target])
         self._outbox.records.append(
             Approaching(now_ns, self._node, self._target, reporters, *_rounded(self._target_at))

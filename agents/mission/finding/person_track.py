@@ -76,7 +76,7 @@ class PersonTrack:
         self.sightings += 1
         self.last_ns = now_ns
         self.evidence = min(_MOST_EVIDENCE, self.evidence + evidence)
-        self.base_m = max(self.base_m, here.minus(self.seen_from).horizontal())
+        self.base_m = max(self.base_m, here.horizontal_to(self.seen_from))
 
     def raise_by(self, up_m: float) -> None:
         """The UAV has been so much higher than was taken at the sightings so far."""

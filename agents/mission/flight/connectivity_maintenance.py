@@ -163,7 +163,7 @@ class ConnectivityMaintenance:
         for other in pattern.tethers(place, swept_s):
             if self._neighbors.motion(plan.nodes[other], now_ns=now_ns) is None:
                 at, velocity = self._formation.known_at(other, swept_s)
-                left_m = self._own_motion.position.minus(at).horizontal()
+                left_m = self._own_motion.position.horizontal_to(at)
                 unheard.append((left_m, plan.nodes[other], Motion(at, velocity, now_ns)))
         return unheard
 
@@ -183,7 +183,7 @@ class ConnectivityMaintenance:
             for other, way in ways.items():
                 left_m = (heard[other] or way).offset_from(at, now_ns).horizontal()
                 is_there = heard[other] is not None or left_m > _UNSURE * self._reach_m
-                if is_there and ends[other].minus(end).horizontal() <= LASTING * self._reach_m:
+                if is_there and ends[other].horizontal_to(end) <= LASTING * self._reach_m:
                     found.append((left_m, other))
             return min(found)
 
@@ -209,11 +209,11 @@ class ConnectivityMaintenance:
             node: (motion.position_at(now_ns), pattern.at(place_of[node], swept_s)) for node, motion in present.items()
         }
         links_m = {node: _longest_m(here, there) for node, there in ends.items()}
-        lasting = [node for node, at in ends.items() if at[1].minus(here[1]).horizontal() <= LASTING * self._reach_m]
+        lasting = [node for node, at in ends.items() if at[1].horizontal_to(here[1]) <= LASTING * self._reach_m]
 
         def is_spared(node: NodeId) -> bool:
             most_m = min(links_m[node], _STRONG * self._reach_m)
-            return any(max(links_m[third], _longest_m(ends[third], ends[node])) < most_m for third in lasting)
+            return any(links_m[third] < most_m and _longest_m(ends[third], ends[node]) < most_m for third in lasting)
 
         return {node: present[node] for node in lasting if not is_spared(node)}
 
@@ -248,7 +248,7 @@ class ConnectivityMaintenance:
 
 def _longest_m(a: tuple[Enu, Enu], b: tuple[Enu, Enu]) -> float:
     """The distance of two UAVs, each given by its position and its place, or of their places if that is greater."""
-    return max(one.minus(other).horizontal() for one, other in zip(a, b, strict=True))
+    return max(a[0].horizontal_to(b[0]), a[1].horizontal_to(b[1]))
 
 
 def tether_plane(

@@ -74,7 +74,7 @@ class Endurance:
         """The time to the ground at home; each second of it counts as one that takes as much as those before it."""
         lately = statistics.fmean(reading.effort for reading in self._readings)
         speed_m_s, airspeed_m_s = self._homeward(here)
-        way_s = here.minus(self._home).horizontal() / speed_m_s * max(1.0, self._effort(airspeed_m_s) / lately)
+        way_s = here.horizontal_to(self._home) / speed_m_s * max(1.0, self._effort(airspeed_m_s) / lately)
         over_s = max(0.0, here.up) / _SINK_M_S + self.wait_s
         return _DETOUR * (way_s + over_s * max(1.0, self._effort(self._wind.horizontal()) / lately))
 

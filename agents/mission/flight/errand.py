@@ -43,7 +43,7 @@ class Errand:
             return None
         middle = Enu(order.east_m, order.north_m, self._height_m)
         here = self._own_motion.position
-        if self._there_ns is None and middle.minus(here).horizontal() <= _THERE_M:
+        if self._there_ns is None and middle.horizontal_to(here) <= _THERE_M:
             self._there_ns = now_ns
         if order.kind is OrderKind.STAY or self._there_ns is None:
             return middle

@@ -149,7 +149,7 @@ class ReturnHome:
     def _waits(self, now_ns: int) -> bool:
         """True while it is the turn of another UAV whose pad is beside that of this one."""
         here = self._own_motion.position
-        has_turn = here.minus(self._home).horizontal() <= _OVER_M
+        has_turn = here.horizontal_to(self._home) <= _OVER_M
         for node in sorted(self._beside):
             motion = self._neighbors.motion(node, now_ns=now_ns)
             other = None if motion is None else motion.position_at(now_ns)
@@ -157,7 +157,7 @@ class ReturnHome:
                 continue
             if other.up < here.up - _SUNK_M and motion.velocity.up <= -_SINKS_M_S:
                 continue
-            away_m = other.minus(self._home).horizontal()
+            away_m = other.horizontal_to(self._home)
             is_over, waits = away_m <= _OVER_M + CLEARANCE_M, away_m <= 2 * _HOLD_M
             if (is_over and (node < self._node or not has_turn)) or (waits and node < self._node and not has_turn):
                 return True
@@ -166,7 +166,7 @@ class ReturnHome:
     def land_if_there(self, now_ns: int) -> bool:
         """Command the landing at the base in this UAV's turn; again with each call, as a setpoint may get lost."""
         here = self._own_motion.position
-        nearly = here.minus(self._home).horizontal() <= _HOME_M
+        nearly = here.horizontal_to(self._home) <= _HOME_M
         if nearly and self._own_motion.velocity.horizontal() <= _STANDS_M_S and not self._waits(now_ns):
             self.lands = True
         if self.lands:

@@ -37,7 +37,7 @@ def turns_ns(pads: Mapping[int, Enu]) -> int:
     """How much longer take-offs last if UAVs stand so near to each other that they take off in turns."""
     turns: dict[int, int] = {}
     for node, pad in sorted(pads.items()):
-        before = [turn for other, turn in turns.items() if pads[other].minus(pad).horizontal() < CLEARANCE_M]
+        before = [turn for other, turn in turns.items() if pads[other].horizontal_to(pad) < CLEARANCE_M]
         turns[node] = 1 + max(before, default=-1)
     return min(_PATIENCE_NS - _LISTEN_NS, max(turns.values(), default=0) * _TURN_NS)
 

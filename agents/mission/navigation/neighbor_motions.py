@@ -35,9 +35,13 @@ class NeighborMotions:
     def __init__(self, *, hello_interval_s: float = 1.0) -> None:
         self._lifetime_ns = max(_LEAST_LIFETIME_NS, neighbor_lifetime_ns(hello_interval_s))
         self._motions: dict[int, Motion] = {}
+        """The latest motion of each neighbor, by id in order."""
 
     def on_hello(self, node: int, motion: Motion) -> None:
+        is_new = node not in self._motions
         self._motions[node] = motion
+        if is_new:
+            self._motions = dict(sorted(self._motions.items()))
 
     def motion(self, node: int, *, now_ns: int) -> Motion | None:
         """The last known motion of a neighbor; None if its last hello is too old."""
@@ -61,8 +65,8 @@ class NeighborMotions:
         return [motion for _, motion in self.by_node(now_ns=now_ns)]
 
     def by_node(self, *, now_ns: int) -> list[tuple[int, Motion]]:
-        """The neighbors that were received recently, each with its motion."""
-        return [item for item in sorted(self._motions.items()) if now_ns - item[1].at_ns <= self._lifetime_ns]
+        """The neighbors that were received recently, each with its motion, by id."""
+        return [item for item in self._motions.items() if now_ns - item[1].at_ns <= self._lifetime_ns]
 
 
 class RadarWatch:

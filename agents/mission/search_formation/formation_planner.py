@@ -234,7 +234,7 @@ class FormationPlanner:
         begins_around = pattern.dimensions != from_middle
         among_s = swarm_at(starts, reach_m=pattern.reach_m).apart_m / _AMONG_M_S if begins_around else 0.0
         farthest_m = max(
-            pattern.at(place, 0.0).minus(start).horizontal() for place, start in zip(chosen, starts, strict=True)
+            pattern.at(place, 0.0).horizontal_to(start) for place, start in zip(chosen, starts, strict=True)
         )
         holders = [0] * pattern.places
         for node, place in zip(nodes, chosen, strict=True):

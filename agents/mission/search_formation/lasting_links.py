@@ -42,7 +42,7 @@ def keep_together(
     are those of the least sum. `dearer_m2`: what it costs that a UAV flies to a goal, beside the square of its way
     there [m2].
     """
-    ways = [[start.minus(goal).horizontal() for goal in goals] for start in starts]
+    ways = [[start.horizontal_to(goal) for goal in goals] for start in starts]
     dearer = [[dearer_m2(uav, goal) for goal in range(len(goals))] for uav in range(len(starts))]
     costs = [[way * way + dearer[uav][goal] for goal, way in enumerate(row)] for uav, row in enumerate(ways)]
     least = assign(costs)
@@ -139,6 +139,6 @@ def _parts(masks: Sequence[int]) -> int:
 
 def _near(points: Sequence[Enu], reach_m: float) -> list[list[int]]:
     return [
-        [b for b, other in enumerate(points) if b != a and point.minus(other).horizontal() <= reach_m]
+        [b for b, other in enumerate(points) if b != a and point.horizontal_to(other) <= reach_m]
         for a, point in enumerate(points)
     ]

@@ -72,7 +72,7 @@ class Pattern:
                 return False
             shared = row.shared(vacant)
             flown = [whole.at(shared.get(place, place), end_s) for place in row.places if place not in vacant]
-            if not flown or any(a.minus(b).horizontal() > self._hop_m for a, b in pairwise(flown)):
+            if not flown or any(a.horizontal_to(b) > self._hop_m for a, b in pairwise(flown)):
                 return False
         return True
 

@@ -74,7 +74,9 @@ class RollCall:
             if node == self._node:
                 self._on_called(place, lost=place in roll.lost, now_ns=now_ns)
             elif node and roll.ages[place] < LONG_AGO:
-                self._take(node, roll.at - roll.ages[place], lost=place in roll.lost, now_ns=now_ns)
+                known, heard, lost = self._heard.get(node), roll.at - roll.ages[place], place in roll.lost
+                if known is None or heard > known or lost:  # mostly nothing is new
+                    self._take(node, heard, lost=lost, now_ns=now_ns)
         if flooded and roll.lost == self._lost_places(plan):
             self.has_news = False
 
@@ -106,6 +108,7 @@ class RollCall:
         self.has_news |= falls and not self._falls
         self._falls = falls
         heard, neighbor_ns, begun = self._heard, self._neighbor_ns, since_ns // ROLL_NS
+        least_ns = min(self._silent_ns, _AWAY_NS)
         for node in plan.nodes:
             if node in (0, self._node) or node in self.lost:
                 continue
@@ -114,9 +117,11 @@ class RollCall:
                 continue  # it was heard since the last roll
             near, gone = now_ns - neighbor_ns.get(node, -_NEIGHBOR_NS) < _NEIGHBOR_NS, False
             if near and self._silent is not None:
-                near = self._silent.might_be_heard(NodeId(node), now_ns=now_ns)
                 by_others = heard.get(node, 0) > neighbor_ns[node] // ROLL_NS + 1
-                gone = near and not by_others and self._silent.has(NodeId(node), now_ns=now_ns)
+                gone = not by_others and self._silent.has(NodeId(node), now_ns=now_ns)
+                if not gone and silent_ns <= least_ns:
+                    continue
+                near = gone or self._silent.might_be_heard(NodeId(node), now_ns=now_ns)
             if gone or silent_ns > (self._silent_ns if near else _AWAY_NS):
                 self.lost[node] = now_ns
                 self.has_news |= near

@@ -41,7 +41,7 @@ class Absence:
         if begins_ns is None or now_ns >= begins_ns or (self.is_permitted and self._formation.is_free(now_ns)):
             return 0.0
         first, _ = self._formation.lane(begins_ns)
-        return max(0.0, first.minus(at).horizontal() / self._speed_m_s + after_s - (begins_ns - now_ns) / S)
+        return max(0.0, first.horizontal_to(at) / self._speed_m_s + after_s - (begins_ns - now_ns) / S)
 
     def permits(self, place: Estimate, now_ns: int, *, after_s: float = 0.0) -> bool:
         """True if a UAV that leaves a survivor's place after some time is within reach of its team soon enough."""

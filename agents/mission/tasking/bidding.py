@@ -187,7 +187,7 @@ class Bidding:
         """True while this UAV may be at a survivor's place without leaving the formation."""
         formation, here = self._formation, self._own_motion.position
         if not formation.is_taken_up(now_ns):
-            near = formation.lane(now_ns)[0].minus(here).horizontal() <= _ASTRAY_M
+            near = formation.lane(now_ns)[0].horizontal_to(here) <= _ASTRAY_M
             return near or self._is_in_time(here, now_ns)
         if formation.is_free(now_ns):
             return formation.holds_together(place, now_ns, within_s=-5.0)

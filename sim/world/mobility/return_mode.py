@@ -36,7 +36,7 @@ class Homeward(NamedTuple):
 
     def goal(self, here: Enu) -> Enu | None:
         """The place to fly to now; None if it is time to land."""
-        if here.minus(self.home).horizontal() <= _HOME_M:
+        if here.horizontal_to(self.home) <= _HOME_M:
             return None
         return here._replace(up=self.home.up) if here.up < self.home.up - _BELOW_M else self.home
 

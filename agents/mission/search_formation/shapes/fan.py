@@ -108,7 +108,7 @@ class Fan(Shape):
         def is_spanned(most_m: float) -> bool:
             fan = Fan(self._formation, most_m=most_m)
             front = [fan.at(place, self.sweep_s) for place in flown]
-            return all(a.minus(b).horizontal() <= hop_m for a, b in pairwise(front))
+            return all(a.horizontal_to(b) <= hop_m for a, b in pairwise(front))
 
         least, most = 0.0, self._spread.last_m
         if is_spanned(most):

@@ -260,7 +260,7 @@ class Lines(Shape):
         to_middle = range(self._formation.lanes // 2 + 1)
         instants = (step * self.sweep_s / _CHECKS for step in range(_CHECKS + 1))
         rows = ([self.at(lane, swept_s) for lane in to_middle] for swept_s in instants)
-        return all(a.minus(b).horizontal() <= hop_m for row in rows for a, b in itertools.pairwise(row))
+        return all(a.horizontal_to(b) <= hop_m for row in rows for a, b in itertools.pairwise(row))
 
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
         """The distance of a point from a line to the north or south; a line is taken to be as wide as the area."""

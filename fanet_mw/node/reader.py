@@ -7,7 +7,7 @@ several runs and threads may share them.
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import Any, Final, TypeVar
+from typing import Final, Protocol, TypeVar
 
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.node.duplicates import PHASES, hash_of, key_of
@@ -40,6 +40,8 @@ BUNDLE: Final = 1 << 30
 """Stands for the phase of a frame with several packets; in no duplicate set, so each such frame is opened."""
 _LATEST: Final = 64
 """The number of packets whose decoded content is cached: more than the hellos that a radio hands over at once."""
+_MESSAGES: Final = 4
+"""The messages in a packet, about, which different parts of a node decode."""
 _UNKNOWN: Final = (-1, b"", 0)
 """Length, inner frames and hash of a packet that was not looked at lately; no frame has this length."""
 _LONG: Final = 400
@@ -134,31 +136,19 @@ class Reader:
 T = TypeVar("T")
 
 
-class _Inside:
-    """The parts of one packet that have been decoded so far. They are immutable, so all readers may share them."""
-
-    def __init__(self) -> None:
-        self.content: Content | None = None
-        self.messages: dict[Callable[[Content], Any], Any] = {}
-        """The result of each decoder for the content, by decoder."""
+class _Decode(Protocol):
+    def __call__(self, frame: bytes, decode: Callable[[Content], T], /) -> T:
+        """The result of `decode` for the packet in a frame; whatever `decode` raises is raised at every call."""
 
 
 class Decoded:
-    """A cache of the latest packets: each is opened and decoded once for all parts of all nodes of a run."""
+    """A cache of the latest packets: each is opened and decoded once for all parts of all nodes of a run. What has been
+    decoded is immutable, so all may share it.
+    """
 
     def __init__(self) -> None:
-        self._inside_of = lru_cache(maxsize=_LATEST)(lambda _: _Inside())
-        """The decoded parts of a packet, by the packet's bytes; the oldest packet is forgotten first."""
-
-    def of(self, frame: bytes, decode: Callable[[Content], T]) -> T:
-        """The result of `decode` for the packet in a frame; whatever `decode` raises is raised at every call."""
-        inside = self._inside_of(frame)
-        if decode in inside.messages:
-            return inside.messages[decode]  # type: ignore[no-any-return]
-        if inside.content is None:
-            inside.content = Content.of(frame)
-        found = inside.messages[decode] = decode(inside.content)
-        return found
+        content_of = lru_cache(maxsize=_LATEST)(Content.of)
+        self.of: _Decode = lru_cache(maxsize=_MESSAGES * _LATEST)(lambda frame, decode: decode(content_of(frame)))
 
 
 decoded: Final = Decoded().of

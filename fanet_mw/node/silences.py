@@ -26,10 +26,12 @@ class Silences:
     def on_frame(self, src: int, now_ns: int) -> None:
         heard_ns = self._heard_ns
         if src < len(heard_ns):
-            silence_ns = min(now_ns - heard_ns[src], _MOST_NS) if heard_ns[src] else _MOST_NS
+            silence_ns = now_ns - heard_ns[src] if heard_ns[src] else _MOST_NS
+            if silence_ns > _MOST_NS:
+                silence_ns = _MOST_NS
             longest_ns = self._longest_ns[src] * 0.5 ** (silence_ns / _HALF_NS)
             heard_ns[src] = now_ns
-            self._longest_ns[src] = max(silence_ns, longest_ns)
+            self._longest_ns[src] = silence_ns if silence_ns > longest_ns else longest_ns
 
     def is_unusual(self, node: NodeId, *, least_ns: int, now_ns: int) -> bool:
         """True if a node that was heard before has been silent for an unusually long time, `least_ns` at least."""

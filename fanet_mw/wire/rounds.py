@@ -4,6 +4,7 @@ import struct
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
+from fanet_mw.units import NodeId
 from fanet_mw.wire.checks import refuse_unless
 from fanet_mw.wire.frame import HEARD, HELD, OVERHEAD, VERSION, Packed, decode_every, encode_inner
 
@@ -25,7 +26,7 @@ _new: Final = tuple.__new__  # for what is made once per entry
 class HeardNodes(NamedTuple):
     """Whom a node hears."""
 
-    node: int
+    node: NodeId
     epoch: int
     """The number of the hello interval, modulo 256."""
     heard: int

@@ -31,6 +31,8 @@ class LastingLinks:
         self._given_up = 0
         self.held = 0
         """The neighbors that this node keeps in reach by how it flies."""
+        self.gone = 0
+        """The neighbors that were out of range when this was last asked, as they flew when they were last heard."""
 
     def hear(self, node: NodeId, motion: Motion) -> None:
         """A neighbor has told where it is."""
@@ -38,20 +40,19 @@ class LastingLinks:
 
     def among(self, near: int, own: Motion) -> int:
         """Those of a set of neighbors whose links will last, if this node flies on as it does now."""
-        lasting = near
-        for bit, motion, range_m in self._known(near & ~self.held, own):
-            if not self._lasts(motion, own, range_m, again=bool(self._given_up & bit)):
+        lasting, self.gone = near, 0
+        for bit, motion, range_m in self._known(near, own):
+            here = motion.offset_from(own.position, own.at_ns)
+            distance_m = here.norm()
+            if distance_m > range_m:
+                self.gone |= bit
+            if self.held & bit:
+                continue
+            drift = motion.velocity.minus(own.velocity)
+            if not self._lasts(here, drift, distance_m, range_m, again=bool(self._given_up & bit)):
                 lasting &= ~bit
         self._given_up = near & ~lasting
         return lasting
-
-    def gone(self, near: int, own: Motion) -> int:
-        """Those of a set of neighbors that are out of range already, as they flew when they were last heard."""
-        found = 0
-        for bit, motion, range_m in self._known(near, own):
-            if motion.offset_from(own.position, own.at_ns).norm() > range_m:
-                found |= bit
-        return found
 
     def _known(self, nodes: int, own: Motion) -> Iterator[tuple[int, Motion, float]]:
         """Nodes whose motion is known, and each link's reach; where somebody was before it was away says nothing."""
@@ -60,15 +61,10 @@ class LastingLinks:
             if nodes & bit and own.at_ns - motion.at_ns <= self._horizon_ns:
                 yield bit, motion, self._farther_m.get(node, self._range_m)
 
-    def _lasts(self, motion: Motion, own: Motion, range_m: float, *, again: bool) -> bool:
-        here = motion.offset_from(own.position, own.at_ns)
-        v, w = motion.velocity, own.velocity
-        drift = Enu(v.east - w.east, v.north - w.north, v.up - w.up)
-        distance_m = here.norm()
+    def _lasts(self, here: Enu, drift: Enu, distance_m: float, range_m: float, *, again: bool) -> bool:
         receding_m_s = (here.east * drift.east + here.north * drift.north + here.up * drift.up) / max(distance_m, 1.0)
         seconds = self._horizon_ns / S * (_AGAIN if again else 1.0)
-        later = Enu(here.east + drift.east * seconds, here.north + drift.north * seconds, here.up + drift.up * seconds)
-        return later.norm() <= range_m or (distance_m <= range_m and receding_m_s < _RECEDING_M_S)
+        return here.plus(drift, seconds).norm() <= range_m or (distance_m <= range_m and receding_m_s < _RECEDING_M_S)
 
 
 class InStep:

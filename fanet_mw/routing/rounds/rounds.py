@@ -509,8 +509,9 @@ class RoundFlooding(RoutingProtocol):
         if self._lasting is None:
             return near
         own = Motion(self._port.position, self._port.velocity, now_ns)
-        self._gone = self._lasting.gone(near, own)
-        return self._lasting.among(near, own)
+        lasting = self._lasting.among(near, own)
+        self._gone = self._lasting.gone
+        return lasting
 
     # --- hellos ---------------------------------------------------------------------------------------------------
 

@@ -106,14 +106,14 @@ class Topology:
         current = now_ns // self._epoch_ns
         stated = self._stated
         for node, short, heard, often in told:
-            known = stated.get(NodeId(node))
+            known = stated.get(node)
             if known is not None and known.epoch % _MODULUS == short:
                 continue
             behind = (current + 1 - short) % _MODULUS - 1  # one epoch ahead is possible, because clocks differ
             if node == self._node or node > self._count or behind > self._lifetime or heard >> self._count:
                 continue
             if known is None or current - behind > known.epoch:
-                self._note(NodeId(node), _Stated(current - behind, heard, often))
+                self._note(node, _Stated(current - behind, heard, often))
 
     def _note(self, node: NodeId, stated: _Stated) -> None:
         known = self._stated.get(node)

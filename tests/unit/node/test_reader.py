@@ -90,10 +90,10 @@ def test_a_packet_is_decoded_once_whatever_was_decoded_in_between() -> None:
         for frame in batch:
             made.of(frame, found.append)
     assert len(found) == len(batch)
-    for size in range(200, 300):
+    for size in range(200, 500):
         made.of(FLOODED.encode() + wire.filler(size), found.append)
     made.of(batch[0], found.append)
-    assert len(found) == len(batch) + 100 + 1, "what is old is forgotten"
+    assert len(found) == len(batch) + 300 + 1, "what is old is forgotten"
 
 
 def test_a_broken_packet_is_named_to_each_who_asks() -> None:

@@ -54,7 +54,7 @@ def test_where_somebody_was_before_it_was_away_says_nothing_when_it_is_heard_aga
     links.hear(OTHER, Motion(Enu(0.0, 240.0, 50.0), Enu(0.0, -10.0, 0.0), 0))
     assert not links.among(BIT, OWN._replace(at_ns=5 * S, position=Enu(300.0, 0.0, 50.0)))
     assert links.among(BIT, OWN._replace(at_ns=60 * S)) == BIT, "it is heard, so it is somewhere near"
-    assert not links.gone(BIT, OWN._replace(at_ns=60 * S))
+    assert not links.gone
 
 
 def test_links_with_a_post_that_has_an_antenna_of_its_own_reach_farther() -> None:
@@ -62,13 +62,13 @@ def test_links_with_a_post_that_has_an_antenna_of_its_own_reach_farther() -> Non
     for east_m, lasts in ((-1300.0, True), (-1350.0, False)):
         links.hear(OTHER, Motion(Enu(east_m, 0.0, 0.0), STILL, 0))
         assert links.among(BIT, OWN) == (BIT if lasts else 0)
-        assert not links.gone(BIT, OWN)
+        assert not links.gone
 
 
 def test_who_should_be_out_of_range_by_now_is_gone() -> None:
     links = LastingLinks(range_m=250.0, horizon_ns=6 * S)
     links.hear(OTHER, Motion(Enu(200.0, 0.0, 50.0), Enu(20.0, 0.0, 0.0), 0))
     still = OWN._replace(velocity=STILL)
-    assert not links.gone(BIT, still._replace(at_ns=2 * S))
-    assert links.gone(BIT, still._replace(at_ns=3 * S)) == BIT
-    assert not links.gone(1, still._replace(at_ns=3 * S))
+    for near, seconds, gone in ((BIT, 2, 0), (BIT, 3, BIT), (1, 3, 0)):
+        links.among(near, still._replace(at_ns=seconds * S))
+        assert links.gone == gone

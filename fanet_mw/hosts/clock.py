@@ -29,6 +29,8 @@ _START_DELAY_NS: Final = 300 * MS
 _ASK_EVERY_S: Final = 0.5
 _ASK_AGAIN_S: Final = 0.05
 """The least time between two queries to the keeper."""
+_FAR_S: Final = 1.5
+"""Two clocks that differ by this much do so not because a process or the bus stood still."""
 START_PATIENCE_S: Final = 3600.0
 """How long a service started by hand waits for the others; it notices within seconds if the router goes away."""
 
@@ -167,6 +169,18 @@ class ClockKeeper:
         return numbered
 
 
+def _require_near(passed_s: float, *, most_s: float) -> None:
+    """Raise BusError if by the clock of this machine so much has passed since swarm instant 0 as cannot be: the keeper
+    tells of it shortly ahead, and it was at most `most_s` ago (infinite: not known).
+    """
+    behind_s, ahead_s = -passed_s - _START_DELAY_NS / S, passed_s - most_s
+    for off_s, side in ((behind_s, "behind"), (ahead_s if math.isfinite(most_s) else 0.0, "ahead of")):
+        if off_s > _FAR_S:
+            raise BusError(
+                f"the clock of this machine is {off_s:.1f} s {side} that of the swarm's: set both by GPS, PTP or NTP"
+            )
+
+
 class ClockListener:
     """Follows the swarm clock, on the event loop's thread. A put on its topic, where any process can put something, is
     only a hint to ask the keeper; an attacker who answers queries in its place is kept out by an access list.
@@ -225,13 +239,19 @@ class ClockListener:
                     self._running.set_result(SwarmClock(message, self._timebase))
 
     async def running(self, *, timeout_s: float) -> SwarmClock:
-        """The clock, once it has started. Raises BusError if it does not start in time, or the router goes away."""
-        waited_s = 0.0
+        """The clock, once it has started. Raises BusError if it does not start in time, the router goes away, or the
+        clock of this machine is far from that of the keeper's.
+        """
+        waited_s, unanswered_s = 0.0, math.inf
         while waited_s < timeout_s:
+            asked_s = self._loop.time()
             self._ask_now()
             try:
-                return await asyncio.wait_for(asyncio.shield(self._running), _ASK_EVERY_S)
+                clock = await asyncio.wait_for(asyncio.shield(self._running), _ASK_EVERY_S)
             except TimeoutError:
-                waited_s += _ASK_EVERY_S
+                waited_s, unanswered_s = waited_s + _ASK_EVERY_S, asked_s
                 self._bus.check()
+            else:
+                _require_near(-clock.wait_s(0), most_s=self._loop.time() - unanswered_s)
+                return clock
         raise BusError(f"nobody started the swarm clock on {self._names.clock} within {timeout_s:g} s")

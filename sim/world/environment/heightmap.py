@@ -17,6 +17,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.foreign_file import read_regular
 from fanet_mw.geodesy import Geodetic, to_geodetic
 from fanet_mw.scenario import ascii_grid
 from fanet_mw.scenario.outlines import half_turn
@@ -33,6 +34,11 @@ _ODD_SHARE: Final = 0.1
 """Cells that are so much lower than all others, and no greater share of them, are told."""
 _THOUSANDS_M: Final = re.compile(r"[1-9],\d{3}")
 """A height with a comma that may be one of thousands; no land is higher."""
+_MOST_PRJ_BYTES: Final = 1 << 16
+_PRJ_UNIT: Final = re.compile(
+    r"""(?:^|[\[,])\s*UNITS?(?:\["([^"]*)",\s*([\d.]+)|\s+(\w+))""", re.IGNORECASE | re.MULTILINE
+)
+"""A unit in the text of a reference system, and in that of ArcInfo; the last one is that of lengths."""
 _TIFF: Final = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _TILE: Final = re.compile(r"([NS])(\d\d)([EW])(\d\d\d)", re.IGNORECASE)
 
@@ -125,7 +131,25 @@ def _read(path: Path, data: bytes, lattice: list[_Place]) -> Heightmap:
             path, data, [place.on_earth for place in lattice], most_cells=_MOST_CELLS
         )
         return _laid(metres, cells, lattice, middle_deg)
-    return _ascii(ascii_grid.parse(data), lattice)
+    grid = ascii_grid.parse(data)
+    if not grid.in_degrees:
+        _require_metres(path)
+    return _ascii(grid, lattice)
+
+
+def _require_metres(path: Path) -> None:
+    """Raises ValueError if the .prj that Esri's tools write beside an ASCII grid says that its lengths are others."""
+    beside = path.with_suffix(".prj")
+    if not beside.exists():
+        return
+    text = read_regular(beside, most_bytes=_MOST_PRJ_BYTES).decode(errors="replace")
+    units = _PRJ_UNIT.findall(text)
+    if not units or (units[-1][0] and math.isclose(float(units[-1][1]), 1.0)) or units[-1][2].upper() == "METERS":
+        return
+    name = units[-1][0] or units[-1][2]
+    raise ValueError(
+        f"{beside.name} says that its lengths are in {name}; convert it: gdalwarp -t_srs EPSG:... -tr 30 30"
+    )
 
 
 def _ascii(grid: ascii_grid.AsciiGrid, lattice: list[_Place]) -> Heightmap:

@@ -7,8 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import ClockEpoch, ClockState
 from fanet_mw.bus.topics import Topics
+from fanet_mw.errors import BusError
+from fanet_mw.hosts import clock as clock_module
 from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
 from fanet_mw.hosts.timebase import Timebase
 from fanet_mw.units import MS, S
@@ -143,3 +146,47 @@ async def test_time_never_goes_back_and_every_clock_ends_where_the_keepers_is(
     machine.let_pass(10_000)
     assert keeper.clock is not None
     assert clock.now_ns() == SwarmClock(keeper.clock, machine.keepers).now_ns()
+
+
+class Answering(Silent):
+    """A bus on which the keeper answers all queries but the first ones."""
+
+    def __init__(self, told: ClockEpoch, *, silent: int) -> None:
+        self._told, self._silent = told, silent
+
+    def subscribe(self, _expression: str, _on_sample: Callable[[str, bytes], None]) -> None: ...
+    def check(self) -> None: ...
+
+    def ask(self, key: str, on_answer: Callable[[str, bytes], None]) -> None:
+        self._silent -= 1
+        if self._silent < 0:
+            on_answer(key, codecs.encode([self._told]))
+
+
+@pytest.mark.parametrize(
+    ("off_s", "silent", "said"),
+    [
+        (0, 0, ""),
+        (0, 2, ""),
+        (0.3, 2, ""),
+        (-3600, 0, "is 3600.0 s behind"),
+        (-3600, 2, "is 3600.0 s behind"),
+        (3600, 2, r"is 3599.\d s ahead of"),
+        (3600, 0, ""),  # it may join late
+    ],
+)
+async def test_a_machine_whose_clock_is_far_from_the_keepers_is_told_and_takes_no_part(
+    monkeypatch: pytest.MonkeyPatch, off_s: float, silent: int, said: str
+) -> None:
+    monkeypatch.setattr(clock_module, "_ASK_EVERY_S", 0.01)
+    monkeypatch.setattr(clock_module, "_ASK_AGAIN_S", 0.0)
+    machine = Machine()
+    keeper = ClockKeeper(Silent(), Topics("far"), time_scale=1.0, expected=[], timebase=machine.keepers)  # type: ignore[arg-type]
+    told = await keeper.start(timeout_s=1)
+    off = Timebase(lambda: machine.other.unix_ns() + round(off_s * S), machine.other.mono_ns, 8)
+    listener = clock_module.ClockListener(Answering(told, silent=silent), Topics("far"), off)  # type: ignore[arg-type]
+    if not said:
+        await listener.running(timeout_s=1)
+        return
+    with pytest.raises(BusError, match=said):
+        await listener.running(timeout_s=1)

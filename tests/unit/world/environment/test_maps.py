@@ -161,6 +161,26 @@ def test_an_ascii_grid_that_is_wrong_is_refused_with_the_line(tmp_path: Path, da
 
 
 @pytest.mark.parametrize(
+    ("said", "unit"),
+    [
+        ('PROJCS["A",GEOGCS["B",UNIT["Degree",0.0174532925199433]],UNIT["Foot_US",0.3048006096012192]]', "Foot_US"),
+        ("Projection STATEPLANE\r\nUnits FEET\r\nDatum NAD27\r\n", "FEET"),
+        ('PROJCS["A",GEOGCS["B",UNIT["Degree",0.0174532925199433]],UNIT["Meter",1.0]]', ""),
+        ("Projection UTM\nUnits METERS\nZunits NO\n", ""),
+        ("\0\1", ""),
+    ],
+)
+def test_a_grid_in_feet_by_the_file_beside_it_is_not_taken_as_metres(tmp_path: Path, said: str, unit: str) -> None:
+    (tmp_path / "feet.asc").write_text(grid(CORNER, hill()))
+    (tmp_path / "feet.prj").write_text(said)
+    if not unit:
+        assert ground(tmp_path / "feet.asc", (0, 0)) == pytest.approx([5])
+        return
+    with pytest.raises(ConfigError, match=rf"feet\.prj says that its lengths are in {unit}; convert it"):
+        ground(tmp_path / "feet.asc", (0, 0))
+
+
+@pytest.mark.parametrize(
     ("cell_m", "area_m"),
     [(5.0, 610.0), (3.0, 610.0), (7.0, 610.0), (7.0, 2500.0), *slow((3.0, 2500.0), (5.0, 2500.0))],
 )

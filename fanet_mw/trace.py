@@ -164,6 +164,16 @@ class PlacedInside(NamedTuple):
     north_m: float
 
 
+class PlacedAmong(NamedTuple):
+    """A UAV announced that a survivor is one of several people whom it saw, in whose middle this place is."""
+
+    t_ns: int
+    node: int
+    survivor: int
+    east_m: float
+    north_m: float
+
+
 class KnownOnGround(NamedTuple):
     """The post on the ground learned of a survivor, or of a person without a phone, at this place."""
 
@@ -356,6 +366,7 @@ Record = (
     | Arrived
     | Confirmed
     | PlacedInside
+    | PlacedAmong
     | KnownOnGround
     | Ordered
     | Refuted

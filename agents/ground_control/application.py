@@ -24,7 +24,7 @@ from fanet_mw.bus.messages import Battery, Gps, SensorReading
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.mavlink import AUTOPILOT_COMPONENT, GATEWAY_COMPONENT, Geodetic, Ned, common, decode, from_ned
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Confirmed, PlacedInside, Record, Refuted, Warned
+from fanet_mw.trace import Confirmed, PlacedAmong, PlacedInside, Record, Refuted, Warned
 from fanet_mw.units import MS, Enu, NodeId, S, earliest, seconds_to_ns
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_REPORT, frames, system_id
 from fanet_mw.wire.survivors import called
@@ -249,6 +249,9 @@ class GroundControl(Application):
             case PlacedInside(survivor=survivor, east_m=east_m, north_m=north_m):
                 self._streams.finds[survivor] = Enu(east_m, north_m, 0.0)
                 text = f"{_named(survivor)} is inside a building"
+            case PlacedAmong(survivor=survivor, east_m=east_m, north_m=north_m):
+                self._streams.finds[survivor] = Enu(east_m, north_m, 0.0)
+                text = f"{_named(survivor)} is among people there"
             case Refuted(survivor=survivor):
                 self._streams.finds.pop(survivor, None)
                 text = f"{_named(survivor)} refuted"

@@ -213,6 +213,9 @@ class Searcher:
             self._bidding.reopen(survivor)
         self._plans.review(self._percent, now_ns)
         self._identify(now_ns)
+        for survivor, place in self._sightings.take_among().items():
+            self._announcing.place_among(survivor, place, now_ns)
+            self._bidding.close(survivor, now_ns=now_ns)
         for place in self._sightings.unreported(now_ns):
             self._announcing.report_person(place, now_ns)
         self._announcing.give_up_doubles(now_ns, steady_m2=self._sightings.steady_m2)
@@ -417,7 +420,7 @@ class Searcher:
             self._announcing.decided(found.survivor, now_ns)
             if is_person(found.survivor):
                 return
-            if found.standing in (Standing.CONFIRMED, Standing.INSIDE):
+            if found.standing in (Standing.CONFIRMED, Standing.INSIDE, Standing.AMONG):
                 self._bidding.close(found.survivor, now_ns=now_ns)
             else:
                 self._bidding.reopen(found.survivor)

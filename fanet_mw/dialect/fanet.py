@@ -2612,7 +2612,7 @@ class MAVLink(object):
         covariance                : Covariance of east and north, in square metres. (type:float)
         north_variance            : Variance of north, in square metres. (type:float)
         node                      : Who estimated it, confirmed it or took it back. (type:uint16_t)
-        confirmed                 : 0: an estimate. 1: seen or heard at close range; nobody needs to go there any more. 2: earlier confirmations within 12 m of there were mistaken; the survivor is searched for again. 3: inside a building there, by the powers received and because no camera shows anybody. (type:uint8_t)
+        confirmed                 : 0: an estimate. 1: seen or heard at close range; nobody needs to go there any more. 2: earlier confirmations within 12 m of there were mistaken; the survivor is searched for again. 3: inside a building there, by the powers received and because no camera shows anybody. 4: one of several people who were seen around there; powers do not tell which. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """
@@ -2631,7 +2631,7 @@ class MAVLink(object):
         covariance                : Covariance of east and north, in square metres. (type:float)
         north_variance            : Variance of north, in square metres. (type:float)
         node                      : Who estimated it, confirmed it or took it back. (type:uint16_t)
-        confirmed                 : 0: an estimate. 1: seen or heard at close range; nobody needs to go there any more. 2: earlier confirmations within 12 m of there were mistaken; the survivor is searched for again. 3: inside a building there, by the powers received and because no camera shows anybody. (type:uint8_t)
+        confirmed                 : 0: an estimate. 1: seen or heard at close range; nobody needs to go there any more. 2: earlier confirmations within 12 m of there were mistaken; the survivor is searched for again. 3: inside a building there, by the powers received and because no camera shows anybody. 4: one of several people who were seen around there; powers do not tell which. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """

@@ -68,6 +68,8 @@ class Standing(IntEnum):
     """Confirmations at this place are taken back, because later receptions contradict them."""
     INSIDE = 3
     """The survivor is most probably inside the building at this place, where no camera shows anybody."""
+    AMONG = 4
+    """The survivor is one of several people who were seen around this place; powers do not tell which."""
 
 
 class Found(NamedTuple):
@@ -101,7 +103,7 @@ class Found(NamedTuple):
     @classmethod
     def checked(cls, fields: tuple[Any, ...]) -> Self:
         *values, standing, version = fields
-        refuse_unless(version == VERSION and standing <= Standing.INSIDE, f"a find of standing {standing}")
+        refuse_unless(version == VERSION and standing <= Standing.AMONG, f"a find of standing {standing}")
         found = cls._make((*values, Standing(standing)))
         refuse_unless(
             (0 < found.survivor <= MOST_SURVIVORS or _is_of_a_node(found))

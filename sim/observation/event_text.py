@@ -12,6 +12,7 @@ from fanet_mw.trace import (
     FlightModeChanged,
     Located,
     MissionModeChanged,
+    PlacedAmong,
     PlacedInside,
     ProcessEnded,
     RadioFault,
@@ -28,6 +29,7 @@ _ABOUT_SURVIVORS: Final[Mapping[type[Any], str]] = {
     Arrived: "arrives at {}",
     Confirmed: "confirms {}",
     PlacedInside: "takes {} to be inside a building",
+    PlacedAmong: "takes {} to be one of the people there",
     Refuted: "takes back the confirmation of {}",
 }
 

@@ -11,7 +11,7 @@ from xml.etree import ElementTree as Xml
 
 from fanet_mw.geodesy import Geodetic, to_geodetic
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Confirmed, PlacedInside, Posed
+from fanet_mw.trace import Confirmed, PlacedAmong, PlacedInside, Posed
 from fanet_mw.units import Enu, S
 from fanet_mw.whole_file import replacing, writing
 from sim.records.record_kinds import records_of
@@ -83,13 +83,15 @@ def _tracks(outcome: Outcome) -> dict[int, list[Posed]]:
     return found
 
 
-def _finds(outcome: Outcome) -> list[Confirmed | PlacedInside]:
-    return list(records_of(outcome.records, Confirmed, PlacedInside))
+def _finds(outcome: Outcome) -> list[Confirmed | PlacedInside | PlacedAmong]:
+    return list(records_of(outcome.records, Confirmed, PlacedInside, PlacedAmong))
 
 
-def _said(record: Confirmed | PlacedInside) -> str:
-    inside = ", inside a building" if isinstance(record, PlacedInside) else ""
-    return f"survivor {record.survivor}{inside}"
+def _said(record: Confirmed | PlacedInside | PlacedAmong) -> str:
+    where = ""
+    if not isinstance(record, Confirmed):
+        where = ", inside a building" if isinstance(record, PlacedInside) else ", among people there"
+    return f"survivor {record.survivor}{where}"
 
 
 def _on_earth(scenario: Scenario, east_m: float, north_m: float) -> Geodetic:

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 from agents.mission.finding.known_survivors import SAME_PLACE_M
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.geodesy import Geodetic, to_geodetic
-from fanet_mw.trace import Approaching, Confirmed, Detected, PlacedInside, Refuted
+from fanet_mw.trace import Approaching, Confirmed, Detected, PlacedAmong, PlacedInside, Refuted
 from fanet_mw.units import US, Enu, S
 from fanet_mw.wire import FOUND
 from fanet_mw.wire.frame import Content, message_id
@@ -22,6 +22,9 @@ from sim.report.run_rows import number, percent
 from sim.results.mission import OverflownCells, left_by
 from sim.results.run_folder import RunFolder
 
+_INSIDE: Final = "inside a building"
+_AMONG: Final = "one of the people there"
+_STANDING: Final = {"confirmed": Standing.CONFIRMED, _INSIDE: Standing.INSIDE, _AMONG: Standing.AMONG}
 _MOST_PIECES: Final = 5
 _RAYLEIGH_95: Final = math.sqrt(-2 * math.log(0.05))
 """Of a place that errs alike in two directions, 95 of 100 are within so many standard deviations."""
@@ -66,9 +69,10 @@ def finds(run: RunRecords) -> list[Find]:
             case Approaching() if survivor not in confirmed:
                 at = (record.east_m, record.north_m)
                 words[survivor] = Find(survivor, "estimated", at, None, record.t_ns, record.node)
-            case PlacedInside():
+            case PlacedInside() | PlacedAmong() if survivor not in confirmed:
+                said = _INSIDE if isinstance(record, PlacedInside) else _AMONG
                 at = (record.east_m, record.north_m)
-                words[survivor] = Find(survivor, "inside a building", at, None, record.t_ns, record.node)
+                words[survivor] = Find(survivor, said, at, None, record.t_ns, record.node)
             case Confirmed():
                 held = confirmed.setdefault(survivor, [])
                 held.append(record)
@@ -111,8 +115,9 @@ def with_estimates(known: Sequence[Find], said: Mapping[tuple[int, Standing], Fo
     """The finds with the better place and the uncertainty that UAVs told each other."""
     better = []
     for one in known:
-        found = said.get((one.survivor, Standing.CONFIRMED if one.said == "confirmed" else Standing.ESTIMATED))
-        if found is not None and one.said == "confirmed":
+        standing = _STANDING.get(one.said, Standing.ESTIMATED)
+        found = said.get((one.survivor, standing))
+        if found is not None and standing is not Standing.ESTIMATED:
             one = one._replace(sigma_m=found.sigma_m)
         elif found is not None and one.said in ("heard", "estimated"):
             place = (found.east_m, found.north_m)

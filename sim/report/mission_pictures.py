@@ -96,7 +96,7 @@ def _draw_counts(axes: Axes, lines: Sequence[tuple[str, list[Step], str, str, st
 
 
 def waits(run: RunRecords) -> RunPicture | None:
-    """How long each survivor waited: from heard to confirmed, and until the post on the ground knew."""
+    """How long each survivor waited: from heard to found, and until the post on the ground knew."""
     heard: dict[int, int] = {}
     known: dict[int, list[int]] = {}
     held = Confirmations(run.survivors)

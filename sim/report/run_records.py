@@ -18,6 +18,7 @@ from fanet_mw.trace import (
     Generated,
     KnownOnGround,
     LetOut,
+    PlacedAmong,
     PlacedInside,
     Posed,
     Record,
@@ -30,7 +31,7 @@ from sim.world.environment.survivors import place
 
 SHOWN: Final = (
     Generated, Delivered, BoundStated, LetOut, RoleChanged, Detected, Approaching, Arrived, Confirmed, PlacedInside,
-    Refuted, KnownOnGround, Posed,
+    PlacedAmong, Refuted, KnownOnGround, Posed,
 )  # fmt: skip
 """The kinds of records that the pictures are drawn from."""
 _WINDOW_NS: Final = 10 * S
@@ -64,9 +65,9 @@ class RunRecords:
     """The last head of each node."""
     roles: dict[int, list[RoleChanged]] = field(default_factory=lambda: defaultdict(list))
     """The roles of each node, in the order of time."""
-    mission: list[Detected | Approaching | Arrived | Confirmed | PlacedInside | Refuted | KnownOnGround] = field(
-        default_factory=list
-    )
+    mission: list[
+        Detected | Approaching | Arrived | Confirmed | PlacedInside | PlacedAmong | Refuted | KnownOnGround
+    ] = field(default_factory=list)
     tracks: dict[int, list[Posed]] = field(default_factory=lambda: defaultdict(list))
     """The positions of each UAV, once a second."""
     survivors: Sequence[Enu] = ()
@@ -96,7 +97,14 @@ class RunRecords:
                     self.heads[record.node] = record.head
                     self.roles[record.node].append(record)
                 case (
-                    Detected() | Approaching() | Arrived() | Confirmed() | PlacedInside() | Refuted() | KnownOnGround()
+                    Detected()
+                    | Approaching()
+                    | Arrived()
+                    | Confirmed()
+                    | PlacedInside()
+                    | PlacedAmong()
+                    | Refuted()
+                    | KnownOnGround()
                 ):
                     self.mission.append(record)
         targets = {node: set(self.targets(node)) for node in self.scenario.node_ids}

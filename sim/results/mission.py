@@ -22,6 +22,7 @@ from fanet_mw.trace import (
     KnownOnGround,
     Located,
     MissionModeChanged,
+    PlacedAmong,
     PlacedInside,
     Posed,
     ProcessEnded,
@@ -74,6 +75,10 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
     right, mistaken = found.right(), found.mistaken()
     persons, false_persons = found.persons()
     confirmed = [*right, *mistaken]
+    found_ns = {survivor: find.t_ns for survivor, find in persons.items()}
+    for one in right:
+        found_ns[one.survivor] = min(one.t_ns, found_ns.get(one.survivor, one.t_ns))
+    waited = [survivor for survivor in found_ns if survivor in heard]
     return {
         "survivors": scenario.mission.survivors,
         "detected": len(heard),
@@ -86,16 +91,12 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
         "reopened": found.reopened,
         "time_to_confirm_s": sorted(round(one.t_ns / S, 3) for one in right),
         "inside": len({r.survivor for r in records_of(records, PlacedInside)}),
-        "inside_error_m": _median(
-            [
-                math.hypot(truth[r.survivor - 1].east - r.east_m, truth[r.survivor - 1].north - r.north_m)
-                for r in records_of(records, PlacedInside)
-                if 1 <= r.survivor <= len(truth)
-            ]
-        ),
-        "wait_s": _waits([(one.t_ns - heard[one.survivor]) / S for one in right if one.survivor in heard]),
+        "inside_error_m": _median(_errors_m(truth, records_of(records, PlacedInside))),
+        "among": len({r.survivor for r in records_of(records, PlacedAmong)}),
+        "among_error_m": _median(_errors_m(truth, records_of(records, PlacedAmong))),
+        "wait_s": _waits([max(0, found_ns[survivor] - heard[survivor]) / S for survivor in waited]),
         "located_wait_s": _waits(
-            [max(0, one.t_ns - located.get(one.survivor, one.t_ns)) / S for one in right if one.survivor in heard]
+            [max(0, found_ns[survivor] - located.get(survivor, found_ns[survivor])) / S for survivor in waited]
         ),
         "post_knows_s": _known_after(_to_ground_s(right, records)),
         "uavs_approaching": len(first),
@@ -105,6 +106,15 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
         "collisions": sum(1 for _ in records_of(records, Collided)),
         **_flown(scenario, records),
     }
+
+
+def _errors_m(truth: Sequence[Enu], said: Iterable[PlacedInside | PlacedAmong]) -> list[float]:
+    """How far from the true place each of these is; a survivor with another number exists only in a forged message."""
+    return [
+        math.hypot(truth[one.survivor - 1].east - one.east_m, truth[one.survivor - 1].north - one.north_m)
+        for one in said
+        if 1 <= one.survivor <= len(truth)
+    ]
 
 
 class Confirmations:
@@ -139,9 +149,9 @@ class Confirmations:
         """The same for those who were announced far from it."""
         return [one for one in self._first() if self.error_m(one) > MISTAKEN_M]
 
-    def persons(self) -> tuple[list[int], int]:
-        """The survivors found as persons without a phone, and the finds that are of nobody, or of somebody of whom
-        there is another one. Each find is of one survivor, the nearest pairs first.
+    def persons(self) -> tuple[dict[int, Confirmed], int]:
+        """The finds of persons without a phone, each by the survivor it is of, the nearest pairs first; and how many
+        others there are, of nobody or of somebody of whom there is another one.
         """
         finds = [held[0] for number, held in sorted(self._held.items()) if held and is_person(number)]
         near = sorted(
@@ -154,7 +164,8 @@ class Confirmations:
         for _, find, survivor in near:
             if find not in of and survivor not in of.values():
                 of[find] = survivor
-        return sorted(of.values()), len(finds) - len(of)
+        by_number = {find.survivor: find for find in finds}
+        return {survivor: by_number[find] for find, survivor in of.items()}, len(finds) - len(of)
 
     def _first(self) -> list[Confirmed]:
         return [held[0] for survivor, held in self._held.items() if held and not is_person(survivor)]

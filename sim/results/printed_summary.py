@@ -172,10 +172,12 @@ def _mission_rows(mission: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield "persons", f"{without} more found without a phone, {mission['persons_false']} finds of nobody else"
     if mission["inside"]:
         yield "inside", f"{mission['inside']} in buildings, median error {mission['inside_error_m']:.0f} m"
+    if mission.get("among"):
+        yield "among", f"{mission['among']} each one of several people, median error {mission['among_error_m']:.0f} m"
     if mission["wait_s"]["p50"] is not None:
         wait, since = mission["wait_s"], mission.get("located_wait_s", {"p50": None})
         placed = "" if since["p50"] is None else f"; once located: {since['p50']:.0f} s, {since['max']:.0f} s"
-        yield "waited", f"from heard to confirmed: median {wait['p50']:.0f} s, longest {wait['max']:.0f} s{placed}"
+        yield "waited", f"from heard to found: median {wait['p50']:.0f} s, longest {wait['max']:.0f} s{placed}"
     if mission["post_knows_s"]["count"]:
         knows = mission["post_knows_s"]
         yield (

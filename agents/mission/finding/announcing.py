@@ -13,7 +13,7 @@ from agents.mission.finding.identities import paired
 from agents.mission.finding.known_survivors import KnownSurvivors, estimate_of
 from agents.mission.finding.phone_localization import Estimate
 from agents.mission.outbox import Outbox, OutgoingPacket
-from fanet_mw.trace import Confirmed, PlacedInside, Refuted
+from fanet_mw.trace import Confirmed, PlacedAmong, PlacedInside, Refuted
 from fanet_mw.units import MS, US, NodeId, S
 from fanet_mw.wire.survivors import Found, Standing, Survivor, person_id
 
@@ -94,6 +94,9 @@ class Announcing:
     def place_inside(self, survivor: int, place: Estimate, now_ns: int) -> None:
         self._decide(Found(now_ns // US, survivor, *place, self._node, Standing.INSIDE), PlacedInside, now_ns)
 
+    def place_among(self, survivor: int, place: Estimate, now_ns: int) -> None:
+        self._decide(Found(now_ns // US, survivor, *place, self._node, Standing.AMONG), PlacedAmong, now_ns)
+
     def report_person(self, place: Estimate, now_ns: int) -> None:
         """Somebody was seen who carries no phone that fits: flood that a person is there."""
         person = person_id(self._node, self._persons)
@@ -126,7 +129,9 @@ class Announcing:
         if not people or paired([place], people, steady_m2=steady_m2) == [None]:
             self.report_person(place, now_ns)
 
-    def _decide(self, verdict: Found, record: type[Confirmed | Refuted | PlacedInside], now_ns: int) -> None:
+    def _decide(
+        self, verdict: Found, record: type[Confirmed | Refuted | PlacedAmong | PlacedInside], now_ns: int
+    ) -> None:
         survivor, east_m, north_m = verdict.survivor, round(verdict.east_m, 2), round(verdict.north_m, 2)
         self._survivors.on_found(verdict, now_ns=now_ns)
         self._outbox.records.append(record(now_ns, self._node, survivor, east_m, north_m))

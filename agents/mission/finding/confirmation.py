@@ -12,6 +12,7 @@ from typing import Final
 from agents.mission.finding.known_survivors import KnownSurvivor
 from agents.mission.finding.person_track import PersonTrack
 from fanet_mw.units import S
+from fanet_mw.wire.survivors import Standing
 
 CLOSE_M: Final = 100.0
 """The greatest slant range from which a call counts for a confirmation. Whom a camera shows counts from any height: how
@@ -24,6 +25,8 @@ _PATIENT_NS: Final = 15 * S
 """The time since the first sighting up to which the whole margin is required."""
 _IMPATIENT_NS: Final = 50 * S
 """The time since the first sighting from which only the least margin is required; it decreases linearly in between."""
+_UNDECIDED_NS: Final = 30 * S
+"""The time since the first sighting after which a survivor is said to be among several people."""
 _SIGHTINGS: Final = 2
 """A person is not confirmed before this number of sightings by a camera, or calls from close by."""
 _SURE_M: Final = 3.5
@@ -54,7 +57,16 @@ def is_confirmable(person: PersonTrack, phone: KnownSurvivor) -> bool:
     )
 
 
-def required_margin(person: PersonTrack, now_ns: int) -> float:
-    """By how much more the next best assignment must cost; decreases with the time since the first sighting."""
+def required_margin(person: PersonTrack, phone: KnownSurvivor, now_ns: int) -> float:
+    """By how much more all other carriers together must cost; decreases with the time since the first sighting, unless
+    the owner is known to be among several people, for whom nobody waits any more.
+    """
+    if phone.settled is not None and phone.settled.standing is Standing.AMONG:
+        return GREATEST_MARGIN
     share = (now_ns - person.first_ns - _PATIENT_NS) / (_IMPATIENT_NS - _PATIENT_NS)
     return GREATEST_MARGIN - (GREATEST_MARGIN - _LEAST_MARGIN) * min(1.0, max(0.0, share))
+
+
+def is_undecided(person: PersonTrack, margin: float, now_ns: int) -> bool:
+    """True if looking longer would hardly tell whose phone it is: not even the least margin is reached after long."""
+    return margin < _LEAST_MARGIN and now_ns - person.first_ns >= _UNDECIDED_NS

@@ -2,23 +2,29 @@
 
     what one reading shows        is assigned to the people known so far, all at once; who is left over is new
     all people and all phones     are assigned at once, so that all received powers together are most likely
-    a person's phone is certain   when every other assignment of this person is far less likely (`confirmation.py`)
+    a person's phone is certain   when all other carriers together are far less likely (`carriers.py`)
+    a phone is of one of several  when that has not become certain for long: nobody need look for its owner any more
 
 A person who is certainly there without a phone that fits is reported without one (`unreported`). The cost of a pair is
 twice the difference of log-likelihoods of the phone's powers from the person's and from the best place: chi-square with
 2 degrees of freedom for a true pair.
 """
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
-from agents.mission.finding.confirmation import GREATEST_MARGIN, is_confirmable, is_seen_enough, required_margin
+from agents.mission.finding.carriers import IMPOSSIBLE, Carriers, assigned, carriers, cost_with
+from agents.mission.finding.confirmation import (
+    GREATEST_MARGIN,
+    is_confirmable,
+    is_seen_enough,
+    is_undecided,
+    required_margin,
+)
 from agents.mission.finding.height_error import NOTHING_TOLD, HeightError
-from agents.mission.finding.known_survivors import SAME_PLACE_M, KnownSurvivors, estimate_of
+from agents.mission.finding.known_survivors import SAME_PLACE_M, KnownSurvivor, KnownSurvivors, estimate_of
 from agents.mission.finding.person_track import PersonTrack
 from agents.mission.finding.phone_localization import Estimate
-from agents.mission.hungarian import assign
 from fanet_mw.units import Enu, S
 from fanet_mw.wire.survivors import Found, is_person
 
@@ -41,10 +47,14 @@ _NEAR_M: Final = 400.0
 """A person does not carry a phone if the middle of its filter's grid, near the strongest power, is farther away."""
 _BESIDE_M: Final = 150.0
 """A confirmed survivor can only have been mistaken for people within this distance."""
+_FRESH: Final = 4
+"""Among whom the owner of a phone is, is asked again after this number of further powers."""
+_ELSEWHERE: Final = 0.1
+"""A survivor is not said to be among people while the probability is greater that none of them carries the phone."""
+_CROWD_M: Final = 50.0
+"""The greatest standard deviation of the places of people among whom a survivor is said to be."""
 _BY_SIDE_M: Final = 15.0
 """People at no more than this distance are found together, so it makes no difference which of their phones is whose."""
-_IMPOSSIBLE: Final = 1e6
-"""The cost of a pair that is excluded."""
 _REFUTED_COST: Final = 9.0
 """An additional cost at a place where the same survivor was confirmed by mistake, because other UAVs know better."""
 _ALONE_M: Final = 20.0
@@ -77,6 +87,9 @@ class Identities:
         self._people: list[PersonTrack] = []
         self._raised_m = 0.0
         """The error of the height by which the places of all people are corrected."""
+        self._among: dict[int, Estimate] = {}
+        self._weighed: dict[int, int] = {}
+        """The number of powers of each phone when it was last asked among whom its owner is."""
         self._now_ns = 0
 
     def on_reading(
@@ -91,7 +104,7 @@ class Identities:
             [person.distance2(sighting.at, sighting.sigma_m**2 + self._steady_m2) for person in people]
             for sighting in sightings
         ]
-        chosen = _assigned(costs, [_SAME_SIGMAS * _SAME_SIGMAS] * len(sightings))[1] if people and sightings else []
+        chosen = assigned(costs, [_SAME_SIGMAS * _SAME_SIGMAS] * len(sightings))[1] if people and sightings else []
         shown: list[PersonTrack] = []
         for row, (at, sigma_m, close) in enumerate(sightings):
             column, variance = chosen[row] if chosen else None, sigma_m * sigma_m
@@ -162,21 +175,47 @@ class Identities:
         if not people or not phones:
             return []
         costs = [[self._cost(person.place, phone) for phone in phones] for person in people]
-        nobody = [_GATE] * len(people)
-        least, chosen = _assigned(costs, nobody)
+        _, chosen = assigned(costs, [_GATE] * len(people))
         sure = []
-        for person, column in zip(people, chosen, strict=True):
+        for row, (person, column) in enumerate(zip(people, chosen, strict=True)):
             person.survivor = None if column is None else phones[column]
             if column is None:
                 continue
             survivor = phones[column]
             known = self._survivors.by_id[survivor]
             known.filter.on_sighting(self._told(person))
-            if is_confirmable(person, known):
-                margin = self._next_best(costs, nobody, people, column, person) - least
-                if margin >= required_margin(person, now_ns):
-                    sure.append(survivor)
+            if not is_confirmable(person, known):
+                continue
+            required = required_margin(person, known, now_ns)
+            if (margin := self._margin(costs, row, column, people)) < required:
+                if is_undecided(person, margin, now_ns) and self._has_news(survivor, known):
+                    self._note_among(survivor, self._carriers(costs, column, people), people)
+            elif (whose := self._carriers(costs, column, people)).margin(row, within_m=_BY_SIDE_M) >= required:
+                known.filter.on_sighting(_doubted(self._told(person), whose.doubt_m(row)))
+                sure.append(survivor)
         return sorted(sure)
+
+    def _has_news(self, survivor: int, known: KnownSurvivor) -> bool:
+        """True if it is worth while to ask again among whom a survivor is, who is not known to be anywhere."""
+        powers = known.filter.included_powers
+        if known.settled is not None or powers < self._weighed.get(survivor, 0) + _FRESH:
+            return False
+        self._weighed[survivor] = powers
+        return True
+
+    def _note_among(self, survivor: int, whose: Carriers, people: Sequence[PersonTrack]) -> None:
+        """A survivor is among people who have all been seen well, and near each other, if nobody else is likely."""
+        if whose.nobody <= _ELSEWHERE and all(
+            is_seen_enough(person) for person, share in zip(people, whose.shares, strict=True) if share > _ELSEWHERE
+        ):
+            place = whose.middle(grain_m=SAME_PLACE_M)
+            if place.sigma_m <= _CROWD_M:
+                self._among[survivor] = place
+
+    def take_among(self) -> dict[int, Estimate]:
+        """The survivors who are each one of several people, none of them for certain, and where those people are."""
+        among, self._among = self._among, {}
+        return among
 
     def unreported(self, now_ns: int) -> list[Estimate]:
         """The places of the people who are certainly there, seen from two places, and of whom there is no find."""
@@ -238,11 +277,9 @@ class Identities:
         phones = [*named, *self._unconfirmed_near(people)]
         costs = [[self._cost(place, phone) for phone in phones] for place in people]
         nobody = [_GATE] * len(people)
-        least, _ = _assigned(costs, nobody)
+        least, _ = assigned(costs, nobody)
         row = phones.index(confirmed.survivor)
-        kept = [[cost if column == row else _IMPOSSIBLE for column, cost in enumerate(costs[row])]]
-        only = [_IMPOSSIBLE if at_row == row else cost for at_row, cost in enumerate(nobody)]
-        return _assigned([*costs[:row], *kept, *costs[row + 1 :]], only)[0] - least
+        return cost_with(costs, nobody, row, row) - least
 
     def _confirmed_at(self, at: Enu) -> int:
         """The number of survivors who are confirmed at this place."""
@@ -253,23 +290,16 @@ class Identities:
             for known in self._survivors.by_id.values()
         )
 
-    def _next_best(
-        self,
-        costs: Sequence[Sequence[float]],
-        nobody: Sequence[float],
-        people: Sequence[PersonTrack],
-        column: int,
-        person: PersonTrack,
-    ) -> float:
-        """The least total cost if neither this person nor anybody beside, who is found together, carries this phone."""
-        others = [list(one) for one in costs]
-        bound = list(nobody)
-        for row, other in enumerate(people):
-            if other.place.distance_m(person.place.at) <= _BY_SIDE_M:
-                others[row][column] = _IMPOSSIBLE
-            if other is person:
-                bound[row] += GREATEST_MARGIN
-        return _assigned(others, bound)[0]
+    def _margin(self, costs: Sequence[Sequence[float]], row: int, column: int, people: Sequence[PersonTrack]) -> float:
+        """By how much more it costs at least if neither a person nor anybody found together with it has a phone."""
+        at, others, nobody = people[row].place.at, [list(one) for one in costs], _nobody(people)
+        for other, person in enumerate(people):
+            if person.place.distance_m(at) <= _BY_SIDE_M:
+                others[other][column] = IMPOSSIBLE
+        return assigned(others, nobody)[0] - cost_with(costs, nobody, row, column)
+
+    def _carriers(self, costs: Sequence[Sequence[float]], column: int, people: Sequence[PersonTrack]) -> Carriers:
+        return carriers(costs, _nobody(people), column, [person.place for person in people])
 
     def _phones(self, people: Sequence[PersonTrack]) -> list[int]:
         """The unconfirmed survivors whose phones one of these people may carry."""
@@ -287,7 +317,7 @@ class Identities:
     def _cost(self, place: Estimate, survivor: int) -> float:
         known, at = self._survivors.by_id[survivor], place.at
         doubt = _REFUTED_COST if known.was_mistaken_at(at, since_ns=self._now_ns - _DOUBTED_NS) else 0.0
-        return min(_IMPOSSIBLE, known.filter.deficit(at.east, at.north) + doubt)
+        return min(IMPOSSIBLE, known.filter.deficit(at.east, at.north) + doubt)
 
 
 def _lean(at: Enu, here: Enu) -> tuple[float, float]:
@@ -305,18 +335,22 @@ def paired(
             one.distance_m(other.at) ** 2
             / (one.east_variance_m2 + other.east_variance_m2 + other.north_variance_m2 + 2 * steady_m2)
             if one.distance_m(other.at) <= within_m
-            else _IMPOSSIBLE
+            else IMPOSSIBLE
             for other in found
         ]
         for one in seen
     ]
-    return _assigned(costs, [_SAME_SIGMAS * _SAME_SIGMAS] * len(seen))[1]
+    return assigned(costs, [_SAME_SIGMAS * _SAME_SIGMAS] * len(seen))[1]
 
 
-def _assigned(costs: Sequence[Sequence[float]], nobody: Sequence[float]) -> tuple[float, list[int | None]]:
-    """The least total cost, and the phone of each person; `nobody` has the cost that a person carries none of them."""
-    phones, people = len(costs[0]), len(costs)
-    table = [[*row, *(nobody[i] if i == j else _IMPOSSIBLE for j in range(people))] for i, row in enumerate(costs)]
-    chosen = assign(table)
-    total = math.fsum(table[i][column] for i, column in enumerate(chosen))
-    return total, [column if column < phones else None for column in chosen]
+def _doubted(place: Estimate, doubt_m: float) -> Estimate:
+    """The place with another cause of error, which is alike in all directions."""
+    doubt_m2 = doubt_m * doubt_m
+    return place._replace(
+        east_variance_m2=place.east_variance_m2 + doubt_m2, north_variance_m2=place.north_variance_m2 + doubt_m2
+    )
+
+
+def _nobody(people: Sequence[PersonTrack]) -> list[float]:
+    """The cost that each of these people carries none of the phones, which is the greater for who is surely there."""
+    return [_GATE + GREATEST_MARGIN * person.is_proven for person in people]

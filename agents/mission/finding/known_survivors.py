@@ -40,8 +40,8 @@ class KnownSurvivor:
     first_ns: int = 0
     announced: Found | None = None
     """The most exact estimate that another node has announced."""
-    inside: Found | None = None
-    """The most exact verdict that the survivor is inside a building; nobody need fly there any more."""
+    settled: Found | None = None
+    """The most exact verdict that the survivor is inside a building, or among people seen: nobody need fly there."""
     confirmed: Found | None = None
     looked_at: LookedAt = field(default_factory=LookedAt)
     """Where cameras have looked for whomever."""
@@ -52,8 +52,8 @@ class KnownSurvivor:
 
     @property
     def verdict(self) -> Found | None:
-        """The confirmation that holds, otherwise the building, otherwise the latest refutation; None without any."""
-        return self.confirmed or self.inside or (self.refuted[-1] if self.refuted else None)
+        """The confirmation that holds, otherwise the building or the people, otherwise the latest refutation."""
+        return self.confirmed or self.settled or (self.refuted[-1] if self.refuted else None)
 
     def is_refuted(self, found: Found) -> bool:
         """True for a confirmation that a known refutation takes back."""
@@ -149,10 +149,10 @@ class KnownSurvivors:
                 if reopened:
                     self._calibrate()
                 return reopened
-            case Standing.INSIDE:
-                first = known.inside is None
-                if known.inside is None or estimate_of(found).sigma_m < estimate_of(known.inside).sigma_m:
-                    known.inside = found
+            case Standing.INSIDE | Standing.AMONG:
+                first = known.settled is None
+                if known.settled is None or estimate_of(found).sigma_m < estimate_of(known.settled).sigma_m:
+                    known.settled = found
                 return first and known.confirmed is None
             case Standing.ESTIMATED:
                 outdated = any(found.t_us <= refuted.t_us for refuted in known.refuted)
@@ -208,17 +208,17 @@ class KnownSurvivors:
         return sorted([survivor for survivor, known in self.by_id.items() if known.confirmed is None])
 
     def sought(self) -> list[int]:
-        """The unconfirmed survivors to whom UAVs fly: not those who are inside a building."""
-        return [survivor for survivor in self.unconfirmed() if self.by_id[survivor].inside is None]
+        """The unconfirmed survivors to whom UAVs fly: not those who are inside a building or among people."""
+        return [survivor for survivor in self.unconfirmed() if self.by_id[survivor].settled is None]
 
     def is_confirmed(self, survivor: int) -> bool:
         known = self.by_id.get(survivor)
         return known is not None and known.confirmed is not None
 
     def is_found(self, survivor: int) -> bool:
-        """True if nobody need fly to the survivor any more, who is confirmed or inside a building."""
+        """True if nobody need fly to the survivor any more, who is confirmed, inside a building or among people."""
         known = self.by_id.get(survivor)
-        return known is not None and (known.confirmed is not None or known.inside is not None)
+        return known is not None and (known.confirmed is not None or known.settled is not None)
 
     def recent_reports(self, *, now_ns: int) -> list[Survivor]:
         """The reports of unconfirmed survivors to pass on with the next hello, newest first."""

@@ -229,15 +229,22 @@ class PhoneFilter:
         self._estimate = self._moments()
 
     def deficit(self, east_m: float, north_m: float) -> float:
-        """Twice the log of the best cell's probability over this place's; 0 before reception, inf off the grid."""
+        """Twice the log of the best cell's probability over this place's, interpolated between cells; 0 before any
+        reception, inf off the grid.
+        """
         self._catch_up()
         if self._middle is None or not self._totals:
             return 0.0
-        i = round((east_m - self._middle.east) / CELL_M) + _HALF_CELLS
-        j = round((north_m - self._middle.north) / CELL_M) + _HALF_CELLS
-        if not (0 <= i <= 2 * _HALF_CELLS and 0 <= j <= 2 * _HALF_CELLS):
+        last, totals = 2 * _HALF_CELLS, self._totals
+        x = (east_m - self._middle.east) / CELL_M + _HALF_CELLS
+        y = (north_m - self._middle.north) / CELL_M + _HALF_CELLS
+        if not (-0.5 <= x <= last + 0.5 and -0.5 <= y <= last + 0.5):
             return math.inf
-        return self._best - self._totals[j * _WIDTH + i]
+        i, j = min(last - 1, max(0, int(x))), min(last - 1, max(0, int(y)))
+        x, y = min(1.0, max(0.0, x - i)), min(1.0, max(0.0, y - j))
+        south = (1 - x) * totals[at := j * _WIDTH + i] + x * totals[at + 1]
+        north = (1 - x) * totals[at + _WIDTH] + x * totals[at + _WIDTH + 1]
+        return self._best - (1 - y) * south - y * north
 
     def likely_cells(self, most_deficit: float) -> Iterator[tuple[float, float, float]]:
         """East, north and `deficit` of each cell whose deficit is at most this; none before reception."""

@@ -118,6 +118,10 @@ class Sightings:
         self._empty_images(now_ns - _SETTLED_NS)
         return self._identities.review(now_ns)
 
+    def take_among(self) -> dict[int, Estimate]:
+        """The survivors who are each one of several people, none of them for certain, and where those people are."""
+        return self._identities.take_among()
+
     def unreported(self, now_ns: int) -> list[Estimate]:
         """The places of the people who are certainly there and of whom there is no find."""
         return self._identities.unreported(now_ns)

@@ -17,6 +17,7 @@ from fanet_mw.trace import (
     Detected,
     KnownOnGround,
     Located,
+    PlacedAmong,
     PlacedInside,
     Posed,
     RadioFault,
@@ -72,6 +73,18 @@ def test_who_is_placed_inside_is_counted_and_has_an_error_unless_nobody_has_that
     assert (found["inside"], found["inside_error_m"]) == (3, 11.1)
 
 
+def test_who_is_said_to_be_among_people_is_counted_and_has_an_error() -> None:
+    found = measured([PlacedAmong(S, 1, 1, 106.0, 68.0), PlacedAmong(2 * S, 4, 1, 100.0, 62.0)])
+    assert (found["among"], found["among_error_m"], found["confirmed"], found["inside"]) == (1, 6.0, 0, 0)
+
+
+def test_a_survivor_waits_until_found_as_a_person_or_by_phone_whichever_comes_first() -> None:
+    heard = [Detected(S, 1, 1, -80.0), Detected(S, 1, 2, -80.0), Detected(S, 1, 3, -80.0)]
+    seen = [Confirmed(4 * S, 7, person_id(7, 0), 100.0, 60.0), Confirmed(3 * S, 7, person_id(7, 1), -100.0, -20.0)]
+    found = measured([*heard, *seen, confirmed(9 * S, 1), confirmed(2 * S, 2)])
+    assert found["wait_s"] == {"p50": 2.0, "max": 3.0}, "who is not found yet has no wait"
+
+
 def test_every_collision_counts_once() -> None:
     assert measured([Collided(S, 1, 2), Collided(S, 2, 1), Collided(2 * S, 1, 2)])["collisions"] == 3
 
@@ -103,7 +116,7 @@ def test_confirmations_of_nobody_are_none_and_their_refutations_reopen_nothing()
     confirmations.add(Refuted(2 * S, 1, 1, 100.0, 60.0))
     confirmations.add(Detected(S, 1, 1, -80.0))  # type: ignore[arg-type]
     assert (confirmations.right(), confirmations.mistaken(), confirmations.persons(), confirmations.reopened) == (
-        [], [], ([], 0), 0,
+        [], [], ({}, 0), 0,
     )  # fmt: skip
 
 
@@ -123,11 +136,13 @@ def test_of_persons_and_survivors_the_nearest_pairs_belong_together() -> None:
         person(4, 0.0, 180.0),
     ):
         confirmations.add(find)
-    assert confirmations.persons() == ([1, 2, 3], 2), "2 is of the second, so 7 is of the first, and 3 comes too late"
+    persons, others = confirmations.persons()
+    assert {survivor: find.node for survivor, find in persons.items()} == {1: 7, 2: 2, 3: 4}, "3 comes too late"
+    assert others == 2
     backwards = Confirmations((Enu(0, 10, 0), Enu(20, 10, 0)))
     for find in (person(2, 20.0, 10.0), person(7, 0.0, 10.0)):
         backwards.add(find)
-    assert backwards.persons() == ([1, 2], 0), "in order of id"
+    assert {survivor: find.node for survivor, find in backwards.persons()[0].items()} == {1: 7, 2: 2}
 
 
 @pytest.mark.parametrize("kind", ["cut", "mute", "deaf", "stop", "crash"])

@@ -65,7 +65,7 @@ PAIRS = [
     *bounds(REPORT, "reporter", *IDS), *bounds(REPORT, "t_us", INSTANT), *bounds(REPORT, "position", *PLACES),
     *bounds(REPORT, "survivor", (1, 0), (MOST_SURVIVORS, MOST_SURVIVORS + 1)),
     *bounds(REPORT, "rssi_dbm", (MOST_DBM, MOST_DBM + 1), (-MOST_DBM, -MOST_DBM - 1), (0.0, math.nan)),
-    *bounds(FIND, "node", *IDS), *bounds(FIND, "t_us", INSTANT), *bounds(FIND, "standing", (Standing.INSIDE, 4)),
+    *bounds(FIND, "node", *IDS), *bounds(FIND, "t_us", INSTANT), *bounds(FIND, "standing", (Standing.AMONG, 5)),
     *bounds(FIND, "survivor", (1, 0), (MOST_SURVIVORS, MOST_SURVIVORS + 1)),
     *[pair for axis in ("east_m", "north_m") for sign in (-1, 1)
       for pair in bounds(FIND, axis, (sign * FARTHEST_M, sign * FAR))],

@@ -6,12 +6,13 @@ from typing import cast
 import pytest
 from seeing_uav import UP_M, Uav, mean_dbm
 
-from agents.mission.finding.confirmation import is_confirmable, required_margin
+from agents.mission.finding.confirmation import is_confirmable, is_undecided, required_margin
 from agents.mission.finding.identities import Sighting
 from agents.mission.finding.known_survivors import KnownSurvivor
 from agents.mission.finding.person_track import PersonTrack
 from agents.mission.finding.phone_localization import Estimate, PhoneFilter
 from fanet_mw.units import Enu, S
+from fanet_mw.wire.survivors import Found, Standing
 
 
 def test_few_powers_by_one_node_do_not_tell_whose_phone_it_is() -> None:
@@ -46,7 +47,20 @@ def test_while_two_phones_fit_one_person_nobody_is_named_until_waiting_longer_is
 @pytest.mark.parametrize(("second", "margin"), [(0, 9.0), (15, 9.0), (32.5, 5.5), (50, 2.0), (500, 2.0)])
 def test_a_uav_is_content_with_less_certainty_the_longer_it_waits(second: float, margin: float) -> None:
     person = PersonTrack(Estimate(0, 0, 1, 0, 1), 7 * S, 8 * S, Enu(0, 0, 0), 9.0)
-    assert required_margin(person, round((7 + second) * S)) == margin
+    phone = heard(powers=20, reporters=2)
+    assert required_margin(person, phone, round((7 + second) * S)) == margin
+    phone.settled = Found(0, 1, 0.0, 0.0, 900.0, 0.0, 900.0, 9, Standing.INSIDE)
+    assert required_margin(person, phone, round((7 + second) * S)) == margin
+    phone.settled = phone.settled._replace(standing=Standing.AMONG)
+    assert required_margin(person, phone, round((7 + second) * S)) == 9.0, "nobody waits for that any more"
+
+
+@pytest.mark.parametrize(("margin", "second", "undecided"), [(1.9, 30, True), (2.0, 30, False), (1.9, 29.9, False)])
+def test_after_half_a_minute_below_the_least_margin_it_stays_open_whose_phone_it_is(
+    margin: float, second: float, undecided: bool
+) -> None:
+    person = PersonTrack(Estimate(0, 0, 1, 0, 1), 7 * S, 8 * S, Enu(0, 0, 0), 9.0)
+    assert is_undecided(person, margin, round((7 + second) * S)) is undecided
 
 
 def test_only_a_person_seen_from_close_by_is_confirmed() -> None:

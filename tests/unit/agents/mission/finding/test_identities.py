@@ -120,6 +120,16 @@ def test_a_sighting_that_was_not_repeated_is_forgotten_and_names_nobody() -> Non
     assert not uav.survivors.by_id[1].filter.is_seen
 
 
+def test_a_false_alarm_beside_a_person_hardly_is_the_owner_of_a_phone() -> None:
+    uav = Uav()
+    for node in range(1, 5):
+        for north in (-60, 0, 60):
+            at = Enu(40.0 * node - 100, north + 100, UP_M)
+            uav.hear(1, node, at, mean_dbm(Enu(0, 0, 0), at))
+    assert uav.see(Enu(0, 0, 0), Enu(60, 0, 0), now_ns=0) == []
+    assert uav.see(Enu(0, 0, 0), now_ns=S) == [1]
+
+
 def two_phones_at_one_place() -> Uav:
     """A UAV that has received two phones of the same place well, where the owner of the first one is confirmed."""
     uav = Uav()

@@ -56,13 +56,13 @@ def knowing(*words: Found) -> KnownSurvivors:
 
 
 def test_of_estimates_and_of_verdicts_inside_the_most_exact_stays_and_of_equal_ones_the_first() -> None:
-    for standing in (Standing.ESTIMATED, Standing.INSIDE):
+    for standing in (Standing.ESTIMATED, Standing.INSIDE, Standing.AMONG):
         words = [
             found(standing, node=node, sigma_m=sigma_m) for node, sigma_m in ((1, 9.0), (2, 9.0), (3, 8.0), (4, 8.5))
         ]
         for count, kept in ((1, 1), (2, 1), (3, 3), (4, 3)):
             known = knowing(*words[:count]).by_id[1]
-            word = known.announced if standing is Standing.ESTIMATED else known.inside
+            word = known.announced if standing is Standing.ESTIMATED else known.settled
             assert word is not None
             assert word.node == kept
 

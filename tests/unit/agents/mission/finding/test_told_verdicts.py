@@ -62,7 +62,7 @@ def test_a_verdict_of_its_own_is_flooded_three_times_7_s_apart() -> None:
     ):  # fmt: skip
         assert uav.numbers(now_ns) == told, now_ns
     assert uav.out.records == [PlacedInside(5 * S, NodeId(8), 2, 10.13, -20.01)]
-    assert uav.survivors.by_id[2].inside == Found(5 * S // US, 2, *PLACE, 8, Standing.INSIDE)
+    assert uav.survivors.by_id[2].settled == Found(5 * S // US, 2, *PLACE, 8, Standing.INSIDE)
     assert uav.in_hello(17 * S - 1) == [2]
 
 

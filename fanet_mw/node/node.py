@@ -72,10 +72,7 @@ class Node:
         """How long neighbors have sent nothing."""
         self._copies = 0
         self._others = 0
-        self._lifetimes_ns = [scenario.routing.lifetime_ns(wire.PRIORITY_BULK)] * 256
-        """The lifetime of a packet by its priority; the air may state any of 256."""
-        for priority in wire.PRIORITIES.values():
-            self._lifetimes_ns[priority] = scenario.routing.lifetime_ns(priority)
+        self._lifetimes_ns = scenario.routing.lifetimes_ns()
         self._most_bytes: dict[int, int] = {}
         """The length of the longest packet of each priority for which somebody has asked; it never changes."""
         self._reader = reader or Reader()

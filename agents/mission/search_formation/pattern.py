@@ -50,6 +50,8 @@ class Pattern:
         self._flown = {place: at for row in whole.rows() for place, at in row.shared(vacant).items()}
         """Where on its row each UAV flies whose row has closed ranks."""
         self.shape: Shape = whole.drawn_in(vacant, self._hop_m) if vacant else whole
+        self._begins: dict[int, Enu] = {}
+        """Where the sweep begins for those places that were asked for: until then they are asked for all the time."""
         self._ties: dict[int, list[int]] = {}
         """The places to which those places are tied that were asked for."""
 
@@ -98,7 +100,12 @@ class Pattern:
 
     def at(self, place: int, swept_s: float) -> Enu:
         """The position of a place after this time of sweeping; before 0, where the sweep begins."""
-        return self.shape.flown_at(self._flown.get(place, place), swept_s)
+        if swept_s > 0:
+            return self.shape.flown_at(self._flown.get(place, place), swept_s)
+        begins = self._begins.get(place)
+        if begins is None:
+            begins = self._begins[place] = self.shape.flown_at(self._flown.get(place, place), 0.0)
+        return begins
 
     def has_beside(self, place: int, others: frozenset[int]) -> bool:
         """True if one of these places is in the row of a place, or in a row that ends there."""

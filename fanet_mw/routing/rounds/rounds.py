@@ -97,7 +97,8 @@ class RoundFlooding(RoutingProtocol):
         scenario = port.scenario
         rounds, radio = scenario.rounds, scenario.radio
         self._timing = timing = RoundTiming.of(scenario)
-        self._lead_ns = radio.lead_ns
+        self._lead_ns, self._handover_ns = radio.lead_ns, radio.handover_ns
+        self._lifetimes_ns = scenario.routing.lifetimes_ns()
         self._law = DelayLaw(timing, scenario)
         self._likely = LikelyDelay() if self._law.loses_frames else None
         self._bulk_likely = LikelyDelay()
@@ -132,7 +133,7 @@ class RoundFlooding(RoutingProtocol):
         self._heard_ns: dict[NodeId, int] = {}
         self._in_step = InStep(timing, certain=not scenario.clock.modelled)
         self._one_way = OneWay(port, timing, self._topology, self._heard_ns)
-        self._blind_ns = self._lead_ns + radio.handover_ns
+        self._blind_ns = self._lead_ns + self._handover_ns
         """The time that passes from the decision to send until others know of it, airtime and waiting left out."""
         self._flood_ns = _FLOOD_HOPS * (self._law.hop_ns + self._blind_ns)
         self._young_ns = self._flood_ns + 2 * scenario.clock.apart_ns(scenario.duration_ns)
@@ -240,7 +241,7 @@ class RoundFlooding(RoutingProtocol):
         if self._likely is not None:
             likely_ns = self._likely.over_ns(self._law.way_ns(self._topology.farthest(now_ns)))
             self._state_likely(packet, likely_ns, now_ns=now_ns)
-        elif law_ns <= self._port.scenario.routing.lifetime_ns(header.priority):
+        elif law_ns <= self._lifetimes_ns[header.priority]:
             self._stated += 1
             self._port.record(BoundStated(header.origin_us * US, self._port.node, header.seq, law_ns))
             self._exclude(self._law.absent(self._topology, now_ns=now_ns) or (), packet)
@@ -248,7 +249,7 @@ class RoundFlooding(RoutingProtocol):
     def _state_likely(self, packet: Packet, likely_ns: int | None, *, now_ns: int) -> None:
         """State by when nearly all nodes to which a way leads have an own packet, if that is known."""
         header = packet.header
-        if likely_ns is None or likely_ns > self._port.scenario.routing.lifetime_ns(header.priority):
+        if likely_ns is None or likely_ns > self._lifetimes_ns[header.priority]:
             return
         absent = self._law.absent(self._topology, now_ns=now_ns)
         if absent is not None:
@@ -265,7 +266,7 @@ class RoundFlooding(RoutingProtocol):
     def _compare(self, packet: Packet, now_ns: int) -> None:
         """How long a packet of another node took shows how long the own ones may take."""
         origin = NodeId(packet.header.origin)
-        delay_ns = now_ns + self._port.scenario.radio.handover_ns - packet.header.origin_us * US
+        delay_ns = now_ns + self._handover_ns - packet.header.origin_us * US
         likely, hops = self._likely, self._topology.hops_to(origin, now_ns)
         if not self._in_turns(packet):
             likely = self._bulk_likely
@@ -368,7 +369,7 @@ class RoundFlooding(RoutingProtocol):
 
     def _is_too_old(self, packet: Packet, at_ns: int) -> bool:
         header = packet.header
-        return at_ns - header.origin_us * US > self._port.scenario.routing.lifetime_ns(header.priority)
+        return at_ns - header.origin_us * US > self._lifetimes_ns[header.priority]
 
     def _told(self, room: int, now_ns: int) -> Packet | None:
         """What this node tells its neighbors of links and held packets, if there is anything and room for it."""

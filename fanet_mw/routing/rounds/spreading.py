@@ -361,9 +361,12 @@ class Spreading:
 
     def _is_done(self, entry: _Spread, neighbors: int) -> bool:
         """Bulk: True if nobody lacks it, or it was sent often enough."""
-        if entry.again:
-            neighbors &= ~self._deaf()
-        return entry.sent > self._repeats or (entry.having != 0 and not neighbors & ~entry.having)
+        if entry.sent > self._repeats:
+            return True
+        if not entry.having:
+            return False
+        lacking = neighbors & ~entry.having
+        return not lacking or (entry.again and not lacking & ~self._deaf())
 
     def _settle(self, key: int, entry: _Spread) -> None:
         self._remove(key)

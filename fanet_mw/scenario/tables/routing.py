@@ -71,3 +71,7 @@ class Routing(Section):
         """The lifetime of a packet of this priority (`wire.PRIORITY_...`)."""
         own_s = {1: self.safety_lifetime_s, 2: self.report_lifetime_s}.get(priority, 0.0)
         return seconds_to_ns(own_s or self.lifetime_s)
+
+    def lifetimes_ns(self) -> list[int]:
+        """The lifetime of a packet by its priority; the air may state any of 256."""
+        return [self.lifetime_ns(priority) for priority in range(256)]

@@ -173,7 +173,7 @@ class Lines(Shape):
         line, share = formation.follower(round(place))
         outward_m, lane = self._outward_m[line], share * (lanes - 1)
         behind_m = FOLLOW_M if not outward_m else min(FOLLOW_M, self._apart_m / 2)
-        behind = max(self._inner_m(swept_s, lane) + outward_m - behind_m, self._starts_m(lane) * 0.5)
+        behind = max(self._inner_m(swept_s, lane) + outward_m - behind_m, self._starts_m(self._straight(lane)) * 0.5)
         east = self._half_width_m(swept_s) * (2 * share - 1)
         return Enu(east, behind if line < self._half else -behind, formation.height_m + FOLLOWER_HIGHER_M)
 
@@ -186,7 +186,7 @@ class Lines(Shape):
         whole_m = shifted_m(
             swept_s, self.sweep_s, lane_m=self.lane_m, speed_m_s=formation.speed_m_s, faster_back=self._faster_back
         )
-        return at._replace(east=at.east + whole_m * min(1.0, formation.lanes - 1 - lane))
+        return Enu(at.east + whole_m * min(1.0, formation.lanes - 1 - lane), at.north, at.up)
 
     def tethers(self, place: int) -> tuple[int, ...]:
         formation = self._formation
@@ -276,14 +276,14 @@ class Lines(Shape):
             return min(self._most_m, swept_m(formation, swept_s))
         if swept_s > self.sweep_s:
             return min(self._most_m, swept_m(self._back, swept_s, faster_back=self._faster_back))
-        waits_s, slow_m_s, fast_m_s = self._pace(lane)
+        straight = self._straight(lane)
+        waits_s, slow_m_s, fast_m_s = self._pace(lane, straight)
         slow_m = max(0.0, min(swept_s, self._aside_s) - waits_s) * slow_m_s
-        out_m = self._starts_m(lane) + slow_m + max(0.0, swept_s - self._aside_s) * fast_m_s
+        out_m = self._starts_m(straight) + slow_m + max(0.0, swept_s - self._aside_s) * fast_m_s
         return min(self._most_m, formation.last_m, out_m)
 
-    def _pace(self, lane: float) -> tuple[float, float, float]:
+    def _pace(self, lane: float, straight: float) -> tuple[float, float, float]:
         """How long a lane of bent lines waits, and its speeds away from the middle: while it goes aside, and then."""
-        straight = self._straight(lane)
         fast_m_s = self._formation.speed_m_s * (BACK + straight * (1 - BACK))
         aside_m_s = self._fastest_m_s * abs(2 * lane / (self._formation.lanes - 1) - 1)
         slow_m_s = min(fast_m_s, math.sqrt(self._fastest_m_s**2 - aside_m_s**2))
@@ -291,14 +291,16 @@ class Lines(Shape):
 
     def _arrives_s(self, lane: float) -> float:
         """When a lane of bent lines is where they turn."""
-        waits_s, slow_m_s, fast_m_s = self._pace(lane)
+        straight = self._straight(lane)
+        waits_s, slow_m_s, fast_m_s = self._pace(lane, straight)
         slow_m = (self._aside_s - waits_s) * slow_m_s
-        return self._aside_s + (self._formation.last_m - self._starts_m(lane) - slow_m) / fast_m_s
+        return self._aside_s + (self._formation.last_m - self._starts_m(straight) - slow_m) / fast_m_s
 
-    def _starts_m(self, lane: float) -> float:
+    def _starts_m(self, straight: float) -> float:
+        """How far from the middle a lane begins, by how straight the line is there (`_straight`)."""
         first_m = self._formation.first_m
         ends_m = min(first_m, _ENDS_APART * self._formation.half_width_m / (self._formation.lanes - 1))
-        return ends_m + self._straight(lane) * (first_m - ends_m)
+        return ends_m + straight * (first_m - ends_m)
 
     def _straight(self, lane: float) -> float:
         """1 for the lanes in the middle of lines that begin around the swarm, and for others; 0 for the outermost."""

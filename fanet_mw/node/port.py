@@ -65,8 +65,10 @@ class NodePort:
     def transmit_together(
         self, packets: Sequence[Packet], *, flags: int, at_ns: Sequence[int], until_ns: int = 0
     ) -> None:
+        phase = flags & wire.PHASE_MASK
         for packet in packets:
-            self.mark(packet, flags=flags & wire.PHASE_MASK)
+            if packet.header.flags & wire.PHASE_MASK != phase:  # else it was marked when it came, or when it was made
+                self.mark(packet, flags=phase)
         frames = [self._begun(packet, flags) for packet in packets]
         for start_ns in at_ns:
             self._share([(start_ns, frame) for frame in frames], until_ns=until_ns)
@@ -91,8 +93,9 @@ class NodePort:
 
     def _begun(self, packet: Packet, flags: int) -> bytes:
         """The bytes of a packet whose phase begins here: an own packet as it is, another node's with one more hop."""
-        flags |= self._deaf_flag if packet.header.origin == self.node else packet.header.flags & wire.FLAG_DEAF
-        return wire.rewrite(packet.frame, self.node, flags, hop=0 if packet.header.origin == self.node else 1)
+        if packet.header.origin == self.node:
+            return wire.rewrite(packet.frame, self.node, flags | self._deaf_flag, hop=0)
+        return wire.rewrite(packet.frame, self.node, flags | packet.header.flags & wire.FLAG_DEAF)
 
     @property
     def _deaf_flag(self) -> int:

@@ -12,6 +12,7 @@ flooding in rounds (Glossy, Ferrari et al., IPSN 2011; LWB, SenSys 2012), withou
 802.11 does not have. Not modeled: two nodes that use the same turn far apart.
 """
 
+from collections import OrderedDict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import ClassVar, Final, NamedTuple
 
@@ -150,7 +151,7 @@ class RoundFlooding(RoutingProtocol):
         """The requests of hellos of which the clock wants to know when they ended."""
         self._held: dict[int, None] = {}
         """Packets of which a neighbor should be told that this node holds them, by key."""
-        self._told_ns: dict[int, int] = {}
+        self._told_ns = OrderedDict[int, int]()
         """When neighbors were last told of each packet, the latest last."""
         self._hello: Packet | None = None
         self._hello_waits = 0
@@ -379,10 +380,10 @@ class RoundFlooding(RoutingProtocol):
             told = list(self._held)[: room // HELD_BYTES * CAPACITY]
             for key in told:
                 del self._held[key]
-                self._told_ns.pop(key, None)
                 self._told_ns[key] = now_ns
+                self._told_ns.move_to_end(key)
             while len(self._told_ns) > _MOST_TOLD:
-                del self._told_ns[next(iter(self._told_ns))]
+                self._told_ns.popitem(last=False)
             packets = [HeldPacket(seq, origin) for origin, seq in map(origin_and_seq, told)]
             inner += encode_held(packets, self._port.node)
             room -= HELD_BYTES * -(-len(told) // CAPACITY)

@@ -14,6 +14,7 @@ for node i + 1.
 """
 
 import math
+from collections import OrderedDict
 from collections.abc import Iterable, Sequence
 from heapq import heappop, heappush
 from typing import Final
@@ -128,9 +129,10 @@ class Spreading:
         """A heap of the instants and keys at which bulk is looked at; outdated entries are skipped."""
         self._ready: list[tuple[bool, tuple[int, int, int]]] = []
         """A heap of the bulk whose instant has come: sent before, rank."""
-        self._done: dict[int, _Spread] = {}
-        """The packets that need not be sent any more, the latest last."""
-        self._early: dict[int, int] = {}
+        self._done = OrderedDict[int, _Spread]()
+        """The packets that need not be sent any more, the latest last. (The first entry of a plain dict is found behind
+        all that was deleted before it.)"""
+        self._early = OrderedDict[int, int]()
         """The neighbors that say to hold packets which this node does not have, the latest last."""
         self.repeated = 0
         self._lossy = lossy
@@ -231,9 +233,10 @@ class Spreading:
             if entry is not None:
                 entry.having |= theirs
             elif key not in done:
-                early[key] = early.pop(key, 0) | theirs
+                early[key] = early.get(key, 0) | theirs
+                early.move_to_end(key)
         while len(early) > _MOST_EARLY:
-            del early[next(iter(early))]
+            early.popitem(last=False)
 
     def assume(self, node: int, *, until_ns: int) -> None:
         """A node that was elsewhere in the swarm has come near: what is older than an instant it has got there."""
@@ -372,7 +375,7 @@ class Spreading:
         self._remove(key)
         self._done[key] = entry
         if len(self._done) > _MOST_DONE:
-            del self._done[next(iter(self._done))]
+            self._done.popitem(last=False)
 
     def _not_before_ns(self, entry: _Spread, neighbors: int, start_ns: int) -> int:
         """The instant before which others may do what sending this packet would."""

@@ -49,6 +49,8 @@ class Topology:
         """The nodes with which each node has links, by its id; the first entry is of no node."""
         self.news: dict[NodeId, None] = {}
         """The nodes of which something is to be passed on, in the order in which it was heard."""
+        self._oldest = 0
+        """The epoch of the oldest statement is this one, or a later one."""
         self._own_epoch = -1
         self.epoch_end_ns = 0
         self._rings: list[int] = []
@@ -88,8 +90,10 @@ class Topology:
         """An epoch has begun in which this node hears these neighbors, and takes part in bulk slots often or not."""
         self._own_epoch = epoch = now_ns // self._epoch_ns
         self.epoch_end_ns = (epoch + 1) * self._epoch_ns
-        for node in [n for n, one in self._stated.items() if one.epoch < epoch - self._lifetime]:
-            self._forget(node)
+        if self._oldest < epoch - self._lifetime:
+            for node in [n for n, one in self._stated.items() if one.epoch < epoch - self._lifetime]:
+                self._forget(node)
+            self._oldest = min((one.epoch for one in self._stated.values()), default=epoch)
         self._arrange(now_ns)
         known = self._stated.get(self._node)
         if known is None and not heard:
@@ -118,6 +122,7 @@ class Topology:
     def _note(self, node: NodeId, stated: _Stated) -> None:
         known = self._stated.get(node)
         self._stated[node] = stated
+        self._oldest = min(self._oldest, stated.epoch)
         self.news[node] = None
         changed = stated.heard if known is None else stated.heard ^ known.heard
         self.changes += changed != 0 or known is None or known.often != stated.often

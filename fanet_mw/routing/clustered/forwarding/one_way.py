@@ -24,6 +24,7 @@ _UNICAST: Final = 0
 """The phase flags of a packet that goes to its receiver."""
 _SHOW_NS: Final = 1 * S
 """The least time between two floods by which a node shows the way to itself."""
+_new: Final = tuple.__new__  # for what is made once per packet
 _RECEIPT: Final = RECEIPT.msgid.to_bytes(3, "little")
 
 
@@ -61,7 +62,7 @@ class OneWay:
         self._neighbors = neighbors
         self._not_before = not_before
         self._takes = takes
-        self._ways: dict[NodeId, Way] = {}
+        self._ways: dict[int, Way] = {}
         self._under_way: dict[int, _Attempt] = {}
         self._shown_ns = -_SHOW_NS
 
@@ -69,10 +70,10 @@ class OneWay:
         return len(self._under_way)
 
     def learn(self, header: Header, neighbor: NodeId) -> None:
-        origin, born_us = NodeId(header.origin), header.origin_us
+        origin, born_us = header.origin, header.origin_us
         known = self._ways.get(origin)
         if known is None or born_us > known.born_us or (born_us == known.born_us and header.hops < known.hops):
-            self._ways[origin] = Way(born_us, header.hops, neighbor)
+            self._ways[origin] = _new(Way, (born_us, header.hops, neighbor))
 
     def takes(self, packet: Packet) -> bool:
         """True if a packet goes hop by hop."""

@@ -5,6 +5,7 @@ They are processes of their own, so that the launcher, whose router all frames p
 
 import contextlib
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 _NICENESS: Final = 5
 _CLOSING_S: Final = 20.0
+_TERMINATED: Final = (-signal.SIGTERM, 128 + signal.SIGTERM)
 
 
 class Companions:
@@ -31,6 +33,8 @@ class Companions:
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._running: list[subprocess.Popen[bytes]] = []
         self._checked = False
+        self.failed: dict[str, str] = {}
+        """How each ended that did not end in good order, by its first word; known when all were ended."""
 
     def __enter__(self) -> Self:
         return self
@@ -64,14 +68,18 @@ class Companions:
 
     def end(self) -> None:
         """End them; a recording closes its file first."""
+        from sim.results.outcome import described
+
         for process in self._running:
             with contextlib.suppress(ProcessLookupError):
                 process.terminate()
-        for process in self._running:
+        for words, process in zip(self._commands, self._running, strict=False):
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.wait(_CLOSING_S)
             process.kill()
-            process.wait()
+            code = process.wait()
+            if code and (words[0] == "record" or code not in _TERMINATED):  # a recording must end by itself
+                self.failed[words[0]] = described(code)
         self._running.clear()
         if self._folder is not None:
             self._folder.cleanup()

@@ -169,7 +169,10 @@ def launch(
                     on_started=lambda run: companions.start(run.address, chosen),
                 )
             )
-        return _finish(outcome, output)
+        failed = {name: f"fanet {name} ended with {how}" for name, how in companions.failed.items()}
+        for sentence in failed.values():
+            _say(sentence)
+        return _finish(outcome, output, {str(output.record): failed["record"]} if "record" in failed else {})
 
 
 def plan(

@@ -1,16 +1,20 @@
 """What the folder of a run, or a recording, holds, as lines and a table for people."""
 
+import os
 import struct
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import BinaryIO, Final, NamedTuple
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.foreign_file import open_regular
 from fanet_mw.trace import Record, kind_of
 from fanet_mw.units import S
 from sim.results.run_folder import RunFolder
+
+_MAGIC: Final = b"\x89MCAP0\r\n"
+"""The first bytes of an MCAP file, and its last."""
 
 
 class Contents(NamedTuple):
@@ -46,18 +50,27 @@ def of_folder(folder: Path) -> Contents:
     return Contents(lines, ("record", "count", "first [s]", "last [s]"), rows)
 
 
+def _ends_whole(file: BinaryIO) -> bool:
+    length = file.seek(0, os.SEEK_END)
+    file.seek(max(0, length - len(_MAGIC)))
+    return length >= 2 * len(_MAGIC) and file.read() == _MAGIC
+
+
 def of_recording(path: Path) -> Contents:
     """The topics of a recording; raises ConfigError for a file that is none, or that was cut off."""
-    from mcap.exceptions import McapError
+    from mcap.exceptions import EndOfFile, McapError
     from mcap.reader import make_reader
 
     try:
         with open_regular(path) as file:
+            if file.read(len(_MAGIC)) == _MAGIC and not _ends_whole(file):
+                raise EndOfFile("it was cut off, and has no index; mcap recover makes one of what is there")
+            file.seek(0)
             summary = make_reader(file).get_summary()
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
     except (McapError, ValueError, struct.error) as error:
-        raise ConfigError(f"{path}: is no MCAP file: {str(error)[:200] or 'it ends too soon'}") from error
+        raise ConfigError(f"{path}: is no whole MCAP file: {str(error)[:200] or 'it ends too soon'}") from error
     if summary is None or summary.statistics is None:
         raise ConfigError(f"{path}: was cut off before its index; `mcap recover` of Foxglove's command line mends it")
     held = summary.statistics

@@ -101,14 +101,17 @@ def in_order(
     source: Spool, key: Callable[[bytes], Any], *, change: Callable[[bytes], bytes] = lambda item: item
 ) -> Spool | None:
     """A new spool with the items sorted by key (stably) after `change`; None if the disk has no room."""
-    runs, ends = Spool(source.folder), [0]
+    folder = source.folder
+    if folder is not None and not folder.exists():  # whoever has removed it meanwhile costs no result
+        folder = None
+    runs, ends = Spool(folder), [0]
     for portion in batches(source.items(), least_bytes=_SORTED_BYTES):
         portion.sort(key=key)
         if not runs.append(*portion):
             return None
         ends.append(runs.size)
     merged = heapq.merge(*(runs.items(start, end) for start, end in pairwise(ends)), key=key)
-    result = Spool(source.folder)
+    result = Spool(folder)
     for portion in batches(map(change, merged), least_bytes=_BLOCK_BYTES):
         if not result.append(*portion):
             return None

@@ -333,11 +333,13 @@ def test_an_export_never_follows_a_link_that_lies_in_the_folder(
         (["export", "@", "--to", "parquet"], "tables: exists"),
         (["export", "/nowhere", "--to", "csv"], "summary.json"),
         (["info", "@/trace.jsonl"], "summary.json"),
-        (["info", "@/broken.mcap"], "is no MCAP file"),
+        (["info", "@/broken.mcap"], "is no whole MCAP file"),
+        (["info", "@/cut.mcap"], "it was cut off, and has no index; mcap recover makes one"),
     ],
 )
 def test_what_cannot_be_exported_is_said(folder: Path, words: list[str], message: str) -> None:
     (folder / "broken.mcap").write_bytes(b"no recording" * 10)
+    (folder / "cut.mcap").write_bytes(b"\x89MCAP0\r\n" + b"a recording" * 10)
     with pytest.raises(ConfigError, match=re.escape(message)):
         app(
             ["log", *(word.replace("@", str(folder)) for word in words)],

@@ -1,5 +1,7 @@
 """Programs beside a swarm that is launched."""
 
+import signal
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -34,3 +36,22 @@ def test_one_that_fails_as_the_swarm_comes_up_keeps_it_on_the_ground_and_one_tha
         companions.start(SwarmAddress("tcp/127.0.0.1:1", "s"), catalog.find("quick"))
         companions._running[0].wait(60)
         companions.check()
+
+
+@pytest.mark.parametrize(
+    ("words", "number", "failed"),
+    [
+        (["record"], signal.SIGKILL, {"record": "signal SIGKILL"}),
+        (["record"], signal.SIGTERM, {"record": "signal SIGTERM"}),
+        (["view"], signal.SIGKILL, {"view": "signal SIGKILL"}),
+        (["view"], signal.SIGTERM, {}),
+    ],
+)
+def test_one_that_did_not_end_in_good_order_is_named_and_a_recording_must_end_by_itself(
+    words: list[str], number: int, failed: dict[str, str]
+) -> None:
+    with Companions([words]) as companions:
+        companions._running.append(subprocess.Popen(["sleep", "60"]))
+        companions._running[0].send_signal(number)
+        companions._running[0].wait(60)
+    assert companions.failed == failed

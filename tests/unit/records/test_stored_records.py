@@ -4,6 +4,7 @@ import os
 import tracemalloc
 from collections.abc import Iterator
 from contextlib import closing
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -98,3 +99,12 @@ def test_memory_does_not_depend_on_how_much_is_sorted(monkeypatch: pytest.Monkey
         spool.close()
         ordered.close()
     assert most[1] < 6 * most[0], "a reader for each run: far less than the items"
+
+
+def test_a_folder_that_is_removed_during_the_run_costs_no_records(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    folder.mkdir()
+    with closing(RecordSpools(folder)) as spools:
+        spools.append([LetOut(3, 1, 1), LetOut(2, 1, 0)])
+        folder.rmdir()
+        assert [one.t_ns for one in spools.records(true_delays=False)] == [2, 3]

@@ -144,7 +144,6 @@ def _between(posed: Sequence[Posed], t_ns: int) -> Enu:
     """The position of a UAV between two of its records, or at the first or the last one."""
     after = bisect_right(posed, t_ns, key=lambda record: record.t_ns)
     first, second = posed[max(0, after - 1)], posed[min(after, len(posed) - 1)]
-    span_ns = second.t_ns - first.t_ns
-    share = min(1.0, max(0.0, (t_ns - first.t_ns) / span_ns)) if span_ns > 0 else 0.0
+    share = min(1.0, max(0.0, (t_ns - first.t_ns) / max(1, second.t_ns - first.t_ns)))
     place = [a + share * (b - a) for a, b in zip(first[2:], second[2:], strict=True)]
     return Enu(*place)

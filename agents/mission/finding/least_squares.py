@@ -47,7 +47,7 @@ def estimate(readings: Sequence[PowerReading], *, phone_power_dbm: float, expone
             break
         step_east, step_north = (c * p - b * q) / determinant, (a * q - b * p) / determinant
         length = math.hypot(step_east, step_north)
-        scale = min(1.0, _MAX_STEP_M / length) if length else 0.0
+        scale = _MAX_STEP_M / max(_MAX_STEP_M, length)
         east, north = east + scale * step_east, north + scale * step_north
         if length < 0.1:
             break

@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from sim.world.arrays import Rows, Values
+from sim.world.arrays import Rows
 from sim.world.engines.contacts import Contacts
 from sim.world.engines.contract import Engine
 from sim.world.engines.quiet_pybullet import pybullet
@@ -173,11 +173,6 @@ class Physics(Engine):
 
     def velocities(self) -> Rows:
         return self._velocity
-
-    def tilts_rad(self) -> Values:
-        """The angle between each body's axis and the vertical."""
-        attitudes = [pybullet.getBasePositionAndOrientation(body, self._client)[1] for body in self._bodies]
-        return np.array([math.acos(max(-1.0, min(1.0, 1 - 2 * (x * x + y * y)))) for x, y, _, _ in attitudes])
 
     def fall(self, row: int) -> None:
         self._wrecks.append(row)

@@ -280,3 +280,12 @@ def test_a_message_that_waits_in_one_flow_is_not_handed_over_for_one_of_another(
     assert numbers(receiver) == [7, 10]
     hear(receiver, head(6, port=5), BORN_NS)
     assert numbers(receiver) == [6, 9]
+
+
+def test_of_all_senders_together_so_many_messages_wait_and_no_more() -> None:
+    receiver = made()
+    for number in range(1, 1 + 12 * 400):
+        sender = NodeId(2 + number % 12)
+        receiver.hear(sender, Piece(head(number, pieces=2), None, b"\0"), b"", priority=3, now_ns=BORN_NS)
+    assert len(receiver._incoming) == 4096
+    assert receiver.not_taken == 12 * 400 - 4096

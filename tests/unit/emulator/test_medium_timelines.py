@@ -8,7 +8,7 @@ import pytest
 from hand_driven import NAMES, PAYLOAD, Air, receptions, statuses
 
 from fanet_mw.airtime import frame_ns
-from fanet_mw.bus.messages import Poses, TxOutcome, TxRequest, TxStatus
+from fanet_mw.bus.messages import Obstructions, Poses, Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, US, S
 
@@ -252,3 +252,23 @@ def test_an_ack_over_more_than_a_slot_of_way_there_and_back_comes_too_late(
         air = Air(make_scenario(**{"nodes.count": 2, "radio.standard": standard, "radio.range_m": 5000}), [0, metres])
         air.send(1, 1 * MS, dst=2)
         assert [tried for *_, tried in statuses(air.run())] == [attempts]
+
+
+@pytest.mark.parametrize(("losses_ddb", "lost_db"), [([], 12.0), ([73], 7.3), ([250], 25.0)])
+def test_a_pair_that_something_parts_is_weaker_by_the_loss_that_the_world_says_or_the_scenario_s(
+    make_scenario: MakeScenario, losses_ddb: list[int], lost_db: float
+) -> None:
+    keys = {"nodes.count": 3, "radio.channel": "friis", "radio.obstruction_loss_db": 12}
+    rssi_dbm = []
+    for parted in (False, True):
+        air = Air(make_scenario(**keys), [0.0, 60.0, -60.0])
+        if parted:
+            obstructions = Obstructions(0, array("H", [1, 2]), array("H", losses_ddb))
+            air.medium.receive(NAMES.obstruction, obstructions, 0)
+            air.place([0.0, 60.0, -60.0], 0)
+        air.send(1, 5 * MS)
+        heard = {h.node: h.message for h in air.run() if isinstance(h.message, Reception)}
+        rssi_dbm.append((heard[2].rssi_dbm, heard[3].rssi_dbm))
+    (before, other), (after, other_after) = rssi_dbm
+    assert before - after == pytest.approx(lost_db, abs=1e-6)
+    assert other == other_after

@@ -313,3 +313,12 @@ def test_a_node_says_how_well_it_knows_its_rate_and_one_that_follows_it_counts_o
         assert now is not None
         grown_ns.append(later - now)
     assert grown_ns[0] > grown_ns[1] + 300 * US
+
+
+def test_a_neighbor_whose_hellos_are_of_another_time_is_out_of_step_after_nine_hellos() -> None:
+    sync = follower()
+    follow(sync, ahead_ns=25 * MS, hellos=5)
+    sync.on_old_hello(NodeId(3), 5 * S)
+    for second in range(6, 17):
+        sync.on_old_hello(NodeId(3), second * S)
+        assert sync.counts["apart"] == max(0, second - 14), "it may be one hello that others have recorded"

@@ -111,6 +111,16 @@ def test_links_are_told_when_there_is_an_estimate_and_again_when_one_has_changed
     assert quality.outdated(now_ns=45 * S)  # fifteen hellos did not come
 
 
+def test_a_link_that_is_gone_has_changed() -> None:
+    quality = LinkQuality(NodeId(1), hello_ns=S)
+    for second in range(WINDOW):
+        quality.on_hello(NodeId(2), rssi_dbm=-80, now_ns=second * S)
+    (link,) = quality.tell(now_ns=WINDOW * S)
+    assert link.chance > 0.95
+    assert quality.links(now_ns=2 * WINDOW * S) == ()
+    assert quality.outdated(now_ns=2 * WINDOW * S)
+
+
 # --- as the leader puts them together ---------------------------------------------------------------------------------
 
 

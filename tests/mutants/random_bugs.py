@@ -58,6 +58,10 @@ _COMPUTED: Final = {ast.Add: "-", ast.Sub: "+", ast.Mult: "/", ast.Div: "*", ast
                     ast.LShift: ">>", ast.RShift: "<<", ast.BitAnd: "|", ast.BitOr: "&"}  # fmt: skip
 _NOT_LOGIC: Final = (ast.Assert, ast.Raise, ast.Import, ast.ImportFrom, ast.FunctionDef, ast.AsyncFunctionDef,
                      ast.ClassDef)  # fmt: skip
+_COMPILED_ONLY: Final = ("emulator/kernel/jit.py", "emulator/kernel/entry.py")
+"""Files whose code runs only where numba compiles: no bugs of the uncompiled code are drawn of them."""
+_LOOKS: Final = ("strict", "linewidth", "zorder", "alpha", "fontsize", "markersize")
+"""Parameters that assert, and those of pictures, of which people's eyes judge."""
 _TOLD: Final = ("__repr__", "__str__", "describe", "sentence", "report")
 """Functions for people's eyes, of which no bugs are drawn."""
 
@@ -153,8 +157,8 @@ class Source:
         told = [
             node
             for node in ast.walk(expression)
-            if isinstance(node, ast.JoinedStr) or (isinstance(node, ast.keyword) and node.arg == "strict")
-        ]  # `strict` asserts
+            if isinstance(node, ast.JoinedStr) or (isinstance(node, ast.keyword) and node.arg in _LOOKS)
+        ]
         left_out = {id(inner) for node in told for inner in ast.walk(node)}
         for node in ast.walk(expression):
             if id(node) in left_out:
@@ -201,7 +205,7 @@ def all_bugs(areas: Sequence[str]) -> list[Bug]:
     for folder in PACKAGES:
         for file in sorted((ROOT / folder).rglob("*.py")):
             path = file.relative_to(ROOT).as_posix()
-            if area_of(path) in areas:
+            if area_of(path) in areas and path not in _COMPILED_ONLY:
                 found += Source(path).bugs()
     return found
 

@@ -31,7 +31,7 @@ def multipoint_relays(node: NodeId, adjacency: Adjacency, *, willingness: Mappin
     while missing:
         # The degree D(y) counts the neighbors of y other than `node` and its neighbors, which is the whole of `reach`.
         best = max(
-            (n for n in sorted(reach) if n not in relays and reach[n] & missing),
+            (n for n in reach if n not in relays and reach[n] & missing),
             key=lambda n: (will[n], len(reach[n] & missing), len(reach[n]), -n),
         )
         relays.add(best)

@@ -23,3 +23,11 @@ def test_who_never_says_where_it_is_stays_where_it_was_put(make_scenario: MakeSc
     links = LinksOverTime(Outcome(make_scenario(**keys), "virtual", 1.0, [], {}))
     assert links.at(0).tolist() == [[True, True, False], [True, True, True], [False, True, True]]
     assert links.at(0) is links.at(0)
+
+
+@pytest.mark.parametrize(("sources", "to", "share"), [([1], 2, 1.0), ([1], 3, 0.0), ([1, 3], 2, 0.5), ([2, 3], 1, 0.5)])
+def test_pairs_are_those_of_the_traffic(make_scenario: MakeScenario, sources: list[int], to: int, share: float) -> None:
+    """Two stand together, and one is far away."""
+    keys = {"nodes.count": 3, "nodes.layout": "explicit", "nodes.positions_m": [[0, 0, 50], [100, 0, 50], [900, 0, 50]]}
+    traffic = {"traffic.sources": sources, "traffic.destination": to, "radio.range_m": 250}
+    assert connectivity(make_scenario(**keys, **traffic)) == share

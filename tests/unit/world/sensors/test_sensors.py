@@ -413,6 +413,8 @@ def test_heights_are_those_of_the_air_and_of_what_is_below(make_scenario: MakeSc
     assert_sigma([reading.up_m - 40 for reading in told[0]], 0.5)
     assert_sigma([reading.above_ground_m - 25 for reading in told[0] if reading.above_ground_m is not None], 0.1)
     assert np.mean([reading.above_ground_m for reading in told[1]]) == pytest.approx(40, abs=0.1)
+    both = np.array([(reading.up_m, reading.above_ground_m) for reading in told[1]])
+    assert abs(np.corrcoef(both.T)[0, 1]) < SIGMAS / math.sqrt(300), "each has a noise of its own"
     assert all(reading.above_ground_m is None for reading in told[2]), "beyond the rangefinder's 120 m"
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
 from fanet_mw.routing.clustered.timetable.turn_allocation import fit, fit_measured, least_interval_ns
+from fanet_mw.routing.clustered.timetable.turn_size import schedule_parts
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId
 from fanet_mw.wire.links import Link, grade_of
@@ -175,3 +176,10 @@ def test_the_least_interval_is_what_it_was_before(
     scenario = scenario_of(make_scenario, interval_s, keys)
     found_ns = least_interval_ns(scenario, places_of(16), heads_of(16, every))
     assert round((found_ns or 0) / MS, 2) == kept_ms
+
+
+@pytest.mark.parametrize(("count", "parts"), [(2, 1), (57, 1), (58, 2), (113, 2), (114, 3)])
+def test_a_schedule_has_a_part_for_each_56_nodes_without_the_leader(
+    make_scenario: MakeScenario, count: int, parts: int
+) -> None:
+    assert schedule_parts(scenario_of(make_scenario, 1.0, {}, count)) == parts

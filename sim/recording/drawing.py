@@ -8,6 +8,7 @@ from sim.observation.swarm_state import UavNow
 
 STATUS_COLORS: Final = {
     "not heard": colors.GRAY, "detected": colors.ORANGE, "approached": colors.BLUE, "reached": colors.PINK,
+    "inside": colors.SHADE, "among": colors.SHADE,
     "confirmed": colors.GREEN, "mistaken": colors.RED, "reopened": colors.RED,
 }  # fmt: skip
 """The color of a survivor by the state of the search for him or her."""

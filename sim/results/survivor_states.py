@@ -3,12 +3,14 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
-from fanet_mw.trace import Approaching, Arrived, Confirmed, Detected, Record, Refuted
+from fanet_mw.trace import Approaching, Arrived, Confirmed, Detected, PlacedAmong, PlacedInside, Record, Refuted
 from fanet_mw.units import Enu
 from sim.results.mission import Confirmations
 
 UNHEARD: Final = "not heard"
-_STAGES: Final[Mapping[type[Any], str]] = {Detected: "detected", Approaching: "approached", Arrived: "reached"}
+_STAGES: Final[Mapping[type[Any], str]] = {
+    Detected: "detected", Approaching: "approached", Arrived: "reached", PlacedInside: "inside", PlacedAmong: "among",
+}  # fmt: skip
 _ORDER: Final = (UNHEARD, *_STAGES.values())
 
 
@@ -17,7 +19,9 @@ class SurvivorState(NamedTuple):
 
     t_ns: int
     status: str
-    """`mistaken`: confirmed far from the true place; `reopened`: the confirmation was taken back."""
+    """`inside`: said to be in a building; `among`: said to be one of several people; `mistaken`: confirmed far from the
+    true place; `reopened`: the confirmation was taken back.
+    """
     node: int
     """The UAV that brought this about; 0 if there was none."""
 
@@ -32,7 +36,7 @@ class SurvivorStates:
 
     def take(self, record: Record) -> tuple[int, SurvivorState] | None:
         """Take in a record; returns the survivor and the new state, if it changes one."""
-        if not isinstance(record, Detected | Approaching | Arrived | Confirmed | Refuted):
+        if not isinstance(record, Detected | Approaching | Arrived | PlacedInside | PlacedAmong | Confirmed | Refuted):
             return None
         if record.survivor not in self.now:
             return None

@@ -452,7 +452,7 @@ def legend(*, by_cluster: bool, links_known: bool) -> str:
     modes = ((MODE_COLORS["search"], "search"), (MODE_COLORS["respond"], "respond"),
              (MODE_COLORS["deploy"], "on its way"), (MODE_COLORS["lost_link"], "hears nobody"),
              (HOMEWARD_COLOR, "homeward"))  # fmt: skip
-    found = ("not heard", "detected", "approached", "reached", "confirmed", "mistaken")
+    found = ("not heard", "detected", "approached", "reached", "inside", "among", "confirmed", "mistaken")
     people = ", ".join(f"<nobr>{_dot(STATUS_COLORS[status])} {status}</nobr>" for status in found)
     marks = ", ".join(f"<nobr>{_dot(color)} {said}</nobr>" for color, said in modes)
     uavs = "by cluster, heads larger" if by_cluster else marks

@@ -17,16 +17,19 @@ from fanet_mw.trace import (
     Detected,
     FlightModeChanged,
     MissionModeChanged,
+    PlacedAmong,
+    PlacedInside,
     Posed,
     ProcessEnded,
     Record,
     Refuted,
     RoleChanged,
 )
-from fanet_mw.units import S
+from fanet_mw.units import Enu, S
 from sim.report import replay_page
 from sim.results.mission import mission
 from sim.results.replay import Replay
+from sim.results.survivor_states import SurvivorStates
 from sim.world.environment.layout import positions
 
 KEYS = {
@@ -68,6 +71,18 @@ def test_a_survivor_goes_from_not_heard_to_confirmed_and_a_mistake_is_reopened(r
     }
     assert [replay.found(t)[2].status for t in (0, 8.99, 9, 11, 13, 14)] == [
         "not heard", "not heard", "detected", "mistaken", "reopened", "confirmed",
+    ]  # fmt: skip
+
+
+def test_a_survivor_said_to_be_in_a_building_or_among_people_is_so_until_confirmed() -> None:
+    states = SurvivorStates([Enu(0, 0, 0), Enu(50, 0, 0)])
+    said: list[Record] = [
+        Detected(S, 1, 1, -80.0), PlacedInside(2 * S, 1, 1, 5.0, 0.0), Arrived(3 * S, 2, 1),
+        PlacedAmong(4 * S, 2, 2, 60.0, 0.0), Confirmed(5 * S, 1, 2, 51.0, 0.0),
+    ]  # fmt: skip
+    changes = [state for record in said if (state := states.take(record)) is not None]
+    assert [(survivor, state.status) for survivor, state in changes] == [
+        (1, "detected"), (1, "inside"), (2, "among"), (2, "confirmed"),
     ]  # fmt: skip
 
 

@@ -47,7 +47,8 @@ class Pattern:
         self.vacant = vacant
         whole = self._whole = _SHAPES[dimensions.shape](dimensions)
         self.reach_m, self._hop_m = reach_m, _HOP * reach_m
-        self._flown = {place: at for row in whole.rows() for place, at in row.shared(vacant).items()}
+        self._rows = whole.rows()
+        self._flown = {place: at for row in self._rows for place, at in row.shared(vacant).items()}
         """Where on its row each UAV flies whose row has closed ranks."""
         self.shape: Shape = whole.drawn_in(vacant, self._hop_m) if vacant else whole
         self._begins: dict[int, Enu] = {}
@@ -111,7 +112,7 @@ class Pattern:
         """True if one of these places is in the row of a place, or in a row that ends there."""
         return any(
             others.intersection(row.places)
-            for row in self._whole.rows()
+            for row in self._rows
             if place in row.places or set(self._whole.tethers(place)).intersection(row.places)
         )
 
@@ -143,7 +144,7 @@ class Pattern:
         return found
 
     def _row(self, place: int) -> RowOfPlaces | None:
-        return next((row for row in self._whole.rows() if place in row.places), None)
+        return next((row for row in self._rows if place in row.places), None)
 
     def _nearest(self, place: int) -> int:
         """The place whose UAV flies nearest to a place of its row, now that the row has closed ranks."""
@@ -170,7 +171,7 @@ class Pattern:
         if self.kind(place) == "follower":
             return True
         rank = place - sum(other < place for other in self.vacant)
-        at, left = self._flown.get(place, place), self._whole.rows()[0].left(self.vacant)
+        at, left = self._flown.get(place, place), self._rows[0].left(self.vacant)
         return rank % 2 == 1 and self.shape.may_leave(at, swept_s, reach_m=_LEAVES * self.reach_m, left=left)
 
     def velocity(self, place: int, swept_s: float) -> Enu:

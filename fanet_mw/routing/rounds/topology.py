@@ -14,6 +14,7 @@ from fanet_mw.units import NodeId, S
 from fanet_mw.wire.rounds import HeardNodes
 
 _MODULUS: Final = 256
+_new: Final = tuple.__new__  # for what is made once per statement
 _REMEMBERED: Final = 4096
 """The sets of nodes whose members a process remembers; most are the neighbors of somebody, and asked for again."""
 
@@ -31,8 +32,8 @@ def nodes_of(bits: int) -> tuple[NodeId, ...]:
 
 class _Stated(NamedTuple):
     epoch: int
-    heard: int
-    often: bool
+    told: HeardNodes
+    """What was stated, as it is passed on."""
 
 
 class Topology:
@@ -100,34 +101,36 @@ class Topology:
             return  # nobody would learn anything
         if (
             known is None
-            or (known.heard, known.often) != (heard, often)
+            or (known.told.heard, known.told.often) != (heard, often)
             or self._own_epoch - known.epoch >= self._refresh
         ):
-            self._note(self._node, _Stated(self._own_epoch, heard, often))
+            self._note(epoch, HeardNodes(self._node, epoch % _MODULUS, heard, often))
 
     def hear(self, told: Sequence[HeardNodes], *, now_ns: int) -> None:
         """A neighbor passes on what nodes have stated."""
         current = now_ns // self._epoch_ns
         stated = self._stated
-        for node, short, heard, often in told:
+        for one in told:
+            node, short, heard, _ = one
             known = stated.get(node)
-            if known is not None and known.epoch % _MODULUS == short:
+            if known is not None and known.told.epoch == short:
                 continue
             behind = (current + 1 - short) % _MODULUS - 1  # one epoch ahead is possible, because clocks differ
             if node == self._node or node > self._count or behind > self._lifetime or heard >> self._count:
                 continue
             if known is None or current - behind > known.epoch:
-                self._note(node, _Stated(current - behind, heard, often))
+                self._note(current - behind, one)
 
-    def _note(self, node: NodeId, stated: _Stated) -> None:
+    def _note(self, epoch: int, told: HeardNodes) -> None:
+        node, _, heard, often = told
         known = self._stated.get(node)
-        self._stated[node] = stated
-        self._oldest = min(self._oldest, stated.epoch)
+        self._stated[node] = _new(_Stated, (epoch, told))
+        self._oldest = min(self._oldest, epoch)
         self.news[node] = None
-        changed = stated.heard if known is None else stated.heard ^ known.heard
-        self.changes += changed != 0 or known is None or known.often != stated.often
+        changed = heard if known is None else heard ^ known.told.heard
+        self.changes += changed != 0 or known is None or known.told.often != often
         if changed or known is None:
-            self._relink(node, stated.heard, changed)
+            self._relink(node, heard, changed)
 
     def _relink(self, node: NodeId, heard: int, changed: int) -> None:
         """A node hears some others now, or no longer."""
@@ -135,7 +138,7 @@ class Topology:
         before = links[node]
         for other in nodes_of(changed):
             stated = self._stated.get(other)
-            if stated is not None and stated.heard & own and heard >> (other - 1) & 1:
+            if stated is not None and stated.told.heard & own and heard >> (other - 1) & 1:
                 links[node] |= 1 << (other - 1)
                 links[other] |= own
             else:
@@ -145,7 +148,7 @@ class Topology:
 
     def _forget(self, node: NodeId) -> None:
         self.changes += 1
-        heard = self._stated.pop(node).heard
+        heard = self._stated.pop(node).told.heard
         self.news.pop(node, None)
         self._relink(node, 0, heard)
 
@@ -153,8 +156,7 @@ class Topology:
         nodes = list(self.news)[:most]
         for node in nodes:
             del self.news[node]
-        stated = ((node, self._stated[node]) for node in nodes)
-        return [HeardNodes(node, one.epoch % _MODULUS, one.heard, one.often) for node, one in stated]
+        return [self._stated[node].told for node in nodes]
 
     # --- what follows from it -------------------------------------------------------------------------------------
 
@@ -245,7 +247,7 @@ class Topology:
             reached = near | self._around(near)
             stated = self._stated
             others = nodes_of(reached & ~(1 << (self._node - 1)))
-            found = [(node, node not in stated or stated[node].often) for node in others]
+            found = [(node, node not in stated or stated[node].told.often) for node in others]
             self._rivals = sorted(
                 found, key=lambda rival: not rival[1]
             )  # those that take part in each slot decide soonest

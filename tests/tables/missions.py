@@ -28,7 +28,7 @@ _NEAR_M: Final = (10.0, 20.0, 50.0)
 _OF_THE_SUMMARY: Final = (
     "survivors", "detected", "confirmed", "mistaken", "reopened", "time_to_confirm_s", "confirmed_error_m",
     "uavs_approaching", "collisions", "coverage", "covered_95_s", "connected", "nearest_m", "wait_s", "biconnected",
-    "diameter",
+    "diameter", "persons",
 )  # fmt: skip
 """What tables read of the summary's table `mission`."""
 
@@ -200,7 +200,7 @@ PLACES_HEAD: Final = [
     "landed early / fell", "code",
 ]  # fmt: skip
 WHOLE_HEAD: Final = [
-    "scenario", "seeds", "confirmed", "last find [s]", "error [m]", "wait: median / worst [s]",
+    "scenario", "seeds", "found (by phone)", "last phone named [s]", "error [m]", "wait: median / worst [s]",
     "95 % covered after [s]", "contacts", "least distance [m]", "connected, least [%]",
     "reports: half / 95 % / worst [s]", "bounds of reports stated, least / broken", "bulk: PDR, least / 95 % [s]",
     "code",
@@ -267,11 +267,14 @@ def whole_row(name: str, runs: Sequence[Run]) -> list[str]:
     def worst(values: Sequence[float | None], digits: int) -> str:
         return f"{max(value for value in values if value is not None):.{digits}f}" if any(values) else "-"
 
+    found = sum(run.get("persons", run["confirmed"]) for run in runs)  # older rows have no persons
     finds, stated = any(run["survivors"] for run in runs), [run["stated"] for run in runs if run["stated"] is not None]
     return [
         name,
         str(len(runs)),
-        f"{sum(run['confirmed'] for run in runs)} of {sum(run['survivors'] for run in runs)}" if finds else "-",
+        f"{found} of {sum(run['survivors'] for run in runs)} ({sum(run['confirmed'] for run in runs)})"
+        if finds
+        else "-",
         median([max(run["time_to_confirm_s"], default=None) for run in runs]),
         median([run["confirmed_error_m"] for run in runs], 1),
         f"{median([run['wait_s']['p50'] for run in runs])} / {worst([run['wait_s']['max'] for run in runs], 0)}",

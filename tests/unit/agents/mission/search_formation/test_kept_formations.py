@@ -23,8 +23,8 @@ def flown(pattern: Pattern) -> Iterator[Any]:
     """Where everybody is over some sweeps, how fast, and tied to whom."""
     yield pattern.dimensions, pattern.shape.sweep_s, pattern.shape.lane_m, pattern.shape.rows()
     teams = range(pattern.dimensions.teams)
-    few = [place for place in range(0, pattern.places, 1 + pattern.places // 16) if place not in pattern.vacant]
-    for share in (-0.1, 0.03, 0.3, 0.61, 0.97, 1.004, 1.4, 1.9, 2.7, 3.6):
+    few = [place for place in range(0, pattern.places, 1 + pattern.places // 12) if place not in pattern.vacant]
+    for share in (-0.1, 0.03, 0.4, 0.97, 1.004, 1.4, 2.7, 3.6):
         swept_s = share * pattern.shape.sweep_s
         yield [pattern.shape.apart_m(team, 40.0 * team, 333.0, swept_s) for team in teams]
         for place in few:

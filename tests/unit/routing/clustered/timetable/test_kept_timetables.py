@@ -161,8 +161,6 @@ def test_a_timetable_by_measured_links_comes_to_what_it_came_to_before(
     ("interval_s", "keys", "every", "kept_ms"),
     [
         (1.0, {}, 1, 250.0),
-        (0.1, {}, 1, 62.5),
-        (0.05, SMALL, 1, 18.52),
         (0.1, SMALL, 4, 27.78),
         (0.1, SMALL | SHORT, 4, 0.0),
         (0.2, HEARD, 2, 83.33),

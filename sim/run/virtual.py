@@ -1,7 +1,9 @@
 """One scenario in virtual time: the same actors as in real time, in one process, deterministic."""
 
+import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from signal import Signals
@@ -92,7 +94,7 @@ def simulate(
     what a part has raised, which ends a run early, and else is raised; a long run keeps what it collects in a nameless
     file in `spool_folder`.
     """
-    with GARBAGE.not_collected():
+    with GARBAGE.not_collected(), _same_folder():
         observed = Observed(
             scenario, capture=capture, applications=applications, folder=spool_folder, observer=observer
         )
@@ -108,6 +110,17 @@ def simulate(
             observed.host.stop_after_failure()
     interrupted = f"interrupted by {Signals(signals[0]).name}" if signals else ""
     return observed.outcome(wall_s=time.perf_counter() - began, cut_short=interrupted, failure=failure)
+
+
+@contextmanager
+def _same_folder() -> Iterator[None]:
+    """Keep the working folder, which a part of another package may change: relative paths stay what they were."""
+    folder = os.open(".", os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        yield
+    finally:
+        os.fchdir(folder)
+        os.close(folder)
 
 
 class Observed:

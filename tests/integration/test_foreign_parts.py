@@ -190,6 +190,11 @@ class Finder(Application):
     def look(self): return {}[7]
 class Leaver(Finder):
     def look(self): sys.exit(0)
+class Mover(Finder):
+    def look(self):
+        import os
+        os.chdir("/")
+        raise ValueError
 class Proto(Flooding):
     def receive(self, packet, reception, *, now_ns):
         assert now_ns < 2_600_000_000, "what\\nis this"
@@ -207,6 +212,10 @@ class Course(Static):
             "raising:Finder.wake (agent-3, at 2.6 s) has raised KeyError: 7",
         ),
         ('applications=[{use="raising:Leaver",nodes=[3]}]', "has called sys.exit(0) at 2.6 s (agent-3, at 2.6 s)"),
+        (
+            'applications=[{use="raising:Mover",nodes=[3]}]',
+            "raising:Finder.wake (agent-3, at 2.6 s) has raised ValueE",
+        ),
         ("routing.protocol=raising:Proto", " s) has raised AssertionError: what is this"),
         ("mobility.model=raising:Course", "raising:Course.track (world, at 2.7 s) has raised ZeroDivisionError: div"),
     ],
@@ -217,18 +226,8 @@ def test_what_was_flown_until_a_part_raises_is_kept_and_said_to_have_been_ended_
     (tmp_path / "raising.py").write_text(RAISING)
     monkeypatch.syspath_prepend(tmp_path)
     keys = ["warmup_s=1", "drain_s=1", "traffic.interval_s=0.2", "mission.survivors=0", change]
-    words = [
-        "simulate",
-        "quick",
-        "--duration",
-        "9",
-        "--out",
-        str(tmp_path / "out"),
-        "--record",
-        str(tmp_path / "r.mcap"),
-        "--set",
-        *keys,
-    ]
+    monkeypatch.chdir(tmp_path)
+    words = ["simulate", "quick", "--duration", "9", "--out", "out", "--record", "r.mcap", "--set", *keys]
     assert app(words, result_action="return_value", exit_on_error=False, print_error=False) == 1
     err = capsys.readouterr().err
     assert "ended early: " in err

@@ -38,8 +38,8 @@ GROUPS: Final[Mapping[str, str]] = {
 }
 """The keys of a scenario that may name a part of another package, and the group of entry points for each."""
 _OURS: Final = ("fanet_mw", "agents", "emulator", "sim")
-_DEEPEST: Final = 16
-"""The depth of a report; one that holds itself has none."""
+_DEEPEST: Final = 10
+"""The depth of a report, which may be read wherever it is told; one that holds itself has none."""
 _TOLD: Final[Mapping[str, tuple[type, ...]]] = {
     **dict.fromkeys(
         ("kind", "node", "generated", "bus_malformed", "heard_late", "messages", "applications", "frames_sent",

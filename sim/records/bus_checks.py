@@ -37,8 +37,8 @@ _SLACK_NS: Final = 10 * S
 """How far an instant may lie outside the scenario's time, because processes start before it and end after it."""
 _FARTHEST_M: Final = 1e7
 """How far from the origin anything can be."""
-_DEEPEST: Final = 6
-"""The greatest depth of nesting in a report's JSON."""
+_DEEPEST: Final = 12
+"""The greatest depth of nesting in a report's JSON; that of an application is two below (`fanet_mw/extensions.py`)."""
 _MOST_RSSI_MDBM: Final = 400_000
 """The greatest magnitude of the mean RSSI of a link [1/1000 dBm]."""
 _SPEAKERS: Final[dict[type[Any], str | None]] = {

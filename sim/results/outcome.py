@@ -44,7 +44,7 @@ class Outcome:
     heard: Mapping[str, Any] = field(default_factory=dict)
     """The number of puts that the launcher received, and of refused items by what was wrong; in real time only."""
     absent: Mapping[str, str] = field(default_factory=dict)
-    """Why the report of an actor is missing, by the actor's name; in real time only."""
+    """Why the report of an actor, or its last one, is missing, by the actor's name; in real time only."""
     slowed: Sequence[tuple[int, float]] = ()
     """When the pace of the clock changed as the machine could not keep up, or could again: swarm instant [ns], scale.
     """

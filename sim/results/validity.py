@@ -110,9 +110,10 @@ def _broken(outcome: Outcome) -> Iterator[str]:
         dead = [name for name, ended in outcome.ended if ended == code]
         yield f"{_named(dead)} ended before the end, with {described(code)}: {len(dead)}, limit 0"
     for name, why in outcome.absent.items():
-        yield f"no report of {name} ({why}); all must report"
+        yield f"no {'last ' if name in outcome.reports else ''}report of {name} ({why}); all must report"
     gone = {f"agent-{node}" for node in outcome.scenario.node_ids if _is_stopped_for_good(outcome.scenario, node)}
     unfinished = [name for name, report in outcome.reports.items() if not report.get("final") and name not in gone]
+    unfinished = [name for name in unfinished if name not in outcome.absent]
     if unfinished and outcome.mode == "realtime":
         yield f"no last report of {_named(unfinished)}: {len(unfinished)}, limit 0"
 

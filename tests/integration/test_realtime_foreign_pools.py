@@ -1,5 +1,7 @@
 """A program with processes of its own ends as it would without us, whether it only looks us up or launches a swarm."""
 
+import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -7,6 +9,7 @@ from pathlib import Path
 import pytest
 from kit import slow
 
+ROOT = Path(__file__).parents[2]
 PROGRAM = """
 import multiprocessing, sys, time
 import fanet_mw
@@ -51,3 +54,41 @@ def test_a_program_whose_own_processes_live_ends_although_we_were_looked_up(
 @pytest.mark.parametrize("kind", ["forkserver", *slow("spawn")])
 def test_a_program_whose_own_processes_live_ends_after_a_launch(tmp_path: Path, kind: str) -> None:
     ends(tmp_path, 'fanet_mw.launch("quick", overrides=["duration_s=1", "drain_s=0", "nodes.count=5"])', kind, "daemon")
+
+
+SCENARIO = """
+duration_s = 1
+drain_s = 0
+nodes = {count = 2, layout = "line"}
+routing = {protocol = "flooding"}
+traffic = {arrivals = "none"}
+applications = [{use = "forking:Part", nodes = [1]}]
+"""
+PART = """
+import os, time
+from fanet_mw import Application
+
+class Part(Application):
+    name = "part"
+
+    def __init__(self, scenario, node, options): pass
+
+    def start(self, port, now_ns):
+        if not os.fork():
+            open("helper", "w").write(str(os.getpid()))
+            time.sleep(600)
+            os._exit(0)
+"""
+
+
+def test_a_process_that_an_application_has_forked_does_not_hold_up_the_launcher(tmp_path: Path) -> None:
+    (tmp_path / "forking.py").write_text(PART)
+    (tmp_path / "lone.toml").write_text(SCENARIO)
+    launch = [sys.executable, "-m", "fanet_mw", "launch", "lone.toml"]
+    path = os.pathsep.join((str(tmp_path), str(ROOT)))
+    with (tmp_path / "said").open("w") as said:  # the helper would keep a pipe open
+        ended = subprocess.run(
+            launch, cwd=tmp_path, env={**os.environ, "PYTHONPATH": path}, stdout=said, stderr=said, timeout=60
+        )
+    assert ended.returncode in (0, 1), (tmp_path / "said").read_text()
+    os.kill(int((tmp_path / "helper").read_text()), signal.SIGKILL)  # it lives

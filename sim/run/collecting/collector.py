@@ -183,7 +183,11 @@ class Collector:
         with self._lock:
             self._keep(further)
             why = dict(sorted(self._refused.items()))
-            missing = [name for name in self._checks.node_of if name not in self._reports]
+            absent = {
+                name: self._why_no_report.get(name, "no report was heard")
+                for name in self._checks.node_of
+                if name not in self._reports or (name in self._why_no_report and not self._reports[name].get("final"))
+            }
             return Outcome(
                 scenario=self._scenario,
                 mode="realtime",
@@ -195,7 +199,7 @@ class Collector:
                 ready_s=ready_s,
                 epoch_unix_ns=epoch_unix_ns,
                 heard={"puts": self._puts, "malformed": sum(why.values()), "why": why},
-                absent={name: self._why_no_report.get(name, "no report was heard") for name in missing},
+                absent=absent,
             )
 
     def reports(self) -> dict[str, dict[str, Any]]:

@@ -72,6 +72,7 @@ def _child(recipe: ChildRecipe) -> None:
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _FOR_THE_LAUNCHER)
     be_killed_with_parent()
     _keep_no_server_alive()
+    _keep_no_tracker_alive()
     entitle(recipe.name, recipe.title)
     try:
         if recipe.gives_way:
@@ -89,6 +90,16 @@ def _keep_no_server_alive() -> None:
     if kept is not None:
         os.close(kept)
         forkserver._forkserver._forkserver_alive_fd = None  # type: ignore[attr-defined]  # noqa: SLF001
+
+
+def _keep_no_tracker_alive() -> None:
+    """Close this copy of the resource tracker's pipe: a process that an application forks would keep it, and so the
+    tracker, for which the launcher waits at its exit. A child that needs a tracker starts its own.
+    """
+    tracker: Any = resource_tracker._resource_tracker  # noqa: SLF001
+    if tracker._fd is not None:  # noqa: SLF001
+        os.close(tracker._fd)  # noqa: SLF001
+        tracker._fd = tracker._pid = None  # noqa: SLF001
 
 
 def _give_way() -> None:

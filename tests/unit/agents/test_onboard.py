@@ -25,11 +25,13 @@ from fanet_mw.bus.messages import (
 )
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
+from fanet_mw.foreign_file import json_of
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Generated
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, PRIORITY_REPORT, SURVIVOR, Header, Kind
 from fanet_mw.wire.survivors import Survivor
+from sim.records.bus_checks import BusChecks
 
 NAMES, OWN, OTHER = Topics("u"), NodeId(2), NodeId(3)
 HELLO = Data(5, b"hello")
@@ -249,6 +251,22 @@ def test_a_report_with_values_that_json_does_not_know_is_told_as_far_as_it_does(
     assert json.loads(json.dumps(told, allow_nan=False)) == told
 
 
+def test_the_deepest_report_of_an_application_is_read_wherever_it_is_told(make_scenario: MakeScenario) -> None:
+    class Deep(Diary):
+        def report(self) -> Any:
+            told: dict[str, Any] = {"leaf": 1}
+            for _ in range(9):
+                told = {"in": told}
+            return told
+
+    told = dict(uav(make_scenario, Deep("deep")).report())
+    assert "report_failed" not in told["applications"]["deep"]
+    name = f"agent-{told['node']}"
+    content, why = BusChecks(make_scenario()).report(name, json.dumps({**told, "final": True}))
+    assert why is None
+    json_of(json.dumps({name: content}).encode(), source="reports.json")
+
+
 class Looping(Diary):
     def report(self) -> Any:
         told: dict[str, Any] = {"lines": 1}
@@ -261,7 +279,7 @@ class Failing(Diary):
 
 
 @pytest.mark.parametrize(
-    ("kind", "said"), [(Looping, "ValueError: deeper than 16"), (Failing, "OSError: no such sensor")]
+    ("kind", "said"), [(Looping, "ValueError: deeper than 10"), (Failing, "OSError: no such sensor")]
 )
 def test_no_run_is_lost_for_a_report_that_fails(make_scenario: MakeScenario, kind: type[Diary], said: str) -> None:
     told = uav(make_scenario, kind("odd"), Diary("even")).report()["applications"]

@@ -155,8 +155,15 @@ BROKEN: dict[str, tuple[Change, str]] = {
     ),
     "aborted": (lambda outcome: setattr(outcome, "aborted", "interrupted"), "partial result: interrupted"),
     "no report": (
-        lambda outcome: setattr(outcome, "absent", {"world": "no report was heard"}),
-        "no report of world (no report was heard); all must report",
+        lambda outcome: setattr(outcome, "absent", {"agent-99": "no report was heard"}),
+        "no report of agent-99 (no report was heard); all must report",
+    ),
+    "too long a last report": (
+        lambda outcome: (
+            put(outcome, "agent-1", "final", value=False),
+            setattr(outcome, "absent", {"agent-1": "of 9 MB"}),
+        ),
+        "no last report of agent-1 (of 9 MB); all must report",
     ),
     "no last report": (
         lambda outcome: put(outcome, "agent-1", "final", value=False), "no last report of agent-1: 1, limit 0"

@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""Draw how a swarm heals into docs/explanation/healing.png: 20 UAVs search a square kilometre, a relay crashes.
+"""Draw how a swarm heals into docs/results/pictures/healing.png: 20 UAVs search a square kilometre, a relay crashes.
 
 Three instants of one flight in virtual time (seed 1): before the crash, while the others are apart, and when they are
 one network again. `python scripts/healing.py` flies it twice, half a minute of work (needs matplotlib).
@@ -23,7 +23,7 @@ from sim.figures.style import applied, canvas  # noqa: E402
 from sim.run.virtual import simulate  # noqa: E402
 from sim.scenarios import catalog  # noqa: E402
 
-OUT: Final = ROOT / "docs" / "explanation" / "healing.png"
+OUT: Final = ROOT / "docs" / "results" / "pictures" / "healing.png"
 KEYS: Final = (
     "nodes.count=20", "nodes.spacing_m=100", "nodes.telemetry_hz=0", "world.area_m=1000", "mission.survivors=4",
     "traffic.arrivals=none", "duration_s=120",

@@ -86,11 +86,11 @@ TABLES: Final[Mapping[str, Table]] = {
     "flight": Table("results/flight.md", flight.measured, Tolerance(absolute=0.02, relative=0.02)),
     "formation-flight": Table("explanation/formation-flight.md", formation_flight.measured, Tolerance(relative=0.05)),
     "whole-missions": Table("results/missions.md", missions.whole, Tolerance(absolute=0.05, relative=0.02)),
-    "losses": Table("explanation/search.md", losses.healing, Tolerance()),
-    "losses-by-geometry": Table("explanation/search.md", losses.by_geometry, Tolerance()),
-    "losses-in-a-row": Table("explanation/search.md", losses.curve, Tolerance()),
-    "flown-on": Table("explanation/search.md", losses.to_the_end, Tolerance()),
-    "partitions": Table("explanation/search.md", losses.partitions, Tolerance()),
+    "losses": Table("results/losses.md", losses.healing, Tolerance()),
+    "losses-by-geometry": Table("results/losses.md", losses.by_geometry, Tolerance()),
+    "losses-in-a-row": Table("results/losses.md", losses.curve, Tolerance()),
+    "flown-on": Table("results/losses.md", losses.to_the_end, Tolerance()),
+    "partitions": Table("results/losses.md", losses.partitions, Tolerance()),
     "places": Table("results/missions.md", missions.places, Tolerance(absolute=0.05, relative=0.02)),
     "country-in-small": Table(
         "results/missions.md", missions.country_in_small, Tolerance(absolute=0.05, relative=0.02)

@@ -17,7 +17,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.whole_file import write_items
 from sim.cli.out_folder import prepare
 from sim.results.file_names import RUN_FILES
-from sim.results.files import begin, finish
+from sim.results.files import begin, begun, finish
 from sim.results.outcome import Outcome
 from sim.results.run_folder import RunFolder
 from sim.run.virtual import simulate
@@ -111,6 +111,25 @@ def test_a_run_that_is_killed_while_it_writes_is_no_result(outcome: Outcome, tmp
             assert signaled == 0
             assert summary["valid"]
             assert len(list(RunFolder(out).records())) > 100
+
+
+def test_a_run_begins_where_another_one_was_broken_off_and_leaves_nothing_if_it_raises(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    begin(out)
+    reserved = {path.name for path in out.iterdir()} - {"summary.json"}
+    (out / min(reserved)).write_bytes(b"of another run")
+    found = {}
+
+    def run() -> None:
+        with begun(out):
+            found.update({path.name: path.read_bytes() for path in out.iterdir()})
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        run()
+    assert found.keys() == {*reserved, "summary.json"}
+    assert b"another" not in found[min(reserved)]
+    assert list(out.iterdir()) == []
 
 
 def test_a_log_that_is_cut_off_ends_with_a_whole_frame(

@@ -92,6 +92,17 @@ def test_what_a_steady_link_loses_is_not_its_own_loss_unless_it_loses_most() -> 
     assert weak.chance < 0.3
 
 
+@pytest.mark.parametrize(
+    ("count", "spread_db", "chance"), [(12, 1.0, 0.99), (12, 1.1, 12.5 / 25), (11, 1.0, 11.5 / 25), (24, 0.0, 0.99)]
+)
+def test_a_link_is_steady_up_to_a_decibel_if_half_of_what_was_due_came(
+    count: int, spread_db: float, chance: float
+) -> None:
+    link = heard(LinkQuality(NodeId(1), hello_ns=S), count, rssi=[-80.0, -80.0 + spread_db], until_ns=100 * S)
+    assert link is not None
+    assert link.chance == pytest.approx(chance, abs=0.03)
+
+
 def test_a_neighbor_that_fell_silent_is_forgotten_after_the_window() -> None:
     quality = LinkQuality(NodeId(1), hello_ns=S)
     quality.on_hello(NodeId(2), rssi_dbm=-70, now_ns=S)

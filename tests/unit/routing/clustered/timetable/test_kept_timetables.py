@@ -9,9 +9,10 @@ from typing import Any
 
 import pytest
 
+from fanet_mw.routing.clustered.roles.position_updates import STRAYED, UNLIKE
 from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
 from fanet_mw.routing.clustered.timetable.turn_allocation import fit, fit_measured, least_interval_ns
-from fanet_mw.routing.clustered.timetable.turn_size import schedule_parts
+from fanet_mw.routing.clustered.timetable.turn_size import links, schedule_parts, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId
 from fanet_mw.wire.links import Link, grade_of
@@ -181,3 +182,24 @@ def test_a_schedule_has_a_part_for_each_56_nodes_without_the_leader(
     make_scenario: MakeScenario, count: int, parts: int
 ) -> None:
     assert schedule_parts(scenario_of(make_scenario, 1.0, {}, count)) == parts
+
+
+@pytest.mark.parametrize(
+    ("model", "link_m", "farther_m"),
+    [
+        ("static", 0, 0),
+        ("formation", 0, 2 * UNLIKE * 250),
+        ("random_waypoint", 0, 2 * STRAYED * 250),
+        ("formation", 200, 2 * UNLIKE * 200),
+        ("random_waypoint", 200, 2 * STRAYED * 200),
+    ],
+)
+def test_who_moves_may_disturb_others_as_much_farther_as_both_may_have_strayed(
+    make_scenario: MakeScenario, model: str, link_m: float, farther_m: float
+) -> None:
+    keys = {"clusters.link_m": link_m, "world.gps_sigma_m": 0, "sensors.gps_bias_m": 0.5}
+    scenario = scenario_of(make_scenario, 1.0, keys | {"mobility.model": model, "mobility.speed_m_s": 10})
+    error_m = 4 * math.sqrt(2) * 0.5 + 1.5
+    found = links(scenario, superframe(scenario))
+    assert found.interference_m == pytest.approx(250 + error_m + farther_m)
+    assert (found.link_m, found.margin_m) == ((200, 0) if link_m else (250, 0.05 * 250))

@@ -3,6 +3,8 @@
 import ast
 import re
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -40,6 +42,15 @@ def test_a_protocol_of_another_package_keeps_the_contract(
     ended = installed.run(installed.python, *TEST, "-k", chosen, "test_gossip3.py::TestGossip3", cwd=tmp_path)
     assert ended.returncode == 0, ended.stdout + ended.stderr
     assert f"{passed} passed" in ended.stdout
+
+
+@pytest.mark.parametrize("folder", ["my-message", "swarm-parts"])
+def test_in_a_clone_an_example_is_tested_by_pytest_alone(folder: str) -> None:
+    """Without the plugins that the strict configuration of this project's own tests names."""
+    without = [word for plugin in ("asyncio", "timeout") for word in ("-p", f"no:{plugin}")]
+    words = [sys.executable, *TEST, "--collect-only", *without, f"examples/{folder}"]
+    ended = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
 
 
 def _modules(tree: ast.AST) -> set[str]:

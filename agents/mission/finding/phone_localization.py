@@ -16,6 +16,7 @@ replaces the estimate.
 """
 
 import math
+from array import array
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache, reduce
 from itertools import compress
@@ -402,11 +403,13 @@ def _calibrated(model: PhoneModel, offset: PhoneOffset) -> PhoneModel:
 
 @lru_cache(maxsize=256)
 def _residuals_db(middle: Enu, position: Enu, rssi_dbm: float, model: PhoneModel) -> Sequence[float]:
-    """Received less expected power for each cell; kept, as grids of UAVs in one process mostly share a middle."""
+    """Received less expected power for each cell; kept, as grids of UAVs in one process mostly share a middle, and as
+    an array, which takes a quarter of a list's memory.
+    """
     residual_at_1_m = rssi_dbm - (model.power_dbm - REFERENCE_LOSS_DB)
     slope = 5 * model.exponent / math.log(10)  # per natural logarithm of the squared distance
     distances2 = _squared_distances_m2(middle, position, max(1.0, position.up * position.up))
-    return [residual_at_1_m + slope * logarithm for logarithm in map(math.log, distances2)]
+    return array("d", [residual_at_1_m + slope * logarithm for logarithm in map(math.log, distances2)])
 
 
 @lru_cache(maxsize=64)

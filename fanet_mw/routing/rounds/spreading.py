@@ -189,8 +189,8 @@ class Spreading:
                 entry.reached |= entry.senders | self._links[src]
         if len(self._entries) <= self._capacity:
             return None
-        last, evicted = max(self._entries.items(), key=lambda item: item[1].dispensable())
-        self._remove(last)
+        evicted = max(self._entries.values(), key=_Spread.dispensable)
+        self._remove(_key(evicted.packet))
         return None if evicted.sent else evicted.packet
 
     def _remove(self, key: int) -> None:

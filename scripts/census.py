@@ -5,6 +5,7 @@
 `--small` lists files that could go into their one reader, `--questions` what a reviewer might ask about.
 """
 
+import argparse
 import ast
 import io
 import os
@@ -254,12 +255,24 @@ def questions(tree: Path) -> Iterator[str]:
                         yield f"{where}: {len(stored)} attributes"
 
 
+def tree_of(name: str) -> Path:
+    tree = Path(name).resolve()
+    if not (tree / PRODUCT[0]).is_dir():
+        raise argparse.ArgumentTypeError(f"{name} has no folder {PRODUCT[0]}/")
+    return tree
+
+
 def main() -> int:
     here = Path(__file__).parents[1]
-    if sys.argv[1:] == ["--questions"]:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("trees", nargs="*", type=tree_of, default=[here], metavar="TREE")
+    parser.add_argument("--small", action="store_true")
+    parser.add_argument("--questions", action="store_true")
+    asked = parser.parse_args()
+    if asked.questions:
         print(*questions(here), sep="\n")
         return 0
-    if sys.argv[1:] == ["--small"]:  # what could be folded into its one reader
+    if asked.small:  # what could be folded into its one reader
         paths = [path for folder in PRODUCT for path in python_files(here, folder)]
         needs = imports(here, paths)
         for path in paths:
@@ -268,8 +281,7 @@ def main() -> int:
             if path.stem != "__init__" and len(users) == 1 and lines < SMALL_LINES:
                 print(f"{lines:4} {path.relative_to(here)}  <- {users[0]}")
         return 0
-    trees = [Path(name).resolve() for name in sys.argv[1:]] or [here]
-    counted = [census(tree) for tree in trees]
+    counted = [census(tree) for tree in asked.trees]
     names = list(dict.fromkeys(name for found in counted for name in found))
     for name in names:
         print(f"{name:62}", *(f"{found.get(name, '-'):>14}" for found in counted))

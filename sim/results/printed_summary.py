@@ -169,7 +169,7 @@ def _mission_rows(mission: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield "confirmed", f"{mission['confirmed']}, the last after {last_s:.0f} s, median error {error_m:.1f} m"
     if mission["persons"] > mission["confirmed"] or mission["persons_false"]:
         without = mission["persons"] - mission["confirmed"]
-        yield "persons", f"{without} more found without a phone, {mission['persons_false']} finds of nobody else"
+        yield "persons", f"{without} more whose phone has no name, {mission['persons_false']} finds of nobody else"
     if mission["inside"]:
         yield "inside", f"{mission['inside']} in buildings, median error {mission['inside_error_m']:.0f} m"
     if mission.get("among"):

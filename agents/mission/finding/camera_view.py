@@ -19,8 +19,8 @@ _MOST: Final = 0.7
 """The greatest probability of recognition that is relied on: trees, walls and postures hide people."""
 _LEAST_FALSE: Final = 1e-5
 """The least probability of a false alarm at a place in one image, whatever is said of the camera."""
-_PLACE_M2: Final = math.pi * 6.0 * 6.0
-"""The area within which two sightings are taken for the same person."""
+PLACE_M2: Final = math.pi * 6.0 * 6.0
+"""The area within which two exact sightings are taken for the same person."""
 _INSIDE: Final = 0.9
 """A person is expected in an image within this share of its half width and height."""
 
@@ -59,7 +59,7 @@ class CameraView:
 
     def sighting_evidence(self, height_m: float) -> float:
         image_m2 = max(1.0, 4 * height_m * height_m * self._tan_east * self._tan_north)
-        false = self._false_per_image * min(1.0, _PLACE_M2 / image_m2)
+        false = self._false_per_image * min(1.0, PLACE_M2 / image_m2)
         return math.log(max(1e-3, min(_MOST, self.recognized(height_m))) / max(_LEAST_FALSE, min(0.5, false)))
 
     def empty_evidence(self, height_m: float) -> float:

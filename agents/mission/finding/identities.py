@@ -10,9 +10,11 @@ twice the difference of log-likelihoods of the phone's powers from the person's 
 2 degrees of freedom for a true pair.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
+from agents.mission.finding.camera_view import PLACE_M2
 from agents.mission.finding.carriers import IMPOSSIBLE, Carriers, assigned, carriers, cost_with
 from agents.mission.finding.confirmation import (
     GREATEST_MARGIN,
@@ -114,8 +116,9 @@ class Identities:
             else:
                 shown.append(person := people[column])
                 lean = _lean(person.place.at, here)  # the sighting's own would hold its error
+                told = evidence - self._surprise(person, at, variance)
                 self._learn_height(person, at, variance, lean)
-                person.on_sighting(at, variance, here=here, evidence=evidence, now_ns=now_ns, lean=lean)
+                person.on_sighting(at, variance, here=here, evidence=told, now_ns=now_ns, lean=lean)
             shown[-1].close_sightings += close
         self._people = [*people, *(person for person in shown if person not in people)]
         self._correct_places()
@@ -124,6 +127,14 @@ class Identities:
                 other is not person and other.place.distance_m(person.place.at) <= SAME_PLACE_M for other in shown
             )
         return shown
+
+    def _surprise(self, person: PersonTrack, at: Enu, variance_m2: float) -> float:
+        """By how much less a sighting tells the farther from a person it is, and the less exactly both are placed: so
+        much more ground is there on which false alarms pass for the same person.
+        """
+        of_both_m2 = person.place.east_variance_m2 + variance_m2 + self._steady_m2
+        wider = max(1.0, 2 * math.pi * of_both_m2 / PLACE_M2)
+        return person.place.distance_m(at) ** 2 / of_both_m2 / 2 + math.log(wider)
 
     def _corrected(self, sighting: Sighting, lean: tuple[float, float]) -> Sighting:
         """The sighting from the height at which the UAV is by all it knows so far."""

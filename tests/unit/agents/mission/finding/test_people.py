@@ -37,6 +37,19 @@ def test_who_is_seen_twice_from_two_places_is_reported_although_no_phone_fits() 
         assert len(uav.identities.unreported(6 * S)) == reported
 
 
+@pytest.mark.parametrize(("apart_m", "sigma_m", "proven"), [(16.0, 4.8, False), (2.0, 1.0, True)])
+def test_false_alarms_that_stand_apart_at_the_edge_of_the_image_are_nobody(
+    apart_m: float, sigma_m: float, proven: bool
+) -> None:
+    """A thousand an hour once made a person of three, 13 to 21 m apart, of 6.4 of evidence each."""
+    uav = Uav()
+    for second, (east, north) in enumerate(((0.0, 0.0), (-0.5, 0.8), (-0.6, -0.4))):
+        sighting = Sighting(Enu(60 + apart_m * east, apart_m * north, 0), sigma_m, close=True)
+        uav.identities.on_reading([sighting], here=Enu(0, 20.0 * second, 77), evidence=6.4, now_ns=second * S)
+    uav.identities.review(3 * S)
+    assert len(uav.identities.unreported(8 * S)) == proven
+
+
 def test_of_whom_there_is_a_find_nobody_reports_again() -> None:
     for found in (Found(0, 1, 2.0, 4.0, 1.0, 0.0, 1.0, 9, Standing.CONFIRMED), told_person(9, 2.0, 4.0)):
         uav = Uav()

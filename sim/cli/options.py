@@ -165,7 +165,7 @@ class OutputFlags:
             yield
 
     def _prepare_recording(self, path: Path) -> None:
-        import sim.recording.mcap_recording  # noqa: F401  what is missing is said before the run, not after it
+        from sim.recording.mcap_recording import opened_alone  # what is missing is said before the run, not after it
 
         if path.suffix != ".mcap":
             raise ConfigError(f"--record {path}: must be a file whose name ends in .mcap")
@@ -174,7 +174,7 @@ class OutputFlags:
         require_file_or_nothing(path)
         with writing(f"--record {path}"):
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.open("wb").close()
+            opened_alone(path).close()
 
     def capture_path(self) -> Path | None:
         from emulator.pcap_file import NAME

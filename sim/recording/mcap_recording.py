@@ -4,6 +4,7 @@ What is on which topic is in docs/how-to/recordings.md. Instants are unix time: 
 """
 
 import contextlib
+import fcntl
 import json
 import math
 import sys
@@ -26,6 +27,7 @@ from mcap_protobuf.writer import Writer
 
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import Poses
+from fanet_mw.errors import ConfigError
 from fanet_mw.geodesy import Geodetic, to_geodetic
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record, RoleChanged
@@ -108,7 +110,7 @@ class McapRecording(Observer):
         self._gives_up = file is None
         with writing(f"--record {path}"):
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._file: BinaryIO = file or path.open("wb")
+            self._file: BinaryIO = file or opened_alone(path)
         self._writer = Writer(self._file, chunk_size=_CHUNK_BYTES)
         self._put("/scene/world", _world(scenario, self._around, self.state.places, self._stamp(0)), 0)
 
@@ -285,6 +287,22 @@ class McapRecording(Observer):
             self._writer.write_message(topic, message, log_time=unix_ns, publish_time=unix_ns)
         except OSError as error:
             self._give_up(error)
+
+
+def opened_alone(path: Path) -> BinaryIO:
+    """An empty file that no other recording is written to, unless its file system locks nothing; raises ConfigError."""
+    file = path.open("ab")
+    try:
+        with contextlib.suppress(OSError):
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                raise ConfigError(f"--record {path}: another run records there now; choose another file") from error
+        file.truncate(0)
+    except BaseException:
+        file.close()
+        raise
+    return file
 
 
 def _world(

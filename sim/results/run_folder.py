@@ -179,7 +179,7 @@ _AGENTS: Final = TypeAdapter(dict[str, _ShownReport], config=ConfigDict(strict=T
 
 def holds_run(folder: Path) -> bool:
     """True for a folder of `fanet simulate --out` or `fanet launch --out`."""
-    return all(os.path.lexists(folder / name) for name in (SUMMARY_FILE, SCENARIO_FILE, TRACE_FILE))
+    return os.path.lexists(folder / SUMMARY_FILE)  # the first file of a run, and of nothing else
 
 
 class RunFolder:

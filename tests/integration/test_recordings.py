@@ -254,6 +254,19 @@ def test_an_observer_changes_nothing_and_sees_the_same_run_twice(tmp_path: Path)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
+def test_a_recording_that_is_being_written_is_no_other_runs_even_by_force(tmp_path: Path) -> None:
+    path = tmp_path / "one.mcap"
+    scenario = catalog.find("quick", ["duration_s=2", "warmup_s=0", "drain_s=1"])
+    with McapRecording(path, scenario, epoch_unix_ns=EPOCH_UNIX_NS) as recording:
+        simulate(scenario, observer=recording)
+        recording._file.flush()
+        before = path.read_bytes()
+        with pytest.raises(ConfigError, match=r"--record .*one.mcap: another run records there now"):
+            app(["simulate", "quick", "--record", str(path), "--force"], result_action="return_value")
+        assert path.read_bytes() == before
+    assert path.read_bytes().startswith(before)
+
+
 def test_a_finished_run_becomes_a_recording(folder: Path, tmp_path: Path) -> None:
     path = tmp_path / "later.mcap"
     assert app(["log", "export", str(folder), "--to", "mcap", "--out", str(path)], result_action="return_value") == 0

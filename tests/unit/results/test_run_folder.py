@@ -17,8 +17,9 @@ import pytest
 from fanet_mw.errors import ConfigError
 from sim.cli.out_folder import prepare
 from sim.report import page, replay_page
-from sim.results.files import finish
+from sim.results.files import begin, finish
 from sim.results.replay import Replay
+from sim.results.run_folder import RunFolder, holds_run
 from sim.results.run_table import read
 from sim.results.stored_result import load_result
 from sim.run.virtual import simulate
@@ -304,3 +305,10 @@ def test_a_description_is_text_in_every_page(folder: Path) -> None:
     assert "](javascript" not in markdown
     assert "http://" not in markdown
     assert "\\`c\\`" in markdown
+
+
+def test_a_run_that_has_only_begun_is_one_that_did_not_end(tmp_path: Path) -> None:
+    begin(tmp_path)
+    assert holds_run(tmp_path)
+    with pytest.raises(ConfigError, match="the run did not end"):
+        RunFolder(tmp_path)

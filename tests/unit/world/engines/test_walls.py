@@ -62,6 +62,20 @@ def test_whoever_has_come_down_lies_level_and_still(solids: Solids | None) -> No
     assert abs(engine._rates).max() < 0.1
 
 
+def test_a_body_without_power_turns_less_by_e_in_each_half_second() -> None:
+    engine = Rotors(IRIS)
+    engine.reset(np.array([[0.0, 0.0, 900.0]]))
+    for _ in range(3):
+        engine.advance(0.05, np.array([[8.0, 3.0, 0.0]]))
+    engine.fall(0)
+    engine.advance(0.05, np.zeros((1, 3)))
+    before = engine._rates[:, 0].copy()
+    assert abs(before).max() > 0.1
+    for _ in range(10):
+        engine.advance(0.05, np.zeros((1, 3)))
+    assert engine._rates[:, 0] == pytest.approx(before / np.e, rel=0.02)
+
+
 @pytest.mark.slow
 def test_who_is_blown_against_a_wall_while_it_lands_has_not_landed(make_scenario: MakeScenario) -> None:
     keys: dict[str, Any] = {

@@ -432,3 +432,19 @@ def test_an_ack_takes_its_time_as_before(make_scenario: MakeScenario) -> None:
     air.send(1, 1 * MS, dst=2)
     there_ns = 1 * MS + FRAME_NS + 500
     assert statuses(air.run()) == [(1, TxOutcome.ACKED, there_ns + SIFS_NS + ACK_NS + 500, 1)]
+
+
+@pytest.mark.parametrize(
+    ("center", "radius_m", "deaf"),
+    [((60, 80), 5, {2}), ((60, -80), 5, {3}), ((-60, 80), 5, {4}), ((0, 80), 60, {2, 4})],
+)
+def test_a_jammer_jams_who_is_within_its_radius_to_all_sides(
+    make_scenario: MakeScenario, center: tuple[float, float], radius_m: float, deaf: set[int]
+) -> None:
+    air = Air(make_scenario(**{"nodes.count": 5}), [0.0] * 5)
+    places = [(0, 0), (60, 80), (60, -80), (-60, 80), (-60, -80)]
+    states = array("d", [value for east, north in places for value in (east, north, 50.0, 0.0, 0.0, 0.0)])
+    air.medium.receive(NAMES.pose, Poses(0, array("H", range(1, 6)), states), 0)
+    control(air, Jam("j", Enu(*center, 0.0), radius_m, math.inf, 0))
+    air.send(1, 1 * MS)
+    assert {node for node, *_ in receptions(air.run())} == {2, 3, 4, 5} - deaf

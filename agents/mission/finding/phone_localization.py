@@ -418,7 +418,7 @@ def _silence_scores(model: PhoneModel) -> tuple[float, ...]:
     sigma = math.hypot(max(model.shadowing_db, 1.0), model.offset_db)
     scores = []
     for step in range(200):
-        distance_m = max(1.0, (step + 0.5) * _STEP_M)
+        distance_m = (step + 0.5) * _STEP_M
         margin = model.power_dbm - REFERENCE_LOSS_DB - 10 * model.exponent * math.log10(distance_m)
         chance = 0.5 * math.erfc((margin - model.threshold_dbm) / (sigma * math.sqrt(2)))
         scores.append(2 / CORRELATION_FACTOR * math.log(max(chance, _NEVER)))

@@ -191,3 +191,10 @@ def test_hostile_obstructions_are_counted_and_change_nothing(make_scenario: Make
     air.send(1, 1 * MS)
     assert len(receptions(air.run())) == 1
     assert air.medium.report()["refused"] == {"obstructions": 4}
+
+
+def test_who_starts_below_the_ground_is_named(make_scenario: MakeScenario) -> None:
+    keys = {"world.engine": "pybullet", "world.terrain_m": 100, "nodes.count": 3, "nodes.layout": "explicit"}
+    low = make_scenario(**keys, **{"nodes.positions_m": [[0, 0, 200], [10, 0, 0.001], [20, 0, 200]], "seed": 2})
+    with pytest.raises(ConfigError, match=r"node 2 starts at 0\.001 m, below the ground there"):
+        obstacles(low, np.array(positions(low)))

@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import fcntl
 import hashlib
 import os
 from collections.abc import Iterable, Iterator
@@ -47,6 +48,17 @@ def write_items(path: Path, items: Iterable[bytes], held: Written | None = None)
                 held.add(memoryview(data)[:kept])
                 raise
             held.add(data)
+
+
+def keep_alone(file: int, busy: str) -> None:
+    """Lock an open file or folder as long as it is open, unless its file system locks nothing; if somebody else has it,
+    raise ConfigError, which says `busy`.
+    """
+    with contextlib.suppress(OSError):
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise ConfigError(busy) from error
 
 
 @contextlib.contextmanager

@@ -5,7 +5,6 @@ as the run lasts: another one would otherwise take it between the check and the 
 """
 
 import contextlib
-import fcntl
 import os
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -15,7 +14,7 @@ from typing import Final
 from emulator.pcap_file import NAME as CAPTURE
 from emulator.pcap_file import captures
 from fanet_mw.errors import ConfigError
-from fanet_mw.whole_file import writing
+from fanet_mw.whole_file import keep_alone, writing
 from sim.results.file_names import PAGES, PICTURES, RESERVED, RUN_FILES, pictures
 
 _MOST_SAID: Final = 8
@@ -31,11 +30,7 @@ def alone(out: Path | None) -> Iterator[None]:
         out.mkdir(parents=True, exist_ok=True)
         folder = os.open(out, os.O_RDONLY | os.O_DIRECTORY)
     try:
-        with contextlib.suppress(OSError):
-            try:
-                fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
-                raise ConfigError(f"--out {out}: another run writes there now; choose another folder") from error
+        keep_alone(folder, f"--out {out}: another run writes there now; choose another folder")
         yield
     finally:
         os.close(folder)

@@ -4,7 +4,6 @@ What is on which topic is in docs/how-to/recordings.md. Instants are unix time: 
 """
 
 import contextlib
-import fcntl
 import json
 import math
 import sys
@@ -27,12 +26,11 @@ from mcap_protobuf.writer import Writer
 
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import Poses
-from fanet_mw.errors import ConfigError
 from fanet_mw.geodesy import Geodetic, to_geodetic
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record, RoleChanged
 from fanet_mw.units import Enu, S
-from fanet_mw.whole_file import writing
+from fanet_mw.whole_file import keep_alone, writing
 from sim.figures import colors
 from sim.observation.observer import Observer
 from sim.observation.surroundings import Surroundings, surroundings
@@ -293,11 +291,7 @@ def opened_alone(path: Path) -> BinaryIO:
     """An empty file that no other recording is written to, unless its file system locks nothing; raises ConfigError."""
     file = path.open("ab")
     try:
-        with contextlib.suppress(OSError):
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
-                raise ConfigError(f"--record {path}: another run records there now; choose another file") from error
+        keep_alone(file.fileno(), f"--record {path}: another run records there now; choose another file")
         file.truncate(0)
     except BaseException:
         file.close()

@@ -8,6 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
+from agents.mission.finding.carriers import RAYLEIGH_95
 from agents.mission.finding.known_survivors import SAME_PLACE_M
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.geodesy import Geodetic, to_geodetic
@@ -26,8 +27,6 @@ _INSIDE: Final = "inside a building"
 _AMONG: Final = "one of the people there"
 _STANDING: Final = {"confirmed": Standing.CONFIRMED, _INSIDE: Standing.INSIDE, _AMONG: Standing.AMONG}
 _MOST_PIECES: Final = 5
-_RAYLEIGH_95: Final = math.sqrt(-2 * math.log(0.05))
-"""Of a place that errs alike in two directions, 95 of 100 are within so many standard deviations."""
 _M2_PER_HA: Final = 10_000.0
 
 
@@ -172,7 +171,7 @@ def _how_sure(one: Find, gps_m: float) -> str:
     }  # fmt: skip
     said = words.get(one.said, one.said)
     if one.sigma_m is not None:
-        return f"{said}, within {max(1.0, _RAYLEIGH_95 * math.hypot(one.sigma_m, gps_m)):.0f} m (95 %)"
+        return f"{said}, within {max(1.0, RAYLEIGH_95 * math.hypot(one.sigma_m, gps_m)):.0f} m (95 %)"
     return f"{said}, roughly" if one.said == "estimated" else said
 
 

@@ -59,14 +59,10 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
     truth = place(scenario)
     first: dict[int, int] = {}
     heard: dict[int, int] = {}
-    errors: list[float] = []
     found = Confirmations(truth)
     for record in records_of(records, Approaching, Confirmed, Refuted):
         if type(record) is Approaching:
             first.setdefault(record.node, record.t_ns)
-            if 1 <= record.survivor <= len(truth):  # a survivor with another number exists only in a forged message
-                at = truth[record.survivor - 1]
-                errors.append(math.hypot(at.east - record.east_m, at.north - record.north_m))
         else:
             found.add(record)
     located: dict[int, int] = {}
@@ -91,9 +87,9 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
         "reopened": found.reopened,
         "time_to_confirm_s": sorted(round(one.t_ns / S, 3) for one in right),
         "inside": len({r.survivor for r in records_of(records, PlacedInside)}),
-        "inside_error_m": _median(_errors_m(truth, records_of(records, PlacedInside))),
+        "inside_error_m": _median(found.errors_m(records_of(records, PlacedInside))),
         "among": len({r.survivor for r in records_of(records, PlacedAmong)}),
-        "among_error_m": _median(_errors_m(truth, records_of(records, PlacedAmong))),
+        "among_error_m": _median(found.errors_m(records_of(records, PlacedAmong))),
         "wait_s": _waits([max(0, found_ns[survivor] - heard[survivor]) / S for survivor in waited]),
         "located_wait_s": _waits(
             [max(0, found_ns[survivor] - located.get(survivor, found_ns[survivor])) / S for survivor in waited]
@@ -101,20 +97,14 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
         "post_knows_s": _known_after(_to_ground_s(right, records)),
         "uavs_approaching": len(first),
         "time_to_approach_s": sorted(round(t_ns / S, 3) for t_ns in first.values()),
-        "localization_error_m": _median(errors),
+        "localization_error_m": _median(found.errors_m(records_of(records, Approaching))),
         "confirmed_error_m": _median([found.error_m(one) for one in confirmed]),
         "collisions": sum(1 for _ in records_of(records, Collided)),
         **_flown(scenario, records),
     }
 
 
-def _errors_m(truth: Sequence[Enu], said: Iterable[PlacedInside | PlacedAmong]) -> list[float]:
-    """How far from the true place each of these is; a survivor with another number exists only in a forged message."""
-    return [
-        math.hypot(truth[one.survivor - 1].east - one.east_m, truth[one.survivor - 1].north - one.north_m)
-        for one in said
-        if 1 <= one.survivor <= len(truth)
-    ]
+_Placed = Approaching | Confirmed | PlacedInside | PlacedAmong
 
 
 class Confirmations:
@@ -137,9 +127,13 @@ class Confirmations:
             self._held[record.survivor] = left_by(record, held)
             self.reopened += not is_person(record.survivor) and len(self._held[record.survivor]) < len(held)
 
-    def error_m(self, confirmed: Confirmed) -> float:
-        at = self._truth[confirmed.survivor - 1]
-        return math.hypot(at.east - confirmed.east_m, at.north - confirmed.north_m)
+    def error_m(self, placed: _Placed) -> float:
+        at = self._truth[placed.survivor - 1]
+        return math.hypot(at.east - placed.east_m, at.north - placed.north_m)
+
+    def errors_m(self, placed: Iterable[_Placed]) -> list[float]:
+        """Of those of whom there is a truth: a survivor with another number exists only in a forged message."""
+        return [self.error_m(one) for one in placed if 1 <= one.survivor <= len(self._truth)]
 
     def right(self) -> list[Confirmed]:
         """The first confirmation of each survivor who was announced near the true place."""
@@ -153,19 +147,18 @@ class Confirmations:
         """The finds of persons without a phone, each by the survivor it is of, the nearest pairs first; and how many
         others there are, of nobody or of somebody of whom there is another one.
         """
-        finds = [held[0] for number, held in sorted(self._held.items()) if held and is_person(number)]
+        finds = {number: held[0] for number, held in sorted(self._held.items()) if held and is_person(number)}
         near = sorted(
-            (apart_m, find.survivor, survivor)
-            for find in finds
+            (apart_m, number, survivor)
+            for number, find in finds.items()
             for survivor, at in enumerate(self._truth, start=1)
             if (apart_m := math.hypot(at.east - find.east_m, at.north - find.north_m)) <= MISTAKEN_M
         )
         of: dict[int, int] = {}
-        for _, find, survivor in near:
-            if find not in of and survivor not in of.values():
-                of[find] = survivor
-        by_number = {find.survivor: find for find in finds}
-        return {survivor: by_number[find] for find, survivor in of.items()}, len(finds) - len(of)
+        for _, number, survivor in near:
+            if survivor not in of and number not in of.values():
+                of[survivor] = number
+        return {survivor: finds[number] for survivor, number in of.items()}, len(finds) - len(of)
 
     def _first(self) -> list[Confirmed]:
         return [held[0] for survivor, held in self._held.items() if held and not is_person(survivor)]

@@ -15,7 +15,7 @@ IMPOSSIBLE: Final = 1e6
 """The cost of a pair that is excluded."""
 _NEVER: Final = 1e-9
 _NEARLY_ALL: Final = 0.95
-_RAYLEIGH_95: Final = math.sqrt(-2 * math.log(1 - _NEARLY_ALL))
+RAYLEIGH_95: Final = math.sqrt(-2 * math.log(1 - _NEARLY_ALL))
 """Of a place that errs alike in two directions, 95 of 100 are within so many standard deviations."""
 
 
@@ -47,7 +47,7 @@ class Carriers(NamedTuple):
         ):
             left -= share
             if left <= 0:
-                return away_m / _RAYLEIGH_95
+                return away_m / RAYLEIGH_95
         return 0.0
 
     def middle(self, *, grain_m: float) -> Estimate:

@@ -18,9 +18,10 @@ other, 15 s apart, and `8!` flies to the end; these may stand together. One JSON
 
 and, of copies that fly to the end, how many were found, by phone or as persons, when 95 % of the area were covered, the
 least distance of two UAVs, the share of reports delivered of what an ideal flood could have delivered, contacts, all
-stretches in which the others were apart, and when the broken bounds were stated. With `--without` the flight itself, in which nobody is lost, has a
-line, too. `--scenario NAME` and `--set KEY=VALUE` fly others. The tables of `docs/results/losses.md` are made of
-these lines, in `docs/results/data/losses.jsonl` (`scripts/tables losses flown-on losses-in-a-row`).
+stretches in which the others were apart, and when the broken bounds were stated. With `--without` the flight itself, in
+which nobody is lost, has a line, too. `--scenario NAME` and `--set KEY=VALUE` fly others. The
+tables of `docs/results/losses.md` are made of these lines, in `docs/results/data/losses.jsonl`
+(`scripts/tables losses flown-on losses-in-a-row`).
 """
 
 import argparse

@@ -97,13 +97,16 @@ def _by_student(values: Sequence[float], mean: float) -> tuple[float, float]:
 def _by_bootstrap(values: Sequence[float]) -> tuple[float, float]:
     """The percentiles of the means of resamples, at the levels that give Student's interval of normal values."""
     count = len(values)
+    if min(values) == max(values):
+        return values[0], values[0]
     tail = statistics.NormalDist().cdf(-math.sqrt(count / (count - 1)) * quantile_975(count - 1))
-    means = np.asarray(values)[_resamples(count)].mean(axis=1)
+    means = _resamples(count) @ np.asarray(values) / count
     low, high = np.quantile(means, [tail, 1 - tail])
     return max(min(values), float(low)), min(max(values), float(high))
 
 
 @functools.cache
-def _resamples(count: int) -> NDArray[np.intp]:
-    """Which values each resample of this many values consists of."""
-    return np.random.default_rng(_SEED).integers(count, size=(_RESAMPLES, count))
+def _resamples(count: int) -> NDArray[np.float64]:
+    """How often each of this many values is in each resample."""
+    drawn = np.random.default_rng(_SEED).integers(count, size=(_RESAMPLES, count))
+    return np.stack([np.count_nonzero(drawn == value, axis=1) for value in range(count)], axis=1).astype(np.float64)

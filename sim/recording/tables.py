@@ -75,7 +75,7 @@ def _deliveries(outcome: Outcome, _: Path | None) -> Iterator[Row]:
     sent: dict[tuple[int, int], tuple[str, SentPacket]] = {
         name: (app, one) for app, packets in packets_of(outcome).items() for name, one in packets.sent.items()
     }
-    classes = set(outcome.scenario.traffic_classes)
+    classes, everyone = set(outcome.scenario.traffic_classes), frozenset(outcome.scenario.node_ids)
     meant: dict[tuple[str, int], frozenset[int]] = {}
     had: set[tuple[int, int, int]] = set()
     exact = not outcome.scenario.clock.modelled
@@ -83,7 +83,7 @@ def _deliveries(outcome: Outcome, _: Path | None) -> Iterator[Row]:
         app, packet = sent.get((one.origin, one.seq), ("", None))
         if app in classes and (app, one.origin) not in meant:
             meant[app, one.origin] = frozenset(targets_of(outcome.scenario, one.origin, app))
-        wanted = one.node in meant[app, one.origin] if app in classes else app in OTHER_APPS
+        wanted = one.node in (meant[app, one.origin] if app in classes else everyone if app in OTHER_APPS else ())
         true = packet is not None and (not exact or one.t_ns - one.delay_ns == packet.born_ns)
         counts = wanted and true and one.node != one.origin and (one.node, one.origin, one.seq) not in had
         if counts:

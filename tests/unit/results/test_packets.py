@@ -2,13 +2,15 @@
 
 from collections import Counter
 from typing import Any
+from unittest import mock
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fanet_mw.scenario import config
 from fanet_mw.trace import Delivered, Generated, Record
 from fanet_mw.units import MS, S
+from sim.recording import tables
 from sim.records.trace_log import TraceLog
 from sim.results.outcome import Outcome
 from sim.results.packets import packets_of
@@ -97,6 +99,26 @@ def test_deliveries_count_as_they_would_one_by_one(
         assert rows == {app: expected["rows"][app] for app in apps}
         assert {app: part.repeated for app, part in apps.items()} == {app: expected["repeated"][app] for app in apps}
         assert found["traffic"].unknown == expected["unknown"]
+
+
+@settings(max_examples=25)
+@given(packets=st.lists(sent, min_size=1, max_size=8), deliveries=st.lists(heard, min_size=9, max_size=20))
+def test_the_table_of_deliveries_has_each_in_its_units_and_says_which_ones_count(
+    packets: list[Record], deliveries: list[Record]
+) -> None:
+    """Those are as many of each packet as the summary counts; a table that is written in portions has the same rows."""
+    outcome = Outcome(SCENARIO, "virtual", 1.0, [*packets, *deliveries], {})
+    rows = tables.table("deliveries", outcome).to_pylist()
+    told = [(one.t_ns / S, one.node, one.origin, one.seq, one.delay_ns / MS, one.hops, one.handover_ns / MS)
+            for one in outcome.records if isinstance(one, Delivered)]  # fmt: skip
+    assert [tuple(row.values())[:4] + tuple(row.values())[5:8] for row in rows] == told
+    summed = {app: found.deliveries for app, found in packets_of(outcome).items()}
+    for app in {row["app"] for row in rows} - {""}:
+        counted = sum(row["counts"] for row in rows if row["app"] == app)
+        assert counted == (len(summed[app].node) if app in summed and app != "my_app" else 0)
+    assert not any(row["counts"] for row in rows if row["app"] == "")
+    with mock.patch.object(tables, "_PORTION", 3):
+        assert tables.table("deliveries", outcome).to_pylist() == rows
 
 
 def test_a_packet_that_two_records_name_is_sent_once() -> None:

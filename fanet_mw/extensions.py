@@ -15,19 +15,24 @@ import hashlib
 import inspect
 import json
 import math
+import os
 import sys
+import threading
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import lru_cache
 from importlib import import_module
 from importlib.machinery import EXTENSION_SUFFIXES, SOURCE_SUFFIXES
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NoReturn
 
 from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationError, ValidationInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import core_schema
+
+from fanet_mw.errors import HostError
 
 GROUPS: Final[Mapping[str, str]] = {
     "routing.protocol": "fanet_mw.routing",
@@ -143,6 +148,29 @@ def _imported(path: Path) -> set[str]:
     return {name.partition(".")[0] for name in (*names, *froms)} - {""}
 
 
+@contextmanager
+def exits_raised() -> Iterator[None]:
+    """Raise HostError where this thread calls `os._exit`, which ends a process without a word, perhaps with 0; another
+    thread ends it with a word and not with 0. A process that was forked meanwhile ends by it as always.
+    """
+    leave, process, thread = os._exit, os.getpid(), threading.get_ident()
+
+    def say(status: int) -> NoReturn:
+        if os.getpid() != process:
+            leave(status)
+        said = f"a part of another package has called os._exit({status!r})"
+        if threading.get_ident() == thread:
+            raise HostError(said)
+        os.write(2, f"fanet: {said}\n".encode())
+        leave(status or 1)
+
+    os._exit = say
+    try:
+        yield
+    finally:
+        os._exit = leave
+
+
 @lru_cache(maxsize=64)
 def load(key: str, name: str) -> Any:  # noqa: ANN401  (whatever the contract of the key asks for)
     """The class that a scenario names; ValueError if there is none, ModuleNotFoundError if it needs an emulator."""
@@ -159,7 +187,8 @@ def load(key: str, name: str) -> Any:  # noqa: ANN401  (whatever the contract of
         raise ValueError(f"{key} = {name!r}: {text} is a part of Python, and no class with {_methods(key)}")
     digest(module.partition(".")[0])
     try:
-        found: Any = import_module(module)
+        with exits_raised():
+            found: Any = import_module(module)
         for part in path.split("."):
             found = getattr(found, part)
     except ModuleNotFoundError as error:
@@ -167,7 +196,9 @@ def load(key: str, name: str) -> Any:  # noqa: ANN401  (whatever the contract of
             raise
         remedy = "; install it, or put its folder on PYTHONPATH" if error.name == module.partition(".")[0] else ""
         raise ValueError(f"{key} = {name!r}: {text} cannot be imported: {error}{remedy}") from error
-    except (Exception, SystemExit) as error:  # whatever the code of another package does when it is imported
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # whatever the code of another package does when it is imported
         raise ValueError(f"{key} = {name!r}: {text} cannot be imported: {error}") from error
     if not _is_part(key, found):
         raise ValueError(f"{key} = {name!r}: {text} is no class with {_methods(key)}")

@@ -52,6 +52,15 @@ def undisguised() -> Iterator[None]:
         raise
 
 
+def is_signal(error: BaseException) -> bool:
+    """True for the KeyboardInterrupt of a signal; a part of another package may raise one, too."""
+    return isinstance(error, KeyboardInterrupt) and (
+        bool(_raised)
+        or isinstance(next(iter(error.args), None), int)
+        or signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    )
+
+
 def installed() -> bool:
     """True if `install` was called; it is not in children of `fanet launch`, whose launcher handles the signals."""
     return signal.getsignal(signal.SIGTERM) is _raise

@@ -214,7 +214,7 @@ class VirtualHost:
                                 push(heap, latest)
                             latest = wake_ns, seq, index
                 awake = None
-        except (Exception, SystemExit):
+        except BaseException:
             self._leave_out(index, left)
             raise
         finally:

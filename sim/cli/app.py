@@ -97,6 +97,14 @@ def _printable(line: str) -> str:
     return shown if len(shown) <= _LONGEST_LINE else f"{shown[: _LONGEST_LINE - 200]} ... {shown[-190:]}"
 
 
+def _interrupted(interrupt: KeyboardInterrupt) -> int:
+    if not interrupts.is_signal(interrupt):
+        return refused("a part of another package has raised KeyboardInterrupt")
+    if (why := interrupts.sentence(interrupt)) is not None:
+        sys.stderr.write(f"fanet: {why}\n")
+    return interrupts.exit_code(interrupt)
+
+
 def main() -> None:
     interrupts.install()
     open_closed_streams()
@@ -127,9 +135,7 @@ def main() -> None:
             raise
         code = refused(why)
     except KeyboardInterrupt as interrupt:
-        code = interrupts.exit_code(interrupt)
-        if (why := interrupts.sentence(interrupt)) is not None:
-            sys.stderr.write(f"fanet: {why}\n")
+        code = _interrupted(interrupt)
     interrupts.leave(code if isinstance(code, int) else 0)
 
 

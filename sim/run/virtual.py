@@ -18,6 +18,8 @@ from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import MavlinkTap, Message, Poses
 from fanet_mw.bus.topics import Topics, node_of_tap
 from fanet_mw.errors import HostError
+from fanet_mw.extensions import exits_raised
+from fanet_mw.hosts import interrupts
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.node.reader import Reader
 from fanet_mw.scenario import Scenario
@@ -94,7 +96,7 @@ def simulate(
     what a part has raised, which ends a run early, and else is raised; a long run keeps what it collects in a nameless
     file in `spool_folder`.
     """
-    with GARBAGE.not_collected(), _same_folder():
+    with GARBAGE.not_collected(), _same_folder(), exits_raised():
         observed = Observed(
             scenario, capture=capture, applications=applications, folder=spool_folder, observer=observer
         )
@@ -221,7 +223,9 @@ def _run(observed: Observed, on_progress: Callable[[float], None], signals: Sequ
             if signals:
                 break
         host.stop()
-    except SystemExit as error:  # exit code 0 would say that there is a result, and that it is valid
-        raise HostError(
-            f"a part of another package has called sys.exit({error.code!r}) at {host.now_ns / S:g} s"
-        ) from error
+    except BaseException as error:
+        if isinstance(error, Exception) or interrupts.is_signal(error):
+            raise
+        # else the process would end with exit code 0, as if there were a valid result, or as if a user had ended it
+        did = f"called sys.exit({error.code!r})" if isinstance(error, SystemExit) else f"raised {type(error).__name__}"
+        raise HostError(f"a part of another package has {did} at {host.now_ns / S:g} s") from error

@@ -190,6 +190,16 @@ class Finder(Application):
     def look(self): return {}[7]
 class Leaver(Finder):
     def look(self): sys.exit(0)
+class Quitter(Finder):
+    def look(self):
+        import os
+        os._exit(0)
+class Presser(Finder):
+    def look(self): raise KeyboardInterrupt
+class Canceller(Finder):
+    def look(self):
+        from asyncio import CancelledError
+        raise CancelledError
 class Mover(Finder):
     def look(self):
         import os
@@ -212,6 +222,9 @@ class Course(Static):
             "raising:Finder.wake (agent-3, at 2.6 s) has raised KeyError: 7",
         ),
         ('applications=[{use="raising:Leaver",nodes=[3]}]', "has called sys.exit(0) at 2.6 s (agent-3, at 2.6 s)"),
+        ('applications=[{use="raising:Quitter",nodes=[3]}]', "has called os._exit(0) (agent-3, at 2.6 s)"),
+        ('applications=[{use="raising:Presser",nodes=[3]}]', "has raised KeyboardInterrupt at 2.6 s (agent-3, at 2.6"),
+        ('applications=[{use="raising:Canceller",nodes=[3]}]', "has raised CancelledError at 2.6 s (agent-3, at 2.6"),
         (
             'applications=[{use="raising:Mover",nodes=[3]}]',
             "raising:Finder.wake (agent-3, at 2.6 s) has raised ValueE",

@@ -69,6 +69,20 @@ def test_an_interrupt_that_an_import_took_for_its_failure_ends_what_starts_next(
             signal.signal(one, handler)
 
 
+def test_an_interrupt_without_the_number_of_a_signal_is_that_of_a_part_unless_python_handles_ctrl_c() -> None:
+    before = [signal.getsignal(one) for one in interrupts.SIGNALS]
+    try:
+        interrupts.install()
+        assert interrupts.is_signal(KeyboardInterrupt(signal.SIGTERM))
+        assert not interrupts.is_signal(KeyboardInterrupt())
+        assert not interrupts.is_signal(KeyboardInterrupt("stop"))
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        assert interrupts.is_signal(KeyboardInterrupt())
+    finally:
+        for one, handler in zip(interrupts.SIGNALS, before, strict=True):
+            signal.signal(one, handler)
+
+
 def test_an_interrupt_that_got_lost_ends_a_simulation_before_it_starts() -> None:
     before = [signal.getsignal(one) for one in interrupts.SIGNALS]
     try:

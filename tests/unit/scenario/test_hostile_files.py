@@ -2,11 +2,14 @@
 
 import os
 import sys
+import threading
 import time
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 
+from fanet_mw import extensions
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import config
 from sim.cli.app import refused
@@ -92,7 +95,25 @@ def test_a_module_that_raises_or_exits_when_it_is_imported_is_one_sentence(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.syspath_prepend(str(tmp_path))
-    for number, code in enumerate(("raise SystemExit(3)", "1 / 0", "def (", "\0")):
+    codes = ("raise SystemExit(3)", "1 / 0", "def (", "\0", "import os; os._exit(0)", "raise GeneratorExit")
+    for number, code in enumerate(codes):
         (tmp_path / f"hostile_{number}.py").write_text(code)
         with pytest.raises(ConfigError, match=f"hostile_{number}:Part cannot be imported"):
             catalog.find("quick", [f"routing.protocol=hostile_{number}:Part"])
+
+
+@pytest.mark.parametrize(("where", "code", "said"), [("thread", 1, b"os._exit(0)"), ("fork", 0, b"")])
+def test_a_thread_of_a_part_does_not_end_the_process_with_0_and_without_a_word(
+    where: str, code: int, said: bytes
+) -> None:
+    read, write = os.pipe()
+    with extensions.exits_raised():
+        if not (child := os.fork()):
+            with extensions.exits_raised() if where == "thread" else nullcontext():
+                os.dup2(write, 2)
+                threading.Thread(target=os._exit, args=(0,)).start()
+                threading.Event().wait()
+    os.close(write)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == code
+    assert said in os.read(read, 999)
+    os.close(read)

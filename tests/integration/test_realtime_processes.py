@@ -170,6 +170,25 @@ async def test_a_server_that_was_stopped_keeps_no_launcher_from_ending(monkeypat
     assert ended == {"sleeper": -signal.SIGKILL}
 
 
+async def test_a_server_that_is_killed_is_why_its_children_ended_and_each_can_be_started_again() -> None:
+    ended: list[tuple[str, int, int | None]] = []
+
+    def on_end(name: str, code: int) -> None:
+        ended.append((name, code, processes.end_of_server(name)))
+        if len(ended) <= 2:
+            processes.restart(name)
+
+    processes = Processes(on_end)
+    for name in ("one", "two"):
+        processes.start(name, sleeper, {"seconds": 300})
+    os.kill(parent(processes.pid("one")), signal.SIGKILL)
+    assert not await processes.wait(1), "both run again"
+    assert sorted(ended) == [(name, -signal.SIGKILL, -signal.SIGKILL) for name in ("one", "two")]
+    os.kill(processes.pid("one"), signal.SIGKILL)
+    await processes.end_all()
+    assert sorted(ended[2:]) == [("one", -signal.SIGKILL, None), ("two", -signal.SIGKILL, None)]
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 async def test_a_child_waits_for_its_launcher_whatever_signal_all_of_them_are_sent(number: int) -> None:
     ended: dict[str, int] = {}

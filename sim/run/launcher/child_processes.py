@@ -14,6 +14,7 @@ import os
 import signal
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Mapping, Sequence
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.context import ForkServerContext, ForkServerProcess
@@ -33,8 +34,9 @@ _LAUNCHES_WHEN_IMPORTED: Final = 79
 """The exit code of a child whose import of the main program starts a swarm."""
 _MUST_COMPILE: Final = 78
 """The exit code of the first child if the emulator's kernel is not compiled yet."""
+_UNKNOWN_END: Final = 255
+"""The exit code that multiprocessing gives a child whose server has not told one."""
 Entry = Callable[..., int]
-
 
 _PR_SET_NAME: Final = 15
 _KILLED_S: Final = 5.0
@@ -160,6 +162,17 @@ def _wake_server() -> None:
             os.kill(pid, signal.SIGCONT)
 
 
+def _end_of_server(pid: int) -> int | None:
+    """The exit code of the server with this pid, if it has ended. It closes its files a moment before it is dead."""
+    with contextlib.suppress(ChildProcessError):  # multiprocessing has waited for it
+        for _ in range(40):
+            ended = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT)
+            if ended is not None:
+                return ended.si_status if ended.si_code == os.CLD_EXITED else -ended.si_status
+            time.sleep(0.005)
+    return None
+
+
 class Processes:
     """The children by name; each of them can be started again."""
 
@@ -175,6 +188,10 @@ class Processes:
         self._loop = asyncio.get_running_loop()
         self._running: dict[str, ForkServerProcess] = {}
         self._recipes: dict[str, ChildRecipe] = {}
+        self._server_of: dict[str, int] = {}
+        """The process id of the server that each child was forked from last."""
+        self._ended_servers: dict[int, int] = {}
+        """Their exit codes, once they have ended before their children."""
         self._empty = asyncio.Event()
 
     async def warm_up(self) -> bool:
@@ -204,13 +221,18 @@ class Processes:
     def start(self, name: str, entry: Entry, arguments: Mapping[str, Any], *, gives_way: bool = False) -> None:
         """Start a child; `entry(**arguments)` must be importable and picklable."""
         recipe = self._recipes[name] = ChildRecipe(entry, arguments, gives_way, name, f"{self._title} {name}")
-        _start_server()
         process = self._context.Process(target=_child, args=(recipe,), name=name)
-        try:
-            process.start()
-        except (OSError, EOFError) as error:
-            raise HostError(f"{name} cannot be started: {error}") from error
-        self._running[name] = process
+        for last in (False, True):
+            _start_server()
+            server: int = forkserver._forkserver._forkserver_pid  # type: ignore[attr-defined]  # noqa: SLF001
+            try:
+                process.start()
+            except (OSError, EOFError) as error:
+                if not last and self._has_ended(server):
+                    continue
+                raise HostError(f"{name} cannot be started: {error}") from error
+            break
+        self._running[name], self._server_of[name] = process, server
         self._empty.clear()
         self._loop.add_reader(process.sentinel, self._ended, name)
 
@@ -218,6 +240,15 @@ class Processes:
         """Start a child again that has ended, with its former arguments, except for those in `more`."""
         recipe = self._recipes[name]
         self.start(name, recipe.entry, {**recipe.arguments, **more}, gives_way=recipe.gives_way)
+
+    def end_of_server(self, name: str) -> int | None:
+        """The exit code of the server that this child was forked from, if it has ended, and the child with it."""
+        return self._ended_servers.get(self._server_of[name])
+
+    def _has_ended(self, server: int) -> bool:
+        if server not in self._ended_servers and (code := _end_of_server(server)) is not None:
+            self._ended_servers[server] = code
+        return server in self._ended_servers
 
     def pid(self, name: str) -> int:
         pid = self._running[name].pid
@@ -233,6 +264,8 @@ class Processes:
         process.join()
         code = process.exitcode or 0
         process.close()
+        if code == _UNKNOWN_END and self._has_ended(self._server_of[name]):
+            code = -signal.SIGKILL  # `be_killed_with_parent`
         if not self._running:
             self._empty.set()
         self._on_end(name, code)

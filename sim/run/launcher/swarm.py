@@ -328,6 +328,8 @@ class SwarmRun:
         node = int(name.removeprefix("agent-")) if name.startswith("agent-") else 0
         self._deaths.note(name, exit_code, node=node, now_ns=now_ns)
         what = f"{name} ended with {described(exit_code)} at {now_ns / S:.1f} s"
+        if (server := self.processes.end_of_server(name)) is not None:
+            what += f", with the server that all processes are forked from, which ended with {described(server)}"
         if self._over.is_set():
             self._broken |= not node
             self._tell(f"{what}, while the swarm was ending")

@@ -1,6 +1,7 @@
 """Compilation by numba when it is installed; otherwise the same source runs uncompiled (for debugging and coverage).
 
-FANET_NO_NUMBA=1 in the environment leaves functions uncompiled. The variable is read here, once, and nowhere else.
+FANET_NO_NUMBA=1 in the environment leaves functions uncompiled, as numba's own NUMBA_DISABLE_JIT=1 does. The variable
+is read here, once, and nowhere else.
 
 numba caches machine code per function and looks only at that function's own file: after a change to
 `frame_exchange.py` it would go on running the old code inlined into `kernel.py`. So each state of all compiled sources
@@ -15,6 +16,8 @@ from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
+
+from fanet_mw.errors import HostError
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -79,7 +82,14 @@ def _decorator(*, counted: bool) -> Callable[[F], F]:
         return _identity
     try:
         import numba
-    except ImportError:
+    except ModuleNotFoundError:
+        return _identity
+    except (ImportError, ValueError) as error:  # without it, a run would take a hundred times as long
+        raise HostError(
+            f"numba is installed and cannot be imported: {error}; it reads the variables NUMBA_* of the environment; "
+            "FANET_NO_NUMBA=1 does without it"
+        ) from error
+    if numba.config.DISABLE_JIT:
         return _identity
     everyone = numba.config.CACHE_DIR
     ours = cache_folder()

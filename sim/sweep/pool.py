@@ -13,6 +13,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Final
 
+from sim.run.launcher import import_path
 from sim.run.launcher.parent_death import be_killed_with_parent
 from sim.sweep.one_run import Finished, carry_out
 from sim.sweep.provenance import code
@@ -27,6 +28,7 @@ def _work(tasks: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the sweep receives the signal, and ends its workers
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     be_killed_with_parent()
+    import_path.restore()
     while True:
         try:
             task: Task = tasks.recv()
@@ -93,7 +95,8 @@ class Pool:
     def _start(self) -> _Worker:
         ours, theirs = self._context.Pipe()
         process = self._context.Process(target=_work, args=(theirs,), name="fanet sweep", daemon=True)
-        process.start()
+        with import_path.without_working_folder():
+            process.start()
         theirs.close()
         worker = _Worker(process, ours)
         self._running.append(worker)

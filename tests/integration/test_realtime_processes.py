@@ -402,3 +402,31 @@ def test_a_program_that_launches_whenever_it_is_imported_is_told_so_once(tmp_pat
     assert (ended.returncode, ended.stdout) == (1, "")
     assert ended.stderr.count("Traceback") == 1, "that of the program itself, and none of a child"
     assert ended.stderr.rstrip().endswith('put the launch below `if __name__ == "__main__":`')
+
+
+@pytest.mark.parametrize(
+    ("set_up", "said"),
+    [
+        ("rmdir $PWD", "the working folder has been deleted"),
+        ("echo 'raise SystemExit(9)' > numpy.py", "started"),
+        ("export NUMBA_NUM_THREADS=0", "ended with exit code 1 while it imported what they need"),
+    ],
+)
+def test_processes_start_from_a_folder_with_anything_in_it_or_say_why_not(
+    tmp_path: Path, set_up: str, said: str
+) -> None:
+    (tmp_path / "program.py").write_text(
+        "import asyncio\n"
+        "from sim.run.launcher.child_processes import Processes\n"
+        "async def main():\n"
+        "    processes = Processes(lambda *_: None)\n"
+        "    print(await processes.warm_up(), 'started')\n"
+        "if __name__ == '__main__':\n"
+        "    asyncio.run(main())\n"
+    )
+    (tmp_path / "here").mkdir()
+    done = subprocess.run(
+        ["sh", "-c", f'{set_up}; exec "$@"', "sh", sys.executable, tmp_path / "program.py"], cwd=tmp_path / "here",
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert said in (done.stdout + done.stderr).splitlines()[-1]

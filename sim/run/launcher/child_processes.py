@@ -23,6 +23,8 @@ from typing import Any, Final, NamedTuple
 
 from fanet_mw.errors import FanetError, HostError
 from fanet_mw.hosts.service import BUS_EXIT_CODE
+from sim.results.outcome import described
+from sim.run.launcher import import_path
 from sim.run.launcher.parent_death import be_killed_with_parent
 
 _PRELOAD: Final = ["agents.__main__", "emulator.__main__", "sim.world.__main__", "sim.run.launcher.services"]
@@ -73,6 +75,7 @@ def _child(recipe: ChildRecipe) -> None:
         signal.signal(number, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _FOR_THE_LAUNCHER)
     be_killed_with_parent()
+    import_path.restore()
     _keep_no_server_alive()
     _keep_no_tracker_alive()
     entitle(recipe.name, recipe.title)
@@ -129,9 +132,10 @@ def _first() -> None:
     sys.exit(_MUST_COMPILE if must_compile() else 0)
 
 
-def _start_server() -> None:
-    """Start the server from which children are forked, with the launcher's signals blocked: it ignores them only after
-    its imports, and a child only from `_child` on; until then each would print a traceback.
+def _start_server() -> int:
+    """Start the server from which children are forked, if there is none; returns its process id. The launcher's signals
+    are blocked: it ignores them only after its imports, and a child only from `_child` on; until then each would print
+    a traceback.
     """
     helpers = {
         "tracker": resource_tracker._resource_tracker._pid,  # type: ignore[attr-defined]  # noqa: SLF001
@@ -140,16 +144,23 @@ def _start_server() -> None:
     _started.update({name: 1 for name, pid in helpers.items() if pid is None}, process=os.getpid())
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGHUP])  # the tracker ignores the other two by itself
     try:
-        resource_tracker.ensure_running()  # otherwise the server starts the tracker, which unblocks SIGINT
-        signal.pthread_sigmask(signal.SIG_BLOCK, _FOR_THE_LAUNCHER)
-        forkserver.ensure_running()
+        with import_path.without_working_folder():
+            resource_tracker.ensure_running()  # otherwise the server starts the tracker, which unblocks SIGINT
+            signal.pthread_sigmask(signal.SIG_BLOCK, _FOR_THE_LAUNCHER)
+            forkserver.ensure_running()
     except OSError as error:
+        try:
+            Path.cwd()
+        except FileNotFoundError:
+            raise HostError("the working folder has been deleted, and the swarm's processes start in it") from error
         raise HostError(
             f"the server of the swarm's processes cannot be started: {error}; its socket is in the folder for "
             f"temporary files, TMPDIR = {tempfile.gettempdir()}, whose path may have 70 characters"
         ) from error
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    pid: int = forkserver._forkserver._forkserver_pid  # type: ignore[attr-defined]  # noqa: SLF001
+    return pid
 
 
 def _wake_server() -> None:
@@ -201,14 +212,15 @@ class Processes:
         first = self._context.Process(target=_first)
 
         def run() -> int | None:
-            _start_server()
-            with contextlib.suppress(OSError, EOFError):  # the next `start` reports the error
+            server = _start_server()
+            try:
                 first.start()
-                first.join()
-                code = first.exitcode
-                first.close()
-                return code
-            return None
+            except (OSError, EOFError) as error:
+                raise self._not_started("a process", server, error) from error
+            first.join()
+            code = first.exitcode
+            first.close()
+            return code
 
         code = await asyncio.to_thread(run)
         if code == _LAUNCHES_WHEN_IMPORTED:
@@ -223,15 +235,14 @@ class Processes:
         recipe = self._recipes[name] = ChildRecipe(entry, arguments, gives_way, name, f"{self._title} {name}")
         process = self._context.Process(target=_child, args=(recipe,), name=name)
         for last in (False, True):
-            _start_server()
-            server: int = forkserver._forkserver._forkserver_pid  # type: ignore[attr-defined]  # noqa: SLF001
+            server = _start_server()
             try:
                 process.start()
             except (OSError, EOFError) as error:
-                if not last and self._has_ended(server):
-                    continue
-                raise HostError(f"{name} cannot be started: {error}") from error
-            break
+                if last or not self._has_ended(server):
+                    raise self._not_started(name, server, error) from error
+            else:
+                break
         self._running[name], self._server_of[name] = process, server
         self._empty.clear()
         self._loop.add_reader(process.sentinel, self._ended, name)
@@ -244,6 +255,13 @@ class Processes:
     def end_of_server(self, name: str) -> int | None:
         """The exit code of the server that this child was forked from, if it has ended, and the child with it."""
         return self._ended_servers.get(self._server_of[name])
+
+    def _not_started(self, name: str, server: int, error: Exception) -> HostError:
+        why = str(error)
+        if self._has_ended(server):
+            how = described(self._ended_servers[server])
+            why = f"the server from which all processes are forked ended with {how} while it imported what they need"
+        return HostError(f"{name} cannot be started: {why}")
 
     def _has_ended(self, server: int) -> bool:
         if server not in self._ended_servers and (code := _end_of_server(server)) is not None:

@@ -71,3 +71,23 @@ def test_where_nothing_can_be_written_the_kernel_runs_without_a_cache() -> None:
         text=True, timeout=60, check=False,
     )  # fmt: skip
     assert (ended.stdout, ended.stderr) == (f"None {jit.COMPILED}\n", "")
+
+
+@pytest.mark.parametrize(
+    ("variable", "said"),
+    [
+        ({"NUMBA_DISABLE_JIT": "1"}, "False"),
+        ({"NUMBA_NUM_THREADS": "0"}, "numba is installed and cannot be imported: Number of threads specified must be"),
+        ({"PYTHONPATH": "{}"}, "numba is installed and cannot be imported: needs another numpy; it reads"),
+    ],
+)
+def test_a_numba_that_is_told_not_to_compile_does_not_and_one_that_is_broken_is_said_to_be(
+    tmp_path: Path, variable: dict[str, str], said: str
+) -> None:
+    (tmp_path / "numba.py").write_text("raise ImportError('needs another numpy')")
+    environment = {**os.environ, **{name: value.format(tmp_path) for name, value in variable.items()}}
+    program = "from emulator.kernel import jit; print(jit.COMPILED)"
+    ended = subprocess.run(
+        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False
+    )
+    assert said in (ended.stderr.splitlines() or [ended.stdout])[-1]

@@ -32,9 +32,9 @@ def _work(tasks: Connection) -> None:
     while True:
         try:
             task: Task = tasks.recv()
-        except EOFError:
+            tasks.send(carry_out(task))
+        except (EOFError, BrokenPipeError):  # the sweep is gone
             return
-        tasks.send(carry_out(task))
 
 
 @dataclass(slots=True)
@@ -117,7 +117,7 @@ class Pool:
     def close(self) -> None:
         """End all workers, even in the middle of a run."""
         for worker in self._running:
-            worker.process.terminate()
+            worker.process.kill()  # one that was stopped (SIGSTOP) heeds nothing else
         for worker in list(self._running):
             self._bury(worker)
 

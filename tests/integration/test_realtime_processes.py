@@ -408,7 +408,7 @@ def test_a_program_that_launches_whenever_it_is_imported_is_told_so_once(tmp_pat
     ("set_up", "said"),
     [
         ("rmdir $PWD", "the working folder has been deleted"),
-        ("echo 'raise SystemExit(9)' > numpy.py", "started"),
+        ("echo 'raise SystemExit(9)' > numpy.py", "ready"),
         ("export NUMBA_NUM_THREADS=0", "ended with exit code 1 while it imported what they need"),
     ],
 )
@@ -420,7 +420,7 @@ def test_processes_start_from_a_folder_with_anything_in_it_or_say_why_not(
         "from sim.run.launcher.child_processes import Processes\n"
         "async def main():\n"
         "    processes = Processes(lambda *_: None)\n"
-        "    print(await processes.warm_up(), 'started')\n"
+        "    print(await processes.warm_up(), 'ready')\n"
         "if __name__ == '__main__':\n"
         "    asyncio.run(main())\n"
     )

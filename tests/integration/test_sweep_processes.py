@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -73,6 +74,17 @@ def test_a_run_whose_worker_is_killed_is_carried_out_by_another() -> None:
     assert {done.key: (done.summary, done.measured) for done in (first, second)} == {
         key: (done.summary, done.measured) for key, done in here.items()
     }
+
+
+def test_a_worker_that_was_stopped_keeps_no_sweep_from_ending() -> None:
+    pool = Pool(1)
+    worker = pool._start()
+    os.kill(worker.process.pid, signal.SIGSTOP)
+    alarm = threading.Timer(5, os.kill, (worker.process.pid, signal.SIGCONT))
+    alarm.start()
+    pool.close()
+    assert alarm.is_alive()
+    alarm.cancel()
 
 
 @pytest.mark.slow

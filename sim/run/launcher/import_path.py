@@ -1,4 +1,4 @@
-"""Keeps files of the working folder, such as a user's `numpy.py`, out of the way of processes that Python starts.
+"""Keeps files of the working folder, such as a numpy of the user's, out of the way of processes that Python starts.
 
 multiprocessing starts them by `python -c`, which looks there first for whatever is imported.
 """

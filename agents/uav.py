@@ -18,8 +18,7 @@ from agents.mission.flight.search_limits import SearchLimits
 from agents.mission.formation_flight.application import FormationFlight
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.onboard import Onboard
-from agents.positioning.dead_reckoning import DeadReckoning
-from agents.positioning.steady_fix import SteadyFix
+from agents.positioning import DeadReckoning, SteadyFix
 from fanet_mw.actor import Actor
 from fanet_mw.application import Application, Course
 from fanet_mw.bus.messages import (

@@ -16,7 +16,7 @@ ROOT: Final = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))  # this tree, not the package that is installed
 
 from sim.figures.all_figures import FIGURES  # noqa: E402
-from sim.figures.kept_tables import keep  # noqa: E402
+from sim.figures.finished_runs import keep  # noqa: E402
 from sim.report.html import Block, Text, as_markdown  # noqa: E402
 from sim.report.page import commands, figure_pages, figures_of, overview  # noqa: E402
 from sim.results.run_table import read  # noqa: E402

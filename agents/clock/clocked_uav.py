@@ -11,8 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Final
 
-from agents.clock.local_clock import LocalClock
-from agents.clock.steady_clock import SteadyClock
+from agents.clock.local_clock import LocalClock, SteadyClock
 from agents.clock.swarm_time import SwarmTime, swarm_time
 from agents.hello_schedule import HelloTime
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap

@@ -9,7 +9,7 @@ With `routing.address_resolution` every unicast first waits for the address of i
 
 import struct
 from abc import abstractmethod
-from typing import ClassVar, Final
+from typing import ClassVar, Final, NamedTuple
 
 from fanet_mw.bus.messages import Reception, TxOutcome, TxStatus
 from fanet_mw.errors import DropReason, MalformedFrameError
@@ -19,8 +19,7 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.routing.address_resolution import Knowledge, Outgoing, Resolver
 from fanet_mw.routing.rival_control_messages import Family, check_node, type_of, unpack
-from fanet_mw.routing.send_buffer import SendBuffer
-from fanet_mw.units import BROADCAST, NodeId, earliest
+from fanet_mw.units import BROADCAST, NodeId, earliest, seconds_to_ns
 from fanet_mw.wire import Kind
 
 REASON_OF: Final = {
@@ -36,6 +35,50 @@ ADDRESS_REQUEST: Final = 1
 ADDRESS_REPLY: Final = 2
 _TARGET: Final = struct.Struct("<H")
 """RFC 826's target protocol address. The sender's is the origin in the header; hardware addresses are the MAC's."""
+
+
+class _Held(NamedTuple):
+    """A packet, and the instant at which it expires."""
+
+    packet: Packet
+    ends_ns: int
+
+
+class _SendBuffer:
+    """The packets of one node that wait for routes, first in, first out."""
+
+    def __init__(self, port: Port) -> None:
+        self._port = port
+        self._capacity = port.scenario.routing.queue_frames
+        self._hold_ns = seconds_to_ns(port.scenario.routing.lifetime_s)
+        self._held: list[_Held] = []
+
+    def __len__(self) -> int:
+        return len(self._held)
+
+    def push(self, packet: Packet, *, now_ns: int) -> None:
+        self._held.append(_Held(packet, now_ns + self._hold_ns))
+        if len(self._held) > self._capacity:
+            self._drop_oldest(DropReason.QUEUE_FULL, now_ns)
+
+    def destinations(self) -> list[NodeId]:
+        return sorted({NodeId(held.packet.header.destination) for held in self._held})
+
+    def take(self, destination: NodeId) -> list[Packet]:
+        taken = [held.packet for held in self._held if held.packet.header.destination == destination]
+        if taken:
+            self._held = [held for held in self._held if held.packet.header.destination != destination]
+        return taken
+
+    def expire(self, *, now_ns: int) -> None:
+        while self._held and self._held[0].ends_ns <= now_ns:
+            self._drop_oldest(DropReason.EXPIRED, now_ns)
+
+    def _drop_oldest(self, reason: DropReason, now_ns: int) -> None:
+        self._port.drop(reason, self._held.pop(0).packet, now_ns=now_ns)
+
+    def next_end_ns(self) -> int | None:
+        return self._held[0].ends_ns if self._held else None
 
 
 class HopByHop(RoutingProtocol):
@@ -58,7 +101,7 @@ class HopByHop(RoutingProtocol):
             if rules != "none"
             else None
         )
-        self._room = SendBuffer(port)
+        self._room = _SendBuffer(port)
         """The packets that wait for a route, in the protocols that let packets wait."""
         self.control_sent = 0
 

@@ -47,7 +47,7 @@ def figures(
 
     """
     from sim.figures.all_figures import chosen
-    from sim.figures.kept_tables import read_kept
+    from sim.figures.finished_runs import read_kept
     from sim.figures.paper_claims import BEYOND
     from sim.figures.recipe import render
     from sim.results.run_table import read

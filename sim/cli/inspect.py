@@ -18,7 +18,7 @@ def inspect(what: str | None = None, *, where: SwarmFlags = SwarmFlags()) -> int
         what: Name of a swarm that runs, by default the only one; or the folder of a run.
 
     """
-    from sim.inspection.run import live, recorded
+    from sim.inspection.screen import live, recorded
 
     if what is not None and Path(what).is_dir():
         return recorded(Path(what))

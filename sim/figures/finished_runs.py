@@ -6,12 +6,16 @@ values are always combined within a seed.
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import accumulate
-from typing import Any
+from pathlib import Path
+from typing import Any, Final
 
+import pyarrow as pa
+import pyarrow.parquet as pq
 from pyarrow import Table
 
 from fanet_mw.errors import ConfigError
 from sim.figures.statistics import Interval, interval
+from sim.results.run_table import read_parquet
 from sim.sweep.measures import DELAY_EDGES_S
 
 Row = Mapping[str, Any]
@@ -76,3 +80,24 @@ def max_per_seed(*many: Mapping[int, float]) -> dict[int, float]:
 def _together(many: Sequence[Mapping[int, float]]) -> dict[int, list[float]]:
     seeds = [seed for seed in many[0] if all(seed in other for other in many)] if many else []
     return {seed: [one[seed] for one in many] for seed in seeds}
+
+
+_LEFT_OUT: Final = ("summary", "trace_sha256")
+"""The summary, whose figures are columns, and hashes, which nothing compresses: half of the file."""
+
+
+def keep(table: pa.Table, folder: Path, sweep: str, variant: str) -> Path:
+    """Write the table of a sweep as the repository keeps it, small; the same table always gives the same bytes."""
+    folder.mkdir(parents=True, exist_ok=True)
+    kept = table.drop_columns([name for name in _LEFT_OUT if name in table.column_names])
+    pq.write_table(kept, _path(folder, sweep, variant), compression="zstd", compression_level=19)
+    return _path(folder, sweep, variant)
+
+
+def read_kept(folder: Path, sweep: str, variant: str) -> pa.Table | None:
+    path = _path(folder, sweep, variant)
+    return read_parquet(path, follow=True) if path.exists() else None
+
+
+def _path(folder: Path, sweep: str, variant: str) -> Path:
+    return folder / f"{sweep}-{variant}.parquet"

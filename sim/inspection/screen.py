@@ -5,6 +5,7 @@ Whatever could not be looked at in time is counted in the last line.
 
 import contextlib
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import ClassVar, Final
 
 from rich.text import Text
@@ -14,12 +15,17 @@ from textual.containers import Horizontal, VerticalScroll
 from textual.css.query import NoMatches
 from textual.widgets import Footer, Input, Static, TabbedContent, TabPane
 
+from fanet_mw.errors import BusError
+from fanet_mw.hosts import interrupts
 from fanet_mw.units import MS, S
-from sim.inspection.inspection import Inspection, LinkLine
+from sim.inspection.inspection import Inspection, LinkLine, of_folder
 from sim.inspection.messages import Key, fields_of, name_of
 from sim.inspection.packets import Way
 from sim.inspection.rows import Column, Rows
+from sim.observation.bus_feed import BusFeed
+from sim.observation.live_frames import LiveFrames
 from sim.observation.turns import Turns
+from sim.results.run_folder import RunFolder
 
 _TABS: Final = {"messages": "#streams", "packets": "#ways", "turns": None, "links": "#pairs"}
 """The tabs, each with the table that has the focus there."""
@@ -260,3 +266,41 @@ def turn_lines(found: Turns, now_ns: int) -> Text:
 def _fits(way: Way, words: list[str]) -> bool:
     text = f"{way.origin} {way.origin}:{way.seq} {way.app} " + " ".join(reason for _, _, reason in way.dropped)
     return all(word in text.split() for word in words)
+
+
+def live(endpoint: str, swarm: str | None, *, zenoh_config: Path | None) -> int:
+    with BusFeed(endpoint, swarm, zenoh_config=zenoh_config) as feed:
+        inspection, frames = Inspection(feed.scenario), LiveFrames()
+
+        def pump(into: Inspection) -> str:
+            try:
+                feed.pump(into)
+            except BusError:
+                feed.over = True
+            for node, request in frames.take():
+                into.take_frame(node, request.start_ns, request.frame)
+            into.messages.malformed += frames.malformed
+            frames.malformed = 0
+            into.now_ns = max(into.now_ns, feed.now_ns())
+            skipped = feed.lost + frames.skipped
+            over = "; the swarm is over" if feed.over else ""
+            return (f"{skipped} puts skipped" if skipped else "nothing skipped") + over
+
+        feed.listen()
+        feed.bus.subscribe(feed.names.all_tx, frames.keep)
+        _run(lambda ended: Inspector(inspection, title=f"swarm {feed.names.swarm}", pump=pump, live=True, ended=ended))
+    return 0
+
+
+def recorded(folder: Path) -> int:
+    inspection = of_folder(RunFolder(folder))
+    note = "a recording: rates are of the whole run"
+    _run(lambda ended: Inspector(inspection, title=str(folder), pump=lambda _: note, live=False, ended=ended))
+    return 0
+
+
+def _run(made: Callable[[Sequence[int]], Inspector]) -> None:
+    """Run the screen until its user or a signal ends it; a signal that interrupted its event loop would not."""
+    signals: list[int] = []
+    with interrupts.handed_to(signals.append):
+        made(signals).run()

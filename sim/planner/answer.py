@@ -11,7 +11,7 @@ from random import Random
 from typing import Any, Final
 
 from agents.applications.traffic import sources_of
-from agents.positioning.steady_fix import error_m
+from agents.positioning import error_m
 from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.errors import ConfigError
 from fanet_mw.graph.topology import within_range

@@ -1,24 +1,26 @@
 """Computes the summary of a run from its outcome. `summary_figures.toml` defines each figure."""
 
+import math
 from collections import Counter
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from fanet_mw.errors import DropReason
 from fanet_mw.trace import ConflictForeseen, DeadlineLost, DeadlineMet, Delivered, Dropped, Warned
 from fanet_mw.units import MS, S
+from sim.records.delivery_columns import Column
 from sim.records.record_kinds import records_of
-from sim.results import delays, ledger, validity
+from sim.results import ledger, validity
 from sim.results.bounds import against_bounds, likely
 from sim.results.clocks import clock_errors
 from sim.results.clusters import clusters
 from sim.results.links_over_time import LinksOverTime
 from sim.results.mission import mission
 from sim.results.outcome import Outcome
-from sim.results.packets import OTHER_APPS, AppPackets, packets_of, targets_by_source
+from sim.results.packets import OTHER_APPS, AppPackets, SentPacket, packets_of, targets_by_source
 from sim.results.reachability import reachability
 from sim.scenarios.notes import notes
 
@@ -123,8 +125,8 @@ def _packets(outcome: Outcome, packets: Mapping[str, AppPackets]) -> dict[str, d
             "repeated": app.repeated,
             "unknown": app.unknown,
             "pdr": _ratio(app.deliveries.number, app.wanted),
-            "delay_ms": delays.summed_up(app.deliveries.delay_ns),
-            "delay_parts_ms": delays.parts(app, lead_ns=lead_ns),
+            "delay_ms": summed_up(app.deliveries.delay_ns),
+            "delay_parts_ms": _delay_parts(app, lead_ns=lead_ns),
         }
         for name, app in packets.items()
     }
@@ -210,3 +212,41 @@ def separation(outcome: Outcome) -> dict[str, Any]:
             "max": round(max(delays_ms), 3),
         } if delays_ms else {},
     }  # fmt: skip
+
+
+PARTS: Final = ("lead", "queue", "air", "handover")
+
+
+def summed_up(delays_ns: Column) -> dict[str, float | None]:
+    """The mean, the percentiles and the maximum of some delays [ms]; None for each if there are no delays."""
+    if not len(delays_ns):
+        return dict.fromkeys(("mean", "p50", "p95", "p99", "max"))
+    values = delays_ns.astype(np.float64) / MS
+    p50, p95, p99 = np.percentile(values, (50, 95, 99))
+    named = {"mean": values.mean(), "p50": p50, "p95": p95, "p99": p99, "max": values.max()}
+    return {name: round(float(value), 3) for name, value in named.items()}
+
+
+def _delay_parts(app: AppPackets, *, lead_ns: int) -> dict[str, float | None]:
+    """The mean of each part of a delay [ms], over the deliveries of packets whose release is known.
+
+    hand-over ......... release ......... end of the frame ......... receipt
+    |  lead  |  queue  |      air, relays included      |  handover  |
+    """
+    waited = np.array([_waited_ns(sent) for sent in app.sent.values()], dtype=np.float64)
+    deliveries = app.deliveries
+    waited_ns = waited[deliveries.packet]
+    known = ~np.isnan(waited_ns)
+    if not known.any():
+        return dict.fromkeys(PARTS)
+    waited_ns = waited_ns[known]
+    lead_part_ns = np.minimum(lead_ns, waited_ns)
+    handover_ns = deliveries.handover_ns[known].astype(np.float64)
+    air_ns = deliveries.delay_ns[known].astype(np.float64) - waited_ns - handover_ns
+    columns = lead_part_ns, waited_ns - lead_part_ns, air_ns, handover_ns
+    return {name: round(float(column.mean()) / MS, 3) for name, column in zip(PARTS, columns, strict=True)}
+
+
+def _waited_ns(sent: SentPacket) -> float:
+    """The time from the hand-over of a packet to its release; NaN if it is not known."""
+    return math.nan if sent.out_ns is None else float(sent.out_ns - sent.born_ns)

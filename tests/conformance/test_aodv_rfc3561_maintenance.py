@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fanet_mw.routing.aodv import parameters as p
 from fanet_mw.routing.aodv.messages import RouteError, RouteReply, Unreachable
-from fanet_mw.routing.aodv.neighbors import HelloNeighbors
+from fanet_mw.routing.aodv.protocol import HelloNeighbors
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, S
 

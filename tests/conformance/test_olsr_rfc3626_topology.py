@@ -10,7 +10,7 @@ from rival_bench import Bench
 
 from fanet_mw.routing.olsr import parameters as p
 from fanet_mw.routing.olsr.messages import TC, TopologyControl, decode_time
-from fanet_mw.routing.olsr.routes import routing_table
+from fanet_mw.routing.olsr.protocol import routing_table
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, NodeId, S
 

@@ -5,8 +5,7 @@ from collections import Counter, defaultdict
 import pytest
 from kit import slow
 
-from agents.clock.local_clock import LocalClock
-from agents.clock.steady_clock import SteadyClock
+from agents.clock.local_clock import LocalClock, SteadyClock
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Clock
 from fanet_mw.trace import BoundStated, ClockSampled, Delivered, Generated

@@ -7,8 +7,8 @@ import pytest
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Delivered, Generated
 from fanet_mw.units import MS
-from sim.results.delays import PARTS
 from sim.results.files import finish
+from sim.results.metrics import PARTS
 from sim.results.outcome import Outcome
 from sim.run.virtual import simulate
 

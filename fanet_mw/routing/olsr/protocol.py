@@ -10,8 +10,8 @@ interfaces (MID), gateways (HNA), link hysteresis (14), TC redundancy (15), MPR 
 data that returns to a node.
 """
 
-from collections.abc import Mapping
-from typing import ClassVar, Final
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Final, NamedTuple
 
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason, MalformedFrameError
@@ -35,7 +35,7 @@ from fanet_mw.routing.olsr.messages import (
     encode_time,
 )
 from fanet_mw.routing.olsr.multipoint_relays import multipoint_relays
-from fanet_mw.routing.olsr.routes import OlsrRoute, routing_table
+from fanet_mw.routing.olsr.parameters import WILL_NEVER
 from fanet_mw.routing.olsr.state import Repositories
 from fanet_mw.routing.rival_control_messages import Family
 from fanet_mw.serial_number import following
@@ -44,6 +44,42 @@ from fanet_mw.units import BROADCAST, NodeId, earliest
 _HELLO_VTIME: Final = encode_time(p.NEIGHB_HOLD_TIME_NS)
 _HELLO_HTIME: Final = encode_time(p.HELLO_INTERVAL_NS)
 _TC_VTIME: Final = encode_time(p.TOP_HOLD_TIME_NS)
+
+
+class _OlsrRoute(NamedTuple):
+    """An entry of the routing table."""
+
+    next_hop: NodeId
+    hops: int
+
+
+def routing_table(
+    node: NodeId,
+    neighbors: Mapping[NodeId, Sequence[NodeId]],
+    willingness: Mapping[NodeId, int],
+    topology: Sequence[tuple[NodeId, NodeId]],
+) -> dict[NodeId, _OlsrRoute]:
+    """The shortest known routes (10), `topology` by pairs (last hop, destination); ties by the lowest last hop."""
+    routes = {neighbor: _OlsrRoute(neighbor, 1) for neighbor in sorted(neighbors)}
+    for neighbor in sorted(neighbors):
+        if willingness[neighbor] != WILL_NEVER:
+            for far in neighbors[neighbor]:
+                if far != node and far not in routes:
+                    routes[far] = _OlsrRoute(neighbor, 2)
+    onward: dict[NodeId, list[NodeId]] = {}
+    for last, destination in topology:
+        onward.setdefault(last, []).append(destination)
+    ring, hops = [far for far in routes if routes[far].hops == 2], 2
+    while ring:
+        hops += 1
+        wider: list[NodeId] = []
+        for last in sorted(ring):
+            for destination in onward.get(last, ()):
+                if destination != node and destination not in routes:
+                    routes[destination] = _OlsrRoute(routes[last].next_hop, hops)
+                    wider.append(destination)
+        ring = wider
+    return routes
 
 
 class Olsr(HopByHop):
@@ -62,7 +98,7 @@ class Olsr(HopByHop):
         self._advertised: list[NodeId] = []
         self._tc_until_ns = -1
         """A node whose last selector is gone advertises that until this instant, for TOP_HOLD_TIME (9.3)."""
-        self._routes: dict[NodeId, OlsrRoute] = {}
+        self._routes: dict[NodeId, _OlsrRoute] = {}
         self._routes_version = -1
         self._routes_end_ns = -1
 
@@ -82,7 +118,7 @@ class Olsr(HopByHop):
     def _relays(self, packet: Packet, reception: Reception, *, now_ns: int) -> bool:
         return self.willingness != p.WILL_NEVER and self._state.is_selector(reception.src, now_ns=now_ns)
 
-    def _route(self, destination: NodeId, *, now_ns: int) -> OlsrRoute | None:
+    def _route(self, destination: NodeId, *, now_ns: int) -> _OlsrRoute | None:
         """The entry of the routing table, which is computed anew when its inputs have changed (10)."""
         state = self._state
         if self._routes_version != state.version or now_ns > self._routes_end_ns:

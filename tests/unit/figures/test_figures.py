@@ -15,8 +15,7 @@ from emulator.pcap_file import PcapFile
 from fanet_mw.errors import ConfigError
 from sim.cli.app import app
 from sim.figures.all_figures import FIGURES, chosen
-from sim.figures.finished_runs import Runs, differences, max_per_seed, mean_per_seed
-from sim.figures.kept_tables import keep, read_kept
+from sim.figures.finished_runs import Runs, differences, keep, max_per_seed, mean_per_seed, read_kept
 from sim.figures.paper_claims import Claim, Finding, Reason, Statement, Verdict, above, alike, below
 from sim.figures.recipe import render
 from sim.figures.rescue import confirmed_s, loss_share

@@ -20,8 +20,7 @@ from matplotlib.figure import Figure
 from test_documents import ROOT
 
 from sim.figures.all_figures import FIGURES
-from sim.figures.finished_runs import Runs
-from sim.figures.kept_tables import read_kept
+from sim.figures.finished_runs import Runs, read_kept
 from sim.figures.recipe import Recipe
 from sim.figures.style import save_data
 

@@ -12,8 +12,7 @@ from fanet_mw.errors import DropReason
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Approaching, Arrived, Collided, DeadlineLost, DeadlineMet, Detected, Dropped, Record
 from fanet_mw.units import MS, S
-from sim.results.delays import summed_up
-from sim.results.metrics import summarize
+from sim.results.metrics import summarize, summed_up
 from sim.results.outcome import Outcome
 from sim.results.printed_summary import show
 from sim.world.environment.survivors import place

@@ -47,3 +47,13 @@ class Clustering(Protocol):
     def divide(self, swarm: Swarm) -> list[Cluster]:
         """The clusters, in an order that depends only on the inputs."""
         ...
+
+
+def succession(cluster: Cluster, swarm: Swarm) -> tuple[NodeId, ...]:
+    """The head, then its stand-ins in order: members that hear the head first, as they notice when it is gone."""
+    near, inside = frozenset(swarm.adjacency[cluster.head]), frozenset(cluster.members)
+
+    def rank(node: NodeId) -> tuple[bool, int, NodeId]:
+        return node not in near, -sum(1 for n in swarm.adjacency[node] if n in inside), node
+
+    return (cluster.head, *sorted((node for node in cluster.members if node != cluster.head), key=rank))

@@ -1,13 +1,5 @@
 """Where PX4 and ArduPilot differ: the numbers of their flight modes, and how they count missions and heights.
 
-    mode        PX4: main, sub     ArduPilot (Copter)
-    hold        AUTO 4, LOITER 3   LOITER 5
-    take-off    AUTO 4, TAKEOFF 2  GUIDED 4
-    mission     AUTO 4, MISSION 4  AUTO 3
-    return      AUTO 4, RTL 5      RTL 6
-    land        AUTO 4, LAND 6     LAND 9
-    guided      OFFBOARD 6         GUIDED 4
-
 On board all is PX4's; a gateway with another flavor translates (`fanet_mw/gateway/translation.py`).
 """
 

@@ -1,16 +1,8 @@
 """Path loss over distance, as equations: arrays in, arrays out, without state and without the scenario.
 
-    friis          20 log10(4 pi d f / c)
-    log_distance   L(1 m) + 10 n log10 d
-    two_ray        friis up to the crossover 4 pi h1 h2 f / c, beyond 40 log10 d - 20 log10(h1 h2)
-    air_to_air     friis at 1 m + 20.5 log10 d
-    air_to_ground  friis + P eta_LoS + (1 - P) eta_NLoS, P from the elevation angle (Al-Hourani et al. 2014), and over
-                   into air_to_air as the lower end rises above the roofs
-    uma_av         P L_LoS + (1 - P) L_NLoS, P from height and distance (3GPP TR 36.777, annex B)
-
-Distances and heights in metres, frequencies in MHz, losses in dB between isotropic antennas; below 1 m as at 1 m. Not
-modeled: antenna patterns and airframes, weather, the curvature of the earth, and the oscillation of two rays before the
-crossover. Ranges of validity: docs/explanation/channel.md.
+Equations, sources and ranges of validity: docs/explanation/channel.md. Distances and heights in metres, frequencies in
+MHz, losses in dB between isotropic antennas; below 1 m as at 1 m. Not modeled: antenna patterns and airframes, weather,
+the curvature of the earth, and the oscillation of two rays before the crossover.
 """
 
 import math

@@ -1,14 +1,10 @@
-"""The link of a companion computer to one flight controller, PX4 or ArduPilot. Sans-IO.
+"""The link of a companion computer to one flight controller, PX4 or ArduPilot (docs/how-to/flight-controllers.md).
+Sans-IO.
 
     in     its MAVLink (`on_bytes`), the setpoints of the computer (`command`), time (`wake`)
     out    MAVLink for it (`out`), what it measures for the computer (`readings`), what happened (`events`)
 
-    POSITION, VELOCITY, HOLD   setpoints, four a second, and the guided mode (OFFBOARD, GUIDED) once they flow
-    TAKEOFF                    arm, then NAV_TAKEOFF
-    LAND, RETURN               the modes of these names
-
-Commands go out one at a time, each again until it is acknowledged. A flight controller that leaves the mode in which it
-was put, because its failsafe or a pilot took over, is left alone until it is back there. Heights are over home.
+Commands go out one at a time, each again until it is acknowledged. Heights are over home.
 """
 
 import math

@@ -2,10 +2,8 @@
 
     samples = taken + malformed + oversized + overflowed + waiting
 
-The queue, and a portion, are bounded by messages or puts and by bytes. A put is dropped if the inbox, or the quota of
-its topic (a quarter, so that no sender shuts out others), is full: waiting puts come first, and the next request shows
-the gap. It holds about what an actor handles in some tens of milliseconds; more would be too late for the air. If a put
-turns out to be malformed in the middle, the messages before that place have been handed over already. `offer` and
+A put is dropped if the inbox, or the quota of its topic (a quarter, so that no sender shuts out others), is full. It
+holds about what an actor handles in some tens of milliseconds; more would be too late for the air. `offer` and
 `deliver` may run on different threads: the ends of a deque are safe, and each counter has one writer.
 """
 

@@ -4,11 +4,10 @@
     waiting --heard--> known     the frames are sent; known for 120 s, then the next frame causes a new request
     waiting --silence--> unknown [rfc826] or dead for 100 s [ns3]: waiting frames are dropped; with ns3 later ones too
 
-There are two sets of rules. `rfc826`: RFC 826's reception algorithm (any request or reply of a known sender updates its
-entry, and the node that is asked learns the sender's address), with RFC 1122, 2.3.2: one request per second and
-neighbor, the latest frames wait. `ns3`: ns-3's ArpL3Protocol and ArpCache with their default attributes: only expected
-answers are learned, frames that find three waiting are dropped, one timer repeats all requests. Not modeled: gratuitous
-requests, conflict detection (RFC 5227), unicast polls; as in ns-3, a link that fails does not remove its entry.
+`rfc826`: RFC 826's reception algorithm with RFC 1122, 2.3.2: one request per second and neighbor, the latest frames
+wait. `ns3`: ns-3's ArpL3Protocol and ArpCache with their defaults: only expected answers are learned, frames that find
+three waiting are dropped, one timer repeats all requests. Not modeled: gratuitous requests, conflict detection (RFC
+5227), unicast polls; as in ns-3, a link that fails does not remove its entry.
 """
 
 from collections.abc import Callable

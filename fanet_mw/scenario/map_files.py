@@ -5,9 +5,7 @@
     mission.survivors_at = "people.kml" -> mission.survivor_positions_m, one for each point
 
 Read are GeoJSON (RFC 7946), KML and KMZ (OGC 12-007r2), plans of QGroundControl (.plan) and lists of waypoints
-(QGC WPL 110). In a plan the area is its surveys and the fences to stay inside, the no-fly areas are the fences to stay
-outside, and the points are its rally points, or its waypoints if there are none. Lists of waypoints may hold the same,
-as Mission Planner saves fences and rally points.
+(QGC WPL 110); what of a plan is what: docs/how-to/write-a-scenario.md.
 """
 
 import io

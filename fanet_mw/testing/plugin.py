@@ -1,13 +1,7 @@
-"""Fixtures for pytest, for applications and programs of one's own.
+"""Fixtures for pytest, for applications and programs of one's own (docs/how-to/send-messages.md, In a test).
 
-    async def test_my_message(swarm):
-        async with swarm("quick") as s:
-            a, b = s.node(1), s.node(3)
-            assert (await a.send(b"hello", port=7, to=3)).ok
-            assert (await b.receive()).data == b"hello"
-
-`swarm` makes swarms in virtual time; `real_swarm` starts real processes. Both end what they began. An asynchronous test
-needs a plugin that runs it (pytest-asyncio, anyio). This file imports neither numpy nor the core until it is used.
+`swarm` makes swarms in virtual time; `real_swarm` starts real processes. Both end what they began. This file imports
+neither numpy nor the core until it is used.
 """
 
 import contextlib

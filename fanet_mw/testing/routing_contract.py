@@ -1,14 +1,8 @@
-"""The contract of a routing protocol as tests, for a protocol of another package to run against itself.
-
-    from fanet_mw.testing.routing_contract import RoutingContract
-
-    class TestGossip3(RoutingContract):
-        protocol = "gossip3"                 # as a scenario names it
-        options = {"p": 0.6}                 # the table [routing.options]
-        least_delivered = 0.9                # share that must arrive in a connected swarm at rest
+"""The contract of a routing protocol as tests, for a protocol of another package to run against itself
+(docs/how-to/extend.md).
 
 Nine nodes on a grid of 3 x 3, 200 m apart, range 250 m, send over the real medium in virtual time; and single nodes are
-driven by hand with frames that no protocol would send. Needs `pip install 'fanet-mw[emulator]'` and pytest.
+driven by hand with frames that no protocol would send.
 """
 
 import json

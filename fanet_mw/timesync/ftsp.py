@@ -3,12 +3,9 @@
     hello n ends                   its sender and all receivers stamp that instant, each by its own clock
     hello n+1 says "hello n ended at swarm time t"     -> a pair (own stamp, t) -> the fit of `clock_fit`
 
-The stamp of a hello is sent in the next one, so that it does not matter how long a hello contends. The reference is the
-node with the lowest id; a node without news of one for a while becomes it (root election by time-out, Maroti et al.
-2004), and continues the swarm's time. Pairs are taken from the neighbors nearest to the reference; others can only
-contradict. A beacon is news if the reference's `round` has advanced beyond the last news or, after a while without,
-beyond that neighbor's last beacon: a restarted reference counts anew. Not provided: secrecy and proof of origin. A
-plausible forged beacon counts as one neighbor's statement; it can be outvoted, but is not recognized.
+Who is the reference, and what is believed: docs/explanation/time.md. A beacon is news if the reference's `round` has
+advanced beyond the last news or, after a while without, beyond that neighbor's last beacon: a restarted reference
+counts anew. A plausible forged beacon counts as one neighbor's statement; it can be outvoted, but is not recognized.
 """
 
 import math

@@ -1,16 +1,7 @@
 """The rights of each participant of a swarm, as an access list of Zenoh's router: what is not allowed is denied.
 
-    agent-N    puts its requests, setpoint, telemetry, trace and report; subscribes to its receptions, its sensors and
-               what ground stations say to it, and the post on the ground to orders
-    emulator   puts receptions, links, trace and report; subscribes to requests, poses, obstructions, changes of the air
-    world      puts poses, obstructions, sensors, radios of crashed UAVs, trace, report; subscribes to setpoints
-    operator   puts changes of the air and of the clock's pace, orders, and commands to UAVs; subscribes to poses,
-               links, traces, reports, telemetry
-    gateway    puts what ground stations say to UAVs; subscribes to telemetry
-
-All subscribe to the clock and query it, and all but the operator and the gateway declare that they are alive. The
-launcher is the router itself: its own puts (the clock) pass no access list. Participants are identified by the common
-names of their certificates. A put that is denied disappears without a message to its sender.
+Who puts and hears what: docs/how-to/security.md. Participants are identified by the common names of their certificates;
+the launcher is the router itself, so that its own puts (the clock) pass no access list.
 """
 
 from typing import Any, Final, NamedTuple

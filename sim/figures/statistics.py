@@ -1,12 +1,9 @@
 """Means over seeds with 95 % intervals.
 
-From eight seeds on an interval is that of the bootstrap, by percentiles that are expanded for few values: T. C.
-Hesterberg, "What Teachers Should Know About the Bootstrap", The American Statistician 69(4), 2015. It lies
-within the values themselves, so it never holds what the quantity cannot be, and it is as skew as they are. The
-resamples are drawn with a fixed seed: the same values always have the same interval.
-
-With fewer seeds such an interval would be the range of the values and hold the mean far less often than it says. There
-it is Student's t, cut where the quantity ends, which takes nothing from its confidence.
+From eight seeds on an interval is that of the bootstrap, by percentiles that are expanded for few values (T. C.
+Hesterberg, "What Teachers Should Know About the Bootstrap", The American Statistician 69(4), 2015), with resamples of a
+fixed seed. With fewer seeds it would hold the mean far less often than it says; there it is Student's t, cut where the
+quantity ends, which takes nothing from its confidence.
 """
 
 import functools

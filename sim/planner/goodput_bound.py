@@ -1,7 +1,7 @@
 """The packets per second that can reach every node, whatever the protocol: an upper bound by counting at receivers.
 
-Every node needs a copy of each packet. F: airtime of its frame; D: DIFS, for which a sender finds its medium idle first
-(IEEE 802.11-2020, 10.3.4.2). A station either sends or receives, and it receives one frame at a time on any channel:
+F: airtime of a packet's frame; D: DIFS, for which a sender finds its medium idle first (IEEE 802.11-2020, 10.3.4.2). A
+station either sends or receives, and it receives one frame at a time on any channel:
 
     (1)  t(u) (F + D) + (L - l(u)) F <= 1       per second, at every node u that sends t(u) frames, l(u) of them for
                                                 packets of its own, L packets of all nodes together
@@ -11,17 +11,9 @@ Every node needs a copy of each packet. F: airtime of its frame; D: DIFS, for wh
 (1) summed over N(v), of which d nodes with a share s of the packets, and (2):      L ((F + D) + (d - s) F) <= d
 (1) summed over all n nodes, m transmissions per packet:                     L (m (F + D) + (n - 1) F) <= n
 
-The m transmitters of a packet are connected and reach all nodes. The first reaches itself and its neighbors, each other
-one at most all its neighbors except the one from which it has the packet: so m is at least the smallest number of nodes
-whose greatest degrees suffice. The least of all these is the bound. Whether it can be reached is not known: it counts
-collisions only at the receiver in question.
-
-A frame with k packets counts as k frames of 1/k of its time each, for F and D alike. A longer frame has the smaller
-share of preamble and MAC header, so the greatest k that a frame permits bounds all. In (2) neighbors bring packets,
-however many there are in a frame; (1) is a sum of times. So neither changes.
-
-Assumed: frames carry whole packets (no coding across packets), sources are equally busy, and the neighbors are those
-given. With fewer sources than nodes the other nodes need copies too, which is counted.
+m is at least the smallest number of nodes whose greatest degrees suffice: the first transmitter reaches its neighbors,
+each other one at most all of them but one. A frame of k packets counts as k frames of 1/k of its time, and the greatest
+k bounds all. Assumed: no coding across packets, and sources that are equally busy.
 """
 
 from collections.abc import Collection

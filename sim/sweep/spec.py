@@ -1,25 +1,11 @@
-"""The sweep file: a base scenario, what is changed in all runs, what is varied, and the seeds.
+"""The sweep file: a base scenario, what is changed in all runs, what is varied, and the seeds (docs/how-to/sweep.md).
 
-    base = "flooding"
-    seeds = 10                          # seeds 1 to 10; or a list
-    [set]                               # in every run
-    traffic.interval_s = 1
-    [grid]                              # every combination
-    traffic.sources = [1, 10, 44]
-    [[case]]                            # each with the whole grid; a case may have [case.grid] of its own
-    name = "flooding"
-    set.routing.protocol = "flooding"
-    realtime = true                     # as processes in real time; by default in virtual time
-    slow_down_to = 0.1                  # their clock may slow down to this while the machine cannot keep up
     [quick]                             # a variant replaces what it names
     seeds = 2
     [full]
     like = "quick"                      # a variant of a variant
-    seeds = 10
 
-Keys are those of a scenario, written as tables or quoted with dots. Every run of a sweep has the same seeds in all its
-settings, and a seed draws the same places, births and losses whatever else is set: differences between settings are
-differences of pairs (common random numbers).
+A seed draws the same places, births and losses in all settings (common random numbers).
 """
 
 import itertools

@@ -1,14 +1,6 @@
-"""The place of one UAV in a formation of clusters, and the velocity at which that place moves.
-
-    the leader                  the head with the lowest id flies the route
-    other heads                 on a circle around the leader (`_APART`)
-    members                     on a circle around their head; one of them flies where the circle is nearest to that of
-                                the leader, and one of the leader's circle opposite to it
-    a UAV without a cluster     on a circle around the nearest head that it receives
-    a UAV whose head is lost    flies parallel to the leader if it receives the leader, otherwise it hovers
-    a UAV that receives nobody  hovers, even if it was the leader: the others fly on without it (and below it)
-
-The leader of the formation need not be that of the network, which assigns the clusters.
+"""The place of one UAV in a formation of clusters, and the velocity at which that place moves
+(docs/explanation/formation-flight.md). The leader of the formation need not be that of the network, which assigns the
+clusters.
 """
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping

@@ -1,21 +1,12 @@
-"""The delay bound of packets in turns: rounds x hops, with what surrounds each hop.
+"""The delay bound of packets in turns: rounds x hops and what surrounds each hop (docs/explanation/rounds.md, The law).
 
     hop = period + turn + lead + handover
     D   = ((h + margin) * hop + (1 + used) * ceil(B / room) * period / (1 - hellos)) / (1 - urgent)
 
-A packet that was heard is announced one lead before the next own turn, at most one period later. `h` is the greatest
-distance that the node knows to another; `margin` is for a topology that changes meanwhile. All urgent packets under
-way, `B` bytes, delay each other once: every node serves them at the same rate, `room` bytes of a frame per round
-(tandem of equal servers; Le Boudec and Thiran, Network Calculus, 1.4.3). Of equally urgent ones the oldest goes first.
-`urgent` is the share of turns that more urgent packets had lately, `hellos` the share of hellos; `used` the share of
-packets not less urgent, as a rule or by the scenario if that is more: older packets not heard yet delay it again
-(without it 17 of 3,600 deliveries over a line of 25 nodes came up to 8 % too late). What waits follows from what was
-heard, because all nodes hear the same packets and serve them at the same rate (a leaky bucket). Assumed: no frame is
-lost; over any channel but `range` a likely delay is stated instead (`LikelyDelay`). None is stated while clocks may be
-further apart than the slack of turns, while more waits than three quarters of `rounds.burst_bytes`, while turns are
-overfilled, while more urgent packets use over half of them, or while no way has been found yet to a node that may only
-just have started. A bound does not apply to nodes without a way, and counts only on links that will last
-(`counted_links.py`).
+All urgent packets under way, `B` bytes, delay each other once: every node serves them at the same rate, `room` bytes of
+a frame per round (tandem of equal servers; Le Boudec and Thiran, Network Calculus, 1.4.3), the oldest first. What waits
+follows from what was heard, because all nodes hear the same packets and serve them at the same rate (a leaky bucket).
+Assumed: no frame is lost; over any channel but `range` a likely delay is stated instead (`LikelyDelay`).
 """
 
 from collections import defaultdict

@@ -7,9 +7,7 @@
     topology        each node states its neighbors when they change, and all pass that on in turns (`topology.py`)
     hello           goes in a turn; holds a digest, so that neighbors send what was missed (`Repair`)
 
-One hop takes at most one round, one turn, the lead and the handover, whatever moves (`delay_law.py`). After slotted
-flooding in rounds (Glossy, Ferrari et al., IPSN 2011; LWB, SenSys 2012), without synchronous transmissions, which
-802.11 does not have. Not modeled: two nodes that use the same turn far apart.
+One hop takes at most one round, one turn, the lead and the handover, whatever moves (`delay_law.py`).
 """
 
 from collections import OrderedDict

@@ -6,11 +6,8 @@
                    -> a round later -> a neighbor is not known to have it: sent (again)
 
 A neighbor has a packet when it was heard to send it (passive acknowledgment, RFC 4728, 3.4.2), or to say so
-(FANET_HELD). Every node sends urgent packets; where frames are lost at random it is enough that two were heard that
-have links to the neighbor, and repetitions come at growing intervals. Bulk is sent only where a neighbor is out of
-reach of all that were heard to send it (scalable broadcast; Peng and Lu, MobiHoc 2000). Nothing is repeated for a
-neighbor that hears nothing, nor within a round in which somebody else sent it. Sets of nodes are integers: bit i stands
-for node i + 1.
+(FANET_HELD). Bulk is sent only where a neighbor is out of reach of all that were heard to send it (scalable broadcast;
+Peng and Lu, MobiHoc 2000). Sets of nodes are integers: bit i stands for node i + 1.
 """
 
 import math

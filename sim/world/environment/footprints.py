@@ -1,11 +1,8 @@
 """Buildings from a GeoJSON file (`fanet_mw/scenario/outlines.py`), as OpenStreetMap tools export them.
 
 Each outline becomes upright boxes: the smallest rectangle around it or, if it is concave and fills less than
-`_LEAST_FILLED` of that, those of its parts. Its height is the property `height` [m], else `building:height` or
-`est_height`, else `building:levels` (`levels`, Overture's `num_floors`) times 3 m, else the middle of
-`world.building_height_m`; what cannot be read is passed over, and of several values the greatest counts. Longitude and
-latitude are converted to east and north of `world.origin_deg`. Other geometries are ignored. Not modeled: courtyards,
-and roofs that are not flat.
+`_LEAST_FILLED` of that, those of its parts. Where its height comes from: docs/how-to/real-place.md; of several values
+the greatest counts. Not modeled: courtyards, and roofs that are not flat.
 """
 
 import json

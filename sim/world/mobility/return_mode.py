@@ -1,15 +1,9 @@
-"""The return mode of the flight controllers, which needs no computer on board: when a UAV returns, and its way home.
+"""The return mode of the flight controllers, which needs no computer on board: when a UAV returns
+(docs/explanation/search-flight.md, What the flight controller does by itself), and its way home.
 
-    lower than the height of its return    it climbs straight up where it is
-    high enough                            it flies straight to its home, as high as it is
-    above its home                         it lands
-
-A UAV returns when its computer commands it. It also returns when its last setpoint is older than
-`mobility.return_after_s` while it flies; in both cases the next setpoint takes over. With `mobility.geofence =
-"return"` it returns when it is beyond the geofence, and then it obeys nothing before it stands on the ground.
-
-A flight controller does not know where other UAVs are. Therefore each has heights of its own, `mobility.return_step_m`
-apart (`_Heights`), so that UAVs that return at once fly above each other. Those that climb or land are not kept clear.
+It climbs to the height of its return, flies straight to its home, and lands. A flight controller does not know where
+other UAVs are, so each has heights of its own, `mobility.return_step_m` apart (`_Heights`). Those that climb or land
+are not kept clear.
 """
 
 import math

@@ -10,10 +10,6 @@ An *epoch* is one assignment of nodes to clusters. The leader begins a new one w
     the clusters or links have become too bad  `clusters.reassign_s` after the present epoch began, and once it is known
                                                who has turned with the leader; never if `reassign_s` is 0
     the load of nodes has changed              likewise, with `clusters.load = "heard"`; after `_RELOAD_NS` if that is 0
-
-Joins come in bursts, so the leader waits until none has come for a moment, but not so long that its lease would end.
-An elected leader knows no nodes at first: it calls all nodes to join, and divides them into clusters when all have had
-time to answer. Between joins, positions are extrapolated by dead reckoning.
 """
 
 from collections.abc import Mapping, Sequence

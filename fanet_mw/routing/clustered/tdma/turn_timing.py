@@ -5,13 +5,9 @@ functions of time.
     | contention window | turn 0 | turn 1 | ... | rest | contention window | ...
 
 A turn has room for one frame of the largest size, the DIFS before it, the longest backoff that an earlier frame may
-have left behind, and a slack, so a frame handed to any 802.11 MAC at the start of the turn ends within the turn. The
-slack is what a guard time is between slots: room for the error of the clocks. Frames without a turn contend in the
-window: unicasts to a head, most joins, and hellos and repairs, unless the timetable is made for lossy links and has
-turns for these (*calls*).
-
-The *root* of a flood is the node at which it begins, in a turn of its own. The *span* of a root's floods is the number
-of turns from that turn until all nodes have the packet, the first and the last one included.
+have left behind, and a slack for the error of the clocks. Frames without a turn contend in the window. The *root* of a
+flood is the node at which it begins; the *span* of its floods is the number of turns from that turn until all nodes
+have the packet, the first and the last one included.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -3,12 +3,10 @@
     a timetable is in force -> the least interval between packets at which the bound meets the deadline; a packet that
                                comes sooner after the one before is refused
                             -> if no interval meets it: DeadlineLost, once; DeadlineMet when a later timetable does
-    no bound yet            -> nothing is said until there should be one, because the timetables of a swarm that is
-                               still joining have gaps, and tell nothing about the final one
+    no bound yet            -> nothing is said: the timetables of a swarm that is still joining have gaps
 
 So a growing load cannot break the deadline of earlier packets. If no interval meets it, packets are accepted at the
-rate that the turns can carry, because late packets are better than none; without a timetable, and more urgent than
-bulk, all are accepted. This is `traffic.deadline_s`; deadlines of messages are for `agents/messenger.py`.
+rate that the turns can carry. This is `traffic.deadline_s`; deadlines of messages are for `agents/messenger.py`.
 """
 
 from typing import Final

@@ -4,12 +4,9 @@
                                  |----------- `Turns.done_ns` ---------|
     `around_ns` is the sum of the other three parts: a lead, the handover, and a second lead
 
-The first lead: a frame is announced before its turn; the handover: from the radio to its node's process
-(`radio.handover_ms`), which may wake up a second lead too late. Each class has room of its own in each turn
-(`turn_release.py`), but a packet larger than that waits as bulk does, and a leader's announcements take the room of
-bulk, so that its bulk has no bound. Bulk at regular intervals has the worst case over its busy period
-(`Turns.worst_ns`); for other classes the bound holds for a packet that finds fewer than `BURST` of its class waiting,
-as of a source that conforms to a token bucket of that depth, filled at the rate of the turns.
+Each class has room of its own in each turn (`turn_release.py`), but a packet larger than that waits as bulk does, and a
+leader's bulk has no bound. Bulk at regular intervals has the worst case over its busy period (`Turns.worst_ns`); for
+other classes the bound holds for a packet that finds fewer than `BURST` of its class waiting.
 """
 
 from typing import Final, NamedTuple

@@ -1,11 +1,9 @@
 """The delays that a node states for its own packets: bounds, likely delays over lossy links, and admission by a
 deadline.
 
-A bound is stated when a packet is accepted, and only if nothing later can break it: no other timetable may come into
-force before the packet's flood is over, so the leader announces each long enough ahead. Nothing is stated for floods
-that `routing.hop_limit` ends early, nor for packets that may expire before (`routing.lifetime_s`). When two separated
-parts of a swarm meet, a node keeps the turns in which it has promised to send; a packet that would break its stated
-bound nevertheless is dropped.
+A bound is stated when a packet is accepted, and only if nothing later can break it (docs/explanation/timetable.md, No
+bound is stated). When two parts of a swarm meet, a node keeps the turns in which it has promised to send; a packet that
+would break its stated bound nevertheless is dropped.
 """
 
 from collections.abc import Mapping, Sequence

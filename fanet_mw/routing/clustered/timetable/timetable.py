@@ -3,15 +3,10 @@
     superframe:  | contention window | turn 0 | turn 1 | ... | turn N-1 |
     flood of h:    h transmits in its root turn, then each relay once in a turn of its own, until all nodes are reached
 
-Each frame is meant for those neighbors of its sender that lack the packet. Two nodes share a turn only if they do not
-hear each other, and if none of the nodes that one frame is meant for is within interference range of the other sender
-(the protocol model of Gupta and Kumar, 2000). A node for which neither frame is meant may receive garbage in that turn;
-it does not transmit in the next one, because a station waits for EIFS after a frame that it could not decode (IEEE
-802.11-2020, 10.3.7).
-
-Floods follow each other like waves (`list_scheduling.py`), so that a packet can cross the swarm in one superframe, as
-in Djukic and Valaee (ToN 17(3), 2009). All nodes compute the same table from the same positions. Not modeled: links
-that are blocked by obstacles; a shorter `link_m` leaves a margin.
+Each frame is meant for those neighbors of its sender that lack the packet. Which nodes may share a turn:
+docs/explanation/timetable.md (the protocol model of Gupta and Kumar, 2000). A node that may receive garbage does not
+transmit in the next turn, because a station waits for EIFS then (IEEE 802.11-2020, 10.3.7). Not modeled: links that are
+blocked by obstacles; a shorter `link_m` leaves a margin.
 """
 
 from collections import Counter

@@ -1,16 +1,8 @@
 """Decides how the turns of a superframe are used: how many turns each root gets, and how many packets share a frame.
 
-These uses are tried one after the other until a timetable is found:
-
-    1  Each node gets a few more turns than its load needs, so that queues can drain; if the air is idle all the same,
-       it gets as many in each half, quarter or eighth of the superframe, so that a packet waits less.
-    2  Each node gets as many turns as it needs. Several of its packets share a frame if they fit, which takes fewer
-       but longer turns.
-    3  Nodes get fewer turns than they need. A node sends what its turns can carry, and has no delay bound.
-    4  Only heads get turns. Members send their packets to the heads by contention, and have no delay bound either.
-
-In 1 to 3 a member's packet has turns on a shortest way to its head, which relays it in the next turn. A *root* is the
-node at which a flood begins. Which turn each packet gets: `list_scheduling.py`.
+The uses are tried in the order of docs/explanation/timetable.md (How many turns each node gets) until a timetable is
+found. Unless only heads get turns, a member's packet has turns on a shortest way to its head, which relays it in the
+next turn. Which turn each packet gets: `list_scheduling.py`.
 """
 
 import math

@@ -154,10 +154,12 @@ def start(
     if autopilot is not None:
         controller = FlightController(address_of(autopilot, flag="--autopilot"), Flavor(flavor))
     if radio.address is None or radio.broadcast is None:
-        if radio.epoch_unix_s is not None:
-            raise ConfigError(
-                f"--epoch {radio.epoch_unix_s:g}: needs --radio-address; the emulated radio is on the router"
-            )
+        given = (
+            f"--epoch {radio.epoch_unix_s:g}" if radio.epoch_unix_s is not None
+            else f"--radio-port {radio.port}" if radio.port != PORT else None
+        )  # fmt: skip
+        if given is not None:
+            raise ConfigError(f"{given}: needs --radio-address; the emulated radio is on the router")
         return run(scenario, address, node=node, position=position, onboard_map=onboard_map, controller=controller)
     on_air = OnAir(
         radio.address, radio.broadcast, radio.port, epoch_unix_s=radio.epoch_unix_s,

@@ -309,7 +309,8 @@ class ClockEpoch(NamedTuple):
     time_scale: float
     state: ClockState
     epoch_mono_ns: int = 0
-    """The same instant as the epoch, on the monotonic clock of the keeper's machine."""
+    """The same instant as the epoch, on the monotonic clock of the keeper's machine; 0: all were given the epoch
+    beforehand, and nobody keeps the clock."""
     machine: int = 0
     """The keeper's machine (`Timebase.machine`); with 0 it is unknown, and only unix time counts."""
     number: int = 0

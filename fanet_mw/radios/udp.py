@@ -23,6 +23,7 @@ from fanet_mw.node.duplicates import DuplicateSet, key_of
 from fanet_mw.units import BROADCAST, MAX_NODES, MS, NodeId, S
 
 PORT: Final = 14560
+MAX_PORT: Final = 0xFFFF
 ATTEMPTS: Final = 4
 _ACK_WAIT_S: Final = 0.03
 TOO_LATE_NS: Final = 50 * MS

@@ -145,7 +145,7 @@ def agent(
         node=NodeId(id),
         position=where,
         onboard_map=map_on_board(chosen),
-        radio=Radio(radio_address, radio_broadcast, radio_port or Radio().port, epoch),
+        radio=Radio(radio_address, radio_broadcast, Radio().port if radio_port is None else radio_port, epoch),
         autopilot=autopilot,
         flavor=flavor,
     )

@@ -12,9 +12,10 @@ from fanet_mw.bus.messages import ClockEpoch, ClockState
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError
 from fanet_mw.hosts import clock as clock_module
-from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
+from fanet_mw.hosts.clock import ClockKeeper, ClockListener, SwarmClock
 from fanet_mw.hosts.timebase import Timebase
-from fanet_mw.units import MS, S
+from fanet_mw.radios.field_bus import FieldBus
+from fanet_mw.units import MS, NodeId, S
 
 
 @pytest.mark.parametrize("scale", [0.5, 1.0, 2.0])
@@ -23,6 +24,15 @@ def test_swarm_time_is_unix_time_since_the_epoch_times_the_scale(scale: float) -
     assert clock.now_ns() / S == pytest.approx(100 * scale, abs=1)
     assert clock.wait_s(round((100 * scale + 30) * S)) == pytest.approx(30 / scale, abs=2)
     assert clock.wait_s(0) < 0, "it has passed"
+
+
+@pytest.mark.parametrize("ahead_s", [-3000, 3000])
+async def test_an_epoch_that_all_were_given_beforehand_may_be_far_and_is_nobodys_wrong_clock(
+    ahead_s: int,
+) -> None:
+    field = FieldBus(Topics("field"), NodeId(1), inner=None, epoch_unix_ns=time.time_ns() + ahead_s * S)
+    clock = await ClockListener(field, Topics("field")).running(timeout_s=5)
+    assert clock.wait_s(0) == pytest.approx(ahead_s, abs=5)
 
 
 class Machine:

@@ -118,6 +118,8 @@ class Solids:
         """Put those bodies of `after` where something solid stops them; returns which these are."""
         path = after - before
         length = np.linalg.norm(path, axis=1)
+        if (after[:, 2] - self.top_m > length * math.hypot(1.0, self._steepest)).all():
+            return np.zeros(len(after), bool)  # all are above everything
         gap = self.gap_m(after)
         stopped = gap <= 0
         near = np.flatnonzero(gap <= length * math.hypot(1.0, self._steepest))

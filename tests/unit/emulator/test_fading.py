@@ -110,8 +110,8 @@ def test_the_sum_of_the_waves_is_mapped_by_its_own_distribution() -> None:
     """Of so few waves of random phase: how often their sum is longer than this, by 640,000 phases."""
     phases = np.random.default_rng(1).uniform(0, 2 * np.pi, (20_000, WAVES))
     length = np.abs(np.exp(1j * phases).sum(axis=1)) / math.sqrt(WAVES)
-    for amplitude in (0.3, 0.8, 1.2, 1.7, 2.1):
-        share = math.exp(-random_walk_exponent(np.array([amplitude]))[0])
+    amplitudes = np.array([0.3, 0.8, 1.2, 1.7, 2.1])
+    for amplitude, share in zip(amplitudes, np.exp(-random_walk_exponent(amplitudes)), strict=True):
         assert (length > amplitude).mean() == pytest.approx(share, abs=4 * math.sqrt(share / 20_000))
 
 

@@ -24,16 +24,20 @@ class Known(NamedTuple):
 def classes() -> Iterator[tuple[str, Known]]:
     for package in PACKAGES:
         for path in (ROOT / package).rglob("*.py"):
-            if path.name != "fanet.py":  # generated
-                for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            text = path.read_text(encoding="utf-8")
+            if path.name != "fanet.py" and "class " in text:  # generated
+                for node in ast.walk(ast.parse(text)):
                     if isinstance(node, ast.ClassDef):
-                        yield node.name, known(node)
+                        yield node.name, known(node, passes="super()" in text)
 
 
-def known(node: ast.ClassDef) -> Known:
+def known(node: ast.ClassDef, *, passes: bool) -> Known:
+    """What is known of a class; `passes`: some method may pass up calls."""
     methods = [item for item in node.body if isinstance(item, ast.FunctionDef | ast.AsyncFunctionDef)]
     bases = [base.attr if isinstance(base, ast.Attribute) else getattr(base, "id", "") for base in node.bases]
-    passed_up = {method.name for method in methods if any(passes_up(call, method.name) for call in ast.walk(method))}
+    passed_up = {
+        method.name for method in methods if passes and any(passes_up(call, method.name) for call in ast.walk(method))
+    }
     return Known(bases, passed_up, {method.name for method in methods})
 
 

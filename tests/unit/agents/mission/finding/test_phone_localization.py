@@ -50,6 +50,16 @@ def test_one_that_passes_straight_leaves_the_side_open_and_silence_elsewhere_set
     assert settled.east_m > 40
 
 
+@pytest.mark.parametrize(("far_m", "counts"), [(449, True), (450, True), (451, False)])
+def test_that_a_phone_is_not_received_counts_up_to_450_m_from_where_it_was(far_m: float, *, counts: bool) -> None:
+    loud = PhoneModel(power_dbm=40, exponent=3, shadowing_db=4, offset_db=1, threshold_dbm=-90)
+    phone = PhoneFilter(loud)
+    phone.on_rssi(1, Enu(0, 0, 50), -60)
+    before = phone.estimate()
+    phone.on_silence(Enu(far_m, 0, 50))
+    assert (phone.estimate() != before) == counts
+
+
 def test_no_place_is_known_better_than_within_a_cell() -> None:
     truth, phone = Enu(60, 0, 0), PhoneFilter(MODEL)
     for node in range(1, 226):

@@ -5,17 +5,21 @@ The queue is driven as its host drives it, with random timetables of which one r
 
 from typing import NamedTuple
 
+import pytest
+from graph_radio import Swarm
 from hypothesis import example, given
 from hypothesis import strategies as st
 from kit import examples
 
+from fanet_mw import wire
 from fanet_mw.node.packet import Packet
 from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.own_bound import BURST, RootTurns
 from fanet_mw.routing.clustered.timetable.turn_release import RootRelease, TurnsInForce
-from fanet_mw.scenario import Routing
-from fanet_mw.units import MS, NodeId
+from fanet_mw.scenario import Routing, config
+from fanet_mw.trace import BoundStated
+from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_CONTROL, PRIORITY_REPORT, PRIORITY_SAFETY, Header, Kind
 
 ME = NodeId(7)
@@ -128,3 +132,35 @@ def test_who_finds_fewer_than_a_burst_of_its_class_waiting_keeps_the_bound_of_a_
     classes = [priority for _, priority in sorted(reports + bulk)]
     delays = [run.through_ns[s] - run.born_ns[s] for s, priority in enumerate(classes) if priority == PRIORITY_REPORT]
     assert max(delays) <= bound_ns
+
+
+SCHEDULED = config.build(
+    {
+        "nodes": {"count": 9, "telemetry_hz": 0},
+        "clusters": {"relay": "scheduled", "count": 8, "flooding_period_s": 0.5},
+        "radio": {"lead_ms": 0, "range_m": 310}, "traffic": {"payload_bytes": 200, "interval_s": 1.0},
+    }
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("to", "priority"), [(BROADCAST, PRIORITY_BULK), (7, PRIORITY_BULK), (9, PRIORITY_BULK)])
+def test_who_has_a_timetable_states_when_a_packet_is_there_be_it_for_all_a_neighbor_or_far_away(
+    to: int, priority: int
+) -> None:
+    """In spare turns or as a flood; and it is there by then, where nothing is lost."""
+    swarm = Swarm(SCHEDULED, [Enu(180.0 * (n % 3), 180.0 * (n // 3), 50.0) for n in range(9)])
+    for node in range(1, 10):
+        swarm.start(node)
+    swarm.advance(10 * S)
+    four = swarm.nodes[NodeId(4)]
+    four.records.clear()
+    sent_ns = swarm.now_ns
+    four.send(
+        wire.filler(60), destination=NodeId(to), priority=priority, app="traffic", born_ns=sent_ns, now_ns=sent_ns
+    )
+    ((bound_ns, seq),) = [(said.bound_ns, said.seq) for said in four.records if isinstance(said, BoundStated)]
+    swarm._drain(NodeId(4))
+    swarm.advance(bound_ns)
+    boots = {boot: node for node, boot in swarm._boots.items()}
+    there = {boots[boot] for boot, *name in swarm.delivered if name == [4, seq]}
+    assert there == ({node for node in range(1, 10) if node != 4} if to == BROADCAST else {to})

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from kit import examples
 
 from agents.mission.hungarian import assign
 from agents.mission.search_formation.lasting_links import keep_together
 from agents.mission.search_formation.pattern import fitted
 from agents.mission.search_formation.shapes.contract import Demands
 from fanet_mw.units import Enu
-from sim.results.coherence import coherence
+from sim.results.connectivity import parts
 
 REACH_M = 250.0
 GRID = [Enu(200.0 * (i % 9) - 800, 200.0 * (i // 9) - 400, 65) for i in range(45)]
@@ -29,7 +30,7 @@ def torn(starts: Sequence[Enu], goals: Sequence[Enu], chosen: Sequence[int]) -> 
     for share in np.linspace(0, 1, 41):
         at = begin + share * (end - begin)
         near = np.hypot(*(at[:, None] - at).transpose(2, 0, 1)) <= REACH_M
-        found += [] if coherence(near).connected else [float(share)]
+        found += [] if (parts(near) == 0).all() else [float(share)]
     return found
 
 
@@ -41,6 +42,7 @@ def nearest(starts: Sequence[Enu], goals: Sequence[Enu]) -> list[int]:
     return assign([[start.minus(goal).horizontal() ** 2 for goal in goals] for start in starts])
 
 
+@examples(10)
 @given(RANDOM_SWARM)
 def test_who_is_said_to_stay_together_does_so_all_the_way_and_nobody_flies_much_farther(
     drawn: tuple[int, int, float, int],

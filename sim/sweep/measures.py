@@ -15,7 +15,7 @@ from fanet_mw.units import S
 from sim.records.record_kinds import records_of
 from sim.results.connectivity import connectivity
 from sim.results.outcome import Outcome
-from sim.results.packets import AppPackets, first_class_of, packets_of
+from sim.results.packets import AppPackets, first_class_of, packets_of, targets_by_source
 
 Value = float | list[float] | None
 _LEAST_S: Final = 1e-3
@@ -41,8 +41,8 @@ def wanted(outcome: Outcome) -> float:
 
 def leader_pdr(outcome: Outcome) -> float | None:
     """The share of packets from other nodes to the leader, or to all nodes, that reached the leader."""
-    leader, sent = outcome.scenario.leader, first_class_of(outcome).sent
-    meant = sum(origin != leader for origin, _ in sent)
+    leader, targets = outcome.scenario.leader, targets_by_source(outcome)
+    meant = sum(origin != leader and leader in targets[origin] for origin, _ in first_class_of(outcome).sent)
     return len(_at_leader_s(outcome)) / meant if meant else None
 
 

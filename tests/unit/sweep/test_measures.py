@@ -37,6 +37,8 @@ def test_the_leader_counts_what_others_sent_and_it_received() -> None:
     assert measured("leader_delay_s", PACKETS) == pytest.approx(0.03)
     assert measured("leader_pdr", PACKETS[:1]) is None
     assert measured("leader_delay_s", PACKETS[:2]) is None
+    assert measured("leader_pdr", PACKETS, "traffic.destination=3") is None, "none of them is meant for the leader"
+    assert measured("leader_pdr", PACKETS, "traffic.destination=1") == pytest.approx(2 / 3)
 
 
 def test_every_delivery_is_in_the_class_of_its_delay() -> None:

@@ -11,7 +11,8 @@ from hand_driven import NAMES, Air, receptions, statuses
 from test_emulator_kernel import completion
 
 from emulator.channel.error_rate import log_success_per_bit
-from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
+from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB, log_ok_alone
+from emulator.kernel.state import DELAY, LINK_DST, LOG_OK
 from fanet_mw.bus.messages import Poses, TxOutcome
 from fanet_mw.bus.radio_control import Jam, Restore
 from fanet_mw.errors import ConfigError
@@ -298,3 +299,27 @@ def test_a_pose_that_makes_no_sense_leaves_those_of_others_and_the_last_one_of_i
     air.send(1, 2 * MS, now_ns=1 * MS)
     assert {node for node, _, _ in receptions(air.run())} == {2, 3}
     assert air.medium.report()["refused"] == {"poses": 1}
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"radio.tx_power_dbm": 18},
+        *({"radio.tx_power_dbm": 16, "radio.standard": "g", "radio.rate_mbps": r} for r in (6, 54)),
+    ],
+)
+@pytest.mark.parametrize("size", [40, 1024])
+def test_a_frame_that_was_alone_has_the_chance_that_it_is_told_to_have_had_alone(
+    make_scenario: MakeScenario, keys: dict[str, Any], size: int
+) -> None:
+    """By that it is told whether interference or weakness has cost it: header, data, and no signal extension."""
+    base = {"nodes.count": 2, "radio.channel": "log_distance", "radio.sensitivity_dbm": -110}
+    air = Air(make_scenario(**base, **keys), [0, 150])
+    air.send(1, 1 * MS, payload=bytes(size))
+    ((_, _, end_ns, _),) = statuses(air.run())
+    a, link = air.medium._kernel.arrays, 0
+    t_ns = end_ns + int(a.lk[DELAY, link])
+    assert a.lk[LINK_DST, link] == 1
+    alone = log_ok_alone(a.p, a.pf, a.st, a.sf, a.lp, a.err, 1, link, t_ns)
+    assert alone == pytest.approx(a.sf[LOG_OK, 1], rel=1e-9)
+    assert alone < -1e-4, "there is noise"

@@ -228,6 +228,16 @@ def test_one_liar_among_honest_neighbors_moves_nothing_whenever_it_begins() -> N
         assert sync.counts["outlier"] >= 20
 
 
+def test_a_liar_brings_nobody_nearer_to_the_reference() -> None:
+    """Nodes 3 and 4 are three hops from it; node 5, which states another time, says that it is beside it."""
+    sync = follower()
+    for hello in range(1, 7):
+        for src, ahead_ns, hops in ((3, 0, 3), (4, 0, 3), (5, 30 * MS, 1)):
+            beacon = said((hello - 1) * S + ahead_ns, hello - 1, node=src, hops=hops) if hello > 1 else None
+            hear(sync, src, hello, hello * S, beacon)
+    assert sync.hops(6 * S) == 4
+
+
 def test_a_liar_that_is_the_first_to_tell_the_time_is_not_believed_for_a_moment() -> None:
     sync = follower(5)
     for hello in range(1, 12):

@@ -367,3 +367,19 @@ def test_the_fast_engines_batteries_are_drained_as_the_full_ones(make_scenario: 
             energy.pass_time(STEP_S, engine, np.ones(1, bool))
         left[engine.name] = 1 - float(energy.batteries.charge[0])
     assert left["kinematic"] == pytest.approx(left["rotors"], rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "climb_m_s"), [((0, 0, 0), 0), ((5, 0, 0), 0), ((3, 4, 2), 2), ((0, 8, 5), 5), ((6, 0, -3), 0)]
+)
+def test_a_body_of_the_fast_engine_takes_the_power_of_steady_flight_and_sinks_as_it_flies_level(
+    make_scenario: MakeScenario, velocity: tuple[float, float, float], climb_m_s: float
+) -> None:
+    engine, energy = Kinematic(), BatteryDrain(make_scenario(**{"nodes.count": 1, "world.vehicle": "crazyflie"}))
+    engine.reset(np.array([[0.0, 0, 500]]))
+    for _ in range(100):
+        engine.advance(STEP_S, np.array([velocity], dtype=float))
+    energy.pass_time(STEP_S, engine, np.ones(1, bool))
+    power_w = float((energy.batteries.current_a * energy.batteries.voltage_v)[0])
+    speed = np.array([math.hypot(*velocity[:2])])
+    assert power_w == pytest.approx(float(trimmed_w(CRAZYFLIE, speed, np.array([climb_m_s]))[0]), rel=1e-3)

@@ -92,3 +92,16 @@ def test_where_all_hear_each_other_one_frame_is_in_the_air_at_a_time() -> None:
 def test_a_swarm_in_parts_has_no_bound_on_what_reaches_everyone() -> None:
     adjacency = within_range(swarm([(0, 0), (900, 0)]), range_m=250)
     assert goodput_bound(adjacency, list(adjacency), send_ns=100, receive_ns=100) is None
+
+
+@pytest.mark.parametrize(("sources", "per_second"), [((1, 2, 3, 4), 1000 / 1.75), ((2, 3), 1000 / 1.5), ((2,), 500.0)])
+def test_the_end_of_a_line_is_the_bottleneck_and_needs_no_copy_of_what_its_only_neighbor_sends(
+    sources: tuple[int, ...], per_second: float
+) -> None:
+    """L (send + (1 - s) receive) <= 1, with s the share of the packets that are the neighbor's: 1/4, 1/2 and, at the
+    other end, 0 of 1.
+    """
+    line = within_range(swarm([(200 * node, 0) for node in range(4)]), range_m=250)
+    found = goodput_bound(line, [NodeId(node) for node in sources], send_ns=1_000_000, receive_ns=1_000_000)
+    assert found is not None
+    assert found.per_second == pytest.approx(per_second)

@@ -12,7 +12,7 @@ from fanet_mw.graph.topology import within_range
 from fanet_mw.mavlink import Encoder
 from fanet_mw.rng import stream
 from fanet_mw.trace import Delivered
-from fanet_mw.units import Enu, NodeId, S
+from fanet_mw.units import MS, Enu, NodeId, S
 from sim.planner.cheapest_change import _changes, cheapest_change
 from sim.planner.demand import TrafficClass, demands
 from sim.planner.flood_cost import FloodCost
@@ -22,7 +22,7 @@ from sim.planner.plan_text import describe, describe_change
 from sim.planner.scenario_plan import ScenarioPlan
 from sim.planner.site import Site
 from sim.planner.timetable_plan import table_for
-from sim.planner.uplink_delay import ways
+from sim.planner.uplink_delay import access_outcome, ways
 from sim.run.virtual import simulate as simulate_swarm
 from sim.scenarios import catalog
 from sim.world.environment.layout import positions
@@ -353,3 +353,20 @@ def test_warnings_are_a_class_of_their_own_that_expires_first(planned) -> None:
     said = Encoder(NodeId(1)).collision(NodeId(2), closest_s=1.0, altitude_m=0.0, horizontal_m=0.0)
     assert warning.payload_bytes == wire.HEADER_BYTES + len(said)
     assert any("warning" in p and "routing.safety_lifetime_s = 1" in p for p in found.problems)
+
+
+def test_each_hop_takes_the_lead_and_the_handover_and_packets_may_be_late_by_them(make_scenario) -> None:
+    line = within_range({NodeId(n): Enu(200.0 * n, 0, 0) for n in range(1, 4)}, range_m=250)
+    one = TrafficClass("application", 100, S // 5, (NodeId(3),))
+    found = ways(line, dict.fromkeys(line, NodeId(1)), [one])
+
+    def bound_ns(**keys: float) -> int:
+        scenario = make_scenario(**{**GRID, **{f"radio.{key}": value for key, value in keys.items()}})
+        outcome = access_outcome(scenario, line, found, [one], spacing_ns=None)
+        assert isinstance(outcome, Bounded), outcome
+        return outcome.delay_ns
+
+    plain_ns = bound_ns(lead_ms=0, handover_ms=0)
+    assert bound_ns(lead_ms=5, handover_ms=0) == plain_ns + 2 * 5 * MS
+    assert bound_ns(lead_ms=0, handover_ms=1) == plain_ns + 2 * MS
+    assert bound_ns(lead_ms=0, handover_ms=250) > plain_ns + 2 * 250 * MS, "one packet more may have come by then"

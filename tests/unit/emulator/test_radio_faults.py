@@ -10,6 +10,7 @@ from kit import slow
 from test_medium_timelines import ACK_NS, FRAME_NS, NAMES, PAYLOAD, SIFS_NS, Air, receptions, statuses
 
 from emulator import faults
+from emulator.kernel.state import LINK_DST, LINK_SRC, SPARED
 from fanet_mw.bus.messages import Poses, Reception, TxOutcome, TxRequest
 from fanet_mw.bus.radio_control import Control, Cut, Degrade, Jam, Partition, Restore
 from fanet_mw.errors import ConfigError
@@ -448,3 +449,19 @@ def test_a_jammer_jams_who_is_within_its_radius_to_all_sides(
     control(air, Jam("j", Enu(*center, 0.0), radius_m, math.inf, 0))
     air.send(1, 1 * MS)
     assert {node for node, *_ in receptions(air.run())} == {2, 3, 4, 5} - deaf
+
+
+def test_a_fault_ends_at_its_instant_however_late_that_is_noticed() -> None:
+    known = faults.Faults(config.build({}).radio, stations=3, planned=[(2 * MS, cut(2, for_ns=5 * MS))])
+    known.pass_time(90 * MS)
+    assert [(record.t_ns, record.active) for record in known.records] == [(2 * MS, True), (7 * MS, False)]
+
+
+def test_of_two_faults_of_a_link_each_loses_its_share_of_what_the_other_lets_pass(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2}), [0, 100])
+    control(air, degrade(1, 2, share=0.2), degrade(1, 2, share=0.5)._replace(label="e"))
+    arrays = air.medium._kernel.arrays
+    links = zip(arrays.lk[LINK_SRC].tolist(), arrays.lk[LINK_DST].tolist(), arrays.lp[SPARED].tolist(), strict=True)
+    spared = {(src, dst): share for src, dst, share in links}
+    assert spared[0, 1] == pytest.approx(0.8 * 0.5)
+    assert spared[1, 0] == 1.0

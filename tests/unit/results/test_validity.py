@@ -271,6 +271,8 @@ def test_what_a_dead_uav_did_not_receive_was_not_lost_on_the_bus(scenario: Scena
     found = reasons(outcome)
     assert any("agent-2" in reason for reason in found)
     assert not any("receptions lost on the bus" in reason for reason in found)
+    put(outcome, "agent-1", "receptions", value=HEARD - round(1.5 * HEARD * validity.LOST_LIMIT))
+    assert any("receptions lost on the bus" in reason for reason in reasons(outcome)), "a share of those of the living"
 
 
 def test_what_a_uav_did_not_count_whose_program_was_started_again_was_not_lost_on_the_bus(make_scenario: Any) -> None:

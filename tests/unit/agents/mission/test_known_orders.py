@@ -66,3 +66,10 @@ def test_only_the_post_may_leave_open_whom_an_order_with_a_place_is_for() -> Non
     assert not is_told(Order(OrderKind.STAY))
     assert is_told(Order(OrderKind.RECALL))
     assert is_told(Order(OrderKind.STAY, 4))
+
+
+def test_a_thousand_orders_are_remembered_and_no_forged_one_more() -> None:
+    known = KnownOrders(NodeId(3))
+    learned = [known.learn(told(serial % 60_000, OrderKind.NO_FLY, 0, float(serial)), 0) for serial in range(1, 1003)]
+    assert learned == [True] * 1000 + [False] * 2
+    assert not known.learn(told(1, OrderKind.NO_FLY, 0, 1.0), 0), "and none is new twice"

@@ -7,7 +7,11 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from kit import examples
 
-from fanet_mw.errors import MalformedFrameError
+from fanet_mw.bus.messages import Reception
+from fanet_mw.errors import DropReason, MalformedFrameError
+from fanet_mw.mavlink import Encoder
+from fanet_mw.node.node import Node
+from fanet_mw.routing import make_protocol
 from fanet_mw.routing.clustered.links.link_quality import FAST, FIRST, WINDOW, LinkQuality
 from fanet_mw.routing.clustered.links.link_state import LinkState, adjacency, worth_a_change
 from fanet_mw.routing.clustered.timetable.delivery_odds import odds
@@ -15,8 +19,9 @@ from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
 from fanet_mw.routing.clustered.timetable.interference import InterferenceByPower
 from fanet_mw.routing.clustered.timetable.redundant_scheduling import Wave, enough_for
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, redundant_timetable
-from fanet_mw.units import Enu, NodeId, S
-from fanet_mw.wire import HEADER_BYTES
+from fanet_mw.scenario import config
+from fanet_mw.units import BROADCAST, Enu, NodeId, S
+from fanet_mw.wire import FLAG_FLOOD, HEADER_BYTES, PRIORITY_CONTROL, Header, Kind
 from fanet_mw.wire.links import CAPACITY, MESSAGES, Link, Links, frames_of, grade_of, power_of
 
 HEADER = bytes(HEADER_BYTES)
@@ -361,3 +366,29 @@ def test_a_call_is_over_after_one_frame() -> None:
     wave = Wave(network, 0, enough=500, call=True)
     wave.send(3, 0, [1], hop_turns=1)
     assert wave.done
+
+
+@pytest.mark.parametrize(
+    ("origin", "inner", "malformed"),
+    [
+        (1, Links(1, (Link(NodeId(2), NodeId(3), 10, -70),)).encode_frames(), False),
+        (3, Links(1, (Link(NodeId(2), NodeId(3), 10, -70),)).encode_frames(), True),
+        (1, Links(1, (Link(NodeId(2), NodeId(9), 10, -70),)).encode_frames(), True),
+        (1, Encoder(NodeId(1)).heartbeat(), True),
+    ],
+    ids=["the leader's", "in another's name", "of a node that is not there", "none"],
+)
+def test_links_that_are_announced_are_those_of_who_says_so(origin: int, inner: bytes, malformed: bool) -> None:
+    scenario = config.build(
+        {
+            "nodes": {"count": 4}, "clusters": {"relay": "scheduled", "count": 3},
+            "radio": {"channel": "log_distance", "fading": "rician"},
+            "traffic": {"arrivals": "none"},
+        }
+    )  # fmt: skip
+    node = Node(NodeId(2), scenario, make_protocol, position=Enu(0.0, 0.0, 50.0))
+    node.start(0)
+    hops = int(origin != 3)
+    header = Header(900_000, 5, NodeId(origin), BROADCAST, NodeId(3), Kind.LINKS, 8, hops, PRIORITY_CONTROL, FLAG_FLOOD)
+    node.hear(Reception(header.encode() + inner, NodeId(3), S, -60.0), now_ns=S)
+    assert node.port.dropped[DropReason.MALFORMED] == malformed

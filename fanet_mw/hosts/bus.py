@@ -278,4 +278,6 @@ def _clock_outside_certificate(config: Path | None) -> str | None:
 
 
 def _first_sentence(error: Exception) -> str:
-    return str(error).split(" at /", 1)[0].split("\n", 1)[0]
+    """What a user needs of an error of Zenoh's. For a file that is no JSON5: the place, and what is expected there."""
+    lines = [line.strip(" |=") for line in str(error).split(" at /", 1)[0].splitlines()]
+    return ": ".join([lines[0], lines[-1]] if lines[0].startswith("-->") else lines[:1])

@@ -6,10 +6,10 @@ these modules import at their top only what `--help` needs.
 
 import errno
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, _convert
 
 from fanet_mw import __version__
 from fanet_mw.errors import FanetError
@@ -58,6 +58,18 @@ app.register_install_completion_command()
 _NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _MOST_LINES: Final = 20
 _LONGEST_LINE: Final = 900
+
+
+def _whole(text: str) -> int:
+    """A whole number as cyclopts reads it, except that it would round: `air cut 2.5` would cut node 2 off."""
+    number = _cyclopts_int(text)
+    if "." in text and float(text) != number:
+        raise ValueError(text)
+    return number
+
+
+_cyclopts_int: Final[Callable[[str], int]] = _convert._converters[int]  # noqa: SLF001  (there is no public way)
+_convert._converters[int] = _whole  # noqa: SLF001
 for option in ("--help", "--version", "--install-completion"):
     app[option].group = (OPTIONS,)
 

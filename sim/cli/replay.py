@@ -34,6 +34,12 @@ def replay(
         port: Port of the page on this machine; by default 8080, or the next one that is free.
 
     """
+    asked = {"--html": html, "--map": map_, "--at": at}
+    if len(given := [name for name, value in asked.items() if value is not None]) > 1:
+        raise ConfigError(f"{' and '.join(given)}: one of them at a time")
+    for name, page in (("--html", html), ("--map", map_)):
+        if page is not None and page.suffix.lower() not in (".html", ".htm"):
+            raise ConfigError(f"{name} {page}: must be a file whose name ends in .html")
     if not 0 <= start < math.inf:
         raise ConfigError(f"--start {start:g}: must be 0 or more")
     if at is None and map_ is None:

@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from cyclopts import CycloptsError
 
 from fanet_mw.application import Application
 from fanet_mw.bus.topics import Topics
@@ -44,6 +45,27 @@ def test_launch_refuses_it_before_it_says_anything_else(capsys: pytest.CaptureFi
 )
 def test_two_values_of_one_key_are_refused_and_both_are_named(words: str, said: str) -> None:
     assert refusal(*changes_last(words.split())).startswith(said)
+
+
+@pytest.mark.parametrize(
+    "words", ["air cut 2.5", "order recall 1.7", "simulate quick --seed 1.5", "sweep quick --seeds 2.2", "air cut inf"]
+)
+def test_a_number_that_is_not_whole_is_not_rounded_to_one(words: str) -> None:
+    with pytest.raises(CycloptsError, match=f'unable to convert "{words.split()[-1]}"'):
+        app(words.split(), result_action="return_value", exit_on_error=False, print_error=False)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("--html run/trace.jsonl", "--html run/trace.jsonl: must be a file whose name ends in .html"),
+        ("--map run/summary.json", "--map run/summary.json: must be a file whose name ends in .html"),
+        ("--html a.html --map b.html", "--html and --map: one of them at a time"),
+        ("--html a.html --at 3", "--html and --at: one of them at a time"),
+    ],
+)
+def test_a_replay_is_written_over_nothing_but_a_page_and_never_left_out(words: str, said: str) -> None:
+    assert refusal("replay", "run", *words.split()) == said
 
 
 def test_a_link_from_a_node_to_itself_is_refused_in_words() -> None:

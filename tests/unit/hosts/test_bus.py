@@ -65,3 +65,9 @@ def test_port_0_becomes_one_that_is_free() -> None:
         assert with_port(other) == other
     with pytest.raises(BusError, match=r"cannot serve on tcp/192\.0\.2\.1:0"):
         with_port("tcp/192.0.2.1:0")
+
+
+def test_a_configuration_that_is_no_json5_is_refused_with_the_place_and_what_is_expected_there(tmp_path: Path) -> None:
+    (tmp_path / "z.json5").write_text("{nonsense")
+    with pytest.raises(ConfigError, match=r"z\.json5: --> 1:1: expected array, boolean, null, number, object, or str"):
+        Bus.serve("tcp/127.0.0.1:0", tmp_path / "z.json5")

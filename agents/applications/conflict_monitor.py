@@ -6,10 +6,8 @@
     still side by side after long -> the one with the higher id flies to the middle of the area
     one stands at the geofence    -> it flies back towards the middle for a while, lower ids first
 
-The ids decide about heights: of two UAVs the one with the lower id goes one level up for the other, the other one down,
-so that any two part and a warning need not state a direction. Levels are one distance to be kept apart, and lie higher
-by the error of a measured height. Both are assumed to keep their horizontal velocity. Not modeled: turns that the other
-UAV has planned, and conflicts that the change of height causes.
+Of two UAVs the one with the lower id goes one level up, the other one down, so that a warning need not state a
+direction. Not modeled: turns that the other UAV has planned, and conflicts that the change of height causes.
 """
 
 import math

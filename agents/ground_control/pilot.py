@@ -7,9 +7,7 @@
     land                 down where it is; disarmed once it stands
     hold                 where it is
 
-The pilot commands courses by the arbitration on board like any application, and objects to those of others while it
-commands; courses that avoid a collision pass (`agents/onboard.py`). Failsafes of the flight controller are
-below all this.
+While it commands, the pilot objects to courses of other applications, but for those that avoid a collision.
 """
 
 import math

@@ -4,13 +4,10 @@
     nakagami   |h|^2 mapped to a gamma distribution of shape m and mean 1          m = 1 is Rayleigh
     rician     |sqrt(K / (K + 1)) exp(j 2 pi d(t) / lambda) + h / sqrt(K + 1)|^2     K: direct over scattered power
 
-The directions are spread over the horizon (R. H. Clarke, Bell Syst. Tech. J. 47, 1968), so h keeps the correlation J0(2
-pi v t / lambda) while one station moves horizontally at v, and the product of both factors while both move (A. S. Akki,
-F. Haber, IEEE Trans. Veh. Technol. 35(1), 1986); vertical motion alike. The lower station number comes first, so that
-both directions fade alike. Places alone determine the gain: between poses x(t) goes on with the pose's velocity, and
-stations at rest keep theirs, unless `radio.scatterer_speed_m_s` moves the surroundings (f_n). The sum of N waves is
-mapped by its own distribution (J. C. Kluyver's random walk); the correlation of powers is lower by 1 / N than the law.
-Not modeled: frequency selectivity, change within a frame, directions that depend on the place.
+Correlations and sources: docs/explanation/channel.md. The lower station number comes first, so that both directions
+fade alike; between poses x(t) goes on with the pose's velocity. The sum of N waves is mapped by its own distribution
+(J. C. Kluyver's random walk); the correlation of powers is lower by 1 / N than the law. Not modeled: frequency
+selectivity, change within a frame, directions that depend on the place.
 """
 
 import math

@@ -104,22 +104,9 @@ def request(g: Ints, p: Ints, st: Ints, hs: Ints, s: int, t: int) -> None:
 
 @jit
 def access(
-    g: Ints,
-    p: Ints,
-    pf: Reals,
-    st: Ints,
-    fr: Ints,
-    lk: Ints,
-    lp: Reals,
-    ptr: Ints,
-    wv: Reals,
-    tb: Reals,
-    hs: Ints,
-    hr: Ints,
-    out: Ints,
-    s: int,
-    t: int,
-) -> None:
+    g: Ints, p: Ints, pf: Reals, st: Ints, fr: Ints, lk: Ints, lp: Reals, ptr: Ints, wv: Reals, tb: Reals, hs: Ints,
+    hr: Ints, out: Ints, s: int, t: int,
+) -> None:  # fmt: skip
     """Transmit the first frame that is still alive, because the backoff has run out."""
     if st[k.SCHEDULED, s] != t:
         return  # the backoff was frozen or planned anew after this event was made
@@ -152,22 +139,9 @@ def access(
 
 @jit
 def begin_tx(
-    g: Ints,
-    p: Ints,
-    pf: Reals,
-    st: Ints,
-    fr: Ints,
-    lk: Ints,
-    lp: Reals,
-    ptr: Ints,
-    wv: Reals,
-    tb: Reals,
-    hr: Ints,
-    s: int,
-    f: int,
-    kind: int,
-    t: int,
-) -> None:
+    g: Ints, p: Ints, pf: Reals, st: Ints, fr: Ints, lk: Ints, lp: Reals, ptr: Ints, wv: Reals, tb: Reals, hr: Ints,
+    s: int, f: int, kind: int, t: int,
+) -> None:  # fmt: skip
     """Let a station start to transmit; what it was receiving is lost."""
     if st[k.LOCK, s] >= 0:
         lk[k.FATE, st[k.LOCK, s]] = k.FATE_HALF_DUPLEX
@@ -270,23 +244,9 @@ def ack_timeout(g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, hs: Ints, out: I
 
 @jit
 def send_ack(
-    g: Ints,
-    p: Ints,
-    pf: Reals,
-    st: Ints,
-    fr: Ints,
-    lk: Ints,
-    lp: Reals,
-    ptr: Ints,
-    wv: Reals,
-    tb: Reals,
-    hs: Ints,
-    hr: Ints,
-    out: Ints,
-    s: int,
-    f: int,
-    t: int,
-) -> None:
+    g: Ints, p: Ints, pf: Reals, st: Ints, fr: Ints, lk: Ints, lp: Reals, ptr: Ints, wv: Reals, tb: Reals, hs: Ints,
+    hr: Ints, out: Ints, s: int, f: int, t: int,
+) -> None:  # fmt: skip
     """Send an ACK, SIFS after the end of a unicast frame, whether or not the medium is busy."""
     st[k.ACK_TO, s] = -1
     if st[k.TX_KIND, s] == k.NOTHING:

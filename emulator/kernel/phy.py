@@ -161,20 +161,9 @@ def spared(st: Ints, lp: Reals, r: int, link: int) -> bool:
 
 @jit
 def rx_end(
-    g: Ints,
-    p: Ints,
-    pf: Reals,
-    st: Ints,
-    sf: Reals,
-    fr: Ints,
-    lk: Ints,
-    lp: Reals,
-    hs: Ints,
-    out: Ints,
-    err: Reals,
-    link: int,
-    t: int,
-) -> None:
+    g: Ints, p: Ints, pf: Reals, st: Ints, sf: Reals, fr: Ints, lk: Ints, lp: Reals, hs: Ints, out: Ints,
+    err: Reals, link: int, t: int,
+) -> None:  # fmt: skip
     """The last bit of a frame has reached a station."""
     r = lk[k.LINK_DST, link]
     whole = False

@@ -4,8 +4,7 @@
     tcpout:127.0.0.1:5760    connect, again and again            tcpin:0.0.0.0:5760    several ground stations
     serial:/dev/ttyUSB0:57600
 
-Also with `//` after the colon, as MAVSDK writes; `udp` and `tcp` mean what pymavlink means by them: `udpin` and
-`tcpout`.
+Also with `//` after the colon; `udp` and `tcp` are pymavlink's `udpin` and `tcpout`.
 """
 
 import asyncio

@@ -1,9 +1,8 @@
 """The plan of rounds: the bound of urgent packets, what turns carry, and how full the slots of bulk are.
 
-In each bulk slot one node of those within two hops of each other sends, drawn by a hash
-(`fanet_mw/routing/rounds/bulk_slots.py`). Relays take part in each slot, so one has a share of one in as many as there
-are relays within its two hops, and has to send the packets of all; who is no relay takes part in one slot of eight,
-with its own packets. Relays whose neighbors all have a packet leave it out, so up to twice as much may fit.
+A relay has a share of one bulk slot in as many as there are relays within its two hops, and has to send the packets of
+all; another node takes part in one slot of eight, with its own. Relays whose neighbors all have a packet leave it out,
+so up to twice as much may fit (`fanet_mw/routing/rounds/bulk_slots.py`).
 """
 
 from collections import defaultdict

@@ -1,11 +1,8 @@
-"""A place on a circle around another UAV, evenly spaced from the neighbors on it. Pure geometry.
-
-    a UAV keeps its bearing from the middle, except that it turns towards the wider of the two gaps beside it
-    the UAV of a circle nearest to the bearing of another circle turns to that bearing, and links the two
+"""A place on a circle around another UAV, evenly spaced from the neighbors on it
+(docs/explanation/formation-flight.md). Pure geometry.
 
 Nobody assigns places (balanced deployment on a circle: Martinez and Bullo, Optimal sensor placement and motion
-coordination for target tracking, Automatica 42(4), 2006). With five UAVs or more the gaps become equal, except beside
-one that faces another circle.
+coordination for target tracking, Automatica 42(4), 2006).
 """
 
 import math

@@ -6,11 +6,10 @@ span):
     a turn:  | one warning | one report | bulk, in order, as many as fit              | the rest, most urgent first |
                                         | or, in its place, a leader's announcements |
 
-Each class in use (`reserved_room.reserved`) has room of its own in a turn, so bulk waits for nothing that comes later
-but a leader's announcements; a packet larger than its class's room waits like bulk. Bulk without a bound, such as what
-came before the timetable, gives way to bulk that has one. A turn is used only if its flood is over before the next
-timetable. `CallRelease` sends what only neighbors need: missed packets and hellos in *calls*
-(`redundant_scheduling.py`), packets to one neighbor in *spare turns* (`list_scheduling.py`).
+Each class in use (`reserved_room.reserved`) has room of its own in a turn; a packet larger than that waits like bulk. A
+turn is used only if its flood is over before the next timetable. `CallRelease` sends what only neighbors need: missed
+packets and hellos in *calls* (`redundant_scheduling.py`), packets to one neighbor in *spare turns*
+(`list_scheduling.py`).
 """
 
 from abc import ABC, abstractmethod

@@ -273,6 +273,8 @@ class Judge:
         if not tests:
             return "never run", 0.0
         verdict = self._verdict(bug, tests, limits_s=coverage.limits_s(tests), uncompiled=uncompiled)
+        if not is_where_it_was(bug):
+            verdict = "not judged: the file has changed since"
         return verdict, time.monotonic() - began_s
 
     def _verdict(self, bug: Bug, tests: Sequence[str], *, limits_s: tuple[float, float], uncompiled: bool) -> str:
@@ -304,6 +306,11 @@ class Judge:
         if not is_noticed(child.returncode, said):
             return f"not judged: {said[-300:]}"
         return BY_FLIGHT if f"FAILED {KEPT}" in said else "caught"
+
+
+def is_where_it_was(bug: Bug) -> bool:
+    """False if the file of a bug has changed meanwhile, so that it was planted elsewhere."""
+    return (ROOT / bug.path).read_text(encoding="utf-8")[bug.begin : bug.end] == bug.old
 
 
 def is_noticed(returncode: int, said: str) -> bool:

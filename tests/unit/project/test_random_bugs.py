@@ -7,7 +7,18 @@ import signal
 import pytest
 
 from tests.mutants.blocks import blocks_of
-from tests.mutants.random_bugs import KEPT, LEAST, ROOT, USAGE, Bug, Coverage, all_bugs, interval, is_noticed
+from tests.mutants.random_bugs import (
+    KEPT,
+    LEAST,
+    ROOT,
+    USAGE,
+    Bug,
+    Coverage,
+    all_bugs,
+    interval,
+    is_noticed,
+    is_where_it_was,
+)
 from tests.mutants.uses import Uses
 
 SOURCE = """
@@ -107,3 +118,9 @@ def test_a_constant_is_tried_by_the_tests_that_run_what_uses_it_and_by_those_tha
     bug = Bug("a/b.py", "", 1, 0, 1, "3", "(3 + 1)", constant="X")
     assert coverage.tests_of(bug, 60.0) == [running, saying]
     assert coverage.tests_of(bug._replace(constant="W"), 60.0) == [], "nothing uses it: superfluous"
+
+
+def test_a_bug_of_a_file_that_has_changed_meanwhile_is_not_judged() -> None:
+    bug = next(bug for bug in all_bugs(["bounds"]) if bug.begin > 100)
+    assert is_where_it_was(bug)
+    assert not is_where_it_was(bug._replace(begin=bug.begin - 1, end=bug.end - 1))

@@ -75,3 +75,11 @@ def test_an_interval_that_means_nothing_ends() -> None:
     source.live(10, others_took_s=3.0)
     source.live(400, others_took_s=0.9)
     assert source.admission.interval_ns == 0
+
+
+def test_delays_are_steady_however_many_packets_they_are_of() -> None:
+    admission = BulkAdmission(None)
+    for tenth in range(1, 121):
+        for _ in range(tenth):
+            admission.hear(NodeId(2), 2 * S, now_ns=tenth * S // 10)
+    assert admission.steady

@@ -101,6 +101,14 @@ def test_bodies_that_meet_are_noticed(engine: Engine) -> None:
     assert engine.contacts() == [(1, 2)]
 
 
+def test_bodies_that_are_put_elsewhere_have_met_nobody_yet(engine: Engine) -> None:
+    for _ in range(2):
+        engine.reset(np.array([[0.0, 0, 50], [1.6, 0, 50]]))
+        assert engine.contacts() == [], "nobody asked for those of before"
+        fly(engine, np.array([[2.0, 0, 0], [-2, 0, 0]]), 1)
+    assert engine.contacts()[0] == (1, 2)
+
+
 def test_who_has_no_power_falls_whatever_is_wanted_of_it(engine: Engine) -> None:
     engine.reset(np.array([[0.0, 0, 50], [20, 0, 50]]))
     engine.fall(0)

@@ -4,8 +4,10 @@ What is on which topic is in docs/how-to/recordings.md. Instants are unix time: 
 """
 
 import contextlib
+import errno
 import json
 import math
+import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -124,7 +126,10 @@ class McapRecording(Observer):
             try:
                 self._writer.finish()
                 if self._gives_up:
+                    ours = os.fstat(self._file.fileno())
                     self._file.close()
+                    if not os.path.samestat(ours, self.path.stat()):
+                        raise FileNotFoundError(errno.ENOENT, "another file has taken its place")
             except OSError as error:
                 self._give_up(error)
 

@@ -15,12 +15,17 @@ from pathlib import Path
 import pytest
 from kit import slow
 
+from fanet_mw.bus.messages import ClockEpoch, ClockState
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError
 from fanet_mw.hosts.bus import Bus
+from fanet_mw.hosts.clock import SwarmClock
+from fanet_mw.hosts.realtime import SwarmAddress
 from sim.run.launcher import child_processes
 from sim.run.launcher.child_processes import Processes, end_servers
-from sim.run.launcher.swarm import free_endpoint
+from sim.run.launcher.services import Services
+from sim.run.launcher.swarm import SwarmRun, free_endpoint
+from sim.scenarios import catalog
 
 MARK = "FANET_TEST_MARK"
 SMALL = "nodes = {count = 2}\nclusters = {count = 1}\nduration_s = %s\nwarmup_s = 0\ndrain_s = 0\n"
@@ -402,6 +407,34 @@ def test_a_program_that_launches_whenever_it_is_imported_is_told_so_once(tmp_pat
     assert (ended.returncode, ended.stdout) == (1, "")
     assert ended.stderr.count("Traceback") == 1, "that of the program itself, and none of a child"
     assert ended.stderr.rstrip().endswith('put the launch below `if __name__ == "__main__":`')
+
+
+async def test_a_child_that_cannot_be_started_again_is_lost_and_said_to_be_and_the_others_go_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    said: list[str] = []
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    scenario = catalog.find("quick", ["nodes.count=2", "clusters.count=1"])
+    with Bus.serve(endpoint := free_endpoint()) as bus:
+        services = Services(scenario, SwarmAddress("test", endpoint))
+        run = SwarmRun(services, bus, respawn=True, tell=said.append)
+        run._clock = SwarmClock(ClockEpoch(time.time_ns(), 1.0, ClockState.RUNNING))
+        for name in ("agent-1", "agent-2"):
+            run.processes.start(name, sleeper, {"seconds": 300})
+            folder = Path(f"/proc/{run.processes.pid(name)}")
+            assert eventually(lambda folder=folder: folder.joinpath("comm").read_text().startswith("agent-"))
+        (tmp_path / "here").rmdir()
+        os.kill(run.processes.pid("agent-2"), signal.SIGKILL)
+        while len(said) < 2:  # noqa: ASYNC110  (the process ends in real time)
+            await asyncio.sleep(0.01)
+        assert run.processes.names() == ["agent-1"]
+        await run.processes.end_all()
+    assert said[1] == (
+        "agent-2 cannot be started: the working folder has been deleted, and the swarm's processes start in it; "
+        "the others carry on"
+    )
 
 
 @pytest.mark.parametrize(

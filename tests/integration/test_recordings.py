@@ -267,6 +267,20 @@ def test_a_recording_that_is_being_written_is_no_other_runs_even_by_force(tmp_pa
     assert path.read_bytes().startswith(before)
 
 
+@pytest.mark.parametrize(("replaced", "why"), [(False, "No such file"), (True, "another file has taken its place")])
+def test_a_recording_that_somebody_removes_meanwhile_ends_early_and_says_so(
+    tmp_path: Path, replaced: bool, why: str
+) -> None:
+    path = tmp_path / "one.mcap"
+    with McapRecording(path, catalog.find("quick"), epoch_unix_ns=EPOCH_UNIX_NS) as recording:
+        path.unlink()
+        if replaced:
+            path.write_bytes(b"mine")
+    assert recording.failure is not None
+    assert why in recording.failure
+    assert not replaced or path.read_bytes() == b"mine"
+
+
 def test_a_finished_run_becomes_a_recording(folder: Path, tmp_path: Path) -> None:
     path = tmp_path / "later.mcap"
     assert app(["log", "export", str(folder), "--to", "mcap", "--out", str(path)], result_action="return_value") == 0

@@ -38,6 +38,7 @@ _MUST_COMPILE: Final = 78
 """The exit code of the first child if the emulator's kernel is not compiled yet."""
 _UNKNOWN_END: Final = 255
 """The exit code that multiprocessing gives a child whose server has not told one."""
+_NO_FOLDER: Final = "the working folder has been deleted, and the swarm's processes start in it"
 Entry = Callable[..., int]
 
 _PR_SET_NAME: Final = 15
@@ -149,10 +150,8 @@ def _start_server() -> int:
             signal.pthread_sigmask(signal.SIG_BLOCK, _FOR_THE_LAUNCHER)
             forkserver.ensure_running()
     except OSError as error:
-        try:
-            Path.cwd()
-        except FileNotFoundError:
-            raise HostError("the working folder has been deleted, and the swarm's processes start in it") from error
+        if _folder_is_gone():
+            raise HostError(_NO_FOLDER) from error
         raise HostError(
             f"the server of the swarm's processes cannot be started: {error}; its socket is in the folder for "
             f"temporary files, TMPDIR = {tempfile.gettempdir()}, whose path may have 70 characters"
@@ -161,6 +160,14 @@ def _start_server() -> int:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
     pid: int = forkserver._forkserver._forkserver_pid  # type: ignore[attr-defined]  # noqa: SLF001
     return pid
+
+
+def _folder_is_gone() -> bool:
+    try:
+        Path.cwd()
+    except FileNotFoundError:
+        return True
+    return False
 
 
 def _wake_server() -> None:
@@ -257,7 +264,7 @@ class Processes:
         return self._ended_servers.get(self._server_of[name])
 
     def _not_started(self, name: str, server: int, error: Exception) -> HostError:
-        why = str(error)
+        why = _NO_FOLDER if _folder_is_gone() else str(error)
         if self._has_ended(server):
             how = described(self._ended_servers[server])
             why = f"the server from which all processes are forked ended with {how} while it imported what they need"

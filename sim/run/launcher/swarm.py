@@ -23,7 +23,7 @@ from typing import Any, Final
 from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import ClockRequest
 from fanet_mw.bus.topics import Topics
-from fanet_mw.errors import BusError, MalformedFrameError
+from fanet_mw.errors import BusError, HostError, MalformedFrameError
 from fanet_mw.hosts import interrupts
 from fanet_mw.hosts.bus import Bus, config_of, with_port
 from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
@@ -240,7 +240,7 @@ class SwarmRun:
             elif starts and name in self._stopped:
                 self._tell(f"{name} is started again at {self._now_ns() / S:.1f} s, as planned")
                 self._stopped.discard(name)
-                self.processes.restart(name)
+                self._start_again(name)
 
     def _on_pace(self, _topic: str, payload: bytes) -> None:
         """Called on a thread of the bus."""
@@ -319,7 +319,7 @@ class SwarmRun:
             return
         if self._clock is None and not self._over.is_set() and self._deaths.grant_late_start(name, exit_code):
             self._tell(f"{name} ended with {described(exit_code)} before the start; started again")
-            self.processes.restart(name)
+            self._start_again(name)
             return
         if name in self._stopped:
             self._tell(f"{name} is stopped at {self._now_ns() / S:.1f} s, as planned")
@@ -337,13 +337,26 @@ class SwarmRun:
         if self._deaths.grant_respawn(name):
             self._tell(f"{what}; started again")
             if name == "world" and self._recorder is not None:
-                self.processes.restart(name, flight=self._recorder.last())
+                self._start_again(name, flight=self._recorder.last())
             else:
-                self.processes.restart(name)
+                self._start_again(name)
         elif node and self._clock is not None:
             self._tell(f"{what}; the others carry on")
         else:
             self.abort(f"{what}; the run cannot go on without it", broken=True)
+
+    def _start_again(self, name: str, **more: object) -> None:
+        """Start a process again. Where that fails, the swarm goes on without a UAV, and not without anything else."""
+        try:
+            self.processes.restart(name, **more)
+        except HostError as error:
+            if not name.startswith("agent-") or self._clock is None:
+                self.abort(f"{error}; the run cannot go on without it", broken=True)
+                return
+            if all(ended != name for ended, _ in self._deaths.ended):  # it was stopped as planned
+                node = int(name.removeprefix("agent-"))
+                self._deaths.note(name, -signal.SIGKILL, node=node, now_ns=self._now_ns())
+            self._tell(f"{error}; the others carry on")
 
     def _now_ns(self) -> int:
         """The swarm instant, limited to the swarm's time."""

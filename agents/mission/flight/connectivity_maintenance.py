@@ -16,7 +16,7 @@ from fanet_mw.wire.search_plan import Search
 
 _TETHER: Final = 0.95
 """The greatest distance of two UAVs that must stay connected, as a share of the radio's reach."""
-_TETHER_S: Final = 4.0
+_TETHER_S: Final = 2.0
 """A UAV may use up the rest of that distance in this time at the earliest."""
 _CLOSING: Final = 0.97
 _CLOSING_S: Final = 1.0
@@ -24,6 +24,10 @@ _CLOSING_S: Final = 1.0
 _FOLLOWS: Final = 0.88
 """The greatest distance, as such a share, of one that is nearer to a gap while the swarm is apart: a line waits and
 turns back for its chain rather than hold it back.
+"""
+_GIVES_WAY: Final = 0.8
+"""The greatest distance, as such a share, of one who responds, for whoever has nothing to do before the sweep: others
+would stand where their links end, with the survivor in sight of nobody.
 """
 _HASTE: Final = 0.95
 """Whoever is too far away for that is approached at this share of the greatest speed."""
@@ -92,7 +96,16 @@ class ConnectivityMaintenance:
             if follows:
                 nearer = self._plane(offset, motion.velocity, _FOLLOWS, _CLOSING_S)
                 closer += [] if nearer is None else [nearer]
+        closer += self._gives_way(ties, offsets, now_ns)
         return planes + closer  # who cannot follow so close stays in reach
+
+    def _gives_way(self, ties: dict[NodeId, Motion], offsets: dict[NodeId, Enu], now_ns: int) -> list[HalfPlane]:
+        """The limits that draw a UAV without a task after those who respond, before the sweep."""
+        if self._bidding.survivor is not None or self._formation.is_taken_up(now_ns):
+            return []
+        responding = sorted(self._bidding.responders(now_ns) & ties.keys())
+        planes = [self._plane(offsets[node], ties[node].velocity, _GIVES_WAY, _CLOSING_S) for node in responding]
+        return [plane for plane in planes if plane is not None]
 
     def _plane(self, offset: Enu, velocity: Enu, share: float, within_s: float) -> HalfPlane | None:
         """The limit that keeps this UAV within a share of the reach of another one."""

@@ -77,7 +77,9 @@ _BENT: Final = 4
 _BENT_HOP: Final = 0.85
 """Neighbors of bent lines are at most this share of the radio's reach apart: less than elsewhere, because the outermost
 are the fastest and have the farthest way, and so that a line from which two are lost holds together."""
-_AROUND: Final = 1.6
+_BEYOND_M: Final = 120.0
+"""Lines begin so far beyond the swarm, whose outer rows have the time to fly there, and look on the way."""
+_AROUND: Final = 2.2
 """Lines that begin around the swarm do so at this share of the radio's reach from the middle at most: whoever is nearer
 and was not found on the way out is found on the way back only."""
 _WIDER: Final = 1.3
@@ -151,6 +153,7 @@ class Lines(Shape):
     def at(self, place: float, swept_s: float) -> Enu:
         formation = self._formation
         lanes = formation.lanes
+        begins_m = formation.first_m if swept_s <= self.sweep_s else min(FIRST_M, formation.first_m)
         if place <= formation.teams * lanes - 1:
             line, lane = divmod(place, lanes)
             inner_m = self._inner_m(swept_s, lane)
@@ -164,7 +167,6 @@ class Lines(Shape):
             if chain != self._half - 1:
                 ends = self._north_m(chain, inner_m), self._north_m(chain + 1, inner_m)
                 return Enu(middle, (sum(ends) + share * (ends[0] - ends[1])) / 2, up_m)
-            begins_m = formation.first_m if swept_s <= self.sweep_s else min(FIRST_M, formation.first_m)
             folded = max(0.0, 1 - (inner_m - begins_m) / _STRAIGHT_M)
             east = -_BUNCHED_M * share * folded
             if begins_m > FIRST_M:
@@ -173,7 +175,8 @@ class Lines(Shape):
         line, share = formation.follower(round(place))
         outward_m, lane = self._outward_m[line], share * (lanes - 1)
         behind_m = FOLLOW_M if not outward_m else min(FOLLOW_M, self._apart_m / 2)
-        behind = max(self._inner_m(swept_s, lane) + outward_m - behind_m, self._starts_m(self._straight(lane)) * 0.5)
+        least_m = min(begins_m, self._starts_m(self._straight(lane))) / 2
+        behind = max(self._inner_m(swept_s, lane) + outward_m - behind_m, least_m)
         east = self._half_width_m(swept_s) * (2 * share - 1)
         return Enu(east, behind if line < self._half else -behind, formation.height_m + FOLLOWER_HIGHER_M)
 
@@ -232,7 +235,7 @@ class Lines(Shape):
         return Lines(formation, most_m=most_m, widest_m=widest_m, gaps_m=gaps_m, joints=joints)
 
     def begun_around(self, swarm: Swarm) -> tuple[Dimensions, ...]:
-        """Two lines that begin where the swarm stands or nearer, the farthest first; none unless it stands densely
+        """Two lines that begin beyond the swarm or nearer, the farthest first; none unless it stands densely
         enough to hear everybody between.
         """
         made = self._formation
@@ -242,7 +245,7 @@ class Lines(Shape):
             return ()
         if swarm.apart_m > _DENSE * swarm.reach_m:
             return ()
-        most_m = max(made.first_m, min(beyond_m, made.last_m / 2, _AROUND * swarm.reach_m))
+        most_m = max(made.first_m, min(beyond_m + _BEYOND_M, made.last_m / 2, _AROUND * swarm.reach_m))
         narrower_m = max(0.0, made.half_width_m - _WIDER * aside_m)
         shares = [step / _STEPS for step in range(_STEPS, 0, -1)]
         found = []

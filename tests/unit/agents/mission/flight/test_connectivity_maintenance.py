@@ -7,6 +7,7 @@ from agents.mission.flight.connectivity_maintenance import ConnectivityMaintenan
 from agents.mission.navigation.half_planes import nearest
 from fanet_mw.motion import Motion
 from fanet_mw.units import STILL, Enu, NodeId, S
+from fanet_mw.wire.bids import Bid
 
 
 def test_who_is_tied_does_not_fly_out_of_reach() -> None:
@@ -136,7 +137,28 @@ def test_a_follower_that_hears_none_of_its_team_stays_with_whom_it_hears() -> No
     assert [plane.north for plane in tied.planes(now_ns)] == [-1.0]
 
 
-def test_who_closes_ranks_over_a_lost_uav_may_use_up_a_little_more_of_its_reach_in_a_quarter_of_the_time() -> None:
+@pytest.mark.parametrize(("now_ns", "drawn"), [(30 * S, True), (TAKEN_UP_NS + S, False)])
+def test_before_the_sweep_a_uav_without_a_task_follows_a_neighbor_who_responds(now_ns: int, drawn: bool) -> None:
+    node, responder = NodeId(34), NodeId(35)
+    board = Board(node, Enu(0, 0, UP_M))
+    board.hear(1, Enu(300, 0, 0), range(35, 37), now_ns=now_ns)
+    board.neighbors.on_hello(responder, Motion(Enu(215, 0, UP_M), STILL, now_ns))
+    tied = ConnectivityMaintenance(
+        board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
+    )
+
+    def flies_m_s() -> float:
+        return nearest((-9.0, 0.0), tied.planes(now_ns), limit=10, hard=0)[0]
+
+    alone_m_s = flies_m_s()
+    assert alone_m_s < 0, "a little of the link is left"
+    board.tasks.merge([Bid(1, responder, 90, serial=1)], now_ns=now_ns)
+    assert (flies_m_s() > 8) == drawn
+    board.tasks.survivor = 1
+    assert flies_m_s() == pytest.approx(alone_m_s), "who responds itself does not"
+
+
+def test_who_closes_ranks_over_a_lost_uav_may_use_up_a_little_more_of_its_reach_in_half_of_the_time() -> None:
     now_ns = TAKEN_UP_NS + 20 * S
     board = Board(LINE, lane_of(LINE, now_ns))
     for other in range(1, COUNT + 1):
@@ -151,7 +173,7 @@ def test_who_closes_ranks_over_a_lost_uav_may_use_up_a_little_more_of_its_reach_
     board.place.close_ranks({LINE + 7}, now_ns)
     after = {(plane.east, plane.north): plane.least for plane in tied.planes(now_ns)}
     for way, least in before.items():
-        assert after[way] == pytest.approx(4 * least - 0.02 * REACH_M / 2)
+        assert after[way] == pytest.approx(2 * least - 0.02 * REACH_M / 2)
 
 
 def test_who_is_too_far_away_is_approached_as_fast_as_a_uav_flies() -> None:

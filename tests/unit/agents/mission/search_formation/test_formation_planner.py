@@ -126,15 +126,17 @@ def test_a_plan_gives_everyone_a_place_and_the_swarm_stays_in_one_piece_on_the_w
         assert is_one(places), share
 
 
-@pytest.mark.parametrize("apart_m", [200.0, 190.0])
-def test_lines_around_a_swarm_begin_when_each_could_have_visited_who_is_near_it(apart_m: float) -> None:
+@pytest.mark.parametrize(("apart_m", "waits_s"), [(200.0, 0.0), (190.0, 2.5)])
+def test_lines_around_a_swarm_begin_when_each_is_there_and_could_have_visited_who_is_near_it(
+    apart_m: float, waits_s: float
+) -> None:
     planner, pattern = planner_of(1, expected=45), formation()
     for node in range(1, 46):
         at = Enu(apart_m * ((node - 1) % 9 - 4), apart_m * ((node - 1) // 9 - 2), 50)
         planner.status(SearchStatus(0, at, node, 0, 100), now_ns=0)
     assert planner.review(pattern, now_ns=S)
     assert planner.plan is not None
-    assert planner.plan.deploy_ds / 10 == pytest.approx(apart_m * math.sqrt(32 / 45) / 3.7, abs=0.1)
+    assert planner.plan.deploy_ds / 10 == pytest.approx(apart_m * math.sqrt(32 / 45) / 3.7 + waits_s, abs=0.1)
 
 
 def test_uavs_that_hear_nobody_take_different_places_and_keep_them() -> None:
@@ -179,16 +181,16 @@ def test_a_plan_with_a_short_notice_is_told_again_a_second_before_it_begins() ->
 
 def test_who_is_out_for_a_survivor_becomes_a_follower_and_until_it_is_back_others_close_ranks() -> None:
     planner, pattern = planner_with(45), formation()
-    planner.status(SearchStatus(1, Enu(-400.0, -200.0, 50), 12, 0, 100, absent=True), now_ns=0)
-    assert planner.absent == {12}
+    planner.status(SearchStatus(1, Enu(-400.0, 0.0, 50), 21, 0, 100, absent=True), now_ns=0)
+    assert planner.absent == {21}
     assert planner.review(pattern, now_ns=S)
     assert planner.plan is not None
-    assert planner.plan.nodes.index(12) in pattern.followers
+    assert planner.plan.nodes.index(21) in pattern.followers
     undisturbed = planner_with(45)
     undisturbed.review(pattern, now_ns=S)
     assert undisturbed.plan is not None
-    assert undisturbed.plan.nodes.index(12) not in pattern.followers
-    planner.status(SearchStatus(2, Enu(-400.0, -200.0, 50), 12, 1, 100), now_ns=2 * S)
+    assert undisturbed.plan.nodes.index(21) not in pattern.followers
+    planner.status(SearchStatus(2, Enu(-400.0, 0.0, 50), 21, 1, 100), now_ns=2 * S)
     assert planner.absent == set()
 
 

@@ -318,12 +318,15 @@ def test_a_ring_begins_as_large_as_the_swarm_that_stands_around_the_middle_and_w
         assert (max(abs(at.east), abs(at.north)) == pytest.approx(1190)) == waits, "who was heard last is to be seen"
 
 
-def test_lines_begin_where_the_swarm_stands_and_leave_out_only_what_it_has_heard() -> None:
+def test_lines_begin_a_little_beyond_the_swarm_and_leave_out_only_what_it_has_heard() -> None:
     lines = formed(ShapeName.LINES)
     begun, *nearer = lines.begun_around(AROUND)
-    assert begun.dimensions == lines.dimensions._replace(first_m=400.0, narrower_m=145.0), "1.3 of how wide it stands"
-    assert [other.dimensions.first_m for other in nearer] == [pytest.approx(16 + 384 * k / 8) for k in range(7, 0, -1)]
-    assert begun.shape.sweep_s < lines.shape.sweep_s - 15
+    assert begun.dimensions == lines.dimensions._replace(first_m=520.0, narrower_m=72.5), (
+        "where neighbors hear each other"
+    )
+    assert [other.dimensions.first_m for other in nearer] == [pytest.approx(16 + 504 * k / 8) for k in range(7, 0, -1)]
+    assert nearer[-1].dimensions.narrower_m == 145.0, "1.3 of how wide it stands"
+    assert begun.shape.sweep_s < lines.shape.sweep_s - 24
     flown = [begun.at(place, second) for second in range(round(begun.shape.sweep_s) + 1) for place in range(45)]
     heard_from = np.array([(at.east, at.north) for at in (*AROUND, *flown)])
     unheard = [
@@ -337,7 +340,6 @@ def test_lines_begin_where_the_swarm_stands_and_leave_out_only_what_it_has_heard
 
 def test_the_outermost_lanes_fly_to_the_sides_while_the_middle_sweeps_and_waits_at_the_edge() -> None:
     begun = formed(ShapeName.LINES).begun_around(AROUND)[0]
-    assert begun.dimensions.narrower_m == pytest.approx(1185 - 1.3 * 800)
     aside_s = begun.dimensions.narrower_m / 9
     east_m, north_m = (
         [
@@ -346,9 +348,9 @@ def test_the_outermost_lanes_fly_to_the_sides_while_the_middle_sweeps_and_waits_
         ]
         for axis in ("east", "north")
     )
-    assert [east for _, east in east_m] == pytest.approx([1040, 1185, 1185, 1185])
+    assert [east for _, east in east_m] == pytest.approx([1112.5, 1185, 1185, 1185])
     assert [north for _, north in north_m] == pytest.approx([85, 85, 85 + 9 * (125 - aside_s), 1225], abs=1)
-    assert [north for north, _ in north_m] == pytest.approx([400, 400 + 7.5 * aside_s, 1225, 1225], abs=1)
+    assert [north for north, _ in north_m] == pytest.approx([520, 520 + 7.5 * aside_s, 1225, 1225], abs=1)
 
 
 def test_lines_begin_wider_and_nearer_where_neighbors_would_lose_each_other() -> None:

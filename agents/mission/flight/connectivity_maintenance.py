@@ -103,8 +103,12 @@ class ConnectivityMaintenance:
         """The limits that draw a UAV without a task after those who respond, before the sweep."""
         if self._bidding.survivor is not None or self._formation.is_taken_up(now_ns):
             return []
-        responding = sorted(self._bidding.responders(now_ns) & ties.keys())
-        planes = [self._plane(offsets[node], ties[node].velocity, _GIVES_WAY, _CLOSING_S) for node in responding]
+        responding = self._bidding.responders(now_ns)
+        planes = [
+            self._plane(offsets[node], ties[node].velocity, _GIVES_WAY, _CLOSING_S)
+            for node in sorted(ties)
+            if node in responding
+        ]
         return [plane for plane in planes if plane is not None]
 
     def _plane(self, offset: Enu, velocity: Enu, share: float, within_s: float) -> HalfPlane | None:

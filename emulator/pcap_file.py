@@ -12,7 +12,7 @@ from typing import BinaryIO, Final, Self
 
 from emulator.pcap import Pcap
 from fanet_mw.scenario import Radio
-from fanet_mw.whole_file import writing
+from fanet_mw.whole_file import require_in_place, writing
 
 NAME: Final = "air.pcap"
 _BUFFER: Final = 1 << 18
@@ -42,6 +42,7 @@ class PcapFile:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file: BinaryIO | None = path.open("wb", buffering=_BUFFER)
         self._path = path
+        self._place = path.absolute()  # a part of another package may change the working folder
         self._failure: str | None = None
         self.pcap = Pcap(self._write, radio, receptions=receptions, flush=self._flush)
 
@@ -56,6 +57,7 @@ class PcapFile:
         if self._file is not None:
             try:
                 self._file.flush()
+                require_in_place(self._file, self._place)
             except OSError as error:
                 self._give_up(error)
         return self._failure

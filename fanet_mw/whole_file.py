@@ -61,6 +61,12 @@ def keep_alone(file: int, busy: str) -> None:
             raise ConfigError(busy) from error
 
 
+def require_in_place(file: BinaryIO, path: Path) -> None:
+    """Raise OSError if an open file was removed or replaced since: what is written to it then is nowhere."""
+    if not os.path.samestat(os.fstat(file.fileno()), path.stat()):
+        raise FileNotFoundError(errno.ENOENT, "another file has taken its place")
+
+
 @contextlib.contextmanager
 def writing(what: object) -> Iterator[None]:
     """Turn what hinders the writing of a file or a folder, which messages call `what`, into a ConfigError."""

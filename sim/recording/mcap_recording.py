@@ -4,10 +4,8 @@ What is on which topic is in docs/how-to/recordings.md. Instants are unix time: 
 """
 
 import contextlib
-import errno
 import json
 import math
-import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -32,7 +30,7 @@ from fanet_mw.geodesy import Geodetic, to_geodetic
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record, RoleChanged
 from fanet_mw.units import Enu, S
-from fanet_mw.whole_file import keep_alone, writing
+from fanet_mw.whole_file import keep_alone, require_in_place, writing
 from sim.figures import colors
 from sim.observation.observer import Observer
 from sim.observation.surroundings import Surroundings, surroundings
@@ -126,10 +124,8 @@ class McapRecording(Observer):
             try:
                 self._writer.finish()
                 if self._gives_up:
-                    ours = os.fstat(self._file.fileno())
+                    require_in_place(self._file, self.path)
                     self._file.close()
-                    if not os.path.samestat(ours, self.path.stat()):
-                        raise FileNotFoundError(errno.ENOENT, "another file has taken its place")
             except OSError as error:
                 self._give_up(error)
 

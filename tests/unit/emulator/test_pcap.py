@@ -295,6 +295,17 @@ def test_a_capture_that_cannot_be_opened_is_one_sentence_and_a_full_disk_ends_it
     assert capsys.readouterr().err.count("the capture ends here: No space left on device") == 1
 
 
+def test_a_capture_that_somebody_removes_meanwhile_ends_there_and_says_so(
+    make_scenario: MakeScenario, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "air.pcap"
+    with PcapFile(path, make_scenario().radio) as file:
+        assert file.pcap.failure() is None
+        path.unlink()
+        assert file.pcap.failure() == "No such file or directory"
+    assert capsys.readouterr().err == f"{path}: the capture ends here: No such file or directory\n"
+
+
 def test_what_was_captured_a_second_ago_can_be_read_while_the_run_goes_on(
     tmp_path: Path, make_scenario: MakeScenario
 ) -> None:

@@ -102,17 +102,17 @@ class Lines(Shape):
         formation: Dimensions,
         *,
         most_m: float = math.inf,
-        widest_m: float = math.inf,
+        widest_m: tuple[float, ...] = (),
         gaps_m: tuple[float, ...] = (),
         joints: tuple[float, ...] = (),
     ) -> None:
         """`most_m`: the farthest innermost lines, and `gaps_m`: distances of lines from the north, that the relays left
-        span; `widest_m`: half of the width that the UAVs left of a line span; `joints`: the lane of each line at which
-        chains end, by default the middle one.
+        span; `widest_m`: half of the width that the UAVs left of each line span; `joints`: the lane of each line at
+        which chains end, by default the middle one.
         """
         self._formation = formation
         self._joints = joints or (formation.lanes // 2,) * formation.teams
-        self._most_m, self._widest_m = most_m, widest_m
+        self._most_m, self._widest_m = most_m, widest_m or (math.inf,) * formation.teams
         self._half = half = formation.teams // 2
         self._apart_m = formation.last_m - formation.first_m
         straight_s = self._apart_m / formation.speed_m_s
@@ -148,7 +148,7 @@ class Lines(Shape):
 
     @property
     def lane_m(self) -> float:
-        return 2 * min(self._widest_m, self._formation.half_width_m) / (self._formation.lanes - 1)
+        return 2 * min(max(self._widest_m), self._formation.half_width_m) / (self._formation.lanes - 1)
 
     def at(self, place: float, swept_s: float) -> Enu:
         formation = self._formation
@@ -157,12 +157,12 @@ class Lines(Shape):
         if place <= formation.teams * lanes - 1:
             line, lane = divmod(place, lanes)
             inner_m = self._inner_m(swept_s, lane)
-            return Enu(self._lane(lane, swept_s), self._north_m(int(line), inner_m), formation.height_m)
+            return Enu(self._lane(int(line), lane, swept_s), self._north_m(int(line), inner_m), formation.height_m)
         if place < formation.fixed:
             inner_m = self._inner_m(swept_s, lanes // 2)
             chain, row = next((c, row) for c, row in enumerate(self._chains) if place < row.first + row.size)
             share = 1 - 2 * (place - row.first + 1) / (row.size + 1)
-            north, south = self._lane(self._joints[chain], swept_s), self._lane(self._joints[chain + 1], swept_s)
+            north, south = (self._lane(line, self._joints[line], swept_s) for line in (chain, chain + 1))
             up_m, middle = formation.height_m + _CHAIN_HIGHER_M, (north + south + share * (north - south)) / 2
             if chain != self._half - 1:
                 ends = self._north_m(chain, inner_m), self._north_m(chain + 1, inner_m)
@@ -177,7 +177,7 @@ class Lines(Shape):
         behind_m = FOLLOW_M if not outward_m else min(FOLLOW_M, self._apart_m / 2)
         least_m = min(begins_m, self._starts_m(self._straight(lane))) / 2
         behind = max(self._inner_m(swept_s, lane) + outward_m - behind_m, least_m)
-        east = self._half_width_m(swept_s) * (2 * share - 1)
+        east = self._half_width_m(line, swept_s) * (2 * share - 1)
         return Enu(east, behind if line < self._half else -behind, formation.height_m + FOLLOWER_HIGHER_M)
 
     def flown_at(self, place: float, swept_s: float) -> Enu:
@@ -222,10 +222,13 @@ class Lines(Shape):
         formation, rows = self._formation, self.rows()
         left = [row.left(vacant) for row in rows]
         lines, relays = rows[: formation.teams], left[formation.teams :]
-        widest_m = min(formation.half_width_m, max(1, min(left[: formation.teams]) - 1) * hop_m / 2)
+        widest_m = tuple(
+            min(formation.half_width_m, max(1, count - 1) * hop_m / 2) for count in left[: formation.teams]
+        )
         joints = tuple(row.nearest(row.first + row.size // 2, vacant)[1] - row.first for row in lines)
-        lane_m = 2 * widest_m / (formation.lanes - 1)
-        aside_m = [lane_m * (a - b) for a, b in itertools.pairwise(joints)]
+        middle = (formation.lanes - 1) / 2
+        joined_m = [wide_m * (lane / middle - 1) for wide_m, lane in zip(widest_m, joints, strict=True)]
+        aside_m = [a - b for a, b in itertools.pairwise(joined_m)]
         spans_m = [
             math.sqrt(max(0.0, ((count + 1) * hop_m) ** 2 - off_m**2))
             for count, off_m in zip(relays, aside_m, strict=True)
@@ -267,7 +270,7 @@ class Lines(Shape):
 
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
         """The distance of a point from a line to the north or south; a line is taken to be as wide as the area."""
-        half_width_m = self._half_width_m(swept_s)
+        half_width_m = self._half_width_m(team, swept_s)
         aside = max(-1.0, min(1.0, east_m / half_width_m)) if half_width_m else 0.0
         lane = (aside + 1) / 2 * (self._formation.lanes - 1)
         return abs(north_m - self._north_m(team, self._inner_m(swept_s, lane)))
@@ -316,13 +319,13 @@ class Lines(Shape):
         out_m = inner_m + self._outward_m[line]
         return out_m if line < self._half else -out_m
 
-    def _half_width_m(self, swept_s: float) -> float:
+    def _half_width_m(self, line: int, swept_s: float) -> float:
         narrower_m = self._formation.narrower_m
         left = 1 - min(1.0, max(0.0, swept_s) / self._aside_s) if narrower_m else 0.0
-        return min(self._widest_m, self._formation.half_width_m - left * narrower_m)
+        return min(self._widest_m[line], self._formation.half_width_m - left * narrower_m)
 
-    def _lane(self, lane: float, swept_s: float) -> float:
-        return self._half_width_m(swept_s) * (2 * lane / (self._formation.lanes - 1) - 1)
+    def _lane(self, line: int, lane: float, swept_s: float) -> float:
+        return self._half_width_m(line, swept_s) * (2 * lane / (self._formation.lanes - 1) - 1)
 
 
 def _is_bent(formation: Dimensions) -> bool:

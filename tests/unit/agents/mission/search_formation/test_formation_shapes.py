@@ -375,6 +375,16 @@ def test_lines_that_begin_around_the_swarm_hang_together_all_the_way_and_come_ba
     assert middle == pytest.approx([1225, 1225, 16], abs=1), "out, a turn, and back to the middle at 9 m/s"
 
 
+def test_only_the_line_whose_uavs_are_missing_becomes_narrower() -> None:
+    lines = formed(ShapeName.LINES)
+    closed = lines.shape.drawn_in(frozenset(range(2, 8)), 0.91 * REACH_M)
+    for second in (0.0, 60.0, 400.0):
+        assert [closed.at(lane, second).east for lane in (0, 14)] == pytest.approx([-910, 910])
+        assert [closed.at(lane, second).east for lane in (15, 29)] == pytest.approx([-1185, 1185])
+        joined = [closed.at(place, second) for place in range(30, 40)]
+        assert all(a.horizontal_to(b) <= 0.91 * REACH_M for a, b in itertools.pairwise(joined))
+
+
 @pytest.mark.parametrize(
     ("swarm", "why"),
     [

@@ -54,7 +54,7 @@ _ASKS_NS: Final = 60 * S
 """How long a node without a plan waits to be told that of the others before it makes one that replaces theirs."""
 _BUSY_M2: Final = 500.0**2
 """By how much longer a way, squared, a UAV may have that becomes a follower because it is out for a survivor."""
-_AMONG_M_S: Final = 3.2
+_AMONG_M_S: Final = 3.7
 """Before a formation begins around the swarm, it stays until each could fly at this speed as far as neighbors are
 apart: who is among them is found meanwhile, and passed by nobody for long after."""
 _LEAVE_NS: Final = 6 * S

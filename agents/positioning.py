@@ -17,6 +17,10 @@ _WANTED: Final = 0.01
 """The wanted error of the estimate, as a share of the radio range; timetables from positions tolerate that much."""
 _NEGLIGIBLE: Final = 0.02
 """Fixes with an error below this share of the radio range are used as they are."""
+_OUT_NS: Final = 500 * MS
+"""GPS is taken to be out when the last fix is older than this."""
+_SETTLE: Final = 0.15
+"""The weight of a fix against dead reckoning, which averages the errors of successive fixes."""
 
 
 class SteadyFix:
@@ -52,12 +56,6 @@ def error_m(*, sigma_m: float, range_m: float) -> float:
     """The standard deviation of the estimate along each axis, if the errors of fixes are independent."""
     k = gain(sigma_m=sigma_m, range_m=range_m)
     return sigma_m * math.sqrt(k / (2 - k))
-
-
-_OUT_NS: Final = 500 * MS
-"""GPS is taken to be out when the last fix is older than this."""
-_SETTLE: Final = 0.15
-"""The weight of a fix against dead reckoning, which averages the errors of successive fixes."""
 
 
 class DeadReckoning:

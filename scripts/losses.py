@@ -19,9 +19,9 @@ other, 15 s apart, and `8!` flies to the end; these may stand together. One JSON
 and, of copies that fly to the end, how many were found, by phone or as persons, when 95 % of the area were covered, the
 least distance of two UAVs, the share of reports delivered of what an ideal flood could have delivered, contacts, all
 stretches in which the others were apart, and when the broken bounds were stated. With `--without` the flight itself, in
-which nobody is lost, has a line, too. `--scenario NAME` and `--set KEY=VALUE` fly others. The
-tables of `docs/results/losses.md` are made of these lines, in `docs/results/data/losses.jsonl`
-(`scripts/tables losses flown-on losses-in-a-row`).
+which nobody is lost, has a line, too. `--scenario NAME` and `--set KEY=VALUE` fly others. The tables of
+`docs/results/losses.md` are made of these lines, in `docs/results/data/losses.jsonl` (`scripts/tables losses flown-on
+losses-in-a-row`).
 """
 
 import argparse
@@ -210,7 +210,7 @@ class Flight:
                     waiting = next(news, None)
                 apart = [is_torn for at_ns, is_torn in torn if begin_ns <= at_ns < end_ns]
                 connected = round(1 - statistics.fmean(apart), 3)
-                rows.append([len(rows) + 1, connected, round(cells.share, 3), _found(found)])
+                rows.append([len(rows) + 1, connected, round(cells.share, 3), len(found.found_ns())])
             if t_ns - seen_ns >= S:
                 seen_ns = t_ns
                 cells.add(at[~np.isin(ids, [loss.node for loss in losses if loss.at_ns <= t_ns])].tolist())
@@ -300,10 +300,6 @@ def without_a_loss(flight: Flight) -> dict[str, Any]:
         "connected": round(1 - statistics.fmean(is_torn for _, is_torn in torn), 3),
         "broken": len(flight.broken(set(), 0)),
     } | outcome(flight)  # fmt: skip
-
-
-def _found(of: Confirmations) -> int:
-    return len({one.survivor for one in of.right()} | set(of.persons()[0]))
 
 
 def _share(yes: Sequence[int], no: Sequence[int]) -> float | None:

@@ -14,6 +14,9 @@ from fanet_mw.scenario import Clock
 from fanet_mw.units import MS, US, NodeId, S, seconds_to_ns
 
 _PPM: Final = 1e-6
+_NOTICED_NS: Final = 50 * US
+_SLEWED: Final = 500e-6
+"""A smaller change between two inputs is not taken for a jump: adjtime(3) slews a clock by 500 ppm."""
 _AHEAD_NS: Final = 60 * S
 """The walk is computed this far ahead of the present, and nothing is announced farther ahead."""
 
@@ -99,11 +102,6 @@ def _added_up(clock: Clock, node: NodeId) -> list[tuple[int | None, int]]:
 def _shown(part: _Second, true_ns: int) -> int:
     elapsed_ns = true_ns - part.true_ns
     return part.local_ns + elapsed_ns + round(elapsed_ns * part.rate)
-
-
-_NOTICED_NS: Final = 50 * US
-_SLEWED: Final = 500e-6
-"""A smaller change between two inputs is not taken for a jump: adjtime(3) slews a clock by 500 ppm."""
 
 
 class SteadyClock:

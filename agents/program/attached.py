@@ -35,12 +35,12 @@ _PATIENCE_S: Final = 10.0
 _LEAVING_S: Final = 5.0
 """A program that leaves waits no longer for what its node has yet to send; a flooding period of the paper."""
 _MOST_AHEAD_S: Final = 30 * 86400.0
-"""A swarm that begins later than this is one whose epoch was meant in another unit."""
+"""The farthest that an epoch may lie ahead; one beyond it was probably given in another unit."""
 _ORIGIN: Final = Enu(0.0, 0.0, 0.0)
 
 
 def _epoch_ns(epoch_unix_s: float, scenario: Scenario) -> int:
-    """The epoch in ns; raises ConfigError if the swarm's time is over, or would not begin."""
+    """The epoch in ns; raises ConfigError if the swarm's time is over, or begins too far ahead."""
     now_s = THIS_MACHINE.unix_ns() / S
     if not -scenario.duration_s < epoch_unix_s - now_s < _MOST_AHEAD_S:
         raise ConfigError(

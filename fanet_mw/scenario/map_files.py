@@ -5,7 +5,7 @@
     mission.survivors_at = "people.kml" -> mission.survivor_positions_m, one for each point
 
 Read are GeoJSON (RFC 7946), KML and KMZ (OGC 12-007r2), plans of QGroundControl (.plan) and lists of waypoints
-(QGC WPL 110); what of a plan is what: docs/how-to/write-a-scenario.md.
+(QGC WPL 110); docs/how-to/write-a-scenario.md says what of a plan becomes the area, no-fly areas and points.
 """
 
 import io

@@ -19,6 +19,8 @@ from sim.results.run_table import read_parquet
 from sim.sweep.measures import DELAY_EDGES_S
 
 Row = Mapping[str, Any]
+_LEFT_OUT: Final = ("summary", "trace_sha256")
+"""The summary, whose figures are columns, and hashes, which nothing compresses: half of the file."""
 Quantity = str | Callable[[Row], float | None]
 """A quantity of a run: the name of a column, or a function of the row; None where it is undefined."""
 
@@ -80,10 +82,6 @@ def max_per_seed(*many: Mapping[int, float]) -> dict[int, float]:
 def _together(many: Sequence[Mapping[int, float]]) -> dict[int, list[float]]:
     seeds = [seed for seed in many[0] if all(seed in other for other in many)] if many else []
     return {seed: [one[seed] for one in many] for seed in seeds}
-
-
-_LEFT_OUT: Final = ("summary", "trace_sha256")
-"""The summary, whose figures are columns, and hashes, which nothing compresses: half of the file."""
 
 
 def keep(table: pa.Table, folder: Path, sweep: str, variant: str) -> Path:

@@ -11,9 +11,11 @@ station either sends or receives, and it receives one frame at a time on any cha
 (1) summed over N(v), of which d nodes with a share s of the packets, and (2):      L ((F + D) + (d - s) F) <= d
 (1) summed over all n nodes, m transmissions per packet:                     L (m (F + D) + (n - 1) F) <= n
 
-m is at least the smallest number of nodes whose greatest degrees suffice: the first transmitter reaches its neighbors,
-each other one at most all of them but one. A frame of k packets counts as k frames of 1/k of its time, and the greatest
-k bounds all. Assumed: no coding across packets, and sources that are equally busy.
+Every node needs a copy of each packet, so m is at least the smallest number of nodes whose greatest degrees suffice:
+the first transmitter reaches itself and its neighbors, each other one at most all its neighbors but the one from which
+it has the packet. The least of these limits is the bound; whether it can be reached is not known. A frame of k packets
+counts as k frames of 1/k of its time each; with the greatest k that fits, the bound holds for all. Assumed: no coding
+across packets, and sources that are equally busy.
 """
 
 from collections.abc import Collection

@@ -69,11 +69,9 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
     for first_known in records_of(records, Detected, Located):
         (heard if type(first_known) is Detected else located).setdefault(first_known.survivor, first_known.t_ns)
     right, mistaken = found.right(), found.mistaken()
-    persons, false_persons = found.persons()
+    _, false_persons = found.persons()
     confirmed = [*right, *mistaken]
-    found_ns = {survivor: find.t_ns for survivor, find in persons.items()}
-    for one in right:
-        found_ns[one.survivor] = min(one.t_ns, found_ns.get(one.survivor, one.t_ns))
+    found_ns = found.found_ns()
     waited = [survivor for survivor in found_ns if survivor in heard]
     return {
         "survivors": scenario.mission.survivors,
@@ -82,7 +80,7 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
         "reached": len({r.survivor for r in records_of(records, Arrived)}),
         "confirmed": len(right),
         "mistaken": len(mistaken),
-        "persons": len({one.survivor for one in right} | set(persons)),
+        "persons": len(found_ns),
         "persons_false": false_persons,
         "reopened": found.reopened,
         "time_to_confirm_s": sorted(round(one.t_ns / S, 3) for one in right),
@@ -132,7 +130,7 @@ class Confirmations:
         return math.hypot(at.east - placed.east_m, at.north - placed.north_m)
 
     def errors_m(self, placed: Iterable[_Placed]) -> list[float]:
-        """Of those of whom there is a truth: a survivor with another number exists only in a forged message."""
+        """The errors [m] of places of survivors that exist; any other number comes only from a forged message."""
         return [self.error_m(one) for one in placed if 1 <= one.survivor <= len(self._truth)]
 
     def right(self) -> list[Confirmed]:
@@ -159,6 +157,13 @@ class Confirmations:
             if survivor not in of and number not in of.values():
                 of[survivor] = number
         return {survivor: finds[number] for survivor, number in of.items()}, len(finds) - len(of)
+
+    def found_ns(self) -> dict[int, int]:
+        """When each survivor was found, by phone or as a person."""
+        found = {survivor: find.t_ns for survivor, find in self.persons()[0].items()}
+        for one in self.right():
+            found[one.survivor] = min(one.t_ns, found.get(one.survivor, one.t_ns))
+        return found
 
     def _first(self) -> list[Confirmed]:
         return [held[0] for survivor, held in self._held.items() if held and not is_person(survivor)]

@@ -25,9 +25,9 @@ _FOLLOWS: Final = 0.88
 """The greatest distance, as such a share, of one that is nearer to a gap while the swarm is apart: a line waits and
 turns back for its chain rather than hold it back.
 """
-_GIVES_WAY: Final = 0.8
-"""The greatest distance, as such a share, of one who responds, for whoever has nothing to do before the sweep: others
-would stand where their links end, with the survivor in sight of nobody.
+_LED: Final = 0.8
+"""Before the sweep a UAV without a task keeps within this share of the reach of a neighbor that responds: otherwise the
+responder would be held where its links end, before it sees the survivor.
 """
 _HASTE: Final = 0.95
 """Whoever is too far away for that is approached at this share of the greatest speed."""
@@ -96,16 +96,16 @@ class ConnectivityMaintenance:
             if follows:
                 nearer = self._plane(offset, motion.velocity, _FOLLOWS, _CLOSING_S)
                 closer += [] if nearer is None else [nearer]
-        closer += self._gives_way(ties, offsets, now_ns)
+        closer += self._led(ties, offsets, now_ns)
         return planes + closer  # who cannot follow so close stays in reach
 
-    def _gives_way(self, ties: dict[NodeId, Motion], offsets: dict[NodeId, Enu], now_ns: int) -> list[HalfPlane]:
-        """The limits that draw a UAV without a task after those who respond, before the sweep."""
+    def _led(self, ties: dict[NodeId, Motion], offsets: dict[NodeId, Enu], now_ns: int) -> list[HalfPlane]:
+        """The limits that keep a UAV without a task near those who respond, before the sweep."""
         if self._bidding.survivor is not None or self._formation.is_taken_up(now_ns):
             return []
         responding = self._bidding.responders(now_ns)
         planes = [
-            self._plane(offsets[node], ties[node].velocity, _GIVES_WAY, _CLOSING_S)
+            self._plane(offsets[node], ties[node].velocity, _LED, _CLOSING_S)
             for node in sorted(ties)
             if node in responding
         ]

@@ -35,7 +35,6 @@ from fanet_mw.routing.olsr.messages import (
     encode_time,
 )
 from fanet_mw.routing.olsr.multipoint_relays import multipoint_relays
-from fanet_mw.routing.olsr.parameters import WILL_NEVER
 from fanet_mw.routing.olsr.state import Repositories
 from fanet_mw.routing.rival_control_messages import Family
 from fanet_mw.serial_number import following
@@ -62,7 +61,7 @@ def routing_table(
     """The shortest known routes (10), `topology` by pairs (last hop, destination); ties by the lowest last hop."""
     routes = {neighbor: _OlsrRoute(neighbor, 1) for neighbor in sorted(neighbors)}
     for neighbor in sorted(neighbors):
-        if willingness[neighbor] != WILL_NEVER:
+        if willingness[neighbor] != p.WILL_NEVER:
             for far in neighbors[neighbor]:
                 if far != node and far not in routes:
                     routes[far] = _OlsrRoute(neighbor, 2)

@@ -89,7 +89,7 @@ class RunningTally(Observer):
                 case Confirmed() | Refuted():
                     self._confirmations.add(record)
                     self.confirmed = {one.survivor for one in self._confirmations.right()}
-                    self.without_phone = set(self._confirmations.persons()[0]) - self.confirmed
+                    self.without_phone = self._confirmations.found_ns().keys() - self.confirmed
                 case _:
                     pass
         self._forget()

@@ -209,7 +209,7 @@ class Processes:
         self._server_of: dict[str, int] = {}
         """The process id of the server that each child was forked from last."""
         self._ended_servers: dict[int, int] = {}
-        """Their exit codes, once they have ended before their children."""
+        """The exit code of each such server that has ended before its children, by its process id."""
         self._empty = asyncio.Event()
 
     async def warm_up(self) -> bool:

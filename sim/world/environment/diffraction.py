@@ -3,8 +3,9 @@
     nu   h sqrt(2 / lambda (1 / d1 + 1 / d2));  h: height of the edge above the straight line, negative below it
     J    6.9 + 20 log10(sqrt((nu - 0.1)^2 + 1) + nu - 0.1)  [dB]  for nu > -0.78, else 0:  6 dB where it grazes
 
-A hill's edge is the point of the ground with the greatest nu; a building has three, its roof and its sides, and the way
-past that with the least nu. Of several obstacles that with the greatest nu counts. Not modeled: several edges in a row,
+A hill's edge is the point of the ground with the greatest nu, if it rises above the straight line between the ground at
+both ends. A building has three edges, its roof and its sides; the wave passes the one with the least nu. Of several
+obstacles that with the greatest nu counts. Not modeled: several edges in a row,
 the ground between, rounded tops, and waves through walls.
 """
 

@@ -11,8 +11,8 @@ where the next one began, and chains join neighboring ones unless these are with
 
 The teams are the lines, from the northernmost to the southernmost (`contract.py`).
 
-Lines of a swarm that stands spread over the middle of the area begin where it stands, little wider than it, bent back
-at both ends:
+Lines of a swarm that stands spread over the middle of the area begin a little beyond it, little wider than it, bent
+back at both ends:
 
              .-o--o--o--o--o-.        what is between them was heard by those who stood there; beside that the
        <--  o                 o  -->  outermost lanes first fly to the sides, and then catch up, while the middle
@@ -78,10 +78,12 @@ _BENT_HOP: Final = 0.85
 """Neighbors of bent lines are at most this share of the radio's reach apart: less than elsewhere, because the outermost
 are the fastest and have the farthest way, and so that a line from which two are lost holds together."""
 _BEYOND_M: Final = 120.0
-"""Lines begin so far beyond the swarm, whose outer rows have the time to fly there, and look on the way."""
+"""Lines begin at most this far beyond the outer rows of a swarm, which have time to fly there before the sweep, and
+search on the way.
+"""
 _AROUND: Final = 2.2
-"""Lines that begin around the swarm do so at this share of the radio's reach from the middle at most: whoever is nearer
-and was not found on the way out is found on the way back only."""
+"""Lines that begin around the swarm do so at this many times the radio's reach from the middle at most: whoever is
+nearer and was not found on the way out is found on the way back only."""
 _WIDER: Final = 1.3
 """Lines that begin around the swarm are this much wider than it at first, if neighbors stay in reach."""
 _STEPS: Final = 8
@@ -153,7 +155,6 @@ class Lines(Shape):
     def at(self, place: float, swept_s: float) -> Enu:
         formation = self._formation
         lanes = formation.lanes
-        begins_m = formation.first_m if swept_s <= self.sweep_s else min(FIRST_M, formation.first_m)
         if place <= formation.teams * lanes - 1:
             line, lane = divmod(place, lanes)
             inner_m = self._inner_m(swept_s, lane)
@@ -167,6 +168,7 @@ class Lines(Shape):
             if chain != self._half - 1:
                 ends = self._north_m(chain, inner_m), self._north_m(chain + 1, inner_m)
                 return Enu(middle, (sum(ends) + share * (ends[0] - ends[1])) / 2, up_m)
+            begins_m = self._begins_m(swept_s)
             folded = max(0.0, 1 - (inner_m - begins_m) / _STRAIGHT_M)
             east = -_BUNCHED_M * share * folded
             if begins_m > FIRST_M:
@@ -175,7 +177,7 @@ class Lines(Shape):
         line, share = formation.follower(round(place))
         outward_m, lane = self._outward_m[line], share * (lanes - 1)
         behind_m = FOLLOW_M if not outward_m else min(FOLLOW_M, self._apart_m / 2)
-        least_m = min(begins_m, self._starts_m(self._straight(lane))) / 2
+        least_m = min(self._begins_m(swept_s), self._starts_m(self._straight(lane))) / 2
         behind = max(self._inner_m(swept_s, lane) + outward_m - behind_m, least_m)
         east = self._half_width_m(line, swept_s) * (2 * share - 1)
         return Enu(east, behind if line < self._half else -behind, formation.height_m + FOLLOWER_HIGHER_M)
@@ -226,8 +228,7 @@ class Lines(Shape):
             min(formation.half_width_m, max(1, count - 1) * hop_m / 2) for count in left[: formation.teams]
         )
         joints = tuple(row.nearest(row.first + row.size // 2, vacant)[1] - row.first for row in lines)
-        middle = (formation.lanes - 1) / 2
-        joined_m = [wide_m * (lane / middle - 1) for wide_m, lane in zip(widest_m, joints, strict=True)]
+        joined_m = [wide_m * self._aside(lane) for wide_m, lane in zip(widest_m, joints, strict=True)]
         aside_m = [a - b for a, b in itertools.pairwise(joined_m)]
         spans_m = [
             math.sqrt(max(0.0, ((count + 1) * hop_m) ** 2 - off_m**2))
@@ -291,7 +292,7 @@ class Lines(Shape):
     def _pace(self, lane: float, straight: float) -> tuple[float, float, float]:
         """How long a lane of bent lines waits, and its speeds away from the middle: while it goes aside, and then."""
         fast_m_s = self._formation.speed_m_s * (BACK + straight * (1 - BACK))
-        aside_m_s = self._fastest_m_s * abs(2 * lane / (self._formation.lanes - 1) - 1)
+        aside_m_s = self._fastest_m_s * abs(self._aside(lane))
         slow_m_s = min(fast_m_s, math.sqrt(self._fastest_m_s**2 - aside_m_s**2))
         return (1 - straight) * self._aside_s, slow_m_s, fast_m_s
 
@@ -301,6 +302,10 @@ class Lines(Shape):
         waits_s, slow_m_s, fast_m_s = self._pace(lane, straight)
         slow_m = (self._aside_s - waits_s) * slow_m_s
         return self._aside_s + (self._formation.last_m - self._starts_m(straight) - slow_m) / fast_m_s
+
+    def _begins_m(self, swept_s: float) -> float:
+        """How far from the middle the innermost lines begin the first sweep, or a later one."""
+        return (self._formation if swept_s <= self.sweep_s else self._back).first_m
 
     def _starts_m(self, straight: float) -> float:
         """How far from the middle a lane begins, by how straight the line is there (`_straight`)."""
@@ -325,7 +330,11 @@ class Lines(Shape):
         return min(self._widest_m[line], self._formation.half_width_m - left * narrower_m)
 
     def _lane(self, line: int, lane: float, swept_s: float) -> float:
-        return self._half_width_m(line, swept_s) * (2 * lane / (self._formation.lanes - 1) - 1)
+        return self._half_width_m(line, swept_s) * self._aside(lane)
+
+    def _aside(self, lane: float) -> float:
+        """Where along its line a lane is: -1 at the western end, 1 at the eastern one."""
+        return 2 * lane / (self._formation.lanes - 1) - 1
 
 
 def _is_bent(formation: Dimensions) -> bool:

@@ -54,7 +54,7 @@ def in_virtual_time(path: Path) -> Got:
     result = fanet_mw.simulate(path, applications=lambda node: [Correspondent(node, COUNT)])
     reports = [result.reports[f"agent-{node}"]["applications"]["letters"] for node in range(1, COUNT + 1)]
     assert {fate for report in reports for fate in report["fates"]} == {"acknowledged"}
-    got = [item for report in reports for item in report["got"]]
+    got = [tuple(item) for report in reports for item in report["got"]]
     assert len(got) == len(set(got)) == 3 * COUNT * (COUNT - 1) * 2, "each to each, and all to all"
     return set(got)
 

@@ -421,15 +421,23 @@ async def test_a_child_that_cannot_be_started_again_is_lost_and_said_to_be_and_t
         services = Services(scenario, SwarmAddress("test", endpoint))
         run = SwarmRun(services, bus, respawn=True, tell=said.append)
         run._clock = SwarmClock(ClockEpoch(time.time_ns(), 1.0, ClockState.RUNNING))
-        for name in ("agent-1", "agent-2"):
+        for name in ("agent-1", "agent-2", "agent-3"):
             run.processes.start(name, sleeper, {"seconds": 300})
             folder = Path(f"/proc/{run.processes.pid(name)}")
             assert eventually(lambda folder=folder: folder.joinpath("comm").read_text().startswith("agent-"))
         (tmp_path / "here").rmdir()
+        run._stopped.add("agent-3")
+        os.kill(run.processes.pid("agent-3"), signal.SIGKILL)
+        while not said:  # noqa: ASYNC110  (the process ends in real time)
+            await asyncio.sleep(0.01)
+        run._start_again("agent-3")
+        assert "agent-3 is stopped at" in said.pop(0)
+        assert said.pop(0).startswith("agent-3 cannot be started: ")
         os.kill(run.processes.pid("agent-2"), signal.SIGKILL)
         while len(said) < 2:  # noqa: ASYNC110  (the process ends in real time)
             await asyncio.sleep(0.01)
         assert run.processes.names() == ["agent-1"]
+        assert [name for name, _ in run._deaths.ended] == ["agent-3", "agent-2"], "each is lost once"
         await run.processes.end_all()
     assert said[1] == (
         "agent-2 cannot be started: the working folder has been deleted, and the swarm's processes start in it; "

@@ -1,5 +1,8 @@
 """What is given for a real radio: an epoch that is past or in another unit would be a flight that never begins."""
 
+import socket
+from contextlib import nullcontext
+
 import pytest
 
 from agents.__main__ import Radio, start
@@ -22,6 +25,20 @@ async def test_an_epoch_whose_swarm_is_over_or_would_never_begin_is_refused(epoc
     (uav,) = (actor for actor in actors_of(SCENARIO, "field") if isinstance(actor, Uav))
     on_air = OnAir("127.0.0.1", "127.255.255.255", epoch_unix_s=float(given))
     with pytest.raises(ConfigError, match=r"^epoch .*: by this machine's clock it is .* duration_s = 14 before"):
+        async with on_air.opened(uav, SCENARIO, NodeId(1)):
+            pass
+
+
+@pytest.mark.parametrize(("ahead_s", "refused"), [(-13, False), (-15, True), (29 * 86400, False), (31 * 86400, True)])
+async def test_who_comes_late_takes_part_while_the_swarm_lasts_and_a_month_ahead_is_refused(
+    ahead_s: int, refused: bool
+) -> None:
+    (uav,) = (actor for actor in actors_of(SCENARIO, "field") if isinstance(actor, Uav))
+    with socket.socket(type=socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    on_air = OnAir("127.0.0.1", "127.255.255.255", port, epoch_unix_s=THIS_MACHINE.unix_ns() / S + ahead_s)
+    with pytest.raises(ConfigError) if refused else nullcontext():
         async with on_air.opened(uav, SCENARIO, NodeId(1)):
             pass
 

@@ -306,6 +306,15 @@ def test_a_capture_that_somebody_removes_meanwhile_ends_there_and_says_so(
     assert capsys.readouterr().err == f"{path}: the capture ends here: No such file or directory\n"
 
 
+def test_a_capture_by_a_relative_path_goes_on_when_a_part_changes_the_working_folder(
+    make_scenario: MakeScenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with PcapFile(Path("air.pcap"), make_scenario().radio) as file:
+        monkeypatch.chdir("/")
+        assert file.pcap.failure() is None
+
+
 def test_what_was_captured_a_second_ago_can_be_read_while_the_run_goes_on(
     tmp_path: Path, make_scenario: MakeScenario
 ) -> None:

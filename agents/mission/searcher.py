@@ -6,7 +6,7 @@
     too few reporters   -> the auction sends a UAV that has not reported, for another bearing   tasking
     nobody seen, ears   -> a UAV with microphones goes down to listen                           tasking.voice_descent
     seen at close range -> confirmed, announced; responders return to their lanes               finding.announcing
-    contradicted later  -> refuted, announced; reported and bid for as before the confirmation  finding.sightings
+    contradicted later  -> refuted, announced; reported and bid for as before the confirmation  finding.refutation
 
 All that a UAV knows it has sensed itself or received over the air. At each position fix it chooses a velocity (flight).
 """
@@ -207,7 +207,7 @@ class Searcher:
             self._give_up(now_ns)
         self._note_looks(now_ns)
         self._reception.review(now_ns)
-        for survivor in self._sightings.contradicted():
+        for survivor in self._sightings.refuted():
             self._announcing.keep_person(survivor, now_ns, steady_m2=self._sightings.steady_m2)
             self._announcing.refute(survivor, now_ns)
             self._bidding.reopen(survivor)

@@ -8,9 +8,10 @@ from agents.mission.finding.camera_view import CameraView
 from agents.mission.finding.confirmation import CLOSE_M
 from agents.mission.finding.height_error import HeightError
 from agents.mission.finding.identities import Identities, Sighting
-from agents.mission.finding.known_survivors import KnownSurvivor, KnownSurvivors
+from agents.mission.finding.known_survivors import KnownSurvivors
 from agents.mission.finding.person_track import PersonTrack
 from agents.mission.finding.phone_localization import Estimate
+from agents.mission.finding.refutation import Refutation
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
 from fanet_mw.bus.messages import Call, Person
@@ -35,46 +36,6 @@ _SETTLED_NS: Final = S // 5
 """An image that has not come after this time has shown nobody."""
 
 
-_FRESH: Final = 4
-"""A confirmation is judged each time that this number of further powers of the phone has been received."""
-_SAMPLES: Final = 12
-"""A confirmation is not refuted by fewer powers of the phone than this."""
-_SURE_M: Final = 45.0
-"""A confirmation is not refuted while the phone's place, by powers alone, has a greater standard deviation."""
-_MARGIN: Final = 6.0
-"""The least difference of costs (`Identities.against`) that refutes: the confirmed pair is then 20 times less likely.
-Of 577 simulated pairs of people 35 to 100 m apart who were confirmed rightly, none came to more than 1."""
-
-
-class Contradictions:
-    """Finds confirmations that later powers contradict: another assignment of phones to people is far likelier."""
-
-    def __init__(self, survivors: KnownSurvivors, identities: Identities) -> None:
-        self._survivors, self._identities = survivors, identities
-        self._judged: dict[int, int] = {}
-        """For each confirmed survivor, the number of received powers when the confirmation was last judged."""
-
-    def review(self) -> list[int]:
-        """The survivors whose confirmations are contradicted, in order of id."""
-        return [
-            survivor
-            for survivor, known in sorted(self._survivors.by_id.items())
-            if self._is_contradicted(survivor, known)
-        ]
-
-    def _is_contradicted(self, survivor: int, known: KnownSurvivor) -> bool:
-        if known.confirmed is None:
-            self._judged.pop(survivor, None)
-            return False
-        received = known.filter.received_powers
-        if received - self._judged.setdefault(survivor, received) < _FRESH:
-            return False
-        self._judged[survivor] = received
-        margin = self._identities.against(known.confirmed)  # this also makes the filter include all pending powers
-        sure = known.is_heard_within(_SURE_M) and known.filter.included_powers >= _SAMPLES
-        return sure and margin >= _MARGIN
-
-
 class Sightings:
     """Turns what camera and microphones detect into positions of people, which `Identities` matches with phones."""
 
@@ -89,7 +50,7 @@ class Sightings:
         )
         self.steady_m2 = 1.0 + bias_m * bias_m
         """The variance of the part of the error of positions that lasts, along each axis."""
-        self._contradictions = Contradictions(survivors, self._identities)
+        self._refutation = Refutation(survivors, self._identities)
         self._own_motion, self._outbox = own_motion, outbox
         self._voice_rad = math.radians(scenario.sensors.voice_sigma_deg)
         self._view = CameraView(scenario)
@@ -126,9 +87,9 @@ class Sightings:
         """The places of the people who are certainly there and of whom there is no find."""
         return self._identities.unreported(now_ns)
 
-    def contradicted(self) -> list[int]:
-        """The survivors whose confirmation is contradicted by powers and sightings that came after it."""
-        return self._contradictions.review()
+    def refuted(self) -> list[int]:
+        """The survivors whose confirmation is refuted by powers and sightings that came after it."""
+        return self._refutation.review()
 
     def _empty_images(self, now_ns: int) -> None:
         """Take in the images up to now that have shown nobody, of which nothing was told."""

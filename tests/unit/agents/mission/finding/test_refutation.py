@@ -9,12 +9,12 @@ from seeing_uav import UP_M, Uav, mean_dbm
 from agents.mission.finding.identities import Identities
 from agents.mission.finding.known_survivors import KnownSurvivor, KnownSurvivors
 from agents.mission.finding.phone_localization import Estimate, PhoneFilter
-from agents.mission.finding.sightings import Contradictions
+from agents.mission.finding.refutation import Refutation
 from fanet_mw.units import US, Enu, S
 from fanet_mw.wire.survivors import Found, Standing
 
 
-def mistaken() -> tuple[Uav, Contradictions]:
+def mistaken() -> tuple[Uav, Refutation]:
     """One UAV that was told that survivor 1 lies where in truth survivor 2 lies; survivor 1 lies 57 m to the east."""
     uav = Uav()
     for survivor in (1, 2):
@@ -23,7 +23,7 @@ def mistaken() -> tuple[Uav, Contradictions]:
                 survivor, node, Enu(east, 200, UP_M), mean_dbm(Enu(57.0 * (survivor == 1), 0, 0), Enu(east, 200, UP_M))
             )
     uav.survivors.on_found(Found(S // US, 1, 0.0, 0.0, 4.0, 0.0, 4.0, 9, Standing.CONFIRMED), now_ns=S)
-    return uav, Contradictions(uav.survivors, uav.identities)
+    return uav, Refutation(uav.survivors, uav.identities)
 
 
 def pass_by(uav: Uav, survivors: Iterable[int], *, second: int, sees: Iterable[Enu] = ()) -> None:
@@ -42,12 +42,12 @@ def pass_by(uav: Uav, survivors: Iterable[int], *, second: int, sees: Iterable[E
 
 
 def test_a_confirmation_is_contradicted_by_what_is_heard_and_seen_later() -> None:
-    uav, contradictions = mistaken()
-    assert contradictions.review() == [], "what was heard before it does not tell"
+    uav, refutation = mistaken()
+    assert refutation.review() == [], "what was heard before it does not tell"
     refuted = []
     for second in (10, 20, 30):
         pass_by(uav, (1, 2), second=second, sees=(Enu(0, 0, 0), Enu(57, 0, 0)))
-        for survivor in contradictions.review():
+        for survivor in refutation.review():
             found = uav.survivors.by_id[survivor].confirmed
             assert found is not None
             uav.survivors.on_found(found._replace(t_us=second * S // US, standing=Standing.REFUTED), now_ns=second * S)
@@ -59,17 +59,17 @@ def test_a_confirmation_is_contradicted_by_what_is_heard_and_seen_later() -> Non
 
 
 def test_a_right_confirmation_is_not_contradicted() -> None:
-    uav, contradictions = mistaken()
+    uav, refutation = mistaken()
     uav.survivors.by_id[1].confirmed = None
-    contradictions.review()
+    refutation.review()
     uav.survivors.on_found(Found(2 * S // US, 1, 57.0, 0.0, 4.0, 0.0, 4.0, 9, Standing.CONFIRMED), now_ns=S)
-    contradictions.review()
+    refutation.review()
     pass_by(uav, (1, 2), second=10, sees=(Enu(0, 0, 0), Enu(57, 0, 0)))
-    assert contradictions.review() == []
+    assert refutation.review() == []
 
 
 def test_a_right_confirmation_that_was_taken_back_holds_in_the_end_though_another_place_was_named_meanwhile() -> None:
-    uav, contradictions = mistaken()
+    uav, refutation = mistaken()
     right, elsewhere = Enu(57, 0, 0), Enu(0, 245, 0)
     uav.survivors.by_id[1].confirmed = None
     confirmed = Found(2 * S // US, 1, right.east, right.north, 4.0, 0.0, 4.0, 9, Standing.CONFIRMED)
@@ -77,10 +77,10 @@ def test_a_right_confirmation_that_was_taken_back_holds_in_the_end_though_anothe
     uav.survivors.on_found(confirmed._replace(t_us=19 * S // US, standing=Standing.REFUTED), now_ns=19 * S)
     wrong = confirmed._replace(t_us=20 * S // US, east_m=elsewhere.east, north_m=elsewhere.north)
     uav.survivors.on_found(wrong, now_ns=20 * S)
-    contradictions.review()
+    refutation.review()
     for second in range(24, 84, 10):
         pass_by(uav, (1, 2), second=second, sees=(Enu(0, 0, 0), right))
-        for survivor in contradictions.review():
+        for survivor in refutation.review():
             found = uav.survivors.by_id[survivor].confirmed
             assert found is not None
             uav.survivors.on_found(found._replace(t_us=second * S // US, standing=Standing.REFUTED), now_ns=second * S)
@@ -97,13 +97,13 @@ def judged(
     place = Estimate(0.0, 0.0, sigma_m**2, 0.0, 1.0)
     powers = SimpleNamespace(received_powers=0, included_powers=included, estimate_by_power=lambda: place)
     known = KnownSurvivor(cast("PhoneFilter", powers), confirmed=found)
-    contradictions = Contradictions(
+    refutation = Refutation(
         cast("KnownSurvivors", SimpleNamespace(by_id={1: known})),
         cast("Identities", SimpleNamespace(against=lambda _: margin)),
     )
     verdicts = []
     for powers.received_powers in received:
-        verdicts.append(contradictions.review() == [1])
+        verdicts.append(refutation.review() == [1])
     return verdicts
 
 
@@ -124,12 +124,12 @@ def test_a_survivor_who_is_confirmed_again_is_judged_by_what_is_received_from_th
     place = Estimate(0.0, 0.0, 1.0, 0.0, 1.0)
     powers = SimpleNamespace(received_powers=10, included_powers=20, estimate_by_power=lambda: place)
     by_id = {number: KnownSurvivor(cast("PhoneFilter", powers), confirmed=found) for number in (9, 1)}
-    contradictions = Contradictions(
+    refutation = Refutation(
         cast("KnownSurvivors", SimpleNamespace(by_id=by_id)), cast("Identities", SimpleNamespace(against=lambda _: 9.0))
     )
     verdicts = []
     for powers.received_powers, by_id[1].confirmed in ((10, found), (12, None), (13, found), (16, found), (17, found)):
-        verdicts.append(contradictions.review())
+        verdicts.append(refutation.review())
     assert verdicts == [[], [], [], [9], [1]]
     powers.received_powers = 30
-    assert contradictions.review() == [1, 9], "in order of id"
+    assert refutation.review() == [1, 9], "in order of id"

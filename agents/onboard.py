@@ -22,9 +22,9 @@ from fanet_mw.actor import require_instant
 from fanet_mw.application import Application, Course, Destination, Received
 from fanet_mw.bus.messages import Gps, SensorReading
 from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
-from fanet_mw.extensions import report_of
 from fanet_mw.node.node import Node
 from fanet_mw.node.packet import Packet
+from fanet_mw.part_failure import report_of
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record

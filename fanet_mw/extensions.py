@@ -14,25 +14,21 @@ import difflib
 import hashlib
 import inspect
 import json
-import math
-import os
 import sys
-import threading
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from functools import lru_cache
 from importlib import import_module
 from importlib.machinery import EXTENSION_SUFFIXES, SOURCE_SUFFIXES
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final, NoReturn
+from typing import Any, Final
 
 from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationError, ValidationInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import core_schema
 
-from fanet_mw.errors import HostError
+from fanet_mw.part_failure import OURS, exits_raised
 
 GROUPS: Final[Mapping[str, str]] = {
     "routing.protocol": "fanet_mw.routing",
@@ -42,19 +38,6 @@ GROUPS: Final[Mapping[str, str]] = {
     "applications.use": "fanet_mw.applications",
 }
 """The keys of a scenario that may name a part of another package, and the group of entry points for each."""
-_OURS: Final = ("fanet_mw", "agents", "emulator", "sim")
-_DEEPEST: Final = 10
-"""The depth of a report, which may be read wherever it is told; one that holds itself has none."""
-_TOLD: Final[Mapping[str, tuple[type, ...]]] = {
-    **dict.fromkeys(
-        ("kind", "node", "generated", "bus_malformed", "heard_late", "messages", "applications", "frames_sent",
-         "receptions", "dropped", "final", "host", "clock", "slots", "turns", "head", "cluster"), ()
-    ),
-    **dict.fromkeys(("missed_turns", "waiting", "leader", "term", "epoch"), (int,)),
-    "bound_ms": (int, float, type(None)),
-    **dict.fromkeys(("state", "role"), (str,)),
-}  # fmt: skip
-"""What results and views read of a node's report: what a protocol must not tell at all, or as values of which types."""
 _SUFFIXES: Final = frozenset(Path(f"_{suffix}").suffix for suffix in (*SOURCE_SUFFIXES, *EXTENSION_SUFFIXES))
 _INSTALLED: Final = ("site-packages", "dist-packages")
 """Folders of packages that were installed: of this environment, of another on its path, of the user, of Debian."""
@@ -109,7 +92,7 @@ def digest(module: str) -> str:
 
 def _sources(module: str) -> Iterator[tuple[str, Path]]:
     """Name and file of each source, without those of Python, of this project, and of packages that were installed."""
-    waiting, known = [module], {module, *_OURS, *sys.stdlib_module_names}
+    waiting, known = [module], {module, *OURS, *sys.stdlib_module_names}
     while waiting:
         for name, path in _files(waiting.pop()):
             yield name, path
@@ -146,29 +129,6 @@ def _imported(path: Path) -> set[str]:
     names = [alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names]
     froms = [node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and not node.level]
     return {name.partition(".")[0] for name in (*names, *froms)} - {""}
-
-
-@contextmanager
-def exits_raised() -> Iterator[None]:
-    """Raise HostError where this thread calls `os._exit`, which ends a process without a word, perhaps with 0; another
-    thread ends it with a word and not with 0. A process that was forked meanwhile ends by it as always.
-    """
-    leave, process, thread = os._exit, os.getpid(), threading.get_ident()
-
-    def say(status: int) -> NoReturn:
-        if os.getpid() != process:
-            leave(status)
-        said = f"a part of another package has called os._exit({status!r})"
-        if threading.get_ident() == thread:
-            raise HostError(said)
-        os.write(2, f"fanet: {said}\n".encode())
-        leave(status or 1)
-
-    os._exit = say
-    try:
-        yield
-    finally:
-        os._exit = leave
 
 
 @lru_cache(maxsize=64)
@@ -218,51 +178,6 @@ def _methods(key: str) -> str:
 
 def _imports(info: ValidationInfo) -> bool:
     return info.context is None or info.context.get("imports", True) is True
-
-
-def report_of(part: Any) -> dict[str, Any]:  # noqa: ANN401  (an application or a protocol)
-    """The counters of a part. Those of another package are told in values of JSON, numbers that are none and whatever
-    else as text, so that no run is lost for its last report.
-    """
-    if type(part).__module__.partition(".")[0] in _OURS:
-        return dict(part.report())
-    try:
-        told = _plain(part.report(), _DEEPEST)
-    except Exception as error:  # noqa: BLE001  (whatever the code of another package raises)
-        told = {"report_failed": f"{type(error).__name__}: {error}"}
-    return told if isinstance(told, dict) else {} if told is None else {"report": told}
-
-
-def protocol_report_of(protocol: Any) -> dict[str, Any]:  # noqa: ANN401
-    """The counters of a protocol. What one of another package calls as results call something else is renamed."""
-    told = report_of(protocol)
-    if type(protocol).__module__.partition(".")[0] in _OURS:
-        return told
-    return {key if _may_tell(key, value) else f"protocol.{key}": value for key, value in told.items()}
-
-
-def _may_tell(key: str, value: object) -> bool:
-    if key not in _TOLD:
-        return True
-    return isinstance(value, _TOLD[key]) and (not isinstance(value, int | float) or value >= 0)
-
-
-def _plain(value: Any, depth: int) -> Any:  # noqa: ANN401
-    if depth < 0:
-        raise ValueError(f"deeper than {_DEEPEST}")
-    if isinstance(value, Mapping):
-        return {str(key): _plain(held, depth - 1) for key, held in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(held, depth - 1) for held in value]
-    if isinstance(value, set | frozenset):
-        return sorted((_plain(held, depth - 1) for held in value), key=str)
-    if hasattr(value, "tolist"):  # of numpy
-        return _plain(value.tolist(), depth - 1)
-    if isinstance(value, float):
-        return value if math.isfinite(value) else str(value)
-    if isinstance(value, int):
-        return value if -(2**63) <= value < 2**63 else str(value)
-    return value if value is None or isinstance(value, str) else str(value)
 
 
 class PartName:

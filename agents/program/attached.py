@@ -20,9 +20,8 @@ from fanet_mw.application import Application
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError, ConfigError
 from fanet_mw.hosts.bus import Bus, HostBus, config_of
-from fanet_mw.hosts.clock import START_PATIENCE_S
+from fanet_mw.hosts.clock import START_PATIENCE_S, given_epoch_ns
 from fanet_mw.hosts.realtime import RealtimeHost
-from fanet_mw.hosts.timebase import THIS_MACHINE
 from fanet_mw.radios.field_bus import FieldBus, joined
 from fanet_mw.radios.udp import MAX_PORT, PORT, UdpRadio
 from fanet_mw.scenario import Scenario
@@ -34,20 +33,7 @@ _PATIENCE_S: Final = 10.0
 """Longer than a person at a terminal would wait; on a busy machine a handshake may take seconds."""
 _LEAVING_S: Final = 5.0
 """A program that leaves waits no longer for what its node has yet to send; a flooding period of the paper."""
-_MOST_AHEAD_S: Final = 30 * 86400.0
-"""The farthest that an epoch may lie ahead; one beyond it was probably given in another unit."""
 _ORIGIN: Final = Enu(0.0, 0.0, 0.0)
-
-
-def _epoch_ns(epoch_unix_s: float, scenario: Scenario) -> int:
-    """The epoch in ns; raises ConfigError if the swarm's time is over, or begins too far ahead."""
-    now_s = THIS_MACHINE.unix_ns() / S
-    if not -scenario.duration_s < epoch_unix_s - now_s < _MOST_AHEAD_S:
-        raise ConfigError(
-            f"epoch {epoch_unix_s:.15g}: by this machine's clock it is {now_s:.0f} now; the swarm's time must begin at "
-            f"most {_MOST_AHEAD_S / 86400:g} days after that, and less than duration_s = {scenario.duration_s:g} before"
-        )
-    return round(epoch_unix_s * S)
 
 
 class NodeClosedError(BusError):
@@ -216,7 +202,7 @@ class OnAir:
         if not 1 <= self.port <= MAX_PORT:
             raise ConfigError(f"the UDP port of a real radio = {self.port}: must be in [1, {MAX_PORT}]")
         names = Topics(self.swarm or scenario.name)
-        epoch_unix_ns = None if self.epoch_unix_s is None else _epoch_ns(self.epoch_unix_s, scenario)
+        epoch_unix_ns = None if self.epoch_unix_s is None else given_epoch_ns(self.epoch_unix_s, scenario)
         with joined(self.endpoint, config_of(self.zenoh_config, uav.name)) as inner:
             bus = FieldBus(names, node, inner=inner, epoch_unix_ns=epoch_unix_ns)
             host = RealtimeHost(uav, through(bus), names)

@@ -16,7 +16,7 @@ from typing import Final
 from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import ClockEpoch, ClockState
 from fanet_mw.bus.topics import Topics
-from fanet_mw.errors import BusError, MalformedFrameError
+from fanet_mw.errors import BusError, ConfigError, MalformedFrameError
 from fanet_mw.hosts.bus import Bus, HostBus
 from fanet_mw.hosts.presence import Presence
 from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
@@ -33,6 +33,19 @@ _FAR_S: Final = 1.5
 """Two clocks that differ by this much do so not because a process or the bus stood still."""
 START_PATIENCE_S: Final = 3600.0
 """How long a service started by hand waits for the others; it notices within seconds if the router goes away."""
+_MOST_AHEAD_S: Final = 30 * 86400.0
+"""The farthest that an epoch may lie ahead; one beyond it was probably given in another unit."""
+
+
+def given_epoch_ns(epoch_unix_s: float, scenario: Scenario) -> int:
+    """The epoch of a swarm without a keeper in ns; raises ConfigError if its time is over, or begins too far ahead."""
+    now_s = THIS_MACHINE.unix_ns() / S
+    if not -scenario.duration_s < epoch_unix_s - now_s < _MOST_AHEAD_S:
+        raise ConfigError(
+            f"epoch {epoch_unix_s:.15g}: by this machine's clock it is {now_s:.0f} now; the swarm's time must begin at "
+            f"most {_MOST_AHEAD_S / 86400:g} days after that, and less than duration_s = {scenario.duration_s:g} before"
+        )
+    return round(epoch_unix_s * S)
 
 
 class SwarmClock:

@@ -18,11 +18,12 @@ from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import MavlinkTap, Message, Poses
 from fanet_mw.bus.topics import Topics, node_of_tap
 from fanet_mw.errors import HostError
-from fanet_mw.extensions import exits_raised
 from fanet_mw.hosts import interrupts
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.node.reader import Reader
+from fanet_mw.part_failure import exits_raised, said_of
 from fanet_mw.scenario import Scenario
+from fanet_mw.scenario.fingerprint import modules_of
 from fanet_mw.trace import Record
 from fanet_mw.units import MS, NodeId, S
 from sim.observation.observer import Observer
@@ -32,7 +33,6 @@ from sim.results.links import LinkTotals
 from sim.results.outcome import Outcome
 from sim.run.collecting.taps import TapLog
 from sim.run.garbage import GARBAGE
-from sim.run.part_failure import said_of
 from sim.run.stoppable_uav import StoppableUav
 from sim.world.environment.layout import positions
 from sim.world.environment.map_on_board import map_on_board
@@ -107,7 +107,7 @@ def simulate(
         except Exception as error:
             if on_failure is None or not observed.host.now_ns or not observed.host.failed:
                 raise
-            failure = said_of(error, scenario, observed.host.failed, now_ns=observed.host.now_ns)
+            failure = said_of(error, modules_of(scenario), observed.host.failed, now_ns=observed.host.now_ns)
             on_failure(error, failure)
             observed.host.stop_after_failure()
     interrupted = f"interrupted by {Signals(signals[0]).name}" if signals else ""

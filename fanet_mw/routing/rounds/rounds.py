@@ -174,7 +174,7 @@ class RoundFlooding(RoutingProtocol):
         self._hold(packet, now_ns)
         if self._in_turns(packet):
             self._state_bound(packet, now_ns)
-            self._take(packet, src=None, now_ns=now_ns)
+            self._queue(packet, src=None, now_ns=now_ns)
             return
         if packet.header.destination == BROADCAST:
             if not self._admission.admit(self._port.node, now_ns=now_ns):
@@ -210,12 +210,12 @@ class RoundFlooding(RoutingProtocol):
         if is_used_up(header):
             self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
         elif self._in_turns(packet):
-            self._take(packet, src=src, now_ns=now_ns)
+            self._queue(packet, src=src, now_ns=now_ns)
         elif not header.flags & FLAG_FLOOD:
             self._send_bulk(packet, from_ns=now_ns + self._lead_ns, now_ns=now_ns)
         else:
             self._tell_held(key_of(header.origin, header.seq), now_ns)
-            self._take_bulk(packet, src=src, from_ns=now_ns + self._lead_ns, now_ns=now_ns)
+            self._queue_bulk(packet, src=src, from_ns=now_ns + self._lead_ns, now_ns=now_ns)
 
     def on_copy(self, key: int, src: NodeId, *, now_ns: int) -> None:
         spreading = self._spreading
@@ -292,10 +292,10 @@ class RoundFlooding(RoutingProtocol):
 
     # --- turns ----------------------------------------------------------------------------------------------------
 
-    def _take(self, packet: Packet, *, src: int | None, now_ns: int, once: bool = False) -> None:
+    def _queue(self, packet: Packet, *, src: int | None, now_ns: int, once: bool = False) -> None:
         """A packet is to go in the node's next turn."""
         self._law.count(len(packet.frame), priority=packet.header.priority, now_ns=now_ns)
-        evicted = self._spreading.take(packet, src=src, now_ns=now_ns, once=once)
+        evicted = self._spreading.push(packet, src=src, now_ns=now_ns, once=once)
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
         self._reach_turn(now_ns)
@@ -325,7 +325,7 @@ class RoundFlooding(RoutingProtocol):
             self._turn_ns = self._timing.turn_start_ns(self._port.node, from_ns=now_ns + self._lead_ns)
         self._turn_asked = True
 
-    def _fill(self, turn_ns: int, now_ns: int) -> None:
+    def _use_turn(self, turn_ns: int, now_ns: int) -> None:
         """Announce the frame of a turn: urgent packets, what neighbors are told, then the hello, as they fit."""
         room, together = self._timing.turn_bytes, list[Packet]()
         hello = self._hello
@@ -414,13 +414,13 @@ class RoundFlooding(RoutingProtocol):
             packet, near=self._neighbors(now_ns), from_ns=from_ns, now_ns=now_ns, tried=tried
         ):
             return
-        self._take_bulk(packet, src=None, from_ns=from_ns, now_ns=now_ns)
+        self._queue_bulk(packet, src=None, from_ns=from_ns, now_ns=now_ns)
 
-    def _take_bulk(self, packet: Packet, *, src: int | None, from_ns: int, now_ns: int) -> None:
+    def _queue_bulk(self, packet: Packet, *, src: int | None, from_ns: int, now_ns: int) -> None:
         spare = src is not None and not self._topology.dominates()
         if spare:
             from_ns += _SPARE_HOPS * self._law.hop_ns
-        evicted = self._spreading.take(packet, src=src, now_ns=now_ns, bulk_from_ns=from_ns, spare=spare)
+        evicted = self._spreading.push(packet, src=src, now_ns=now_ns, bulk_from_ns=from_ns, spare=spare)
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
         self._reach_slot(from_ns, now_ns)
@@ -586,7 +586,7 @@ class RoundFlooding(RoutingProtocol):
         if turn_ns - self._lead_ns > now_ns:
             return
         if turn_ns + self._timing.turn_ns // 2 >= now_ns:
-            self._fill(turn_ns, now_ns)
+            self._use_turn(turn_ns, now_ns)
         waits = self._spreading.urgent or self._hello is not None or self._held or self._topology.news
         self._turn_asked = bool(waits)
         self._turn_ns = self._timing.turn_start_ns(self._port.node, from_ns=max(turn_ns + 1, now_ns + self._lead_ns))
@@ -601,9 +601,9 @@ class RoundFlooding(RoutingProtocol):
             if key_of_packet(packet) in self._spreading:
                 continue
             if self._in_turns(packet):
-                self._take(packet, src=None, now_ns=now_ns, once=True)
+                self._queue(packet, src=None, now_ns=now_ns, once=True)
             else:
-                self._take_bulk(packet, src=None, from_ns=due_ns + self._lead_ns, now_ns=now_ns)
+                self._queue_bulk(packet, src=None, from_ns=due_ns + self._lead_ns, now_ns=now_ns)
 
     # --- what is known --------------------------------------------------------------------------------------------
 

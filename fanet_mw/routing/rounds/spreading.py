@@ -154,7 +154,7 @@ class Spreading:
 
     # --- what is heard --------------------------------------------------------------------------------------------
 
-    def take(
+    def push(
         self,
         packet: Packet,
         *,

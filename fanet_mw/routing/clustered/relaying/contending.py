@@ -17,7 +17,7 @@ _NOTHING: Final[Mapping[str, object]] = {}
 
 
 class ContendingRelaying:
-    """The relays of one node, which go as soon as they may contend."""
+    """The relays of one node (`contract.Relaying`), which go as soon as they may contend."""
 
     def __init__(self, port: Port, rule: Rule, contention: ContentionTiming) -> None:
         self._port = port

@@ -20,7 +20,7 @@ _NOTHING: Final[Mapping[str, object]] = {}
 
 
 class SlotAccess:
-    """The queue for the slot of this node's cluster while it is head; its route to a head while it is not."""
+    """The slot of one node (`contract.ScheduledAccess`) while it is head; its route to a head while it is not."""
 
     def __init__(
         self, port: Port, release: SlotRelease, *, membership: Membership, uplink: Uplink, floods: Floods

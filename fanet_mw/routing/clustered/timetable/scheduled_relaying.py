@@ -29,7 +29,7 @@ _MOST_LATE_TURNS: Final = 8
 
 
 class ScheduledRelaying:
-    """The relays of one node, in the turns of its timetables."""
+    """The relays of one node (`contract.Relaying`), in the turns of its timetables."""
 
     def __init__(
         self,

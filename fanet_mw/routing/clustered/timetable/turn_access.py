@@ -36,7 +36,7 @@ _SHOWN: Final = 1.5
 
 
 class TurnAccess:
-    """The turns of one node; the slots of heads while it has no turns."""
+    """The turns of one node (`contract.ScheduledAccess`); the slots of heads while it has no turns."""
 
     def __init__(
         self,
@@ -134,7 +134,7 @@ class TurnAccess:
         self._slots.arm(now_ns)
         for packet in self._slots.drain_uplink():
             if self._roots.has_turn(now_ns=now_ns):
-                self._let_out(packet, now_ns=now_ns)
+                self._enqueue(packet, now_ns=now_ns)
             else:  # the schedule has made this node a head, and its timetable has yet to come
                 self._slots.enqueue(packet, now_ns=now_ns)
 
@@ -150,7 +150,7 @@ class TurnAccess:
             return now_ns > self._shown_ns + _SHOWN * max(self._hello_ns, timetable.turns.period_ns)
         return now_ns > timetable.valid_ns + _SHOWN_NS
 
-    # --- letting out ----------------------------------------------------------------------------------------------
+    # --- packets --------------------------------------------------------------------------------------------------
 
     def admit(self, packet: Packet, *, due_ns: int) -> bool:
         return self._delays.admit(packet, due_ns=due_ns)
@@ -176,13 +176,13 @@ class TurnAccess:
 
     def forward(self, packet: Packet, *, start_ns: int, now_ns: int, tries: int = 0) -> None:
         if self._roots.has_turn(now_ns=now_ns):
-            self._let_out(packet, now_ns=now_ns)
+            self._enqueue(packet, now_ns=now_ns)
         else:
             access_ns = longest_access_ns(len(packet.frame), self._port.scenario.radio)
             start_ns = self._contention.with_room(start_ns, access_ns)
             self._slots.forward(packet, start_ns=start_ns, now_ns=now_ns, tries=tries)
 
-    def _let_out(self, packet: Packet, *, last: bool = False, now_ns: int) -> None:
+    def _enqueue(self, packet: Packet, *, last: bool = False, now_ns: int) -> None:
         """Queue a packet for the turns of this node; with `last` it goes behind all others, including later ones."""
         newest = self._timetables.newest
         assert newest is not None, "a node without a timetable has no turn"
@@ -223,7 +223,7 @@ class TurnAccess:
         packet = self._floods.control(kind, inner, now_ns=now_ns)
         for stale in self._roots.outdated(before_us=packet.header.origin_us) if kind is not Kind.JOIN else ():
             self._port.drop(DropReason.EXPIRED, stale, now_ns=now_ns)
-        self._let_out(packet, last=last, now_ns=now_ns)
+        self._enqueue(packet, last=last, now_ns=now_ns)
         return packet
 
     def answer(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:

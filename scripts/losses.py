@@ -51,6 +51,7 @@ from fanet_mw.trace import BoundExcludes, BoundStated, Confirmed, Delivered, Gen
 from fanet_mw.units import STILL, NodeId, S  # noqa: E402
 from sim.records.record_kinds import records_of  # noqa: E402
 from sim.records.trace_log import TraceLog  # noqa: E402
+from sim.results.bounds import UNNOTICED_NS  # noqa: E402
 from sim.results.clocks import true_delays  # noqa: E402
 from sim.results.connectivity import parts  # noqa: E402
 from sim.results.files import finish  # noqa: E402
@@ -73,8 +74,7 @@ _APART_S: Final = 0.5
 _WINDOW_S: Final = 17.0
 """So long after a loss bounds are looked at."""
 _AGAIN_S: Final = 3.0
-_NOTICED_S: Final = 4.0
-"""Who states a bound so soon after a loss may count on ways that are not there any more."""
+"""So long after the others have healed bounds should be stated again."""
 
 
 class Loss(NamedTuple):
@@ -253,7 +253,7 @@ def judged(flight: Flight, copy: Copy) -> dict[str, Any]:
     _, without = flight.bounds(lost, from_ns=last_ns, to_ns=window_ns)
     again_ns = last_ns + round((heal_s[-1] + _AGAIN_S) * S)
     held, late = flight.bounds(lost, from_ns=again_ns, to_ns=window_ns)
-    broken_s = flight.broken(lost, last_ns + round(max(_NOTICED_S, heal_s[-1]) * S))
+    broken_s = flight.broken(lost, last_ns + max(UNNOTICED_NS, round(heal_s[-1] * S)))
     found: dict[str, Any] = {
         "scenario": flight.scenario.name, "seed": flight.scenario.seed, "losses": losses, "heal_s": heal_s,
         "connected": round(1 - statistics.fmean(is_torn for _, is_torn in torn), 3) if torn else None,

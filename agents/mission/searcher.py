@@ -148,7 +148,7 @@ class Searcher:
         self._return_home = ReturnHome(
             node, position, own_motion, neighbors, outbox, speed_m_s=speed_m_s,
             airspeed_m_s=FASTEST_AIR_M_S[scenario.world.vehicle], height_m=scenario.nodes.altitude_m, limits=limits,
-            beside=beside,
+            fixes_hz=scenario.world.gps_hz, beside=beside,
         )  # fmt: skip
         connectivity = ConnectivityMaintenance(
             own_motion, neighbors, place, self._bidding, reach_m=reach_m, speed_m_s=speed_m_s
@@ -200,7 +200,7 @@ class Searcher:
         if self._next_review_ns is None or now_ns < self._next_review_ns:
             return
         self._next_review_ns = now_ns + _REVIEW_NS
-        if self._return_home.loses_link(now_ns):
+        if self._return_home.loses_link(now_ns) or self._return_home.loses_position(now_ns):
             self._leave(now_ns)
         if not self._return_home.leaves and self._orders.errand is None and self._is_over(now_ns):
             self._return_home.end()
@@ -272,6 +272,8 @@ class Searcher:
     # --- what its own sensors say ---------------------------------------------------------------------------------
 
     def fix(self, position: Enu, velocity: Enu, *, now_ns: int) -> None:
+        if self._return_home.on_fix(now_ns):
+            self._take_part_again(now_ns)
         if now_ns >= self._next_roll_ns:
             self._next_roll_ns = now_ns + _ROLL_NS
             self._plans.close_ranks(now_ns)
@@ -357,7 +359,11 @@ class Searcher:
 
     def _on_heard(self, now_ns: int) -> None:
         """Another UAV was heard; a UAV that flew home because it heard nobody takes part again."""
-        if self._return_home.on_heard(now_ns) and self._orders.errand is None:
+        if self._return_home.on_heard(now_ns):
+            self._take_part_again(now_ns)
+
+    def _take_part_again(self, now_ns: int) -> None:
+        if self._orders.errand is None:
             self._plans.come_back(self._percent, now_ns)
             self._review_mode(now_ns)
 

@@ -43,7 +43,7 @@ def event_text(record: Record) -> str:
             return f"collides with {f'UAV {record.other}' if record.other else 'the ground or something solid'}"
         case FlightModeChanged() if record.mode in ("fallen", "failsafe"):
             return f"has flight mode {record.mode}"
-        case MissionModeChanged() if record.mode in ("return", "done", "lost_link", "land"):
+        case MissionModeChanged() if record.mode in ("return", "done", "lost_link", "lost_position", "land"):
             return f"has mission mode {record.mode}"
         case ProcessEnded():
             return f"process {record.name} ended"

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from fanet_mw.errors import DropReason
-from fanet_mw.trace import ConflictForeseen, DeadlineLost, DeadlineMet, Delivered, Dropped, Warned
+from fanet_mw.trace import ConflictForeseen, DeadlineLost, DeadlineMet, Delivered, Dropped, RadioFault, Warned
 from fanet_mw.units import MS, S
 from sim.records.delivery_columns import Column
 from sim.records.record_kinds import records_of
@@ -35,7 +35,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
     frames, copies, lateness = ledger.frames(outcome), ledger.copies(outcome), _lateness(outcome, emulator)
     disturbance = validity.measures(outcome, frames=frames, late_share=lateness["share"])
     links = LinksOverTime(outcome)
-    bound = against_bounds(sent, ended_ns=outcome.simulated_ns)
+    bound = against_bounds(sent, records_of(outcome.records, RadioFault), ended_ns=outcome.simulated_ns)
     clock = clock_errors(outcome)
     reasons = validity.reasons(outcome, frames=frames, copies=copies, bound=bound, clock=clock, disturbance=disturbance)
     return {

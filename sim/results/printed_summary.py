@@ -85,7 +85,11 @@ def _network_rows(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     )
     bound = summary["bound"]
     if bound:
-        broken = f"broken {bound['violations']} times" if bound["violations"] else "never broken"
+        overtaken = bound.get("overtaken", 0)
+        broken = (
+            f"broken {bound['violations'] - overtaken} times" if bound["violations"] > overtaken else "never broken"
+        )
+        broken += f", overtaken by a fault {overtaken} times" if overtaken else ""
         share = "-" if bound["within_share"] is None else f"{bound['within_share']:.2%}"
         yield (
             "bound",

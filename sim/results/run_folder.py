@@ -60,7 +60,7 @@ class _ShownBound(_ShownShape):
     within_share: Share | None
     stated_share: Share | None = None
     violations: Count = 0
-    never: Count = 0
+    overtaken: Count = 0
     worst_ms: Measured
     observed_max_ms: Measured
 

@@ -450,7 +450,7 @@ def legend(*, by_cluster: bool, links_known: bool) -> str:
     bars = ((colors.BLUE, "90 % received"), (colors.ORANGE, "half"), (colors.RED, "less"))
     links = ", ".join(f"<nobr><span style='color:{color}'>&#9644;</span> {said}</nobr>" for color, said in bars)
     modes = ((MODE_COLORS["search"], "search"), (MODE_COLORS["respond"], "respond"),
-             (MODE_COLORS["deploy"], "on its way"), (MODE_COLORS["lost_link"], "hears nobody"),
+             (MODE_COLORS["deploy"], "on its way"), (MODE_COLORS["lost_link"], "hears nobody, or knows no place"),
              (HOMEWARD_COLOR, "homeward"))  # fmt: skip
     found = ("not heard", "detected", "approached", "reached", "inside", "among", "confirmed", "mistaken")
     people = ", ".join(f"<nobr>{_dot(STATUS_COLORS[status])} {status}</nobr>" for status in found)

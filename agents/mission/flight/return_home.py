@@ -1,6 +1,8 @@
 """The return of a UAV whose battery runs low, that hears nobody any more, or whose search is over: it flies home above
 all UAVs that search, then lands straight down.
 
+Whoever does not know its place gives it up as well: its flight controller holds it, and lands it after a while.
+
 UAVs whose pads are beside each other land in turns: who comes waits `_HOLD_M` from its pad while another one is over
 the pads and has not begun to sink, or while one with a lower id waits as well.
 """
@@ -16,7 +18,8 @@ from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
 from fanet_mw.application import Course
-from fanet_mw.units import Enu, NodeId
+from fanet_mw.scenario.tables.world import NO_AID_S
+from fanet_mw.units import MS, Enu, NodeId, S
 
 _HIGHER_M: Final = 18.0
 """A UAV flies home this far above the lanes; relays and followers fly below it."""
@@ -37,6 +40,10 @@ _TURN_S: Final = 14.0
 """The time between two landings beside each other."""
 _LAND_M_S: Final = 1.5
 """The speed of the landing."""
+_NO_FIX_NS: Final = 1_500 * MS
+"""A UAV does not know its place once it has had no position for so long, nor in the time of so many: by then its flight
+controller holds it, because no velocity is commanded without a position."""
+_NO_FIXES: Final = 3
 
 
 class ReturnReason(StrEnum):
@@ -46,6 +53,8 @@ class ReturnReason(StrEnum):
     """Its battery is only enough for the way home."""
     LOST_LINK = "lost_link"
     """It has received nothing from anybody for too long."""
+    LOST_POSITION = "lost_position"
+    """Its receiver has told no position for too long."""
     DONE = "done"
     """The search is over."""
     RECALLED = "recall"
@@ -67,9 +76,11 @@ class ReturnHome:
         airspeed_m_s: float,
         height_m: float,
         limits: SearchLimits,
+        fixes_hz: float,
         beside: AbstractSet[int] = frozenset(),
     ) -> None:
         """`height_m`: of the lanes above ground. `beside`: the UAVs whose pads are beside its own."""
+        self._no_fix_ns = max(_NO_FIX_NS, round(_NO_FIXES * S / fixes_hz))
         self._node, self._neighbors, self._beside = node, neighbors, beside
         self._home = home._replace(up=height_m + _HIGHER_M)
         self._own_motion, self._outbox = own_motion, outbox
@@ -78,6 +89,8 @@ class ReturnHome:
         self._heard_ns: int | None = None
         """The instant at which another UAV was last heard; None before the first time: there is no link to lose."""
         self.reason: ReturnReason | None = None
+        self._was_blind = False
+        """True once the flight controller has not known its place either: it lands, and may obey nothing further."""
         self.lands = False
 
     def on_battery(self, charge: float, *, now_ns: int) -> bool:
@@ -111,6 +124,25 @@ class ReturnHome:
         if not most_ns or heard_ns is None or self.leaves or now_ns - heard_ns < most_ns:
             return False
         self.reason = ReturnReason.LOST_LINK
+        return True
+
+    def loses_position(self, now_ns: int) -> bool:
+        """True if the UAV must leave now, because it does not know where it is."""
+        fixed_ns = self._own_motion.fixed_ns
+        if self.leaves or fixed_ns is None or now_ns - fixed_ns <= self._no_fix_ns:
+            return False
+        self.reason = ReturnReason.LOST_POSITION
+        return True
+
+    def on_fix(self, now_ns: int) -> bool:
+        """The next position is there; returns True if the UAV therefore takes part in the mission again."""
+        if self.reason is not ReturnReason.LOST_POSITION:
+            return False
+        fixed_ns = self._own_motion.fixed_ns
+        self._was_blind |= fixed_ns is not None and now_ns - fixed_ns > NO_AID_S * S
+        if self._was_blind:
+            return False
+        self.reason = None
         return True
 
     def end(self, reason: ReturnReason = ReturnReason.DONE) -> None:

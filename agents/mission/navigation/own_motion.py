@@ -21,18 +21,19 @@ class OwnMotion:
         self.rise_m = self._rise_m if obstacles.has_hills else None
         """By how much the ground at a place (east, north) is higher than below this UAV; None over level ground."""
         self.velocity = STILL
-        self._fix_ns: int | None = None
+        self.fixed_ns: int | None = None
+        """The instant of the latest fix; None before the first one."""
         self._above_ground: tuple[float, int] | None = None
 
     def fix(self, position: Enu, velocity: Enu, *, now_ns: int) -> None:
-        if self._fix_ns is None:
+        if self.fixed_ns is None:
             self.position = position
         else:
-            seconds, k = (now_ns - self._fix_ns) / S, _FIX_GAIN
+            seconds, k = (now_ns - self.fixed_ns) / S, _FIX_GAIN
             here = Motion(self.position, velocity, 0).position_at(round(seconds * S))
             off = position.minus(here)
             self.position = Enu(here.east + k * off.east, here.north + k * off.north, here.up + k * off.up)
-        self._fix_ns, self.velocity = now_ns, velocity
+        self.fixed_ns, self.velocity = now_ns, velocity
 
     def altimeter(self, above_ground_m: float | None, *, now_ns: int) -> None:
         """The height over whatever is below; None if nothing is within the rangefinder's range."""

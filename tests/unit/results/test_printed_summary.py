@@ -148,6 +148,8 @@ def test_of_a_run_in_which_nothing_happened_four_rows_are_printed(make_scenario:
         (["frames"], {"closes": True, "dropped": {}}, ["+ 0 dropped + 45 in flight (closes; drops: none)"]),
         (["air"], {"pdr": None, "late_acks": 0}, ["air - of copies received"]),
         (["bound"], {"violations": 0, "within_share": None}, ["bound - of packets", "never broken"]),
+        (["bound"], {"violations": 9, "overtaken": 9}, ["never broken, overtaken by a fault 9 times"]),
+        (["bound"], {"violations": 9, "overtaken": 2}, ["broken 7 times, overtaken by a fault 2 times"]),
         (["likely"], {"within_share": None}, ["likely - of the copies"]),
         (["reachable"], {"at rest": {"share": 1.0, "pdr": 1.0}}, ["reachable 100.00% of 100.0% in reach (at rest)"]),
         ([], {"reachable": {"at rest": {"share": 1.0, "pdr": 1.0}}}, []),

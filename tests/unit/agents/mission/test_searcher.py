@@ -58,18 +58,26 @@ class Flight:
         if planned:
             self.searcher.on_message(self.plan, now_ns=0)
 
-    def fly(self, seconds: float, *, charge: Callable[[float], float] | None = None, heard: bool = False) -> None:
+    def fly(
+        self,
+        seconds: float,
+        *,
+        charge: Callable[[float], float] | None = None,
+        heard: bool = False,
+        fixes: bool = True,
+    ) -> None:
         """Fly as it wants to; `charge` is what its battery says, by the second. With `heard` it receives the hello of a
-        UAV far away once a second.
+        UAV far away once a second; without `fixes` it hovers, and its GPS tells nothing.
         """
         until_ns = self.now_ns + round(seconds * S)
         while self.now_ns < until_ns:
             self.now_ns += 200 * MS
-            velocity = self.searcher.velocity or STILL
+            velocity = (fixes and self.searcher.velocity) or STILL
             self.at = Enu(
                 self.at.east + 0.2 * velocity.east, self.at.north + 0.2 * velocity.north, self.at.up + 0.2 * velocity.up
             )
-            self.searcher.fix(self.at, velocity, now_ns=self.now_ns)
+            if fixes:
+                self.searcher.fix(self.at, velocity, now_ns=self.now_ns)
             if charge is not None and self.now_ns % S == 0:
                 reading = Battery(self.now_ns, 15.0, 20.0, charge(self.now_ns / S))
                 self.searcher.on_sensor(reading, now_ns=self.now_ns)
@@ -148,6 +156,48 @@ def test_who_hears_somebody_again_on_its_way_home_takes_up_its_place_again(
     assert abs(flight.away_m - before_m) > 50, "of the two who are left each has a place"
     flight.fly(17)
     assert flight.modes[-2:] == ["search", "lost_link"], "and the second time as the first"
+
+
+def charges(flight: Flight) -> list[int]:
+    return [message.charge for message in flight.told if isinstance(message, SearchStatus)]
+
+
+def test_who_does_not_know_its_place_gives_it_up_at_once_and_takes_one_again_when_it_does(
+    make_scenario: Callable[..., Scenario],
+) -> None:
+    flight = Flight(make_scenario)
+    flight.fly(40)
+    flight.fly(1.2, fixes=False)
+    assert (flight.modes[-1], charges(flight)[-1] > 0) == ("search", True), "a fix or two may be missing"
+    flight.fly(1.4, fixes=False)
+    assert (flight.modes[-1], charges(flight)[-1]) == ("lost_position", 0), "it holds nobody together any more"
+    flight.fly(1)
+    assert (flight.modes[-1], charges(flight)[-1] > 0) == ("search", True)
+    at = flight.at
+    flight.fly(10)
+    assert flight.at.horizontal_to(at) > 30, "and flies on"
+
+
+def test_who_has_not_known_its_place_for_longer_than_its_flight_controller_waits_is_landed_and_takes_none_again(
+    make_scenario: Callable[..., Scenario],
+) -> None:
+    flight = Flight(make_scenario)
+    flight.fly(40)
+    flight.fly(5.4, fixes=False)
+    before_m = flight.away_m
+    flight.fly(8)
+    assert (flight.modes[-1], charges(flight)[-1]) == ("lost_position", 0)
+    assert flight.away_m < before_m - 30, "if it still obeys, it comes home"
+
+
+def test_who_flies_home_already_flies_on_once_it_knows_its_place_again(make_scenario: Callable[..., Scenario]) -> None:
+    flight = Flight(make_scenario)
+    flight.fly(40)
+    flight.fly(2, charge=lambda _: 0.05)
+    flight.fly(3, fixes=False)
+    assert flight.modes[-1] == "return"
+    flight.fly(60)
+    assert flight.modes[-1] == "land"
 
 
 def test_a_low_battery_takes_a_uav_home_for_good_even_if_it_hears_somebody_again(

@@ -28,6 +28,8 @@ from fanet_mw.units import Enu
 _MOST_BYTES: Final = 16 << 20
 _MOST_SHAPES: Final = 10_000
 _FARTHEST_M: Final = 1e6
+_ROUNDED_DEG: Final = 1e-6
+"""Corners that are no farther than this from a line lie on it: 0.1 m."""
 _Point = tuple[float, float]
 _WAYPOINT: Final = 16
 _FENCE_VERTICES: Final = {5001: True, 5002: False}
@@ -195,6 +197,12 @@ def _circle_of(place: _Point, radius: Any) -> tuple[float, float, float]:  # noq
 def _ring(points: list[_Point]) -> list[_Point]:
     if len(set(points)) < 3:
         raise ValueError(f"a polygon has {len(set(points))} corners, must be >= 3")
+    (lat, lon), *others = points
+    far = max(others, key=lambda point: math.hypot(point[0] - lat, point[1] - lon))
+    span_deg = math.hypot(far[0] - lat, far[1] - lon)
+    aside = (abs((far[0] - lat) * (x - lon) - (far[1] - lon) * (y - lat)) for y, x in others)
+    if max(aside) <= _ROUNDED_DEG * span_deg:
+        raise ValueError(f"all corners of a polygon lie on a line, from {points[0]} to {far}")
     return points
 
 
@@ -351,7 +359,7 @@ def _items(lines: list[str]) -> Iterator[tuple[int, float, _Point]]:
         row = line.split("\t") if "\t" in line else line.split()
         try:
             command = int(row[3])
-            is_home = command == _WAYPOINT and number == rows[0][0]
+            is_home = command == _WAYPOINT and number == rows[0][0] and int(row[2]) == 0  # its height is above the sea
             if command in known and not is_home:
                 yield command, float(row[4]), _flown(int(row[2]), *row[8:10])
         except (ValueError, IndexError, TypeError) as error:

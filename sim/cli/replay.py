@@ -30,7 +30,7 @@ def replay(
         map_: Write a map that plays to this file instead, with modes and events; it needs no WebGL, and is a tenth the
             size.
         at: Print the state at this instant [s] as text instead, and write nothing.
-        start: Begin at this instant [s].
+        start: Begin at this instant [s], in the browser.
         port: Port of the page on this machine; by default 8080, or the next one that is free.
 
     """
@@ -40,6 +40,8 @@ def replay(
     for name, page in (("--html", html), ("--map", map_)):
         if page is not None and page.suffix.lower() not in (".html", ".htm"):
             raise ConfigError(f"{name} {page}: must be a file whose name ends in .html")
+    if given and start:
+        raise ConfigError(f"--start and {given[0]}: only a replay in the browser begins later than at 0 s")
     if not 0 <= start < math.inf:
         raise ConfigError(f"--start {start:g}: must be 0 or more")
     if at is None and map_ is None:

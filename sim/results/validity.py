@@ -59,15 +59,16 @@ def measures(outcome: Outcome, *, frames: Mapping[str, Any], late_share: float) 
     agents = [report for report in outcome.reports.values() if report.get("kind") == "agent"]
     world = outcome.reports.get("world", {})
     late, heard = _sum(agents, "heard_late"), _sum(agents, "receptions")
+    requests = frames["sent"] + frames["unasked"]  # what is dropped may be of either
     parts = {
         "lost_on_bus": Measure(
-            "requests lost on the bus", _share(frames["dropped"].get("bus", 0), frames["sent"]), LOST_LIMIT
+            "requests lost on the bus", _share(frames["dropped"].get("bus", 0), requests), LOST_LIMIT
         ),
         "dropped_late": Measure(
-            "requests dropped as too late", _share(frames["dropped"].get("late", 0), frames["sent"]), LOST_LIMIT
+            "requests dropped as too late", _share(frames["dropped"].get("late", 0), requests), LOST_LIMIT
         ),
         "missed_turns": Measure(
-            "turns missed, of all requests", _share(_sum(agents, "missed_turns"), frames["sent"]), LOST_LIMIT
+            "turns missed, of all requests", _share(_sum(agents, "missed_turns"), requests), LOST_LIMIT
         ),
         "copies_lost": Measure("receptions lost on the bus", _copies_lost(outcome), LOST_LIMIT),
     }

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, S
 from fanet_mw.whole_file import replace_file, writing
@@ -99,8 +100,10 @@ def told_apart(names: Sequence[str]) -> list[str]:
 def serve(folder: Path, *, port: int | None, start_s: float, ended: Sequence[int], tell: Callable[[str], None]) -> None:
     """Show a run until somebody ends it; raises ConfigError for a folder that holds none."""
     timeline = Timeline(folder)
+    start_ns = round(start_s * S)
+    if start_ns > timeline.end_ns:
+        raise ConfigError(f"--start {start_s:g}: must be within 0 and {timeline.end_ns / S:g}, the end of {folder}")
     with served(port) as server:
-        start_ns = round(start_s * S)
         panels: Panels
         state = timeline.at(start_ns)
         scene = Scene(server, state, on_select=lambda node: panels.jobs.put(lambda: panels.select(node)))

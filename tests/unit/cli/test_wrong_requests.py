@@ -62,6 +62,7 @@ def test_a_number_that_is_not_whole_is_not_rounded_to_one(words: str) -> None:
         ("--map run/summary.json", "--map run/summary.json: must be a file whose name ends in .html"),
         ("--html a.html --map b.html", "--html and --map: one of them at a time"),
         ("--html a.html --at 3", "--html and --at: one of them at a time"),
+        ("--html a.html --start 3", "--start and --html: only a replay in the browser begins later than at 0 s"),
     ],
 )
 def test_a_replay_is_written_over_nothing_but_a_page_and_never_left_out(words: str, said: str) -> None:
@@ -103,6 +104,9 @@ def test_an_instant_beyond_the_end_of_a_run_is_refused(tmp_path: Path) -> None:
             "mobility": {"model": "random_waypoint"}}  # fmt: skip
     finish(simulate(config.build(tree)), out=tmp_path)
     assert refusal("replay", str(tmp_path), "--at", "99") == "--at 99: must be within 0 and duration_s = 2"
+    assert (
+        refusal("replay", str(tmp_path), "--start", "9") == f"--start 9: must be within 0 and 2, the end of {tmp_path}"
+    )
 
 
 @pytest.mark.parametrize("code", [0, None, "done"])

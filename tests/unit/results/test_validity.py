@@ -190,6 +190,18 @@ def test_whatever_is_broken_makes_a_run_invalid_and_is_said(scenario: Scenario, 
     assert reasons(outcome) == [why]
 
 
+def test_a_share_of_requests_is_at_most_all_of_them_whoever_made_them(scenario: Scenario) -> None:
+    outcome = good(scenario)  # a liar in the name of node 1 skips numbers, so that most of its requests seem lost
+    put(outcome, "emulator", "requests", "1", "all", value=11 * SENT)
+    put(outcome, "emulator", "frames", value={
+        "sent": 12 * SENT, "delivered": 3 * SENT, "in_flight": 0, "dropped": {"bus": 9 * SENT},
+    })  # fmt: skip
+    assert reasons(outcome) == [
+        "frames that no node asked for: 40000, limit 0",
+        "requests lost on the bus: 75.000%, limit 0.250%",
+    ]
+
+
 def test_frames_that_a_dead_emulator_took_with_it_are_said_besides_its_death(scenario: Scenario) -> None:
     outcome = good(scenario)
     outcome.ended.append(("emulator", -9))

@@ -74,8 +74,10 @@ def geojson() -> str:
 
 def waypoints() -> str:
     home = degrees((0.0, 0.0))
-    rows = [(0, 16, *home), *((n + 1, 16, *degrees(point)) for n, point in enumerate(SQUARE)), (5, 20, 0.0, 0.0)]
-    return "QGC WPL 110\n" + "".join(f"{n}\t0\t3\t{c}\t0\t0\t0\t0\t{lat}\t{lon}\t50\t1\n" for n, c, lat, lon in rows)
+    rows = [(0, 0, 16, *home), *((n + 1, 3, 16, *degrees(at)) for n, at in enumerate(SQUARE)), (5, 3, 20, 0.0, 0.0)]
+    return "QGC WPL 110\n" + "".join(
+        f"{n}\t0\t{frame}\t{c}\t0\t0\t0\t0\t{lat}\t{lon}\t50\t1\n" for n, frame, c, lat, lon in rows
+    )
 
 
 def wpl(*rows: tuple[float, ...], home: bool = True) -> str:
@@ -143,6 +145,7 @@ def test_points_are_people(files: Path, name: str) -> None:
         ("x.kml", "<kml", "cannot be read as .kml"),
         ("x.kml", '<!DOCTYPE x [<!ENTITY a "b">]><kml/>', "entities"),
         ("x.kml", kml([[(0, 0), (1, 1), (0, 0)]]), "has 2 corners, must be >= 3"),
+        ("x.kml", kml([[(0, 0), (100, 100), (900, 900), (0, 0)]]), "all corners of a polygon lie on a line"),
         ("x.kml", kml([], PEOPLE), "it holds no polygon"),
         ("x.kml", "<kml><Polygon><coordinates>8.5,97 1,2 3,4</coordinates></Polygon></kml>", "within 90 and 180"),
         ("x.geojson", '{"type": "Polygon", "coordinates": [[["a", 1], [2, 3], [4, 5]]]}', "cannot be read"),
@@ -227,6 +230,15 @@ def test_fences_and_rally_points_of_mission_planner_are_read(tmp_path: Path, hom
     assert found.world.no_fly_m[0] == pytest.approx((100, 100, 14.15), abs=0.1)
     assert found.world.no_fly_m[1] == pytest.approx((0, -100, 25), abs=0.1)
     assert found.mission.survivor_positions_m[1] == pytest.approx(PEOPLE[1], abs=0.1)
+
+
+def test_of_a_list_without_home_the_first_waypoint_counts(tmp_path: Path) -> None:
+    (tmp_path / "people.waypoints").write_text(
+        wpl(*((n, 3, 16, 0, *degrees(at)) for n, at in enumerate(PEOPLE)), home=False)
+    )
+    names = f'survivors_at = "people.waypoints"\n[world]\norigin_deg = [{ORIGIN.lat_deg}, {ORIGIN.lon_deg}]'
+    found = scenario(tmp_path, f"[mission]\n{names}").mission.survivor_positions_m
+    assert [round(east) for east, _ in found] == [round(east) for east, _ in PEOPLE]
 
 
 @pytest.mark.parametrize(("encoding", "end"), [("utf-16", "\n"), ("utf-8-sig", "\r"), ("ascii", "\r\n")])

@@ -43,14 +43,23 @@ def simulate(
         scenario: A shipped scenario's name (see `fanet scenarios`) or a .toml file.
 
     """
+    from fanet_mw.scenario.fingerprint import modules_of
+    from sim.cli.foreign_parts import in_own_process
+
+    chosen = choice.scenario(scenario)
+    parts = modules_of(chosen)
+    return in_own_process(partial(_simulate, chosen, output), parts) if parts else _simulate(chosen, output)
+
+
+def _simulate(chosen: "Scenario", output: OutputFlags) -> int:
     from emulator.compile_kernel import COMPILING_NOTICE, must_compile, warm_up
     from emulator.pcap_file import PcapFile
     from fanet_mw.hosts import interrupts
+    from sim.cli.foreign_parts import own_output
     from sim.results.files import begun
     from sim.run.virtual import EPOCH_UNIX_NS
     from sim.run.virtual import simulate as run
 
-    chosen = choice.scenario(scenario)
     with output.prepared():
         print_notes(chosen)
         if must_compile():
@@ -61,6 +70,7 @@ def simulate(
         path = output.capture_path()
         capture = PcapFile(path, chosen.radio, receptions=output.pcap_receptions) if path else nullcontext()
         with (
+            own_output(json=output.json),
             begun(output.out),
             _simulated(chosen, quiet=output.json) as (tell, watcher),
             capture as file,

@@ -1,5 +1,6 @@
 """What a new user tries and what cannot be: a sentence with the value and its bound, at once."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -123,3 +124,24 @@ def test_a_part_that_calls_exit_does_not_end_a_run_as_if_it_were_right(code: obj
     scenario = config.build({"nodes": {"count": 1}, "duration_s": 2, "routing": {"protocol": "flooding"}})
     with pytest.raises(HostError, match=rf"has called sys.exit\({code!r}\) at 1 s"):
         simulate(scenario, applications=lambda _: [Leaving()])
+
+
+def test_a_copy_of_the_process_that_a_part_has_forked_does_not_fly_on(capfd: pytest.CaptureFixture[str]) -> None:
+    children, process = [], os.getpid()
+
+    class Forking(Application):
+        name = "forking"
+
+        def next_wake_ns(self) -> int | None:
+            return None if children else 1_000_000_000
+
+        def wake(self, now_ns: int) -> None:
+            children.append(os.fork())
+
+    scenario = config.build({"nodes": {"count": 1}, "duration_s": 2, "routing": {"protocol": "flooding"}})
+    outcome = simulate(scenario, applications=lambda _: [Forking()])
+    if os.getpid() != process:
+        os._exit(0)  # it has flown on
+    assert outcome.aborted is None
+    assert os.waitstatus_to_exitcode(os.waitpid(children[0], 0)[1]) == 1
+    assert "has called os.fork, and its child flew on: that ends here" in capfd.readouterr().err

@@ -54,7 +54,7 @@ def _module(frame: FrameType) -> str:
 @contextmanager
 def exits_raised() -> Iterator[None]:
     """Raise HostError where this thread calls `os._exit`, which ends a process without a word, perhaps with 0; another
-    thread ends it with a word and not with 0. A process that was forked meanwhile ends by it as always.
+    thread ends it with a word and not with 0. A process that was forked meanwhile ends by it as always, or else here.
     """
     leave, process, thread = os._exit, os.getpid(), threading.get_ident()
 
@@ -72,6 +72,9 @@ def exits_raised() -> Iterator[None]:
         yield
     finally:
         os._exit = leave
+        if os.getpid() != process:
+            os.write(2, b"fanet: a part of another package has called os.fork, and its child flew on: that ends here\n")
+            leave(1)
 
 
 def report_of(part: Any) -> dict[str, Any]:  # noqa: ANN401  (an application or a protocol)

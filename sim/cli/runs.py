@@ -131,6 +131,7 @@ def launch(
     import asyncio
 
     from fanet_mw.bus.topics import Topics
+    from sim.cli.foreign_parts import own_output
     from sim.results.files import begun
     from sim.run.launcher.leads import fitted
     from sim.run.launcher.swarm import launch as run
@@ -155,7 +156,12 @@ def launch(
             if not no_world:
                 raise ConfigError("--autopilots: needs --no-world, because flight controllers are the world then")
             beside.append(["autopilots", autopilots, "--flavor", doors.flavor])
-        with begun(output.out), Companions(beside) as companions, _watched(chosen, bar=not output.json) as tell:
+        with (
+            own_output(json=output.json),
+            begun(output.out),
+            Companions(beside) as companions,
+            _watched(chosen, bar=not output.json) as tell,
+        ):
 
             def on_progress(progress: "Progress") -> None:
                 companions.check()

@@ -100,13 +100,10 @@ def simulate(
         observed = Observed(
             scenario, capture=capture, applications=applications, folder=spool_folder, observer=observer
         )
-        began, process = time.perf_counter(), os.getpid()
+        began = time.perf_counter()
         failure = None
         try:
-            try:
-                _run(observed, on_progress, signals)
-            finally:
-                _require_process(process)
+            _run(observed, on_progress, signals)
         except Exception as error:
             if on_failure is None or not observed.host.now_ns or not observed.host.failed:
                 raise
@@ -126,13 +123,6 @@ def _same_folder() -> Iterator[None]:
     finally:
         os.fchdir(folder)
         os.close(folder)
-
-
-def _require_process(number: int) -> None:
-    """End a copy of the process that a part has forked and let come back; it would write the result once more."""
-    if os.getpid() != number:
-        os.write(2, b"fanet: a part of another package has called os.fork, and its child flew on: that ends here\n")
-        os._exit(1)
 
 
 class Observed:

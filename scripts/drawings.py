@@ -1,7 +1,7 @@
 #!/usr/bin/env python
 """Draws what explanations explain, into docs/explanation/drawings (needs matplotlib): `scripts/drawings.py [NAME ...]`.
 
-The flood is one of the timetable that the product computes.
+The flood is one of the timetable that the product computes, and the search one of its formations.
 """
 
 import sys
@@ -16,11 +16,14 @@ from matplotlib.patches import FancyBboxPatch, Rectangle
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry  # noqa: E402  (the root is on the path now)
+from agents.mission.searcher import formation  # noqa: E402  (the root is on the path now)
+from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry  # noqa: E402
 from fanet_mw.routing.clustered.timetable.timetable import timetable  # noqa: E402
 from fanet_mw.units import Enu, NodeId  # noqa: E402
 from sim.figures.colors import BLUE, DARK, GRAY, GREEN, ORANGE, PINK, RED, SHADE  # noqa: E402
 from sim.figures.style import applied, canvas  # noqa: E402
+from sim.scenarios import catalog  # noqa: E402
+from sim.world.environment.layout import positions  # noqa: E402
 
 FOLDER: Final = ROOT / "docs" / "explanation" / "drawings"
 Bar = tuple[float, float, str, str]
@@ -51,7 +54,8 @@ def rows(axes: Axes, lines: Sequence[tuple[str, Sequence[Bar]]], *, unit: str, w
         axes.text(-0.01 * wide, number, name, ha="right", va="center", fontsize=8)
         for begin, length, color, text in bars:
             axes.barh(number, length, 0.7, begin, color=color, edgecolor=DARK, linewidth=0.6)
-            axes.text(begin + length / 2, number, text, ha="center", va="center", fontsize=7)
+            ink = "white" if color in (BLUE, GRAY) else DARK
+            axes.text(begin + length / 2, number, text, ha="center", va="center", fontsize=7, color=ink)
     axes.set(xlim=(0, wide), ylim=(-0.6, len(lines) - 0.4), yticks=[], xlabel=unit)
     for side in ("left", "right", "top"):
         axes.spines[side].set_visible(False)
@@ -68,9 +72,9 @@ def superframes() -> Figure:
     rows(
         axes,
         [
-            ("`all`, `counter`", slots + guards),
-            ("`scheduled`", [(0.0, 40.0, SHADE, "window"), *turns]),
-            ("`rounds`", [*ring, bulk[0], *[(begin + 250, *rest) for begin, *rest in ring], bulk[1]]),
+            ("all, counter", slots + guards),
+            ("scheduled", [(0.0, 40.0, SHADE, "window"), *turns]),
+            ("rounds", [*ring, bulk[0], *[(begin + 250, *rest) for begin, *rest in ring], bulk[1]]),
         ],
         unit="ms of a flooding period of 0.5 s; gray: guard time, one color after the other: turns of one frame each",
         wide=500,
@@ -108,11 +112,39 @@ def flood() -> Figure:
             ha="center",
             va="center",
             fontsize=7,
+            color="white" if node in sent and shade < 0.3 else DARK,
         )
     axes.set_aspect("equal")
     axes.set_title(
         f"Node 1 floods: {len(sent)} of 45 send, all have it after {table.spans[root]} turns (+: turns after its own)"
     )
+    return figure
+
+
+def search() -> Figure:
+    """The lines of `rescue` as their sweep begins, on the way and at the edge, and who must stay in reach of whom."""
+    made = catalog.find("rescue", [])
+    whole = formation(made, made.nodes.count)
+    assert whole is not None, "rescue is shipped"
+    pattern = whole.begun_around([Enu(*at) for at in positions(made)])[0]
+    edge_s = pattern.shape.sweep_s
+    figure, panels = canvas(columns=3, width=2.8, height=3.5, share_y=True)
+    half_m = made.world.area_m / 2
+    titles = ("the sweep begins", "half of the way", "at the edge")
+    for axes, title, swept_s in zip(panels, titles, (0.0, edge_s / 2, edge_s), strict=True):
+        at = [pattern.at(place, swept_s) for place in range(pattern.places)]
+        for place in range(pattern.places):
+            for other in pattern.tethers(place, swept_s):
+                axes.plot(*zip(at[place][:2], at[other][:2], strict=True), color=GRAY, linewidth=0.8, zorder=1)
+        for kind, color, mark, what in (
+            ("line", BLUE, "o", "in two lines"), ("relay", RED, "s", "relays"), ("follower", ORANGE, "^", "followers"),
+        ):  # fmt: skip
+            of_kind = [at[place][:2] for place in range(pattern.places) if pattern.kind(place) == kind]
+            axes.scatter(*zip(*of_kind, strict=True), s=14, color=color, marker=mark, label=f"{len(of_kind)} {what}")
+        axes.add_patch(Rectangle((-half_m, -half_m), 2 * half_m, 2 * half_m, fill=False, edgecolor=DARK, linestyle=":"))
+        axes.set(title=f"{title}: {swept_s:.0f} s", xlabel="east [m]", aspect="equal")
+    panels[0].set_ylabel("north [m]")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure
 
 
@@ -313,7 +345,7 @@ def ledgers() -> Figure:
 
 
 DRAWINGS: Final[dict[str, Callable[[], Figure]]] = {
-    function.__name__: function for function in (superframes, flood, dcf, delay, beacons, hosts, way, ledgers)
+    function.__name__: function for function in (superframes, flood, search, dcf, delay, beacons, hosts, way, ledgers)
 }
 
 

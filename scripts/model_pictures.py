@@ -30,7 +30,7 @@ from fanet_mw.bus.messages import Altimeter, Camera, Inertial, Radar, WindEstima
 from fanet_mw.scenario import Radio, Scenario, config  # noqa: E402
 from fanet_mw.units import S  # noqa: E402
 from sim.figures.colors import BLUE, GRAY, GREEN, RED  # noqa: E402
-from sim.figures.style import applied, canvas  # noqa: E402
+from sim.figures.style import SERIES, applied, canvas  # noqa: E402
 from sim.scenarios import catalog  # noqa: E402
 from sim.world.environment.diffraction import loss_db as edge_loss_db  # noqa: E402
 from sim.world.environment.obstacles import Box, Obstacles, obstacles  # noqa: E402
@@ -300,7 +300,6 @@ def panels(title: str, draw: Callable[[Axes, str], None]) -> Figure:
     for axes, channel in zip(grid.flat, CHANNELS, strict=True):
         draw(axes, channel)
         axes.set_title(f"{channel}, other node at {ANTENNA_M.get(channel, 2.0):g} m", fontsize=9)
-        axes.grid(alpha=0.3)
         axes.set_ylabel("loss [dB]")
     figure.legend(*grid.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=9)
     figure.suptitle(title, fontsize=10)
@@ -309,15 +308,17 @@ def panels(title: str, draw: Callable[[Axes, str], None]) -> Figure:
 
 def over_distance(axes: Axes, channel: str) -> None:
     along = np.geomspace(10, 10_000, 300)
-    for height_m in (2.0, 10.0, 30.0, 100.0):
-        axes.semilogx(along, loss_db(channel, along, height_m), label=f"{height_m:g} m up")
+    for height_m, look in zip((2.0, 10.0, 30.0, 100.0), SERIES, strict=False):
+        loss = loss_db(channel, along, height_m)
+        axes.semilogx(along, loss, label=f"{height_m:g} m up", color=look.color, linestyle=look.dash)
     axes.set_xlabel("distance along the ground [m]")
 
 
 def over_height(axes: Axes, channel: str) -> None:
     up = np.linspace(1, 150, 600)
-    for along_m in (50.0, 200.0, 1000.0):
-        axes.plot(up, loss_db(channel, along_m, up), label=f"{along_m:g} m away")
+    for along_m, look in zip((50.0, 200.0, 1000.0), SERIES, strict=False):
+        loss = loss_db(channel, along_m, up)
+        axes.plot(up, loss, label=f"{along_m:g} m away", color=look.color, linestyle=look.dash)
     axes.set_xlabel("height [m]")
 
 
@@ -334,7 +335,7 @@ def correlation() -> Figure:
     figure = Figure(figsize=(7, 3.6), layout="constrained")
     axes = figure.subplots()
     random = np.random.Generator(np.random.PCG64(1))
-    for both, color in ((False, "tab:blue"), (True, "tab:orange")):
+    for both, color in ((False, BLUE), (True, RED)):
         drawn = []
         for seed in range(240):
             at, velocity = random.uniform(0, 5000, (60, 3)), np.zeros((60, 3))
@@ -347,7 +348,6 @@ def correlation() -> Figure:
         law = j0**4 if both else (j0**2 - 1 / WAVES) / (1 - 1 / WAVES)
         axes.plot(way, law, color=color, lw=1, label="J0^4" if both else f"J0^2 (Clarke, Jakes) by {WAVES} waves")
     axes.set(xlabel="way of a node [wavelengths]", ylabel="correlation of the power")
-    axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
     return figure
 
@@ -370,7 +370,6 @@ def edge() -> Figure:
             places, edge_loss_db(solids, at, np.repeat(other, len(at), axis=0), wavelength_m=wavelength_m), color=BLUE
         )
         axes.set(xlabel=name, ylabel="loss by the edge [dB]")
-        axes.grid(alpha=0.3)
     above.set_title("behind a wall of 40 m, 50 and 250 m away", fontsize=9)
     beside.set_title("behind a tower 20 m wide", fontsize=9)
     return figure
@@ -387,14 +386,14 @@ def main() -> None:
         for draw, axes in zip(drawn, grid, strict=True):
             draw(axes)
         figure.savefig(REFERENCE / "sensors.png", dpi=90, metadata={"Software": None})
-    pictures = {
-        "distance": panels("Loss over distance, by the height of one node; 2412 MHz, urban", over_distance),
-        "height": panels("Loss over the height of one node; 2412 MHz, urban", over_height),
-        "edge": edge(),
-        "fading": correlation(),
-    }
-    for name, picture in pictures.items():
-        picture.savefig(EXPLANATION / f"channel-{name}.png", dpi=90, metadata={"Software": None})
+        pictures = {
+            "distance": panels("Loss over distance, by the height of one node; 2412 MHz, urban", over_distance),
+            "height": panels("Loss over the height of one node; 2412 MHz, urban", over_height),
+            "edge": edge(),
+            "fading": correlation(),
+        }
+        for name, picture in pictures.items():
+            picture.savefig(EXPLANATION / f"channel-{name}.png", dpi=90, metadata={"Software": None})
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
 #!/usr/bin/env python
 """Draw how long N UAVs need to cover 95 % of a square kilometre into docs/explanation/search-curve.png, and print it.
 
-From the plans alone, with no air and no wind: the ways to the places, and the sweep. The bound is area / (N x distance
-of lanes x speed), after the longest of these ways. `python scripts/search_curve.py` (needs matplotlib).
+From the plans alone, with no air and no wind: the ways to the places, and the sweep. Beside it stands area / (N x
+distance of lanes x speed), after the longest of these ways; receivers reach beyond half a lane, so a sweep may be
+sooner. `python scripts/search_curve.py` (needs matplotlib).
 """
 
 import math
@@ -65,7 +66,7 @@ def covered_95_s(made: Scenario, pattern: Pattern) -> float:
 
 
 def row(count: int, search: str, start: Sequence[str]) -> tuple[float, float] | None:
-    """The time to 95 %, and its bound; None if the UAVs are too few for this shape."""
+    """The time to 95 %, and that by lanes; None if the UAVs are too few for this shape."""
     try:
         made = scenario(count, search, start)
     except ConfigError:
@@ -77,8 +78,8 @@ def row(count: int, search: str, start: Sequence[str]) -> tuple[float, float] | 
     pattern = pattern.begun_around([Enu(*at) for at in positions(made)])[0]
     there_s = way_s(made, pattern)
     lane_m = 1.35 * math.sqrt(cells_range_m(made) ** 2 - made.nodes.altitude_m**2)
-    bound_s = made.world.area_m**2 / (count * lane_m * made.mobility.speed_m_s)
-    return there_s + covered_95_s(made, pattern), there_s + bound_s
+    by_lanes_s = made.world.area_m**2 / (count * lane_m * made.mobility.speed_m_s)
+    return there_s + covered_95_s(made, pattern), there_s + by_lanes_s
 
 
 def cells_range_m(made: Scenario) -> float:
@@ -95,13 +96,14 @@ def main() -> None:
             for search, color, mark in (("fastest", BLUE, "o"), ("lines", RED, "s"), (other, ORANGE, "^")):
                 rows = [(count, found) for count in COUNTS if (found := row(count, search, start)) is not None]
                 counts = np.array([count for count, _ in rows])
-                times, bounds = np.array([found for _, found in rows]).T
+                times, by_lanes = np.array([found for _, found in rows]).T
                 panel.plot(counts, times, color=color, marker=mark, markersize=3, label=search)
                 if search == "fastest":
-                    panel.plot(counts, bounds, color=GRAY, linestyle=":", label="bound")
-                for count, (time_s, bound_s) in rows:
-                    of_bound = "" if search == "fan" else f", {time_s / bound_s:.2f} of the bound"  # its way is search
-                    print(f"{title}: {count} UAVs, {search}: {time_s:.0f} s{of_bound}")
+                    panel.plot(counts, by_lanes, color=GRAY, linestyle=":", label="area / (N lane speed)")
+                for count, (time_s, by_lanes_s) in rows:
+                    # the way of a fan is a part of its search
+                    of_that = "" if search == "fan" else f", {time_s / by_lanes_s:.2f} of area / (N lane speed)"
+                    print(f"{title}: {count} UAVs, {search}: {time_s:.0f} s{of_that}")
             panel.set(title=title, xlabel="UAVs", yscale="log", xscale="log")
             for axis, ticks in ((panel.xaxis, (1, 2, 5, 10, 20, 50)), (panel.yaxis, (20, 50, 100, 200, 500))):
                 axis.set_major_locator(FixedLocator(ticks))

@@ -14,14 +14,6 @@ from tests.tables.summaries import summarized
 _SEEDS: Final = (1, 2, 3)
 _MOBILITIES: Final = {"static": "at rest", "formation": "formation", "random_waypoint": "random waypoint"}
 _UAVS: Final = (45, 100, 200, 500, 1000)
-_OF_RESCUE: Final = {
-    "as it is": (),
-    "`clusters.repair_s=0`": ("clusters.repair_s=0",),
-    "`clusters.reassign_s=0`": ("clusters.reassign_s=0",),
-    "`clusters.relay=all`": ("clusters.relay=all",),
-    "`radio.lead_ms=40`, `radio.handover_ms=10`": ("radio.lead_ms=40", "radio.handover_ms=10"),
-}
-_RESCUE_S: Final = 150
 _NO_REPORTS: Final = mock.patch.object(NeighborFailureDetector, "find_suspect", return_value=None)
 _TOGETHER: Final = (
     ("all", 1.0), ("all", 0.2),
@@ -65,24 +57,6 @@ def silent_neighbors() -> Rows:
                 f"{statistics.mean(run.epochs for run in found):.1f}",
                 f"{statistics.mean(run.control for run in found):.1f}",
             ])  # fmt: skip
-    return rows
-
-
-def settings_of_rescue() -> Rows:
-    """Scenario `rescue` with single keys changed."""
-    rows = [
-        ["changed", "PDR, seeds 1-3", "reports delivered, mean", "frames sent per second and UAV", "radio busy [%]"]
-    ]
-    for name, keys in _OF_RESCUE.items():
-        found = [summarized("rescue", f"duration_s={_RESCUE_S}", *keys, f"seed={seed}") for seed in _SEEDS]
-        frames = statistics.mean(run["frames"]["sent"] / run["simulated_s"] / run["nodes"] for run in found)
-        rows.append([
-            name,
-            ", ".join(f"{run['pdr']:.3f}" for run in found),
-            f"{statistics.mean(run['reports']['pdr'] for run in found):.3f}",
-            f"{frames:.1f}",
-            f"{100 * statistics.mean(run['air']['busy'] for run in found):.0f}",
-        ])  # fmt: skip
     return rows
 
 

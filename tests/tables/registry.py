@@ -66,9 +66,6 @@ TABLES: Final[Mapping[str, Table]] = {
     "silent-neighbors": Table(
         "explanation/roles.md", clusters.silent_neighbors, Tolerance(absolute=0.02, relative=0.1)
     ),
-    "rescue-settings": Table(
-        "explanation/protocol.md", clusters.settings_of_rescue, Tolerance(absolute=0.02, relative=0.1)
-    ),
     "together": Table("explanation/protocol.md", clusters.together, Tolerance(absolute=0.02, relative=0.1)),
     "relay-rules": Table("explanation/protocol.md", clusters.rules, Tolerance(absolute=0.02, relative=0.1)),
     "plans-of-relays": Table("explanation/planning.md", plans.contending, Tolerance(absolute=0.02, relative=0.1)),

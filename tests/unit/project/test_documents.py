@@ -14,6 +14,8 @@ SOURCES = ("fanet_mw", "agents", "emulator", "sim")
 _LINK = re.compile(r"\]\(([^)#\s]*)(#[^)\s]+)?\)")
 _FILE = re.compile(r"(?<![\w./-])((?:fanet_mw|agents|emulator|sim|tests|scripts|docs|examples)/[\w./-]*\w)(?![\w*{<])")
 _WITH_FOLDER = re.compile(r"`([\w.-]+/[\w./-]*\w\.py)`")
+_FENCED = re.compile(r"^```.*?^```", re.DOTALL | re.MULTILINE)
+_BELOW_HEAD = re.compile(r"\|[|: -]*-[|: -]*")
 _ALONE = re.compile(r"`([a-z]\w*\.py)`")
 
 
@@ -34,6 +36,13 @@ def test_every_link_of_a_page_and_every_file_that_it_names_exists(page: Path) ->
     missing = [str(target) for target in links(page) if not target.exists()]
     missing += [name for name in names(page) if not (ROOT / name).exists()]
     assert not missing
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_table_has_its_head_and_no_row_stands_apart_from_it(page: Path) -> None:
+    lines = ["", *_FENCED.sub("", page.read_text(encoding="utf-8")).splitlines(), ""]
+    firsts = [at for at in range(1, len(lines) - 1) if lines[at].startswith("|") and not lines[at - 1].startswith("|")]
+    assert [lines[at] for at in firsts if not _BELOW_HEAD.fullmatch(lines[at + 1])] == []
 
 
 def test_every_file_of_ours_that_source_text_names_exists() -> None:

@@ -108,6 +108,12 @@ class Scenario(Section):
         return self
 
     @property
+    def rigid(self) -> bool:
+        """True if no distance between UAVs changes: in formation or at rest, and no UAV approaches a survivor."""
+        approach = self.mission.survivors > 0 and self.mission.reports_to_approach <= self.nodes.count
+        return self.mobility.rigid and not approach
+
+    @property
     def measures_links(self) -> bool:
         """True if timetables are made from measured links (`clusters.links`)."""
         chosen, lossy = self.clusters.links, self.radio.shadowing_db > 0 or self.radio.fading != "none"

@@ -161,7 +161,7 @@ def swarm(seed: int) -> Drawn | None:
     tree["world"] = {"gps_sigma_m": pick.choice([0.0, 1.5, 5.0, 15.0])}
     tree["mission"] = {
         "survivors": pick.choice([0, 10, 40]), "report_interval_s": pick.choice([0.5, 2.0, 5.0]),
-        "reports_to_approach": count,
+        "reports_to_approach": count + 1,
     }  # fmt: skip
     if tree["radio"]["channel"] == "log_distance":
         tree["radio"]["shadowing_db"] = pick.choice([0.0, 4.0])

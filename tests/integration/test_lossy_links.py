@@ -71,7 +71,12 @@ def test_no_delay_is_stated_that_is_longer_than_packets_live() -> None:
 
 def test_a_packet_that_may_expire_before_its_turn_has_no_bound() -> None:
     """Three reports a second in turns of half a second: some wait for longer than they live."""
-    reports = ("mission.survivors=4", "mission.report_interval_s=0.3", "world.area_m=600")
+    reports = (
+        "mission.survivors=4",
+        "mission.reports_to_approach=100",
+        "mission.report_interval_s=0.3",
+        "world.area_m=600",
+    )
     size = ("nodes.count=9", "clusters.count=8", "traffic.sources=8", "warmup_s=10", "duration_s=16")
     outcome = simulate(find("clusters", [*size, *reports, "routing.report_lifetime_s=0.3"]))
     stated = {(r.node, r.seq) for r in outcome.records if isinstance(r, BoundStated) and r.t_ns < 15 * S}

@@ -19,7 +19,7 @@ class Flight(NamedTuple):
     area_m: float
     duration_s: float
 
-    def summary(self, **clusters: Any) -> tuple[dict[str, Any], int]:
+    def summary(self, *, mission: dict[str, Any] | None = None, **clusters: Any) -> tuple[dict[str, Any], int]:
         """What came of it, and the last epoch."""
         count = self.columns**2
         tree = {
@@ -32,6 +32,7 @@ class Flight(NamedTuple):
             "traffic": {"payload_bytes": 256, "sources": tuple(range(2, count + 1))},
             "radio": {"lead_ms": 0, "cw_min": 7},
             "mobility": {"model": self.model, "speed_m_s": self.speed_m_s}, "world": {"area_m": self.area_m},
+            "mission": mission or {},
         }  # fmt: skip
         outcome = simulate(config.build(tree))
         epochs = max(r["epoch"] for r in outcome.reports.values() if r.get("kind") == "agent")
@@ -50,6 +51,15 @@ def test_a_formation_keeps_its_timetable_and_its_bound_through_its_turns(speed_m
 def test_a_timetable_promises_nothing_to_uavs_that_move_among_each_other() -> None:
     bound = Flight("random_waypoint", 4, 5, area_m=500, duration_s=25).summary()[0]["bound"]
     assert not bound.get("stated_share")
+
+
+@pytest.mark.parametrize(("reports", "stated"), [(3, False), (10, True)])
+def test_a_timetable_promises_nothing_where_the_mission_takes_uavs_to_survivors(reports: int, stated: bool) -> None:
+    """Nine UAVs stand; with three reports they fly to a survivor, and ten do not come."""
+    mission = {"survivors": 2, "reports_to_approach": reports}
+    summary, _ = Flight("static", 3, 5, area_m=500, duration_s=16).summary(mission=mission)
+    assert bool(summary["bound"].get("stated_share")) == stated
+    assert bool(summary["mission"]["time_to_approach_s"]) != stated
 
 
 @pytest.mark.slow

@@ -283,7 +283,8 @@ def test_classes_of_one_priority_wait_for_each_other_and_the_plan_counts_both() 
 
 def test_reports_fill_nothing_of_the_room_that_turns_have_for_bulk() -> None:
     """Each turn carries a packet and reports of a node beside it; in the same room they would need more turns."""
-    keys = ("mission.survivors=9", "mission.report_interval_s=0.1", "traffic.interval_s=0.2", "traffic.sources=9")
+    stays = ("mission.survivors=9", "mission.reports_to_approach=10")
+    keys = (*stays, "mission.report_interval_s=0.1", "traffic.interval_s=0.2", "traffic.sources=9")
     _, plan, feasible = planned(*NINE, *keys)
     assert feasible, plan["problems"]
     assert max(slot["used"] for slot in plan["slots"]) <= 1

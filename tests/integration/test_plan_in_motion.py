@@ -48,9 +48,12 @@ def test_urgent_packets_that_overfill_the_turns_though_their_bytes_do_not_are_no
     assert (Result(simulate(scenario)).summary["pdr"] > 0.999) == fits
 
 
-def test_a_timetable_is_no_plan_for_uavs_that_move_among_each_other() -> None:
+@pytest.mark.parametrize(
+    "motion", [("mobility.model=random_waypoint",), ("mission.survivors=1", "mission.approach_speed_m_s=5")]
+)
+def test_a_timetable_is_no_plan_for_uavs_that_move_among_each_other(motion: tuple[str, ...]) -> None:
     walking = ("nodes.count=12", "clusters.count=11", "traffic.sources=11", "mobility.speed_m_s=5", "world.area_m=900")
-    _, content, feasible = planned(*walking, "mobility.model=random_waypoint")
+    _, content, feasible = planned(*walking, *motion)
     assert not feasible
     (problem,) = content["problems"]
     assert "two that are linked over 200 m may be out of range after 5.0 s" in problem

@@ -29,8 +29,8 @@ def summary_of(*settings: str) -> dict[str, Any]:
 
 
 def test_reports_take_nothing_from_the_bound_of_bulk_and_have_one_of_their_own() -> None:
-    weak = ("mission.phone_power_dbm=11", "seed=3")  # no phone is received by so many that they fly there
-    summary = summary_of("mission.survivors=30", "mission.report_interval_s=0.7", *weak)
+    stays = ("mission.reports_to_approach=100", "seed=3")
+    summary = summary_of("mission.survivors=30", "mission.report_interval_s=0.7", *stays)
     bound = summary["bound"]
     assert summary["mission"]["uavs_approaching"] == 0
     assert bound["violations"] == 0

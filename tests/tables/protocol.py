@@ -48,6 +48,7 @@ _BOUNDED: Final = (
     (22, 0.5, "range"),
 )  # fmt: skip
 _DISTURBED: Final = (
+    ("mission.survivors=16", "mission.reports_to_approach=46"),
     ("mission.survivors=16",),
     ("traffic.arrivals=poisson",),
     ("radio.lead_ms=40", "radio.handover_ms=20"),

@@ -140,7 +140,7 @@ def _in_slots(ground: _Ground, rule: Rule, *hear_copies: HearsCopies) -> Cluster
 def _way_beside_turns(ground: _Ground) -> OneWay:
     """The way of packets beside turns: where turns bound delays, only receipts in windows; else all, at any time."""
     scenario = ground.port.scenario
-    if scenario.mobility.rigid and not scenario.measures_links:
+    if scenario.rigid and not scenario.measures_links:
         not_before = ground.contention.not_before
         return OneWay(ground.port, ground.neighbors, takes=is_receipt, not_before=not_before)
     return OneWay(ground.port, ground.neighbors)

@@ -97,7 +97,7 @@ class StatedDelays:
         """The node's share of the newest timetable; None if it states no bounds, as when frames may be lost."""
         scenario = self._port.scenario
         # the links of a timetable end when UAVs move among each other, and who learns of that learns it too late
-        timetable = None if scenario.measures_links or not scenario.mobility.rigid else self._timetables.newest
+        timetable = None if scenario.measures_links or not scenario.rigid else self._timetables.newest
         if timetable is None or not timetable.roots or not timetable.whole:
             return None
         if timetable.table.uncovered[self._port.node]:

@@ -44,8 +44,6 @@ _LONGEST: Final = 900
 _SLOWEST_NS: Final = 60 * S
 _WATCHED_NS: Final = 10 * S
 """Telemetry over the air ends when the gateway has not been heard for so long."""
-_AGAIN_NS: Final = 3 * S
-"""A command that comes again within this time, in the same words of the same operator, is not carried out again."""
 _OVER_AIR: Final = frozenset({
     common.MAVLINK_MSG_ID_HEARTBEAT, common.MAVLINK_MSG_ID_SYSTEM_TIME, common.MAVLINK_MSG_ID_COMMAND_LONG,
     common.MAVLINK_MSG_ID_COMMAND_INT, common.MAVLINK_MSG_ID_SET_MODE, common.MAVLINK_MSG_ID_MISSION_SET_CURRENT,
@@ -123,9 +121,6 @@ class GroundControl(Application):
         """True if the last question of an operator came over the air."""
         self._report_ns: int | None = None
         self._turn = 0
-        self._last_command: tuple[Any, ...] = ()
-        self._last_command_ns = 0
-        self._last_ack: Any = None
         self._count = scenario.nodes.count
         origin = Geodetic(*scenario.world.origin_deg, 0.0)
         on_ground = scenario.nodes.on_ground
@@ -313,18 +308,7 @@ class GroundControl(Application):
 
     def _on_command(self, message: Any, peer: Peer, now_ns: int) -> None:  # noqa: ANN401
         self._counts["commanded"] += 1
-        said = (
-            peer,
-            message.get_type(),
-            message.command,
-            *(repr(getattr(message, name)) for name in _PARAMS[message.get_type()]),
-        )
-        if said == self._last_command and now_ns - self._last_command_ns < _AGAIN_NS and self._last_ack is not None:
-            self._counts["repeated"] += 1  # its acknowledgment was lost, or is on its way
-            self._reply(self._last_ack)
-            return
-        self._commands.on_command(message, peer, now_ns)
-        self._last_command, self._last_command_ns = said, now_ns
+        self._counts["repeated"] += self._commands.on_command(message, peer, now_ns)
 
     def _on_set_mode(self, message: Any, peer: Peer, now_ns: int) -> None:  # noqa: ANN401
         self._counts["commanded"] += 1
@@ -488,8 +472,6 @@ class GroundControl(Application):
             self._reply(common.MAVLink_statustext_message(severity, text.encode()[:_TEXT_BYTES]))
 
     def _reply(self, message: Any) -> None:  # noqa: ANN401  (pymavlink has no types)
-        if message.get_type() == "COMMAND_ACK":
-            self._last_ack = message
         encoder = self._streams.air_encoder if self._over_air else self._streams.encoder
         self._out.append(encoder.pack(message))
 
@@ -537,10 +519,6 @@ def _named(survivor: int) -> str:
     return name[0].upper() + name[1:]
 
 
-_PARAMS: Final = {
-    "COMMAND_LONG": tuple(f"param{number}" for number in range(1, 8)),
-    "COMMAND_INT": ("frame", "param1", "param2", "param3", "param4", "x", "y", "z"),
-}
 _ALWAYS: Final = (common.MAVLINK_MSG_ID_HEARTBEAT, common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT)
 _IN_TURN: Final = (
     (common.MAVLINK_MSG_ID_SYS_STATUS, common.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, common.MAVLINK_MSG_ID_GPS_RAW_INT,

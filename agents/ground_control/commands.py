@@ -10,7 +10,7 @@ from agents.ground_control.plan_transfer import Peer
 from agents.ground_control.plans import Ground
 from fanet_mw.flavors import Mode, mode_of
 from fanet_mw.mavlink import common
-from fanet_mw.units import US, Enu
+from fanet_mw.units import US, Enu, S
 
 _ACCEPTED: Final[int] = common.MAV_RESULT_ACCEPTED
 _DENIED: Final[int] = common.MAV_RESULT_DENIED
@@ -21,6 +21,13 @@ _NONE: Final = 0x7FFF_FFFF
 """A latitude or longitude that is not given (INT32_MAX)."""
 _CHANGE_MODE: Final = 1
 """MAV_DO_REPOSITION_FLAGS_CHANGE_MODE."""
+_AGAIN_NS: Final = 3 * S
+"""A command that comes again within this time, in the same words of the same operator, is not carried out again."""
+_PARAMS: Final = {
+    "COMMAND_LONG": tuple(f"param{number}" for number in range(1, 8)),
+    "COMMAND_INT": ("frame", "param1", "param2", "param3", "param4", "x", "y", "z"),
+}
+"""The parameters of a command, by the message that brings it."""
 
 
 class Command(NamedTuple):
@@ -69,10 +76,20 @@ class Commands:
         """`reply` takes a message to be sent, `send` one that is packed already; `one` packs a stream's message now."""
         self._pilot, self._streams, self._ground = pilot, streams, ground
         self._reply, self._send, self._one = reply, send, one
+        self._last_said: tuple[Any, ...] = ()
+        """The latest command that was carried out: its sender, its kind, and its parameters."""
+        self._last_ns = 0
+        self._last_ack: Any = None
         self.paced = False
         """True while telemetry crosses the air, at a pace of its own that no ground station changes."""
 
-    def on_command(self, message: Any, peer: Peer, now_ns: int) -> None:  # noqa: ANN401
+    def on_command(self, message: Any, peer: Peer, now_ns: int) -> bool:  # noqa: ANN401
+        """Carry out a command and acknowledge it; returns True for one repeated, which is only acknowledged again."""
+        params = (repr(getattr(message, name)) for name in _PARAMS[message.get_type()])
+        said = (peer, message.get_type(), message.command, *params)
+        if said == self._last_said and now_ns - self._last_ns < _AGAIN_NS:
+            self._reply(self._last_ack)
+            return True
         command = command_of(message)
         does = self._DOES.get(message.command)
         if does is None:
@@ -81,7 +98,10 @@ class Commands:
             result = _DENIED
         else:
             result = self._change_to(does, now_ns) if isinstance(does, Mode) else does(self, command, now_ns)
-        self._reply(common.MAVLink_command_ack_message(message.command, result, 0, 0, *peer))
+        self._last_ack = common.MAVLink_command_ack_message(message.command, result, 0, 0, *peer)
+        self._last_said, self._last_ns = said, now_ns
+        self._reply(self._last_ack)
+        return False
 
     def set_mode(self, number: int, now_ns: int) -> int:
         mode = mode_of(number)

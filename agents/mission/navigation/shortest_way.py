@@ -38,7 +38,9 @@ def is_clear(start: Place, goal: Place, taken: Callable[[Cell], bool]) -> bool:
 
 
 def nearest_free(goal: Place, taken: Callable[[Cell], bool], *, within: int) -> Cell | None:
-    """The nearest free cell to a place; None if there is none within this number of cells."""
+    """The free cell nearest to a place, of the first square around it that has one; None if none has within this number
+    of cells.
+    """
     column, row = cell_of(*goal)
     for ring in range(within + 1):
         found = [

@@ -71,10 +71,9 @@ class Counts(NamedTuple):
 
     def excess(self, late_limit: float) -> float:
         """The greater one of both late shares, as a multiple of its limit."""
-        return max(
-            self.late_frames / max(1, self.frames) / late_limit,
-            self.late_receptions / max(1, self.receptions) / HEARD_LATE_LIMIT,
-        )
+        frames, receptions = self.late_frames / max(1, self.frames), self.late_receptions / max(1, self.receptions)
+        of_frames = frames / late_limit if late_limit else math.inf if frames else 0.0
+        return max(of_frames, receptions / HEARD_LATE_LIMIT)
 
 
 class Instant(NamedTuple):

@@ -18,9 +18,11 @@ FRAMES, RECEPTIONS = 1000, 4000
 class Swarm:
     """An emulator and two UAVs that report once a second; and the clock's scale by the governor."""
 
-    def __init__(self, *, scale: float = 1.0, least: float = 0.1, end_s: int = 1000) -> None:
+    def __init__(
+        self, *, scale: float = 1.0, least: float = 0.1, end_s: int = 1000, late_limit: float = 0.01
+    ) -> None:
         self.scale = scale
-        self._governor = ClockGovernor(scale, least=least, late_limit=0.01, end_ns=end_s * S, processors=2.0)
+        self._governor = ClockGovernor(scale, least=least, late_limit=late_limit, end_ns=end_s * S, processors=2.0)
         self._seconds = self._late_moments = self._late_frames = self._late_receptions = self._close = 0
         self._late_ms = self._others_s = self._emulator_s = 0.0
 
@@ -82,6 +84,11 @@ def test_more_lateness_in_a_few_seconds_than_is_allowed_in_20_slows_it(late: dic
     swarm = Swarm()
     assert [swarm.second(**late) for _ in range(5)] == [1.0, 1.0, 1.0, 1.0, 0.75]
     assert [Swarm().second(late=0.5) for _ in range(3)] == [1.0, 1.0, 1.0], "one second alone may be a pause"
+
+
+def test_where_no_frame_may_be_late_one_in_each_of_three_seconds_slows_it() -> None:
+    swarm = Swarm(late_limit=0.0)
+    assert [swarm.second(late=late) for late in (0.0, 0.001, 0.001, 0.001)] == [1.0, 1.0, 1.0, 0.75]
 
 
 @pytest.mark.slow

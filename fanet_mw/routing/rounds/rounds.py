@@ -595,15 +595,11 @@ class RoundFlooding(RoutingProtocol):
         """Send again what a neighbor's hello has shown to be missing there."""
         if self._repair is None:
             return
-        for due_ns, packet in self._repair.due(now_ns=now_ns):
+        for _, packet in self._repair.due(now_ns=now_ns):
             if is_used_up(packet.header) and packet.header.origin != self._port.node:
                 continue
-            if key_of_packet(packet) in self._spreading:
-                continue
-            if self._in_turns(packet):
+            if key_of_packet(packet) not in self._spreading:
                 self._queue(packet, src=None, now_ns=now_ns, once=True)
-            else:
-                self._queue_bulk(packet, src=None, from_ns=due_ns + self._lead_ns, now_ns=now_ns)
 
     # --- what is known --------------------------------------------------------------------------------------------
 

@@ -18,9 +18,7 @@ FRAMES, RECEPTIONS = 1000, 4000
 class Swarm:
     """An emulator and two UAVs that report once a second; and the clock's scale by the governor."""
 
-    def __init__(
-        self, *, scale: float = 1.0, least: float = 0.1, end_s: int = 1000, late_limit: float = 0.01
-    ) -> None:
+    def __init__(self, *, scale: float = 1.0, least: float = 0.1, end_s: int = 1000, late_limit: float = 0.01) -> None:
         self.scale = scale
         self._governor = ClockGovernor(scale, least=least, late_limit=late_limit, end_ns=end_s * S, processors=2.0)
         self._seconds = self._late_moments = self._late_frames = self._late_receptions = self._close = 0

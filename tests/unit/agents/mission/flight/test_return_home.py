@@ -168,6 +168,14 @@ def test_a_link_is_lost_after_the_silence_the_scenario_names(make_scenario: Make
     assert not one.back.on_heard(152 * S), "who lands lands"
 
 
+def test_a_uav_says_what_of_its_battery_it_may_spend_and_0_only_as_it_flies_home(make_scenario: MakeScenario) -> None:
+    one = Alone(make_scenario)
+    assert one.back.percent == 100, "nothing was read yet"
+    for charge, percent in ((0.5, 50), (0.004, 1), (0.0, 0)):
+        assert one.back.on_battery(one.limits.reserve + charge, now_ns=0) == (percent == 0)
+        assert one.back.percent == percent
+
+
 def test_only_the_recalled_are_released_before_they_land(make_scenario: MakeScenario) -> None:
     for reason, released in ((ReturnReason.RECALLED, True), (ReturnReason.DONE, False)):
         one = Alone(make_scenario)

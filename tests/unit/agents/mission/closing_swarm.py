@@ -58,7 +58,7 @@ class _Uav:
         )
         home = ReturnHome(
             node, at, own, neighbors, board.out,
-            speed_m_s=_SPEED_M_S, airspeed_m_s=15.0, height_m=at.up, limits=SearchLimits(SCENARIO),
+            speed_m_s=_SPEED_M_S, airspeed_m_s=15.0, height_m=at.up, limits=SearchLimits(SCENARIO), fixes_hz=5.0,
         )  # fmt: skip
         self._roll_call = RollCall(node, hello_interval_s=1.0)
         self._flight = Flight(

@@ -33,7 +33,7 @@ class Homecoming:
         self.returns = [
             ReturnHome(
                 NodeId(node), pad, own, heard, Outbox(), speed_m_s=10.0, airspeed_m_s=19.0,
-                height_m=65.0, limits=limits, beside={*nodes} - {node},
+                height_m=65.0, limits=limits, fixes_hz=5.0, beside={*nodes} - {node},
             )
             for node, pad, own, heard in zip(nodes, pads, self.own, self.heard, strict=True)
         ]  # fmt: skip
@@ -104,7 +104,7 @@ class Alone:
         self.own = OwnMotion(HOME, KnownObstacles(NO_MAP))
         self.back = ReturnHome(
             NodeId(node), HOME._replace(up=0.0), self.own, self.heard, self.out, speed_m_s=10.0, airspeed_m_s=19.0,
-            height_m=65.0, limits=self.limits, beside=beside,
+            height_m=65.0, limits=self.limits, fixes_hz=5.0, beside=beside,
         )  # fmt: skip
 
     def lands(self, east_m: float, north_m: float, velocity: Enu = STILL) -> bool:

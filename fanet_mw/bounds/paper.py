@@ -12,7 +12,7 @@ every hop as periodic. If C p_c > S p, no Q exists, so the equations give no num
 """
 
 from fractions import Fraction
-from math import ceil, gcd
+from math import gcd
 from typing import Final
 
 from fanet_mw.bounds.bounded_or_refused import Bounded, DelayBound, Refused
@@ -25,11 +25,6 @@ _SLOTS_EXAMINED: Final = 100_000
 def paper_slot(*, airtime_ns: int, interval_ns: int, period_ns: int) -> Fraction:
     """S = ((b/R)/p) p_c [ns], a fraction: the slot that just holds the packets of one period."""
     return Fraction(airtime_ns * period_ns, interval_ns)
-
-
-def w_ns(q: int, *, airtime_ns: int, slot_ns: Fraction | int, period_ns: int) -> int:
-    """Equation (4): the instant at which the q-th packet is completed."""
-    return ceil(Fraction(q * airtime_ns) / slot_ns) * period_ns
 
 
 def cluster_estimate(

@@ -287,6 +287,14 @@ def test_what_a_dead_uav_did_not_receive_was_not_lost_on_the_bus(scenario: Scena
     assert any("receptions lost on the bus" in reason for reason in reasons(outcome)), "a share of those of the living"
 
 
+def test_what_a_uav_had_not_read_when_the_run_ended_was_not_lost_on_the_bus(scenario: Scenario) -> None:
+    outcome = good(scenario)
+    put(outcome, "agent-2", "receptions", value=HEARD - HEARD // 4)
+    assert any("receptions lost on the bus" in reason for reason in reasons(outcome))
+    put(outcome, "agent-2", "host", "unread_receptions", value=HEARD // 4)
+    assert reasons(outcome) == []
+
+
 def test_what_a_uav_did_not_count_whose_program_was_started_again_was_not_lost_on_the_bus(make_scenario: Any) -> None:
     stop = {"kind": "stop", "node": 2, "at_s": 4, "for_s": 1}
     outcome = good(make_scenario(**{"nodes.count": 2, "faults": [stop]}))

@@ -43,6 +43,17 @@ def test_a_hello_alone_tells_no_time_and_the_next_one_tells_that_of_the_first() 
     assert (sync.reference, sync.hops(4 * S)) == (1, 1)
 
 
+def test_a_time_is_supported_until_three_hellos_after_the_reference_or_two_others_stated_it() -> None:
+    sync = follower()
+    assert not sync.supported(0)
+    follow(sync, ahead_ns=25 * MS, hellos=5)
+    assert sync.supported(8 * S)
+    assert not sync.supported(8 * S + 1)
+    for src, enough in ((3, False), (4, True)):
+        follow(sync, ahead_ns=25 * MS, hellos=2, src=src, first=8, hops=1)
+        assert sync.supported(9 * S) == enough
+
+
 def test_a_pair_holds_half_the_flight_and_its_hop_s_error() -> None:
     """Up to 20 us of flight: 10 us are taken for granted, 10 us and a stamp are stated as error."""
     sync = TimeSync(Settings(NodeId(2), False, S, Oscillator(40e-6, 0.0, US), 20 * US, LIMIT_NS, NodeId(1)))  # noqa: FBT003

@@ -128,6 +128,13 @@ def test_who_finds_a_neighbor_lost_floods_that_once() -> None:
     assert told == [[], [{PLAN.nodes.index(out)}], [], []]
 
 
+def test_who_looks_often_whether_somebody_is_lost_waits_no_longer_to_tell_it() -> None:
+    exchange = who_lost(LINE, NodeId(6), waits=0.9)
+    for after_ms in range(0, 1000, 100):
+        exchange.plans.close_ranks(NOW_NS + 4 * S + after_ms * MS)
+    assert len(exchange.out.packets) == 1
+
+
 @pytest.mark.parametrize(("flooded", "also_lost", "floods"), [(True, False, 0), (False, False, 1), (True, True, 1)])
 def test_of_two_who_find_the_same_loss_only_the_first_floods_it(flooded: bool, also_lost: bool, floods: int) -> None:
     out, other = NodeId(6), NodeId(9)

@@ -38,6 +38,16 @@ def test_a_uav_that_has_heard_a_phone_once_passes_all_places_where_it_may_be_and
     assert passed >= 20, "within a minute at 8 m/s, without any further power, of 24 places around it"
 
 
+def test_who_turns_to_another_survivor_looks_where_that_one_may_be_and_otherwise_keeps_its_place() -> None:
+    look, here, far = LookAround(LookedAt(LOOK_M, height_m=UP_M)), Enu(0, 0, UP_M), Enu(900, 0, UP_M)
+    near_one, far_one = heard_once(Enu(80, 0, 0), here), heard_once(Enu(820, 0, 0), far)
+    assert look.next_place(1, near_one, here, 0) != look.next_place(2, far_one, here, 0)
+    chosen = look.next_place(2, far_one, here, 0)
+    assert chosen is not None
+    assert math.dist(chosen, (far.east, far.north)) < 300
+    assert look.next_place(2, far_one, Enu(chosen[0], chosen[1] + 200, UP_M), S // 2) == chosen
+
+
 def test_without_a_camera_there_is_nothing_to_look_at() -> None:
     phone = heard_once(Enu(0, 0, 0), Enu(0, 0, UP_M))
     assert LookAround(LookedAt()).next_place(1, phone, Enu(0, 0, UP_M), 0) is None

@@ -70,6 +70,14 @@ def test_a_plan_ends_where_the_next_one_begins() -> None:
     assert let_out(release, until_ms=1000) == [([0, 1], 160)]
 
 
+def test_what_waits_for_a_turn_goes_by_a_plan_that_it_learns_of_meanwhile() -> None:
+    for before in (), (TurnsInForce(0, TURNS, (3,), 100, 2),):
+        release = root(*before)
+        release.push(packet(0), now_ns=60 * MS)
+        release.follow([*before, TurnsInForce(100 * MS, TURNS, (10,), 200, 2)], now_ns=70 * MS)
+        assert let_out(release, until_ms=1000) == [([0], 160)]
+
+
 @pytest.mark.parametrize(("change_ms", "start_ms"), [(50, 46), (49, 60)])
 def test_a_turn_whose_flood_would_outlive_its_timetable_is_not_used(change_ms: int, start_ms: float) -> None:
     """The flood of turn 3 lasts two turns, from 46 to 50 ms."""

@@ -7,7 +7,7 @@ from fanet_mw.application import AppPort, Course
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record
 from fanet_mw.units import NodeId
-from fanet_mw.wire import HEADER_BYTES, PRIORITIES, PRIORITY_REPORT, filler
+from fanet_mw.wire import HEADER_BYTES, PRIORITY_REPORT, filler
 from fanet_mw.wire.survivors import Survivor
 
 
@@ -40,16 +40,15 @@ class Outbox:
 
 
 class ReportFormat:
-    """The length and the priority of survivor reports, by the scenario."""
+    """Survivor reports of the length that the scenario says."""
 
     def __init__(self, scenario: Scenario, node: NodeId) -> None:
         self._node = node
         self._bytes = scenario.mission.report_bytes
-        self._priority = PRIORITIES[scenario.mission.report_priority]
 
     def packet(self, report: Survivor) -> OutgoingPacket:
         """The packet of a report, padded to its length."""
         frames = report.encode_frame(self._node)
         if self._bytes:
             frames += filler(self._bytes - HEADER_BYTES - len(frames), node=self._node)
-        return OutgoingPacket(frames, self._priority)
+        return OutgoingPacket(frames)

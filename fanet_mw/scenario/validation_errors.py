@@ -26,12 +26,13 @@ _REMOVED: Final = {
     ),
     "clusters.gossip_degree": 'removed with clusters.relay = "gossip"; take "counter"',
     "mission.avoid_by": "removed: UAVs avoid others by hellos, and by a radar where they have one",
+    "mission.report_priority": "removed: survivor reports have the priority report",
     "mission.coverage_map": "removed: as much was searched without it; free UAVs follow their place in the formation",
     "clusters.slots": 'removed with clusters.relay = "claimed"; take routing.protocol = "rounds"',
 }
 """Keys and values that older scenarios may have, and what to take instead."""
 _REMOVED_DEFAULTS: Final[Mapping[str, Mapping[str, Any]]] = {
-    "mission": {"coverage_map": False, "avoid_by": ["hellos", "radar"]},
+    "mission": {"report_priority": "report", "coverage_map": False, "avoid_by": ["hellos", "radar"]},
     "world": {"heightmap_white_m": 100.0, "heightmap_pixel_m": 10.0},
     "clusters": {"slots": 0, "gossip_degree": 6.0},
 }

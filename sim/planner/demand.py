@@ -51,8 +51,7 @@ def demands(scenario: Scenario, sources: Sequence[NodeId] | None = None) -> list
         found.append(TrafficClass("warning", WARNING_BYTES, interval_ns, _all(scenario), wire.PRIORITY_SAFETY))
     if scenario.mission.survivors:
         interval_ns = seconds_to_ns(scenario.mission.report_interval_s)
-        priority = wire.PRIORITIES[scenario.mission.report_priority]
-        found.append(TrafficClass("report", report_bytes(scenario), interval_ns, _all(scenario), priority))
+        found.append(TrafficClass("report", report_bytes(scenario), interval_ns, _all(scenario), wire.PRIORITY_REPORT))
     for name, traffic in scenario.traffic_classes.items():
         first = traffic is scenario.traffic
         if traffic.arrivals in ("saturated", "poisson", "trace"):

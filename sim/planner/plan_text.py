@@ -116,7 +116,7 @@ def _lines(found: ScenarioPlan) -> Iterator[str]:
     yield from (item("problem", problem) for problem in found.problems)
     yield from (item("class" if index == 0 else "", _class(c, found)) for index, c in enumerate(found.classes))
     if isinstance(found.access, Bounded):
-        yield item("to the head", "every source is one" if not found.access.delay_ns else _bound_text(found.access))
+        yield item("to the head", "every source is a head" if not found.access.delay_ns else _bound_text(found.access))
     if found.superframe is not None:
         yield from _superframe(found.superframe)
     yield from _capacity(found)

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import S
-from fanet_mw.wire import PRIORITIES, PRIORITY_SAFETY
+from fanet_mw.wire import PRIORITIES, PRIORITY_REPORT, PRIORITY_SAFETY
 from sim.results.connectivity import parts
 from sim.results.links_over_time import LinksOverTime
 from sim.results.outcome import Outcome
@@ -34,10 +34,10 @@ def reachability(outcome: Outcome, applications: Mapping[str, AppPackets], links
 
 
 def _lifetime_ns(scenario: Scenario, name: str) -> int:
-    if name == "warning":
-        return scenario.routing.lifetime_ns(PRIORITY_SAFETY)
-    own = scenario.mission.report_priority if name == "report" else scenario.traffic_classes[name].priority
-    return scenario.routing.lifetime_ns(PRIORITIES[own])
+    urgent = {"warning": PRIORITY_SAFETY, "report": PRIORITY_REPORT}.get(name)
+    return scenario.routing.lifetime_ns(
+        PRIORITIES[scenario.traffic_classes[name].priority] if urgent is None else urgent
+    )
 
 
 def _held_against(outcome: Outcome, name: str, app: AppPackets, flood: "_IdealFlood") -> dict[str, Any]:

@@ -120,7 +120,6 @@ WITH_REPORTS = ["mission.survivors=1", "mission.report_bytes=900", "traffic.payl
         ["clusters.relay=all"],
         *slow(
             ["clusters.relay=scheduled"],
-            ["clusters.relay=scheduled", *WITH_REPORTS, "mission.report_priority=bulk"],
             ["clusters.relay=scheduled", "routing.aggregate=true"],
             ["clusters.relay=scheduled", "clusters.links=measured"],
         ),

@@ -288,20 +288,3 @@ def test_reports_fill_nothing_of_the_room_that_turns_have_for_bulk() -> None:
     _, plan, feasible = planned(*NINE, *keys)
     assert feasible, plan["problems"]
     assert max(slot["used"] for slot in plan["slots"]) <= 1
-    assert not planned(*NINE, *keys, 'mission.report_priority="bulk"')[2], "there they share a room that they overfill"
-
-
-def test_a_bulk_report_that_is_longer_than_the_traffic_takes_a_turn_for_itself() -> None:
-    load = ("traffic.interval_s=0.02", "traffic.payload_bytes=200", "traffic.sources=9", "clusters.flooding_period_s=1")
-    keys = (*load, "mission.survivors=1", 'mission.report_priority="bulk"', "mission.report_bytes=1000")
-    plans = {
-        interval_s: without_capacity(*NINE, *keys, f"mission.report_interval_s={interval_s}") for interval_s in (2, 1)
-    }
-    used = {interval_s: [slot.utilization for slot in found.clusters] for interval_s, found in plans.items()}
-    assert plans[1].superframe is not None
-    together, turns = plans[1].superframe.together, 25
-    assert together > 1
-    more = used[1][-1] - used[2][-1]
-    assert more == pytest.approx(0.5 * (2 - 1 / together) / turns), (
-        "half a report a second, of up to two turns less one"
-    )

@@ -103,14 +103,6 @@ def test_hellos_that_find_no_room_in_their_window_leave_the_first_turn_alone() -
     assert bound["violations"] == 0
 
 
-@pytest.mark.slow
-def test_reports_that_are_sent_as_bulk_and_longer_than_the_traffic_are_carried() -> None:
-    keys = ['mission.report_priority="bulk"', "mission.report_bytes=1500", "traffic.payload_bytes=128"]
-    reports = summary_of("mission.survivors=30", "mission.report_interval_s=2", *keys)["reports"]
-    assert reports["generated"] >= 20
-    assert reports["pdr"] > 0.9
-
-
 def broken_in(outcome: Outcome, stated: Sequence[BoundStated]) -> list[tuple[int, int, int]]:
     """The origin, number and target of what did not arrive in time at a node of 15 to which a bound was stated."""
     given = {(r.origin, r.seq, r.node): r.t_ns for r in outcome.records if type(r) is Delivered}

@@ -90,8 +90,6 @@ class Mission(Section):
     """The interval at which a UAV repeats its report of a survivor whose phone it still receives."""
     report_bytes: Annotated[int, Field(ge=0, le=2304)] = 0
     """UDP payload of a report on the air, including the routing header; 0: as short as possible, which is 79 bytes."""
-    report_priority: Literal["safety", "report", "bulk"] = "report"
-    """Priority of reports, which decides which packets go first, and after which time they expire (`routing`)."""
     scan_interval_s: Interval = 1.0
     """The interval at which the Wi-Fi receiver of a UAV scans for phones."""
     phone_power_dbm: Level = 15.0

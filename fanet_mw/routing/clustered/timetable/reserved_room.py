@@ -20,19 +20,11 @@ def report_bytes(scenario: Scenario) -> int:
     return scenario.mission.report_bytes or _REPORT_BYTES
 
 
-def bulk_report_bytes(scenario: Scenario) -> int:
-    """The length of a survivor report that has no room of its own, because it is sent as bulk; 0 if there is none."""
-    mission = scenario.mission
-    return report_bytes(scenario) if mission.survivors and mission.report_priority == "bulk" else 0
-
-
 def reserved(scenario: Scenario) -> Mapping[int, int]:
     """Bytes of each turn that bulk must leave free, by priority: one packet of each urgent class in use."""
-    mission = scenario.mission
     found = {}
-    if mission.collision_horizon_s:
+    if scenario.mission.collision_horizon_s:
         found[wire.PRIORITY_SAFETY] = WARNING_BYTES
-    if mission.survivors and mission.report_priority != "bulk":
-        priority = wire.PRIORITIES[mission.report_priority]
-        found[priority] = max(report_bytes(scenario), found.get(priority, 0))
+    if scenario.mission.survivors:
+        found[wire.PRIORITY_REPORT] = report_bytes(scenario)
     return found

@@ -6,7 +6,7 @@ from typing import Final
 from fanet_mw.routing.clustered.roles.position_updates import STRAYED, UNLIKE
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_ns
 from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
-from fanet_mw.routing.clustered.timetable.reserved_room import bulk_report_bytes, reserved
+from fanet_mw.routing.clustered.timetable.reserved_room import reserved
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, seconds_to_ns
 from fanet_mw.wire import DIGEST, HEADER_BYTES, LINKS, LOADS, OVERHEAD, PLACES, SCHEDULE
@@ -32,10 +32,9 @@ LOAD: Final = 0.9
 
 
 def largest_frame(scenario: Scenario, *, together: int = 1) -> int:
-    """The largest frame of a turn: bulk (survivor reports may be longer) and reserved room, or an announcement."""
+    """The largest frame of a turn: bulk and reserved room, or an announcement."""
     links_bytes = HEADER_BYTES + MESSAGES * (LINKS.layout.size + OVERHEAD) if scenario.measures_links else 0
-    bulk_bytes = max(together * scenario.traffic.payload_bytes, bulk_report_bytes(scenario))
-    longest = max(bulk_bytes, schedule_bytes(scenario), links_bytes)
+    longest = max(together * scenario.traffic.payload_bytes, schedule_bytes(scenario), links_bytes)
     return longest + sum(reserved(scenario).values())
 
 

@@ -12,7 +12,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.trace import Approaching, Arrived, Detected
 from fanet_mw.units import Enu, NodeId, S
-from fanet_mw.wire import HEADER_BYTES, PRIORITY_BULK, PRIORITY_REPORT
+from fanet_mw.wire import HEADER_BYTES, PRIORITY_REPORT
 from fanet_mw.wire.survivors import Survivor
 
 HERE = Enu(0, 0, 50)
@@ -65,12 +65,12 @@ def test_a_phone_is_reported_more_often_than_it_is_measured_until_a_scan_no_long
     assert len(uav.out.packets) == 16, "the receiver looks every second: after 1.5 s of silence the phone is gone"
 
 
-def test_a_report_is_filled_up_to_its_length_and_as_urgent_as_the_scenario_says() -> None:
-    short, long = Uav(), Uav(report_bytes=512, report_priority="bulk")
+def test_a_report_is_filled_up_to_its_length_and_urgent() -> None:
+    short, long = Uav(), Uav(report_bytes=512)
     for uav in (short, long):
         uav.rule.scan(((4, -70.0),), position=HERE, now_ns=0)
     assert [len(packet.frames) + HEADER_BYTES for packet in (*short.out.packets, *long.out.packets)] == [79, 512]
-    assert [packet.priority for packet in (*short.out.packets, *long.out.packets)] == [PRIORITY_REPORT, PRIORITY_BULK]
+    assert [packet.priority for packet in (*short.out.packets, *long.out.packets)] == 2 * [PRIORITY_REPORT]
     assert long.reported_us == [0]
 
 

@@ -13,7 +13,6 @@ from fanet_mw.units import BROADCAST, Enu, NodeId
 from fanet_mw.wire import HEADER_BYTES, PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY, filler
 
 REPORTS = {"mission.survivors": 2, "mission.report_bytes": 900}
-BULK_REPORTS = {**REPORTS, "mission.report_priority": "bulk"}
 
 
 def lengths(make_scenario: MakeScenario, relay: str, payload_bytes: int, **keys: Any) -> tuple[int, int]:
@@ -39,9 +38,8 @@ def test_in_a_timetable_bulk_has_the_room_of_traffic_or_of_a_schedule(make_scena
     assert lengths(make_scenario, "scheduled", 600) == (600, 600)
 
 
-def test_in_a_timetable_reports_have_room_whether_they_are_urgent_or_not(make_scenario: MakeScenario) -> None:
+def test_in_a_timetable_reports_have_room_of_their_own(make_scenario: MakeScenario) -> None:
     assert lengths(make_scenario, "scheduled", 600, **REPORTS) == (600, 900)
-    assert lengths(make_scenario, "scheduled", 600, **BULK_REPORTS) == (900, 900)
     assert lengths(make_scenario, "scheduled", 1200, **REPORTS) == (1200, 1200)
 
 

@@ -8,7 +8,7 @@ from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_ns, turn_sla
 from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
 from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
-from fanet_mw.routing.clustered.timetable.turn_size import largest_frame, links, superframe
+from fanet_mw.routing.clustered.timetable.turn_size import links, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.timesync.turn_slack import clocks_fit
 from fanet_mw.units import MS, US, NodeId
@@ -75,10 +75,3 @@ def test_a_turn_beyond_the_superframe_is_heard_in_the_next_one() -> None:
         NodeId(3), 0, FittedTimetable(turns, table, together=1, frame_bytes=1024, whole=True, enough=True)
     )
     assert plan.heard == {(28, 1): (28, 1, 0), (1, 2): (30, 1, 0)}
-
-
-def test_a_turn_has_room_for_a_report_that_is_sent_as_bulk(make_scenario: MakeScenario) -> None:
-    keys = {**KEYS, "traffic.payload_bytes": 100, "mission.report_bytes": 1500, "mission.report_priority": "bulk"}
-    assert largest_frame(make_scenario(**keys, **{"mission.survivors": 4})) == 1500
-    assert largest_frame(make_scenario(**keys, **{"mission.survivors": 4}), together=20) == 2000
-    assert largest_frame(make_scenario(**keys, **{"mission.survivors": 0})) < 1500, "nobody reports"

@@ -16,6 +16,7 @@ import inspect
 import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import redirect_stdout
 from functools import lru_cache
 from importlib import import_module
 from importlib.machinery import EXTENSION_SUFFIXES, SOURCE_SUFFIXES
@@ -147,7 +148,7 @@ def load(key: str, name: str) -> Any:  # noqa: ANN401  (whatever the contract of
         raise ValueError(f"{key} = {name!r}: {text} is a part of Python, and no class with {_methods(key)}")
     digest(module.partition(".")[0])
     try:
-        with exits_raised():
+        with exits_raised(), redirect_stdout(sys.stderr):  # a greeting would stand in the output of --json
             found: Any = import_module(module)
         for part in path.split("."):
             found = getattr(found, part)

@@ -53,6 +53,7 @@ def in_own_process(work: Callable[[], int], parts: Iterable[str]) -> int:
         os.close(write)
         interrupts.leave(_code(_awaited(child, waited), read, parts))
     os.setpgid(0, 0)  # a terminal's signals come by the parent, once
+    signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # it may write there all the same
     be_killed_with_parent()
     signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     if os.getppid() != parent:

@@ -81,6 +81,7 @@ def carry_out(
     dry_run: bool = False,
     json: bool = False,
 ) -> int:
+    from sim.cli.foreign_parts import own_output
     from sim.sweep.one_run import processor_s
     from sim.sweep.provenance import code
     from sim.sweep.store import TABLE, Store
@@ -100,7 +101,7 @@ def carry_out(
         if plan.todo:
             _compile()
         began, began_cpu_s = time.monotonic(), processor_s()
-        with _progress(name, quiet=json) as tell:
+        with own_output(json=json), _progress(name, quiet=json) as tell:
             try:
                 table = run(plan, store, workers, wanted.varied(), on_progress=tell)
             except KeyboardInterrupt:

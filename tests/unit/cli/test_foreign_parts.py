@@ -34,7 +34,11 @@ def ended(work: Callable[[], int], says: Path) -> int:
         finally:
             sys.stderr.flush()
             os._exit(code)
-    return os.waitstatus_to_exitcode(os.waitpid(command, 0)[1])
+    _, status = os.waitpid(command, os.WUNTRACED)
+    if os.WIFSTOPPED(status):
+        os.kill(command, signal.SIGCONT)
+        _, status = os.waitpid(command, 0)
+    return os.waitstatus_to_exitcode(status)
 
 
 def raises() -> NoReturn:
@@ -53,6 +57,12 @@ def is_interrupted() -> int:
     return 0
 
 
+def is_stopped() -> int:
+    os.kill(os.getppid(), signal.SIGTSTP)
+    time.sleep(0.01)
+    return 6
+
+
 _GONE = (
     "fanet: the run has no result: its process, which flew parts of mine, yours, was ended with {}, from C or by "
     "another program\n"
@@ -69,6 +79,7 @@ _GONE = (
         (lambda: 7, 7, ""),
         (raises, 5, ""),
         (is_interrupted, 143, ""),
+        (is_stopped, 6, ""),
         (
             leaves_threads,
             3,

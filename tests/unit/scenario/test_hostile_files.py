@@ -102,6 +102,17 @@ def test_a_module_that_raises_or_exits_when_it_is_imported_is_one_sentence(
             catalog.find("quick", [f"routing.protocol=hostile_{number}:Part"])
 
 
+def test_what_a_module_prints_when_it_is_imported_is_no_output_of_a_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "greeting.py").write_text(
+        "from fanet_mw.routing.flooding import Flooding as Theirs\nclass Part(Theirs): pass\nprint('hello')"
+    )
+    catalog.find("quick", ["routing.protocol=greeting:Part"])
+    assert capsys.readouterr() == ("", "hello\n")
+
+
 @pytest.mark.parametrize(("where", "code", "said"), [("thread", 1, b"os._exit(0)"), ("fork", 0, b"")])
 def test_a_thread_of_a_part_does_not_end_the_process_with_0_and_without_a_word(
     where: str, code: int, said: bytes

@@ -21,7 +21,7 @@ from xml.etree import ElementTree
 from fanet_mw.errors import ConfigError
 from fanet_mw.foreign_file import read_regular
 from fanet_mw.geodesy import Geodetic, to_enu, to_geodetic
-from fanet_mw.scenario.outlines import require_degrees
+from fanet_mw.scenario.outlines import half_turn, require_degrees
 from fanet_mw.scenario.text_files import decoded
 from fanet_mw.units import Enu
 
@@ -98,12 +98,9 @@ def _take_area(world: dict[str, Any], said: str, shapes: Shapes) -> None:
     points = [point for ring in shapes.inside for point in ring]
     if not points:
         raise ConfigError(f"{said}: it holds no polygon")
-    lats, lons = [lat for lat, _ in points], [lon for _, lon in points]
-    if max(lons) - min(lons) > 180:
-        raise ConfigError(
-            f"{said}: it reaches across 180 degrees of longitude; shift it, or state world.origin_deg and area_m"
-        )
-    middle = (min(lats) + max(lats)) / 2, (min(lons) + max(lons)) / 2
+    start = points[0][1]
+    lats, lons = [lat for lat, _ in points], [start + half_turn(lon - start) for _, lon in points]
+    middle = (min(lats) + max(lats)) / 2, half_turn((min(lons) + max(lons)) / 2)
     world.setdefault("origin_deg", [round(part, 7) for part in middle])
     reach_m = max(abs(part) for point in points for part in _flat(point, world["origin_deg"]))
     if 2 * reach_m > _FARTHEST_M and "area_m" not in world:

@@ -1,6 +1,7 @@
 """Areas, no-fly areas and people from the files of ground stations and maps."""
 
 import json
+import math
 import zipfile
 from pathlib import Path
 
@@ -230,6 +231,17 @@ def test_fences_and_rally_points_of_mission_planner_are_read(tmp_path: Path, hom
     assert found.world.no_fly_m[0] == pytest.approx((100, 100, 14.15), abs=0.1)
     assert found.world.no_fly_m[1] == pytest.approx((0, -100, 25), abs=0.1)
     assert found.mission.survivor_positions_m[1] == pytest.approx(PEOPLE[1], abs=0.1)
+
+
+@pytest.mark.parametrize(("west", "east", "middle"), [(179.999, -179.998, -179.9995), (-179.999, 179.996, 179.9985)])
+def test_an_area_across_180_degrees_is_one(tmp_path: Path, west: float, east: float, middle: float) -> None:
+    corners = [[west, -16.5], [east, -16.5], [east, -16.501], [west, -16.501]]
+    (tmp_path / "fiji.geojson").write_text(json.dumps({"type": "Polygon", "coordinates": [[*corners, corners[0]]]}))
+    world = scenario(tmp_path, '[mission]\narea = "fiji.geojson"').world
+    assert world.origin_deg == pytest.approx((-16.5005, middle))
+    assert world.area_m == pytest.approx(
+        60.0 * 1852 * abs(east - west - math.copysign(360, east - west)) * 0.959, rel=0.01
+    )
 
 
 def test_of_a_list_without_home_the_first_waypoint_counts(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ Constructors are left out: each names what it hands on.
 """
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,9 +26,17 @@ def classes() -> Iterator[tuple[str, Known]]:
         for path in (ROOT / package).rglob("*.py"):
             text = path.read_text(encoding="utf-8")
             if path.name != "fanet.py" and "class " in text:  # generated
-                for node in ast.walk(ast.parse(text)):
-                    if isinstance(node, ast.ClassDef):
-                        yield node.name, known(node, passes="super()" in text)
+                for node in classes_in(ast.parse(text).body):
+                    yield node.name, known(node, passes="super()" in text)
+
+
+def classes_in(body: Sequence[ast.stmt]) -> Iterator[ast.ClassDef]:
+    """The classes of a module, those in others and in functions too."""
+    for node in body:
+        if isinstance(node, ast.ClassDef):
+            yield node
+        if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            yield from classes_in(node.body)
 
 
 def known(node: ast.ClassDef, *, passes: bool) -> Known:

@@ -50,6 +50,12 @@ def test_a_uav_of_a_line_turns_back_for_a_survivor_where_no_connection_is_asked(
         assert (bids_of(board, behind(LINE, 300), NOW_NS).survivor == 1) == goes
 
 
+def test_however_few_seconds_a_uav_may_be_out_of_reach_that_is_a_permission() -> None:
+    board = Board(LINE, lane_of(LINE, NOW_NS))
+    for connection, permitted in (("always", False), (0.5, True), (30, True), ("none", True)):
+        assert Absence(board.place, connection, speed_m_s=10.0).is_permitted == permitted  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("connection", ["always", 30, "none"])
 def test_who_goes_to_nobody_is_not_absent_wherever_it_is(connection: Connection) -> None:
     board = Board(LINE, behind(LINE, 400), connection=connection)

@@ -142,6 +142,14 @@ def test_until_a_fix_comes_it_stands_where_it_started_and_says_that_it_has_none(
     assert latest(streams, "GPS_RAW_INT", now_ns=60 * S).fix_type == 3
 
 
+def test_a_receiver_is_healthy_until_three_seconds_after_a_fix() -> None:
+    streams = make()
+    streams.fix(Gps(1 * S, START, STILL))
+    for now_ns, healthy in ((1 * S, True), (4 * S - 1, True), (4 * S, False)):
+        (status,) = mavlink.decode(streams.one(1, now_ns) or b"")
+        assert bool(status.onboard_control_sensors_health & 32) == healthy  # MAV_SYS_STATUS_SENSOR_GPS
+
+
 def test_a_heading_is_unknown_until_it_flies_and_a_beacon_is_as_long_as_later() -> None:
     streams = make()
     at_rest = streams.beacon_frames(1 * S)

@@ -47,6 +47,13 @@ def timings(draw: st.DrawFn) -> RoundTiming:
     )
 
 
+@pytest.mark.parametrize(("bulk_share", "slots"), [(0.0, 0), (0.0001, 4), (0.1, 4)])
+def test_however_small_the_share_of_bulk_a_round_has_four_slots_for_it(bulk_share: float, slots: int) -> None:
+    timing = RoundTiming.of(config.build({"nodes": {"count": 6}, "rounds": {"bulk_share": bulk_share}}))
+    assert timing.slots == slots
+    assert timing.period_ns >= timing.nodes * timing.turn_ns + slots * timing.slot_ns
+
+
 @given(timings(), INSTANTS, st.data())
 def test_turns_of_two_nodes_never_overlap(timing: RoundTiming, from_ns: int, data: st.DataObject) -> None:
     one, other = data.draw(st.permutations(range(1, timing.nodes + 1)))[:2]

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from hand_driven import NAMES, PAYLOAD, Air, receptions, statuses
 
+from emulator.late_requests import LateRequests
 from fanet_mw.airtime import frame_ns
 from fanet_mw.bus.messages import Obstructions, Poses, Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.scenario import Scenario
@@ -180,6 +181,14 @@ def test_a_frame_that_waits_beyond_its_own_end_is_dropped_and_the_next_one_goes(
     heard = air.run()
     assert [outcome for node, outcome, _, _ in statuses(heard) if node == 1] == [TxOutcome.LIFETIME, TxOutcome.SENT]
     assert air.medium.report()["frames"]["dropped"] == {"mac_lifetime": 1}
+
+
+def test_however_late_a_request_is_it_counts_by_its_lateness() -> None:
+    late = LateRequests(time_scale=1.0)
+    for late_ms in (0.05, 3, 700, 5000):
+        assert late.is_too_late(round(late_ms * MS), now_ns=0) == (late_ms > 50)
+    assert [late.report(requests)["p50_ms"] for requests in (4, 8)] == [5.0, 0.0]
+    assert [late.report(requests)["p99_ms"] for requests in (4, 100, 400)] == [5000.0, 1000.0, 0.0]
 
 
 def test_late_requests_are_counted_and_very_late_ones_dropped(make_scenario: MakeScenario) -> None:

@@ -54,6 +54,15 @@ def test_however_small_the_share_of_bulk_a_round_has_four_slots_for_it(bulk_shar
     assert timing.period_ns >= timing.nodes * timing.turn_ns + slots * timing.slot_ns
 
 
+@pytest.mark.parametrize(("most", "together"), [(500, 1), (1200, 2), (1500, 2)])
+def test_a_frame_of_bulk_holds_two_packets_where_the_radio_sends_frames_so_long(most: int, together: int) -> None:
+    radio, traffic = {"max_frame_bytes": most}, {"payload_bytes": 300, "priority": "bulk"}
+    scenario = config.build({"nodes": {"count": 6}, "radio": radio, "traffic": traffic, "rounds": {"turn_bytes": 400}})
+    slot_bytes = RoundTiming.of(scenario).slot_bytes
+    assert slot_bytes // scenario.longest_bulk_bytes == together
+    assert slot_bytes <= most
+
+
 @given(timings(), INSTANTS, st.data())
 def test_turns_of_two_nodes_never_overlap(timing: RoundTiming, from_ns: int, data: st.DataObject) -> None:
     one, other = data.draw(st.permutations(range(1, timing.nodes + 1)))[:2]

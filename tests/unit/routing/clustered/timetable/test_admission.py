@@ -1,13 +1,19 @@
 """Admission: the shortest interval that meets a deadline, who is refused, and what is said when it is lost."""
 
+import json
+
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fanet_mw.node.node import Node
+from fanet_mw.routing import make_protocol
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.admission import Admission, least_interval_ns
 from fanet_mw.routing.clustered.timetable.own_bound import RootTurns
 from fanet_mw.trace import DeadlineLost, DeadlineMet
-from fanet_mw.units import MS, NodeId, S
+from fanet_mw.units import MS, Enu, NodeId, S
+from sim.scenarios import catalog
 
 ME = NodeId(7)
 EXPECTED_NS = 8 * S
@@ -89,3 +95,16 @@ def test_who_had_a_bound_says_at_once_that_it_is_gone() -> None:
     assert isinstance(admission.follow(own, now_ns=4 * S), DeadlineMet)
     assert admission.next_wake_ns() is None
     assert isinstance(admission.follow(None, now_ns=5 * S), DeadlineLost)
+
+
+@pytest.mark.parametrize(("node", "sources", "says"), [(2, 8, True), (1, 8, False), (1, "all", True)])
+def test_who_has_packets_of_its_own_says_so_if_no_timetable_comes_for_them(
+    node: int, sources: object, says: bool
+) -> None:
+    """A leader, node 1 here, is in no cluster: its packets have turns only where it is named as a source."""
+    keys = ["nodes.count=9", "clusters.count=8", "traffic.deadline_s=1", f"traffic.sources={json.dumps(sources)}"]
+    alone = Node(NodeId(node), catalog.find("clusters", keys), make_protocol, position=Enu(0, 0, 50))
+    alone.start(0)
+    while (wake_ns := alone.next_wake_ns()) is not None and wake_ns < 30 * S:
+        alone.wake(wake_ns)
+    assert any(isinstance(record, DeadlineLost) for record in alone.records) == says

@@ -18,7 +18,7 @@ from agents.mission.finding.calibration import common_offset, likelihood
 from agents.mission.finding.least_squares import PowerReading, estimate
 from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, Estimate, PhoneFilter, PhoneModel, PhoneOffset
 from fanet_mw.scenario import Traffic
-from fanet_mw.trace import BoundStated
+from fanet_mw.trace import BoundStated, RadioFault
 from fanet_mw.units import MS, Enu, NodeId
 from sim.records.record_kinds import records_of
 from sim.results.bounds import against_bounds
@@ -112,7 +112,8 @@ def swarm_row(name: str, case: Case) -> list[str]:
             record.bound_ns / MS for record in records_of(outcome.records, BoundStated) if record.t_ns >= late_ns
         ]
         pdr.append(sum(len(app.deliveries) for app in found.values()) / sum(app.wanted for app in found.values()))
-        bounds.append(against_bounds(found, ended_ns=outcome.simulated_ns))
+        faults = records_of(outcome.records, RadioFault)
+        bounds.append(against_bounds(found, faults, ended_ns=outcome.simulated_ns))
     stated = statistics.fmean(bound.get("stated_share", 0.0) for bound in bounds)
     within = statistics.fmean(bound.get("within_share", 0.0) for bound in bounds)
     broken = sum(bound.get("violations", 0) for bound in bounds)

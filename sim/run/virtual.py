@@ -2,12 +2,15 @@
 
 import os
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from signal import Signals
 from typing import Final
+
+import numpy as np
 
 from agents.clock.clocked_uav import make_uav
 from emulator.medium import Medium
@@ -96,7 +99,7 @@ def simulate(
     what a part has raised, which ends a run early, and else is raised; a long run keeps what it collects in a nameless
     file in `spool_folder`.
     """
-    with GARBAGE.not_collected(), _same_folder(), exits_raised():
+    with GARBAGE.not_collected(), _same_surroundings(), exits_raised():
         observed = Observed(
             scenario, capture=capture, applications=applications, folder=spool_folder, observer=observer
         )
@@ -115,12 +118,17 @@ def simulate(
 
 
 @contextmanager
-def _same_folder() -> Iterator[None]:
-    """Keep the working folder, which a part of another package may change: relative paths stay what they were."""
+def _same_surroundings() -> Iterator[None]:
+    """Keep what a part of another package may change for all of the process: the working folder, so that relative paths
+    stay what they were, the mode of new files, so that results can be read, and what warns or raises.
+    """
     folder = os.open(".", os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    os.umask(mode := os.umask(0o077))
     try:
-        yield
+        with warnings.catch_warnings(), np.errstate():
+            yield
     finally:
+        os.umask(mode)
         os.fchdir(folder)
         os.close(folder)
 

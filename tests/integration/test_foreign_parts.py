@@ -204,6 +204,7 @@ class Mover(Finder):
     def look(self):
         import os
         os.chdir("/")
+        os.umask(0o777)
         raise ValueError
 class Proto(Flooding):
     def receive(self, packet, reception, *, now_ns):
@@ -251,3 +252,4 @@ def test_what_was_flown_until_a_part_raises_is_kept_and_said_to_have_been_ended_
     assert 2 < summary["simulated_s"] < 9
     assert summary["frames"]["delivered"] > 5
     assert (tmp_path / "out" / "trace.jsonl").stat().st_size > 1000
+    assert all(path.stat().st_mode & 0o600 == 0o600 for path in (tmp_path / "out").iterdir()), "they can be read"

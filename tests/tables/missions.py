@@ -72,7 +72,7 @@ _NO_LEADS: Final = ("radio.lead_ms=0", "radio.handover_ms=0", "duration_s=300")
 _FIVE: Final = tuple(range(1, 6))
 _AS_SHIPPED: Final = ("hills", "night", "rescue-base", "convoy", "crossing", "town")
 WHOLE: Final[Mapping[str, Case]] = {
-    "`rescue`, no leads": Case("rescue", _NO_LEADS, tuple(range(12, 21))),
+    "`rescue`, no leads": Case("rescue", _NO_LEADS, tuple(range(12, 32))),
     **{f"`{name}`": Case(name, (), _FIVE) for name in _AS_SHIPPED},
     "`town`, in lines": _TOWN,
 }

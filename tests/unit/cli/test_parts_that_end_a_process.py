@@ -46,8 +46,8 @@ def raises() -> NoReturn:
 
 
 def leaves_threads() -> int:
-    for _ in range(5):
-        threading.Thread(target=time.sleep, args=(60,)).start()
+    for name in "abcde":
+        threading.Thread(target=time.sleep, args=(60,), name=name).start()
     return 3
 
 
@@ -83,8 +83,7 @@ _GONE = (
         (
             leaves_threads,
             3,
-            "fanet: a part of another package has left threads, which are not waited for: Thread-1 (sleep), Thread-2 "
-            "(sleep), Thread-3 (sleep) and 2 more\n",
+            "fanet: a part of another package has left threads, which are not waited for: a, b, c and 2 more\n",
         ),
     ],
 )

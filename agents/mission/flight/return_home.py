@@ -146,8 +146,9 @@ class ReturnHome:
         return True
 
     def end(self, reason: ReturnReason = ReturnReason.DONE) -> None:
-        """The search is over, or the UAV is recalled: it leaves now."""
-        self.reason = self.reason or reason
+        """The search is over, or the UAV is recalled: it leaves now, for good if it only waits for its position."""
+        if self.reason in (None, ReturnReason.LOST_POSITION):
+            self.reason = reason
 
     def release(self) -> bool:
         if self.reason is not ReturnReason.RECALLED or self.lands:

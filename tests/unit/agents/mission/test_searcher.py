@@ -1,7 +1,7 @@
 """What one UAV of a planned search does with its battery, its tasks and its other sensors: timelines."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import pytest
 
@@ -12,6 +12,7 @@ from agents.mission.search_formation.formation_planner import plan_of
 from agents.mission.searcher import Searcher, formation, phone_model
 from fanet_mw.bus.messages import Battery, Call, Camera, Echo, Person, Radar, Voice, WifiScan
 from fanet_mw.motion import Motion
+from fanet_mw.orders import Order, OrderKind
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Confirmed, MissionModeChanged, Sighted
 from fanet_mw.units import MS, US, Enu, NodeId, S
@@ -21,6 +22,7 @@ from fanet_mw.wire.roll import ROLL_NS, Roll
 from fanet_mw.wire.search_messages import Told, told_in
 from fanet_mw.wire.search_plan import SearchStatus
 from fanet_mw.wire.survivors import Found, Standing, Survivor
+from fanet_mw.wire.told_order import ToldOrder
 
 HOME = Enu(0.0, -100.0, 65.0)
 STILL = Enu(0.0, 0.0, 0.0)
@@ -38,11 +40,12 @@ class Flight:
         planned: bool = True,
         home: Enu = HOME,
         lost_link_s: float = 0.0,
+        post_m: Sequence[float] = (),
     ) -> None:
         keys = {
             "nodes.count": 20, "nodes.altitude_m": 65, "mission.survivors": 3, "mission.search": "lines",
             "mobility.model": "onboard", "world.area_m": 1000, "radio.range_m": 250, "sensors.battery_hz": 1,
-            "sensors.camera_hz": 2, "mission.lost_link_s": lost_link_s,
+            "sensors.camera_hz": 2, "mission.lost_link_s": lost_link_s, "ground.at_m": post_m,
         }  # fmt: skip
         scenario = make_scenario(**keys)
         self.outbox = Outbox()
@@ -90,6 +93,11 @@ class Flight:
         return [message for packet in self.outbox.packets for message in told_in(bytes(HEADER_BYTES) + packet.frames)]
 
     @property
+    def charges(self) -> list[int]:
+        """What its statuses have told of its battery [%]; 0 once it has given up its place."""
+        return [message.charge for message in self.told if isinstance(message, SearchStatus)]
+
+    @property
     def away_m(self) -> float:
         """Its horizontal distance from home."""
         return math.hypot(self.at.east - HOME.east, self.at.north - HOME.north)
@@ -114,9 +122,8 @@ def test_who_has_just_enough_left_says_so_flies_home_and_lands(make_scenario: Ca
     flight.outbox.course = None
     flight.fly(0.4)
     assert flight.outbox.course is not None, "a setpoint may be lost: the landing is commanded again at each fix"
-    charges = [message.charge for message in flight.told if isinstance(message, SearchStatus)]
-    assert min(charges[:3]) > 50
-    assert charges[-1] == 0
+    assert min(flight.charges[:3]) > 50
+    assert flight.charges[-1] == 0
 
 
 def test_who_hears_nobody_any_more_flies_home_and_lands(make_scenario: Callable[..., Scenario]) -> None:
@@ -128,8 +135,7 @@ def test_who_hears_nobody_any_more_flies_home_and_lands(make_scenario: Callable[
     assert flight.modes == ["deploy", "search"], "it is silent for 13 s only"
     flight.fly(4)
     assert flight.modes == ["deploy", "search", "lost_link"]
-    charges = [message.charge for message in flight.told if isinstance(message, SearchStatus)]
-    assert charges[-1] == 0, "others may still hear that its place is free"
+    assert flight.charges[-1] == 0, "others may still hear that its place is free"
     flight.fly(60)
     assert flight.modes == ["deploy", "search", "lost_link", "land"]
     assert flight.away_m < 5
@@ -150,16 +156,11 @@ def test_who_hears_somebody_again_on_its_way_home_takes_up_its_place_again(
     before_m = flight.away_m
     flight.fly(1, heard=True)
     assert flight.modes[-1] == "search"
-    charges = [message.charge for message in flight.told if isinstance(message, SearchStatus)]
-    assert charges[-1] > 0, "and it says so at once"
+    assert flight.charges[-1] > 0, "and it says so at once"
     flight.fly(20, heard=True)
     assert abs(flight.away_m - before_m) > 50, "of the two who are left each has a place"
     flight.fly(17)
     assert flight.modes[-2:] == ["search", "lost_link"], "and the second time as the first"
-
-
-def charges(flight: Flight) -> list[int]:
-    return [message.charge for message in flight.told if isinstance(message, SearchStatus)]
 
 
 def test_who_does_not_know_its_place_gives_it_up_at_once_and_takes_one_again_when_it_does(
@@ -168,11 +169,11 @@ def test_who_does_not_know_its_place_gives_it_up_at_once_and_takes_one_again_whe
     flight = Flight(make_scenario)
     flight.fly(40)
     flight.fly(1.2, fixes=False)
-    assert (flight.modes[-1], charges(flight)[-1] > 0) == ("search", True), "a fix or two may be missing"
+    assert (flight.modes[-1], flight.charges[-1] > 0) == ("search", True), "a fix or two may be missing"
     flight.fly(1.4, fixes=False)
-    assert (flight.modes[-1], charges(flight)[-1]) == ("lost_position", 0), "it holds nobody together any more"
+    assert (flight.modes[-1], flight.charges[-1]) == ("lost_position", 0), "it holds nobody together any more"
     flight.fly(1)
-    assert (flight.modes[-1], charges(flight)[-1] > 0) == ("search", True)
+    assert (flight.modes[-1], flight.charges[-1] > 0) == ("search", True)
     at = flight.at
     flight.fly(10)
     assert flight.at.horizontal_to(at) > 30, "and flies on"
@@ -186,8 +187,21 @@ def test_who_has_not_known_its_place_for_longer_than_its_flight_controller_waits
     flight.fly(5.4, fixes=False)
     before_m = flight.away_m
     flight.fly(8)
-    assert (flight.modes[-1], charges(flight)[-1]) == ("lost_position", 0)
+    assert (flight.modes[-1], flight.charges[-1]) == ("lost_position", 0)
     assert flight.away_m < before_m - 30, "if it still obeys, it comes home"
+
+
+def test_who_is_recalled_while_it_does_not_know_its_place_comes_home_once_it_does(
+    make_scenario: Callable[..., Scenario],
+) -> None:
+    flight = Flight(make_scenario, post_m=(0.0, -100.0))
+    flight.fly(40)
+    flight.fly(3, fixes=False)
+    assert flight.modes[-1] == "lost_position"
+    order = ToldOrder(43 * S // US, 21, 1, Order(OrderKind.RECALL, 7))
+    flight.searcher.on_message(order, now_ns=flight.now_ns)
+    flight.fly(10)
+    assert (flight.modes[-1], flight.charges[-1]) == ("recall", 0)
 
 
 def test_who_flies_home_already_flies_on_once_it_knows_its_place_again(make_scenario: Callable[..., Scenario]) -> None:

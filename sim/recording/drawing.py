@@ -14,8 +14,7 @@ STATUS_COLORS: Final = {
 """The color of a survivor by the state of the search for him or her."""
 MODE_COLORS: Final = {
     "": colors.BLUE, "search": colors.BLUE, "respond": colors.RED, "deploy": colors.ORANGE, "takeoff": colors.ORANGE,
-    "wait": colors.ORANGE, "errand": colors.ORANGE, "lost_link": colors.PINK,
-    "lost_position": colors.PINK,
+    "wait": colors.ORANGE, "errand": colors.ORANGE, "lost_link": colors.PINK, "lost_position": colors.PINK,
 }  # fmt: skip
 """The color of a UAV by the mode of its mission; in all other modes it flies home, or has landed."""
 HOMEWARD_COLOR: Final = colors.GRAY

@@ -9,8 +9,8 @@ end.
 Packets of users' applications, whose targets the trace does not tell, are in no share.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -28,35 +28,42 @@ _OF_PLACES: Final = ("partition", "jam")
 Span = tuple[int, int]
 
 
+class _Held(NamedTuple):
+    """The promises of one application, held against what came; its figures are numbers of copies."""
+
+    app: AppPackets
+    stated_ns: list[int]
+    delays_ns: Column
+    late: int
+    never: int
+    overtaken: int
+
+
 def against_bounds(
     applications: Mapping[str, AppPackets], faults: Iterable[RadioFault], *, ended_ns: int
 ) -> dict[str, Any]:
     """The table `bound` of `summary.json`, for all applications together and for each."""
-    promised = {name: app for name, app in applications.items() if _promises(app)}
-    if not promised:
+    if not any(_promises(app) for app in applications.values()):
         return {}
-    surprises = _surprises(faults, ended_ns)
+    surprises = _surprises([*faults], ended_ns)
+    held = {name: _held(app, surprises, ended_ns) for name, app in applications.items() if app.sent}
     return {
-        **_judged([app for app in applications.values() if app.sent], surprises, ended_ns),
-        "classes": {name: _judged([app], surprises, ended_ns) for name, app in promised.items()},
+        **_summed_up(held.values()),
+        "classes": {name: _summed_up([one]) for name, one in held.items() if one.stated_ns},
     }
 
 
-def _surprises(faults: Iterable[RadioFault], ended_ns: int) -> list[Span]:
+def _surprises(faults: Sequence[RadioFault], ended_ns: int) -> list[Span]:
     """When each fault is one that not everybody knows of."""
-    spans, open_spans = list[Span](), dict[str, tuple[RadioFault, Span]]()
-    for fault in faults:
-        began, (since_ns, until_ns) = open_spans.pop(fault.label, (None, (0, 0)))
-        if began is not None and began.kind in _OF_PLACES:
-            spans.append((since_ns, max(until_ns, fault.t_ns)))
-        elif began is not None:
-            spans.append((since_ns, until_ns))
+    spans = []
+    for number, fault in enumerate(faults):
         if fault.active:
-            open_spans[fault.label] = fault, (fault.t_ns, fault.t_ns + UNNOTICED_NS)
-    return spans + [
-        (since_ns, max(until_ns, ended_ns) if fault.kind in _OF_PLACES else until_ns)
-        for fault, (since_ns, until_ns) in open_spans.values()
-    ]
+            until_ns = fault.t_ns + UNNOTICED_NS
+            if fault.kind in _OF_PLACES:
+                ends_ns = (later.t_ns for later in faults[number + 1 :] if later.label == fault.label)
+                until_ns = max(until_ns, next(ends_ns, ended_ns))
+            spans.append((fault.t_ns, until_ns))
+    return spans
 
 
 def likely(applications: Mapping[str, AppPackets]) -> dict[str, Any]:
@@ -71,8 +78,9 @@ def likely(applications: Mapping[str, AppPackets]) -> dict[str, Any]:
     delays = {name: delay_ns for _, name, (delay_ns, _) in stated}
     within = 0
     for app in applications.values():
-        delays_ns, limits_ns = _beside(app, [sent.likely[0] if sent.likely else -1 for sent in app.sent.values()])
-        within += int((delays_ns <= limits_ns)[_not_excluded(app)].sum()) if app.wanted else 0
+        limits_ns = np.array([sent.likely[0] if sent.likely else -1 for sent in app.sent.values()], dtype=np.int64)
+        in_time = app.deliveries.delay_ns <= limits_ns[app.deliveries.packet]
+        within += int(in_time[_not_excluded(app)].sum()) if app.wanted else 0
     wanted = sum(app.sent[name].targets for app, name, _ in stated)
     packets = sum(len(app.sent) for app in applications.values())
     return {
@@ -87,70 +95,49 @@ def _promises(app: AppPackets) -> bool:
     return any(sent.bound_ns is not None for sent in app.sent.values())
 
 
-def _judged(apps: list[AppPackets], surprises: Sequence[Span], ended_ns: int) -> dict[str, Any]:
-    bounds = [sent.bound_ns for app in apps for sent in app.sent.values()]
-    stated = [bound_ns for bound_ns in bounds if bound_ns is not None]
-    wanted = sum(app.wanted for app in apps)
-    deliveries = within_wanted = violations = never = overtaken = longest_ns = 0
-    for app in apps:
-        delays_ns, _ = delays_under_bound(app)
-        deliveries += len(delays_ns)
-        late, missing = _late(app), _never_there(app, ended_ns)
-        violations += int((late + missing).sum())
-        never += int(missing.sum())
-        overtaken += int((late + missing)[_overtaken(app, surprises)].sum())
-        within_wanted += len(delays_ns) - int(late.sum()) if app.wanted else 0
-        longest_ns = max(longest_ns, int(delays_ns.max(initial=0)))
+def _held(app: AppPackets, surprises: Sequence[Span], ended_ns: int) -> _Held:
+    born_ns, targets = np.array([(sent.born_ns, sent.targets) for sent in app.sent.values()], dtype=np.int64).T
+    bounds_ns = _bounds_ns(app)
+    over_ns = born_ns + bounds_ns
+    packets, delays_ns, limits_ns = deliveries_under_bound(app)
+    late = np.bincount(packets[delays_ns > limits_ns], minlength=len(app.sent))
+    missing = np.maximum(0, targets - np.bincount(packets, minlength=len(app.sent)))
+    missing[(bounds_ns < 0) | (over_ns >= ended_ns)] = 0
+    overtaken = np.zeros(len(app.sent), dtype=np.bool_)
+    for since_ns, until_ns in surprises:
+        overtaken |= (born_ns <= until_ns) & (over_ns >= since_ns)
+    broken = (late + missing)[overtaken].sum()
+    return _Held(app, bounds_ns[bounds_ns >= 0].tolist(), delays_ns, int(late.sum()), int(missing.sum()), int(broken))
+
+
+def _summed_up(many: Collection[_Held]) -> dict[str, Any]:
+    stated_ns = [bound_ns for one in many for bound_ns in one.stated_ns]
+    wanted = sum(one.app.wanted for one in many)
+    in_time = sum(len(one.delays_ns) - one.late for one in many if one.app.wanted)
+    never = sum(one.never for one in many)
     return {
-        "within_share": round(within_wanted / wanted, 6) if wanted else None,
-        "violations": violations,
+        "within_share": round(in_time / wanted, 6) if wanted else None,
+        "violations": sum(one.late for one in many) + never,
         "never": never,
-        "overtaken": overtaken,
-        "deliveries": deliveries,
-        "stated_share": round(len(stated) / len(bounds), 6),
-        "worst_ms": round(max(stated) / MS, 3),
-        "observed_max_ms": round(longest_ns / MS, 3),
+        "overtaken": sum(one.overtaken for one in many),
+        "deliveries": sum(len(one.delays_ns) for one in many),
+        "stated_share": round(len(stated_ns) / sum(len(one.app.sent) for one in many), 6),
+        "worst_ms": round(max(stated_ns) / MS, 3),
+        "observed_max_ms": round(max(int(one.delays_ns.max(initial=0)) for one in many) / MS, 3),
     }
 
 
-def _late(app: AppPackets) -> npt.NDArray[np.int64]:
-    """Of each packet, how many copies came later than the bound that was stated for them."""
-    delays_ns, bounds_ns = _beside(app, _bounds_ns(app))
-    came_late = (bounds_ns >= 0) & (delays_ns > bounds_ns) & _not_excluded(app)
-    return np.bincount(app.deliveries.packet[came_late], minlength=len(app.sent))
-
-
-def _never_there(app: AppPackets, ended_ns: int) -> npt.NDArray[np.int64]:
-    """The number of targets that each packet never reached although the bound that was stated for it is over."""
-    promised = app.deliveries.packet[_not_excluded(app)]
-    arrived = np.bincount(promised, minlength=len(app.sent)).tolist()
-    missing = [
-        max(0, sent.targets - count) if sent.bound_ns is not None and sent.born_ns + sent.bound_ns < ended_ns else 0
-        for sent, count in zip(app.sent.values(), arrived, strict=True)
-    ]
-    return np.array(missing, dtype=np.int64)
-
-
-def _overtaken(app: AppPackets, surprises: Sequence[Span]) -> npt.NDArray[np.bool_]:
-    """Of each packet with a bound, whether a fault overtook it: others are not asked for."""
-    born_ns = np.array([sent.born_ns for sent in app.sent.values()], dtype=np.int64)
-    over_ns = born_ns + np.array(_bounds_ns(app), dtype=np.int64)
-    found = np.zeros(len(app.sent), dtype=np.bool_)
-    for since_ns, until_ns in surprises:
-        found |= (born_ns <= until_ns) & (over_ns >= since_ns)
-    return found
-
-
-def _bounds_ns(app: AppPackets) -> list[int]:
+def _bounds_ns(app: AppPackets) -> Column:
     """The bound of each packet; -1 for one without."""
-    return [-1 if sent.bound_ns is None else sent.bound_ns for sent in app.sent.values()]
+    return np.array([-1 if sent.bound_ns is None else sent.bound_ns for sent in app.sent.values()], dtype=np.int64)
 
 
-def delays_under_bound(app: AppPackets) -> tuple[Column, Column]:
-    """The delays of all deliveries for which a bound was stated, and those bounds."""
-    delays_ns, bounds_ns = _beside(app, _bounds_ns(app))
+def deliveries_under_bound(app: AppPackets) -> tuple[Column, Column, Column]:
+    """The deliveries for which a bound was stated: the numbers of their packets, their delays, and those bounds."""
+    deliveries = app.deliveries
+    bounds_ns = _bounds_ns(app)[deliveries.packet]
     promised = (bounds_ns >= 0) & _not_excluded(app)
-    return delays_ns[promised], bounds_ns[promised]
+    return deliveries.packet[promised], deliveries.delay_ns[promised], bounds_ns[promised]
 
 
 def _not_excluded(app: AppPackets) -> npt.NDArray[np.bool_]:
@@ -159,9 +146,3 @@ def _not_excluded(app: AppPackets) -> npt.NDArray[np.bool_]:
         number << 16 | node for number, sent in enumerate(app.sent.values()) if sent.excluded for node in sent.excluded
     ]
     return ~np.isin(app.deliveries.packet.astype(np.int64) << 16 | app.deliveries.node, np.array(pairs, np.int64))
-
-
-def _beside(app: AppPackets, of_packets: list[int]) -> tuple[Column, Column]:
-    """The delay of each delivery, and the value in `of_packets` of its packet."""
-    figures = np.array(of_packets, dtype=np.int64)
-    return app.deliveries.delay_ns, figures[app.deliveries.packet]

@@ -86,9 +86,8 @@ def _network_rows(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     bound = summary["bound"]
     if bound:
         overtaken = bound.get("overtaken", 0)
-        broken = (
-            f"broken {bound['violations'] - overtaken} times" if bound["violations"] > overtaken else "never broken"
-        )
+        times = bound["violations"] - overtaken
+        broken = f"broken {times} times" if times else "never broken"
         broken += f", overtaken by a fault {overtaken} times" if overtaken else ""
         share = "-" if bound["within_share"] is None else f"{bound['within_share']:.2%}"
         yield (

@@ -34,10 +34,9 @@ def reachability(outcome: Outcome, applications: Mapping[str, AppPackets], links
 
 
 def _lifetime_ns(scenario: Scenario, name: str) -> int:
-    urgent = {"warning": PRIORITY_SAFETY, "report": PRIORITY_REPORT}.get(name)
-    return scenario.routing.lifetime_ns(
-        PRIORITIES[scenario.traffic_classes[name].priority] if urgent is None else urgent
-    )
+    own = {"warning": PRIORITY_SAFETY, "report": PRIORITY_REPORT}
+    priority = own[name] if name in own else PRIORITIES[scenario.traffic_classes[name].priority]
+    return scenario.routing.lifetime_ns(priority)
 
 
 def _held_against(outcome: Outcome, name: str, app: AppPackets, flood: "_IdealFlood") -> dict[str, Any]:

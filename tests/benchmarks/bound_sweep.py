@@ -37,7 +37,7 @@ from fanet_mw.units import Enu, NodeId, S
 from sim.planner.plan import plan
 from sim.planner.scenario_plan import ScenarioPlan
 from sim.records.record_kinds import records_of
-from sim.results.bounds import Column, delays_under_bound, likely
+from sim.results.bounds import Column, deliveries_under_bound, likely
 from sim.results.outcome import Outcome
 from sim.results.packets import packets_of
 from sim.run.virtual import actors_of
@@ -217,7 +217,7 @@ def measure(seed: int, *, heard: bool = False) -> Result:
     outcome = flown_by_ear(scenario) if heard else flown(scenario, restarts)
     scenario = outcome.scenario
     found = packets_of(outcome)
-    classes = {name: class_of(*delays_under_bound(app)) for name, app in found.items()}
+    classes = {name: class_of(*deliveries_under_bound(app)[1:]) for name, app in found.items()}
     classes = {name: of for name, of in classes.items() if of.deliveries}
     period_ns = scenario.clusters.flooding_period_s * S
     targets = scenario.nodes.count - 1
@@ -229,7 +229,7 @@ def measure(seed: int, *, heard: bool = False) -> Result:
         nodes=scenario.nodes.count,
         deliveries=sum(of.deliveries for of in classes.values()),
         broken=sum(of.broken for of in classes.values()),
-        broken_paper=sum(int((delays_under_bound(app)[0] > period_ns).sum()) for app in found.values()),
+        broken_paper=sum(int((deliveries_under_bound(app)[1] > period_ns).sum()) for app in found.values()),
         wanted=sum(app.wanted for app in found.values()),
         stated=targets * sum(packet.bound_ns is not None for packet in sent),
         likely=with_likely,

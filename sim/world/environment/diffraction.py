@@ -5,8 +5,8 @@
 
 A hill's edge is the point of the ground with the greatest nu, if it rises above the straight line between the ground at
 both ends. A building has three edges, its roof and its sides; the wave passes the one with the least nu. Of several
-obstacles that with the greatest nu counts. Not modeled: several edges in a row,
-the ground between, rounded tops, and waves through walls.
+obstacles that with the greatest nu counts. Not modeled: several edges in a row, the ground between, rounded tops, and
+waves through walls.
 """
 
 import math

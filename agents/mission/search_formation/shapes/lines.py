@@ -62,7 +62,9 @@ are near where they stand.
 _STRAIGHT_M: Final = 300.0
 """Once the lines have flown this far, the relays are no longer displaced: the chain is a straight line to the north."""
 _SIDE_M: Final = 65.0
-"""The distance of the outermost lanes from the edge, at most a quarter of the area's side; it leaves room to shift."""
+"""The greatest distance of the outermost lanes from the edge, at most a quarter of the area's side."""
+_SHOWN_M: Final = 45.0
+"""Their distance from it where that takes no further lane: their cameras show the edge."""
 _LEAST_LANES: Final = 2
 """The least number of lanes of a line, which has one at each end."""
 _LEAST_APART_M: Final = 60.0
@@ -347,9 +349,9 @@ def fitted(count: int, demands: Demands) -> Dimensions | None:
     `EDGE_M` turn where all beyond are heard, so much slower that more UAVs need no more time.
     """
     half = demands.area_m / 2
-    side = min(_SIDE_M, half / 2)
-    half_width = half - side
-    lanes = max(_LEAST_LANES, math.ceil(2 * half_width / demands.apart_m(demands.reach_m)) + 1)
+    lane_m = demands.apart_m(demands.reach_m)
+    lanes = max(_LEAST_LANES, math.ceil(2 * (half - min(_SIDE_M, half / 2)) / lane_m) + 1)
+    half_width = min(half - min(_SHOWN_M, half / 2), (lanes - 1) * lane_m / 2)
     near = min(EDGE_M, half / 2)
     swept = half - near - min(FIRST_M, (half - near) / 2)
     found: Dimensions | None = None

@@ -126,7 +126,7 @@ def test_a_plan_gives_everyone_a_place_and_the_swarm_stays_in_one_piece_on_the_w
         assert is_one(places), share
 
 
-@pytest.mark.parametrize(("apart_m", "waits_s"), [(200.0, 0.0), (190.0, 2.5)])
+@pytest.mark.parametrize(("apart_m", "waits_s"), [(200.0, 0.0), (190.0, 7.0)])
 def test_lines_around_a_swarm_begin_when_each_is_there_and_could_have_visited_who_is_near_it(
     apart_m: float, waits_s: float
 ) -> None:

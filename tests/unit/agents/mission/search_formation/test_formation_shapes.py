@@ -321,11 +321,11 @@ def test_a_ring_begins_as_large_as_the_swarm_that_stands_around_the_middle_and_w
 def test_lines_begin_a_little_beyond_the_swarm_and_leave_out_only_what_it_has_heard() -> None:
     lines = formed(ShapeName.LINES)
     begun, *nearer = lines.begun_around(AROUND)
-    assert begun.dimensions == lines.dimensions._replace(first_m=520.0, narrower_m=72.5), (
+    assert begun.dimensions == lines.dimensions._replace(first_m=520.0, narrower_m=61.875), (
         "where neighbors hear each other"
     )
     assert [other.dimensions.first_m for other in nearer] == [pytest.approx(16 + 504 * k / 8) for k in range(7, 0, -1)]
-    assert nearer[-1].dimensions.narrower_m == 145.0, "1.3 of how wide it stands"
+    assert nearer[-1].dimensions.narrower_m == 165.0, "1.3 of how wide it stands"
     assert begun.shape.sweep_s < lines.shape.sweep_s - 24
     flown = [begun.at(place, second) for second in range(round(begun.shape.sweep_s) + 1) for place in range(45)]
     heard_from = np.array([(at.east, at.north) for at in (*AROUND, *flown)])
@@ -348,8 +348,8 @@ def test_the_outermost_lanes_fly_to_the_sides_while_the_middle_sweeps_and_waits_
         ]
         for axis in ("east", "north")
     )
-    assert [east for _, east in east_m] == pytest.approx([1112.5, 1185, 1185, 1185])
-    assert [north for _, north in north_m] == pytest.approx([85, 85, 85 + 9 * (125 - aside_s), 1225], abs=1)
+    assert [east for _, east in east_m] == pytest.approx([1143.125, 1205, 1205, 1205])
+    assert [north for _, north in north_m] == pytest.approx([86, 86, 86 + 9 * (125 - aside_s), 1225], abs=1)
     assert [north for north, _ in north_m] == pytest.approx([520, 520 + 7.5 * aside_s, 1225, 1225], abs=1)
 
 
@@ -375,12 +375,19 @@ def test_lines_that_begin_around_the_swarm_hang_together_all_the_way_and_come_ba
     assert middle == pytest.approx([1225, 1225, 16], abs=1), "out, a turn, and back to the middle at 9 m/s"
 
 
+def test_cameras_of_the_outermost_lanes_show_the_edge_where_that_takes_no_further_lane() -> None:
+    wide, small = formed(ShapeName.LINES), formed(ShapeName.LINES, 20, 1000)
+    assert (wide.dimensions.lanes, wide.dimensions.half_width_m) == (15, 1250 - 45)
+    assert small.dimensions.lanes == 6, "seven would leave too few UAVs for four lines"
+    assert 500 - 65 < small.dimensions.half_width_m < 500 - 45
+
+
 def test_only_the_line_whose_uavs_are_missing_becomes_narrower() -> None:
     lines = formed(ShapeName.LINES)
     closed = lines.shape.drawn_in(frozenset(range(2, 8)), 0.91 * REACH_M)
     for second in (0.0, 60.0, 400.0):
         assert [closed.at(lane, second).east for lane in (0, 14)] == pytest.approx([-910, 910])
-        assert [closed.at(lane, second).east for lane in (15, 29)] == pytest.approx([-1185, 1185])
+        assert [closed.at(lane, second).east for lane in (15, 29)] == pytest.approx([-1205, 1205])
         joined = [closed.at(place, second) for place in range(30, 40)]
         assert all(a.horizontal_to(b) <= 0.91 * REACH_M for a, b in itertools.pairwise(joined))
 

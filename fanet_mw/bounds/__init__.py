@@ -1,12 +1,11 @@
 """Worst-case delays: the paper's estimate, and bounds that hold. Pure functions of integer nanoseconds.
 
 `paper` has the paper's equations (1)-(4), for comparison; `slot_service` and `turn_service` are services of slots and
-turns, `arrivals` and `network_calculus` bound a queue, `timetable_flood` floods in a timetable; `guard_time` is the
+turns, `arrivals` and `network_calculus` bound a queue, `timetable_flood` floods in a timetable, `guard_time` is the
 guard time of a slot.
 """
 
-from fanet_mw.bounds.arrivals import Arrivals, Periodic, Total
-from fanet_mw.bounds.bounded_or_refused import Bounded, DelayBound, Refused
+from fanet_mw.bounds.arrivals import Arrivals, Bounded, DelayBound, Periodic, Refused, Total
 from fanet_mw.bounds.network_calculus import backlog, delay_any_order, delay_fifo
 from fanet_mw.bounds.slot_service import Dcf, Server, SlotServer
 from fanet_mw.bounds.turn_service import TurnServer

@@ -19,6 +19,21 @@ from typing import NamedTuple, Protocol
 from fanet_mw.errors import LocalProtocolError
 
 
+class Bounded(NamedTuple):
+    """No packet waits longer than this, under the assumptions of the function that returned it."""
+
+    delay_ns: int
+
+
+class Refused(NamedTuple):
+    """No bound exists, or none can be given; the reason names the quantity, its value and the limit it exceeds."""
+
+    reason: str
+
+
+DelayBound = Bounded | Refused
+
+
 class Arrivals(Protocol):
     """An arrival curve: the traffic that can arrive at a queue."""
 

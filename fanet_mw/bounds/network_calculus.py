@@ -12,8 +12,7 @@ from itertools import islice
 from math import ceil, lcm
 from typing import Final
 
-from fanet_mw.bounds.arrivals import Arrivals, Periodic
-from fanet_mw.bounds.bounded_or_refused import Bounded, DelayBound, Refused
+from fanet_mw.bounds.arrivals import Arrivals, Bounded, DelayBound, Periodic, Refused
 from fanet_mw.bounds.slot_service import Server
 
 _PACKETS_EXAMINED: Final = 100_000

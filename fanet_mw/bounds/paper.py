@@ -15,7 +15,7 @@ from fractions import Fraction
 from math import gcd
 from typing import Final
 
-from fanet_mw.bounds.bounded_or_refused import Bounded, DelayBound, Refused
+from fanet_mw.bounds.arrivals import Bounded, DelayBound, Refused
 from fanet_mw.errors import LocalProtocolError
 
 _SLOTS_EXAMINED: Final = 100_000

@@ -11,8 +11,7 @@ from typing import ClassVar
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port, RoutingProtocol
-from fanet_mw.node.hop_limit import is_used_up
-from fanet_mw.node.packet import Packet, Relay
+from fanet_mw.node.packet import Packet, Relay, is_used_up
 from fanet_mw.units import BROADCAST
 from fanet_mw.wire import FLAG_FLOOD
 

@@ -14,8 +14,7 @@ from typing import ClassVar, Final, NamedTuple
 from fanet_mw.bus.messages import Reception, TxOutcome, TxStatus
 from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.node.contract import Port, RoutingProtocol
-from fanet_mw.node.hop_limit import is_used_up
-from fanet_mw.node.packet import Packet
+from fanet_mw.node.packet import Packet, is_used_up
 from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.routing.address_resolution import Knowledge, Outgoing, Resolver
 from fanet_mw.routing.rival_control_messages import Family, check_node, type_of, unpack

@@ -6,6 +6,10 @@
 Who is the reference, and what is believed: docs/explanation/time.md. A beacon is news if the reference's `round` has
 advanced beyond the last news or, after a while without, beyond that neighbor's last beacon: a restarted reference
 counts anew. A plausible forged beacon counts as one neighbor's statement; it can be outvoted, but is not recognized.
+
+While a node has no time of its own it accepts the leader's statement at once. Any other needs a second neighbor that
+agrees, or some time in which no more contradict it than agree. Not detected: a liar that is the only neighbor, and
+liars that outnumber the honest neighbors (`clock_fit`).
 """
 
 import math
@@ -15,10 +19,44 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 from fanet_mw.serial_number import following, newer
-from fanet_mw.timesync.clock_fit import EXACT, ClockFit, Line, Oscillator, Pair
-from fanet_mw.timesync.initial_sync import InitialSync
+from fanet_mw.timesync.clock_fit import EXACT, ClockFit, Line, Oscillator, Pair, alike
 from fanet_mw.units import MS, NodeId, S
 from fanet_mw.wire.hello.time_beacon import TimeBeacon
+
+_ENOUGH: Final = 2
+"""The number of neighbors that must agree."""
+
+
+class InitialSync:
+    """The statements of neighbors while none has been accepted."""
+
+    def __init__(self, oscillator: Oscillator, *, leader: NodeId, wait_ns: int, memory_ns: int) -> None:
+        self._oscillator = oscillator
+        self._leader = leader
+        self._wait_ns = wait_ns
+        """How long a single statement waits for a second one."""
+        self._memory_ns = memory_ns
+        """How long a statement counts."""
+        self._stated: dict[NodeId, tuple[int, Pair]] = {}
+        self._since_ns = 0
+        """The instant since which there has always been a statement that counts."""
+
+    def on_statement(self, src: NodeId, reference: int, pair: Pair, *, local_ns: int) -> bool:
+        """A neighbor has stated the time; returns True if the node should follow this reference from now on."""
+        horizon_ns = pair.local_ns - self._memory_ns
+        self._stated = {node: stated for node, stated in self._stated.items() if stated[1].local_ns >= horizon_ns}
+        if not self._stated:
+            self._since_ns = local_ns
+        self._stated[src] = reference, pair
+        if src == reference == self._leader:
+            return True
+        statements = self._stated.values()
+        agreeing = sum(of == reference and alike(other, pair, self._oscillator) for of, other in statements)
+        contradicting = len(self._stated) - agreeing
+        if local_ns - self._since_ns >= self._wait_ns:
+            return agreeing >= contradicting
+        return agreeing >= _ENOUGH and agreeing > contradicting
+
 
 _LISTEN_HELLOS: Final = 2.5
 """How long the leader listens at its start, because a swarm that already has a time keeps it."""

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from itertools import pairwise
 from typing import Final
 
-from fanet_mw.bounds.bounded_or_refused import Bounded
+from fanet_mw.bounds.arrivals import Bounded
 from fanet_mw.bounds.paper import cluster_estimate
 from fanet_mw.units import S
 from sim.figures.colors import DARK

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from fanet_mw import wire
 from fanet_mw.bounds import Bounded, DelayBound, Refused
-from fanet_mw.routing.clustered.timetable.reserved_room import WARNING_BYTES, report_bytes
+from fanet_mw.routing.clustered.timetable.turn_size import WARNING_BYTES, report_bytes
 from fanet_mw.scenario import Scenario, Traffic
 from fanet_mw.units import NodeId, seconds_to_ns
 

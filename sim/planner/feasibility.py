@@ -16,9 +16,8 @@ from fanet_mw.graph.topology import Adjacency, components, levels, within_range
 from fanet_mw.routing.clustered.clustering import Cluster, Swarm
 from fanet_mw.routing.clustered.clustering.division import Division
 from fanet_mw.routing.clustered.tdma.turn_timing import receipt_ns
-from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
-from fanet_mw.routing.clustered.timetable.reserved_room import reserved
-from fanet_mw.routing.clustered.timetable.turn_size import links, schedule_parts, superframe
+from fanet_mw.routing.clustered.timetable.node_timetable import FittedTimetable
+from fanet_mw.routing.clustered.timetable.turn_size import links, reserved, schedule_parts, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S
 from sim.planner import contention_window, flood_hops, problems_and_notes

@@ -11,9 +11,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from fanet_mw.routing.clustered.tdma.turn_timing import receipt_ns
-from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
-from fanet_mw.routing.clustered.timetable.likely_delay import likely_delay_ns
-from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
+from fanet_mw.routing.clustered.timetable.node_timetable import FittedTimetable, NodeTimetable
+from fanet_mw.routing.clustered.timetable.own_bound import likely_delay_ns
 from fanet_mw.routing.clustered.timetable.turn_allocation import Places, fit_measured
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns

@@ -20,8 +20,8 @@ from fanet_mw.bounds import (
     delay_fifo,
 )
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_slack_ns
-from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort
+from fanet_mw.routing.clustered.timetable.node_timetable import FittedTimetable
 from fanet_mw.routing.clustered.timetable.own_bound import RootTurns
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, timetable
 from fanet_mw.routing.clustered.timetable.turn_allocation import Places, fit

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from agents.applications.traffic import sources_of
-from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
+from fanet_mw.routing.clustered.timetable.node_timetable import FittedTimetable
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.config import build
 from fanet_mw.trace import Delivered, Generated

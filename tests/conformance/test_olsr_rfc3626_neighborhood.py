@@ -22,7 +22,7 @@ from rival_bench import Bench
 
 from fanet_mw.routing.olsr import parameters as p
 from fanet_mw.routing.olsr.messages import HelloNeighbor, LinkType, NeighborType, decode_time, encode_time
-from fanet_mw.routing.olsr.multipoint_relays import multipoint_relays
+from fanet_mw.routing.olsr.protocol import multipoint_relays
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, NodeId, S
 

@@ -17,8 +17,7 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import Final, NamedTuple
 
-from fanet_mw.bounds.arrivals import Arrivals, Periodic, Total
-from fanet_mw.bounds.bounded_or_refused import Bounded, DelayBound, Refused
+from fanet_mw.bounds.arrivals import Arrivals, Bounded, DelayBound, Periodic, Refused, Total
 from fanet_mw.bounds.network_calculus import backlog, delay_fifo
 from fanet_mw.bounds.slot_service import SlotServer
 from fanet_mw.errors import LocalProtocolError

@@ -7,8 +7,8 @@ from kit import examples
 from fanet_mw.graph.connected_dominating_set import dominates
 from fanet_mw.graph.topology import components, levels, symmetric, within_range
 from fanet_mw.rng import stream
-from fanet_mw.routing.olsr.multipoint_relays import multipoint_relays
 from fanet_mw.routing.olsr.parameters import WILL_ALWAYS, WILL_NEVER
+from fanet_mw.routing.olsr.protocol import multipoint_relays
 from fanet_mw.units import Enu, NodeId
 
 

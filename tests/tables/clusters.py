@@ -6,7 +6,7 @@ from contextlib import nullcontext
 from typing import Any, Final
 from unittest import mock
 
-from fanet_mw.routing.clustered.roles.neighbor_failure_detector import NeighborFailureDetector
+from fanet_mw.routing.clustered.roles.failure_detectors import NeighborFailureDetector
 from tests.benchmarks import moving_swarm, relay_rules
 from tests.tables.markdown import Rows
 from tests.tables.summaries import summarized

@@ -14,6 +14,7 @@ from fanet_mw.node.neighbors import Neighbors, neighbor_lifetime_ns
 from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.clustered import Clustered, Parts
 from fanet_mw.routing.clustered.contract import HearsCopies, ScheduledAccess
+from fanet_mw.routing.clustered.forwarding.contending_relays import ContendingRelaying, CounterRule, RelayAll, Rule
 from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTiming
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
@@ -21,18 +22,14 @@ from fanet_mw.routing.clustered.forwarding.one_way import OneWay, is_receipt
 from fanet_mw.routing.clustered.forwarding.uplink import Uplink
 from fanet_mw.routing.clustered.links.heard_load import HeardLoads, stated_loads
 from fanet_mw.routing.clustered.links.link_quality import LinkQuality
-from fanet_mw.routing.clustered.relaying.all_and_counter import CounterRule, RelayAll, Rule
-from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
 from fanet_mw.routing.clustered.roles.assigned_roles import AssignedRoles, RoleParts
 from fanet_mw.routing.clustered.roles.contract import NoTimetable, Timetabling
-from fanet_mw.routing.clustered.roles.deafness import Deafness
 from fanet_mw.routing.clustered.roles.failover import Failover
+from fanet_mw.routing.clustered.roles.failure_detectors import Deafness, Liveness, NeighborFailureDetector
 from fanet_mw.routing.clustered.roles.joining import Joining
 from fanet_mw.routing.clustered.roles.leader import Leader
 from fanet_mw.routing.clustered.roles.leader_election import Lease
-from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import Membership
-from fanet_mw.routing.clustered.roles.neighbor_failure_detector import NeighborFailureDetector
 from fanet_mw.routing.clustered.roles.position_updates import PositionUpdates
 from fanet_mw.routing.clustered.roles.schedule_check import ScheduleCheck
 from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
@@ -40,16 +37,15 @@ from fanet_mw.routing.clustered.slots.slot_access import SlotAccess
 from fanet_mw.routing.clustered.slots.slot_release import SlotRelease
 from fanet_mw.routing.clustered.timetable.admission import Admission
 from fanet_mw.routing.clustered.timetable.followers import Followers
-from fanet_mw.routing.clustered.timetable.reserved_room import reserved
+from fanet_mw.routing.clustered.timetable.node_timetable import TimetablesInForce
 from fanet_mw.routing.clustered.timetable.resumed_floods import ResumedFloods
 from fanet_mw.routing.clustered.timetable.scheduled_relaying import ScheduledRelaying
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
-from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
 from fanet_mw.routing.clustered.timetable.timetabling import FromPlaces
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.routing.clustered.timetable.turn_allocation import leader_load
 from fanet_mw.routing.clustered.timetable.turn_release import CallRelease, RootRelease
-from fanet_mw.routing.clustered.timetable.turn_size import measured_period_ns
+from fanet_mw.routing.clustered.timetable.turn_size import measured_period_ns, reserved
 from fanet_mw.routing.missing_packets import MissingPackets
 from fanet_mw.routing.packet_repair import FLOOD_OVER_NS, Repair
 from fanet_mw.units import MS, S, seconds_to_ns

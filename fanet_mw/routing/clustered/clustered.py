@@ -16,19 +16,18 @@ from typing import Final, NamedTuple
 from fanet_mw.bus.messages import Reception, TxOutcome, TxStatus
 from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.node.contract import Port, RoutingProtocol
-from fanet_mw.node.hop_limit import is_used_up
 from fanet_mw.node.neighbors import Neighbor, Neighbors
-from fanet_mw.node.packet import Packet, Relay
+from fanet_mw.node.packet import Packet, Relay, is_used_up
 from fanet_mw.node.reader import decoded
 from fanet_mw.routing.clustered.contract import Access, HearsCopies, Relaying
+from fanet_mw.routing.clustered.forwarding.contending_relays import ContendingRelaying
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
 from fanet_mw.routing.clustered.forwarding.one_way import OneWay
 from fanet_mw.routing.clustered.forwarding.uplink import MOST_TRIES, Uplink
 from fanet_mw.routing.clustered.links.heard_load import HeardLoads
-from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
 from fanet_mw.routing.clustered.roles.assigned_roles import AssignedRoles
-from fanet_mw.routing.clustered.roles.deafness import Deafness
+from fanet_mw.routing.clustered.roles.failure_detectors import Deafness
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.missing_packets import MissingPackets
 from fanet_mw.routing.packet_repair import Repair

@@ -18,8 +18,7 @@ from typing import ClassVar, Final
 from fanet_mw.bus.messages import Reception, TxOutcome
 from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.node.contract import Port
-from fanet_mw.node.hop_limit import is_used_up
-from fanet_mw.node.packet import Packet
+from fanet_mw.node.packet import Packet, is_used_up
 from fanet_mw.routing.address_resolution import Outgoing
 from fanet_mw.routing.geographic.locations import HELLO_INTERVAL_NS, LocationTable
 from fanet_mw.routing.geographic.messages import BEACON, LOCATION, QUERY, Fix, Location, PositionBeacon, Query

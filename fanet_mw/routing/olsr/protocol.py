@@ -15,9 +15,9 @@ from typing import ClassVar, Final, NamedTuple
 
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason, MalformedFrameError
+from fanet_mw.graph.topology import Adjacency
 from fanet_mw.node.contract import Port
-from fanet_mw.node.hop_limit import is_used_up
-from fanet_mw.node.packet import Packet
+from fanet_mw.node.packet import Packet, is_used_up
 from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.routing.hop_by_hop import HopByHop
 from fanet_mw.routing.olsr import parameters as p
@@ -34,11 +34,48 @@ from fanet_mw.routing.olsr.messages import (
     TopologyControl,
     encode_time,
 )
-from fanet_mw.routing.olsr.multipoint_relays import multipoint_relays
+from fanet_mw.routing.olsr.parameters import WILL_ALWAYS, WILL_DEFAULT, WILL_NEVER
 from fanet_mw.routing.olsr.state import Repositories
 from fanet_mw.routing.rival_control_messages import Family
 from fanet_mw.serial_number import following
 from fanet_mw.units import BROADCAST, NodeId, earliest
+
+
+def multipoint_relays(node: NodeId, adjacency: Adjacency, *, willingness: Mapping[NodeId, int]) -> tuple[NodeId, ...]:
+    """The relays of `node`, of which `adjacency` must hold it and its neighbors. As in the RFC: always willing ones;
+    those that alone reach some node; then by willingness, nodes added, degree, lower id. Redundant ones are not
+    dropped, an optional step.
+    """
+    will = {n: willingness.get(n, WILL_DEFAULT) for n in adjacency[node]}
+    near = frozenset(adjacency[node])
+    reach = {
+        n: frozenset(m for m in adjacency[n] if m != node and m not in near)
+        for n in adjacency[node]
+        if will[n] != WILL_NEVER
+    }
+    relays = {n for n in reach if will[n] == WILL_ALWAYS}
+    relays |= _only_ones(reach)
+    missing = set().union(*reach.values()) if reach else set()
+    for n in relays:
+        missing -= reach[n]
+    while missing:
+        # The degree D(y) counts the neighbors of y other than `node` and its neighbors, which is the whole of `reach`.
+        best = max(
+            (n for n in reach if n not in relays and reach[n] & missing),
+            key=lambda n: (will[n], len(reach[n] & missing), len(reach[n]), -n),
+        )
+        relays.add(best)
+        missing -= reach[best]
+    return tuple(sorted(relays))
+
+
+def _only_ones(reach: Mapping[NodeId, frozenset[NodeId]]) -> set[NodeId]:
+    through: dict[NodeId, list[NodeId]] = {}
+    for n in reach:
+        for far in sorted(reach[n]):
+            through.setdefault(far, []).append(n)
+    return {ways[0] for ways in through.values() if len(ways) == 1}
+
 
 _HELLO_VTIME: Final = encode_time(p.NEIGHB_HOLD_TIME_NS)
 _HELLO_HTIME: Final = encode_time(p.HELLO_INTERVAL_NS)

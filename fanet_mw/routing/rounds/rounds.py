@@ -20,8 +20,7 @@ from fanet_mw.geodesy import Geodetic
 from fanet_mw.motion import Motion
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.duplicates import key_of, key_of_packet, origin_and_seq
-from fanet_mw.node.hop_limit import is_used_up
-from fanet_mw.node.packet import Packet
+from fanet_mw.node.packet import Packet, is_used_up
 from fanet_mw.node.reader import decoded
 from fanet_mw.node.received_motion import motion_in
 from fanet_mw.routing.packet_repair import FLOOD_OVER_NS, Repair

@@ -2,7 +2,7 @@
 
 import pytest
 
-from fanet_mw.node.hop_limit import is_used_up
+from fanet_mw.node.packet import is_used_up
 from fanet_mw.units import BROADCAST
 from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Header, Kind, decode_header, rewrite
 

@@ -1,7 +1,7 @@
 """A node without a time, and what its neighbors say of it: whose word is taken, when, and against whom."""
 
 from fanet_mw.timesync.clock_fit import Oscillator, Pair
-from fanet_mw.timesync.initial_sync import InitialSync
+from fanet_mw.timesync.ftsp import InitialSync
 from fanet_mw.units import MS, US, NodeId, S
 
 LEADER = NodeId(1)

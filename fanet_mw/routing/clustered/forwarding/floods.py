@@ -8,8 +8,7 @@ from typing import Final
 
 from fanet_mw.airtime import longest_access_ns
 from fanet_mw.node.contract import Port
-from fanet_mw.node.hop_limit import is_used_up
-from fanet_mw.node.packet import Packet
+from fanet_mw.node.packet import Packet, is_used_up
 from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTiming
 from fanet_mw.routing.packet_repair import Repair
 from fanet_mw.units import BROADCAST, S

@@ -18,12 +18,11 @@ from fanet_mw.routing.clustered.forwarding.gradient import UNREACHABLE, Gradient
 from fanet_mw.routing.clustered.links.link_quality import LinkQuality
 from fanet_mw.routing.clustered.roles.contract import Timetabling
 from fanet_mw.routing.clustered.roles.failover import Failover
+from fanet_mw.routing.clustered.roles.failure_detectors import Liveness, NeighborFailureDetector
 from fanet_mw.routing.clustered.roles.joining import Joining
 from fanet_mw.routing.clustered.roles.leader import Leader
 from fanet_mw.routing.clustered.roles.leader_election import Authority, Lease
-from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import Membership
-from fanet_mw.routing.clustered.roles.neighbor_failure_detector import NeighborFailureDetector
 from fanet_mw.routing.clustered.roles.schedule_check import ScheduleCheck
 from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
 from fanet_mw.routing.clustered.roles.states import Action

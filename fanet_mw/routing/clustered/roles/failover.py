@@ -4,17 +4,15 @@
                                                                 -> actions for `assigned_roles.py`
 
 The first member of the succession, the order in which a schedule lists the members of a cluster, stands in for a silent
-head (`head_failure_detector.py`), or a later one if none before it has. It floods a join that names the silent node.
-Without a timetable it also uses the slot of the head; with one any silent neighbor is reported likewise
-(`neighbor_failure_detector.py`).
+head (`failure_detectors.py`), or a later one if none before it has. It floods a join that names the silent node.
+Without a timetable it also uses the slot of the head; with one any silent neighbor is reported likewise.
 """
 
 from typing import Final
 
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
-from fanet_mw.routing.clustered.roles.head_failure_detector import HeadFailureDetector
+from fanet_mw.routing.clustered.roles.failure_detectors import HeadFailureDetector, Liveness
 from fanet_mw.routing.clustered.roles.leader_election import Authority, Lease
-from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import Membership
 from fanet_mw.routing.clustered.roles.states import Action, Event, State, step
 from fanet_mw.units import MS, NodeId

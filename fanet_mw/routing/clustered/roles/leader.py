@@ -22,8 +22,8 @@ from fanet_mw.routing.clustered.clustering import Cluster, Swarm, succession
 from fanet_mw.routing.clustered.clustering.division import Division, drift
 from fanet_mw.routing.clustered.links.heard_load import HeardLoads
 from fanet_mw.routing.clustered.links.link_state import LinkState, adjacency, worth_a_change
+from fanet_mw.routing.clustered.roles.failure_detectors import Liveness
 from fanet_mw.routing.clustered.roles.leader_election import Authority, silence_ns
-from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import EPOCH_BITS
 from fanet_mw.routing.clustered.roles.position_updates import lost_ns, settled_ns
 from fanet_mw.routing.clustered.roles.roster import NO_SILENCE, Roster, sure_m

@@ -10,7 +10,7 @@ junior one.
 
 from typing import Final, NamedTuple
 
-from fanet_mw.routing.clustered.roles.liveness import Liveness
+from fanet_mw.routing.clustered.roles.failure_detectors import Liveness
 from fanet_mw.units import NodeId, S
 
 _PERIODS: Final = 4

@@ -21,7 +21,7 @@ from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from fanet_mw.motion import Motion
-from fanet_mw.routing.clustered.roles.liveness import Liveness
+from fanet_mw.routing.clustered.roles.failure_detectors import Liveness
 from fanet_mw.units import MS, Enu, NodeId, S
 
 NO_SILENCE: Final[Mapping[NodeId, int]] = MappingProxyType({})

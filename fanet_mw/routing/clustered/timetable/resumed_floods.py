@@ -10,8 +10,7 @@ from typing import Final
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.forwarding.floods import Floods
-from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
-from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
+from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable, TimetablesInForce
 from fanet_mw.units import earliest
 
 _SUPERFRAMES: Final = 3

@@ -11,14 +11,12 @@ from typing import Final
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port
-from fanet_mw.node.hop_limit import is_used_up
-from fanet_mw.node.packet import Packet, Relay
+from fanet_mw.node.packet import Packet, Relay, is_used_up
 from fanet_mw.routing.clustered.contract import Relaying
 from fanet_mw.routing.clustered.tdma.turn_timing import turn_slack_ns
 from fanet_mw.routing.clustered.timetable.followers import Followers
-from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
+from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable, TimetablesInForce
 from fanet_mw.routing.clustered.timetable.resumed_floods import ResumedFloods
-from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
 from fanet_mw.routing.missing_packets import MissingPackets
 from fanet_mw.routing.packet_repair import Repair
 from fanet_mw.units import NodeId

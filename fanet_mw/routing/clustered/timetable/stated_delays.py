@@ -17,10 +17,8 @@ from fanet_mw.routing.clustered.tdma.hello_room import hellos_ns, room_ns
 from fanet_mw.routing.clustered.tdma.turn_timing import receipt_ns, turn_slack_ns
 from fanet_mw.routing.clustered.timetable.admission import Admission, least_interval_ns
 from fanet_mw.routing.clustered.timetable.followers import Followers
-from fanet_mw.routing.clustered.timetable.likely_delay import likely_delay_ns
-from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
-from fanet_mw.routing.clustered.timetable.own_bound import RootTurns
-from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
+from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable, TimetablesInForce
+from fanet_mw.routing.clustered.timetable.own_bound import RootTurns, likely_delay_ns
 from fanet_mw.routing.clustered.timetable.turn_release import RootRelease
 from fanet_mw.timesync.turn_slack import clocks_fit
 from fanet_mw.trace import LIKELY_SHARE, BoundExcludes, BoundStated, LikelyStated

@@ -19,9 +19,8 @@ from fanet_mw.routing.clustered.roles.leader import Leader
 from fanet_mw.routing.clustered.roles.leader_election import Authority, Lease
 from fanet_mw.routing.clustered.roles.membership import Membership, Version
 from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
-from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
 from fanet_mw.routing.clustered.timetable.followers import Followers
-from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
+from fanet_mw.routing.clustered.timetable.node_timetable import FittedTimetable, NodeTimetable
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.routing.clustered.timetable.turn_allocation import fit, fit_measured

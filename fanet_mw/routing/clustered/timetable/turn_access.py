@@ -17,10 +17,9 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTiming
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.slots.slot_access import SlotAccess
-from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
+from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable, TimetablesInForce
 from fanet_mw.routing.clustered.timetable.resumed_floods import ResumedFloods
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays
-from fanet_mw.routing.clustered.timetable.timetables_in_force import TimetablesInForce
 from fanet_mw.routing.clustered.timetable.turn_release import CallRelease, RootRelease, TurnsInForce
 from fanet_mw.routing.clustered.timetable.turn_size import most_packet_bytes, superframe
 from fanet_mw.units import BROADCAST, S, earliest, seconds_to_ns

@@ -1,12 +1,17 @@
-"""How large the frames of a timetable are, and so how long its turns, and how many a superframe holds."""
+"""How large the frames of a timetable are, and so how long its turns, and how many a superframe holds.
+
+Each turn reserves room for one packet of each urgent class that the scenario uses: a collision warning, a survivor
+report, whose lengths are known before take-off. `turn_release.py` fills the room.
+"""
 
 import math
+from collections.abc import Mapping
 from typing import Final
 
+from fanet_mw import wire
 from fanet_mw.routing.clustered.roles.position_updates import STRAYED, UNLIKE
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_ns
 from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
-from fanet_mw.routing.clustered.timetable.reserved_room import reserved
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, seconds_to_ns
 from fanet_mw.wire import DIGEST, HEADER_BYTES, LINKS, LOADS, OVERHEAD, PLACES, SCHEDULE
@@ -14,6 +19,26 @@ from fanet_mw.wire.hello.digest import CAPACITY as DIGEST_CAPACITY
 from fanet_mw.wire.links import MESSAGES
 from fanet_mw.wire.places import CAPACITY as PLACES_CAPACITY
 from fanet_mw.wire.schedule import CAPACITY
+
+WARNING_BYTES: Final = wire.HEADER_BYTES + 19 + wire.OVERHEAD
+"""MAVLink's COLLISION has 19 bytes (common.xml)."""
+_REPORT_BYTES: Final = wire.HEADER_BYTES + wire.SURVIVOR.layout.size + wire.OVERHEAD
+
+
+def report_bytes(scenario: Scenario) -> int:
+    """The length of a packet with a survivor report."""
+    return scenario.mission.report_bytes or _REPORT_BYTES
+
+
+def reserved(scenario: Scenario) -> Mapping[int, int]:
+    """Bytes of each turn that bulk must leave free, by priority: one packet of each urgent class in use."""
+    found = {}
+    if scenario.mission.collision_horizon_s:
+        found[wire.PRIORITY_SAFETY] = WARNING_BYTES
+    if scenario.mission.survivors:
+        found[wire.PRIORITY_REPORT] = report_bytes(scenario)
+    return found
+
 
 _AVERAGED: Final = 0.02
 """The greatest error of a reported position along each axis, as a share of the radio range; it is a little less."""

@@ -16,8 +16,7 @@ from fanet_mw.routing import make_protocol
 from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.delivery_odds import Odds
-from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
-from fanet_mw.routing.clustered.timetable.node_timetable import UNANNOUNCED, NodeTimetable
+from fanet_mw.routing.clustered.timetable.node_timetable import UNANNOUNCED, FittedTimetable, NodeTimetable
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.scenario import Scenario

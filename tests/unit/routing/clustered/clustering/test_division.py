@@ -7,8 +7,8 @@ from fanet_mw.graph.topology import within_range
 from fanet_mw.motion import Motion
 from fanet_mw.routing.clustered.clustering import Cluster, Swarm
 from fanet_mw.routing.clustered.clustering.division import Division, carried_on, cost, drift
+from fanet_mw.routing.clustered.roles.failure_detectors import Liveness
 from fanet_mw.routing.clustered.roles.leader_election import Authority, Lease
-from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.position_updates import PositionUpdates
 from fanet_mw.units import Enu, NodeId, S
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.routing.clustered.links.heard_load import HeardLoads, stated_loads
-from fanet_mw.routing.clustered.timetable.fitted_timetable import NO_LOADS, FittedTimetable
+from fanet_mw.routing.clustered.timetable.node_timetable import NO_LOADS, FittedTimetable
 from fanet_mw.routing.clustered.timetable.turn_allocation import fit
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S

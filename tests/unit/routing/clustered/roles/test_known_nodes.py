@@ -3,7 +3,7 @@
 import pytest
 
 from fanet_mw.motion import Motion
-from fanet_mw.routing.clustered.roles.liveness import Liveness
+from fanet_mw.routing.clustered.roles.failure_detectors import Liveness
 from fanet_mw.routing.clustered.roles.roster import OwnFlight, Roster, alike, sure_m
 from fanet_mw.units import MS, STILL, Enu, NodeId, S
 

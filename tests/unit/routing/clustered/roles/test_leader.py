@@ -6,9 +6,9 @@ from itertools import pairwise
 import pytest
 
 from fanet_mw.motion import Motion
+from fanet_mw.routing.clustered.roles.failure_detectors import Liveness
 from fanet_mw.routing.clustered.roles.leader import ANSWER_NS, OBJECTION_NS, SETTLE_NS, Leader
 from fanet_mw.routing.clustered.roles.leader_election import Authority, silence_ns
-from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.position_updates import lost_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S

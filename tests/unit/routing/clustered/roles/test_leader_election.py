@@ -2,8 +2,8 @@
 
 import pytest
 
+from fanet_mw.routing.clustered.roles.failure_detectors import Liveness
 from fanet_mw.routing.clustered.roles.leader_election import Authority, Lease
-from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.units import NodeId, S
 
 LEADER = Authority(5, 9)

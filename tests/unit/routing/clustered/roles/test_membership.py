@@ -3,8 +3,8 @@
 from fanet_mw.node.neighbors import Neighbors
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
 from fanet_mw.routing.clustered.roles.failover import Failover
+from fanet_mw.routing.clustered.roles.failure_detectors import Liveness
 from fanet_mw.routing.clustered.roles.leader_election import Lease
-from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import Membership
 from fanet_mw.routing.clustered.roles.states import Action, Event
 from fanet_mw.units import Enu, NodeId, S

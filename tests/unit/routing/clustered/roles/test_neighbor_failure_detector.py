@@ -2,8 +2,7 @@
 
 import pytest
 
-from fanet_mw.routing.clustered.roles.liveness import Liveness
-from fanet_mw.routing.clustered.roles.neighbor_failure_detector import NeighborFailureDetector
+from fanet_mw.routing.clustered.roles.failure_detectors import Liveness, NeighborFailureDetector
 from fanet_mw.units import NodeId, S
 
 OTHER = NodeId(7)

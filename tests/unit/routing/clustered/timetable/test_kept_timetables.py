@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from fanet_mw.routing.clustered.roles.position_updates import STRAYED, UNLIKE
-from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
+from fanet_mw.routing.clustered.timetable.node_timetable import FittedTimetable
 from fanet_mw.routing.clustered.timetable.turn_allocation import fit, fit_measured, least_interval_ns
 from fanet_mw.routing.clustered.timetable.turn_size import links, schedule_parts, superframe
 from fanet_mw.scenario import Scenario

@@ -4,9 +4,8 @@ import pytest
 
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.delivery_odds import Odds
-from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
-from fanet_mw.routing.clustered.timetable.likely_delay import likely_delay_ns
-from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
+from fanet_mw.routing.clustered.timetable.node_timetable import FittedTimetable, NodeTimetable
+from fanet_mw.routing.clustered.timetable.own_bound import likely_delay_ns
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.routing.packet_repair import RIPE_NS
 from fanet_mw.units import MS, NodeId, S

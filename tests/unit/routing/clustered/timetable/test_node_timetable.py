@@ -5,8 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_ns, turn_slack_ns
-from fanet_mw.routing.clustered.timetable.fitted_timetable import FittedTimetable
-from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable
+from fanet_mw.routing.clustered.timetable.node_timetable import FittedTimetable, NodeTimetable
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.routing.clustered.timetable.turn_size import links, superframe
 from fanet_mw.scenario import Scenario

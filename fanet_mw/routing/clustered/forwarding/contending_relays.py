@@ -1,16 +1,57 @@
-"""Relaying in contention: after a random jitter, a packet is passed on if a rule says so; urgent control always is."""
+"""Relaying in contention: after a random jitter, a packet is passed on if a rule says so; urgent control always is.
 
-from collections.abc import Mapping, Sequence
-from typing import Final
+    all      the node passes on each packet, at once
+    counter  it passes on a packet after a random delay, unless it has heard enough copies by then
+
+`counter` is after Ni et al. (MobiCom 1999, 3.2): in a sparse swarm all relay, in a dense one few do. Where a timetable
+decides: `timetable/scheduled_relaying.py`.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final, Protocol
 
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port
-from fanet_mw.node.hop_limit import is_used_up
-from fanet_mw.node.packet import Packet, Relay
+from fanet_mw.node.packet import Packet, Relay, is_used_up
 from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTiming
-from fanet_mw.routing.clustered.relaying.all_and_counter import Rule
+from fanet_mw.routing.random_assessment_delay import Assessment
+from fanet_mw.scenario import Clusters
 from fanet_mw.units import MS
+
+
+class Rule(Protocol):
+    """The decisions of one node. `open_until` is empty if the rule decides at once."""
+
+    open_until: Assessment
+    """The packets about which it is not decided yet whether they are relayed."""
+
+    def relays_now(self, packet: Packet, *, now_ns: int) -> bool:
+        """True if a new packet is relayed now; False if it is not, or if that is still open."""
+
+
+class RelayAll:
+    """Every packet is relayed at once."""
+
+    def __init__(self) -> None:
+        self.open_until = Assessment(enough=1)
+
+    def relays_now(self, packet: Packet, *, now_ns: int) -> bool:
+        return True
+
+
+class CounterRule:
+    """A packet is relayed after a random delay, unless enough other nodes have relayed it by then."""
+
+    def __init__(self, clusters: Clusters, random: Callable[[], float]) -> None:
+        self.open_until = Assessment(enough=clusters.counter)
+        self._assess_ns = round(clusters.assess_ms * MS)
+        self._random = random
+
+    def relays_now(self, packet: Packet, *, now_ns: int) -> bool:
+        self.open_until.first_copy(packet, due_ns=now_ns + int(self._random() * self._assess_ns))
+        return False
+
 
 _CONTROL_JITTER_NS: Final = 100 * MS
 _NOTHING: Final[Mapping[str, object]] = {}

@@ -1,1 +1,0 @@
-"""Relaying in contention: which nodes pass on a flooded packet, and when. Relaying in turns is in `timetable/`."""

@@ -53,13 +53,12 @@ from sim.records.record_kinds import records_of  # noqa: E402
 from sim.records.trace_log import TraceLog  # noqa: E402
 from sim.results.bounds import UNNOTICED_NS  # noqa: E402
 from sim.results.clocks import true_delays  # noqa: E402
-from sim.results.connectivity import parts  # noqa: E402
 from sim.results.files import finish  # noqa: E402
+from sim.results.links_over_time import parts  # noqa: E402
 from sim.results.mission import Confirmations, OverflownCells  # noqa: E402
 from sim.results.outcome import Outcome  # noqa: E402
-from sim.run.garbage import GARBAGE  # noqa: E402
 from sim.run.stoppable_uav import StoppableUav  # noqa: E402
-from sim.run.virtual import actors_of  # noqa: E402
+from sim.run.virtual import GARBAGE, actors_of  # noqa: E402
 from sim.scenarios.catalog import find  # noqa: E402
 from sim.world.environment.survivors import place  # noqa: E402
 

@@ -46,10 +46,10 @@ from fanet_mw.units import S  # noqa: E402
 from scripts.losses import Flight, Instant, stretches  # noqa: E402
 from scripts.search_witness import FOLLOWS, FORGETS, KNOWS, PLANS, STARTS, known, plans  # noqa: E402
 from sim.records.record_kinds import records_of  # noqa: E402
-from sim.results.connectivity import parts  # noqa: E402
 from sim.results.file_names import SUMMARY_FILE, TRACE_FILE  # noqa: E402
-from sim.run.garbage import GARBAGE  # noqa: E402
+from sim.results.links_over_time import parts  # noqa: E402
 from sim.run.stoppable_uav import StoppableUav  # noqa: E402
+from sim.run.virtual import GARBAGE  # noqa: E402
 from sim.scenarios.catalog import find  # noqa: E402
 
 _FOR_S: Final = 20.0

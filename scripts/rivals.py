@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from fanet_mw.trace import Delivered
-from sim.results.connectivity import connectivity
 from sim.results.files import finish
+from sim.results.links_over_time import connectivity
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 

@@ -1,1 +1,1 @@
-"""The MAVLink dialect of fanet-mw: fanet.xml, the module generated from it, and `export_xml.py` for other tools."""
+"""The MAVLink dialect of fanet-mw: fanet.xml, and the module generated from it."""

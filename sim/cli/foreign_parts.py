@@ -15,7 +15,7 @@ from typing import Final
 
 from fanet_mw.hosts import interrupts
 from sim.results.outcome import described
-from sim.run.launcher.parent_death import be_killed_with_parent
+from sim.run.launcher.process_setup import be_killed_with_parent
 
 _STOPS: Final = (signal.SIGTSTP, signal.SIGCONT)
 _NAMED: Final = 3

@@ -1,15 +1,48 @@
 """`fanet keys`, `dialect` and `dissector`: files for other programs (Zenoh, MAVLink tools, Wireshark)."""
 
+import gzip
 import os
+import re
 import sys
+from importlib.resources import files
+from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 from cyclopts import Parameter
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.whole_file import replace_file, writing
 from sim.cli.options import ScenarioFlags, ScenarioName
 from sim.console import Console
+
+_INCLUDE: Final = re.compile(r"<include>\s*(\S+?)\s*</include>")
+
+
+def write_dialect(folder: Path) -> Path:
+    """Write `v1.0/fanet.xml` and what it includes; returns its path. Raises ConfigError."""
+    target = folder / "v1.0"
+    ours, theirs = files("fanet_mw.dialect"), files("pymavlink.dialects.v20")
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+        for name, text in _with_included(ours / "fanet.xml", theirs).items():
+            replace_file(target / name, text.encode())
+    except FileNotFoundError as error:
+        raise ConfigError(f"{error.filename}: is missing: install pymavlink anew") from error
+    except OSError as error:
+        raise ConfigError(f"{target}: cannot be written: {error.strerror}") from error
+    return target / "fanet.xml"
+
+
+def _with_included(source: Traversable, theirs: Traversable) -> dict[str, str]:
+    """The texts of a definition and of all definitions that it includes, by file name."""
+    found: dict[str, str] = {}
+    wanted = [source]
+    while wanted:
+        file = wanted.pop()
+        found[file.name] = file.read_text(encoding="utf-8")
+        wanted += [theirs / name for name in _INCLUDE.findall(found[file.name]) if name not in found]
+    return found
 
 
 def keys(
@@ -48,9 +81,7 @@ def dialect(folder: Path | None = None, *, definitions: Annotated[bool, Paramete
         definitions: Print the folder of definitions instead, which pymavlink wants in MDEF.
 
     """
-    from fanet_mw.dialect.export_xml import write
-
-    path = write(folder or _data() / "fanet-mw" / "message_definitions")
+    path = write_dialect(folder or _data() / "fanet-mw" / "message_definitions")
     sys.stdout.write(f"{path.parents[1] if definitions else path}\n")
     return 0
 
@@ -70,11 +101,6 @@ def dissector(folder: Path) -> int:
         folder: Wireshark's folder of personal Lua plugins: see Help, About Wireshark, Folders.
 
     """
-    import gzip
-    from importlib.resources import files
-
-    from fanet_mw.whole_file import replace_file, writing
-
     path = folder / "mavlink.lua"
     with writing(path):
         folder.mkdir(parents=True, exist_ok=True)

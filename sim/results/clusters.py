@@ -14,8 +14,7 @@ import numpy.typing as npt
 from fanet_mw.trace import RoleChanged
 from fanet_mw.units import S
 from sim.records.record_kinds import records_of
-from sim.results.connectivity import parts
-from sim.results.links_over_time import LinksOverTime
+from sim.results.links_over_time import LinksOverTime, parts
 from sim.results.outcome import Outcome
 from sim.world.arrays import Flags
 

@@ -2,20 +2,53 @@
 
     link in second k   both on the air, and within reach at its beginning or at its end
 
-Obstacles, fading and collisions are left out: this is what distance allows.
+Obstacles, fading and collisions are left out: this is what distance allows. `connectivity` is the same on the ideal
+track of the mobility model; no protocol that delivers packets at once can exceed it, one that carries packets for a
+while can.
 """
 
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
+from agents.applications.traffic import sources_of, targets_of
 from emulator.channel.link_budget import heard_m
+from fanet_mw.scenario.model import Scenario
 from fanet_mw.trace import Posed, ProcessEnded, RadioFault
 from fanet_mw.units import S
 from sim.records.record_kinds import records_of
 from sim.results.outcome import Outcome
 from sim.world.arrays import Flags, Rows
 from sim.world.environment.layout import positions
+from sim.world.mobility.guidance import Guidance
+
+
+def parts(linked: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
+    """The number of the connected component of each node; `linked` holds for a node and itself, too."""
+    part = np.arange(len(linked))
+    while True:
+        lower = np.where(linked, part[None], len(linked)).min(axis=1, initial=len(linked))
+        if (lower == part).all():
+            return part
+        part = lower
+
+
+def connectivity(scenario: Scenario) -> float:
+    """The share of (source, target, second of the measured window) with a multi-hop path of `radio.range_m` links."""
+    guidance = Guidance(np.array(positions(scenario)[: scenario.nodes.count], dtype=np.float64), scenario)
+    first_ns, end_ns = scenario.traffic_window_ns
+    pairs = [(source, target) for source in sources_of(scenario) for target in targets_of(scenario, source)]
+    if not pairs:
+        return 0.0
+    sources, targets = np.array(pairs).T - 1
+    shares = []
+    for t_s in range(first_ns // S, max(end_ns // S, first_ns // S + 1)):
+        at = guidance.track(float(t_s)).places
+        part = parts(within(at, scenario.radio.range_m))
+        shares.append(float((part[sources] == part[targets]).mean()))
+    return float(np.mean(shares))
+
 
 OFF_AIR: Final = frozenset({"cut", "mute", "deaf", "stop", "crash"})
 """The faults that take a UAV out of the network."""

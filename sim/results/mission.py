@@ -34,8 +34,7 @@ from fanet_mw.units import Enu, S
 from fanet_mw.wire.survivors import is_person
 from sim.records.record_kinds import records_of
 from sim.results.coherence import Coherence, coherence
-from sim.results.connectivity import parts
-from sim.results.links_over_time import OFF_AIR
+from sim.results.links_over_time import OFF_AIR, parts
 from sim.world.arrays import Flags, Rows, Values
 from sim.world.environment.layout import positions
 from sim.world.environment.survivors import place

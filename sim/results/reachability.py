@@ -16,8 +16,7 @@ import numpy.typing as npt
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import S
 from fanet_mw.wire import PRIORITIES, PRIORITY_REPORT, PRIORITY_SAFETY
-from sim.results.connectivity import parts
-from sim.results.links_over_time import LinksOverTime
+from sim.results.links_over_time import LinksOverTime, parts
 from sim.results.outcome import Outcome
 from sim.results.packets import OTHER_APPS, AppPackets, targets_by_source
 from sim.world.arrays import Flags

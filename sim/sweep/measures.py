@@ -13,7 +13,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.trace import Approaching, Detected
 from fanet_mw.units import S
 from sim.records.record_kinds import records_of
-from sim.results.connectivity import connectivity
+from sim.results.links_over_time import connectivity
 from sim.results.outcome import Outcome
 from sim.results.packets import AppPackets, first_class_of, packets_of, targets_by_source
 

@@ -13,8 +13,8 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Final
 
-from sim.run.launcher import import_path
-from sim.run.launcher.parent_death import be_killed_with_parent
+from sim.run.launcher import process_setup
+from sim.run.launcher.process_setup import be_killed_with_parent
 from sim.sweep.one_run import Finished, carry_out
 from sim.sweep.provenance import code
 from sim.sweep.tasks import Task
@@ -28,7 +28,7 @@ def _work(tasks: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the sweep receives the signal, and ends its workers
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     be_killed_with_parent()
-    import_path.restore()
+    process_setup.restore()
     while True:
         try:
             task: Task = tasks.recv()
@@ -95,7 +95,7 @@ class Pool:
     def _start(self) -> _Worker:
         ours, theirs = self._context.Pipe()
         process = self._context.Process(target=_work, args=(theirs,), name="fanet sweep", daemon=True)
-        with import_path.without_working_folder():
+        with process_setup.without_working_folder():
             process.start()
         theirs.close()
         worker = _Worker(process, ours)

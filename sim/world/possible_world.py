@@ -17,7 +17,7 @@ def require_possible(scenario: Scenario) -> None:
 
     from sim.world.environment.layout import positions
     from sim.world.environment.obstacles import obstacles
-    from sim.world.incidents.incidents import NoFlyEntries
+    from sim.world.incidents import NoFlyEntries
 
     starts = np.array(positions(scenario), dtype=np.float64)
     if world.has_obstacles:

@@ -30,8 +30,7 @@ from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors
 from sim.world.environment.wind import Wind
 from sim.world.flight_recorder import SwarmFlight
-from sim.world.incidents.incidents import Incidents
-from sim.world.incidents.mishaps import Mishaps
+from sim.world.incidents import Incidents, Mishaps
 from sim.world.mobility.guidance import Guidance, makes_sense
 from sim.world.sensors.contract import Truth
 from sim.world.sensors.gps import GpsReceiver

@@ -181,7 +181,7 @@ RAISING = """
 import sys
 from fanet_mw.application import Application
 from fanet_mw.routing.flooding import Flooding
-from sim.world.mobility.formation import Formation as Static
+from sim.world.mobility.models import Formation as Static
 class Finder(Application):
     name = "finder"
     def __init__(self, scenario, node, options): pass

@@ -12,11 +12,11 @@ import pytest
 
 from agents.applications.telemetry_streams import TelemetryStreams
 from fanet_mw import tlog
-from fanet_mw.dialect import export_xml
 from fanet_mw.errors import ConfigError
 from fanet_mw.units import Enu, NodeId, S
 from fanet_mw.wire.survivors import Survivor
 from sim.cli.app import app
+from sim.cli.tool_files import write_dialect
 
 INSTALLED = Path(pymavlink.__file__).parent
 SURVIVOR = Survivor(t_us=1_500_000, survivor=3, reporter=1, position=Enu(1.0, 2.0, 3.0), rssi_dbm=-70.5)
@@ -76,4 +76,4 @@ def test_the_path_of_the_dialect_is_printed_and_all_that_it_includes_is_beside_i
 def test_a_folder_that_cannot_be_written_is_one_message(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(ConfigError, match="cannot be written"):
-        export_xml.write(tmp_path / "file")
+        write_dialect(tmp_path / "file")

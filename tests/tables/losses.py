@@ -11,7 +11,7 @@ import numpy as np
 from agents.mission.search_formation.pattern import Pattern, fitted
 from agents.mission.search_formation.shapes.contract import Demands, ShapeName
 from fanet_mw.units import Enu
-from sim.results.connectivity import parts
+from sim.results.links_over_time import parts
 from tests.tables.markdown import Rows
 
 _DATA: Final = Path(__file__).parents[2] / "docs" / "results" / "data"

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from typing import Final
 
-from sim.results.connectivity import connectivity
+from sim.results.links_over_time import connectivity
 from sim.scenarios import catalog
 from tests.benchmarks import (
     clock_sync,

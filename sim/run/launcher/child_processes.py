@@ -24,8 +24,8 @@ from typing import Any, Final, NamedTuple
 from fanet_mw.errors import FanetError, HostError
 from fanet_mw.hosts.service import BUS_EXIT_CODE
 from sim.results.outcome import described
-from sim.run.launcher import import_path
-from sim.run.launcher.parent_death import be_killed_with_parent
+from sim.run.launcher import process_setup
+from sim.run.launcher.process_setup import be_killed_with_parent
 
 _PRELOAD: Final = ["agents.__main__", "emulator.__main__", "sim.world.__main__", "sim.run.launcher.services"]
 _NICENESS: Final = 4
@@ -76,7 +76,7 @@ def _child(recipe: ChildRecipe) -> None:
         signal.signal(number, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _FOR_THE_LAUNCHER)
     be_killed_with_parent()
-    import_path.restore()
+    process_setup.restore()
     _keep_no_server_alive()
     _keep_no_tracker_alive()
     entitle(recipe.name, recipe.title)
@@ -145,7 +145,7 @@ def _start_server() -> int:
     _started.update({name: 1 for name, pid in helpers.items() if pid is None}, process=os.getpid())
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGHUP])  # the tracker ignores the other two by itself
     try:
-        with import_path.without_working_folder():
+        with process_setup.without_working_folder():
             resource_tracker.ensure_running()  # otherwise the server starts the tracker, which unblocks SIGINT
             signal.pthread_sigmask(signal.SIG_BLOCK, _FOR_THE_LAUNCHER)
             forkserver.ensure_running()

@@ -14,7 +14,7 @@ import os
 import signal
 import socket
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -29,8 +29,10 @@ from fanet_mw.hosts.bus import Bus, config_of, with_port
 from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
 from fanet_mw.hosts.loop import heeding
 from fanet_mw.hosts.realtime import SwarmAddress
+from fanet_mw.hosts.service import BUS_EXIT_CODE
 from fanet_mw.routing import module_of
 from fanet_mw.scenario import Scenario
+from fanet_mw.trace import ProcessEnded
 from fanet_mw.units import MS, S
 from sim.bus.rights import ROUTER
 from sim.bus.running_swarms import registered
@@ -40,13 +42,48 @@ from sim.run.collecting.running_tally import Progress
 from sim.run.launcher import limits
 from sim.run.launcher.child_processes import Processes, end_if_imported_by_a_child
 from sim.run.launcher.clock_governor import ClockGovernor, Instant
-from sim.run.launcher.deaths import Deaths
 from sim.run.launcher.leads import Leads
 from sim.run.launcher.pauses import PauseWatch, processors
 from sim.run.launcher.services import Services
 from sim.run.router import expected_names
 from sim.world.flight_recorder import FlightRecorder
 from sim.world.possible_world import require_possible
+
+_MAX_LATE_STARTS: Final = 3
+"""How often a process that has found no router may be started again before the swarm's time begins."""
+_MAX_RESPAWNS: Final = 5
+"""How often a process may be started again, so that one that cannot live is not started for ever."""
+
+
+class Deaths:
+    """The processes that died during one run, and which of them may be started again."""
+
+    def __init__(self, *, respawn: bool) -> None:
+        self.ended: list[tuple[str, int]] = []
+        """Name and exit code of each process that died, in order."""
+        self.records: list[ProcessEnded] = []
+        """The same as trace records."""
+        self._respawn = respawn
+        self._respawns: Counter[str] = Counter()
+        self._late_starts: Counter[str] = Counter()
+
+    def grant_late_start(self, name: str, exit_code: int) -> bool:
+        """True if a process that has found no router may be started again before the swarm's time begins."""
+        if exit_code != BUS_EXIT_CODE or self._late_starts[name] >= _MAX_LATE_STARTS:
+            return False
+        self._late_starts[name] += 1
+        return True
+
+    def note(self, name: str, exit_code: int, *, node: int, now_ns: int) -> None:
+        """A process has died; `node` is its UAV, or 0 for the emulator and the world."""
+        self.ended.append((name, exit_code))
+        self.records.append(ProcessEnded(now_ns, node, name, exit_code))
+
+    def grant_respawn(self, name: str) -> bool:
+        """True if a process that has died may be started again."""
+        self._respawns[name] += 1
+        return self._respawn and self._respawns[name] <= _MAX_RESPAWNS
+
 
 READY_TIMEOUT_S: Final = 300.0
 """Until all processes are present: 47 take a minute on a busy machine, and a compilation may come on top."""

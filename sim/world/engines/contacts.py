@@ -1,6 +1,6 @@
 """Detects which bodies touch each other, once for each contact. The ground, roofs, walls and hillsides count as body 0.
 
-A step moves bodies straight, and a contact is the closest approach within it, as in `incidents/incidents.py`: two that
+A step moves bodies straight, and a contact is the closest approach within it, as in `sim/world/incidents.py`: two that
 pass each other between two instants have touched, too.
 """
 

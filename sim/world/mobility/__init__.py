@@ -1,1 +1,1 @@
-"""The flight of UAVs: their starts, one module per mobility model behind `contract.py`, and the flight controllers."""
+"""The flight of UAVs: their starts, the mobility models behind `contract.py`, and the flight controllers."""

@@ -11,19 +11,25 @@ Laboratory's static performance model (Ratches et al., ECOM-7043, 1975). Each im
 buried, or hidden from the camera by anything solid, is not seen. The pixels that a detector counts are off by a tenth
 (assumed). A gimbal keeps the image's width along east; angular errors are Gaussian. False alarms are a Poisson process,
 anywhere in the image. Not modeled: light, motion blur, and that successive images are alike.
+
+Rendered images are for users who run a detector of their own on board: the field of view is the same, and the camera
+shows a person with the same number of pixels. Its gimbal has no error.
 """
 
 import math
 from collections.abc import Iterator, Sequence
+from importlib.util import find_spec
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from fanet_mw.bus.messages import Camera, Message, Person
+from fanet_mw.bus.messages import Camera, CameraImage, Message, Person
+from fanet_mw.errors import ConfigError
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import S
 from sim.world.arrays import Flags, Rows, Values
+from sim.world.environment.obstacles import Obstacles
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors
 from sim.world.sensors.contract import Sensor, Truth, angles, generator, shaken
@@ -108,3 +114,34 @@ class CameraSensor(Sensor):
     def _counted(self, pixels: float) -> float:
         """The pixels that the detector says."""
         return float(max(1.0, round(pixels * (1 + self._random.normal(0.0, SIZE_SIGMA)))))
+
+
+class ImageSensor(Sensor):
+    """One camera with rendered images on each UAV of `sensors.image_nodes`, by default on all UAVs."""
+
+    kind = "image"
+
+    def __init__(self, scenario: Scenario, survivors: Survivors, obstacles: Obstacles | None) -> None:
+        config = scenario.sensors
+        if find_spec("pybullet") is None:
+            raise ConfigError(
+                f"sensors.image_hz = {config.image_hz:g} needs pybullet to render: pip install 'fanet-mw[pybullet]'"
+            )
+        from sim.world.sensors.scene import Scene
+
+        self.period_ns = round(S / config.image_hz)
+        self._tan_half_fov = math.tan(math.radians(config.camera_fov_deg) / 2)
+        self._pixels = config.image_pixels
+        self._carriers = frozenset(config.image_nodes or scenario.uav_ids)
+        not_buried = survivors.places[~survivors.buried]
+        self._scene = Scene(obstacles, not_buried, area_m=scenario.world.area_m, uavs=scenario.nodes.count)
+
+    def read(self, truth: Truth, rows: Sequence[int]) -> Iterator[tuple[int, Message]]:
+        width, height = self._pixels
+        self._scene.move(truth.at)
+        for row in (row for row in rows if row + 1 in self._carriers):
+            image = self._scene.image(truth.at[row], pixels=self._pixels, tan_half_fov=self._tan_half_fov)
+            yield row, CameraImage(truth.now_ns, width, height, image.tobytes())
+
+    def close(self) -> None:
+        self._scene.close()

@@ -22,7 +22,7 @@ from fanet_mw.bus.messages import Gps, Message
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import Enu, S, seconds_to_ns
 from sim.world.arrays import Flags, Rows
-from sim.world.incidents.mishaps import Mishaps
+from sim.world.incidents import Mishaps
 from sim.world.sensors.contract import Drift, Sensor, Truth, generator
 
 

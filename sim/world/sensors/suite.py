@@ -14,10 +14,9 @@ from sim.world.environment.obstacles import Obstacles
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors
 from sim.world.sensors.altimeter import AltimeterSensor
-from sim.world.sensors.camera import CameraSensor
+from sim.world.sensors.camera import CameraSensor, ImageSensor
 from sim.world.sensors.contract import Sensor, Truth
 from sim.world.sensors.gps import GpsReceiver
-from sim.world.sensors.image import ImageSensor
 from sim.world.sensors.inertial import InertialSensor
 from sim.world.sensors.phone import PhoneSensor
 from sim.world.sensors.radar import RadarSensor

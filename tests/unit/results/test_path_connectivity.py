@@ -3,8 +3,7 @@
 import pytest
 from kit import MakeScenario
 
-from sim.results.connectivity import connectivity
-from sim.results.links_over_time import LinksOverTime
+from sim.results.links_over_time import LinksOverTime, connectivity
 from sim.results.outcome import Outcome
 
 

@@ -8,8 +8,7 @@ import pytest
 
 from fanet_mw.actor import Actor
 from sim.run import virtual
-from sim.run.garbage import GarbageOfRuns
-from sim.run.virtual import actors_of, simulate
+from sim.run.virtual import GarbageOfRuns, actors_of, simulate
 from sim.scenarios.catalog import find
 
 

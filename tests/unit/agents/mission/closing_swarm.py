@@ -27,7 +27,7 @@ from fanet_mw.bus.messages import VELOCITY_LASTS_NS
 from fanet_mw.motion import Motion
 from fanet_mw.units import MS, US, Enu, NodeId, S
 from fanet_mw.wire.search_plan import Search
-from sim.results.connectivity import parts
+from sim.results.links_over_time import parts
 
 _STEP_NS: Final = S // 5
 _SPEED_M_S: Final = 10.0

@@ -25,7 +25,7 @@ from sim.world.environment.layout import positions
 from sim.world.environment.obstacles import Box, Obstacles, obstacles
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors, place
-from sim.world.incidents.incidents import NoFlyEntries
+from sim.world.incidents import NoFlyEntries
 
 MakeScenario = Callable[..., Scenario]
 PARIS = Geodetic(48.8566, 2.3522, 0.0)

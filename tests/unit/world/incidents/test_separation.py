@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sim.world.incidents.incidents import Separation
+from sim.world.incidents import Separation
 
 
 def rows(*places: tuple[float, float]) -> np.ndarray:

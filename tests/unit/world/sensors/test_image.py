@@ -16,8 +16,8 @@ from fanet_mw.units import S
 from sim.run.virtual import simulate
 from sim.world.environment.obstacles import Box, Hills, Obstacles
 from sim.world.environment.survivors import Survivors
+from sim.world.sensors.camera import ImageSensor
 from sim.world.sensors.contract import Truth
-from sim.world.sensors.image import ImageSensor
 
 MakeScenario = Callable[..., Scenario]
 WIDTH, HEIGHT = 320, 240

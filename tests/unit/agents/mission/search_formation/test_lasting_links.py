@@ -15,7 +15,7 @@ from agents.mission.search_formation.lasting_links import keep_together
 from agents.mission.search_formation.pattern import fitted
 from agents.mission.search_formation.shapes.contract import Demands
 from fanet_mw.units import Enu
-from sim.results.connectivity import parts
+from sim.results.links_over_time import parts
 
 REACH_M = 250.0
 GRID = [Enu(200.0 * (i % 9) - 800, 200.0 * (i // 9) - 400, 65) for i in range(45)]

@@ -1,15 +1,20 @@
-"""Keeps files of the working folder, such as a numpy of the user's, out of the way of processes that Python starts.
+"""What a process that Python starts (a swarm's process, a sweep's worker) needs: it ends with its parent, however that
+ends, and files of the working folder, such as a numpy of the user's, are not in its way.
 
-multiprocessing starts them by `python -c`, which looks there first for whatever is imported.
+multiprocessing starts processes by `python -c`, which looks there first for whatever is imported.
 """
 
+import ctypes
 import os
+import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
 
 _VARIABLE: Final = "PYTHONSAFEPATH"
 _OURS: Final = "fanet"
+_PR_SET_PDEATHSIG: Final = 1
 
 
 @contextmanager
@@ -27,3 +32,9 @@ def restore() -> None:
     """In such a process: let those that it starts in its turn import as always."""
     if os.environ.get(_VARIABLE) == _OURS:
         del os.environ[_VARIABLE]
+
+
+def be_killed_with_parent() -> None:
+    """Let Linux kill this process when the thread that forked it ends; on other systems nothing happens."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)

@@ -19,7 +19,9 @@ it would have been so long after its last hello."""
 _STOPS_BUT_S: Final = 1.0
 """The hello may have been sent so long before the program stopped."""
 _UNTIL_LOST_NS: Final = seconds_to_ns(5.0)
-"""A UAV not heard for longer when it was lost had left this one's reach, and may be anywhere."""
+"""A UAV not heard for longer when it was lost had left this one's reach: it may be anywhere near its place."""
+_PLACE_BUT_M: Final = 10.0
+"""So far from its place a UAV may have been, or have flown on from there before it stopped."""
 _FALLS_M_S: Final = 6.0
 """Nobody sinks this fast on purpose."""
 
@@ -48,16 +50,19 @@ class NeighborMotions:
         motion = self._motions.get(node)
         return None if motion is None or now_ns - motion.at_ns > self._lifetime_ns else motion
 
-    def hovering(self, lost: Mapping[int, int]) -> list[tuple[Enu, float]]:
-        """Where those who fell silent may hover, and how far from there; `lost`: since when each is lost. No place for
-        who said that it fell, or had left this UAV's reach before.
+    def hovering(self, lost: Mapping[int, int], places: Mapping[int, Enu]) -> list[tuple[Enu, float]]:
+        """Where those who fell silent may hover, and how far from there; `lost`: since when each is lost, `places`:
+        where those were due whom this UAV did not hear until then. No place for who said that it fell.
         """
         found = []
         for node, lost_ns in lost.items():
             last = self._motions.get(node)
-            if last is not None and lost_ns - last.at_ns <= _UNTIL_LOST_NS and not falls(last.velocity):
-                flown = last.velocity._replace(up=0.0)
-                found.append((last.position.plus(flown, _STOPS_S), _STOPS_BUT_S * flown.horizontal()))
+            if last is not None and lost_ns - last.at_ns <= _UNTIL_LOST_NS:
+                if not falls(last.velocity):
+                    flown = last.velocity._replace(up=0.0)
+                    found.append((last.position.plus(flown, _STOPS_S), _STOPS_BUT_S * flown.horizontal()))
+            elif node in places:
+                found.append((places[node], _PLACE_BUT_M))
         return found
 
     def all(self, *, now_ns: int) -> list[Motion]:

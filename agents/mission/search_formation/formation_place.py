@@ -65,6 +65,8 @@ class FormationPlace:
         """Where each other UAV was, by its latest hello or status, and when."""
         self._closing_ns = 0
         """The instant at which the last of them was lost."""
+        self._lost_at: dict[int, Enu] = {}
+        """Where each UAV lost in the sweep was due when this one learned of it, above ground."""
         self._hops: Mapping[int, int] = {}
         """How many ties lead from each place to the nearest one of another part."""
         self._before: Pattern | None = None
@@ -104,11 +106,21 @@ class FormationPlace:
             self._hops = self.pattern.hops_from([at for at, node in enumerate(self.plan.nodes) if node in parted])
         if not gaps <= self._gaps:
             self._closing_ns = now_ns
+            if self.is_taken_up(now_ns):
+                self._lost_at |= {
+                    self.plan.nodes[place]: self.pattern.at(place, self.swept_s(now_ns) or 0.0)
+                    for place in gaps - self._gaps
+                }
             if now_ns - self._changed_ns >= _FLOWN_NS:
                 self._before = self.pattern
         self._gaps = gaps
         if vacant != self.pattern.vacant:
             self.pattern, self._changed_ns = self.pattern.closed(vacant), now_ns
+
+    def lost_at(self, now_ns: int) -> Mapping[int, Enu]:
+        """Where those lost in the sweep were due, over ground as high as below this UAV."""
+        rise_m = self._own_motion.position.up - self._own_motion.height_m(now_ns)
+        return {node: at._replace(up=at.up + rise_m) for node, at in self._lost_at.items()}
 
     def closing_s(self, now_ns: int) -> float | None:
         """How long this row has been closing ranks over the last one lost; None if it is not, or has done."""

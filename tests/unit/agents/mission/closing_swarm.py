@@ -67,7 +67,7 @@ class _Uav:
 
     def fly(self, at: Enu, velocity: Enu, now_ns: int) -> Enu:
         self.board.place.close_ranks(self.lost, now_ns, parted=self.parted)
-        self._obstacles.hovering = self.board.neighbors.hovering(self.lost)
+        self._obstacles.hovering = self.board.neighbors.hovering(self.lost, self.board.place.lost_at(now_ns))
         self._flight.fix(at, velocity, None, now_ns=now_ns)
         self.lost |= {node: now_ns for node in self._roll_call.lost if node not in self.lost}
         assert self._flight.velocity is not None

@@ -30,5 +30,7 @@ def test_a_neighbor_that_fell_silent_may_hover_where_its_flight_controller_stops
     motions.on_hello(5, Motion(at, Enu(0.0, 5.0, 0.0), S))
     falls, left_this_reach_before, never_heard = 3, 4, 6
     lost = {2: 2 * S, falls: 2 * S, left_this_reach_before: 40 * S, never_heard: 2 * S}
-    assert motions.hovering(lost) == [(Enu(0.0, 50.0, 65.0), 5.0)]
-    assert motions.hovering({}) == []
+    assert motions.hovering(lost, {}) == [(Enu(0.0, 50.0, 65.0), 5.0)]
+    assert motions.hovering({}, {}) == []
+    places = {node: Enu(300.0, 10.0 * node, 65.0) for node in (*lost, 9)}
+    assert motions.hovering(lost, places)[1:] == [(Enu(300.0, 40.0, 65.0), 10.0), (Enu(300.0, 60.0, 65.0), 10.0)]

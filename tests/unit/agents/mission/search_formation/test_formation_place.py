@@ -120,3 +120,14 @@ def test_another_part_is_sought_until_ranks_are_closed_also_while_a_link_by_chan
         place.close_ranks({29}, now_ns + after_s * S, parted=parted)
         sought.append(set(place.sought))
     assert sought == [{30}, {30}, {30}, set(), {31}]
+
+
+def test_a_uav_lost_in_the_sweep_may_hover_where_its_place_was_then_over_ground_as_high_as_here() -> None:
+    early, lost, hill_m = NodeId(20), NodeId(9), 30.0
+    board = Board(LINE, Enu(0, 0, UP_M + hill_m))
+    board.own_motion.altimeter(UP_M, now_ns=TAKEN_UP_NS + 40 * S)
+    board.place.close_ranks({early}, TAKEN_UP_NS - S)
+    for after_s in (40, 41, 90):
+        board.place.close_ranks({early, lost}, TAKEN_UP_NS + after_s * S)
+        at = lane_of(lost, TAKEN_UP_NS + 40 * S)
+        assert board.place.lost_at(TAKEN_UP_NS + 40 * S) == {lost: at._replace(up=at.up + hill_m)}

@@ -19,7 +19,8 @@ sys.path.insert(0, str(ROOT))
 from agents.mission.searcher import formation  # noqa: E402  (the root is on the path now)
 from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry  # noqa: E402
 from fanet_mw.routing.clustered.timetable.timetable import timetable  # noqa: E402
-from fanet_mw.units import Enu, NodeId  # noqa: E402
+from fanet_mw.routing.rounds.round_timing import RoundTiming  # noqa: E402
+from fanet_mw.units import MS, Enu, NodeId  # noqa: E402
 from sim.figures.colors import BLUE, DARK, GRAY, GREEN, ORANGE, PINK, RED, SHADE  # noqa: E402
 from sim.figures.style import applied, canvas  # noqa: E402
 from sim.scenarios import catalog  # noqa: E402
@@ -53,7 +54,8 @@ def rows(axes: Axes, lines: Sequence[tuple[str, Sequence[Bar]]], *, unit: str, w
     for number, (name, bars) in enumerate(reversed(lines)):
         axes.text(-0.01 * wide, number, name, ha="right", va="center", fontsize=8)
         for begin, length, color, text in bars:
-            axes.barh(number, length, 0.7, begin, color=color, edgecolor=DARK, linewidth=0.6)
+            edge = 0.6 if length > wide / 250 else 0.1
+            axes.barh(number, length, 0.7, begin, color=color, edgecolor=DARK, linewidth=edge)
             ink = "white" if color in (BLUE, GRAY) else DARK
             axes.text(begin + length / 2, number, text, ha="center", va="center", fontsize=7, color=ink)
     axes.set(xlim=(0, wide), ylim=(-0.6, len(lines) - 0.4), yticks=[], xlabel=unit)
@@ -67,14 +69,28 @@ def superframes() -> Figure:
     slots = [(k * 125.0, 115.0, color, f"head {k + 1}") for k, color in enumerate((BLUE, ORANGE, GREEN, PINK))]
     guards = [(k * 125.0 + 115, 10.0, GRAY, "") for k in range(4)]
     turns = [(40 + k * 2.875, 2.875, (BLUE, ORANGE, GREEN, PINK, RED)[k % 5], "") for k in range(160)]
-    ring = [(k * 3.05, 3.05, (BLUE, ORANGE, GREEN, PINK, RED)[k % 5], "") for k in range(45)]
-    bulk = [(137.0, 113.0, SHADE, "bulk slots"), (387.0, 113.0, SHADE, "bulk slots")]
+    ring = RoundTiming.of(catalog.find("rescue"))
+    of_nodes = [
+        (
+            ring.turn_start_ns(node, from_ns=begin_ns) / MS,
+            ring.turn_ns / MS,
+            (BLUE, ORANGE, GREEN, PINK, RED)[node % 5],
+            "",
+        )
+        for node in range(1, ring.nodes + 1)
+        for begin_ns in range(0, 3 * ring.period_ns, ring.period_ns)
+    ]
+    bulk = [
+        ((begin_ns + block.slots_start_ns) / MS, block.slots * ring.slot_ns / MS, SHADE, "bulk")
+        for block in ring.blocks
+        for begin_ns in range(0, 3 * ring.period_ns, ring.period_ns)
+    ]
     rows(
         axes,
         [
             ("all, counter", slots + guards),
             ("scheduled", [(0.0, 40.0, SHADE, "window"), *turns]),
-            ("rounds", [*ring, bulk[0], *[(begin + 250, *rest) for begin, *rest in ring], bulk[1]]),
+            ("rounds", [*of_nodes, *bulk]),
         ],
         unit="ms of a flooding period of 0.5 s; gray: guard time, one color after the other: turns of one frame each",
         wide=500,

@@ -248,9 +248,9 @@ def turn_lines(found: Turns, now_ns: int) -> Text:
     text = Text(f"{found.period_called} {superframe} of {period_ns / MS:g} ms, {place_ns / MS:.1f} ms into it; ")
     free = found.window_called if found.in_window(now_ns) else "nobody's"
     text.append(f"now: {found.called} of {', '.join(map(str, now))}\n\n" if now else f"now: {free}\n\n", "bold")
-    if found.window[1]:
-        first, last = (at * _WIDTH // period_ns for at in (found.window[0], sum(found.window)))
-        text.append(f"{'all':>5} {'.' * first}{'~' * (last - first)}{'.' * (_WIDTH - last)}\n", "dim")
+    if found.windows:
+        middles = ((2 * at + 1) * period_ns // (2 * _WIDTH) + found.start_ns for at in range(_WIDTH))
+        text.append(f"{'all':>5} {''.join('~' if found.in_window(at_ns) else '.' for at_ns in middles)}\n", "dim")
     for owner in owners:
         line = ["."] * _WIDTH
         for span in found.own:

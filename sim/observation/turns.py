@@ -28,8 +28,8 @@ class Turns(NamedTuple):
     """The spans of nodes; of slots, those of clusters by number, which their heads have."""
     called: str
     """What a span is called: `slot` or `turn`."""
-    window: tuple[int, int] = (0, 0)
-    """What is left beside the spans, for contention or bulk: start and length."""
+    windows: Sequence[tuple[int, int]] = ()
+    """What is left beside the spans, for contention or bulk: starts and lengths."""
     window_called: str = "all contend"
     period_called: str = "superframe"
 
@@ -38,8 +38,8 @@ class Turns(NamedTuple):
         return (t_ns - self.start_ns) % self.period_ns
 
     def in_window(self, t_ns: int) -> bool:
-        start_ns, length_ns = self.window
-        return (self.place_ns(t_ns) - start_ns) % self.period_ns < length_ns
+        place_ns = self.place_ns(t_ns)
+        return any(0 <= place_ns - start_ns < length_ns for start_ns, length_ns in self.windows)
 
     def owners(self, t_ns: int) -> list[int]:
         """The nodes, or the clusters, whose span it is; several where turns are used again far away."""
@@ -51,15 +51,16 @@ def turns(scenario: Scenario, reports: Mapping[int, Mapping[str, Any]]) -> Turns
     """The turns in force by the reports of nodes, or by the rule of rounds; None if nobody owns any."""
     if scenario.routing.protocol == "rounds":
         timing = RoundTiming.of(scenario)
-        own = [Span(node, (node - 1) * timing.turn_ns, timing.turn_ns) for node in scenario.node_ids]
-        window = (timing.nodes * timing.turn_ns, timing.slots * timing.slot_ns)
-        return Turns(0, timing.period_ns, own, "turn", window, "bulk slots", "round")
+        own = [Span(node, timing.turn_start_ns(node, from_ns=0), timing.turn_ns) for node in scenario.node_ids]
+        windows = [(block.slots_start_ns, block.slots * timing.slot_ns) for block in timing.blocks if block.slots]
+        return Turns(0, timing.period_ns, own, "turn", windows, "bulk slots", "round")
     turned = {node: report["turns"] for node, report in reports.items() if report.get("turns")}
     if turned:
         newest = max(turned.values(), key=lambda frame: float(frame["start_ms"]))
         own = sorted((one for node, frame in turned.items() for one in spans_of(node, frame)), key=lambda one: one[1:])
-        window = (0, _ns(newest.get("contention_ms", 0.0)))
-        return Turns(_ns(newest["start_ms"]), _ns(newest["period_ms"]), own, "turn", window)
+        contention_ns = _ns(newest.get("contention_ms", 0.0))
+        windows = [(0, contention_ns)] if contention_ns else []
+        return Turns(_ns(newest["start_ms"]), _ns(newest["period_ms"]), own, "turn", windows)
     slotted = [report["slots"] for report in reports.values() if report.get("slots")]
     if not slotted:
         return None

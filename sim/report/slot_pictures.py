@@ -113,8 +113,8 @@ def _in_turns(run: RunRecords, frame: Turns) -> RunPicture:
 
 def _in_rounds(run: RunRecords, frame: Turns) -> RunPicture:
     kept = _kept(frame, run.let_out)
-    bulk = sum(frame.place_ns(one.t_ns) >= frame.window[0] for one in run.let_out)
-    window = (", and the slots in which bulk is sent", f", {bulk:,} in the slots") if frame.window[1] else ("", "")
+    bulk = sum(frame.in_window(one.t_ns) for one in run.let_out)
+    window = (", and the slots in which bulk is sent", f", {bulk:,} in the slots") if frame.windows else ("", "")
     said = (
         f"When packets were let out first. Shaded: the turn of each node, on its line{window[0]}. Of "
         f"{len(run.let_out):,} packets, {kept:,} were let out in a turn of the origin{window[1]}."
@@ -145,9 +145,9 @@ def _over_time(run: RunRecords) -> Figure:
 def _by_node(run: RunRecords, frame: Turns, shown: Sequence[LetOut], labels: tuple[str, str], window: str) -> Figure:
     """A line for each node, with its own spans shaded. `labels`: of the packets of owners, and of others."""
     figure, (axes,) = canvas(1, width=7.5, height=4.4)
-    start_ns, length_ns = frame.window
-    if length_ns:
-        axes.axvspan(start_ns / MS, (start_ns + length_ns) / MS, color=_WINDOW_COLOR, zorder=0, label=window)
+    for index, (start_ns, length_ns) in enumerate(frame.windows):
+        label = None if index else window
+        axes.axvspan(start_ns / MS, (start_ns + length_ns) / MS, color=_WINDOW_COLOR, zorder=0, label=label)
     for index, own in enumerate(frame.own):
         axes.barh(
             own.node, own.length_ns / MS, left=own.start_ns / MS, height=0.8, color=SHADE, edgecolor=SHADE, zorder=1,

@@ -173,7 +173,7 @@ def to_one(**tables: Any) -> Mapping[str, Any]:
 
 
 def test_bulk_for_a_neighbor_takes_one_frame_and_no_wait_for_a_slot() -> None:
-    silent = to_one(traffic={"arrivals": "none"})
+    silent = to_one(traffic={**ONE, "arrivals": "none"})
     summary = to_one(traffic={**ONE, "sources": [2]})
     assert summary["pdr"] == 1.0
     assert summary["frames"]["sent"] - silent["frames"]["sent"] <= 1.2 * summary["generated"]

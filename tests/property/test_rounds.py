@@ -1,6 +1,7 @@
 """Laws of rounds: turns never overlap, bulk ends in its window, messages survive the air, links need both ends."""
 
 import contextlib
+from itertools import pairwise
 
 import pytest
 from hypothesis import given
@@ -75,22 +76,70 @@ def test_turns_of_two_nodes_never_overlap(timing: RoundTiming, from_ns: int, dat
     assert all(abs(turn_ns - start_ns) >= timing.turn_ns for turn_ns in around)
 
 
+def turns_and_slots(timing: RoundTiming) -> list[tuple[int, int]]:
+    """Start and end of every turn and slot of the first round, in their order."""
+    turns = (timing.turn_start_ns(node, from_ns=0) for node in range(1, timing.nodes + 1))
+    slots = map(timing.slot_start_ns, range(timing.slots))
+    return sorted(
+        [(at_ns, at_ns + timing.turn_ns) for at_ns in turns] + [(at_ns, at_ns + timing.slot_ns) for at_ns in slots]
+    )
+
+
+@given(timings())
+def test_a_round_has_a_turn_of_each_node_and_all_slots_and_none_of_them_overlap(timing: RoundTiming) -> None:
+    spans = turns_and_slots(timing)
+    assert len(spans) == timing.nodes + timing.slots
+    assert spans[0][0] == 0
+    assert all(start_ns == end_ns for (_, end_ns), (start_ns, _) in pairwise(spans)), "nothing is left between them"
+    assert spans[-1][1] <= timing.period_ns
+
+
+@given(timings())
+def test_blocks_cover_the_round_in_equal_parts(timing: RoundTiming) -> None:
+    blocks = timing.blocks
+    assert [block.end_ns for block in blocks] == [*(block.start_ns for block in blocks[1:]), timing.period_ns]
+    turns = [(block.slots_start_ns - block.start_ns) // timing.turn_ns for block in blocks]
+    for parts, whole in (turns, timing.nodes), ([block.slots for block in blocks], timing.slots):
+        assert sum(parts) == whole
+        assert max(parts) - min(parts) <= 1
+    if len(blocks) > 1:
+        assert min(turns) >= 1
+        assert min(block.slots for block in blocks) >= 4
+
+
+@given(timings(), INSTANTS, st.data())
+def test_a_frame_belongs_to_the_node_in_whose_turn_it_ended(
+    timing: RoundTiming, from_ns: int, data: st.DataObject
+) -> None:
+    node = data.draw(st.integers(1, timing.nodes))
+    start_ns = timing.turn_start_ns(node, from_ns=from_ns)
+    assert timing.owner(start_ns + data.draw(st.integers(1, timing.turn_ns))) == node
+    if timing.slots:
+        slot_ns = timing.slot_start_ns(timing.slot_from(from_ns))
+        assert timing.owner(slot_ns + data.draw(st.integers(1, timing.slot_ns))) is None
+
+
 @given(timings().filter(lambda timing: timing.slots > 0), INSTANTS)
-def test_bulk_slots_follow_the_turns_and_each_other(timing: RoundTiming, from_ns: int) -> None:
+def test_the_next_slot_is_the_first_that_starts_from_an_instant_on(timing: RoundTiming, from_ns: int) -> None:
     slot = timing.slot_from(from_ns)
-    start_ns = timing.slot_start_ns(slot)
-    assert timing.slot_start_ns(slot - 1) < from_ns <= start_ns
-    assert start_ns - timing.slot_start_ns(slot - 1) >= timing.slot_ns
-    within_ns = start_ns % timing.period_ns
-    assert timing.nodes * timing.turn_ns <= within_ns <= timing.period_ns - timing.slot_ns
+    assert timing.slot_start_ns(slot - 1) < from_ns <= timing.slot_start_ns(slot)
 
 
 @given(timings().filter(lambda timing: timing.slots > 0), INSTANTS)
-def test_what_is_sent_at_once_starts_between_the_turns_and_ends_before_them(timing: RoundTiming, from_ns: int) -> None:
+def test_what_is_sent_at_once_starts_between_turns_and_ends_before_the_next(timing: RoundTiming, from_ns: int) -> None:
     start_ns = timing.between_turns_ns(from_ns)
     assert from_ns <= start_ns < from_ns + timing.period_ns
-    within_ns = start_ns % timing.period_ns
-    assert timing.nodes * timing.turn_ns <= within_ns <= timing.period_ns - 2 * timing.slot_ns
+    assert timing.owner(start_ns + 1) is None
+    next_ns = min(timing.turn_start_ns(node, from_ns=start_ns) for node in range(1, timing.nodes + 1))
+    assert next_ns - start_ns >= 2 * timing.slot_ns
+    assert timing.between_turns_ns(start_ns) == start_ns
+
+
+@pytest.mark.parametrize("nodes", [9, 45, 200])
+def test_what_goes_to_a_neighbor_at_once_never_waits_longer_than_18_ms(nodes: int) -> None:
+    timing = RoundTiming.of(config.build({"nodes": {"count": nodes}, "routing": {"protocol": "rounds"}}))
+    at_ns = range(0, timing.period_ns, MS // 10)
+    assert max(timing.between_turns_ns(from_ns) - from_ns for from_ns in at_ns) <= 18 * MS
 
 
 @given(timings().filter(lambda timing: timing.slots > 0), INSTANTS, st.data())
@@ -201,7 +250,7 @@ def test_a_frame_in_its_senders_turn_shows_that_both_keep_the_same_rounds() -> N
     assert not known.among(-1), "nobody, before a frame was heard"
     known.hear(7, ends_ns)
     assert known.among(-1) == seven
-    known.hear(7, begins_ns + timing.nodes * timing.turn_ns)
+    known.hear(7, timing.slot_start_ns(timing.slot_from(begins_ns)) + timing.turn_ns)
     assert known.among(-1) == seven, "among the slots a frame shows nothing"
     known.hear(7, ends_ns - timing.turn_ns)
     assert not known.among(-1), "its clock is behind by a turn"

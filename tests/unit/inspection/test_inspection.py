@@ -210,7 +210,7 @@ def test_sigterm_ends_it_at_once(folder: Path) -> None:
 
 
 def test_where_all_contend_is_drawn_above_the_turns() -> None:
-    frame = Turns(0, 100 * MS, [Span(1, 0, 20 * MS), Span(2, 20 * MS, 20 * MS)], "turn", (40 * MS, 60 * MS))
+    frame = Turns(0, 100 * MS, [Span(1, 0, 20 * MS), Span(2, 20 * MS, 20 * MS)], "turn", [(40 * MS, 60 * MS)])
     lines = turn_lines(frame, 150 * MS).plain.splitlines()
     assert lines[0].endswith("now: all contend")
     assert lines[2] == "  all " + "." * 40 + "~" * 60

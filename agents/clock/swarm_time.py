@@ -18,7 +18,7 @@ from fanet_mw.scenario import Clock, Scenario
 from fanet_mw.timesync.clock_fit import EXACT, ClockFit, Line, Oscillator, Pair
 from fanet_mw.timesync.ftsp import MOST_STATED_NS, WORST_LIFE_NS, Settings, TimeSync
 from fanet_mw.units import LIGHT_M_PER_S, MS, US, NodeId, S, seconds_to_ns
-from fanet_mw.wire.hello.time_beacon import TimeBeacon
+from fanet_mw.wire.hello.beacon import TimeBeacon
 
 _SIGMAS: Final = 4
 """The error bound of a GPS fix, in standard deviations."""

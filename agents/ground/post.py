@@ -21,10 +21,9 @@ from fanet_mw.serial_number import newer
 from fanet_mw.trace import KnownOnGround
 from fanet_mw.units import US, S, seconds_to_ns
 from fanet_mw.wire import BIDS, FOUND, ORDER, PRIORITY_SAFETY, ROLL, SEARCH, STATUS, SURVIVOR
-from fanet_mw.wire.search_messages import told_in
+from fanet_mw.wire.search_messages import ToldOrder, told_in
 from fanet_mw.wire.search_plan import Search, SearchStatus
 from fanet_mw.wire.survivors import Found, Standing
-from fanet_mw.wire.told_order import ToldOrder
 
 _TELLINGS: Final = 3
 """The number of times that an order is flooded."""

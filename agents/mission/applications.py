@@ -23,10 +23,9 @@ from fanet_mw.node.received_motion import motion_in
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId
 from fanet_mw.wire import BIDS, FOUND, ORDER, ROLL, SEARCH, STATUS, SURVIVOR
-from fanet_mw.wire.search_messages import Told, told_in
+from fanet_mw.wire.search_messages import Told, ToldOrder, told_in
 from fanet_mw.wire.search_plan import Search, SearchStatus
 from fanet_mw.wire.survivors import Found, Standing, Survivor
-from fanet_mw.wire.told_order import ToldOrder
 
 
 class Rescue(Application):

@@ -12,7 +12,7 @@ from fanet_mw.orders import Order, OrderKind
 from fanet_mw.serial_number import newer
 from fanet_mw.trace import Ordered
 from fanet_mw.units import NodeId, S
-from fanet_mw.wire.told_order import ToldOrder
+from fanet_mw.wire.search_messages import ToldOrder
 
 _TOLD_NS: Final = 12 * S
 """How long hellos tell an order on."""

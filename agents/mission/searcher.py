@@ -67,12 +67,9 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.world import FASTEST_AIR_M_S
 from fanet_mw.trace import MissionModeChanged
 from fanet_mw.units import MS, Enu, NodeId, S, earliest
-from fanet_mw.wire.bids import Bids, encode_bids
-from fanet_mw.wire.roll import Roll
-from fanet_mw.wire.search_messages import Told
+from fanet_mw.wire.search_messages import Bids, Roll, Told, ToldOrder, encode_bids
 from fanet_mw.wire.search_plan import MOST_PLACES, Search, SearchStatus
 from fanet_mw.wire.survivors import Found, Standing, Survivor, is_person
-from fanet_mw.wire.told_order import ToldOrder
 
 _MOST_DECADES: Final = 12.0
 """The greatest range of a phone's receiver is 10^12 m, farther than anything is apart; its square is a number."""

@@ -21,7 +21,7 @@ from typing import Final, NamedTuple
 from fanet_mw.serial_number import following, newer
 from fanet_mw.timesync.clock_fit import EXACT, ClockFit, Line, Oscillator, Pair, alike
 from fanet_mw.units import MS, NodeId, S
-from fanet_mw.wire.hello.time_beacon import TimeBeacon
+from fanet_mw.wire.hello.beacon import TimeBeacon
 
 _ENOUGH: Final = 2
 """The number of neighbors that must agree."""

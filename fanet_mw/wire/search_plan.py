@@ -5,7 +5,7 @@ from typing import Any, Final, NamedTuple, Self
 from fanet_mw.errors import LocalProtocolError
 from fanet_mw.units import FARTHEST_M, Enu
 from fanet_mw.wire.checks import refuse_unless
-from fanet_mw.wire.frame import ANY_NODE, LATEST_US, SEARCH, STATUS, VERSION, Packed, decode_first, encode_inner
+from fanet_mw.wire.frame import ANY_NODE, LATEST_US, SEARCH, STATUS, VERSION, encode_inner
 
 MOST_PLACES: Final = 79
 """The number of places of a formation that one message can assign."""
@@ -48,11 +48,6 @@ class Search(NamedTuple):
         counts = self.lanes, self.relays, self.followers, self.shape, self.teams
         packed = SEARCH.layout.pack(*self[:6], self.narrower_m, *self[6:9], *self.nodes, *unused, *counts, VERSION)
         return encode_inner(SEARCH, packed, node=node)
-
-    @classmethod
-    def decode_frame(cls, packed: Packed) -> Self:
-        """The first plan in a frame; raises MalformedFrameError for a plan that no swarm could fly."""
-        return cls.checked(decode_first(SEARCH, packed))
 
     @classmethod
     def checked(cls, fields: tuple[Any, ...]) -> Self:
@@ -118,11 +113,6 @@ class SearchStatus(NamedTuple):
     def encode_frame(self, node: int) -> bytes:
         payload = STATUS.layout.pack(self.t_us, *self.position, *self[2:], VERSION)
         return encode_inner(STATUS, payload, node=node)
-
-    @classmethod
-    def decode_frame(cls, packed: Packed) -> Self:
-        """The first FANET_STATUS in a frame; raises MalformedFrameError."""
-        return cls.checked(decode_first(STATUS, packed))
 
     @classmethod
     def checked(cls, fields: tuple[Any, ...]) -> Self:

@@ -48,11 +48,9 @@ from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.trace import Record
 from fanet_mw.units import BROADCAST, Enu, NodeId, S
 from fanet_mw.wire.application_message import DELIVERED, MISSING, Head, Receipt, encode_piece, encode_receipts
-from fanet_mw.wire.bids import Bid, encode_bids
-from fanet_mw.wire.roll import Roll
+from fanet_mw.wire.search_messages import Bid, Roll, ToldOrder, encode_bids
 from fanet_mw.wire.search_plan import Search, SearchStatus
 from fanet_mw.wire.survivors import Found, Standing
-from fanet_mw.wire.told_order import ToldOrder
 from sim.run.virtual import actors_of
 from sim.scenarios import catalog
 

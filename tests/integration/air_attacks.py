@@ -15,9 +15,8 @@ from fanet_mw import wire
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, Kind
-from fanet_mw.wire.hello.beacon import Beacon, Role
+from fanet_mw.wire.hello.beacon import Beacon, Role, TimeBeacon
 from fanet_mw.wire.hello.digest import Digest, Holding
-from fanet_mw.wire.hello.time_beacon import TimeBeacon
 from fanet_mw.wire.join import Join
 from fanet_mw.wire.links import Link, Links
 from fanet_mw.wire.schedule import Member, Schedule

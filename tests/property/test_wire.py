@@ -15,8 +15,7 @@ from fanet_mw.dialect import fanet
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.units import FARTHEST_M, FASTEST_M_S, Enu
 from fanet_mw.wire import Header
-from fanet_mw.wire.hello.beacon import Beacon, Role
-from fanet_mw.wire.hello.time_beacon import TimeBeacon
+from fanet_mw.wire.hello.beacon import Beacon, Role, TimeBeacon
 from fanet_mw.wire.join import Join
 from fanet_mw.wire.schedule import CAPACITY, Member, Schedule
 from fanet_mw.wire.survivors import MOST_DBM, MOST_SURVIVORS, Survivor

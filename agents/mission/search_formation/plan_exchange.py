@@ -13,7 +13,7 @@ from agents.mission.search_formation.roll_call import RollCall
 from fanet_mw.motion import Motion
 from fanet_mw.trace import Planned
 from fanet_mw.units import MS, US, NodeId, S
-from fanet_mw.wire.roll import Roll
+from fanet_mw.wire.search_messages import Roll
 from fanet_mw.wire.search_plan import Search, SearchStatus
 
 _FIRST_STATUS_S: Final = 2

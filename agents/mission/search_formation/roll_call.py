@@ -20,7 +20,7 @@ from typing import Final
 from agents.mission.navigation.silent_neighbors import SilentNeighbors
 from fanet_mw.node.neighbors import neighbor_lifetime_ns
 from fanet_mw.units import NodeId, S
-from fanet_mw.wire.roll import LONG_AGO, ROLL_NS, Roll
+from fanet_mw.wire.search_messages import LONG_AGO, ROLL_NS, Roll
 from fanet_mw.wire.search_plan import Search
 
 _SILENT_NS: Final = 3 * S

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 
 from fanet_mw.serial_number import following, newer
 from fanet_mw.units import NodeId, S
-from fanet_mw.wire.bids import MOST_BIDS, WITHDRAWN, Bid
+from fanet_mw.wire.search_messages import MOST_BIDS, WITHDRAWN, Bid
 
 _FORGOTTEN_NS: Final = 15 * S
 """How long a bid counts if its bidder does not confirm it."""

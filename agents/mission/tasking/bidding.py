@@ -24,7 +24,7 @@ from agents.mission.tasking.voice_descent import descent_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Approaching, Located
 from fanet_mw.units import Enu, NodeId, S
-from fanet_mw.wire.bids import Bid
+from fanet_mw.wire.search_messages import Bid
 
 FAR_M: Final = 450.0
 """A UAV does not bid for a survivor if the middle of the phone filter's grid is farther away than this."""

@@ -4,7 +4,7 @@ MAVLink's position and velocity   `fanet_mw/mavlink.py`; every node says it
 messages of a search              `fanet_mw/wire/`: survivors, bids, searched cells
 FANET_BEACON                      `beacon.py`: cluster, role, leader, and the distance from a head
 FANET_DIGEST                      `digest.py`: which recent packets the sender holds, so that others can repair
-FANET_TIME                        `time_beacon.py`: when an earlier hello ended, in swarm time
+FANET_TIME                        `beacon.py`: when an earlier hello ended, in swarm time
 """
 
 from typing import Final

@@ -1,11 +1,14 @@
-"""FANET_BEACON: the part of a hello that states its sender's cluster, role, leader and distance from a head."""
+"""What a hello states of its sender: cluster, role, leader and distance from a head (FANET_BEACON), and when an earlier
+hello ended, in swarm time (FANET_TIME).
+"""
 
 from enum import IntEnum
 from typing import NamedTuple, Self
 
 from fanet_mw.errors import MalformedFrameError
+from fanet_mw.units import US
 from fanet_mw.wire.checks import require_sender
-from fanet_mw.wire.frame import ANY_NODE, BEACON, VERSION, Packed, decode_first, encode_inner
+from fanet_mw.wire.frame import ANY_NODE, BEACON, TIME, VERSION, Packed, decode_first, encode_inner, inner_frames
 
 
 class Role(IntEnum):
@@ -44,3 +47,37 @@ class Beacon(NamedTuple):
         if beacon.role > Role.HEAD or ANY_NODE in (beacon.head, beacon.leader):
             raise MalformedFrameError(f"beacon of role {beacon.role}, head {beacon.head}")
         return beacon
+
+
+class TimeBeacon(NamedTuple):
+    """FANET_TIME: the swarm time at which hello number `hello` of its sender ended; bounds in ns."""
+
+    t_ns: int
+    error_ns: int
+    rate_ppb: int
+    worst_ns: int
+    hello: int
+    round: int
+    node: int
+    reference: int
+    worst_age_s: int
+    hops: int
+
+    def encode_frame(self, node: int) -> bytes:
+        return encode_inner(TIME, TIME.layout.pack(*self, VERSION), node=node)
+
+    @classmethod
+    def decode_frame(cls, packed: Packed) -> Self:
+        """Decode a beacon; raises MalformedFrameError. Only a beacon of the reference itself has 0 hops."""
+        *fields, version = decode_first(TIME, packed)
+        beacon = cls(*fields)
+        require_sender(version, beacon.node, t_us=beacon.t_ns // US)
+        if not 0 < beacon.reference < ANY_NODE or (beacon.reference == beacon.node) != (beacon.hops == 0):
+            raise MalformedFrameError(f"time of node {beacon.reference}, {beacon.hops} hops from {beacon.node}")
+        return beacon
+
+    @classmethod
+    def in_hello(cls, hello: Packed) -> Self | None:
+        """The beacon in a hello; None when it has none. Raises MalformedFrameError."""
+        has_time = any(message == TIME.msgid for message, _ in inner_frames(hello))
+        return cls.decode_frame(hello) if has_time else None

@@ -4,7 +4,7 @@ from fanet_mw.scenario import Clock
 from fanet_mw.timesync.clock_fit import Oscillator
 from fanet_mw.timesync.ftsp import Settings, TimeSync
 from fanet_mw.units import MS, US, NodeId, S
-from fanet_mw.wire.hello.time_beacon import TimeBeacon
+from fanet_mw.wire.hello.beacon import TimeBeacon
 from tests.property.time_network import Network, line
 
 LIMIT_NS = 5 * S

@@ -8,15 +8,12 @@ import pytest
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.orders import MOST_M, Order, OrderKind
 from fanet_mw.units import FARTHEST_M, FASTEST_M_S, STILL, Enu
-from fanet_mw.wire import bids, frame, links, loads, places, roll, rounds, schedule
-from fanet_mw.wire.bids import Bid, encode_bids
+from fanet_mw.wire import frame, links, loads, places, rounds, schedule, search_messages
 from fanet_mw.wire.join import Join
-from fanet_mw.wire.roll import Roll
 from fanet_mw.wire.schedule import Member, Schedule
-from fanet_mw.wire.search_messages import told_in
+from fanet_mw.wire.search_messages import Bid, Roll, ToldOrder, encode_bids, told_in
 from fanet_mw.wire.search_plan import MOST_PLACES, Search, SearchStatus
 from fanet_mw.wire.survivors import MOST_DBM, MOST_SURVIVORS, Found, Standing, Survivor, person_id
-from fanet_mw.wire.told_order import ToldOrder
 
 AHEAD = bytes(frame.HEADER_BYTES)
 NOBODY = frame.ANY_NODE
@@ -116,8 +113,13 @@ PAIRS = [
 ]  # fmt: skip
 
 
+def read_as(kind: Any, packed: bytes) -> Any:
+    """The only message of a frame; of a search there may be several kinds in one frame."""
+    return kind.decode_frame(packed) if hasattr(kind, "decode_frame") else told_in(packed)[0]
+
+
 def read(message: Any) -> Any:
-    return type(message).decode_frame(AHEAD + message.encode_frame(4))
+    return read_as(type(message), AHEAD + message.encode_frame(4))
 
 
 @pytest.mark.parametrize(("held", "refused"), PAIRS, ids=[str(at) for at in range(len(PAIRS))])
@@ -138,7 +140,7 @@ def test_a_message_of_another_version_is_refused(spec: frame.Spec, message: Any)
     assert version == frame.VERSION
     for other in (frame.VERSION - 1, frame.VERSION + 1):
         with pytest.raises(MalformedFrameError):
-            type(message).decode_frame(AHEAD + frame.encode_inner(spec, spec.layout.pack(*fields, other), node=4))
+            read_as(type(message), AHEAD + frame.encode_inner(spec, spec.layout.pack(*fields, other), node=4))
 
 
 def test_bids_are_of_nodes_for_survivors_and_as_many_as_one_message_holds() -> None:
@@ -151,12 +153,12 @@ def test_bids_are_of_nodes_for_survivors_and_as_many_as_one_message_holds() -> N
         ("bidder", NOBODY - 1, NOBODY),
     ):  # fmt: skip
         kept = bid._replace(**{field: held})
-        assert read_bids(bid, kept) == (bids.Bids((bid, kept)),)
+        assert read_bids(bid, kept) == (search_messages.Bids((bid, kept)),)
         with pytest.raises(MalformedFrameError):
             read_bids(bid, bid._replace(**{field: refused}))
-    full = tuple(Bid(1 + at, 2 + at, 3 + at, 4 + at, 5 + at) for at in range(bids.MOST_BIDS))
-    assert read_bids(*full) == (bids.Bids(full),)
-    assert read_bids() == (bids.Bids(()),)
+    full = tuple(Bid(1 + at, 2 + at, 3 + at, 4 + at, 5 + at) for at in range(search_messages.MOST_BIDS))
+    assert read_bids(*full) == (search_messages.Bids(full),)
+    assert read_bids() == (search_messages.Bids(()),)
     with pytest.raises(LocalProtocolError):
         encode_bids((*full, bid), node=4)
 
@@ -165,7 +167,7 @@ def test_a_roll_tells_ages_up_to_long_ago_and_no_more_places_than_a_plan_has() -
     told = ROLL._replace(ages=(0, 126, 127, 128, 4000), lost=frozenset({0, 3}))
     got = read(told)
     assert got.ages[:5] == (0, 126, 127, 127, 127)
-    assert set(got.ages[5:]) == {roll.LONG_AGO}
+    assert set(got.ages[5:]) == {search_messages.LONG_AGO}
     assert got.lost == told.lost
     with pytest.raises(LocalProtocolError):
         ROLL._replace(ages=(1,) * (MOST_PLACES + 1)).encode_frame(4)

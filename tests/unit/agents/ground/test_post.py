@@ -7,9 +7,8 @@ from agents.uav import Uav
 from fanet_mw.bus.messages import TxRequest
 from fanet_mw.node.reader import decoded
 from fanet_mw.units import Enu, NodeId, S
-from fanet_mw.wire.search_messages import told_in
+from fanet_mw.wire.search_messages import ToldOrder, told_in
 from fanet_mw.wire.search_plan import SearchStatus
-from fanet_mw.wire.told_order import ToldOrder
 
 KEYS = {
     "nodes.count": 3, "ground.at_m": (0.0, -150.0), "mission.survivors": 1, "mission.search": "lines",

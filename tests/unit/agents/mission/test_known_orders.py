@@ -7,8 +7,7 @@ import pytest
 from agents.mission.orders import KnownOrders
 from fanet_mw.orders import Order, OrderKind, is_told, wrong
 from fanet_mw.units import NodeId, S
-from fanet_mw.wire.search_messages import told_in
-from fanet_mw.wire.told_order import ToldOrder
+from fanet_mw.wire.search_messages import ToldOrder, told_in
 
 
 def told(serial: int, kind: OrderKind, node: int = 0, radius_m: float = 0.0) -> ToldOrder:

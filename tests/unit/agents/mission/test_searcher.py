@@ -17,12 +17,9 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Confirmed, MissionModeChanged, Sighted
 from fanet_mw.units import MS, US, Enu, NodeId, S
 from fanet_mw.wire import HEADER_BYTES
-from fanet_mw.wire.bids import Bid, Bids
-from fanet_mw.wire.roll import ROLL_NS, Roll
-from fanet_mw.wire.search_messages import Told, told_in
+from fanet_mw.wire.search_messages import ROLL_NS, Bid, Bids, Roll, Told, ToldOrder, told_in
 from fanet_mw.wire.search_plan import SearchStatus
 from fanet_mw.wire.survivors import Found, Standing, Survivor
-from fanet_mw.wire.told_order import ToldOrder
 
 HOME = Enu(0.0, -100.0, 65.0)
 STILL = Enu(0.0, 0.0, 0.0)

@@ -7,7 +7,7 @@ import pytest
 from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, PhoneModel
 from agents.mission.finding.plausibility import Plausibility
 from fanet_mw.units import US, Enu, S
-from fanet_mw.wire.roll import Roll
+from fanet_mw.wire.search_messages import Roll
 from fanet_mw.wire.survivors import Found, Standing, Survivor
 
 MODEL = PhoneModel(power_dbm=15, exponent=3, shadowing_db=4, offset_db=1, threshold_dbm=-90, half_m=250.0)

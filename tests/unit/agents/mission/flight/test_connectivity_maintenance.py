@@ -7,7 +7,7 @@ from agents.mission.flight.connectivity_maintenance import ConnectivityMaintenan
 from agents.mission.navigation.half_planes import nearest
 from fanet_mw.motion import Motion
 from fanet_mw.units import STILL, Enu, NodeId, S
-from fanet_mw.wire.bids import Bid
+from fanet_mw.wire.search_messages import Bid
 
 
 def test_who_is_tied_does_not_fly_out_of_reach() -> None:

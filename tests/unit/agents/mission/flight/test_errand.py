@@ -11,7 +11,7 @@ from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.orders import KnownOrders
 from fanet_mw.orders import Order, OrderKind
 from fanet_mw.units import Enu, NodeId, S
-from fanet_mw.wire.told_order import ToldOrder
+from fanet_mw.wire.search_messages import ToldOrder
 
 NODE = NodeId(3)
 MIDDLE, HEIGHT_M, SPEED_M_S, LOOK_M = Enu(100.0, -50.0, 40.0), 40.0, 8.0, 25.0

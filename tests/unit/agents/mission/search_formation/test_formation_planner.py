@@ -20,6 +20,7 @@ from agents.mission.search_formation.roll_call import RollCall
 from agents.mission.search_formation.shapes.contract import Demands, ShapeName
 from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire import HEADER_BYTES
+from fanet_mw.wire.search_messages import told_in
 from fanet_mw.wire.search_plan import Search, SearchStatus
 
 REACH_M = 250.0
@@ -319,7 +320,7 @@ def test_the_number_of_a_plan_wraps_as_a_forged_one_may_be_the_greatest() -> Non
         planner.status(SearchStatus(later_ns // US, Enu(0, 0, 50), node, 65535, charge), now_ns=later_ns)
     assert planner.review(pattern, now_ns=later_ns)
     assert planner.plan is not None
-    told = Search.decode_frame(bytes(HEADER_BYTES) + planner.plan.encode_frame(1))
+    told = told_in(bytes(HEADER_BYTES) + planner.plan.encode_frame(1))[0]
     assert told.revision == 1, "0 stands for no plan"
     other = planner_with(45, node=2)
     other.on_plan(told._replace(revision=65535))

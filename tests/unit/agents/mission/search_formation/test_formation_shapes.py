@@ -18,6 +18,7 @@ from agents.mission.search_formation.shapes.sectors import rows_of
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.units import Enu
 from fanet_mw.wire import HEADER_BYTES
+from fanet_mw.wire.search_messages import told_in
 from fanet_mw.wire.search_plan import MOST_PLACES, Search
 from sim.results.coherence import coherence
 from sim.results.mission import PhotographedCells
@@ -108,7 +109,7 @@ def test_neighbors_of_a_line_stay_in_reach_of_each_other(pattern: Pattern, swept
 def test_a_plan_names_no_more_than_it_can_hold_and_is_the_same_formation_after_the_air(pattern: Pattern) -> None:
     assert pattern.places <= MOST_PLACES
     plan = plan_of(pattern, tuple(range(1, pattern.places + 1)), planner=1, start_us=7, deploy_ds=10)
-    heard = pattern_of(Search.decode_frame(bytes(HEADER_BYTES) + plan.encode_frame(1)), reach_m=REACH_M)
+    heard = pattern_of(told_in(bytes(HEADER_BYTES) + plan.encode_frame(1))[0], reach_m=REACH_M)
     for place in range(pattern.places):
         assert heard.at(place, 30.0).minus(pattern.at(place, 30.0)).norm() < 0.1
         assert heard.shape.tethers(place) == pattern.shape.tethers(place)
@@ -572,9 +573,9 @@ def test_a_formation_that_nobody_could_fly_is_refused(impossible: dict[str, floa
     plan = Search(7, 100.0, 16.0, 400.0, 65.0, 7.5, 30, 1, 1, (1, 2, 3, 4), 2, 0, 0)
     fan = plan._replace(shape=5, teams=1, lanes=4, first_m=0.0, last_m=-100.0)
     for possible in (plan, plan._replace(shape=1), plan._replace(shape=2, teams=1, lanes=4), fan):
-        assert Search.decode_frame(bytes(HEADER_BYTES) + possible.encode_frame(1)) == possible
+        assert told_in(bytes(HEADER_BYTES) + possible.encode_frame(1))[0] == possible
     with pytest.raises(MalformedFrameError):
-        Search.decode_frame(bytes(HEADER_BYTES) + plan._replace(**impossible).encode_frame(1))  # type: ignore[arg-type]
+        told_in(bytes(HEADER_BYTES) + plan._replace(**impossible).encode_frame(1))[0]  # type: ignore[arg-type]
 
 
 @given(
@@ -591,7 +592,7 @@ def test_whatever_lines_a_plan_off_the_air_may_name_each_place_is_somewhere(
         7, half_width_m, first_m, first_m + more_m, 65.0, 7.5, 30, 1, 1, tuple(range(1, 2 * pairs * lanes + 9)),
         lanes, 6, 2, 0, 2 * pairs, narrower * half_width_m,
     )  # fmt: skip
-    plan = Search.decode_frame(bytes(HEADER_BYTES) + named.encode_frame(1))
+    plan = told_in(bytes(HEADER_BYTES) + named.encode_frame(1))[0]
     whole = pattern_of(plan, reach_m=REACH_M)
     for pattern in (whole, whole.closed(frozenset(vacant.intersection(range(whole.places - 3))))):
         for swept_s in (0.0, 7.0, 0.5 * pattern.shape.sweep_s, pattern.shape.sweep_s, 1.5 * pattern.shape.sweep_s):

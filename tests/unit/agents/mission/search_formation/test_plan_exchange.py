@@ -16,7 +16,7 @@ from fanet_mw.errors import MalformedFrameError
 from fanet_mw.motion import Motion
 from fanet_mw.units import MS, STILL, US, Enu, NodeId, S
 from fanet_mw.wire import HEADER_BYTES
-from fanet_mw.wire.roll import ROLL_NS, Roll
+from fanet_mw.wire.search_messages import ROLL_NS, Roll, told_in
 from fanet_mw.wire.search_plan import SearchStatus
 
 NOW_NS = TAKEN_UP_NS + 40 * S
@@ -41,7 +41,7 @@ class Exchange:
 
     def said(self) -> list[SearchStatus]:
         packets, self.out.packets = self.out.packets, []
-        return [SearchStatus.decode_frame(bytes(HEADER_BYTES) + packet.frames) for packet in packets]
+        return [told_in(bytes(HEADER_BYTES) + packet.frames)[0] for packet in packets]
 
 
 def test_it_is_absent_from_when_it_goes_until_it_is_near_its_place_again() -> None:
@@ -123,7 +123,7 @@ def test_who_finds_a_neighbor_lost_floods_that_once() -> None:
     for after_s in (1, 4, 5, 8):
         exchange.plans.close_ranks(NOW_NS + after_s * S)
         exchange.plans.tell_losses(NOW_NS + after_s * S + S // 2)
-        told.append([Roll.decode_frame(bytes(HEADER_BYTES) + packet.frames).lost for packet in exchange.out.packets])
+        told.append([told_in(bytes(HEADER_BYTES) + packet.frames)[0].lost for packet in exchange.out.packets])
         exchange.out.packets.clear()
     assert told == [[], [{PLAN.nodes.index(out)}], [], []]
 
@@ -146,7 +146,7 @@ def test_of_two_who_find_the_same_loss_only_the_first_floods_it(flooded: bool, a
         first.plans.tell_losses(now_ns)
         second.plans.tell_losses(now_ns)
         for packet in first.out.packets:
-            told = Roll.decode_frame(bytes(HEADER_BYTES) + packet.frames)
+            told = told_in(bytes(HEADER_BYTES) + packet.frames)[0]
             second.plans.on_roll(told, flooded=flooded, now_ns=now_ns)
         first.out.packets.clear()
     assert len(second.out.packets) == floods
@@ -154,6 +154,6 @@ def test_of_two_who_find_the_same_loss_only_the_first_floods_it(flooded: bool, a
 
 def test_a_status_of_more_charge_than_a_battery_holds_is_malformed() -> None:
     full = SearchStatus(1, Enu(0, 0, 65), 7, 1, 100)
-    assert SearchStatus.decode_frame(bytes(HEADER_BYTES) + full.encode_frame(7)) == full
+    assert told_in(bytes(HEADER_BYTES) + full.encode_frame(7))[0] == full
     with pytest.raises(MalformedFrameError, match="101 %"):
-        SearchStatus.decode_frame(bytes(HEADER_BYTES) + full._replace(charge=101).encode_frame(7))
+        told_in(bytes(HEADER_BYTES) + full._replace(charge=101).encode_frame(7))[0]

@@ -15,7 +15,7 @@ from agents.mission.search_formation.shapes.contract import Demands, ShapeName
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.units import MS, NodeId, S
 from fanet_mw.wire import HEADER_BYTES
-from fanet_mw.wire.roll import LONG_AGO, Roll
+from fanet_mw.wire.search_messages import LONG_AGO, Roll, told_in
 from fanet_mw.wire.search_plan import MOST_PLACES, Search
 
 COUNT = 45
@@ -59,7 +59,7 @@ class Swarm:
                     continue
                 call = self.calls[node]
                 call.review(self.plan, since_ns=0, now_ns=now_ns)
-                told = Roll.decode_frame(bytes(HEADER_BYTES) + call.roll(self.plan, now_ns=now_ns).encode_frame(node))
+                told = told_in(bytes(HEADER_BYTES) + call.roll(self.plan, now_ns=now_ns).encode_frame(node))[0]
                 for other in self.beside(node):
                     if other not in self.silent and self._random.random() >= loses:
                         self.calls[other].on_hello(node, now_ns=now_ns)
@@ -133,14 +133,14 @@ def test_what_comes_from_another_plan_or_from_the_future_is_not_believed() -> No
 @given(st.lists(st.integers(0, LONG_AGO), max_size=MOST_PLACES), st.integers(0, 2**32 - 1), st.randoms())
 def test_a_roll_is_the_same_after_the_air(ages: list[int], at: int, pick: random.Random) -> None:
     lost = frozenset(pick.sample(range(len(ages)), len(ages) // 2))
-    heard = Roll.decode_frame(bytes(HEADER_BYTES) + Roll(at, 7, 9, tuple(ages), lost).encode_frame(3))
+    heard = told_in(bytes(HEADER_BYTES) + Roll(at, 7, 9, tuple(ages), lost).encode_frame(3))[0]
     assert (heard.at, heard.ages[: len(ages)], heard.lost) == (at, tuple(ages), lost)
 
 
 def test_a_roll_of_no_plan_is_refused() -> None:
     for wrong in (Roll(1, 0, 1, (), frozenset()), Roll(1, 65535, 1, (), frozenset()), Roll(1, 1, 0, (), frozenset())):
         with pytest.raises(MalformedFrameError):
-            Roll.decode_frame(bytes(HEADER_BYTES) + wrong.encode_frame(3))
+            told_in(bytes(HEADER_BYTES) + wrong.encode_frame(3))[0]
     with pytest.raises(LocalProtocolError):
         Roll(1, 1, 1, (0,) * 80, frozenset()).encode_frame(3)
 

@@ -9,7 +9,7 @@ from agents.mission.finding.looked_at import LookedAt
 from agents.mission.finding.phone_localization import Estimate
 from fanet_mw.motion import Motion
 from fanet_mw.units import STILL, Enu, S
-from fanet_mw.wire.bids import Bid
+from fanet_mw.wire.search_messages import Bid
 from fanet_mw.wire.survivors import Survivor
 
 

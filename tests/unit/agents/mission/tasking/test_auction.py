@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from agents.mission.tasking.auction import Auction
 from fanet_mw.units import NodeId, S
-from fanet_mw.wire.bids import WITHDRAWN, Bid
+from fanet_mw.wire.search_messages import WITHDRAWN, Bid
 
 bids = st.lists(
     st.builds(Bid, st.just(1), st.integers(2, 9), st.integers(0, 500) | st.just(WITHDRAWN), st.integers(0, 4)),

@@ -6,7 +6,7 @@ from search_board import FOLLOWER, LINE, TAKEN_UP_NS, UP_M, Board, lane_of
 from agents.mission.finding.phone_localization import Estimate
 from fanet_mw.trace import Approaching, Arrived, Located
 from fanet_mw.units import US, Enu, S
-from fanet_mw.wire.bids import Bid
+from fanet_mw.wire.search_messages import Bid
 from fanet_mw.wire.survivors import Survivor
 
 NOW_NS = TAKEN_UP_NS + 20 * S

@@ -30,8 +30,7 @@ if TYPE_CHECKING:
     from fanet_mw.errors import BusError, ConfigError, DropReason, FanetError, LocalProtocolError, MalformedFrameError
     from fanet_mw.scenario import Scenario
     from fanet_mw.units import BROADCAST, Enu, NodeId
-    from sim.results.result import Result
-    from sim.results.stored_result import load_result
+    from sim.results.result import Result, load_result
     from sim.run.api import Launched, launch, simulate
     from sim.run.virtual_swarm import VirtualSwarm
     from sim.scenarios.catalog import find as load_scenario
@@ -55,8 +54,7 @@ _HOMES: Final = {
     "fanet_mw.scenario": ("Scenario",),
     "fanet_mw.units": ("BROADCAST", "Enu", "NodeId"),
     "sim.run.api": ("Launched", "launch", "simulate"),
-    "sim.results.result": ("Result",),
-    "sim.results.stored_result": ("load_result",),
+    "sim.results.result": ("Result", "load_result"),
     "sim.run.virtual_swarm": ("VirtualSwarm",),
 }  # fmt: skip
 """The module of each public name. The packages above this one are named here and imported by nothing else in it."""

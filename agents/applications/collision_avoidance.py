@@ -12,7 +12,7 @@ from fanet_mw import mavlink, wire
 from fanet_mw.application import Application, AppPort, Course, Received
 from fanet_mw.bus.messages import Gps
 from fanet_mw.motion import Motion
-from fanet_mw.node.received_motion import motion_in
+from fanet_mw.node.reader import motion_in
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Warned
 from fanet_mw.units import NodeId

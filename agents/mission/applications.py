@@ -18,8 +18,7 @@ from fanet_mw.application import Application, AppPort, Received
 from fanet_mw.bus.messages import Gps, SensorReading, WifiScan
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.geodesy import Geodetic
-from fanet_mw.node.reader import decoded
-from fanet_mw.node.received_motion import motion_in
+from fanet_mw.node.reader import decoded, motion_in
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId
 from fanet_mw.wire import BIDS, FOUND, ORDER, ROLL, SEARCH, STATUS, SURVIVOR

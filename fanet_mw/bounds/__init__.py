@@ -1,8 +1,7 @@
 """Worst-case delays: the paper's estimate, and bounds that hold. Pure functions of integer nanoseconds.
 
-`paper` has the paper's equations (1)-(4), for comparison; `slot_service` and `turn_service` are services of slots and
-turns, `arrivals` and `network_calculus` bound a queue, `timetable_flood` floods in a timetable, `guard_time` is the
-guard time of a slot.
+`paper` has the paper's equations (1)-(4), for comparison; `slot_service` and `turn_service` are services of slots, with
+their guard time, and of turns, with the floods of a timetable; `arrivals` and `network_calculus` bound a queue.
 """
 
 from fanet_mw.bounds.arrivals import Arrivals, Bounded, DelayBound, Periodic, Refused, Total

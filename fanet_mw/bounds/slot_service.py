@@ -1,4 +1,4 @@
-"""One slot per period that sends whole frames in FIFO order: the service that it guarantees.
+"""One slot per period that sends whole frames in FIFO order: the service that it guarantees, and its guard time.
 
 |<------------- P ------------->|
 |   S   |                       |   S   |      a frame of airtime C starts only if it also ends within the slot
@@ -15,12 +15,14 @@ slot, loss, clock error (subtract the guard time from S).
 """
 
 from fractions import Fraction
-from typing import NamedTuple, Protocol
+from math import ceil
+from typing import Final, NamedTuple, Protocol
 
-from fanet_mw.airtime import Timing
+from fanet_mw.airtime import OVERHEAD_BYTES, Timing, airtime_ns
 from fanet_mw.errors import LocalProtocolError
+from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.radio import Radio
-from fanet_mw.units import US
+from fanet_mw.units import LIGHT_M_PER_S, MS, US, S
 
 
 class Dcf(NamedTuple):
@@ -116,3 +118,18 @@ class SlotServer(NamedTuple):
             return 0
         turns, rest_ns = divmod(left_ns, self.period_ns)
         return turns * self.frames + min(self.frames, rest_ns // self.airtime_ns)
+
+
+PLANNED_ERROR_NS: Final = 50 * US
+"""The clock error that a plan before take-off assumes of synchronized clocks."""
+
+
+def slot_guard_ns(scenario: Scenario, *, clock_error_ns: int) -> int:
+    """The guard time of a slot; `auto` covers two opposite clock errors of `clock_error_ns`, the propagation over
+    `radio.range_m`, and one data frame that starts just before the guard, but no relays that follow it.
+    """
+    given_ms, radio = scenario.clusters.guard_ms, scenario.radio
+    if given_ms != "auto":
+        return round(given_ms * MS)
+    overhang_ns = airtime_ns(scenario.traffic.payload_bytes + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
+    return 2 * clock_error_ns + ceil(radio.range_m * S / LIGHT_M_PER_S) + overhang_ns

@@ -17,11 +17,11 @@ from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.duplicates import DELIVERED, DuplicateSet
 from fanet_mw.node.header_check import HeaderCheck
+from fanet_mw.node.neighbors import Silences
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.node.packet_numbering import PacketNumbering
 from fanet_mw.node.port import NodePort
 from fanet_mw.node.reader import BUNDLE, Looked, Reader
-from fanet_mw.node.silences import Silences
 from fanet_mw.part_failure import protocol_report_of
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Delivered, Generated, Record

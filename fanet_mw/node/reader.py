@@ -9,9 +9,12 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Final, Protocol, TypeVar
 
+from fanet_mw import mavlink
 from fanet_mw.errors import MalformedFrameError
+from fanet_mw.motion import Motion
 from fanet_mw.node.duplicates import PHASES, hash_of, key_of
 from fanet_mw.node.packet import Packet
+from fanet_mw.units import MS, NodeId, S
 from fanet_mw.wire import (
     END_TO_END,
     FLAG_MORE,
@@ -159,3 +162,19 @@ decoded: Final = Decoded().of
 def packet_of(frame: bytes) -> Packet:
     """The packet in a frame, checked; raises MalformedFrameError. The latest packets are cached."""
     return Reader().look(frame).read(cached=False)
+
+
+FUTURE_NS: Final = S
+"""What was sent by an instant further in the future than this is rejected: the clocks of a swarm differ by less."""
+
+
+def motion_in(frame: bytes, *, own: NodeId, now_ns: int, place: mavlink.Geodetic) -> tuple[NodeId, Motion] | None:
+    """The origin of a frame and its motion; None if malformed, without position, too far in the future, or `own`."""
+    try:
+        origin, heard = packet_of(frame).origin, decoded(frame, mavlink.kinematics_about(place))
+    except MalformedFrameError:
+        return None
+    motion = Motion(heard.position, heard.velocity, heard.t_ms * MS)
+    if origin == own or motion.at_ns > now_ns + FUTURE_NS:
+        return None
+    return origin, motion

@@ -2,7 +2,7 @@
 
 model.py, tables/            the whole scenario; each of its tables: `[radio]` in `tables/radio.py`
 cross_checks.py              what the tables allow together
-config.py, overrides.py      reading from files; settings as `--set KEY=VALUE`
+config.py                    reading from files; settings as `--set KEY=VALUE`
 quantities.py                units that a value may be written with
 validation_errors.py         what the user reads of a scenario that is not valid
 commented.py, reference.py   a file with every key explained; what can be said of each key

@@ -12,18 +12,15 @@ from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, mod
 
 from fanet_mw.bus.radio_control import Control, Mishap, MishapKind
 from fanet_mw.scenario.cross_checks import disagreements
-from fanet_mw.scenario.tables.applications import ForeignApplication
 from fanet_mw.scenario.tables.clock import Clock
 from fanet_mw.scenario.tables.clusters import Clusters
 from fanet_mw.scenario.tables.faults import AnyFault
-from fanet_mw.scenario.tables.ground import Ground
+from fanet_mw.scenario.tables.ground import Ground, PlannedOrder
 from fanet_mw.scenario.tables.mission import Mission
 from fanet_mw.scenario.tables.mobility import Mobility
-from fanet_mw.scenario.tables.nodes import Nodes
-from fanet_mw.scenario.tables.orders import PlannedOrder
+from fanet_mw.scenario.tables.nodes import ForeignApplication, Nodes
 from fanet_mw.scenario.tables.radio import Radio
-from fanet_mw.scenario.tables.rounds import Rounds
-from fanet_mw.scenario.tables.routing import Routing
+from fanet_mw.scenario.tables.routing import Rounds, Routing
 from fanet_mw.scenario.tables.sections import Duration, Section, SomeTime
 from fanet_mw.scenario.tables.sensors import Sensors
 from fanet_mw.scenario.tables.traffic import Traffic

@@ -10,6 +10,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
+from fanet_mw.errors import ConfigError
+from fanet_mw.foreign_file import read_regular
 from fanet_mw.scenario import ascii_grid, outlines
 
 MOST_BYTES: Final = 256 * 1024 * 1024
@@ -57,3 +59,14 @@ def _middle_of_heights(path: str, digest: str) -> tuple[float, float] | None:
             return ascii_grid.parse(file.read(_HEADER_BYTES)).place_deg
     except (OSError, ValueError):
         return None
+
+
+def content(path: Path, *, key: str, digest: str = "") -> bytes:
+    """The bytes of the file that a key names; raises ConfigError if it cannot be read, or has another digest."""
+    try:
+        data = read_regular(path, most_bytes=MOST_BYTES)
+    except ConfigError as error:
+        raise ConfigError(f"{key}: {error}") from error
+    if digest and digest != digest_of_bytes(data):
+        raise ConfigError(f"{key}: {path} has changed since the scenario was read")
+    return data

@@ -86,7 +86,7 @@ def export(
         force: Replace what is there.
 
     """
-    from sim.results.stored_result import load_result
+    from sim.results.result import load_result
 
     if to not in _TARGETS:
         raise ConfigError(f"--to {to}: must be one of {', '.join(_TARGETS)}")

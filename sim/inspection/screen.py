@@ -22,8 +22,7 @@ from sim.inspection.inspection import Inspection, LinkLine, of_folder
 from sim.inspection.messages import Key, fields_of, name_of
 from sim.inspection.packets import Way
 from sim.inspection.rows import Column, Rows
-from sim.observation.bus_feed import BusFeed
-from sim.observation.live_frames import LiveFrames
+from sim.observation.bus_feed import BusFeed, LiveFrames
 from sim.observation.turns import Turns
 from sim.results.run_folder import RunFolder
 

@@ -8,13 +8,23 @@ What roles UAVs took before it came it learns from their reports.
 
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
 
 from fanet_mw.bus import codecs
 from fanet_mw.bus.link_stats import LinkStats
-from fanet_mw.bus.messages import CameraImage, ClockEpoch, ClockState, MavlinkTap, Message, Poses, Report, TraceBatch
+from fanet_mw.bus.messages import (
+    CameraImage,
+    ClockEpoch,
+    ClockState,
+    MavlinkTap,
+    Message,
+    Poses,
+    Report,
+    TraceBatch,
+    TxRequest,
+)
 from fanet_mw.bus.topics import Topics, node_of, node_of_tap
 from fanet_mw.errors import ConfigError, FanetError, MalformedFrameError
 from fanet_mw.hosts.bus import Bus, config_of
@@ -253,3 +263,34 @@ class Paced:
     def wait(self) -> None:
         self._next_s = max(self._next_s + self._interval_s, time.monotonic())
         time.sleep(max(0.0, self._next_s - time.monotonic()))
+
+
+_MOST_FRAMES: Final = 20_000
+
+
+class LiveFrames:
+    """The frames as they come; those for which there is no time are skipped and counted."""
+
+    def __init__(self) -> None:
+        self.skipped = self.malformed = 0
+        self.wanted = True
+        """False: what comes is passed over."""
+        self._puts: deque[tuple[str, bytes]] = deque(maxlen=_MOST_FRAMES)
+
+    def keep(self, topic: str, payload: bytes) -> None:
+        """Called on the bus's threads."""
+        if self.wanted:
+            self.skipped += len(self._puts) == _MOST_FRAMES
+            self._puts.append((topic, payload))
+
+    def take(self) -> Iterator[tuple[int, TxRequest]]:
+        for _ in range(len(self._puts)):
+            topic, payload = self._puts.popleft()
+            try:
+                messages = codecs.decode(payload)
+            except MalformedFrameError:
+                self.malformed += 1
+                continue
+            for message in messages:
+                if isinstance(message, TxRequest):
+                    yield node_of(topic), message

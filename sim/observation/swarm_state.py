@@ -40,8 +40,7 @@ from fanet_mw.wire.survivors import Found, Standing
 from sim.observation.event_text import event_line
 from sim.observation.observer import Observer
 from sim.observation.turns import Turns, turns
-from sim.results.mission import OverflownCells
-from sim.results.survivor_states import SurvivorStates
+from sim.results.mission import OverflownCells, SurvivorStates
 from sim.world.environment.survivors import place
 
 LATELY_NS: Final = 10 * S

@@ -27,7 +27,6 @@ from sim.planner.cheapest_change import cheapest_change
 from sim.planner.demand import ClassPlan, demands
 from sim.planner.expected_links import chance_of, expected_links
 from sim.planner.lossy_plan import LossyPlan, plan_lossy
-from sim.planner.not_counted import not_counted, outdated
 from sim.planner.plan import plan, with_capacity
 from sim.planner.plan_text import (
     describe,
@@ -38,6 +37,7 @@ from sim.planner.plan_text import (
     describe_operator,
     item,
 )
+from sim.planner.problems_and_notes import not_counted, outdated
 from sim.planner.rounds_plan import judge_rounds
 from sim.planner.scenario_plan import ScenarioPlan
 from sim.world.environment.layout import positions

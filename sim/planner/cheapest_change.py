@@ -16,7 +16,7 @@ from fanet_mw.routing.clustered.tdma.turn_timing import turn_slack_ns
 from fanet_mw.routing.clustered.timetable.turn_size import distance_error_m, most_together, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import US, Enu, NodeId
-from sim.planner import contention_window, problems_and_notes
+from sim.planner import problems_and_notes
 from sim.planner.demand import demands
 from sim.planner.goodput_bound import in_turns
 from sim.planner.plan import judge
@@ -108,7 +108,7 @@ def _turn_options(site: Site, delivers_m: float | None) -> Iterator[dict[str, Va
 
 def _hello_options(site: Site) -> list[dict[str, Value]]:
     """Changes that help when the contention window is too short for hellos: a longer one, also for a longer period."""
-    if not any(contention_window.too_short(site.scenario, site.adjacency)):
+    if not any(problems_and_notes.too_short(site.scenario, site.adjacency)):
         return [{}]
     least = least_ms(hellos_ns(site.scenario, crowd(site.adjacency)))
     return [{"clusters.contention_ms": float(ms)} for ms in (least, 2 * least)]

@@ -20,12 +20,12 @@ from fanet_mw.routing.clustered.timetable.node_timetable import FittedTimetable
 from fanet_mw.routing.clustered.timetable.turn_size import links, reserved, schedule_parts, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S
-from sim.planner import contention_window, flood_hops, problems_and_notes
+from sim.planner import flood_hops, problems_and_notes
 from sim.planner.demand import ClassPlan, TrafficClass
 from sim.planner.flood_cost import FloodCost
 from sim.planner.goodput_bound import Goodput, any_protocol
 from sim.planner.head_slot import ClassLoad, ClusterPlan, slot_delays, work_ns
-from sim.planner.not_counted import outdated
+from sim.planner.problems_and_notes import outdated
 from sim.planner.scenario_plan import ScenarioPlan
 from sim.planner.site import Site
 from sim.planner.timetable_plan import Candidate, TimetablePlan, judge, table_for
@@ -91,8 +91,8 @@ def evaluate(
         else tuple(problems_and_notes.late(summed, deadline_ns))
     )
     cut_off = tuple(_in_parts(judged.cut_off))
-    uplinks_ns = contention_window.uplinks_ns(scenario, found.through, classes)
-    crowded = tuple(contention_window.too_short(scenario, site.adjacency, uplinks_ns)) if site.timetable else ()
+    uplinks_ns = problems_and_notes.uplinks_ns(scenario, found.through, classes)
+    crowded = tuple(problems_and_notes.too_short(scenario, site.adjacency, uplinks_ns)) if site.timetable else ()
     clocks = problems_and_notes.clocks_apart if site.timetable else problems_and_notes.refused_time
     apart = tuple(clocks(scenario))
     unheard = tuple(_unheard(scenario, fitted)) if isinstance(fitted, FittedTimetable) else ()

@@ -2,7 +2,7 @@
 
 Around the busiest node all relays within two hops transmit one after another, each for airtime + DIFS + the mean
 backoff; the duration is that time for each hop, plus jitter, handover and lead. CSMA/CA bounds neither, so this is an
-estimate; with a timetable both are exact (`fanet_mw/bounds/timetable_flood.py`).
+estimate; with a timetable both are exact (`fanet_mw/bounds/turn_service.py`).
 """
 
 from typing import NamedTuple

@@ -1,19 +1,28 @@
-"""The sentences of a plan: its problems say why it is not feasible, its notes what its bounds assume and leave out."""
+"""The sentences of a plan: its problems say why it is not feasible, its notes what its bounds assume and leave out.
 
-from collections.abc import Iterator, Sequence
+A plan is for nodes that stay where they start, and for frames that arrive wherever links are taken to be; what a
+scenario has beyond that is not counted. A bound that a node states in flight is another one: it follows from the
+timetable that is in force then. Whether hellos, and packets of members to their heads if only heads have turns, fit the
+contention window is an estimate (`fanet_mw/routing/clustered/tdma/hello_room.py`).
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 from math import ceil
 from operator import attrgetter
+from types import MappingProxyType
 from typing import Final
 
 from fanet_mw import wire
+from fanet_mw.airtime import mean_access_ns
 from fanet_mw.bounds import Bounded, DelayBound, Refused
-from fanet_mw.graph.topology import Adjacency, levels
+from fanet_mw.graph.topology import Adjacency, levels, two_hop
+from fanet_mw.routing.clustered.tdma.hello_room import crowd, hellos_ns, least_ms, room_ns
 from fanet_mw.routing.clustered.tdma.turn_timing import turn_slack_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.timesync.ftsp import MOST_STATED_NS
 from fanet_mw.timesync.turn_slack import least_slack_ns
-from fanet_mw.units import MS, US, NodeId, S
+from fanet_mw.units import MS, US, Enu, NodeId, S
 from sim.planner.demand import ClassPlan, TrafficClass
 from sim.planner.head_slot import ClusterPlan
 
@@ -175,3 +184,94 @@ def notes(access: DelayBound, clusters: Sequence[ClusterPlan], *, guard_ns: int,
             )
     else:
         yield "floods hold their bound while no frame is lost and the nodes are where the timetable has them"
+
+
+_NONE: Final[Mapping[NodeId, int]] = MappingProxyType({})
+
+
+def too_short(scenario: Scenario, adjacency: Adjacency, uplinks_ns: Mapping[NodeId, int] = _NONE) -> Iterator[str]:
+    """A sentence if hellos and packets to heads (`uplinks_ns`: their airtime by sender) do not fit the window."""
+    needed_ns = hellos_ns(scenario, crowd(adjacency)) + _densest_ns(adjacency, uplinks_ns)
+    window_ns = round(scenario.clusters.contention_ms * MS)
+    what = "hellos and packets to heads" if any(uplinks_ns.values()) else "hellos"
+    if needed_ns > room_ns(window_ns):
+        yield (
+            f"the {what} of a superframe take {needed_ns / MS:.1f} ms where nodes are densest, its contention window "
+            f"of {window_ns / MS:g} ms has {room_ns(window_ns) / MS:g} ms for them: neighbors are missed, taken for "
+            f"dead (clusters.contention_ms, which has to be at least {least_ms(needed_ns)}, routing.hello_interval_s, "
+            "clusters.flooding_period_s)"
+        )
+
+
+def uplinks_ns(
+    scenario: Scenario, through: Mapping[NodeId, Sequence[int]], classes: Sequence[TrafficClass]
+) -> dict[NodeId, int]:
+    """The airtime in a superframe of what each node sends towards a head; `through`: its sources by class."""
+    return {
+        node: sum(
+            n * scenario.clusters.period_ns * mean_access_ns(c.payload_bytes, scenario.radio) // c.interval_ns
+            for n, c in zip(counts, classes, strict=True)
+        )
+        for node, counts in through.items()
+    }
+
+
+def _densest_ns(adjacency: Adjacency, airtime_ns: Mapping[NodeId, int]) -> int:
+    """The greatest sum of the airtimes of a node and of all nodes within two hops of it."""
+    if not airtime_ns:
+        return 0
+    near = two_hop(adjacency).items()
+    return max(airtime_ns.get(node, 0) + sum(airtime_ns.get(other, 0) for other in others) for node, others in near)
+
+
+_STATED = "the bounds that nodes state for their packets in flight hold for every delivery all the same"
+
+
+def not_counted(scenario: Scenario) -> Iterator[str]:
+    """A sentence for each; nothing for nodes at rest whose frames arrive."""
+    bounded = scenario.clusters.relay == "scheduled" and not scenario.measures_links
+    begins = [fault.at_s for fault in scenario.faults if fault.kind != "restore" and fault.at_s < scenario.duration_s]
+    if begins:
+        yield f"[[faults]]: what is said here holds until {min(begins):g} s; then packets may miss nodes" + (
+            f", and a timetable without nodes that fall silent has other bounds; {_STATED}" if bounded else ""
+        )
+    if scenario.mobility.model != "static":
+        yield f'movement (mobility.model = "{scenario.mobility.model}"): what is said here is for where nodes start' + (
+            f"; the timetable follows them, and its bounds change; {_STATED}" if bounded else ""
+        )
+    held = "; bounds are for packets that arrive" if bounded else ""
+    if scenario.world.has_obstacles:
+        yield f"obstacles: a link that they block loses its frames, and packets may miss nodes{held}"
+    losses = [f"{key} = {value}" for key, value in _losses(scenario)]
+    if losses and not scenario.measures_links:
+        yield f"losses by {' and '.join(losses)}: packets may miss nodes{held}"
+
+
+def _losses(scenario: Scenario) -> Iterator[tuple[str, str]]:
+    radio = scenario.radio
+    if radio.channel != "range" and scenario.clusters.relay != "scheduled":
+        yield "radio.channel", f'"{radio.channel}"'  # for a timetable the plan states them as a probability
+    if radio.fading != "none":
+        yield "radio.fading", f'"{radio.fading}"'
+    if radio.shadowing_db:
+        yield "radio.shadowing_db", f"{radio.shadowing_db:g}"
+
+
+def outdated(scenario: Scenario, at: Mapping[NodeId, Enu], adjacency: Adjacency) -> Iterator[str]:
+    """A sentence about two UAVs that may fly out of range while a timetable counts on their link."""
+    range_m, speed_m_s = scenario.radio.range_m, scenario.mobility.speed_m_s
+    why = f'mobility.model = "{scenario.mobility.model}"'
+    if scenario.mobility.rigid:
+        speed_m_s = scenario.mission.approach_speeds_m_s[1]
+        why = f"to survivors, mission.survivors = {scenario.mission.survivors}"
+    lengths = [at[a].minus(at[b]).norm() for a in adjacency for b in adjacency[a] if a < b]
+    lengths = [length_m for length_m in lengths if length_m <= range_m]  # antennas of the ground reach farther
+    if scenario.clusters.relay != "scheduled" or scenario.rigid or not lengths:
+        return
+    lasts_s = (range_m - max(lengths)) / (2 * speed_m_s)
+    if lasts_s < scenario.duration_s:
+        yield (
+            f"UAVs move among each other ({why}, {speed_m_s:g} m/s): two that are linked over {max(lengths):.0f} m may "
+            f"be out of range after {lasts_s:.1f} s, and what a timetable "
+            'promises ends with its links; bounds of routing.protocol = "rounds" count on no link that ends'
+        )

@@ -10,8 +10,7 @@ from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
 from agents.applications.traffic import sources_of
-from fanet_mw.graph.connected_dominating_set import dominates
-from fanet_mw.graph.topology import Adjacency, levels, two_hop, within_range
+from fanet_mw.graph.topology import Adjacency, dominates, levels, two_hop, within_range
 from fanet_mw.routing.rounds.bulk_slots import SELDOM
 from fanet_mw.routing.rounds.delay_law import DelayLaw
 from fanet_mw.routing.rounds.round_timing import RoundTiming

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from fanet_mw.bounds.guard_time import PLANNED_ERROR_NS, slot_guard_ns
+from fanet_mw.bounds.slot_service import PLANNED_ERROR_NS, slot_guard_ns
 from fanet_mw.graph.topology import Adjacency, within_range
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId

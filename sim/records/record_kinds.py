@@ -1,13 +1,20 @@
-"""The kinds of trace records; and the records of a trace while it is in memory or on disk, by kind or as lines.
+"""The kinds of trace records; and the records of a trace while it is in memory or on disk: by kind, as lines, or
+deliveries as columns of numbers.
 
-A log on disk can leave most of what was not asked for undecoded, so analysis code calls `records_of` and `lines`.
+A log on disk can leave most of what was not asked for undecoded, so analysis code calls `records_of`, `lines` and
+`delivery_columns`. There are millions of deliveries in an hour of a large swarm, and numpy handles a column many times
+as fast as Python its records.
 """
 
 from collections.abc import Iterable, Iterator
-from typing import Any, Final, Protocol, TypeVar, get_args, overload, runtime_checkable
+from itertools import islice
+from typing import Any, Final, NamedTuple, Protocol, TypeVar, get_args, overload, runtime_checkable
+
+import numpy as np
+import numpy.typing as npt
 
 from fanet_mw import trace
-from fanet_mw.trace import Record
+from fanet_mw.trace import Delivered, Record
 
 A = TypeVar("A", bound=Record)
 B = TypeVar("B", bound=Record)
@@ -59,3 +66,39 @@ def lines(records: Iterable[Record]) -> Iterator[bytes]:
     if isinstance(records, StoredAsLines):
         return records.lines()
     return (f"{trace.line(record)}\n".encode() for record in records)
+
+
+_PORTION: Final = 4096
+Column = npt.NDArray[np.integer[Any]]
+
+
+class DeliveryColumns(NamedTuple):
+    """Some deliveries in the order of the trace: the fields of `Delivered`, each as a column [n]."""
+
+    t_ns: Column
+    node: Column
+    origin: Column
+    seq: Column
+    delay_ns: Column
+    hops: Column
+    handover_ns: Column
+
+
+@runtime_checkable
+class StoredInColumns(Protocol):
+    """A trace that can give its deliveries as columns without making records of them."""
+
+    def delivery_columns(self) -> Iterator[DeliveryColumns]:
+        """All deliveries in the order of the trace, in portions."""
+
+
+def delivery_columns(records: Iterable[Record]) -> Iterator[DeliveryColumns]:
+    if isinstance(records, StoredInColumns):
+        return records.delivery_columns()
+    return in_columns(records_of(records, Delivered))
+
+
+def in_columns(deliveries: Iterable[Delivered]) -> Iterator[DeliveryColumns]:
+    rest = iter(deliveries)
+    while portion := list(islice(rest, _PORTION)):
+        yield DeliveryColumns(*np.array(portion, dtype=np.int64).T)

@@ -17,9 +17,8 @@ from typing import Any, Final
 import numpy as np
 
 from fanet_mw.trace import DELIVERED_LINE, Delivered, Record, line
-from sim.records.delivery_columns import DeliveryColumns, in_columns
 from sim.records.disk_backed_log import MOST_IN_MEMORY, MOST_PACKED_BYTES, DiskBackedLog
-from sim.records.record_kinds import CODES, KINDS
+from sim.records.record_kinds import CODES, KINDS, DeliveryColumns, in_columns
 from sim.records.spool import OnDisk
 
 _DELIVERED: Final = CODES[Delivered]

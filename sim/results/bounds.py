@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from fanet_mw.trace import RadioFault
 from fanet_mw.units import MS, S
-from sim.records.delivery_columns import Column
+from sim.records.record_kinds import Column
 from sim.results.packets import AppPackets
 
 UNNOTICED_NS: Final = 4 * S

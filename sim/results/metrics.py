@@ -11,8 +11,7 @@ import numpy as np
 from fanet_mw.errors import DropReason
 from fanet_mw.trace import ConflictForeseen, DeadlineLost, DeadlineMet, Delivered, Dropped, RadioFault, Warned
 from fanet_mw.units import MS, S
-from sim.records.delivery_columns import Column
-from sim.records.record_kinds import records_of
+from sim.records.record_kinds import Column, records_of
 from sim.results import ledger, validity
 from sim.results.bounds import against_bounds, likely
 from sim.results.clocks import clock_errors

@@ -12,8 +12,7 @@ import numpy.typing as npt
 
 from agents.applications.traffic import targets_of
 from fanet_mw.trace import BoundExcludes, BoundStated, Generated, LetOut, LikelyStated
-from sim.records.delivery_columns import Column, DeliveryColumns, delivery_columns
-from sim.records.record_kinds import records_of
+from sim.records.record_kinds import Column, DeliveryColumns, delivery_columns, records_of
 from sim.results.outcome import Outcome
 
 OTHER_APPS: Final = ("report", "warning")

@@ -17,9 +17,8 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import FlightModeChanged, MissionModeChanged, Planned, Posed, Record, RoleChanged
 from fanet_mw.units import Enu, NodeId, S
-from sim.results.mission import OverflownCells, overflown
+from sim.results.mission import OverflownCells, SurvivorState, SurvivorStates, overflown
 from sim.results.run_folder import RunFolder
-from sim.results.survivor_states import SurvivorState, SurvivorStates
 from sim.world.environment.layout import positions
 from sim.world.environment.survivors import place
 

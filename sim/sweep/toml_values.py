@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator, Mapping
 
 from fanet_mw.errors import ConfigError
-from fanet_mw.scenario.overrides import one_value
+from fanet_mw.scenario.config import one_value
 
 _OPENING = "[{"
 _CLOSING = "]}"

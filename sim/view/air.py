@@ -20,8 +20,7 @@ from fanet_mw.units import MS, S
 from fanet_mw.wire import PRIORITIES
 from sim.figures.colors import BLUE, GRAY, GREEN, ORANGE, PINK, RED
 from sim.observation.air_causes import AirCauses, AirTime, Cause, transmissions
-from sim.observation.bus_feed import BusFeed
-from sim.observation.live_frames import LiveFrames
+from sim.observation.bus_feed import BusFeed, LiveFrames
 
 _COLORS: Final = dict(zip(Cause, (BLUE, GREEN, RED, ORANGE, PINK, GRAY), strict=True))
 TAKEN_NS: Final = 5 * S

@@ -33,9 +33,9 @@ from sim.report import page, replay_page
 from sim.report.run_records import SHOWN, RunRecords
 from sim.results.files import finish
 from sim.results.replay import Replay
+from sim.results.result import load_result
 from sim.results.run_folder import RunFolder
 from sim.results.run_table import read
-from sim.results.stored_result import load_result
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 from sim.sweep.one_run import Finished

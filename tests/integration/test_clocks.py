@@ -10,7 +10,7 @@ from agents.applications.traffic import sources_of
 from agents.clock.clocked_uav import ClockedUav, make_uav
 from agents.uav import Uav
 from fanet_mw.bounds import Bounded
-from fanet_mw.bounds.guard_time import slot_guard_ns
+from fanet_mw.bounds.slot_service import slot_guard_ns
 from fanet_mw.bus.messages import Reception
 from fanet_mw.bus.topics import Topics
 from fanet_mw.timesync.turn_slack import clocks_fit

@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kit import examples
 
-from fanet_mw.graph.connected_dominating_set import dominates
-from fanet_mw.graph.topology import components, within_range
+from fanet_mw.graph.topology import components, dominates, within_range
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.routing.clustered.timetable.timetable import Geometry, timetable
 from fanet_mw.units import Enu, NodeId, S

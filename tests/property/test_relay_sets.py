@@ -4,8 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kit import examples
 
-from fanet_mw.graph.connected_dominating_set import dominates
-from fanet_mw.graph.topology import components, levels, symmetric, within_range
+from fanet_mw.graph.topology import components, dominates, levels, symmetric, within_range
 from fanet_mw.rng import stream
 from fanet_mw.routing.olsr.parameters import WILL_ALWAYS, WILL_NEVER
 from fanet_mw.routing.olsr.protocol import multipoint_relays

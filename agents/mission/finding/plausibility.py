@@ -12,7 +12,7 @@ import math
 from typing import Final
 
 from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, PhoneModel
-from fanet_mw.node.received_motion import FUTURE_NS
+from fanet_mw.node.reader import FUTURE_NS
 from fanet_mw.units import FARTHEST_M, US
 from fanet_mw.wire.search_messages import Told
 from fanet_mw.wire.survivors import Found, Survivor

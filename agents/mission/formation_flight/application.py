@@ -15,7 +15,7 @@ from agents.mission.navigation.own_motion import OwnMotion
 from fanet_mw import mavlink
 from fanet_mw.application import Application, AppPort, Received
 from fanet_mw.bus.messages import Altimeter, Gps, SensorReading
-from fanet_mw.node.received_motion import motion_in
+from fanet_mw.node.reader import motion_in
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire import PRIORITY_REPORT

@@ -6,7 +6,7 @@ from typing import Final, Protocol
 from agents.mission.navigation.known_obstacles import KnownObstacles
 from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.own_motion import OwnMotion
-from fanet_mw.node.silences import Silences
+from fanet_mw.node.neighbors import Silences
 from fanet_mw.units import MS, NodeId
 
 _NEAR: Final = 0.96

@@ -21,8 +21,7 @@ from fanet_mw.motion import Motion
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.duplicates import key_of, key_of_packet, origin_and_seq
 from fanet_mw.node.packet import Packet, is_used_up
-from fanet_mw.node.reader import decoded
-from fanet_mw.node.received_motion import motion_in
+from fanet_mw.node.reader import decoded, motion_in
 from fanet_mw.routing.packet_repair import FLOOD_OVER_NS, Repair
 from fanet_mw.routing.rounds.admission import BulkAdmission
 from fanet_mw.routing.rounds.bulk_slots import BulkSlots

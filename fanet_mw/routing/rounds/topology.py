@@ -9,7 +9,7 @@ from functools import lru_cache, reduce
 from operator import or_
 from typing import Final, NamedTuple
 
-from fanet_mw.graph.connected_dominating_set import dominates
+from fanet_mw.graph.topology import dominates
 from fanet_mw.units import NodeId, S
 from fanet_mw.wire.rounds import HeardNodes
 

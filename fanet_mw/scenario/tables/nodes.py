@@ -1,11 +1,14 @@
-"""The `[nodes]` table: how many nodes there are, and where they start."""
+"""The `[nodes]` table: how many nodes there are, and where they start; and `[[applications]]` of other packages that
+they carry.
+"""
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from fanet_mw.scenario.tables.sections import Coordinate, Count, Length, Rate, Section, SomeLength
+from fanet_mw.extensions import OptionsOf, PartName
+from fanet_mw.scenario.tables.sections import Coordinate, Count, Id, Length, Rate, Section, SomeLength
 from fanet_mw.units import MAX_NODES
 
 
@@ -56,3 +59,18 @@ def grid_columns(count: int) -> int:
     divisors = [d for d in range(1, count + 1) if count % d == 0 and d * d >= count]
     best = min(divisors, key=lambda d: abs(d - wanted))
     return best if best <= 2 * wanted else math.ceil(wanted)
+
+
+class ForeignApplication(Section):
+    """An application of another package (documentation, how-to/extend), on board some or all UAVs."""
+
+    use: Annotated[str, PartName("applications.use", ())]
+    """The application: an entry point, or module and class."""
+    nodes: Literal["all"] | tuple[Id, ...] = "all"
+    """Ids of the nodes that carry it, or `all`."""
+    options: Annotated[dict[str, Any], OptionsOf("applications.use", ())] = Field(default_factory=dict)
+    """The application's own table, as its package documents it."""
+
+    def on(self, node: int) -> bool:
+        """True if a node carries it."""
+        return self.nodes == "all" or node in self.nodes

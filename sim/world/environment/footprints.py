@@ -18,8 +18,8 @@ import numpy as np
 from fanet_mw.errors import ConfigError
 from fanet_mw.geodesy import Geodetic, to_enu
 from fanet_mw.scenario import outlines
+from fanet_mw.scenario.named_files import content
 from sim.world.arrays import Rows
-from sim.world.environment.given_file import content
 
 LEVEL_M: Final = 3.0
 _FOOT_M: Final = 0.3048

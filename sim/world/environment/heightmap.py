@@ -20,10 +20,10 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.foreign_file import read_regular
 from fanet_mw.geodesy import Geodetic, to_geodetic
 from fanet_mw.scenario import ascii_grid
+from fanet_mw.scenario.named_files import content
 from fanet_mw.scenario.outlines import half_turn
 from fanet_mw.units import Enu
 from sim.world.arrays import Flags, Rows, Values
-from sim.world.environment.given_file import content
 
 _MOST_CELLS: Final = 64_000_000
 _LOWEST_M: Final = -500.0

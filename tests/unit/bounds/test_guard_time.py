@@ -1,7 +1,6 @@
 """What a guard time must hold: both clocks' errors, flight, and the last frame."""
 
-from fanet_mw.bounds.guard_time import slot_guard_ns
-from fanet_mw.bounds.slot_service import Dcf
+from fanet_mw.bounds.slot_service import Dcf, slot_guard_ns
 from fanet_mw.scenario import config
 from fanet_mw.units import US
 

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fanet_mw.bounds import timetable_flood
+from fanet_mw.bounds import turn_service
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns
 from fanet_mw.units import MS
 
@@ -55,11 +55,11 @@ def test_a_backlog_that_no_turn_drains_has_no_bound() -> None:
 
 
 def test_the_worst_packet_may_be_one_that_waits_for_a_later_turn() -> None:
-    assert timetable_flood.worst_ns([100, 190], period_ns=150, interval_ns=40, together=2) == 190 - 80
-    assert timetable_flood.worst_ns([100, 150], period_ns=150, interval_ns=40, together=2) == 100
+    assert turn_service.worst_ns([100, 190], period_ns=150, interval_ns=40, together=2) == 190 - 80
+    assert turn_service.worst_ns([100, 150], period_ns=150, interval_ns=40, together=2) == 100
 
 
 def test_a_flood_lasts_as_long_as_in_the_turn_that_carries_the_packet() -> None:
     """Turns at 0 and 30 of 100: who misses one waits for the next, or the one after."""
-    assert timetable_flood.done_ns([0, 30], [5, 50], period_ns=100) == [30 + 50, 100 + 50]
-    assert timetable_flood.done_ns([0, 30], [50, 5], period_ns=100) == [70 + 50, 100 + 50]
+    assert turn_service.done_ns([0, 30], [5, 50], period_ns=100) == [30 + 50, 100 + 50]
+    assert turn_service.done_ns([0, 30], [50, 5], period_ns=100) == [70 + 50, 100 + 50]

@@ -4,7 +4,7 @@ import pytest
 
 from fanet_mw.mavlink import ORIGIN, Encoder
 from fanet_mw.motion import Motion
-from fanet_mw.node.received_motion import motion_in
+from fanet_mw.node.reader import motion_in
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
 from fanet_mw.wire import PRIORITY_CONTROL, Header, Kind
 

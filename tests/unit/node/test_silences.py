@@ -2,7 +2,7 @@
 
 import pytest
 
-from fanet_mw.node.silences import Silences
+from fanet_mw.node.neighbors import Silences
 from fanet_mw.units import MS, NodeId, S
 
 OTHER = NodeId(2)

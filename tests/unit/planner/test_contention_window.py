@@ -5,7 +5,7 @@ import pytest
 from fanet_mw.graph.topology import within_range
 from fanet_mw.routing.clustered.tdma.hello_room import crowd, hellos_ns
 from fanet_mw.units import MS, Enu, NodeId
-from sim.planner.contention_window import too_short
+from sim.planner.problems_and_notes import too_short
 from sim.scenarios import catalog
 from sim.world.environment.layout import positions
 

@@ -8,8 +8,7 @@ import pytest
 
 from fanet_mw.errors import DropReason
 from fanet_mw.trace import Delivered, Dropped, Generated, Posed, Record, line
-from sim.records.delivery_columns import delivery_columns
-from sim.records.record_kinds import lines, records_of
+from sim.records.record_kinds import delivery_columns, lines, records_of
 from sim.records.trace_log import TraceLog
 
 MOST = 7

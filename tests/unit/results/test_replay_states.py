@@ -27,9 +27,8 @@ from fanet_mw.trace import (
 )
 from fanet_mw.units import Enu, S
 from sim.report import replay_page
-from sim.results.mission import mission
+from sim.results.mission import SurvivorStates, mission
 from sim.results.replay import Replay
-from sim.results.survivor_states import SurvivorStates
 from sim.world.environment.layout import positions
 
 KEYS = {

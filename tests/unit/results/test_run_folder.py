@@ -19,9 +19,9 @@ from sim.cli.out_folder import prepare
 from sim.report import page, replay_page
 from sim.results.files import begin, finish
 from sim.results.replay import Replay
+from sim.results.result import load_result
 from sim.results.run_folder import RunFolder, holds_run
 from sim.results.run_table import read
-from sim.results.stored_result import load_result
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fanet_mw.errors import ConfigError
-from fanet_mw.scenario.overrides import one_value
+from fanet_mw.scenario.config import one_value
 from sim.cli.sweep import asked
 from sim.sweep import spec
 from sim.sweep.tasks import tasks_of

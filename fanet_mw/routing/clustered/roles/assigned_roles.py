@@ -7,7 +7,7 @@ announces schedules, and tells the access what the schedule makes of this node.
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
-from fanet_mw.bounds.guard_time import slot_guard_ns
+from fanet_mw.bounds.slot_service import slot_guard_ns
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.node.contract import Port
 from fanet_mw.node.neighbors import Neighbor

@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from fanet_mw.airtime import longest_access_ns
-from fanet_mw.bounds import timetable_flood
+from fanet_mw.bounds import turn_service
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, US
 
@@ -64,9 +64,9 @@ class Turns(NamedTuple):
 
     def worst_ns(self, roots: Sequence[int], *, span: int, interval_ns: int, together: int = 1) -> int | None:
         """A bound of the delay of packets `interval_ns` apart, from generation until all nodes have them, or None if
-        too many; `together` go in each turn of `roots` (`fanet_mw/bounds/timetable_flood.py`).
+        too many; `together` go in each turn of `roots` (`fanet_mw/bounds/turn_service.py`).
         """
-        return timetable_flood.worst_ns(
+        return turn_service.worst_ns(
             self.done_ns(roots, span=span), period_ns=self.period_ns, interval_ns=interval_ns, together=together
         )
 
@@ -74,7 +74,7 @@ class Turns(NamedTuple):
         """For each n: the longest time from just after one of `roots` until all have the n-th one's packets."""
         starts = [self.start_ns(offset, superframe_start_ns=0) for offset in roots]
         floods = [self.flood_ns(offset, span=span) for offset in roots]
-        return timetable_flood.done_ns(starts, floods, period_ns=self.period_ns)
+        return turn_service.done_ns(starts, floods, period_ns=self.period_ns)
 
     def flood_ns(self, offset: int, *, span: int) -> int:
         """The duration of a flood of `span` turns from turn `offset` on, including contention windows in between."""

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.scenario.named_files import content
 from sim.world.environment import footprints
-from sim.world.environment.given_file import content
 
 
 def test_a_file_is_read_whole(tmp_path: Path) -> None:

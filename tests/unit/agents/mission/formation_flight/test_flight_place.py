@@ -5,8 +5,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-from agents.mission.formation_flight.flight_place import Clusters, FlightPlace
-from agents.mission.formation_flight.ring import place_on_ring
+from agents.mission.formation_flight.flight_place import Clusters, FlightPlace, place_on_ring
 from agents.mission.formation_flight.route import Route
 from agents.mission.navigation.neighbor_motions import NeighborMotions
 from fanet_mw.motion import Motion

@@ -10,7 +10,7 @@ from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.navigation.silent_neighbors import SilentNeighbors
 from fanet_mw.motion import Motion
-from fanet_mw.node.silences import Silences
+from fanet_mw.node.neighbors import Silences
 from fanet_mw.units import MS, Enu, NodeId, S
 
 OTHER, LAST_NS = NodeId(2), 30 * S

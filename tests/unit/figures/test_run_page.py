@@ -252,3 +252,7 @@ def test_bounds_are_kept_of_those_that_were_stated() -> None:
         ("of these, delivered within their bound", "80 %"),
         ("of these, later than their bound or never; the rest had time left when the run ended", "7"),
     ]
+    assert list(run_rows._bounds(bound | {"overtaken": 5}))[2:] == [
+        ("of these, later than their bound or never; the rest had time left when the run ended", "2"),
+        ("late or lost likewise, because a fault overtook them", "5"),
+    ]

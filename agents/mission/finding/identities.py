@@ -35,7 +35,7 @@ _SAME_SIGMAS: Final = 4.0
 _STEADY_M: Final = 1.5
 """The part of the error of a sighting, along each axis, that is the same for successive sightings."""
 _TOGETHER: Final = 2
-"""Where somebody is confirmed, another person is believed after this number of readings that show somebody beside; in a
+"""Where somebody is found, another person is believed after this number of readings that show somebody beside; in a
 single one a false alarm may stand beside a person."""
 _UNREPORTED_NS: Final = 4 * S
 """How long a person who is certainly there waits for a phone before being reported without one."""
@@ -235,10 +235,16 @@ class Identities:
             for person in self._people
             if person.find is None
             and self._is_unnamed(person)
+            and (person.together >= _TOGETHER or not self._is_beside_a_find(person))
             and person.proven_ns is not None
             and now_ns - person.proven_ns >= _UNREPORTED_NS
             and person.place.sigma_m <= _SURE_M
         ]
+
+    def _is_beside_a_find(self, person: PersonTrack) -> bool:
+        return any(
+            place.distance_m(person.place.at) <= SAME_PLACE_M for place in self._survivors.person_places().values()
+        )
 
     def _is_unnamed(self, person: PersonTrack) -> bool:
         """True for a person who is not known to be a confirmed survivor."""

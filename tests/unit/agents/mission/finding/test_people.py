@@ -64,6 +64,19 @@ def test_of_whom_there_is_a_find_nobody_reports_again() -> None:
         assert len(other.identities.unreported(9 * S)) == 1
 
 
+@pytest.mark.parametrize(("together", "reported"), [(False, 0), (True, 1)])
+def test_beside_who_is_found_a_second_person_is_one_whom_images_show_together_with_the_first(
+    together: bool, reported: int
+) -> None:
+    """Of a thousand false alarms an hour some once became a second person, 9 m beside the first."""
+    uav, found, beside = Uav(), Enu(0, 4, 0), Enu(11.5, 4, 0)
+    uav.survivors.on_found(told_person(9, 0.0, 4.0), now_ns=0)
+    for second in range(16):
+        shown = (found,) if second < 8 else (found, beside) if together else (beside,)
+        see(uav, *shown, second=second, north_m=7.5 * second)
+    assert len(uav.identities.unreported(16 * S)) == reported
+
+
 @pytest.mark.parametrize(
     ("find_m", "others_m", "reported"), [(15.0, (), 0), (15.0, (15.0,), 1), (21.0, (), 1), (15.0, (-15.0,), 2)]
 )

@@ -30,6 +30,8 @@ _SINK_M_S: Final = 1.5
 _STANDS_M_S: Final = 0.25
 _STANDS_NS: Final = 2 * S
 """A UAV that lands stands on the ground when it has sunk more slowly than that for so long; none lands so gently."""
+_OBEYS_NS: Final = 15 * S
+"""A flight controller begins to sink within this time, for it acknowledges one command after the other, or it stood."""
 _UP_M: Final = 2.5
 """A UAV this high above the place where it stood has taken off."""
 _BRAKE_M_S: Final = 5.0
@@ -54,8 +56,10 @@ class Pilot:
         self.has_task = has_task
         self.mode = Mode.MISSION if has_task else Mode.HOLD
         self.armed = not on_ground
-        self.lands_ns: int | None = None
+        self._stands_ns: int | None = None
         """The instant since which it has not sunk while it was landing; None: it sinks, or does not land."""
+        self._sank = False
+        """Whether it has sunk since it was told to land."""
         self.on_ground = on_ground
         self.settings = settings
         self.fence: tuple[Area, ...] = ()
@@ -123,8 +127,7 @@ class Pilot:
     def land(self) -> bool:
         if self.on_ground:
             return False
-        self.lands_ns = None
-        self._enter(Mode.LAND, Course(self.position, _SINK_M_S, land=True))
+        self._enter(Mode.LAND, self._landing_at(self.position))
         return True
 
     def hold(self) -> bool:
@@ -252,9 +255,9 @@ class Pilot:
         least_m = self.home.up + self.settings[names.RETURN_HEIGHT]
         reached = self.settings[names.ACCEPTANCE]
         if away_m <= reached:
-            if self._course is None or not self._course.land:
-                self.lands_ns = None
-            self._command(Course(target._replace(up=0.0), _SINK_M_S, land=True))
+            place = target._replace(up=0.0)
+            landing = self._course is not None and self._course.land
+            self._command(Course(place, _SINK_M_S, land=True) if landing else self._landing_at(place))
         elif here.up < least_m - _THERE_M and away_m > 2 * reached and not self._crosses:
             self._command(Course(self._column(here)._replace(up=least_m), self.cruise_m_s))
         else:
@@ -305,18 +308,21 @@ class Pilot:
             over_m = math.hypot(here.east - place.east, here.north - place.north)
             landing = self._course is not None and self._course.land
             if landing or over_m <= self.settings[names.ACCEPTANCE]:
-                if not landing:
-                    self.lands_ns = None
-                return self._course if landing else Course(place, _SINK_M_S, land=True)
+                return self._course if landing else self._landing_at(place)
             place = place._replace(up=max(place.up, here.up) if self._course is None else self._course.position.up)
         return Course(place, self.cruise_m_s)
 
+    def _landing_at(self, place: Enu) -> Course:
+        """The course of a landing that begins now."""
+        self._stands_ns, self._sank = None, False
+        return Course(place, _SINK_M_S, land=True)
+
     def _watch_landing(self, now_ns: int) -> None:
         if self.velocity.up < -_STANDS_M_S:
-            self.lands_ns = None
-        elif self.lands_ns is None:
-            self.lands_ns = now_ns
-        elif now_ns - self.lands_ns >= _STANDS_NS:
+            self._stands_ns, self._sank = None, True
+        elif self._stands_ns is None:
+            self._stands_ns = now_ns
+        elif now_ns - self._stands_ns >= (_STANDS_NS if self._sank else _OBEYS_NS):
             self.on_ground, self.armed = True, False
             self._ground_m = self.position.up
             self._course = None

@@ -338,12 +338,17 @@ class AutopilotLink:
         self._ask(common.MAV_CMD_DO_SET_MODE, params, f"mode {mode}", first=True)
 
     def _ask(self, command: int, params: tuple[float, ...], what: str, *, first: bool = False) -> None:
-        """Put a command into the line, unless it waits there already; `first`: before those that were not sent yet."""
+        """Put a command into the line, unless it waits there already; `first`: before the others, but after one of its
+        kind that was sent, whose answer would be taken for its own.
+        """
         waiting = _Waiting(command, params, what)
         if any(other.what == what for other in self._waiting):
             return
-        if first:
-            self._waiting.insert(1 if self._times else 0, waiting)
+        if first and self._times and self._waiting[0].command == command:
+            self._waiting.insert(1, waiting)
+        elif first:
+            self._waiting.appendleft(waiting)
+            self._times = 0
         else:
             self._waiting.append(waiting)
 

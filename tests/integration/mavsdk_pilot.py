@@ -11,7 +11,7 @@ from typing import Any
 
 from mavsdk import ComponentType, Configuration, Mavsdk
 from mavsdk.plugins.action.action import Action
-from mavsdk.plugins.info.info import Info
+from mavsdk.plugins.info.info import Info, InfoError
 from mavsdk.plugins.mission.mission import Mission, MissionItem, MissionPlan
 from mavsdk.plugins.offboard.offboard import Offboard, VelocityNedYaw
 from mavsdk.plugins.param.param import Param
@@ -43,6 +43,14 @@ def item(latitude_deg: float, longitude_deg: float, height_m: float) -> MissionI
     )  # fmt: skip
 
 
+def version(info: Info) -> int | None:
+    """The first number of the version, once it has come."""
+    try:
+        return int(info.get_version().flight_sw_major)
+    except InfoError:
+        return None
+
+
 def fly(system: Any) -> None:
     action, telemetry, param = Action(system), Telemetry(system), Param(system)
     mission, offboard = Mission(system), Offboard(system)
@@ -51,7 +59,7 @@ def fly(system: Any) -> None:
         return float(telemetry.position().relative_altitude_m)
 
     until("telemetry.health_all_ok()", telemetry.health_all_ok)
-    say(f"  capabilities: fanet-mw {Info(system).get_version().flight_sw_major}.x")
+    until("capabilities: fanet-mw 0.x", lambda: version(Info(system)) == 0)
     say("params")
     found = {entry.name: entry.value for entry in param.get_all_params().float_params}
     say(f"  get_all_params(): {', '.join(found)}")

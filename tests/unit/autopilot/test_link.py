@@ -240,6 +240,22 @@ def test_landing_and_return_are_modes_and_no_setpoints_flow(kind: SetpointKind, 
     assert not controller.link.yielded, "it was asked to leave the guided mode"
 
 
+def test_a_landing_does_not_wait_for_a_speed_that_nobody_acknowledges() -> None:
+    controller = Controller()
+    controller.run(6)
+    controller.want(SetpointKind.POSITION, Enu(0.0, 0.0, 30.0))
+    controller.run(3)
+    controller.answers = False
+    controller.want(SetpointKind.POSITION, Enu(0.0, 0.0, 30.0), speed=9.0)
+    controller.want(SetpointKind.POSITION, Enu(9.0, 0.0, 30.0), speed=9.0)
+    assert commands(controller.run(0.2)) == [178]
+    controller.want(SetpointKind.LAND)
+    assert commands(controller.run(0.2)) == [176]
+    controller.answers = True
+    assert commands(controller.run(3)) == [176, 178], "the speed is said again after it"
+    assert controller.mode is Mode.LAND
+
+
 def test_whoever_takes_over_is_left_alone_until_the_guided_mode_is_back() -> None:
     controller = Controller()
     controller.run(6)

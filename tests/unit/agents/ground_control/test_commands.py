@@ -80,6 +80,29 @@ def test_a_landing_ends_on_the_ground_disarmed() -> None:
     assert "Landed and disarmed" in [text.text for text in bench.told("STATUSTEXT")]
 
 
+def test_who_is_told_to_land_and_does_not_sink_yet_has_not_landed() -> None:
+    """A flight controller that was asked for a speed first took 3 s, and was said to have landed 25 m up."""
+    bench = Bench().airborne()
+    assert bench.command(LAND) == ACCEPTED
+    landing = bench.courses.pop()
+    bench.courses.append(Course(bench.position, 1.0))
+    bench.run(12)
+    assert bench.flown.armed
+    assert not bench.flown.on_ground
+    bench.courses.append(landing)
+    bench.run(20 / 1.5 + 4)
+    assert bench.flown.on_ground
+
+
+def test_who_is_told_to_land_where_it_stands_has_landed_after_a_while() -> None:
+    """A barometer that drifts says of one that stands that it has taken off."""
+    bench = Bench().airborne()
+    assert bench.command(LAND) == ACCEPTED
+    bench.courses[-1] = Course(bench.position, 1.0)
+    bench.run(18)
+    assert bench.flown.on_ground
+
+
 def test_a_return_climbs_first_then_crosses_then_lands_at_home() -> None:
     bench = Bench()
     bench.say(common.MAVLink_param_set_message(1, 1, b"RTL_RETURN_ALT", 40.0, 9))

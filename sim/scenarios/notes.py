@@ -25,10 +25,17 @@ _WORDS: Final = re.compile(r"`(\w+)`")
 _OFF: Final = ("none", "", False, None)
 _BETWEEN_BANDS_MHZ: Final = 3700.0
 _CLUSTERED: Final = frozenset({"clustered"})
+_LANDS_WITHIN_M: Final = 1.5
+"""How far from its pad a searching UAV may begin to land (`agents/mission/flight/return_home.py`)."""
+_SIGMAS: Final = 2.0
+"""Errors of two receivers that a pad should have room for, in standard deviations."""
 
 
 def notes(scenario: Scenario) -> list[str]:
-    kinds = (_after_the_end, _without_effect, _without_place, _still_waves, _beyond_the_vehicle, _odd_band, _guessed)
+    kinds = (
+        _after_the_end, _without_effect, _without_place, _still_waves, _beyond_the_vehicle, _close_pads, _odd_band,
+        _guessed,
+    )  # fmt: skip
     return [note for kind in kinds for note in kind(scenario)]
 
 
@@ -133,6 +140,23 @@ def _odd_band(scenario: Scenario) -> Iterator[str]:
         yield (
             f"radio.frequency_mhz = {radio.frequency_mhz:g}: IEEE 802.11{radio.standard} is sent at "
             f"{'5 GHz' if low else '2.4 GHz'}"
+        )
+
+
+def _close_pads(scenario: Scenario) -> Iterator[str]:
+    """The error that all receivers have in common moves all landings alike."""
+    nodes = scenario.nodes
+    own_m = math.hypot(scenario.sensors.gps_bias_m, scenario.world.gps_sigma_m)
+    least_m = 2 * _LANDS_WITHIN_M + _SIGMAS * math.sqrt(2) * own_m
+    if (
+        nodes.on_ground
+        and scenario.mission.search != "none"
+        and nodes.layout != "explicit"
+        and nodes.spacing_m < least_m
+    ):
+        yield (
+            f"nodes.spacing_m = {nodes.spacing_m:g}: pads nearer to each other than {least_m:.1f} m; UAVs that come "
+            "home by such receivers may land on each other"
         )
 
 

@@ -61,6 +61,20 @@ def test_uavs_for_whom_the_plan_has_no_place_are_noted() -> None:
     assert said.startswith("nodes.count = 82: the plan of a search has 79 places; 3 of the UAVs will get none")
 
 
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        (("nodes.spacing_m=4.8",), True),
+        (("nodes.spacing_m=5",), False),
+        (("nodes.spacing_m=3.2", "sensors.gps_bias_m=0.02", "world.gps_sigma_m=0.02"), False),
+        (("nodes.spacing_m=4.8", "nodes.on_ground=false"), False),
+    ],
+)
+def test_pads_that_receivers_confuse_are_noted(changes: tuple[str, ...], *, told: bool) -> None:
+    found = [note for note in notes(catalog.find("rescue-base", changes)) if note.startswith("nodes.spacing_m")]
+    assert len(found) == told
+
+
 def test_an_order_after_the_end_is_noted() -> None:
     orders = 'orders=[{order="end", at_s=70}, {order="end", at_s=9}]'
     found = notes(catalog.find("rescue", ["duration_s=40", "ground.at_m=[0, 0]", orders]))

@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
 from agents.mission.searcher import formation  # noqa: E402  (the root is on the path now)
-from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry  # noqa: E402
+from fanet_mw.routing.clustered.timetable.interference import Geometry  # noqa: E402
 from fanet_mw.routing.clustered.timetable.timetable import timetable  # noqa: E402
 from fanet_mw.routing.rounds.round_timing import RoundTiming  # noqa: E402
 from fanet_mw.units import MS, Enu, NodeId  # noqa: E402

@@ -57,8 +57,11 @@ from sim.results.files import finish  # noqa: E402
 from sim.results.links_over_time import parts  # noqa: E402
 from sim.results.mission import Confirmations, OverflownCells  # noqa: E402
 from sim.results.outcome import Outcome  # noqa: E402
-from sim.run.stoppable_uav import StoppableUav  # noqa: E402
-from sim.run.virtual import GARBAGE, actors_of  # noqa: E402
+from sim.run.virtual import (  # noqa: E402
+    GARBAGE,
+    StoppableUav,
+    actors_of,
+)
 from sim.scenarios.catalog import find  # noqa: E402
 from sim.world.environment.survivors import place  # noqa: E402
 

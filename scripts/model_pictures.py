@@ -32,7 +32,7 @@ from fanet_mw.units import S  # noqa: E402
 from sim.figures.colors import BLUE, GRAY, GREEN, RED  # noqa: E402
 from sim.figures.style import SERIES, applied, canvas  # noqa: E402
 from sim.scenarios import catalog  # noqa: E402
-from sim.world.environment.diffraction import loss_db as edge_loss_db  # noqa: E402
+from sim.world.environment.line_of_sight import loss_db as edge_loss_db  # noqa: E402
 from sim.world.environment.obstacles import Box, Obstacles, obstacles  # noqa: E402
 from sim.world.environment.solids import Solids  # noqa: E402
 from sim.world.environment.survivors import Survivors  # noqa: E402

@@ -48,8 +48,7 @@ from scripts.search_witness import FOLLOWS, FORGETS, KNOWS, PLANS, STARTS, known
 from sim.records.record_kinds import records_of  # noqa: E402
 from sim.results.file_names import SUMMARY_FILE, TRACE_FILE  # noqa: E402
 from sim.results.links_over_time import parts  # noqa: E402
-from sim.run.stoppable_uav import StoppableUav  # noqa: E402
-from sim.run.virtual import GARBAGE  # noqa: E402
+from sim.run.virtual import GARBAGE, StoppableUav  # noqa: E402
 from sim.scenarios.catalog import find  # noqa: E402
 
 _FOR_S: Final = 20.0

@@ -5,8 +5,9 @@ a module of its own, and is coded by struct. Any bytes decode to a value or to M
 of this project would send are malformed:
 
     `hello/`                            the parts of a hello: beacon and time beacon, digest
-    `join.py`, `links.py`               a node asks for a place in a cluster, and reports the quality of its links
-    `schedule.py`, `places.py`, `loads.py`    the leader's division into clusters; positions and loads for a timetable
+    `schedule.py`, `links.py`           a node asks for a place in a cluster, and reports the quality of its links; the
+                                        leader's division into clusters
+    `places.py`, `loads.py`             positions and loads of the nodes, for a timetable
     `rounds.py`                         who hears whom, and packets that are held, in turns of rounds
     `application_message.py`            messages of applications: pieces, targets, receipts
     `search_messages.py`                messages of a search; of these also `search_plan.py`, `survivors.py`

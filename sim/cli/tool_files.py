@@ -65,7 +65,7 @@ def keys(
         days: How long the certificates are valid [days].
 
     """
-    from sim.bus.certificates import make
+    from sim.bus.rights import make
 
     chosen = choice.scenario(scenario)
     made = make(chosen, out, swarm=swarm or chosen.name, hosts=host, days=days)

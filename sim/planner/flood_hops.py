@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from fanet_mw.graph.topology import Adjacency
-from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
+from fanet_mw.routing.clustered.timetable.interference import Geometry
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId

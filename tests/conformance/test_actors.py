@@ -33,8 +33,7 @@ from fanet_mw.scenario.tables.routing import PROTOCOLS
 from fanet_mw.trace import Generated
 from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire.hello.beacon import TimeBeacon
-from fanet_mw.wire.join import Join
-from fanet_mw.wire.schedule import Member, Schedule
+from fanet_mw.wire.schedule import Join, Member, Schedule
 from fanet_mw.wire.survivors import Survivor
 from sim.scenarios import catalog
 from sim.world.world import WorldActor

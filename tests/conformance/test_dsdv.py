@@ -6,7 +6,7 @@ import pytest
 from rival_bench import Bench
 
 from fanet_mw.routing.dsdv.messages import FULL, INCREMENTAL, INFINITE, Advertised, Update
-from fanet_mw.routing.dsdv.table import HOLD_NS, MAX_SETTLING_NS, PERIODIC_UPDATE_NS
+from fanet_mw.routing.dsdv.protocol import HOLD_NS, MAX_SETTLING_NS, PERIODIC_UPDATE_NS
 from fanet_mw.routing.rival_control_messages import Family, type_of
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, NodeId, S

@@ -36,11 +36,10 @@ from fanet_mw.wire import application_message as pieces
 from fanet_mw.wire import rounds
 from fanet_mw.wire.hello.beacon import Beacon, TimeBeacon
 from fanet_mw.wire.hello.digest import Digest
-from fanet_mw.wire.join import Join
 from fanet_mw.wire.links import Links
 from fanet_mw.wire.loads import Loads
 from fanet_mw.wire.places import Places
-from fanet_mw.wire.schedule import Schedule
+from fanet_mw.wire.schedule import Join, Schedule
 from fanet_mw.wire.search_messages import Roll, ToldOrder, checked_bids
 from fanet_mw.wire.search_plan import Search, SearchStatus
 from fanet_mw.wire.survivors import Found as FoundMessage

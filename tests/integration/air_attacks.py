@@ -17,9 +17,8 @@ from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, Kind
 from fanet_mw.wire.hello.beacon import Beacon, Role, TimeBeacon
 from fanet_mw.wire.hello.digest import Digest, Holding
-from fanet_mw.wire.join import Join
 from fanet_mw.wire.links import Link, Links
-from fanet_mw.wire.schedule import Member, Schedule
+from fanet_mw.wire.schedule import Join, Member, Schedule
 from fanet_mw.wire.survivors import Survivor
 from sim.scenarios import catalog
 

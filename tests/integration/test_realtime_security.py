@@ -34,7 +34,7 @@ from fanet_mw.hosts.bus import Bus, exposure
 from fanet_mw.hosts.clock import ClockKeeper, ClockListener
 from fanet_mw.hosts.timebase import THIS_MACHINE
 from fanet_mw.units import BROADCAST, Enu, NodeId, S
-from sim.bus.certificates import make
+from sim.bus.rights import make
 from sim.results.outcome import Outcome
 from sim.run.launcher.swarm import free_endpoint, launch
 from sim.scenarios import catalog

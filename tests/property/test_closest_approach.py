@@ -5,7 +5,7 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.applications.conflict_monitor import closest
+from agents.applications.collision_avoidance import closest
 from fanet_mw.units import Enu
 
 lengths = st.floats(-500, 500, allow_nan=False)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from kit import examples
 
 from fanet_mw.graph.topology import components, within_range
-from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
+from fanet_mw.routing.clustered.timetable.interference import Geometry
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort
 from fanet_mw.routing.clustered.timetable.timetable import timetable
 from fanet_mw.units import Enu, NodeId

@@ -6,7 +6,7 @@ from itertools import pairwise
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
+from fanet_mw.routing.clustered.timetable.interference import Geometry
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, timetable
 from fanet_mw.units import Enu, NodeId

@@ -16,8 +16,7 @@ from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.units import FARTHEST_M, FASTEST_M_S, Enu
 from fanet_mw.wire import Header
 from fanet_mw.wire.hello.beacon import Beacon, Role, TimeBeacon
-from fanet_mw.wire.join import Join
-from fanet_mw.wire.schedule import CAPACITY, Member, Schedule
+from fanet_mw.wire.schedule import CAPACITY, Join, Member, Schedule
 from fanet_mw.wire.survivors import MOST_DBM, MOST_SURVIVORS, Survivor
 
 u8, u16, u32, u64 = (st.integers(0, 2**bits - 1) for bits in (8, 16, 32, 64))

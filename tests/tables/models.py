@@ -26,7 +26,7 @@ from sim.world.engines.pybullet import Physics
 from sim.world.engines.rotors.power import induced_m_s, trimmed_w
 from sim.world.engines.rotors.rigid_body import Rotors
 from sim.world.engines.rotors.vehicle_types import AIR_KG_M3, CRAZYFLIE, IRIS
-from sim.world.environment.diffraction import knife_edge_db
+from sim.world.environment.line_of_sight import knife_edge_db
 from sim.world.environment.obstacles import Hills, Obstacles
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors

@@ -31,10 +31,8 @@ from fanet_mw.routing.clustered.roles.leader import Leader
 from fanet_mw.routing.clustered.roles.leader_election import Lease
 from fanet_mw.routing.clustered.roles.membership import Membership
 from fanet_mw.routing.clustered.roles.position_updates import PositionUpdates
-from fanet_mw.routing.clustered.roles.schedule_check import ScheduleCheck
-from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
-from fanet_mw.routing.clustered.slots.slot_access import SlotAccess
-from fanet_mw.routing.clustered.slots.slot_release import SlotRelease
+from fanet_mw.routing.clustered.roles.schedule_check import ScheduleCheck, ScheduleRefresh
+from fanet_mw.routing.clustered.slots import SlotAccess, SlotRelease
 from fanet_mw.routing.clustered.timetable.admission import Admission
 from fanet_mw.routing.clustered.timetable.followers import Followers
 from fanet_mw.routing.clustered.timetable.node_timetable import TimetablesInForce

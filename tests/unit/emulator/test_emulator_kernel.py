@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from kit import examples
 
 from emulator.channel.error_rate import log_success_per_bit
-from emulator.channel.pairs_in_reach import neighbors
+from emulator.channel.propagation import neighbors
 from emulator.kernel import jit, state
 from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
 from emulator.medium import Medium

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from hand_driven import Air, receptions, statuses
 
-from emulator.channel.error_rate import log_success_per_bit
-from emulator.channel.ofdm_error_rate import bit_error, log_success
+from emulator.channel.error_rate import bit_error, log_success, log_success_per_bit
 from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
 from fanet_mw.airtime import Timing, ofdm_frame_ns
 from fanet_mw.bus.messages import TxOutcome

@@ -28,7 +28,7 @@ from sim.scenarios import catalog
 from sim.sweep import spec
 from sim.sweep.one_run import carry_out
 from sim.sweep.provenance import code
-from sim.sweep.table import table_of
+from sim.sweep.store import table_of
 from sim.sweep.tasks import tasks_of
 
 

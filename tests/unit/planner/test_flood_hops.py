@@ -7,7 +7,7 @@ import pytest
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.graph.topology import within_range
-from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
+from fanet_mw.routing.clustered.timetable.interference import Geometry
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.units import Enu, NodeId
 from sim.planner.answer import judge

@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[3]
 PRODUCT = ("fanet_mw", "agents", "emulator", "sim")
 PLANTED = {
     "fanet_mw/routing/clustered/roles/failure_detectors.py": "import fanet_mw.routing.clustered.timetable.turn_size",
-    "sim/results/coherence.py": "import sim.run.stoppable_uav",
+    "sim/results/coherence.py": "import sim.run.virtual",
     "sim/world/engines/contacts.py": "import sim.world.sensors.radar",
     "emulator/kernel/heap.py": "import emulator.channel.fading",
 }

@@ -4,7 +4,7 @@ from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import Message
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.units import S
-from sim.run.stoppable_uav import StoppableUav
+from sim.run.virtual import StoppableUav
 
 
 class Ticking(Actor):

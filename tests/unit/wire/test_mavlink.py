@@ -19,7 +19,7 @@ from fanet_mw import mavlink, tlog, wire
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.mavlink import Attitude, BatteryState, Encoder, Geodetic, Ned
 from fanet_mw.units import MS, Enu, NodeId, S
-from fanet_mw.wire.join import Join
+from fanet_mw.wire.schedule import Join
 
 NODE = NodeId(7)
 STILL = Enu(0.0, 0.0, 0.0)

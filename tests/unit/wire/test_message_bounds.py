@@ -9,8 +9,7 @@ from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.orders import MOST_M, Order, OrderKind
 from fanet_mw.units import FARTHEST_M, FASTEST_M_S, STILL, Enu
 from fanet_mw.wire import frame, links, loads, places, rounds, schedule, search_messages
-from fanet_mw.wire.join import Join
-from fanet_mw.wire.schedule import Member, Schedule
+from fanet_mw.wire.schedule import Join, Member, Schedule
 from fanet_mw.wire.search_messages import Bid, Roll, ToldOrder, encode_bids, told_in
 from fanet_mw.wire.search_plan import MOST_PLACES, Search, SearchStatus
 from fanet_mw.wire.survivors import MOST_DBM, MOST_SURVIVORS, Found, Standing, Survivor, person_id

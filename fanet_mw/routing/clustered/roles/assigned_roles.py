@@ -23,15 +23,13 @@ from fanet_mw.routing.clustered.roles.joining import Joining
 from fanet_mw.routing.clustered.roles.leader import Leader
 from fanet_mw.routing.clustered.roles.leader_election import Authority, Lease
 from fanet_mw.routing.clustered.roles.membership import Membership
-from fanet_mw.routing.clustered.roles.schedule_check import ScheduleCheck
-from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
+from fanet_mw.routing.clustered.roles.schedule_check import ScheduleCheck, ScheduleRefresh
 from fanet_mw.routing.clustered.roles.states import Action
 from fanet_mw.units import US, NodeId
 from fanet_mw.wire import Kind
 from fanet_mw.wire.hello.beacon import Beacon
-from fanet_mw.wire.join import Join
 from fanet_mw.wire.links import Links
-from fanet_mw.wire.schedule import Schedule
+from fanet_mw.wire.schedule import Join, Schedule
 
 
 class MakeLeader(Protocol):

@@ -16,8 +16,7 @@ from fanet_mw.routing.clustered.roles.leader_election import Authority, Lease
 from fanet_mw.routing.clustered.roles.membership import Membership
 from fanet_mw.routing.clustered.roles.states import Action, Event, State, step
 from fanet_mw.units import MS, NodeId
-from fanet_mw.wire.join import Join
-from fanet_mw.wire.schedule import Schedule
+from fanet_mw.wire.schedule import Join, Schedule
 
 _AGAIN_HELLOS: Final = 2.0
 """The hello intervals after which a stand-in announces itself again, until confirmed by a schedule."""

@@ -16,8 +16,8 @@ from fanet_mw.node.contract import Port
 from fanet_mw.routing.clustered.links.link_quality import LinkQuality
 from fanet_mw.routing.clustered.roles.position_updates import UPDATE_NS, PositionUpdates
 from fanet_mw.units import MS, S
-from fanet_mw.wire.join import Join
 from fanet_mw.wire.links import Links
+from fanet_mw.wire.schedule import Join
 
 _FIRST_NS: Final = 500 * MS
 """The least time between the start of a node and its first join."""

@@ -21,7 +21,7 @@ from fanet_mw.motion import Motion
 from fanet_mw.routing.clustered.clustering import Cluster, Swarm, succession
 from fanet_mw.routing.clustered.clustering.division import Division, drift
 from fanet_mw.routing.clustered.links.heard_load import HeardLoads
-from fanet_mw.routing.clustered.links.link_state import LinkState, adjacency, worth_a_change
+from fanet_mw.routing.clustered.links.link_quality import LinkState, adjacency, worth_a_change
 from fanet_mw.routing.clustered.roles.failure_detectors import Liveness
 from fanet_mw.routing.clustered.roles.leader_election import Authority, silence_ns
 from fanet_mw.routing.clustered.roles.membership import EPOCH_BITS
@@ -30,10 +30,9 @@ from fanet_mw.routing.clustered.roles.roster import NO_SILENCE, Roster, sure_m
 from fanet_mw.scenario import Scenario
 from fanet_mw.serial_number import following, newer
 from fanet_mw.units import MS, US, Enu, NodeId, S, seconds_to_ns
-from fanet_mw.wire.join import Join
 from fanet_mw.wire.links import Link
 from fanet_mw.wire.loads import AS_EXPECTED
-from fanet_mw.wire.schedule import CAPACITY, Member, Schedule
+from fanet_mw.wire.schedule import CAPACITY, Join, Member, Schedule
 
 SETTLE_NS: Final = 700 * MS
 """The time without a join after which the clusters are computed."""

@@ -1,14 +1,25 @@
-"""Rejects schedules that no leader of this swarm would announce, such as forged ones, before they have any effect."""
+"""Rejects schedules that no leader of this swarm would announce, such as forged ones, before they have any effect.
 
+Sends the newest one again (anti-entropy): a node whose neighbor follows an older schedule, or none, sends it. It
+reaches nodes that the leader's floods miss: that come back to the swarm or, with a timetable, still use an older one.
+Duplicates are suppressed as in Trickle (RFC 6206); a node refreshes only while it has heard of its leader recently
+(`Lease.fresh`).
+"""
+
+from collections.abc import Callable
 from typing import Final
 
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.node.contract import Port
+from fanet_mw.node.duplicates import key_of_packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.roles.leader import SETTLE_NS
 from fanet_mw.routing.clustered.roles.leader_election import Authority
 from fanet_mw.routing.clustered.roles.membership import EPOCH_BITS, Membership
+from fanet_mw.routing.packet_repair import AGAIN_NS, ASSESS_NS, FLOOD_OVER_NS
 from fanet_mw.serial_number import newer
 from fanet_mw.units import US, S
+from fanet_mw.wire.hello.beacon import Beacon
 from fanet_mw.wire.schedule import Schedule
 
 _START_NS: Final = 60 * S
@@ -49,3 +60,58 @@ class ScheduleCheck:
         ahead = (epoch - known.epoch) & 0xFFFF
         if epoch and newer(epoch, known.epoch, bits=EPOCH_BITS) and ahead > most:
             raise MalformedFrameError(f"epoch {epoch} after {known.epoch}: at most {most} can have been missed")
+
+
+class ScheduleRefresh:
+    """The newest schedule at one node, and when to send it again."""
+
+    def __init__(self, random: Callable[[], float]) -> None:
+        self._random = random
+        self._version: tuple[Authority, int] | None = None
+        self._packets: dict[int, Packet] = {}
+        self._kept_ns = 0
+        """No refresh is planned until `FLOOD_OVER_NS` after this instant."""
+        self.due_ns: int | None = None
+        self.pending: set[int] = set()
+        """The keys of the packets that are to be sent again."""
+
+    def keep(self, packet: Packet, part: int, authority: Authority, epoch: int, *, now_ns: int) -> None:
+        """Keep a packet of the schedule that this node follows, or announces itself."""
+        if (authority, epoch) != self._version:
+            self._version, self._packets = (authority, epoch), {}
+            self._kept_ns = now_ns  # at the first copy only: repetitions would else prevent a refresh
+        self._packets[part] = packet
+        self._plan(self.due_ns)
+
+    def on_beacon(self, beacon: Beacon, *, now_ns: int) -> None:
+        """A neighbor's beacon was received, which states the schedule that the neighbor follows."""
+        if self._version is None or self.due_ns is not None or now_ns - self._kept_ns < FLOOD_OVER_NS:
+            return
+        authority, epoch = self._version
+        theirs = Authority(beacon.term, beacon.leader)
+        behind = not beacon.leader or theirs > authority
+        if behind or (theirs == authority and newer(epoch, beacon.epoch, bits=EPOCH_BITS)):
+            self._plan(now_ns + int(self._random() * ASSESS_NS))
+
+    def _plan(self, due_ns: int | None) -> None:
+        self.due_ns = due_ns
+        self.pending.clear()
+        if due_ns is not None:
+            self.pending.update(map(key_of_packet, self._packets.values()))
+
+    def on_copy(self, key: int, *, now_ns: int) -> None:
+        """Another node has flooded the schedule again, so this node need not."""
+        if key in self.pending:
+            self._over(now_ns)
+
+    def due(self, *, now_ns: int) -> list[Packet]:
+        """The packets to flood again now."""
+        if self.due_ns is None or now_ns < self.due_ns:
+            return []
+        self._over(now_ns)
+        return [self._packets[part] for part in sorted(self._packets)]
+
+    def _over(self, now_ns: int) -> None:
+        """A flood of the schedule has begun, here or elsewhere: plan nothing until it should be over."""
+        self._plan(None)
+        self._kept_ns = now_ns + AGAIN_NS - FLOOD_OVER_NS

@@ -15,8 +15,7 @@ from math import exp, fsum
 from typing import Final, NamedTuple
 
 from fanet_mw.rng import stream
-from fanet_mw.routing.clustered.timetable.flood_geometry import rows
-from fanet_mw.routing.clustered.timetable.interference import InterferenceByPower
+from fanet_mw.routing.clustered.timetable.interference import InterferenceByPower, rows
 from fanet_mw.units import NodeId
 from fanet_mw.wire.links import NEPERS
 

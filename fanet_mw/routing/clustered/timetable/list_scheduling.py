@@ -15,16 +15,16 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Final, NamedTuple
 
 from fanet_mw.rng import stream
-from fanet_mw.routing.clustered.timetable.flood_geometry import (
+from fanet_mw.routing.clustered.timetable.interference import (
     ONLY,
     RECEIVER,
     WINDOW,
     Geometry,
+    InterferenceByDistance,
     age,
     rows,
     turn_by_turn,
 )
-from fanet_mw.routing.clustered.timetable.interference import InterferenceByDistance
 
 _NOISE: Final = 50
 _TRIAL: Final = 64

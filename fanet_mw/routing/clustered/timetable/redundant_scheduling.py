@@ -16,17 +16,17 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from fanet_mw.routing.clustered.timetable.flood_geometry import (
+from fanet_mw.routing.clustered.timetable.interference import (
     ONLY,
     RECEIVER,
     WINDOW,
     Geometry,
+    InterferenceByPower,
     age,
     reach,
     rows,
     turn_by_turn,
 )
-from fanet_mw.routing.clustered.timetable.interference import InterferenceByPower
 from fanet_mw.wire.links import NEPERS
 
 

@@ -17,8 +17,13 @@ from typing import NamedTuple
 
 from fanet_mw.routing.clustered.tdma.hello_room import crowd
 from fanet_mw.routing.clustered.timetable.delivery_odds import Odds, odds
-from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry, NodeRows, rows
-from fanet_mw.routing.clustered.timetable.interference import InterferenceByDistance, InterferenceByPower
+from fanet_mw.routing.clustered.timetable.interference import (
+    Geometry,
+    InterferenceByDistance,
+    InterferenceByPower,
+    NodeRows,
+    rows,
+)
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort, Flood, Packing
 from fanet_mw.routing.clustered.timetable.redundant_scheduling import RedundantPacking, Wave, enough_for
 from fanet_mw.units import Enu, NodeId

@@ -18,7 +18,7 @@ from fanet_mw.routing.clustered.roles.contract import PartDetails
 from fanet_mw.routing.clustered.roles.leader import Leader
 from fanet_mw.routing.clustered.roles.leader_election import Authority, Lease
 from fanet_mw.routing.clustered.roles.membership import Membership, Version
-from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
+from fanet_mw.routing.clustered.roles.schedule_check import ScheduleRefresh
 from fanet_mw.routing.clustered.timetable.followers import Followers
 from fanet_mw.routing.clustered.timetable.node_timetable import FittedTimetable, NodeTimetable
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays

@@ -16,7 +16,7 @@ from fanet_mw.node.duplicates import key_of_packet
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTiming
 from fanet_mw.routing.clustered.forwarding.floods import Floods
-from fanet_mw.routing.clustered.slots.slot_access import SlotAccess
+from fanet_mw.routing.clustered.slots import SlotAccess
 from fanet_mw.routing.clustered.timetable.node_timetable import NodeTimetable, TimetablesInForce
 from fanet_mw.routing.clustered.timetable.resumed_floods import ResumedFloods
 from fanet_mw.routing.clustered.timetable.stated_delays import StatedDelays

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple, TypeVar
 
 from fanet_mw.routing.clustered.links.heard_load import packets, stated_loads
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_ns
-from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
+from fanet_mw.routing.clustered.timetable.interference import Geometry
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort
 from fanet_mw.routing.clustered.timetable.node_timetable import NO_LOADS, FittedTimetable
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, redundant_timetable, timetable

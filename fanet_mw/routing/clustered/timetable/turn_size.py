@@ -11,7 +11,7 @@ from typing import Final
 from fanet_mw import wire
 from fanet_mw.routing.clustered.roles.position_updates import STRAYED, UNLIKE
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_ns
-from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
+from fanet_mw.routing.clustered.timetable.interference import Geometry
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, seconds_to_ns
 from fanet_mw.wire import DIGEST, HEADER_BYTES, LINKS, LOADS, OVERHEAD, PLACES, SCHEDULE

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from agents.applications.conflict_monitor import ConflictMonitor
+from agents.applications.collision_avoidance import ConflictMonitor
 from fanet_mw.application import HOME, Course
 from fanet_mw.mavlink import Collision
 from fanet_mw.motion import Motion

@@ -8,7 +8,7 @@ import pytest
 from kept_values import kept
 from kit import MakeScenario
 
-from agents.applications.conflict_monitor import ConflictMonitor
+from agents.applications.collision_avoidance import ConflictMonitor
 from fanet_mw.mavlink import Collision
 from fanet_mw.motion import Motion
 from fanet_mw.units import MS, Enu, NodeId

@@ -14,8 +14,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, PRIORITY_BULK, PRIORITY_CONTROL, Header, Kind, filler
 from fanet_mw.wire.hello.beacon import Beacon, Role
-from fanet_mw.wire.join import Join
-from fanet_mw.wire.schedule import Member, Schedule
+from fanet_mw.wire.schedule import Join, Member, Schedule
 
 LEADER, OURS, THEIRS, ANOTHER = NodeId(1), NodeId(2), NodeId(3), NodeId(4)
 MakeScenario = Callable[..., Scenario]

@@ -14,8 +14,8 @@ from emulator.kernel_interface import KernelInterface
 from fanet_mw.bus.messages import Obstructions
 from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import config
-from sim.world.environment.diffraction import knife_edge_db, loss_db
 from sim.world.environment.layout import positions
+from sim.world.environment.line_of_sight import knife_edge_db, loss_db
 from sim.world.environment.obstacles import obstacles
 from sim.world.environment.solids import Solids
 from sim.world.world import WorldActor

@@ -8,9 +8,8 @@ import pytest
 from kept_values import kept
 
 from fanet_mw.scenario import Scenario
-from sim.world.environment.diffraction import loss_db
 from sim.world.environment.layout import positions
-from sim.world.environment.line_of_sight import Sight
+from sim.world.environment.line_of_sight import Sight, loss_db
 from sim.world.environment.map_on_board import map_on_board
 from sim.world.environment.obstacles import obstacles
 from sim.world.environment.solids import Solids

@@ -12,11 +12,17 @@ from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.mavlink import Encoder
 from fanet_mw.node.node import Node
 from fanet_mw.routing import make_protocol
-from fanet_mw.routing.clustered.links.link_quality import FAST, FIRST, WINDOW, LinkQuality
-from fanet_mw.routing.clustered.links.link_state import LinkState, adjacency, worth_a_change
+from fanet_mw.routing.clustered.links.link_quality import (
+    FAST,
+    FIRST,
+    WINDOW,
+    LinkQuality,
+    LinkState,
+    adjacency,
+    worth_a_change,
+)
 from fanet_mw.routing.clustered.timetable.delivery_odds import odds
-from fanet_mw.routing.clustered.timetable.flood_geometry import Geometry
-from fanet_mw.routing.clustered.timetable.interference import InterferenceByPower
+from fanet_mw.routing.clustered.timetable.interference import Geometry, InterferenceByPower
 from fanet_mw.routing.clustered.timetable.redundant_scheduling import Wave, enough_for
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, redundant_timetable
 from fanet_mw.scenario import config

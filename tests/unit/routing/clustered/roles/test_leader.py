@@ -12,8 +12,7 @@ from fanet_mw.routing.clustered.roles.leader_election import Authority, silence_
 from fanet_mw.routing.clustered.roles.position_updates import lost_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
-from fanet_mw.wire.join import Join
-from fanet_mw.wire.schedule import Schedule
+from fanet_mw.wire.schedule import Join, Schedule
 
 STILL = Enu(0.0, 0.0, 0.0)
 HERE = Motion(Enu(0.0, 0.0, 50.0), STILL, 0)

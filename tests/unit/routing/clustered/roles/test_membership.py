@@ -8,8 +8,7 @@ from fanet_mw.routing.clustered.roles.leader_election import Lease
 from fanet_mw.routing.clustered.roles.membership import Membership
 from fanet_mw.routing.clustered.roles.states import Action, Event
 from fanet_mw.units import Enu, NodeId, S
-from fanet_mw.wire.join import Join
-from fanet_mw.wire.schedule import Member, Schedule
+from fanet_mw.wire.schedule import Join, Member, Schedule
 
 US = NodeId(2)
 

@@ -5,7 +5,7 @@ import pytest
 from fanet_mw.node.duplicates import key_of
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.roles.leader_election import Authority
-from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
+from fanet_mw.routing.clustered.roles.schedule_check import ScheduleRefresh
 from fanet_mw.units import MS, S
 from fanet_mw.wire import Header, Kind
 from fanet_mw.wire.hello.beacon import Beacon, Role

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from fanet_mw.errors import DropReason
 from fanet_mw.node.packet import Packet
 from fanet_mw.node.queue import TxQueue
-from fanet_mw.routing.clustered.slots.slot_release import SlotRelease, Tenure
+from fanet_mw.routing.clustered.slots import SlotRelease, Tenure
 from fanet_mw.routing.clustered.tdma.slot_timing import Superframe
 from fanet_mw.scenario import Clusters, Routing
 from fanet_mw.units import MS, US, S

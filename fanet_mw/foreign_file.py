@@ -75,10 +75,10 @@ _LONGEST_NAME: Final = 64
 """The part of a key's name that an error repeats."""
 
 
-def require_plain(value: object, *, source: str, finite: bool = False) -> None:
+def require_plain(value: object, *, source: str, finite: bool = False, deepest: int = _DEEPEST) -> None:
     """Raises ConfigError for values nested deeply, integers beyond 64 bits and, with `finite`, infinite numbers."""
     level: list[tuple[str, object]] = [("", value)]
-    for _ in range(_DEEPEST + 1):
+    for _ in range(deepest + 1):
         inner: list[tuple[str, object]] = []
         for name, item in level:
             if isinstance(item, dict):
@@ -94,7 +94,7 @@ def require_plain(value: object, *, source: str, finite: bool = False) -> None:
         if not inner:
             return
         level = inner
-    raise ConfigError(f"{source}: holds values nested more than {_DEEPEST} deep")
+    raise ConfigError(f"{source}: holds values nested more than {deepest} deep")
 
 
 def _decoded(data: bytes, source: str) -> str:

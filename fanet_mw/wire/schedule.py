@@ -45,23 +45,11 @@ class Schedule(NamedTuple):
                 f"schedule of {len(self.members)} entries, {self.clusters} clusters: must be <= {CAPACITY}, {_HEAD_BIT}"
             )
         unused = (0,) * (CAPACITY - len(self.members))
-        return encode_inner(
-            SCHEDULE,
-            SCHEDULE.layout.pack(
-                *self[:3],
-                self.term,
-                *self[3:6],
-                *(m.node for m in self.members),
-                *unused,
-                *(m.cluster | (_HEAD_BIT if m.is_head else 0) for m in self.members),
-                *unused,
-                self.part,
-                self.parts,
-                len(self.members),
-                VERSION,
-            ),
-            node=node,
-        )
+        nodes = (*(m.node for m in self.members), *unused)
+        assigned = (*(m.cluster | (_HEAD_BIT if m.is_head else 0) for m in self.members), *unused)
+        last = (self.part, self.parts, len(self.members), VERSION)
+        payload = SCHEDULE.layout.pack(*self[:3], self.term, *self[3:6], *nodes, *assigned, *last)
+        return encode_inner(SCHEDULE, payload, node=node)
 
     @classmethod
     def decode_frame(cls, packed: Packed) -> Self:

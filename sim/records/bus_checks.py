@@ -6,7 +6,6 @@ Who really sent a message is not checked: that is the task of the router's acces
 """
 
 import json
-import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal
 
@@ -15,7 +14,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from fanet_mw import wire
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import MavlinkTap
-from fanet_mw.errors import MalformedFrameError
+from fanet_mw.errors import ConfigError, MalformedFrameError
+from fanet_mw.foreign_file import require_plain
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import (
     Collided,
@@ -235,10 +235,11 @@ class BusChecks:
         """The content of a report, and what is wrong with it; in that case the content is empty."""
         try:
             content = json.loads(text)
+            require_plain(content, source=name, finite=True, deepest=_DEEPEST)
+        except ConfigError:
+            return {}, "a value beyond its bounds"
         except (ValueError, RecursionError):
             return {}, "no JSON"
-        if not isinstance(content, dict) or not _tame(content, _DEEPEST):
-            return {}, "a value beyond its bounds"
         shape = _SHAPES.get(name, _Agent)
         try:
             shape.model_validate(content)
@@ -248,13 +249,3 @@ class BusChecks:
         if shape is _Agent and content["node"] != self.node_of[name]:
             return {}, "node: another's"
         return content, None
-
-
-def _tame(value: object, depth: int) -> bool:
-    """True for JSON of bounded depth, 64-bit integers and finite numbers."""
-    if isinstance(value, dict | list):
-        inner = value.values() if isinstance(value, dict) else value
-        return depth > 0 and all(_tame(item, depth - 1) for item in inner)
-    if isinstance(value, int):
-        return -(2**63) <= value < 2**63
-    return not isinstance(value, float) or math.isfinite(value)

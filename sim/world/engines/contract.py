@@ -8,6 +8,7 @@ from abc import ABC, abstractmethod
 from typing import Final
 
 from sim.world.arrays import Flags, Rows, Values
+from sim.world.engines.contacts import Contacts
 
 GRAVITY_M_S2: Final = 9.81
 
@@ -16,6 +17,11 @@ class Engine(ABC):
     """Moves the bodies of a swarm."""
 
     name: str
+    _at: Rows
+    _velocity: Rows
+    _wrecks: list[int]
+    """The rows of the bodies that fall."""
+    _contacts: Contacts
 
     @abstractmethod
     def reset(self, positions: Rows, velocities: Rows | None = None) -> None:
@@ -25,21 +31,21 @@ class Engine(ABC):
     def advance(self, dt_s: float, wanted_m_s: Rows) -> None:
         """Let `dt_s` pass, while each body tries to fly at its wanted velocity."""
 
-    @abstractmethod
-    def positions(self) -> Rows: ...
+    def positions(self) -> Rows:
+        return self._at
 
-    @abstractmethod
-    def velocities(self) -> Rows: ...
+    def velocities(self) -> Rows:
+        return self._velocity
 
-    @abstractmethod
     def fall(self, row: int) -> None:
         """Switch the motors of a body off for good: it falls, whatever velocity is wanted."""
+        self._wrecks.append(row)
 
-    @abstractmethod
     def contacts(self) -> list[tuple[int, int]]:
         """Pairs of nodes that have begun to touch since the last call, the smaller id first; 0 stands for the ground
         and obstacles.
         """
+        return self._contacts.take()
 
     def stand(self, rows: Flags) -> None:  # noqa: B027  (an engine without wind moves nobody who wants no velocity)
         """Switch the motors of these bodies off until the next call: they stand where friction holds them, or sink."""

@@ -53,15 +53,3 @@ class Kinematic(Engine):
         else:
             self._solids.stop(came_from, self._at, self._velocity)
         self._contacts.notice(came_from, self._at)
-
-    def positions(self) -> Rows:
-        return self._at
-
-    def velocities(self) -> Rows:
-        return self._velocity
-
-    def fall(self, row: int) -> None:
-        self._wrecks.append(row)
-
-    def contacts(self) -> list[tuple[int, int]]:
-        return self._contacts.take()

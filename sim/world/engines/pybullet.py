@@ -168,18 +168,6 @@ class Physics(Engine):
         pairs = {(self._node_of[point[1]], self._node_of[point[2]]) for point in points}
         return frozenset((min(pair), max(pair)) for pair in pairs if pair[0] != pair[1])
 
-    def positions(self) -> Rows:
-        return self._at
-
-    def velocities(self) -> Rows:
-        return self._velocity
-
-    def fall(self, row: int) -> None:
-        self._wrecks.append(row)
-
-    def contacts(self) -> list[tuple[int, int]]:
-        return self._contacts.take()
-
     def close(self) -> None:
         if self._client >= 0:
             pybullet.disconnect(physicsClientId=self._client)

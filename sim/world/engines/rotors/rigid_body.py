@@ -192,6 +192,3 @@ class Rotors(Engine):
 
     def air_m_s(self) -> Rows:
         return self._air.T
-
-    def contacts(self) -> list[tuple[int, int]]:
-        return self._contacts.take()

@@ -29,6 +29,8 @@ MAX_PUT_BYTES: Final = 16 << 20
 """The first session that receives a longer put drops it; Zenoh's default would collect up to 1 GiB."""
 LOST_AFTER_S: Final = 2.0
 """A router silent for so long counts as gone; to one that returns earlier, Zenoh reconnects by itself."""
+_ANSWERED_S: Final = 2.0
+"""How long a query waits for answers."""
 _RUNTIME_VARIABLE: Final = "ZENOH_RUNTIME"
 """The environment variable from which Zenoh reads its threads when a process opens its first session."""
 _ONE_RUNTIME: Final = (
@@ -236,14 +238,18 @@ class Bus:
         self._session.declare_queryable(topic, on_query)
 
     def ask(self, topic: str, on_sample: OnSample) -> None:
-        """Query a topic; answers come as samples. On a closed session no query is made."""
+        """Query a topic; each answer comes as a sample. On a closed session no query is made."""
 
         def on_reply(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
                 on_sample(topic, reply.ok.payload.to_bytes())
 
         if not self._session.is_closed():
-            self._session.get(topic, on_reply, timeout=2.0)
+            self._session.get(topic, on_reply, timeout=_ANSWERED_S, consolidation=zenoh.ConsolidationMode.NONE)
+
+    def is_answered(self, topic: str) -> bool:
+        """True if somebody answers queries on a topic; waits for an answer, at most as long as for those of `ask`."""
+        return any(reply.ok is not None for reply in self._session.get(topic, timeout=_ANSWERED_S))
 
     def connected(self) -> bool:
         """True if a client has its router."""

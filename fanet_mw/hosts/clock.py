@@ -207,6 +207,10 @@ class ClockListener:
         self._running: asyncio.Future[SwarmClock] = self._loop.create_future()
         self._kept = True
         """False for an epoch that all were given beforehand."""
+        self._epochs: dict[int, int] = {}
+        """The unix time [ns] of swarm instant 0 in each announcement, by its number."""
+        self.failure: BusError | None = None
+        """Why the clock counts as stopped although its keeper has not stopped it."""
         self.stopped = asyncio.Event()
         self.changed = asyncio.Event()
         """Set when the clock that runs has another pace or end than before; whoever waits for it clears it."""
@@ -245,7 +249,12 @@ class ClockListener:
             return
         for message in messages:
             if isinstance(message, ClockEpoch):
-                if message.state is ClockState.STOPPED:
+                if self._epochs.setdefault(message.number, message.epoch_unix_ns) != message.epoch_unix_ns:
+                    self.failure = BusError(
+                        f"the clock of swarm {self._names.swarm} was started anew: its router has been, or another "
+                        "swarm on the same router has its name"
+                    )
+                if message.state is ClockState.STOPPED or self.failure is not None:
                     self.stopped.set()
                 if self._running.done():
                     if self._running.result().follow(message):

@@ -156,6 +156,8 @@ class RealtimeHost:
                 if self._failure.done():
                     break
                 if stopped.done():
+                    if listener.failure is not None:
+                        raise listener.failure
                     return
                 if changed.done():
                     listener.changed.clear()

@@ -270,7 +270,7 @@ def _watched(scenario: "Scenario", *, bar: bool, lines: bool = True) -> Iterator
     def say(progress: "Progress") -> None:
         nonlocal said_s
         if monotonic() >= said_s + _WORD_EVERY_S:
-            said_s += _WORD_EVERY_S
+            said_s = monotonic()
             _say(progress.sentence())
 
     yield say

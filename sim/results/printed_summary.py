@@ -230,7 +230,8 @@ def _warnings(summary: Mapping[str, Any]) -> Iterator[str]:
         )
     for reason in summary["invalid_because"]:
         yield f"NOT VALID: {reason}"
-    if any(item["value"] > item["limit"] for item in summary["disturbance"].values()):
+    disturbed = any(item["value"] > item["limit"] for item in summary["disturbance"].values())
+    if disturbed and not summary["processes"]["ended"]:  # what came late or was lost may be the dead process's
         yield (
             "This machine could not hold real time. Lower the load, raise radio.lead_ms, "
             "or let the swarm's clock slow down: fanet launch --slow-down-to 0.1"

@@ -4,8 +4,11 @@ results.
 
 import asyncio
 import contextlib
+import signal
 import time
 from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -13,16 +16,23 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError
 from fanet_mw.hosts.bus import Bus, config_of, with_port
 from fanet_mw.hosts.clock import START_PATIENCE_S, ClockKeeper, SwarmClock
+from fanet_mw.hosts.loop import heeding
 from fanet_mw.scenario import Scenario
+from fanet_mw.units import MS, S
 from sim.bus.rights import ROUTER
 from sim.bus.running_swarms import registered
+from sim.run.launcher.pauses import PauseWatch
 
 _STOP_HEARD_S: Final = 0.3
 """The time from telling services to stop until the bus is closed over which they are told."""
 WORD_EVERY_S: Final = 5.0
 """The interval at which the router says which participants are missing or present twice."""
+_NOTICE_S: Final = 1.0
+"""How long before its early end the swarm is told of it."""
+_LEAVING_S: Final = 1.0
+"""How long the bus stays after the end of the swarm's time."""
 _LAST_WORDS_S: Final = 3.0
-"""How long the router waits for last reports after the end of the swarm's time."""
+"""How long the router waits after that for last reports."""
 Tell = Callable[[str], None]
 
 
@@ -39,8 +49,9 @@ async def serve(
     out: Path | None = None,
     zenoh_config: Path | None = None,
 ) -> int:
-    """Serve the bus and the clock until the scenario is over; with `out`, collect and write what the services did.
-    Returns 1 when a result was asked for and may not be used; raises BusError when it cannot listen.
+    """Serve the bus and the clock until the scenario is over; with `out`, collect and write what the services did, also
+    what they did until a signal. Returns 1 when a result was asked for and may not be used; raises BusError when it
+    cannot listen.
     """
     listen = with_port(listen)
     with contextlib.ExitStack() as held:
@@ -55,23 +66,44 @@ async def serve(
 
             collection = held.enter_context(Collection(scenario, bus, names, out))
         keeper = ClockKeeper(bus, names, time_scale=scenario.time_scale, expected=expected, scenario=scenario)
+        pauses = held.enter_context(contextlib.closing(PauseWatch()))
         on_event(f"serving {listen}, waiting for {len(keeper.missing())} services of swarm {swarm}")
         teller = asyncio.ensure_future(_say_who_is_missing(keeper, on_event))
         began_s = time.monotonic()
         try:
             running = await keeper.start(timeout_s=START_PATIENCE_S)
             clock, ready_s = SwarmClock(running), time.monotonic() - began_s
+            pauses.restart()
             on_event("all are there: the clock runs")
-            await asyncio.sleep(clock.wait_s(scenario.duration_ns) + 1)
-            if collection is not None:
-                await collection.last_words(_LAST_WORDS_S)
+            signaled: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+            aborted, ended_ns = None, None
+            with heeding(partial(_settle, signaled)) if collection else contextlib.nullcontext():
+                await asyncio.wait([signaled], timeout=max(0, clock.wait_s(scenario.duration_ns)))
+                teller.cancel()  # who leaves at the end is not missing
+                if signaled.done():
+                    aborted = f"interrupted by {signal.Signals(signaled.result()).name}"
+                    on_event(aborted)
+                    notice_ns = round(_NOTICE_S * scenario.time_scale * S)
+                    ended_ns = min(max(0, clock.now_ns()) + notice_ns, scenario.duration_ns)
+                    keeper.end_at(ended_ns)
+                    await asyncio.sleep(clock.wait_s(ended_ns))
+                await asyncio.sleep(_LEAVING_S)
+                if collection is not None:
+                    await collection.last_words(_LAST_WORDS_S)
         finally:  # no service may go on running on a bus that ends
             teller.cancel()
             keeper.stop()
             time.sleep(_STOP_HEARD_S)  # noqa: ASYNC251  (nothing else runs here, and a cancelled task cannot await)
         if collection is None:
             return 0
-        return collection.finish(epoch_unix_ns=running.epoch_unix_ns, ready_s=ready_s)
+        outcome = collection.outcome(ready_s=ready_s, epoch_unix_ns=running.epoch_unix_ns)
+        stall_ms, paused = pauses.longest_ns / MS, pauses.summary()
+        return collection.finish(replace(outcome, aborted=aborted, ended_ns=ended_ns, stall_ms=stall_ms, pauses=paused))
+
+
+def _settle(signaled: asyncio.Future[int], number: int) -> None:
+    if not signaled.done():
+        signaled.set_result(number)
 
 
 async def _say_who_is_missing(keeper: ClockKeeper, tell: Tell) -> None:

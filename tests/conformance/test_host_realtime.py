@@ -468,6 +468,19 @@ async def test_an_actor_ends_at_the_instant_that_the_keeper_says() -> None:
         await observer.last_report()
 
 
+async def test_an_actor_leaves_with_an_error_when_a_second_keeper_starts_its_swarms_clock_anew() -> None:
+    """So it is after a router was killed and started again, and where two swarms of one name share a router."""
+    endpoint, actor = free_endpoint(), Ticker()
+    with Bus.serve(endpoint) as bus:
+        await ClockKeeper(bus, NAMES, time_scale=1.0, expected=[]).start(timeout_s=_PATIENCE_S)
+        host = asyncio.create_task(run_actor(actor, SwarmAddress("host", endpoint), until_ns=1000 * S))
+        while not actor.wakes:  # noqa: ASYNC110  (real time passes)
+            await asyncio.sleep(0.01)
+        await ClockKeeper(bus, NAMES, time_scale=1.0, expected=[]).start(timeout_s=_PATIENCE_S)
+        with pytest.raises(BusError, match="the clock of swarm host was started anew"):
+            await asyncio.wait_for(host, _PATIENCE_S)
+
+
 async def test_whoever_comes_late_gets_the_clock_that_runs() -> None:
     endpoint = free_endpoint()
     with Bus.serve(endpoint) as bus:

@@ -3,12 +3,13 @@
 import asyncio
 import time
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.scenario import Scenario
 from sim.results.files import finish
+from sim.results.outcome import Outcome
 from sim.run.collecting.collector import Collector
 
 
@@ -20,7 +21,6 @@ class Collection:
         self._began_s = time.monotonic()
         self._collector = Collector(scenario, bus.subscribe, names, now_ns=time.monotonic_ns, folder=out)
         bus.answer(names.standing, self._collector.standing)
-        self.summary: dict[str, Any] = {}
 
     def __enter__(self) -> Self:
         return self
@@ -34,9 +34,11 @@ class Collection:
         while self._collector.unfinished() and time.monotonic() < end_s:  # noqa: ASYNC110  (other threads fill it)
             await asyncio.sleep(0.05)
 
-    def finish(self, *, epoch_unix_ns: int, ready_s: float) -> int:
-        """Write the result; returns exit code 0 if it may be used, otherwise 1."""
+    def outcome(self, *, ready_s: float, epoch_unix_ns: int) -> Outcome:
+        """What was heard until now."""
         wall_s = time.monotonic() - self._began_s - ready_s
-        outcome = self._collector.outcome(wall_s=wall_s, ready_s=ready_s, epoch_unix_ns=epoch_unix_ns)
-        self.summary = finish(outcome, out=self._out)
-        return 0 if self.summary["valid"] else 1
+        return self._collector.outcome(wall_s=wall_s, ready_s=ready_s, epoch_unix_ns=epoch_unix_ns)
+
+    def finish(self, outcome: Outcome) -> int:
+        """Write the result; returns exit code 0 if it may be used, otherwise 1."""
+        return 0 if finish(outcome, out=self._out)["valid"] else 1

@@ -454,6 +454,8 @@ async def launch(
     limits.prepare(processes=processes)
     bus, endpoint = _bus(listen, connect, zenoh_config)
     with bus, registered(swarm, endpoint) as known:
+        if connect is not None and await asyncio.to_thread(bus.is_answered, Topics(swarm).scenario):
+            raise BusError(f"swarm {swarm} is already served on {endpoint}: another name (--swarm) keeps the two apart")
         on_event(f"swarm {swarm} on {endpoint}" + ("" if known else "; other commands must be told so: --connect"))
         address = SwarmAddress(swarm, endpoint, zenoh_config, READY_TIMEOUT_S)
         services = Services(scenario, address, own_world, frozenset(leave_out), emulator_options or {})

@@ -27,6 +27,18 @@ def test_a_line_every_ten_seconds_says_how_the_swarm_fares(
     ]
 
 
+def test_a_swarm_that_took_long_to_come_up_is_told_of_once(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], make_scenario: MakeScenario
+) -> None:
+    now_s = 100.0
+    monkeypatch.setattr(runs, "monotonic", lambda: now_s)
+    with runs._watched(make_scenario(), bar=False) as tell:
+        for quarter in range(4 * 15):
+            now_s = 147 + quarter / 4
+            tell(state(quarter / 4))
+    assert [line.split()[0] for line in capsys.readouterr().err.splitlines()] == ["0", "10"]
+
+
 def test_what_is_not_known_or_not_searched_for_is_not_said() -> None:
     assert Progress(1.4, 60.0, 1.0, None, 0.0, 0, 0, 0).sentence() == "1 of 60 s: clock 1, late 0.00%"
 

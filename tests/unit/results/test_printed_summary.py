@@ -57,6 +57,7 @@ EVERYTHING: dict[str, Any] = {
     "trace_sha256": "0123456789abcdef" * 2,
     "heard": {"malformed": 3, "why": {"too long": 161, "no such node": 162}},
     "invalid_because": ["163 frames are late", "the world ended"],
+    "processes": {"ended": []},
     "disturbance": {"late": {"value": 2, "limit": 3}, "pauses": {"value": 2, "limit": 1}},
 }  # fmt: skip
 
@@ -168,6 +169,7 @@ def test_of_a_run_in_which_nothing_happened_four_rows_are_printed(make_scenario:
         (["separation"], {"least_m": None}, []),
         (["heard"], {"malformed": 0}, []),
         ([], {"disturbance": {"late": {"value": 3, "limit": 3}}}, []),
+        ([], {"processes": {"ended": [{"name": "emulator", "exit_code": -9}]}}, []),
     ],
 )  # fmt: skip
 def test_a_row_says_no_more_than_there_is(path: list[str], keys: dict[str, Any], said: list[str]) -> None:

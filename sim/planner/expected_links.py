@@ -94,7 +94,7 @@ def chance_of(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance | None:
     if radio.fading != "none" or radio.shadowing_db > 0 or scenario.world.has_obstacles:
         return None
     if radio.channel == "range":
-        return lambda sender, receiver, others: _clear(at, receiver, (sender, *others), radio.range_m)
+        return _by_range(at, radio.range_m)
     return _by_error_rate(scenario, at)
 
 
@@ -127,7 +127,15 @@ def _by_error_rate(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance:
     return chance
 
 
-def _clear(at: Mapping[NodeId, Enu], receiver: NodeId, senders: tuple[NodeId, ...], range_m: float) -> float:
+def _by_range(at: Mapping[NodeId, Enu], range_m: float) -> Chance:
     """1 if exactly one sender is within range of the receiver, which does not send itself."""
-    heard = sum(at[receiver].minus(at[sender]).norm() <= range_m for sender in senders)
-    return float(heard == 1 and receiver not in senders)
+
+    @cache
+    def near(receiver: NodeId) -> frozenset[NodeId]:
+        return frozenset(node for node, place in at.items() if at[receiver].minus(place).norm() <= range_m)
+
+    def chance(sender: NodeId, receiver: NodeId, others: tuple[NodeId, ...]) -> float:
+        senders = (sender, *others)
+        return float(receiver not in senders and sum(map(near(receiver).__contains__, senders)) == 1)
+
+    return chance

@@ -17,6 +17,7 @@ from fanet_mw.routing.clustered.clustering import Cluster, Swarm
 from fanet_mw.routing.clustered.clustering.division import Division
 from fanet_mw.routing.clustered.tdma.turn_timing import receipt_ns
 from fanet_mw.routing.clustered.timetable.node_timetable import FittedTimetable
+from fanet_mw.routing.clustered.timetable.timetable import Turn
 from fanet_mw.routing.clustered.timetable.turn_size import links, reserved, schedule_parts, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S
@@ -236,9 +237,13 @@ def _in_turns(site: Site, found: FittedTimetable | Refused, candidates: Sequence
         return _Judged(refused, (), TimetablePlan(superframe(scenario), 0, 0, None), (found.reason,))
     lead_ns, control = scenario.radio.lead_ns, {scenario.leader: schedule_parts(scenario)}
     bulk_bytes = found.frame_bytes - sum(reserved(scenario).values())
+    of_root: dict[NodeId, list[Turn]] = {}
+    for turn in found.table.turns:
+        of_root.setdefault(turn.root, []).append(turn)
     judged = tuple(
         judge(
             found,
+            of_root.get(NodeId(c.head), []),
             c,
             lead_ns=lead_ns,
             receipt_ns=receipt_ns(scenario),

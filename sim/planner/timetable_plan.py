@@ -23,7 +23,7 @@ from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_slack_ns
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort
 from fanet_mw.routing.clustered.timetable.node_timetable import FittedTimetable
 from fanet_mw.routing.clustered.timetable.own_bound import RootTurns
-from fanet_mw.routing.clustered.timetable.timetable import Timetable, timetable
+from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn, timetable
 from fanet_mw.routing.clustered.timetable.turn_allocation import Places, fit
 from fanet_mw.routing.clustered.timetable.turn_size import links, superframe
 from fanet_mw.scenario import Scenario
@@ -99,6 +99,7 @@ def _most_slack_us(scenario: Scenario, places: Places, head_of: Mapping[NodeId, 
 
 def judge(
     found: FittedTimetable,
+    floods: Sequence[Turn],
     candidate: Candidate,
     *,
     lead_ns: int,
@@ -107,19 +108,19 @@ def judge(
     control: int = 0,
     bulk_bytes: int,
 ) -> ClusterPlan:
-    """Judge one root. `receipt_ns`: until applications have a packet; `control`: announcements per period, before all
-    bulk; `bulk_bytes`: the room for bulk in a turn.
+    """Judge one root, whose `floods` take these turns. `receipt_ns`: until applications have a packet; `control`:
+    announcements per period, before all bulk; `bulk_bytes`: the room for bulk in a turn.
     """
-    table, turns = found.table, found.turns
-    offsets = tuple(table.offsets_of(NodeId(candidate.head)))
-    span = table.spans.get(candidate.head, 1)
+    turns = found.turns
+    offsets = tuple(sorted(turn.offset for turn in floods if turn.node == turn.root))
+    span = found.table.spans.get(candidate.head, 1)
     own = RootTurns(turns, offsets, span, found.together, lead_ns + receipt_ns)
     part_bytes = bulk_bytes // found.together
     rooms = [
         _Room(own, lead_ns, jitter_ns, control, _of(priority, candidate.shares), part_bytes)
         for priority in sorted({share.priority for share in candidate.shares})
     ]
-    relays = sum(1 for turn in table.turns if turn.root == candidate.head and turn.instance == 0)
+    relays = sum(1 for turn in floods if turn.instance == 0)
     fullest = max(rooms, key=lambda room: room.turns_needed, default=None)
     waiting = [room.backlog() for room in rooms if room.packets]
     return ClusterPlan(

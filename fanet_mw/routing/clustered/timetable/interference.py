@@ -10,6 +10,7 @@ are represented as the bits of integers, by the nodes' row numbers.
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache
 from typing import Final, NamedTuple, Protocol, TypeVar
 
 from fanet_mw.units import Enu, NodeId
@@ -121,16 +122,16 @@ class InterferenceByDistance:
     def __init__(self, positions: Sequence[tuple[NodeId, Enu]], geometry: Geometry) -> None:
         self.nodes = NodeRows(node for node, _ in positions)
         self._parts: dict[int, tuple[int, int]] = {}
-        at = [place for _, place in positions]
-        self.hears = [_within(at, row, geometry.link_m) for row in range(len(at))]
-        sure = [_within(at, row, geometry.link_m - geometry.margin_m) for row in range(len(at))]
+        at = tuple(place for _, place in positions)
+        self.hears = _within(at, geometry.link_m)
+        sure = _within(at, geometry.link_m - geometry.margin_m)
         parts = ([reach(links, row)[0] for row in range(len(at))] for links in (sure, self.hears))
         self.sure = not geometry.margin_m or next(parts) == next(parts)
         """True if the links that are farther than errors of positions from the end of the range connect as many."""
         if self.sure:
             self.hears = sure
         disturbed_m = max(geometry.interference_m, geometry.link_m)
-        self.disturbs = [_within(at, row, disturbed_m) for row in range(len(at))]
+        self.disturbs = _within(at, disturbed_m)
 
     def part(self, root: int) -> tuple[int, int]:
         """The rows that a flood from this row can reach, itself included, and the number of hops to the farthest."""
@@ -229,10 +230,10 @@ class InterferenceByPower:
         return self._disturbing[sender, receiver]
 
 
-def _within(at: Sequence[Enu], row: int, reach_m: float) -> int:
-    here = at[row]
-    return sum(
-        1 << other
-        for other, there in enumerate(at)
-        if other != row and math.dist((here.east, here.north, here.up), (there.east, there.north, there.up)) <= reach_m
+@lru_cache(maxsize=8)
+def _within(at: tuple[Enu, ...], reach_m: float) -> tuple[int, ...]:
+    """For each place, the others within reach. Many timetables are tried for the same places."""
+    return tuple(
+        sum(1 << other for other, there in enumerate(at) if other != row and math.dist(here, there) <= reach_m)
+        for row, here in enumerate(at)
     )

@@ -53,6 +53,11 @@ class Flood:
         """The rows that must transmit first, in this order."""
         self._has = 1 << root
         self._ready = {root: 0}
+        """From which turn on each holder of the packet can send it, as long as a neighbor lacks it."""
+        self._served = swarm.hears[root]
+        """The rows that hear a holder of the packet."""
+        self._twice = 0
+        """Those that hear several."""
         self._offers: list[tuple[int, int, int, int]] | None = None
 
     @property
@@ -71,13 +76,16 @@ class Flood:
             return [(0, 0, self.root, 0)]  # the only node in this part of the swarm; it transmits nevertheless
         while self._way and not hears[self._way[0]] & ~has:
             self._way.pop(0)
-        found = []
+        found, done = [], []
         for row in self._way[:1] or self._ready:
             lacking = hears[row] & ~has
             if lacking:
-                mine = 1 << row
-                only = sum(1 for other in rows(lacking) if hears[other] & has == mine)
+                only = (lacking & ~self._twice).bit_count()
                 found.append((self._ready[row], RECEIVER * lacking.bit_count() + ONLY * only, row, lacking))
+            else:
+                done.append(row)
+        for row in done:
+            del self._ready[row]
         return found
 
     def send(self, offset: int, row: int, receivers: int, *, hop_turns: int) -> None:
@@ -86,6 +94,8 @@ class Flood:
         self._has |= receivers
         for other in rows(receivers):
             self._ready.setdefault(other, offset + hop_turns)
+            self._twice |= self._served & self._hears[other]
+            self._served |= self._hears[other]
         self._offers = None
 
 
@@ -101,6 +111,8 @@ class _FilledTurn(NamedTuple):
 _EMPTY: Final = _FilledTurn()
 _Offer = tuple[int, int, int, int]
 """A possible transmission: its worth, minus the number of its flood, its row, and its receivers."""
+_Offered = tuple[int, int, list[tuple[int, int, int, int]]]
+"""What one flood could send: how much more its age makes it worth, minus its number, and `Flood.offers`."""
 _Choice = tuple[int, list[_Offer], _FilledTurn]
 """The sum of the worth of some transmissions, these transmissions, and the turn with them."""
 
@@ -159,7 +171,7 @@ class Packing:
         """For each row, turns that reach all neighbors and disturb no flood; who has fewest chooses first."""
         found: list[list[int]] = [[] for _ in hears]
         for turn in range(self._turns):
-            wanted = ((-len(turns), -row, row, hears[row]) for row, turns in enumerate(found) if hears[row])
+            wanted = ((0, -row, [(0, -len(turns), row, hears[row])]) for row, turns in enumerate(found) if hears[row])
             following = self._filled[(turn + 1) % self._turns].sending
             offers = sorted(self._possible(turn, wanted), reverse=True)
             _, chosen, self._filled[turn] = self._choose(offers, self._filled[turn], following)
@@ -169,29 +181,23 @@ class Packing:
 
     def _offers(self, offset: int, under_way: dict[int, Flood]) -> list[_Offer]:
         """The transmissions of floods that would be possible in this turn if no other one used it."""
-        return self._possible(
-            offset,
-            (
-                (worth + age(flood, offset) // self._hop_turns, -number, row, receivers)
-                for number, flood in under_way.items()
-                for ready, worth, row, receivers in flood.offers()
-                if ready <= offset
-            ),
+        wanted = (
+            (age(flood, offset) // self._hop_turns, -number, flood.offers()) for number, flood in under_way.items()
         )
+        return self._possible(offset, wanted)
 
-    def _possible(self, offset: int, wanted: Iterable[_Offer]) -> list[_Offer]:
+    def _possible(self, offset: int, wanted: Iterable[_Offered]) -> list[_Offer]:
         """Those transmissions that disturb none for which this turn is taken, nor are disturbed by one."""
-        there = self._filled[offset % self._turns]
+        sending, meant, disturbed, _ = self._filled[offset % self._turns]
         following = self._filled[(offset + 1) % self._turns].sending
-        barred = self._filled[(offset - 1) % self._turns].deaf | there.sending | there.disturbed
+        barred = self._filled[(offset - 1) % self._turns].deaf | sending | disturbed
+        spared = meant | disturbed & following
         disturbs = self._disturbs
         return [
-            offer
-            for offer in wanted
-            if not barred >> offer[2] & 1
-            and not disturbs[offer[2]] & there.meant
-            and not offer[3] & there.disturbed
-            and not there.disturbed & disturbs[offer[2]] & following
+            (worth + more, number, row, receivers)
+            for more, number, offers in wanted
+            for ready, worth, row, receivers in offers
+            if ready <= offset and not (barred >> row & 1 or disturbs[row] & spared or receivers & disturbed)
         ]
 
     def _shuffled(self, offers: list[_Offer]) -> list[_Offer]:
@@ -202,6 +208,7 @@ class Packing:
     def _choose(self, offers: Sequence[_Offer], there: _FilledTurn, following: int) -> _Choice:
         """Take transmissions in order, if they disturb none taken; no receiver gets the same packet twice."""
         sending, meant, disturbed, deaf = there
+        spared = meant | disturbed & following
         disturbs = self._disturbs
         chosen: list[_Offer] = []
         served: dict[int, int] = {}
@@ -209,19 +216,18 @@ class Packing:
         for offer in offers:
             worth, number, row, receivers = offer
             around = disturbs[row]
-            twice = disturbed & around
             if (
                 (disturbed | sending) >> row & 1
-                or around & meant
+                or around & spared
                 or receivers & disturbed
-                or twice & following
                 or receivers & served.get(number, 0)
             ):
                 continue
             sending |= 1 << row
             meant |= receivers
+            deaf |= disturbed & around
             disturbed |= around
-            deaf |= twice
+            spared = meant | disturbed & following
             served[number] = served.get(number, 0) | receivers
             total += worth
             chosen.append(offer)

@@ -25,6 +25,8 @@ from fanet_mw.hosts.timebase import THIS_MACHINE
 
 JOIN_PATIENCE_S: Final = 2.5
 """How long a process waits for a router by default; it is short, so that a mistyped endpoint is soon reported."""
+BUSY_PATIENCE_S: Final = 10.0
+"""How much longer if somebody listens there: a router whose machine is busy accepts connections before it answers."""
 MAX_PUT_BYTES: Final = 16 << 20
 """The first session that receives a longer put drops it; Zenoh's default would collect up to 1 GiB."""
 LOST_AFTER_S: Final = 2.0
@@ -167,17 +169,24 @@ class Bus:
         """
         _require_endpoint(endpoint)
         os.environ.setdefault(_RUNTIME_VARIABLE, _ONE_RUNTIME)
-        settings = _config(mode="client", listen=None, connect=endpoint, file=config, patience_s=patience_s)
-        try:
-            return cls(zenoh.open(settings), endpoint)
-        except zenoh.ZError as error:
-            if (off := _clock_outside_certificate(config)) is not None:
-                raise BusError(f"no Zenoh router at {endpoint}: {off}") from error
-            why = "no answer" if "onnect" in str(error) else _first_sentence(error)
-            raise BusError(
-                f"no Zenoh router at {endpoint} ({why} within {patience_s:g} s); "
-                f"start one with `fanet router SCENARIO` or `fanet launch SCENARIO`, and --listen {endpoint}"
-            ) from error
+        waited_s, listens = 0.0, False
+        while True:
+            waited_s += patience_s
+            settings = _config(mode="client", listen=None, connect=endpoint, file=config, patience_s=patience_s)
+            try:
+                return cls(zenoh.open(settings), endpoint)
+            except zenoh.ZError as error:
+                if not listens and (listens := _somebody_listens(endpoint)):
+                    patience_s = BUSY_PATIENCE_S
+                    continue
+                if (off := _clock_outside_certificate(config)) is not None:
+                    raise BusError(f"no Zenoh router at {endpoint}: {off}") from error
+                why = "no answer" if "onnect" in str(error) else _first_sentence(error)
+                raise BusError(
+                    f"no Zenoh router at {endpoint} ({why} within {waited_s:g} s"
+                    f"{', although somebody listens there' if listens else ''}); "
+                    f"start one with `fanet router SCENARIO` or `fanet launch SCENARIO`, and --listen {endpoint}"
+                ) from error
 
     def __enter__(self) -> Self:
         return self
@@ -281,6 +290,15 @@ def _clock_outside_certificate(config: Path | None) -> str | None:
             now = time.strftime("%b %d %H:%M:%S %Y GMT", time.gmtime(now_s))
             return f"the clock of this machine says {now}, and its certificates are valid from {since} to {until}"
     return None
+
+
+def _somebody_listens(endpoint: str) -> bool:
+    """True if a connection is accepted there. Not asked of TLS, where a certificate may be what is refused."""
+    protocol, _, address = endpoint.partition("/")
+    host, _, port = address.partition("#")[0].partition("?")[0].rpartition(":")
+    with contextlib.suppress(OSError, ValueError), socket.create_connection((host.strip("[]"), int(port)), timeout=1):
+        return protocol == "tcp"
+    return False
 
 
 def _first_sentence(error: Exception) -> str:

@@ -7,6 +7,7 @@ fanet/<swarm>/alive/<name>                             a process of another prog
 from collections.abc import Iterable
 
 from fanet_mw.bus.topics import Topics
+from fanet_mw.scenario import Scenario
 
 _NAMED = 5
 
@@ -15,6 +16,11 @@ def few(names: Iterable[str]) -> str:
     """The first five of the names, and the number of the others."""
     found = list(names)
     return ", ".join(found[:_NAMED]) + (f" and {len(found) - _NAMED} more" if len(found) > _NAMED else "")
+
+
+def expected_names(scenario: Scenario) -> list[str]:
+    """The processes of a swarm."""
+    return ["emulator", "world", *(f"agent-{node}" for node in scenario.node_ids)]
 
 
 class Presence:

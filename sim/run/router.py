@@ -17,6 +17,7 @@ from fanet_mw.errors import BusError
 from fanet_mw.hosts.bus import Bus, config_of, with_port
 from fanet_mw.hosts.clock import START_PATIENCE_S, ClockKeeper, SwarmClock
 from fanet_mw.hosts.loop import heeding
+from fanet_mw.hosts.presence import expected_names
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, S
 from sim.bus.rights import ROUTER
@@ -34,10 +35,6 @@ _LEAVING_S: Final = 1.0
 _LAST_WORDS_S: Final = 3.0
 """How long the router waits after that for last reports."""
 Tell = Callable[[str], None]
-
-
-def expected_names(scenario: Scenario) -> list[str]:
-    return ["emulator", "world", *(f"agent-{node}" for node in scenario.node_ids)]
 
 
 async def serve(

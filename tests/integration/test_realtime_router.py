@@ -14,6 +14,7 @@ from fanet_mw.errors import BusError
 from fanet_mw.hosts import interrupts, loop
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper, ClockListener
+from fanet_mw.hosts.presence import expected_names
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.fingerprint import fingerprint
 from sim.run import router
@@ -26,7 +27,7 @@ async def all_services(scenario: Scenario, endpoint: str) -> None:
     """What all services of a swarm do on the bus, but for what they have to say: they leave with the swarm's time."""
     with await asyncio.to_thread(Bus.join, endpoint, patience_s=30.0) as bus:
         listener = ClockListener(bus, SWARM)
-        for name in router.expected_names(scenario):
+        for name in expected_names(scenario):
             bus.announce(SWARM.alive(name, fingerprint=fingerprint(scenario), instance="1"))
         clock = await listener.running(timeout_s=30)
         while (left_s := clock.wait_s(clock.ends_ns or scenario.duration_ns)) > 0:

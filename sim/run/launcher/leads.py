@@ -10,10 +10,10 @@ import math
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
+from fanet_mw.hosts.presence import expected_names
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS
 from sim.run.launcher.pauses import longest_pause_ns, processors
-from sim.run.router import expected_names
 
 _MEASURED_S: Final = 1.0
 _LEAST_MS: Final = 20

@@ -28,6 +28,7 @@ from fanet_mw.hosts import interrupts
 from fanet_mw.hosts.bus import Bus, config_of, with_port
 from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
 from fanet_mw.hosts.loop import heeding
+from fanet_mw.hosts.presence import expected_names
 from fanet_mw.hosts.realtime import SwarmAddress
 from fanet_mw.hosts.service import BUS_EXIT_CODE
 from fanet_mw.routing import module_of
@@ -45,7 +46,6 @@ from sim.run.launcher.clock_governor import ClockGovernor, Instant
 from sim.run.launcher.leads import Leads
 from sim.run.launcher.pauses import PauseWatch, processors
 from sim.run.launcher.services import Services
-from sim.run.router import expected_names
 from sim.world.flight_recorder import FlightRecorder
 from sim.world.possible_world import require_possible
 

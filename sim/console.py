@@ -55,10 +55,12 @@ def tell(text: str) -> None:
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]] = ()) -> "Table":
-    """A table as commands print them."""
-    from rich.table import Table
+    """A table as commands print them; a name that is longer than its column goes on below."""
+    from rich.table import Column, Table
 
-    made = Table(*headings, box=None, header_style="bold", padding=(0, 2, 0, 0))
+    made = Table(
+        *(Column(heading, overflow="fold") for heading in headings), box=None, header_style="bold", padding=(0, 2, 0, 0)
+    )
     for row in rows:
         made.add_row(*row)
     return made

@@ -37,7 +37,9 @@ def scenario(*overrides: str) -> Scenario:
     return catalog.find("quick", [*SHORT, *overrides])
 
 
-def run(chosen: Scenario, *acts: tuple[float, Act], respawn: bool = False) -> tuple[Outcome, dict[str, Any]]:
+def run(
+    chosen: Scenario, *acts: tuple[float, Act], respawn: bool = False, tell: Callable[[str], None] = print
+) -> tuple[Outcome, dict[str, Any]]:
     """Launch, do each act at its swarm instant [s], and summarize."""
     tasks = []
 
@@ -49,7 +51,7 @@ def run(chosen: Scenario, *acts: tuple[float, Act], respawn: bool = False) -> tu
 
         tasks.extend(asyncio.ensure_future(later(*item)) for item in acts)
 
-    outcome = asyncio.run(launch(chosen, swarm="verdict", respawn=respawn, on_started=started))
+    outcome = asyncio.run(launch(chosen, swarm="verdict", respawn=respawn, on_event=tell, on_started=started))
     return outcome, finish(outcome, out=None)
 
 
@@ -98,11 +100,13 @@ def test_a_run_whose_emulator_was_killed_and_started_again_is_not_valid_and_says
 
 
 @pytest.mark.slow
-def test_a_run_whose_world_stood_still_for_seconds_is_not_valid() -> None:
+def test_a_run_whose_world_stood_still_for_seconds_is_not_valid_and_the_world_is_named_meanwhile() -> None:
+    said: list[str] = []
     moving = scenario("duration_s=7.5", "mobility.model=formation")
     frozen = (1.0, send(signal.SIGSTOP, "world")), (6.0, send(signal.SIGCONT, "world"))
-    outcome, summary = run(moving, *frozen)
+    outcome, summary = run(moving, *frozen, tell=said.append)
     assert outcome.ended == []
+    assert [what[-24:] for what in said if "no report" in what] == ["no report for 4 s: world"]
     why = about(summary, "longest standstill")
     assert "(world), limit 500 ms" in why
     assert 4500 < summary["disturbance"]["stall_ms"]["value"] < 9000

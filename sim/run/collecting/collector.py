@@ -74,6 +74,8 @@ class Collector:
         self._reports: dict[str, dict[str, Any]] = {}
         self._links = LinkTotals()
         self._refused: Counter[str] = Counter()
+        self._reported_ns: dict[str, int] = {}
+        """When the last report of each actor was heard."""
         self._why_no_report: dict[str, str] = {}
         self._puts = 0
         for expression, what, take in (
@@ -151,6 +153,7 @@ class Collector:
             return "message type"
         if message.name != name:
             return "speaker"
+        self._reported_ns[name] = self._now_ns()
         content, why = self._checks.report(name, message.json)
         if why is not None:
             self._why_no_report[name] = f"malformed: {why[:_LONGEST_WHY]}"
@@ -213,6 +216,16 @@ class Collector:
         """The actors that have not yet sent their last report."""
         with self._lock:
             return {name for name in self._checks.node_of if not self._reports.get(name, {}).get("final")}
+
+    def begin(self) -> None:
+        """All actors are there now: silence counts from here on."""
+        with self._lock:
+            self._reported_ns = dict.fromkeys(self._checks.node_of, self._now_ns())
+
+    def silent(self, for_ns: int) -> set[str]:
+        """The actors that have sent no report for so long."""
+        with self._lock:
+            return {name for name, heard_ns in self._reported_ns.items() if self._now_ns() - heard_ns > for_ns}
 
     def disk_failure(self) -> str | None:
         """Why the trace or the taps are incomplete; None if both are complete."""

@@ -28,7 +28,7 @@ from fanet_mw.hosts import interrupts
 from fanet_mw.hosts.bus import Bus, config_of, with_port
 from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
 from fanet_mw.hosts.loop import heeding
-from fanet_mw.hosts.presence import expected_names
+from fanet_mw.hosts.presence import expected_names, few
 from fanet_mw.hosts.realtime import SwarmAddress
 from fanet_mw.hosts.service import BUS_EXIT_CODE
 from fanet_mw.routing import module_of
@@ -96,6 +96,9 @@ _GRACE_S: Final = 5.0
 _LAST_WORDS_S: Final = 1.0
 """After the end of all processes: some last messages may still be on the bus."""
 _PROGRESS_S: Final = 0.25
+_SILENT_S: Final = 4
+"""A process that has sent no report for so long is named; it sends one each second."""
+_SILENT_TIMES: Final = 2
 Tell = Callable[[str], None]
 OnProgress = Callable[[Progress], None]
 
@@ -153,6 +156,8 @@ class SwarmRun:
         """When the programs of UAVs end and are started again, by the scenario's faults."""
         self._stopped: set[str] = set()
         """The processes that do not run now because of that."""
+        self._silent: dict[str, int] = {}
+        """How often in a row each process has been found silent: a launcher that stood still finds all so, once."""
         self._asked: deque[float] = deque(maxlen=16)
         """The paces that operators have asked for, not yet heeded."""
         bus.subscribe(names.clock_control, self._on_pace)
@@ -249,6 +254,7 @@ class SwarmRun:
             self._check_not_over()
         self._clock = SwarmClock(start.result())
         self._pauses.restart()
+        self._collector.begin()
         ready_s = time.monotonic() - began
         self._tell(f"{len(self.processes.names())} processes up after {ready_s:.1f} s")
         return ready_s
@@ -259,10 +265,18 @@ class SwarmRun:
             reports = self._collector.reports()
             self._heed_paces()
             self._govern(reports)
+            self._name_silent()
             on_progress(self._progress(reports))
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._over.wait(), _PROGRESS_S)
             self._change_programs()
+
+    def _name_silent(self) -> None:
+        """Say which processes hang, or get no processor time; their run is not valid, but it would last to its end."""
+        silent = self._collector.silent(_SILENT_S * S).intersection(self.processes.names())
+        self._silent = {name: self._silent.get(name, 0) + 1 for name in silent}
+        if found := sorted(name for name, times in self._silent.items() if times == _SILENT_TIMES):
+            self._tell(f"at {self._now_ns() / S:.1f} s no report for {_SILENT_S} s: {few(found)}")
 
     def _change_programs(self) -> None:
         """End the programs of UAVs, and start them again, as the scenario plans it."""

@@ -113,6 +113,23 @@ def replay(ear: Ear, outcome: Outcome) -> None:
             ear.say(NAMES.mavlink(node), MavlinkTap(t_ns, data))
 
 
+def test_who_has_sent_no_report_for_long_is_silent_until_it_sends_the_next(ear: Ear, genuine: Outcome) -> None:
+    def report(name: str) -> None:
+        ear.say(NAMES.report(name), Report(name, END_NS, json.dumps(genuine.reports[name])))
+
+    everyone = set(genuine.reports)
+    assert ear.collector.silent(4 * S) == set(), "the swarm's time has not begun"
+    ear.collector.begin()
+    ear.now_ns = 3 * S
+    for name in everyone - {"world"}:
+        report(name)
+    assert ear.collector.silent(4 * S) == set()
+    ear.now_ns = 5 * S
+    assert ear.collector.silent(4 * S) == {"world"}
+    report("world")
+    assert ear.collector.silent(4 * S) == set()
+
+
 def test_what_genuine_actors_say_passes_and_gives_the_result_of_the_run(ear: Ear, genuine: Outcome) -> None:
     replay(ear, genuine)
     assert ear.why == {}

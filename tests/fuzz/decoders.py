@@ -40,7 +40,7 @@ from fanet_mw.wire.links import Links
 from fanet_mw.wire.loads import Loads
 from fanet_mw.wire.places import Places
 from fanet_mw.wire.schedule import Join, Schedule
-from fanet_mw.wire.search_messages import Roll, ToldOrder, checked_bids
+from fanet_mw.wire.search_messages import Roll, ToldOrder, checked_bids, told_in
 from fanet_mw.wire.search_plan import Search, SearchStatus
 from fanet_mw.wire.survivors import Found as FoundMessage
 from fanet_mw.wire.survivors import Survivor
@@ -91,7 +91,7 @@ def _of_the_air(found: Corpus) -> Iterator[Decoder]:
     yield Decoder("inner frames", lambda data: list(wire.inner_frames(data)), any_frame)
     for kind, spec in (
         (Beacon, wire.BEACON), (Schedule, wire.SCHEDULE), (Survivor, wire.SURVIVOR), (TimeBeacon, wire.TIME),
-        (Join, wire.JOIN),
+        (Join, wire.JOIN), (FoundMessage, wire.FOUND),
     ):  # fmt: skip
         yield Decoder(kind.__name__, _there_and_back(kind.decode_frame, _encode_frame), of(spec.msgid))
     yield Decoder("Digest", _there_and_back(Digest.decode_frames, lambda m: m.encode_frames(3)), of(wire.DIGEST.msgid))
@@ -105,11 +105,10 @@ def _of_the_air(found: Corpus) -> Iterator[Decoder]:
     for kind, spec in (
         (Search, wire.SEARCH),
         (SearchStatus, wire.STATUS),
-        (FoundMessage, wire.FOUND),
         (Roll, wire.ROLL),
         (ToldOrder, wire.ORDER),
     ):
-        yield Decoder(kind.__name__, _there_and_back(kind.decode_frame, _encode_frame), of(spec.msgid))
+        yield Decoder(kind.__name__, _there_and_back(_first_told(kind), _encode_frame), of(spec.msgid))
     yield Decoder(
         "links in rounds",
         _there_and_back(rounds.decode_heard, lambda m: rounds.encode_heard(m, 3, count=rounds.MOST_NODES)),
@@ -124,6 +123,16 @@ def _of_the_air(found: Corpus) -> Iterator[Decoder]:
     yield Decoder("position", mavlink.kinematics_of, of(mavlink.common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT))
     yield Decoder("collision", mavlink.collision_of, of(mavlink.common.MAVLINK_MSG_ID_COLLISION))
     yield Decoder("datagram", Datagram.decode, lambda pick: mutations.scrambled(pick.choice(found.datagrams), pick))
+
+
+def _first_told(kind: type) -> Callable[[bytes], object]:
+    def decode(data: bytes) -> object:
+        told = next((one for one in told_in(data) if isinstance(one, kind)), None)
+        if told is None:
+            raise MalformedFrameError(f"no {kind.__name__}")
+        return told
+
+    return decode
 
 
 def _encode_frame(message: Any) -> bytes:

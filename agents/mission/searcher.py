@@ -274,7 +274,8 @@ class Searcher:
         if now_ns >= self._next_roll_ns:
             self._next_roll_ns = now_ns + _ROLL_NS
             self._plans.close_ranks(now_ns)
-            self._obstacles.hovering = self._neighbors.hovering(self._roll_call.lost, self._place.lost_at(now_ns))
+            lost = self._roll_call.lost
+            self._obstacles.hovering = self._neighbors.hovering(lost, self._place.lost_at(now_ns)) if lost else ()
         self._flight.fix(position, velocity, self._bidding.survivor, now_ns=now_ns)
         if self._radio is not None:
             self._radio.hold(self._flight.held)

@@ -296,8 +296,10 @@ def _somebody_listens(endpoint: str) -> bool:
     """True if a connection is accepted there. Not asked of TLS, where a certificate may be what is refused."""
     protocol, _, address = endpoint.partition("/")
     host, _, port = address.partition("#")[0].partition("?")[0].rpartition(":")
+    if protocol != "tcp":
+        return False
     with contextlib.suppress(OSError, ValueError), socket.create_connection((host.strip("[]"), int(port)), timeout=1):
-        return protocol == "tcp"
+        return True
     return False
 
 

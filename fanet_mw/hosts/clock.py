@@ -26,6 +26,8 @@ from fanet_mw.units import MS, S
 
 _START_DELAY_NS: Final = 300 * MS
 """The time from the moment at which all processes are present to swarm instant 0."""
+_NOTICE_S: Final = 1.0
+"""How long before its early end the swarm is told of it."""
 _ASK_EVERY_S: Final = 0.5
 _ASK_AGAIN_S: Final = 0.05
 """The least time between two queries to the keeper."""
@@ -169,6 +171,14 @@ class ClockKeeper:
         clock = self.clock
         assert clock is not None, "the clock runs"
         return self._publish(clock._replace(ends_ns=instant_ns))
+
+    async def end_early(self, clock: SwarmClock, *, duration_ns: int) -> int:
+        """Let every process end in good order soon, and wait for it by `clock`; returns the last swarm instant."""
+        assert self.clock is not None, "the clock runs"
+        ends_ns = min(max(0, clock.now_ns()) + round(_NOTICE_S * self.clock.time_scale * S), duration_ns)
+        clock.follow(self.end_at(ends_ns))
+        await asyncio.sleep(clock.wait_s(ends_ns))
+        return ends_ns
 
     def stop(self) -> None:
         """Stop the clock, so that every process ends at once."""

@@ -19,7 +19,7 @@ from fanet_mw.hosts.clock import START_PATIENCE_S, ClockKeeper, SwarmClock
 from fanet_mw.hosts.loop import heeding
 from fanet_mw.hosts.presence import expected_names
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import MS, S
+from fanet_mw.units import MS
 from sim.bus.rights import ROUTER
 from sim.bus.running_swarms import registered
 from sim.run.launcher.pauses import PauseWatch
@@ -28,8 +28,6 @@ _STOP_HEARD_S: Final = 0.3
 """The time from telling services to stop until the bus is closed over which they are told."""
 WORD_EVERY_S: Final = 5.0
 """The interval at which the router says which participants are missing or present twice."""
-_NOTICE_S: Final = 1.0
-"""How long before its early end the swarm is told of it."""
 _LEAVING_S: Final = 1.0
 """How long the bus stays after the end of the swarm's time."""
 _LAST_WORDS_S: Final = 3.0
@@ -80,10 +78,7 @@ async def serve(
                 if signaled.done():
                     aborted = f"interrupted by {signal.Signals(signaled.result()).name}"
                     on_event(aborted)
-                    notice_ns = round(_NOTICE_S * scenario.time_scale * S)
-                    ended_ns = min(max(0, clock.now_ns()) + notice_ns, scenario.duration_ns)
-                    keeper.end_at(ended_ns)
-                    await asyncio.sleep(clock.wait_s(ended_ns))
+                    ended_ns = await keeper.end_early(clock, duration_ns=scenario.duration_ns)
                 await asyncio.sleep(_LEAVING_S)
                 if collection is not None:
                     await collection.last_words(_LAST_WORDS_S)

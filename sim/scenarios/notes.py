@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator
 from typing import Final, get_args
 
+from agents.mission.flight.return_home import LANDS_WITHIN_M
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.routing import PROTOCOLS
@@ -25,8 +26,6 @@ _WORDS: Final = re.compile(r"`(\w+)`")
 _OFF: Final = ("none", "", False, None)
 _BETWEEN_BANDS_MHZ: Final = 3700.0
 _CLUSTERED: Final = frozenset({"clustered"})
-_LANDS_WITHIN_M: Final = 1.5
-"""How far from its pad a searching UAV may begin to land (`agents/mission/flight/return_home.py`)."""
 _SIGMAS: Final = 2.0
 """Errors of two receivers that a pad should have room for, in standard deviations."""
 
@@ -147,7 +146,7 @@ def _close_pads(scenario: Scenario) -> Iterator[str]:
     """The error that all receivers have in common moves all landings alike."""
     nodes = scenario.nodes
     own_m = math.hypot(scenario.sensors.gps_bias_m, scenario.world.gps_sigma_m)
-    least_m = 2 * _LANDS_WITHIN_M + _SIGMAS * math.sqrt(2) * own_m
+    least_m = 2 * LANDS_WITHIN_M + _SIGMAS * math.sqrt(2) * own_m
     if (
         nodes.on_ground
         and scenario.mission.search != "none"

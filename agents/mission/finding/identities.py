@@ -235,10 +235,10 @@ class Identities:
             for person in self._people
             if person.find is None
             and self._is_unnamed(person)
-            and (person.together >= _TOGETHER or not self._is_beside_a_find(person))
             and person.proven_ns is not None
             and now_ns - person.proven_ns >= _UNREPORTED_NS
             and person.place.sigma_m <= _SURE_M
+            and (person.together >= _TOGETHER or not self._is_beside_a_find(person))
         ]
 
     def _is_beside_a_find(self, person: PersonTrack) -> bool:

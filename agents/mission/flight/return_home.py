@@ -23,7 +23,7 @@ from fanet_mw.units import MS, Enu, NodeId, S
 
 _HIGHER_M: Final = 18.0
 """A UAV flies home this far above the lanes; relays and followers fly below it."""
-_HOME_M: Final = 1.5
+LANDS_WITHIN_M: Final = 1.5
 """The UAV lands once it is within this horizontal distance of its base, and nearly stands."""
 _STANDS_M_S: Final = 0.5
 _HOLD_M: Final = 40.0
@@ -199,7 +199,7 @@ class ReturnHome:
     def land_if_there(self, now_ns: int) -> bool:
         """Command the landing at the base in this UAV's turn; again with each call, as a setpoint may get lost."""
         here = self._own_motion.position
-        nearly = here.horizontal_to(self._home) <= _HOME_M
+        nearly = here.horizontal_to(self._home) <= LANDS_WITHIN_M
         if nearly and self._own_motion.velocity.horizontal() <= _STANDS_M_S and not self._waits(now_ns):
             self.lands = True
         if self.lands:

@@ -106,11 +106,10 @@ class FormationPlace:
             self._hops = self.pattern.hops_from([at for at, node in enumerate(self.plan.nodes) if node in parted])
         if not gaps <= self._gaps:
             self._closing_ns = now_ns
-            if self.is_taken_up(now_ns):
-                self._lost_at |= {
-                    self.plan.nodes[place]: self.pattern.at(place, self.swept_s(now_ns) or 0.0)
-                    for place in gaps - self._gaps
-                }
+            swept_s = self.swept_s(now_ns)
+            if swept_s is not None:
+                fresh = gaps - self._gaps
+                self._lost_at |= {self.plan.nodes[place]: self.pattern.at(place, swept_s) for place in fresh}
             if now_ns - self._changed_ns >= _FLOWN_NS:
                 self._before = self.pattern
         self._gaps = gaps

@@ -89,8 +89,6 @@ READY_TIMEOUT_S: Final = 300.0
 """Until all processes are present: 47 take a minute on a busy machine, and a compilation may come on top."""
 WORD_EVERY_S: Final = 10.0
 """The interval at which the launcher says for which processes it is waiting."""
-_NOTICE_S: Final = 1.0
-"""How long before its early end the swarm is told of it."""
 _GRACE_S: Final = 5.0
 """How long the launcher waits for last reports after the end of the swarm's time."""
 _LAST_WORDS_S: Final = 1.0
@@ -340,11 +338,7 @@ class SwarmRun:
         assert self._clock is not None, "the clock was started"
         if self._broken:
             return self._now_ns()
-        notice_ns = round(_NOTICE_S * self._governor.scale * S)
-        ends_ns = min(max(0, self._clock.now_ns()) + notice_ns, self._services.scenario.duration_ns)
-        self._clock.follow(self._keeper.end_at(ends_ns))
-        await asyncio.sleep(self._clock.wait_s(ends_ns))
-        return ends_ns
+        return await self._keeper.end_early(self._clock, duration_ns=self._services.scenario.duration_ns)
 
     async def _wind_up(self) -> None:
         """End all processes, by the clock or by a signal, and wait for last reports."""

@@ -3,6 +3,7 @@
 import pytest
 from kit import MakeScenario
 
+from fanet_mw.scenario import Scenario
 from sim.cli import runs
 from sim.run.collecting.running_tally import Progress
 
@@ -11,15 +12,20 @@ def state(swarm_s: float) -> Progress:
     return Progress(swarm_s, 300.0, 0.75, 0.9876, 0.00456, 7, 0, 16)
 
 
+def told(monkeypatch: pytest.MonkeyPatch, scenario: Scenario, *, up_s: float, lasts_s: int) -> None:
+    """A run that is up after so long and lasts so long, with its progress four times a second."""
+    now_s = 100.0
+    monkeypatch.setattr(runs, "monotonic", lambda: now_s)
+    with runs._watched(scenario, bar=False) as tell:
+        for quarter in range(4 * lasts_s):
+            now_s = 100 + up_s + quarter / 4
+            tell(state(quarter / 4))
+
+
 def test_a_line_every_ten_seconds_says_how_the_swarm_fares(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], make_scenario: MakeScenario
 ) -> None:
-    now_s = 100.0
-    monkeypatch.setattr(runs, "monotonic", lambda: now_s)
-    with runs._watched(make_scenario(), bar=False) as tell:
-        for quarter in range(4 * 35):
-            now_s = 100 + quarter / 4
-            tell(state(quarter / 4))
+    told(monkeypatch, make_scenario(), up_s=0, lasts_s=35)
     out, err = capsys.readouterr()
     assert out == "", "that is for the summary"
     assert err.splitlines() == [
@@ -30,12 +36,7 @@ def test_a_line_every_ten_seconds_says_how_the_swarm_fares(
 def test_a_swarm_that_took_long_to_come_up_is_told_of_once(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], make_scenario: MakeScenario
 ) -> None:
-    now_s = 100.0
-    monkeypatch.setattr(runs, "monotonic", lambda: now_s)
-    with runs._watched(make_scenario(), bar=False) as tell:
-        for quarter in range(4 * 15):
-            now_s = 147 + quarter / 4
-            tell(state(quarter / 4))
+    told(monkeypatch, make_scenario(), up_s=47, lasts_s=15)
     assert [line.split()[0] for line in capsys.readouterr().err.splitlines()] == ["0", "10"]
 
 

@@ -31,7 +31,9 @@ _STANDS_M_S: Final = 0.25
 _STANDS_NS: Final = 2 * S
 """A UAV that lands stands on the ground when it has sunk more slowly than that for so long; none lands so gently."""
 _OBEYS_NS: Final = 15 * S
-"""A flight controller begins to sink within this time, for it acknowledges one command after the other, or it stood."""
+"""A UAV that has not begun to sink this long after it was told to land stood on the ground already. Until then its
+flight controller may still be busy with earlier commands.
+"""
 _UP_M: Final = 2.5
 """A UAV this high above the place where it stood has taken off."""
 _BRAKE_M_S: Final = 5.0
@@ -313,7 +315,7 @@ class Pilot:
         return Course(place, self.cruise_m_s)
 
     def _landing_at(self, place: Enu) -> Course:
-        """The course of a landing that begins now."""
+        """The course of a landing that begins now; this UAV has not sunk for it yet."""
         self._stands_ns, self._sank = None, False
         return Course(place, _SINK_M_S, land=True)
 

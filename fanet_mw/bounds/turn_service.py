@@ -10,9 +10,9 @@ then the n-th packet of a queue that never empties is completed at the end of th
 Each turn can take one packet of any length, so no time is lost at the end of a turn, and no packet blocks another: an
 urgent packet takes the next turn for which it can be announced.
 
-Of floods in a timetable (`done_ns`, `worst_ns`), each of which begins in a turn of its root and lasts until all nodes
-have the packet, a busy period, a time in which packets wait, is longest if it begins just after a turn, and lasts until
-a turn carries fewer than k packets, the most that fit. Up to then the n-th turn carries the packets from number
+Floods in a timetable (`done_ns`, `worst_ns`) begin in turns of their root, and last until all nodes have the packet. A
+busy period is a time in which packets wait for these turns. It is longest if it begins just after a turn, and it ends
+with a turn that carries fewer than k packets, the most that fit. Up to then the n-th turn carries those from number
 (n - 1) k + 1 on. The first of these has waited longest: it was generated at least (n - 1) k intervals after the
 beginning of the period, and all nodes have it
 

@@ -26,7 +26,7 @@ from fanet_mw.hosts.timebase import THIS_MACHINE
 JOIN_PATIENCE_S: Final = 2.5
 """How long a process waits for a router by default; it is short, so that a mistyped endpoint is soon reported."""
 BUSY_PATIENCE_S: Final = 10.0
-"""How much longer if somebody listens there: a router whose machine is busy accepts connections before it answers."""
+"""How much longer a process waits for a router whose port accepts connections: its machine may be busy."""
 MAX_PUT_BYTES: Final = 16 << 20
 """The first session that receives a longer put drops it; Zenoh's default would collect up to 1 GiB."""
 LOST_AFTER_S: Final = 2.0
@@ -68,10 +68,10 @@ def config_of(path: Path | None, name: str) -> Path | None:
 
 def exposure(endpoint: str, *, listens: bool) -> str | None:
     """A warning if others can reach or forge messages on an endpoint; None for the loopback interface, TLS and QUIC."""
-    protocol, slash, address = endpoint.partition("/")
+    protocol, slash, _ = endpoint.partition("/")
     if not slash:
         return None  # it is refused before anything is opened
-    host = address.partition("#")[0].partition("?")[0].rpartition(":")[0].strip("[]")
+    host, _ = _host_and_port(endpoint)
     if protocol in ("tls", "quic", "unixsock-stream", "unixpipe") or host == "localhost":
         return None
     with contextlib.suppress(ValueError):
@@ -293,14 +293,18 @@ def _clock_outside_certificate(config: Path | None) -> str | None:
 
 
 def _somebody_listens(endpoint: str) -> bool:
-    """True if a connection is accepted there. Not asked of TLS, where a certificate may be what is refused."""
-    protocol, _, address = endpoint.partition("/")
-    host, _, port = address.partition("#")[0].partition("?")[0].rpartition(":")
-    if protocol != "tcp":
+    """True if a TCP port accepts connections. TLS is not tried: its certificate may be what is refused."""
+    if not endpoint.startswith("tcp/"):
         return False
-    with contextlib.suppress(OSError, ValueError), socket.create_connection((host.strip("[]"), int(port)), timeout=1):
+    host, port = _host_and_port(endpoint)
+    with contextlib.suppress(OSError, ValueError), socket.create_connection((host, int(port)), timeout=1):
         return True
     return False
+
+
+def _host_and_port(endpoint: str) -> tuple[str, str]:
+    host, _, port = endpoint.partition("/")[2].partition("#")[0].partition("?")[0].rpartition(":")
+    return host.strip("[]"), port
 
 
 def _first_sentence(error: Exception) -> str:

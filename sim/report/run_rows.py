@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from sim.report.html import Rows
+from sim.results.bounds import broken
 from sim.results.mission import MISTAKEN_M
 
 _LONG_MS: Final = 10_000
@@ -50,13 +51,9 @@ def _bounds(bound: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         return
     yield "packets x targets for which a bound was stated", percent(stated)
     yield "of these, delivered within their bound", percent(min(1.0, within / stated))
-    overtaken = bound.get("overtaken", 0)
-    yield (
-        "of these, later than their bound or never; the rest had time left when the run ended",
-        number(bound.get("violations", 0) - overtaken),
-    )
-    if overtaken:
-        yield "late or lost likewise, because a fault overtook them", number(overtaken)
+    yield "of these, later than their bound or never; the rest had time left when the run ended", number(broken(bound))
+    if bound.get("overtaken"):
+        yield "late or lost likewise, because a fault overtook them", number(bound["overtaken"])
 
 
 def _mission(found: Mapping[str, Any], *, confirms: bool) -> Iterator[tuple[str, str]]:

@@ -29,7 +29,7 @@ Span = tuple[int, int]
 
 
 class _Held(NamedTuple):
-    """The promises of one application, held against what came; its figures are numbers of copies."""
+    """The bounds of one application's packets, compared with its deliveries; `late` and the rest count copies."""
 
     app: AppPackets
     stated_ns: list[int]
@@ -51,6 +51,11 @@ def against_bounds(
         **_summed_up(held.values()),
         "classes": {name: _summed_up([one]) for name, one in held.items() if one.stated_ns},
     }
+
+
+def broken(bound: Mapping[str, Any]) -> int:
+    """How many bounds of a table `bound` did not hold, those aside that a fault overtook."""
+    return int(bound.get("violations", 0)) - int(bound.get("overtaken", 0))
 
 
 def _surprises(faults: Sequence[RadioFault], ended_ns: int) -> list[Span]:

@@ -7,6 +7,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from sim.results.bounds import broken
+
 
 def show(summary: Mapping[str, Any], console: Console) -> None:
     mode = "virtual time" if summary["mode"] == "virtual" else "real processes"
@@ -85,15 +87,14 @@ def _network_rows(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     )
     bound = summary["bound"]
     if bound:
-        overtaken = bound.get("overtaken", 0)
-        times = bound["violations"] - overtaken
-        broken = f"broken {times} times" if times else "never broken"
-        broken += f", overtaken by a fault {overtaken} times" if overtaken else ""
+        times = broken(bound)
+        kept = f"broken {times} times" if times else "never broken"
+        kept += f", overtaken by a fault {bound['overtaken']} times" if bound.get("overtaken") else ""
         share = "-" if bound["within_share"] is None else f"{bound['within_share']:.2%}"
         yield (
             "bound",
             f"{share} of packets x targets within it; at most {bound['worst_ms']:.0f} ms, stated for "
-            f"{bound['stated_share']:.1%} of the packets; worst seen {bound['observed_max_ms']:.0f} ms, {broken}",
+            f"{bound['stated_share']:.1%} of the packets; worst seen {bound['observed_max_ms']:.0f} ms, {kept}",
         )
     missed = {name: part for name, part in summary["reachable"].items() if part["share"] is not None}
     if any(part["share"] < 1 for part in missed.values()):

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final, NamedTuple
 
 from fanet_mw.scenario import Scenario
+from sim.results.bounds import broken
 from sim.results.outcome import Outcome, described
 
 LOST_LIMIT: Final = 0.0025
@@ -145,10 +146,9 @@ def _unaccounted(frames: Mapping[str, Any], copies: Mapping[str, Any]) -> Iterat
 
 
 def _promised(bound: Mapping[str, Any], clock: Mapping[str, Any]) -> Iterator[str]:
-    overtaken = bound.get("overtaken", 0)
-    if broken := bound.get("violations", 0) - overtaken:
-        more = f" ({overtaken} more were overtaken by a fault)" if overtaken else ""
-        yield f"delay bounds that did not hold: {broken}, limit 0{more}"
+    if times := broken(bound):
+        more = f" ({bound['overtaken']} more were overtaken by a fault)" if bound.get("overtaken") else ""
+        yield f"delay bounds that did not hold: {times}, limit 0{more}"
     if wrong := clock.get("beyond_bound"):
         yield f"clocks that were off by more than their nodes stated: {wrong} of {clock['samples']} samples, limit 0"
 

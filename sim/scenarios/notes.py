@@ -27,7 +27,7 @@ _OFF: Final = ("none", "", False, None)
 _BETWEEN_BANDS_MHZ: Final = 3700.0
 _CLUSTERED: Final = frozenset({"clustered"})
 _SIGMAS: Final = 2.0
-"""Errors of two receivers that a pad should have room for, in standard deviations."""
+"""The error of one receiver beside another, in standard deviations, for which pads should leave room."""
 
 
 def notes(scenario: Scenario) -> list[str]:
@@ -143,7 +143,9 @@ def _odd_band(scenario: Scenario) -> Iterator[str]:
 
 
 def _close_pads(scenario: Scenario) -> Iterator[str]:
-    """The error that all receivers have in common moves all landings alike."""
+    """Pads so near to each other that UAVs may land on each other. The error that all receivers have in common is left
+    out, because it moves all landings alike.
+    """
     nodes = scenario.nodes
     own_m = math.hypot(scenario.sensors.gps_bias_m, scenario.world.gps_sigma_m)
     least_m = 2 * LANDS_WITHIN_M + _SIGMAS * math.sqrt(2) * own_m

@@ -35,8 +35,9 @@ _SAME_SIGMAS: Final = 4.0
 _STEADY_M: Final = 1.5
 """The part of the error of a sighting, along each axis, that is the same for successive sightings."""
 _TOGETHER: Final = 2
-"""Where somebody is found, another person is believed after this number of readings that show somebody beside; in a
-single one a false alarm may stand beside a person."""
+"""Beside somebody who is found, another person is believed after this number of readings that show two people at once.
+In a single one the second may be a false alarm.
+"""
 _UNREPORTED_NS: Final = 4 * S
 """How long a person who is certainly there waits for a phone before being reported without one."""
 _SURE_M: Final = 3.5
@@ -229,16 +230,17 @@ class Identities:
         return among
 
     def unreported(self, now_ns: int) -> list[Estimate]:
-        """The places of the people who are certainly there, seen from two places, and of whom there is no find."""
+        """The places of the people who are certainly there, seen from two places, and of whom there is no find.
+        Beside a find only readings that show two people at once prove the second one.
+        """
         return [
             self._told(person)
             for person in self._people
             if person.find is None
-            and self._is_unnamed(person)
             and person.proven_ns is not None
             and now_ns - person.proven_ns >= _UNREPORTED_NS
             and person.place.sigma_m <= _SURE_M
-            and (person.together >= _TOGETHER or not self._is_beside_a_find(person))
+            and (person.together >= _TOGETHER or not (person.confirmed or self._is_beside_a_find(person)))
         ]
 
     def _is_beside_a_find(self, person: PersonTrack) -> bool:

@@ -19,9 +19,11 @@ it would have been so long after its last hello."""
 _STOPS_BUT_S: Final = 1.0
 """The hello may have been sent so long before the program stopped."""
 _UNTIL_LOST_NS: Final = seconds_to_ns(5.0)
-"""A UAV not heard for longer when it was lost had left this one's reach: it may be anywhere near its place."""
+"""A UAV that was last heard longer ago than this when it was lost was out of reach. Its place in the formation then
+tells where it may be.
+"""
 _PLACE_BUT_M: Final = 10.0
-"""So far from its place a UAV may have been, or have flown on from there before it stopped."""
+"""A lost UAV that was out of reach hovers at most this far from its place in the formation."""
 _FALLS_M_S: Final = 6.0
 """Nobody sinks this fast on purpose."""
 
@@ -51,8 +53,8 @@ class NeighborMotions:
         return None if motion is None or now_ns - motion.at_ns > self._lifetime_ns else motion
 
     def hovering(self, lost: Mapping[int, int], places: Mapping[int, Enu]) -> list[tuple[Enu, float]]:
-        """Where those who fell silent may hover, and how far from there; `lost`: since when each is lost, `places`:
-        where those were due whom this UAV did not hear until then. No place for who said that it fell.
+        """The places at which silent UAVs may hover, each with a radius; a UAV that said that it fell has none. `lost`:
+        since when each is lost; `places`: in the formation, of UAVs that were out of reach.
         """
         found = []
         for node, lost_ns in lost.items():

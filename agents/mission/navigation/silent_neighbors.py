@@ -1,4 +1,6 @@
-"""Which neighbors are silent although they are near: their radios or programs have failed, or they fell."""
+"""Which neighbors are silent although they are near: their radios or programs have failed, or they fell. Where they may
+hover then, `neighbor_motions.py` says.
+"""
 
 from collections.abc import Collection
 from typing import Final, Protocol

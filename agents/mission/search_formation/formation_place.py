@@ -117,7 +117,9 @@ class FormationPlace:
             self.pattern, self._changed_ns = self.pattern.closed(vacant), now_ns
 
     def lost_at(self, now_ns: int) -> Mapping[int, Enu]:
-        """Where those lost in the sweep were due, over ground as high as below this UAV."""
+        """The places of the UAVs lost in the sweep, as they were then. The ground there is taken to be as high as that
+        below this UAV.
+        """
         rise_m = self._own_motion.position.up - self._own_motion.height_m(now_ns)
         return {node: at._replace(up=at.up + rise_m) for node, at in self._lost_at.items()}
 

@@ -23,8 +23,8 @@ from fanet_mw.units import MS, US
 _LEAST_SLOTS: Final = 4
 """The bulk slots of a block at least, if there are any."""
 _TURNS_NS: Final = 11 * MS
-"""The turns of a block take about so long, if there are slots for so many blocks: with the two slots before them in
-which nothing begins at once any more, and the packet itself, one for a neighbor takes less than 20 ms.
+"""The turns of one block last about this long, so that a packet for a neighbor takes less than 20 ms: it may have to
+wait for them, and for the last two slots before. With too few bulk slots there are fewer blocks, with longer turns.
 """
 _TOGETHER: Final = 2
 """The longest bulk packets that share a frame, if the radio allows it."""

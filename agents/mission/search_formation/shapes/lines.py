@@ -64,7 +64,7 @@ _STRAIGHT_M: Final = 300.0
 _SIDE_M: Final = 65.0
 """The greatest distance of the outermost lanes from the edge, at most a quarter of the area's side."""
 _SHOWN_M: Final = 45.0
-"""Their distance from it where that takes no further lane: their cameras show the edge."""
+"""The outermost lanes are this far from the edge if that takes no further lane: from there cameras show the edge."""
 _LEAST_LANES: Final = 2
 """The least number of lanes of a line, which has one at each end."""
 _LEAST_APART_M: Final = 60.0

@@ -1,7 +1,7 @@
 """Rejects schedules that no leader of this swarm would announce, such as forged ones, before they have any effect.
 
-Sends the newest one again (anti-entropy): a node whose neighbor follows an older schedule, or none, sends it. It
-reaches nodes that the leader's floods miss: that come back to the swarm or, with a timetable, still use an older one.
+A node whose neighbor follows an older schedule, or none, sends the newest one again (anti-entropy). So it reaches nodes
+that missed the leader's floods: some come back to the swarm, and some, with a timetable, still use an older one.
 Duplicates are suppressed as in Trickle (RFC 6206); a node refreshes only while it has heard of its leader recently
 (`Lease.fresh`).
 """

@@ -142,6 +142,18 @@ def test_what_goes_to_a_neighbor_at_once_never_waits_longer_than_18_ms(nodes: in
     assert max(timing.between_turns_ns(from_ns) - from_ns for from_ns in at_ns) <= 18 * MS
 
 
+@pytest.mark.parametrize("nodes", [9, 45, 200])
+def test_in_the_last_two_slots_of_each_block_nothing_begins_at_once(nodes: int) -> None:
+    timing = RoundTiming.of(config.build({"nodes": {"count": nodes}, "routing": {"protocol": "rounds"}}))
+    assert len(timing.blocks) > 1
+    again_ns = timing.period_ns + timing.blocks[0].slots_start_ns
+    following_ns = [*(block.slots_start_ns for block in timing.blocks[1:]), again_ns]
+    for block, next_ns in zip(timing.blocks, following_ns, strict=True):
+        late_ns = block.slots_start_ns + (block.slots - 2) * timing.slot_ns
+        assert timing.between_turns_ns(late_ns - 1) == late_ns - 1
+        assert timing.between_turns_ns(late_ns) == next_ns
+
+
 @given(timings().filter(lambda timing: timing.slots > 0), INSTANTS, st.data())
 def test_of_nodes_within_two_hops_one_owns_a_bulk_slot(timing: RoundTiming, from_ns: int, data: st.DataObject) -> None:
     nodes = data.draw(st.lists(st.integers(1, 488), min_size=2, max_size=12, unique=True))

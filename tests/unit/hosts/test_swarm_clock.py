@@ -133,6 +133,20 @@ async def test_an_early_end_reaches_the_clocks_and_moves_no_instant() -> None:
     assert clock.ends_ns == 7 * S, "another pace does not take it back"
 
 
+@pytest.mark.parametrize("scale", [0.1, 2.0])
+async def test_who_ends_early_is_told_ahead_by_real_time_and_never_beyond_the_end(
+    monkeypatch: pytest.MonkeyPatch, scale: float
+) -> None:
+    monkeypatch.setattr(clock_module, "_NOTICE_S", 0.02)
+    machine = Machine()
+    keeper, told = await started(machine, scale)
+    clock = SwarmClock(told, machine.keepers)
+    machine.let_pass(10)
+    now_ns = clock.now_ns()
+    assert await keeper.end_early(clock, duration_ns=600 * S) == clock.ends_ns == now_ns + round(0.02 * scale * S)
+    assert await keeper.end_early(clock, duration_ns=now_ns + 1) == clock.ends_ns == now_ns + 1
+
+
 @given(
     st.lists(st.tuples(st.floats(0.01, 50), st.floats(0.3, 3), st.floats(0, 2)), max_size=6),
     st.floats(0.1, 20),

@@ -94,6 +94,19 @@ def test_who_is_told_to_land_and_does_not_sink_yet_has_not_landed() -> None:
     assert bench.flown.on_ground
 
 
+def test_who_sank_in_a_landing_that_was_broken_off_has_not_landed_before_it_sinks_again() -> None:
+    bench = Bench().airborne()
+    assert bench.command(LAND) == ACCEPTED
+    bench.run(4)
+    assert bench.command(PAUSE, 0) == ACCEPTED
+    bench.run(3)
+    assert bench.command(LAND) == ACCEPTED
+    bench.courses.append(Course(bench.position, 1.0))
+    bench.run(12)
+    assert bench.flown.armed
+    assert not bench.flown.on_ground
+
+
 def test_who_is_told_to_land_where_it_stands_has_landed_after_a_while() -> None:
     """A barometer that drifts says of one that stands that it has taken off."""
     bench = Bench().airborne()

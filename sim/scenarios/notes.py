@@ -7,7 +7,6 @@ import re
 from collections.abc import Iterator
 from typing import Final, get_args
 
-from agents.mission.flight.return_home import LANDS_WITHIN_M
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.routing import PROTOCOLS
@@ -147,14 +146,13 @@ def _close_pads(scenario: Scenario) -> Iterator[str]:
     out, because it moves all landings alike.
     """
     nodes = scenario.nodes
+    if not nodes.on_ground or scenario.mission.search == "none" or nodes.layout == "explicit":
+        return
+    from agents.mission.flight.return_home import LANDS_WITHIN_M
+
     own_m = math.hypot(scenario.sensors.gps_bias_m, scenario.world.gps_sigma_m)
     least_m = 2 * LANDS_WITHIN_M + _SIGMAS * math.sqrt(2) * own_m
-    if (
-        nodes.on_ground
-        and scenario.mission.search != "none"
-        and nodes.layout != "explicit"
-        and nodes.spacing_m < least_m
-    ):
+    if nodes.spacing_m < least_m:
         yield (
             f"nodes.spacing_m = {nodes.spacing_m:g}: pads nearer to each other than {least_m:.1f} m; UAVs that come "
             "home by such receivers may land on each other"

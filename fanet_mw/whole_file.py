@@ -73,7 +73,10 @@ def writing(what: object) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise ConfigError(f"{what}: cannot be written: {error.strerror}") from error
+        why = error.strerror
+        if isinstance(error, FileExistsError) and (link := Path(error.filename)).is_symlink() and not link.exists():
+            why = f"a link to {link.readlink()}, which does not exist"
+        raise ConfigError(f"{what}: cannot be written: {why}") from error
 
 
 @contextlib.contextmanager

@@ -5,11 +5,12 @@ these modules import at their top only what `--help` needs.
 """
 
 import errno
+import re
 import sys
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from cyclopts import App, CycloptsError, _convert
+from cyclopts import App, CycloptsError, UnusedCliTokensError, _convert
 
 from fanet_mw import __version__
 from fanet_mw.errors import FanetError
@@ -109,6 +110,15 @@ def _printable(line: str) -> str:
     return shown if len(shown) <= _LONGEST_LINE else f"{shown[: _LONGEST_LINE - 200]} ... {shown[-190:]}"
 
 
+def misread(error: CycloptsError) -> str:
+    """What cyclopts did not understand, in one line. A change of the scenario that stands alone lacks its `--set`."""
+    if isinstance(error, UnusedCliTokensError) and error.unused_tokens:
+        changes = " ".join(word for word in error.unused_tokens if re.match(r"[a-z_]+(\.\w+)*=", word))
+        unused = " ".join(error.unused_tokens)
+        return f"not understood: {unused}{f'; a key of the scenario is changed by --set {changes}' if changes else ''}"
+    return " ".join(str(error).split())
+
+
 def _interrupted(interrupt: KeyboardInterrupt) -> int:
     if not interrupts.is_signal(interrupt):
         return refused("a part of another package has raised KeyboardInterrupt")
@@ -131,7 +141,7 @@ def main() -> None:
     except BrokenPipeError:
         nobody_reads()
     except (FanetError, CycloptsError) as error:
-        code = refused(" ".join(str(error).split()) if isinstance(error, CycloptsError) else str(error))
+        code = refused(misread(error) if isinstance(error, CycloptsError) else str(error))
     except OSError as error:
         if error.errno not in _NO_ROOM:
             raise

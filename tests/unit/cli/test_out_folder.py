@@ -41,6 +41,12 @@ def test_a_folder_that_cannot_be_written_is_found_before_the_run(
             fanet(command, "quick", "--out", str(out))
 
 
+def test_a_link_to_a_folder_that_does_not_exist_says_so(tmp_path: Path, never_runs: None) -> None:
+    (tmp_path / "link").symlink_to(tmp_path / "gone")
+    with pytest.raises(ConfigError, match=f"link: cannot be written: a link to {tmp_path / 'gone'}, which does not"):
+        fanet("simulate", "quick", "--out", str(tmp_path / "link"))
+
+
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 def test_a_folder_without_the_right_to_write_is_refused(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)

@@ -11,7 +11,7 @@ from fanet_mw.application import Application
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError, HostError
 from fanet_mw.scenario import config
-from sim.cli.app import app, changes_last
+from sim.cli.app import app, changes_last, misread
 from sim.results.files import finish
 from sim.run.virtual import simulate
 
@@ -68,6 +68,19 @@ def test_a_number_that_is_not_whole_is_not_rounded_to_one(words: str) -> None:
 )
 def test_a_replay_is_written_over_nothing_but_a_page_and_never_left_out(words: str, said: str) -> None:
     assert refusal("replay", "run", *words.split()) == said
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("plan clusters nodes.count=200", "nodes.count=200; a key of the scenario is changed by --set nodes.count=200"),
+        ("check quick quick", "quick"),
+    ],
+)
+def test_words_too_many_are_named_and_a_change_without_set_is_known_as_one(words: str, said: str) -> None:
+    with pytest.raises(CycloptsError) as caught:
+        app(words.split(), result_action="return_value", exit_on_error=False, print_error=False)
+    assert misread(caught.value) == f"not understood: {said}"
 
 
 def test_a_link_from_a_node_to_itself_is_refused_in_words() -> None:

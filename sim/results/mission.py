@@ -112,6 +112,8 @@ class Confirmations:
         self._truth = truth
         self._held: dict[int, list[Confirmed]] = {}
         """For each survivor, and each person without a phone, the confirmations that hold, in their order."""
+        self._as_ns: dict[int, int] = {}
+        """Since when people without a phone were told as somebody who carries one, until that was taken back."""
         self.reopened = 0
         """The number of times that a confirmation was taken back."""
 
@@ -121,8 +123,16 @@ class Confirmations:
             self._held.setdefault(record.survivor, []).append(record)
         elif type(record) is Refuted and record.survivor in self._held:
             held = self._held[record.survivor]
-            self._held[record.survivor] = left_by(record, held)
+            self._held[record.survivor] = left = left_by(record, held)
+            self._keep_as_persons(record, [one for one in held if one not in left])
             self.reopened += not is_person(record.survivor) and len(self._held[record.survivor]) < len(held)
+
+    def _keep_as_persons(self, refuted: Refuted, given_up: Sequence[Confirmed]) -> None:
+        """Whoever takes a confirmation back tells at once that a person is there all the same: found since then."""
+        for number, finds in self._held.items():
+            same_instant = is_person(number) and finds and finds[0].t_ns == refuted.t_ns
+            if same_instant and given_up and not left_by(refuted, finds):
+                self._as_ns[number] = given_up[0].t_ns
 
     def error_m(self, placed: _Placed) -> float:
         at = self._truth[placed.survivor - 1]
@@ -158,8 +168,9 @@ class Confirmations:
         return {survivor: finds[number] for survivor, number in of.items()}, len(finds) - len(of)
 
     def found_ns(self) -> dict[int, int]:
-        """When each survivor was found, by phone or as a person."""
-        found = {survivor: find.t_ns for survivor, find in self.persons()[0].items()}
+        """When each survivor was found, by phone or as a person, or there by another's phone."""
+        persons, _ = self.persons()
+        found = {survivor: self._as_ns.get(find.survivor, find.t_ns) for survivor, find in persons.items()}
         for one in self.right():
             found[one.survivor] = min(one.t_ns, found.get(one.survivor, one.t_ns))
         return found

@@ -100,6 +100,17 @@ def test_a_survivor_waits_from_the_first_reception_to_the_right_confirmation() -
     assert measured([*heard, away, Refuted(6 * S, 1, 1, -100.0, 0.0), found[0]])["wait_s"]["max"] == 5.0
 
 
+def test_who_was_told_by_another_phone_at_that_place_does_not_wait_until_that_is_noticed() -> None:
+    heard, somebody = Detected(2 * S, 1, 1, -80.0), person_id(3, 0)
+    named = [Confirmed(5 * S, 1, 2, 100.0, 1.0)]
+    renamed = [Confirmed(50 * S, 3, somebody, 100.0, 1.0), Refuted(50 * S, 3, 2, 100.0, 1.0)]
+    assert measured([heard, *named, *renamed])["wait_s"] == {"p50": 3.0, "max": 3.0}
+    later = renamed[0]._replace(t_ns=60 * S)
+    assert measured([heard, *named, renamed[1], later])["wait_s"]["max"] == 58.0, "in between nobody was told there"
+    elsewhere = renamed[0]._replace(north_m=-15.0)
+    assert measured([heard, *named, elsewhere, renamed[1]])["wait_s"]["max"] == 48.0, "that was somebody else"
+
+
 def test_the_wait_since_a_survivor_was_located_is_told_beside_that_since_the_first_reception() -> None:
     heard = [Detected(2 * S, 1, survivor, -80.0) for survivor in (1, 2)]
     located = [Located(5 * S, 1, 1, 140.0, 0.0), Located(6 * S, 2, 1, 110.0, 0.0)]

@@ -37,10 +37,9 @@ class FlightController(NamedTuple):
         """Its link, in the time of a host."""
         link = AutopilotLink(flavor=self.flavor, origin=Geodetic(*scenario.world.origin_deg, 0.0))
 
-        def now_ns() -> int:
-            return host().now_ns() if host().running else 0
-
-        return Autopilot(f"UAV {node}", link, self.address, now_ns=now_ns, tell=_tell)
+        return Autopilot(
+            f"UAV {node}", link, self.address, now_ns=lambda: host().now_ns(), tell=_tell, hears=lambda: host().running
+        )
 
 
 def _tell(text: str) -> None:

@@ -9,6 +9,7 @@ Commands go out one at a time, each again until it is acknowledged. Heights are 
 
 import math
 from collections import Counter, deque
+from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 from fanet_mw.bus.messages import VELOCITY_LASTS_NS, Battery, FlightState, Gps, Setpoint, SetpointKind
@@ -43,6 +44,10 @@ _LAST_UNIX_US: Final = 1 << 52
 _POSITION_MASK: Final = 0b110111111000
 _VELOCITY_MASK: Final = 0b110111000111
 _MISSING: Final = (_UNKNOWN_U16, -1)
+_STREAM: Final = common.MAV_CMD_SET_MESSAGE_INTERVAL
+_MODE: Final = common.MAV_CMD_DO_SET_MODE
+_TAKES_OFF: Final = (_MODE, common.MAV_CMD_COMPONENT_ARM_DISARM, common.MAV_CMD_NAV_TAKEOFF)
+"""The commands of a take-off."""
 
 
 class _Waiting(NamedTuple):
@@ -91,6 +96,8 @@ class AutopilotLink:
         self._waiting: deque[_Waiting] = deque()
         self._sent_ns, self._times = 0, 0
         self._wanted: Setpoint | None = None
+        self._unsaid = False
+        """True while what the computer wants has not been asked for: the flight controller was lost, or left alone."""
         self._hold: Enu | None = None
         self._setpoint_ns = 0
         self._streamed = 0
@@ -120,11 +127,11 @@ class AutopilotLink:
             self.system = message.get_srcSystem()
             self._mav = common.MAVLink(None, srcSystem=self.system, srcComponent=COMPONENT)
             self.events.append(f"flight controller {self.system} heard")
-            for message_id, interval_ns in _STREAMS.items():
-                self._ask(511, (message_id, interval_ns / 1000), f"message {message_id} every {interval_ns / MS:g} ms")
+            self._ask_streams()
         if self.lost:
             self.lost = False
             self.events.append("flight controller heard again")
+            self._ask_streams()  # it may have started again
         self._heard_ns = now_ns
         self.armed = bool(message.base_mode & common.MAV_MODE_FLAG_SAFETY_ARMED)
         before, self.mode = self.mode, mode_of(message.custom_mode, self._flavor)
@@ -134,9 +141,11 @@ class AutopilotLink:
             self._guided, self.yielded = True, False
         elif self._guided and before is Mode.GUIDED and not self._asked_to_leave:
             self.yielded, self._guided = True, False
-            self._waiting.clear()
-            self._times = 0
+            self._drop(lambda one: one.command != _STREAM)
             self.events.append(f"left the guided mode for {self.mode or message.custom_mode}: left alone")
+        if self._unsaid and self._wanted is not None and not self.yielded:
+            self._unsaid = False
+            self._ask_for(self._wanted)
 
     @property
     def _asked_to_leave(self) -> bool:
@@ -226,22 +235,29 @@ class AutopilotLink:
             self._hold = self.position if self._hold is None else self._hold
         else:
             self._hold = None
-        if self.yielded or self.lost or again:
+        if again:
             return
+        self._unsaid = self.yielded or self.lost
+        if not self._unsaid:
+            self._ask_for(setpoint)
+            self._setpoint_ns = min(self._setpoint_ns, now_ns)
+
+    def _ask_for(self, setpoint: Setpoint) -> None:
+        """The commands that a setpoint needs, instead of those for the one before."""
+        kind = setpoint.kind
         if kind is SetpointKind.TAKEOFF:
             self._take_off(setpoint.position.up)
-        elif kind is SetpointKind.LAND:
-            self._ask_mode(Mode.LAND)
-        elif kind is SetpointKind.RETURN:
-            self._ask_mode(Mode.RETURN)
+        elif kind in (SetpointKind.LAND, SetpointKind.RETURN):
+            said = self._waiting[0] if self._waiting and self._times else None
+            self._drop(lambda one: one.command in _TAKES_OFF and not (one is said and one.command == _MODE))
+            self._ask_mode(Mode.LAND if kind is SetpointKind.LAND else Mode.RETURN)
         elif kind is SetpointKind.POSITION and setpoint.speed_m_s > 0 and setpoint.speed_m_s != self._speed_m_s:
             self._speed_m_s = setpoint.speed_m_s
             self._ask(common.MAV_CMD_DO_CHANGE_SPEED, (1, setpoint.speed_m_s, -1), f"speed {setpoint.speed_m_s:g} m/s")
-        self._setpoint_ns = min(self._setpoint_ns, now_ns)
 
     def _take_off(self, up_m: float) -> None:
-        self._waiting.clear()
-        self._times = 0
+        streams = [one for one in self._waiting if one.command == _STREAM]
+        self._drop(lambda _: True)
         if self._flavor is Flavor.ARDUPILOT:
             self._ask_mode(Mode.GUIDED)
         self._ask(common.MAV_CMD_COMPONENT_ARM_DISARM, (1,), "arm")
@@ -249,6 +265,7 @@ class AutopilotLink:
         self._ask(
             common.MAV_CMD_NAV_TAKEOFF, (0, 0, 0, math.nan, math.nan, math.nan, height_m), f"take-off to {up_m:g} m"
         )
+        self._waiting += streams
 
     # --- time -----------------------------------------------------------------------------------------------------
 
@@ -335,7 +352,18 @@ class AutopilotLink:
             params: tuple[float, ...] = (1, number >> 16 & 0xFF, number >> 24)
         else:
             params = (1, number)
-        self._ask(common.MAV_CMD_DO_SET_MODE, params, f"mode {mode}", first=True)
+        self._ask(_MODE, params, f"mode {mode}", first=True)
+
+    def _ask_streams(self) -> None:
+        for message_id, interval_ns in _STREAMS.items():
+            self._ask(_STREAM, (message_id, interval_ns / 1000), f"message {message_id} every {interval_ns / MS:g} ms")
+
+    def _drop(self, is_over: Callable[[_Waiting], bool]) -> None:
+        """Ask no more for what nobody wants any longer."""
+        first = self._waiting[0] if self._waiting else None
+        self._waiting = deque(one for one in self._waiting if not is_over(one))
+        if not self._waiting or self._waiting[0] is not first:
+            self._times = 0
 
     def _ask(self, command: int, params: tuple[float, ...], what: str, *, first: bool = False) -> None:
         """Put a command into the line, unless it waits there already; `first`: before the others, but after one of its

@@ -29,16 +29,25 @@ class Autopilot:
     """One flight controller with its connection."""
 
     def __init__(
-        self, name: str, link: AutopilotLink, address: Address, *, now_ns: Callable[[], int], tell: Tell
+        self,
+        name: str,
+        link: AutopilotLink,
+        address: Address,
+        *,
+        now_ns: Callable[[], int],
+        tell: Tell,
+        hears: Callable[[], bool] = lambda: True,
     ) -> None:
+        """`hears`: False before the swarm's clock runs, when there is no instant to which a reading would belong."""
         self.link = link
-        self._name, self._now_ns, self._tell = name, now_ns, tell
+        self._name, self._now_ns, self._tell, self._hears = name, now_ns, tell, hears
         self._clock_off = False
         whole = address.kind.startswith("udp")
         self.connection = Connection(address, lambda _, data: self._hear(data, whole=whole))
 
     def _hear(self, data: bytes, *, whole: bool) -> bytes:
-        self.link.on_bytes(data, self._now_ns(), whole=whole)
+        if self._hears():
+            self.link.on_bytes(data, self._now_ns(), whole=whole)
         return b""
 
     def tick(self) -> list[Reading]:

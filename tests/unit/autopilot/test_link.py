@@ -291,6 +291,74 @@ def test_a_flight_controller_that_falls_silent_is_lost_and_found_again() -> None
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize(("kind", "mode"), [(SetpointKind.LAND, Mode.LAND), (SetpointKind.RETURN, Mode.RETURN)])
+def test_what_was_asked_of_a_lost_flight_controller_it_is_told_once_it_is_heard_again(
+    kind: SetpointKind, mode: Mode
+) -> None:
+    controller = Controller()
+    controller.run(6)
+    controller.want(SetpointKind.POSITION, Enu(0.0, 0.0, 30.0))
+    controller.run(3)
+    controller.silent = True
+    controller.run(4)
+    controller.want(kind)
+    controller.run(1)
+    controller.want(kind)  # the computer repeats it, so that it counts as alive
+    controller.silent = False
+    controller.run(3)
+    assert controller.mode is mode
+
+
+def test_what_was_asked_while_a_pilot_flew_is_flown_once_the_guided_mode_is_back() -> None:
+    controller = Controller()
+    controller.run(6)
+    controller.want(SetpointKind.POSITION, Enu(0.0, 0.0, 30.0))
+    controller.run(4)
+    controller.mode = Mode.HOLD
+    controller.run(1)
+    controller.want(SetpointKind.RETURN)
+    controller.run(2)
+    assert controller.mode is Mode.HOLD
+    controller.mode = Mode.GUIDED
+    controller.run(3)
+    assert controller.mode is Mode.RETURN
+
+
+def test_a_flight_controller_that_has_started_again_is_asked_for_its_streams_again() -> None:
+    controller = Controller()
+    controller.run(9)
+    controller.silent = True
+    controller.run(5)
+    controller.silent = False
+    assert commands(controller.run(9)) == [511] * 6
+
+
+@pytest.mark.parametrize("flavor", [*Flavor])
+def test_a_take_off_that_is_broken_off_is_not_flown_after_the_landing(flavor: Flavor) -> None:
+    controller = Controller(flavor)
+    controller.run(6)
+    controller.answers = False
+    controller.want(SetpointKind.TAKEOFF, Enu(10.0, 20.0, 20.0))
+    controller.run(0.5)
+    controller.answers = True
+    controller.want(SetpointKind.LAND)
+    said = controller.run(6)
+    assert controller.mode is Mode.LAND
+    assert commands(said)[-1] == 176, "nothing follows the landing"
+    assert 22 not in commands(said)
+
+
+def test_a_take_off_leaves_the_streams_asked_for() -> None:
+    controller = Controller()
+    controller.run(1.1)
+    controller.want(SetpointKind.TAKEOFF, Enu(10.0, 20.0, 20.0))
+    assert commands(controller.run(0.2))[:2] == [400, 22]
+    controller.run(9)
+    assert {m.param1 for m in controller.said if m.get_type() == "COMMAND_LONG" and m.command == 511} == {
+        33, 24, 1, 245, 30, 2,
+    }  # fmt: skip
+
+
 def test_other_systems_on_the_line_are_not_taken_for_it() -> None:
     controller = Controller()
     controller.run(3)
@@ -384,3 +452,19 @@ def test_a_setpoint_that_is_no_number_is_counted_and_not_flown() -> None:
     for east_m in (math.nan, math.inf):
         bus.put(names.setpoint(1), codecs.encode([Setpoint(0, Enu(east_m, 0.0, 50.0), 5.0)]))
     assert link.counts == {"setpoints_malformed": 2}
+
+
+def test_what_a_flight_controller_says_before_the_swarms_clock_runs_is_not_kept() -> None:
+    """A UAV may wait for hours for the swarm to begin; then it would fly through hours of fixes of one instant."""
+    controller, runs = Controller(), False
+    autopilot = Autopilot(
+        "UAV 1", controller.link, Address("udpin", "127.0.0.1", 0), now_ns=lambda: controller.now_ns,
+        tell=lambda _: None, hears=lambda: runs,
+    )  # fmt: skip
+    controller.tell = lambda message: autopilot.connection.said(None, bytes(message.pack(controller.mav)))  # type: ignore[method-assign]
+    controller.run(10)
+    assert not controller.link.readings
+    runs = True
+    controller.run(2)
+    assert controller.link.readings
+    assert not controller.link.counts["lost"]

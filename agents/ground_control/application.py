@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from agents.applications.telemetry_streams import Flown, Link, TelemetryStreams
 from agents.ground_control import settings as names
-from agents.ground_control.commands import Commands
+from agents.ground_control.commands import Commands, is_question
 from agents.ground_control.pilot import Pilot
 from agents.ground_control.plan_transfer import Peer, PlanTransfer
 from agents.ground_control.plans import Ground, Item, Kind, RefusedError, fence_of, rally_of, step_of
@@ -307,7 +307,8 @@ class GroundControl(Application):
     # --- what ground stations ask ---------------------------------------------------------------------------------
 
     def _on_command(self, message: Any, peer: Peer, now_ns: int) -> None:  # noqa: ANN401
-        self._counts["commanded"] += 1
+        if not is_question(message.command):
+            self._counts["commanded"] += 1
         self._counts["repeated"] += self._commands.on_command(message, peer, now_ns)
 
     def _on_set_mode(self, message: Any, peer: Peer, now_ns: int) -> None:  # noqa: ANN401

@@ -28,6 +28,15 @@ _PARAMS: Final = {
     "COMMAND_INT": ("frame", "param1", "param2", "param3", "param4", "x", "y", "z"),
 }
 """The parameters of a command, by the message that brings it."""
+_QUESTIONS: Final = frozenset({
+    common.MAV_CMD_SET_MESSAGE_INTERVAL, common.MAV_CMD_GET_MESSAGE_INTERVAL, common.MAV_CMD_REQUEST_MESSAGE,
+    common.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES,
+})  # fmt: skip
+
+
+def is_question(number: int) -> bool:
+    """True for a command that only asks to be told something."""
+    return number in _QUESTIONS
 
 
 class Command(NamedTuple):
@@ -99,7 +108,8 @@ class Commands:
         else:
             result = self._change_to(does, now_ns) if isinstance(does, Mode) else does(self, command, now_ns)
         self._last_ack = common.MAVLink_command_ack_message(message.command, result, 0, 0, *peer)
-        self._last_said, self._last_ns = said, now_ns
+        carried_out = result == _ACCEPTED and not is_question(message.command)
+        self._last_said, self._last_ns = said if carried_out else (), now_ns
         self._reply(self._last_ack)
         return False
 
@@ -159,6 +169,8 @@ class Commands:
 
     def _speed(self, command: Command, _now_ns: int) -> int:
         speed_m_s = command.params[1]
+        if speed_m_s == -1:
+            return _ACCEPTED  # no change; -2: back to the usual speed
         known = math.isfinite(speed_m_s) and self._pilot.change_speed(-1.0 if speed_m_s == -2 else speed_m_s)
         return _ACCEPTED if known else _DENIED
 

@@ -53,6 +53,8 @@ class PlanTransfer:
         self._reply, self._check, self._accept = reply, check, accept
         self.plans: dict[Kind, list[Item]] = {kind: [] for kind in Kind}
         self._uploads: dict[Kind, _Upload] = {}
+        self._ended: dict[Kind, tuple[Peer, int, int]] = {}
+        """Whose upload of each kind came to its end last, the number of its items, and the result."""
 
     def next_due_ns(self) -> int | None:
         return earliest(*(upload.due_ns for upload in self._uploads.values()))
@@ -98,7 +100,9 @@ class PlanTransfer:
         kind = Kind(message.mission_type)
         upload = self._uploads.get(kind)
         if upload is None or upload.peer != peer:
-            self._ack(peer, kind, common.MAV_MISSION_INVALID_SEQUENCE)
+            whose, count, result = self._ended.get(kind, (None, 0, 0))
+            again = whose == peer and message.seq == count - 1  # the last item: its answer was lost
+            self._ack(peer, kind, result if again else common.MAV_MISSION_INVALID_SEQUENCE)
             return
         if message.seq == len(upload.items):  # any other one was asked for twice
             try:
@@ -117,13 +121,14 @@ class PlanTransfer:
         self._request(kind, upload, now_ns)
 
     def _finish(self, kind: Kind, items: list[Item], peer: Peer) -> None:
+        result = _ACCEPTED
         try:
             self._accept(kind, items)
+            self.plans[kind] = items
         except RefusedError as refused:
-            self._ack(peer, kind, refused.result)
-            return
-        self.plans[kind] = items
-        self._ack(peer, kind, _ACCEPTED)
+            result = refused.result
+        self._ended[kind] = peer, len(items), result
+        self._ack(peer, kind, result)
 
     def _on_list(self, message: Any, peer: Peer, _now_ns: int) -> None:  # noqa: ANN401
         kind = Kind(message.mission_type)

@@ -105,6 +105,8 @@ class Step(NamedTuple):
 
 def step_of(item: Item, ground: Ground) -> Step:
     """What a mission's item asks for; raises RefusedError."""
+    if item.command == common.MAV_CMD_DO_JUMP and not math.isfinite(item.params[0]):
+        raise RefusedError(common.MAV_MISSION_INVALID_PARAM1)
     if item.command in _OTHERS:
         return Step(item.command, None, item.params)
     if item.command not in _PLACES:

@@ -179,6 +179,45 @@ def test_who_stands_on_the_ground_is_not_sent_anywhere() -> None:
     assert go_to(bench, 10, 10, 20) == LATER
 
 
+def test_a_message_is_sent_as_often_as_it_is_requested() -> None:
+    """A ground station asks again, in the same words, when the message was lost although the answer was not."""
+    bench = Bench()
+    for _ in range(3):
+        bench.now_ns += S
+        answers = bench.say(
+            common.MAVLink_command_long_message(1, 1, 512, 0, common.MAVLINK_MSG_ID_HOME_POSITION, *[0] * 6)
+        )
+        assert [answer.get_type() for answer in answers] == ["HOME_POSITION", "COMMAND_ACK"]
+
+
+def test_what_was_refused_is_judged_anew_when_it_comes_again() -> None:
+    bench = Bench()
+    bench.command(ARM, 1)
+    assert bench.command(START) == LATER
+    upload(bench, square())
+    assert bench.command(START) == ACCEPTED
+
+
+def test_a_question_takes_no_uav_from_those_who_fly_it() -> None:
+    bench = Bench(scenario(mobility={"model": "static", "speed_m_s": 10}))
+    course = Course(Enu(10.0, 0.0, 20.0), 5.0)
+    bench.command(512, common.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+    bench.command(511, common.MAVLINK_MSG_ID_ATTITUDE, 100_000)
+    assert bench.control.permits(course, bench.now_ns)
+    bench.command(ARM, 1)
+    assert not bench.control.permits(course, bench.now_ns)
+
+
+def test_a_speed_of_minus_one_changes_nothing_and_minus_two_takes_it_back() -> None:
+    bench = Bench().airborne()
+    assert bench.command(SPEED, 1, 4.0) == ACCEPTED
+    assert bench.command(SPEED, 1, -1.0) == ACCEPTED
+    assert go_to(bench, 40, 0, 20) == ACCEPTED
+    assert bench.courses[-1].speed_m_s == 4.0
+    assert bench.command(SPEED, 1, -2.0) == ACCEPTED
+    assert bench.courses[-1].speed_m_s == 10.0
+
+
 def test_another_speed_counts_on_the_way_and_later_until_it_is_taken_back() -> None:
     bench = Bench().airborne()
     go_to(bench, 300, 0, 20)
@@ -362,6 +401,16 @@ def test_an_item_that_comes_twice_is_taken_once() -> None:
     assert (third.x, third.y) == items[2][2:4]
 
 
+def test_whoever_missed_that_an_upload_was_accepted_is_told_so_again() -> None:
+    bench = Bench()
+    items = square()
+    assert upload(bench, items) == 0
+    frame, command, x, y, z, params = items[-1]
+    last = common.MAVLink_mission_item_int_message(1, 1, len(items) - 1, frame, command, 0, 1, *params, x, y, z, 0)
+    assert [(answer.get_type(), answer.type) for answer in bench.say(last)] == [("MISSION_ACK", 0)]
+    assert [answer.type for answer in bench.say(last, sender=(254, 190))] == [common.MAV_MISSION_INVALID_SEQUENCE]
+
+
 def test_an_upload_that_breaks_off_leaves_the_old_mission() -> None:
     bench = Bench()
     upload(bench, square())
@@ -380,6 +429,8 @@ def test_an_upload_that_breaks_off_leaves_the_old_mission() -> None:
         ((6, 16, 2_000_000_000, 0, 20.0, NONE), common.MAV_MISSION_INVALID_PARAM5_X),
         ((6, 16, *degrees(900, 0), 20.0, NONE), common.MAV_MISSION_INVALID_PARAM7),
         ((6, 16, *degrees(0, 0), math.nan, NONE), common.MAV_MISSION_UNSUPPORTED_FRAME),
+        ((2, 177, 0, 0, 0.0, (math.nan, 1, 0, 0)), common.MAV_MISSION_INVALID_PARAM1),
+        ((2, 177, 0, 0, 0.0, (math.inf, 1, 0, 0)), common.MAV_MISSION_INVALID_PARAM1),
     ],
 )
 def test_a_mission_that_cannot_be_flown_is_refused_with_its_reason(item: object, result: int) -> None:

@@ -293,8 +293,9 @@ class StoppableUav(Actor):
     def __init__(self, make: Callable[[], Actor], stops: Sequence[tuple[int, int | None]]) -> None:
         """`stops`: when the program ends, and when it is started again; None if it is not."""
         self._make = make
-        self._uav: Actor | None = make()
-        super().__init__(self._uav.name, self._uav.subscriptions)
+        self.alive: Actor | None = make()
+        """The UAV while its program runs."""
+        super().__init__(self.alive.name, self.alive.subscriptions)
         self._changes = [
             (at_ns, starts)
             for stop in stops
@@ -311,50 +312,50 @@ class StoppableUav(Actor):
         self._changes.insert(0, (at_ns, False))
 
     def start(self, now_ns: int) -> None:
-        assert self._uav is not None, "it lives at first"
-        self._enter(self._uav)
-        self._uav.start(now_ns)
+        assert self.alive is not None, "it lives at first"
+        self._enter(self.alive)
+        self.alive.start(now_ns)
 
     def _enter(self, uav: Actor) -> None:
         uav.outbox, uav.records = self.outbox, self.records
 
     def receive(self, topic: str, message: Message, now_ns: int) -> bool | None:
-        if self._uav is None:
+        if self.alive is None:
             self._unheard += isinstance(message, Reception)
             return True
-        return self._uav.receive(topic, message, now_ns)
+        return self.alive.receive(topic, message, now_ns)
 
     def wake(self, now_ns: int) -> None:
         while self._changes and self._changes[0][0] <= now_ns:
             _, starts = self._changes.pop(0)
-            if not starts and self._uav is not None:
-                self._uav.stop(now_ns)
-                self._earlier.append(self._uav.report())
-                self._uav = None
-            elif starts and self._uav is None:
-                self._uav = self._make()
-                self._enter(self._uav)
-                self._uav.start(now_ns)
-        if self._uav is not None:
-            due_ns = self._uav.next_wake_ns()
+            if not starts and self.alive is not None:
+                self.alive.stop(now_ns)
+                self._earlier.append(self.alive.report())
+                self.alive = None
+            elif starts and self.alive is None:
+                self.alive = self._make()
+                self._enter(self.alive)
+                self.alive.start(now_ns)
+        if self.alive is not None:
+            due_ns = self.alive.next_wake_ns()
             if due_ns is not None and due_ns <= now_ns:
-                self._uav.wake(now_ns)
+                self.alive.wake(now_ns)
 
     def next_wake_ns(self) -> int | None:
         own = [self._changes[0][0]] if self._changes else []
-        due_ns = None if self._uav is None else self._uav.next_wake_ns()
+        due_ns = None if self.alive is None else self.alive.next_wake_ns()
         return min([*own, *([] if due_ns is None else [due_ns])], default=None)
 
     def nudge(self, now_ns: int) -> None:
-        if self._uav is not None:
-            self._uav.nudge(now_ns)
+        if self.alive is not None:
+            self.alive.nudge(now_ns)
 
     def stop(self, now_ns: int) -> None:
-        if self._uav is not None:
-            self._uav.stop(now_ns)
+        if self.alive is not None:
+            self.alive.stop(now_ns)
 
     def report(self) -> Mapping[str, Any]:
-        lives = [*self._earlier, *([] if self._uav is None else [self._uav.report()])]
+        lives = [*self._earlier, *([] if self.alive is None else [self.alive.report()])]
         summed: dict[str, Any] = dict(lives[-1])
         summed["receptions"] = summed.get("receptions", 0) + self._unheard
         for life in lives[:-1]:

@@ -13,6 +13,7 @@ from agents.program.attached import Drive, NodeClosedError
 from agents.program.joined import Node
 from agents.program.mailbox import Mailbox
 from agents.uav import NodeState, Uav
+from fanet_mw.actor import Actor
 from fanet_mw.application import Application
 from fanet_mw.bus.radio_control import Cut, Degrade, Restore, require_valid
 from fanet_mw.errors import ConfigError
@@ -21,13 +22,15 @@ from fanet_mw.trace import Delivered
 from fanet_mw.units import MS, NodeId, S, seconds_to_ns
 from sim.results.result import Result
 from sim.run.arguments import OfUser, by_node, scenario_of
-from sim.run.virtual import Observed
+from sim.run.virtual import Observed, StoppableUav
 
 T = TypeVar("T")
 _STEP_NS: Final = 10 * MS
 """Virtual time advances by this much before the program's tasks run again."""
 _TURNS: Final = 4
 """This many turns of the event loop are enough for a chain of tasks that wait for each other."""
+_STOPPED: Final = NodeState((), None, {}, owing=False)
+"""The state of a node whose program has ended, by a fault of the scenario."""
 
 
 class _Time:
@@ -56,9 +59,8 @@ class _Time:
             self.observed.host.start()
         return self.observed
 
-    def uav(self, node: int) -> Uav | ClockedUav:
-        actors = self.start().actors
-        return next(a for a in actors if isinstance(a, Uav | ClockedUav) and a.name == f"agent-{node}")
+    def uav(self, node: int) -> Actor:
+        return next(actor for actor in self.start().actors if actor.name == f"agent-{node}")
 
     async def step(self, until_ns: int) -> None:
         """Let a little time pass, and then let the other tasks of the program run."""
@@ -90,7 +92,9 @@ class _VirtualDrive:
         return self._time.now_ns()
 
     def state(self) -> NodeState:
-        return self._time.uav(self._node).state(self._time.now_ns())
+        uav = self._time.uav(self._node)
+        alive = uav.alive if isinstance(uav, StoppableUav) else uav
+        return alive.state(self._time.now_ns()) if isinstance(alive, Uav | ClockedUav) else _STOPPED
 
     def report(self) -> Mapping[str, Any]:
         return self._time.uav(self._node).report()

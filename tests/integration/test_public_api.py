@@ -107,6 +107,22 @@ async def test_time_is_what_can_pass_and_ends(swarm: MakeSwarm) -> None:
             await s.run_for(1)
 
 
+async def test_a_node_whose_program_the_scenario_stops_knows_nothing_and_goes_on_when_it_is_started_again(
+    swarm: MakeSwarm,
+) -> None:
+    stop = "faults=[{kind = 'stop', node = 3, at_s = 7, for_s = 3}]"
+    async with swarm("quick", overrides=[*QUIET, stop]) as s:
+        node, other = s.node(3), s.node(1)
+        await s.run_until(6)
+        assert node.neighbors
+        await s.run_until(8)
+        assert (node.neighbors, node.clusters, node.bound_ms) == ((), {}, None)
+        assert (await node.send(b"later", port=7, to=1)).ok
+        assert s.now_s > 10
+        assert (await other.receive()).data == b"later"
+        assert node.report()["kind"] == "agent"
+
+
 async def test_faults_and_who_is_out_of_reach(swarm: MakeSwarm) -> None:
     async with swarm("quick", overrides=QUIET) as s:
         node, _, _ = s.node(1), s.node(2), s.node(9)

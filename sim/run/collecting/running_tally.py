@@ -83,6 +83,7 @@ class RunningTally(Observer):
             match record:
                 case Delivered():
                     self._copies[-1][record.origin, record.seq] += 1
+                    self._latest_ns = max(self._latest_ns, record.t_ns)
                 case Generated(app=self._traffic):
                     self._sent[record.node, record.seq] = record.t_ns
                     self._latest_ns = max(self._latest_ns, record.t_ns)

@@ -97,7 +97,7 @@ class ClockGovernor:
         """When the pace changed: swarm instant [ns] and the scale from then on."""
         self.scale = time_scale
         self._full = time_scale
-        self._least = least
+        self._least = least if least < time_scale else math.inf
         self._late_limit = late_limit
         self._end_ns = end_ns
         self._processors = processors
@@ -114,7 +114,6 @@ class ClockGovernor:
     def ask(self, scale: float, *, swarm_ns: int) -> None:
         """Let an operator choose the pace, which is the full one from now on."""
         self.scale = self._full = scale
-        self._least = min(self._least, scale)
         self._moment_ns = moment_ns(scale)
         self._lately.clear()
         self._return = _Return(scale, scale, scale)

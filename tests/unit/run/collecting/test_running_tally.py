@@ -57,6 +57,14 @@ def test_copies_that_take_seconds_count_and_other_packets_do_not(make_scenario: 
     assert sum(map(len, found._copies)) + len(found._sent) < 60, "what is ripe is forgotten"
 
 
+def test_nothing_is_kept_of_packets_while_the_traffic_rests(make_scenario: MakeScenario) -> None:
+    found = tally(make_scenario)
+    for second in range(200):
+        found.take_records([Generated(second * S, 2, second, "report", 30), Delivered(second * S, 3, 2, second, MS, 1)])
+    assert sum(map(len, found._copies)) < 30
+    assert found.delivered_share() is None
+
+
 PLACES = ((100.0, 0.0), (200.0, 0.0), (300.0, 0.0))
 
 

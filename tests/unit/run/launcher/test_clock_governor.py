@@ -56,6 +56,10 @@ class Swarm:
             self.scale = self._governor.pace(reports, at) or self.scale
         return self.scale
 
+    def ask(self, scale: float) -> None:
+        self._governor.ask(scale, swarm_ns=self._seconds * S)
+        self.scale = scale
+
     def steps(self) -> list[tuple[int, float]]:
         return self._governor.steps
 
@@ -221,3 +225,19 @@ def test_an_operator_sets_the_pace_and_it_stays() -> None:
         assert governor.pace(calm, Instant(7 * S + second * S // 4, second * S, 0.1 * second)) is None
     governor.ask(1.0, swarm_ns=30 * S)
     assert governor.scale == 1.0
+
+
+@pytest.mark.parametrize("asked", [(0.25, 1.0), (2.0,)])
+def test_a_clock_that_may_not_slow_down_keeps_every_pace_that_an_operator_sets(asked: tuple[float, ...]) -> None:
+    swarm = Swarm(least=1.0)
+    for scale in asked:
+        swarm.ask(scale)
+        assert {swarm.second(late=0.5, moments=30) for _ in range(5)} == {scale}
+
+
+def test_one_that_may_slow_down_does_not_fall_below_its_least_because_an_operator_once_did() -> None:
+    swarm = Swarm(least=0.5)
+    swarm.ask(0.25)
+    assert {swarm.second(late=0.5, moments=30) for _ in range(5)} == {0.25}
+    swarm.ask(1.0)
+    assert [swarm.second(late=0.5, moments=30) for _ in range(8)][-1] == 0.5

@@ -78,6 +78,7 @@ class Clustered(RoutingProtocol):
         self._lead_ns = port.scenario.radio.lead_ns
 
     def start(self, now_ns: int) -> None:
+        self._on_frame(now_ns)  # it has yet to hear anybody
         for part in (self.parts.roles, self.parts.access, self.parts.relaying):
             part.start(now_ns)
 

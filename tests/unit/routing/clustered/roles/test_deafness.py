@@ -43,6 +43,11 @@ def test_it_says_so_after_four_hellos_without_a_frame_until_the_next_one(node: N
     assert not states_deafness(node, at_ns=6 * S + 2 * MS)
 
 
+def test_a_node_that_starts_long_after_the_others_has_had_no_time_to_hear_anybody(node: Node) -> None:
+    node.start(100 * S)
+    assert [states_deafness(node, at_ns=t_ns) for t_ns in (100 * S, 104 * S - 1, 104 * S)] == [False, False, True]
+
+
 @pytest.mark.parametrize("deaf", [False, True])
 def test_what_a_deaf_node_sends_is_delivered_and_no_sign_of_life(node: Node, *, deaf: bool) -> None:
     hear(node, at_ns=S, flags=FLAG_FLOOD | (FLAG_DEAF if deaf else 0))

@@ -47,7 +47,7 @@ class Goal:
         if not leaves:
             place = None if task is None else self._survivors.by_id[task].place()
             if task is None or not formation.leads_by(place, lane, moves):
-                leaves = task is not None and self._absence.is_permitted
+                leaves = task is not None and (self._absence.is_permitted or formation.finishes(place, now_ns))
                 survivor = task if leaves else self._in_lane(lane, moves, now_ns)
         place = None if survivor is None else self._survivors.by_id[survivor].place()
         if survivor is None or place is None:

@@ -30,6 +30,11 @@ _LEASH_M: Final = 58.0
 """The greatest distance to the side at which a UAV of a team, or a relay, may be from its place."""
 _LAG_M: Final = 140.0
 """The greatest distance by which a UAV of a team, or a relay, may be behind its place."""
+_NEARLY_M: Final = 120.0
+"""A UAV that is so near to the survivor to whom it was sent goes on to him, if he is placed so well..."""
+_PLACED_M: Final = 50.0
+_ENDS_M: Final = 200.0
+"""... and it is at most so far from its own place: until then its row waits for it, or closes up without it."""
 
 
 _CLOSES_S: Final = 15.0
@@ -215,6 +220,13 @@ class FormationPlace:
             return False
         ahead_m, aside_m = along(moves, estimate.east_m - lane.east, estimate.north_m - lane.north)
         return abs(aside_m) <= _LEASH_M + self._aside_m and -_LAG_M <= ahead_m <= _AHEAD_M
+
+    def finishes(self, estimate: Estimate | None, now_ns: int) -> bool:
+        """True in the sweep for a UAV that nearly is where a survivor is placed, and not yet far from its own place."""
+        here = self._own_motion.position
+        if estimate is None or estimate.sigma_m > _PLACED_M or not self.is_taken_up(now_ns):
+            return False
+        return estimate.distance_m(here) <= _NEARLY_M and self.lane(now_ns)[0].horizontal_to(here) <= _ENDS_M
 
     def is_near(self, now_ns: int) -> bool:
         """True if this UAV is as near to its place as the swarm needs it to stay connected."""

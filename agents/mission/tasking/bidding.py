@@ -163,8 +163,10 @@ class Bidding:
         """Give up the present survivor if the auction is lost, it takes too long, or it is not permitted any more; but
         for a lost auction the bid is withdrawn.
         """
-        lost = self._node not in self._winners(survivor, now_ns)
         arrived_ns, patience_ns = self._approach.arrived_ns.get(survivor), self._patience_ns
+        place = self._survivors.by_id[survivor].place()
+        nearly_there = arrived_ns is None and self._formation.finishes(place, now_ns)
+        lost = self._node not in self._winners(survivor, now_ns) and not nearly_there
         if arrived_ns is None and self._formation.plan is not None and not self._formation.is_taken_up(now_ns):
             patience_ns = _OVERDUE_NS
         there_ns = self._due_ns if arrived_ns is None else arrived_ns
@@ -177,10 +179,11 @@ class Bidding:
 
     def _may_stay(self, survivor: int, now_ns: int) -> bool:
         """True while this UAV may be with a survivor, by its place in the formation or because it may be absent."""
-        known = self._survivors.by_id[survivor]
-        place = known.place()
-        if place is None or self._is_within_limits(place, now_ns) or not self._absence.permits(place, now_ns):
-            return self._is_within_limits(place, now_ns)
+        place = self._survivors.by_id[survivor].place()
+        if self._is_within_limits(place, now_ns) or self._formation.finishes(place, now_ns):
+            return True
+        if place is None or not self._absence.permits(place, now_ns):
+            return False
         return self._node in self._auction.winners(survivor, count=_absent(place), now_ns=now_ns)
 
     def _is_within_limits(self, place: Estimate | None, now_ns: int) -> bool:

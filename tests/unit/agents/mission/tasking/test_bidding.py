@@ -30,14 +30,21 @@ def test_a_follower_bids_for_a_reported_survivor_near_its_line_wins_and_says_so(
     assert board.tasks.survivor is None
 
 
-def test_better_bids_take_a_task_away() -> None:
-    board = board_with_a_task(east_m=60)
+@pytest.mark.parametrize(("ahead_m", "task"), [(120, None), (90, 1)])
+def test_better_bids_take_a_task_away_but_from_who_is_nearly_there(ahead_m: float, task: int | None) -> None:
+    at = lane_of(LINE, NOW_NS)
+    board = Board(LINE, at)
+    board.hear(1, Enu(at.east + 60, at.north + ahead_m, 0), range(1, 5), now_ns=NOW_NS)
+    board.tasks.bid(NOW_NS)
     board.tasks.merge([Bid(1, bidder, 1, 1) for bidder in (30, 31)], now_ns=NOW_NS)
     board.tasks.choose(NOW_NS)
     assert board.tasks.survivor == 1, "three are wanted"
     board.tasks.merge([Bid(1, 32, 1, 1)], now_ns=NOW_NS)
     board.tasks.choose(NOW_NS)
-    assert board.tasks.survivor is None
+    assert board.tasks.survivor == task
+    board.approach.arrived_ns[1] = NOW_NS
+    board.tasks.choose(NOW_NS)
+    assert board.tasks.survivor is None, "it was there, and found nobody"
 
 
 @pytest.mark.parametrize("reporters", [range(1, 2), range(FOLLOWER, FOLLOWER + 1)])
@@ -120,14 +127,18 @@ def test_a_responder_that_finds_nobody_takes_its_bid_back_and_does_not_bid_again
     assert board.approach.arrived_ns == {}, "what it came to was not the place"
 
 
-def test_a_responder_whose_lane_leaves_a_survivor_behind_takes_its_bid_back() -> None:
+@pytest.mark.parametrize(("behind_m", "stays_s"), [(125, 1), (60, 25)])
+def test_a_responder_whose_lane_leaves_a_survivor_behind_takes_its_bid_back(behind_m: float, stays_s: int) -> None:
+    """A line of 7.5 m/s keeps its UAVs within 140 m, and who is within 120 m of somebody within 200 m."""
     at = lane_of(LINE, NOW_NS)
     board = Board(LINE, at)
-    board.hear(1, Enu(at.east + 60, at.north, 0), range(1, 5), now_ns=NOW_NS)
+    board.hear(1, Enu(at.east, at.north - behind_m, 0), range(1, 5), now_ns=NOW_NS)
     board.tasks.bid(NOW_NS)
-    for after_s, task in ((0, 1), (15, 1), (22, None)):
+    goes = board.goal.at(1, NOW_NS + stays_s * S)[0]
+    assert goes.north == pytest.approx(at.north - behind_m, abs=20), "to the place, not as far as the lag"
+    for after_s, task in ((0, 1), (stays_s, 1), (stays_s + 3, None)):
         board.tasks.choose(NOW_NS + after_s * S)
-        assert board.tasks.survivor == task, "it may stay 140 m behind, which are 19 s"
+        assert board.tasks.survivor == task
     assert [bid.eta_ds for bid in board.tasks.bids_to_tell(now_ns=NOW_NS + 22 * S)] == [0xFFFF]
 
 

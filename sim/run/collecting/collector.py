@@ -217,10 +217,10 @@ class Collector:
         with self._lock:
             return {name for name in self._checks.node_of if not self._reports.get(name, {}).get("final")}
 
-    def begin(self) -> None:
-        """All actors are there now: silence counts from here on."""
+    def begin(self, *names: str) -> None:
+        """These actors, or all, are there now: their silence counts from here on."""
         with self._lock:
-            self._reported_ns = dict.fromkeys(self._checks.node_of, self._now_ns())
+            self._reported_ns |= dict.fromkeys(names or self._checks.node_of, self._now_ns())
 
     def silent(self, for_ns: int) -> set[str]:
         """The actors that have sent no report for so long."""

@@ -394,6 +394,7 @@ class SwarmRun:
         """Start a process again. Where that fails, the swarm goes on without a UAV, and not without anything else."""
         try:
             self.processes.restart(name, **more)
+            self._collector.begin(name)
         except HostError as error:
             if not name.startswith("agent-") or self._clock is None:
                 self.abort(f"{error}; the run cannot go on without it", broken=True)

@@ -128,6 +128,10 @@ def test_who_has_sent_no_report_for_long_is_silent_until_it_sends_the_next(ear: 
     assert ear.collector.silent(4 * S) == {"world"}
     report("world")
     assert ear.collector.silent(4 * S) == set()
+    ear.now_ns = 20 * S
+    ear.collector.begin("world", "agent-1")
+    ear.now_ns = 23 * S
+    assert ear.collector.silent(4 * S) == everyone - {"world", "agent-1"}
 
 
 def test_what_genuine_actors_say_passes_and_gives_the_result_of_the_run(ear: Ear, genuine: Outcome) -> None:

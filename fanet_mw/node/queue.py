@@ -39,7 +39,7 @@ class TxQueue:
         self._entries: list[tuple[int, int, Packet]] = []
         self._order = 0
         self._fresh_us = 0
-        """No packet in the queue was generated before this instant [us], so none expires by an earlier horizon."""
+        """No packet in the queue expires by an earlier horizon (`_fresh_until_us`)."""
 
     def __len__(self) -> int:
         return len(self._entries)
@@ -56,7 +56,7 @@ class TxQueue:
         self._order += 1
         if rank is None:
             rank = packet.header.priority
-        fresh_us = packet.header.origin_us - self._sooner_us.get(rank, 0)
+        fresh_us = self._fresh_until_us(packet)
         if not self._entries or fresh_us < self._fresh_us:
             self._fresh_us = fresh_us
         insort(self._entries, (rank, self._order, packet))
@@ -118,12 +118,15 @@ class TxQueue:
         stale: list[tuple[int, int, Packet]] = []
         kept: list[tuple[int, int, Packet]] = []
         for entry in self._entries:
-            late_us = before_us + self._sooner_us.get(entry[0], 0)
-            (stale if entry[2].header.origin_us < late_us else kept).append(entry)
+            (stale if self._fresh_until_us(entry[2]) < before_us else kept).append(entry)
         self._entries = kept
-        self._fresh_us = min((p.header.origin_us - self._sooner_us.get(rank, 0) for rank, _, p in kept), default=0)
+        self._fresh_us = min((self._fresh_until_us(packet) for _, _, packet in kept), default=0)
         for _, _, packet in stale:
             self._drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+
+    def _fresh_until_us(self, packet: Packet) -> int:
+        """The horizon [swarm us] by which a packet expires: its birth, less by how much its class lives shorter."""
+        return packet.header.origin_us - self._sooner_us.get(packet.header.priority, 0)
 
     def drain(self) -> list[Packet]:
         """Remove all packets, the most urgent first."""

@@ -56,8 +56,8 @@ _NODE: Final = pa.uint16()
 
 
 def _packets(outcome: Outcome, _: Path | None) -> Iterator[Row]:
+    sizes = {(one.node, one.seq): one.payload_bytes for one in records_of(outcome.records, Generated)}
     for app, packets in packets_of(outcome).items():
-        sizes = {(one.node, one.seq): one.payload_bytes for one in records_of(outcome.records, Generated)}
         for (origin, seq), sent in packets.sent.items():
             yield (
                 sent.born_ns / S, origin, seq, app, sizes[origin, seq], sent.targets,

@@ -26,7 +26,6 @@ MOST_RUNS: Final = 100_000
 """A file with more runs than this is taken for a mistake."""
 NO_CASE: Final = "-"
 """The name of the case of a sweep that has none."""
-_Tree = Mapping[str, Any]
 
 
 def flattened(tree: object) -> object:

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from fanet_mw.errors import DropReason
@@ -35,6 +35,7 @@ def packet(number: int, born_us: int, priority: int) -> Packet:
     return Packet(header, header.encode())
 
 
+@example([("push", 70, 1, 3), ("expire", 60)])  # a warning for which there is only bulk's room
 @given(st.lists(PUSHES | EXPIRIES | st.just(("pop",)), max_size=30))
 def test_a_queue_holds_what_a_sorted_list_would(steps: list[tuple[object, ...]]) -> None:
     dropped: list[tuple[DropReason, Packet]] = []
@@ -55,7 +56,7 @@ def test_a_queue_holds_what_a_sorted_list_would(steps: list[tuple[object, ...]])
                 queue.push(one, rank=place if rank is not None else None, now_ns=0)
                 assert dropped == expected
             case ("expire", int(before_us)):
-                stale = [e for e in model if e[2].header.origin_us < before_us + SOONER_US.get(e[0], 0)]
+                stale = [e for e in model if e[2].header.origin_us < before_us + SOONER_US.get(e[2].header.priority, 0)]
                 model = [e for e in model if e not in stale]
                 queue.expire(now_ns=S + before_us * US)
                 assert dropped == [(DropReason.EXPIRED, e[2]) for e in stale]

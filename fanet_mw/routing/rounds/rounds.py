@@ -143,8 +143,6 @@ class RoundFlooding(RoutingProtocol):
         """The neighbors, the state of the topology, and the part in slots, by which it was found."""
         self._gone = 0
         """The neighbors that have left, though they were heard lately."""
-        self._clock_hellos: set[int] = set()
-        """The requests of hellos of which the clock wants to know when they ended."""
         self._held: dict[int, None] = {}
         """Packets of which a neighbor should be told that this node holds them, by key."""
         self._told_ns = OrderedDict[int, int]()
@@ -474,7 +472,6 @@ class RoundFlooding(RoutingProtocol):
             self._seek_slot(max(due_ns, soonest_ns), now_ns)
 
     def on_status(self, status: TxStatus, *, now_ns: int) -> None:
-        self._clock_hellos.discard(status.seq)
         attempt = self._one_way.failed(status)
         if attempt is None:
             return
@@ -536,9 +533,7 @@ class RoundFlooding(RoutingProtocol):
                 self._turn_asked = True
             return -1
         self._turn_ns = max(self._turn_ns, self._timing.turn_start_ns(self._port.node, from_ns=turn_ns + 1))
-        request = self._port.transmit(packet.frame, BROADCAST, turn_ns, wants_status=True)
-        self._clock_hellos.add(request)
-        return request
+        return self._port.transmit(packet.frame, BROADCAST, turn_ns, wants_status=True)
 
     def on_hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         src = reception.src

@@ -20,6 +20,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Delivered
 from fanet_mw.units import MS, NodeId, S, seconds_to_ns
+from sim.records.record_kinds import records_of
 from sim.results.result import Result
 from sim.run.arguments import OfUser, by_node, scenario_of
 from sim.run.virtual import Observed, StoppableUav
@@ -213,8 +214,7 @@ class VirtualSwarm:
     @property
     def deliveries(self) -> Sequence[Delivered]:
         """Packets that were delivered until now."""
-        records = () if self._time.observed is None else self._time.observed.records
-        return [record for record in records if type(record) is Delivered]
+        return [] if self._time.observed is None else [*records_of(self._time.observed.records, Delivered)]
 
     def result(self) -> Result:
         """End the run where it is, and what came of it; time does not pass any more."""

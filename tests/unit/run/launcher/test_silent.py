@@ -21,6 +21,8 @@ def test_a_process_that_hangs_is_named_once_and_one_that_has_ended_is_not() -> N
 
 def test_the_silence_of_a_process_that_is_started_again_counts_from_then_on() -> None:
     begun: list[str] = []
-    run = SimpleNamespace(processes=SimpleNamespace(restart=begun.append), _collector=SimpleNamespace(begin=begun.append))
+    run = SimpleNamespace(
+        processes=SimpleNamespace(restart=begun.append), _collector=SimpleNamespace(begin=begun.append)
+    )
     SwarmRun._start_again(cast("Any", run), "agent-3")
     assert begun == ["agent-3", "agent-3"]

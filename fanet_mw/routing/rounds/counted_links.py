@@ -2,6 +2,8 @@
 
 Two nodes that fly straight on lose each other when their distance exceeds the range (link expiration time; Su, Lee and
 Gerla, 2001). Those that hardly recede, whose position is not known, or that a UAV keeps in reach, are taken to stay.
+A UAV that lets go of another one for a moment mostly holds it again at once, and far nodes would learn of both for
+seconds: such a link counts until it would end sooner than that is noticed.
 """
 
 from collections.abc import Iterator, Mapping
@@ -17,20 +19,28 @@ _RECEDING_M_S: Final = 1.0
 """Speeds below this are errors of positioning."""
 _AGAIN: Final = 1.5
 """A link that was given up counts again when it will last so many times as long."""
+_LET_GO_NS: Final = 1 * S
+"""So long after a node has kept a neighbor in reach their link need not last as long as others."""
 
 
 class LastingLinks:
     """The links of one node that will last."""
 
-    def __init__(self, *, range_m: float, horizon_ns: int, reaches: Mapping[NodeId, float] = {}) -> None:
-        """`horizon_ns`: how long a link must last; `reaches`: factors of nodes with antennas of their own."""
+    def __init__(
+        self, *, range_m: float, horizon_ns: int, noticed_ns: int, reaches: Mapping[NodeId, float] = {}
+    ) -> None:
+        """`horizon_ns`: how long a link must last; `noticed_ns`: after which time its end is noticed; `reaches`:
+        factors of nodes with antennas of their own.
+        """
         self._range_m = range_m
         self._farther_m = {node: times * range_m for node, times in reaches.items()}
-        self._horizon_ns = horizon_ns
+        self._horizon_ns, self._noticed_ns = horizon_ns, noticed_ns
         self._motions: dict[NodeId, Motion] = {}
         self._given_up = 0
         self.held = 0
         """The neighbors that this node keeps in reach by how it flies."""
+        self._held_ns: dict[int, int] = {}
+        """When each neighbor was kept in reach last, by its bit."""
         self.gone = 0
         """The neighbors that were out of range when this was last asked, as they flew when they were last heard."""
 
@@ -47,9 +57,10 @@ class LastingLinks:
             if distance_m > range_m:
                 self.gone |= bit
             if self.held & bit:
+                self._held_ns[bit] = own.at_ns
                 continue
             drift = motion.velocity.minus(own.velocity)
-            if not self._lasts(here, drift, distance_m, range_m, again=bool(self._given_up & bit)):
+            if not self._lasts(here, drift, distance_m, range_m, for_ns=self._asked_ns(bit, own.at_ns)):
                 lasting &= ~bit
         self._given_up = near & ~lasting
         return lasting
@@ -61,10 +72,17 @@ class LastingLinks:
             if nodes & bit and own.at_ns - motion.at_ns <= self._horizon_ns:
                 yield bit, motion, self._farther_m.get(node, self._range_m)
 
-    def _lasts(self, here: Enu, drift: Enu, distance_m: float, range_m: float, *, again: bool) -> bool:
+    def _asked_ns(self, bit: int, now_ns: int) -> float:
+        """How long the link with a neighbor must last to count."""
+        if self._given_up & bit:
+            return _AGAIN * self._horizon_ns
+        held_ns = self._held_ns.get(bit)
+        return self._noticed_ns if held_ns is not None and now_ns - held_ns <= _LET_GO_NS else self._horizon_ns
+
+    def _lasts(self, here: Enu, drift: Enu, distance_m: float, range_m: float, *, for_ns: float) -> bool:
         receding_m_s = (here.east * drift.east + here.north * drift.north + here.up * drift.up) / max(distance_m, 1.0)
-        seconds = self._horizon_ns / S * (_AGAIN if again else 1.0)
-        return here.plus(drift, seconds).norm() <= range_m or (distance_m <= range_m and receding_m_s < _RECEDING_M_S)
+        stays = distance_m <= range_m and receding_m_s < _RECEDING_M_S
+        return stays or here.plus(drift, for_ns / S).norm() <= range_m
 
 
 class InStep:

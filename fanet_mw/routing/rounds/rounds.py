@@ -113,6 +113,7 @@ class RoundFlooding(RoutingProtocol):
             self._lasting = LastingLinks(
                 range_m=radio.range_m * scenario.reaches.get(port.node, 1.0),
                 horizon_ns=self._law.silent_ns + _LASTING_HOPS * self._law.hop_ns,
+                noticed_ns=self._law.silent_ns,
                 reaches=scenario.reaches,
             )
         self._spreading = Spreading(

@@ -24,13 +24,13 @@ OWN = Motion(Enu(0.0, 0.0, 50.0), Enu(10.0, 0.0, 0.0), 0)
     ],
 )
 def test_a_link_lasts_if_both_are_in_range_for_the_horizon(at_m: float, speed_m_s: float, lasts: bool) -> None:
-    links = LastingLinks(range_m=250.0, horizon_ns=6 * S)
+    links = LastingLinks(range_m=250.0, horizon_ns=6 * S, noticed_ns=2 * S)
     links.hear(OTHER, Motion(Enu(at_m, 0.0, 50.0), Enu(speed_m_s, 0.0, 0.0), 0))
     assert links.among(BIT | 1, OWN) == (BIT if lasts else 0) | 1
 
 
 def test_a_link_that_was_given_up_counts_again_only_with_a_margin() -> None:
-    links = LastingLinks(range_m=250.0, horizon_ns=6 * S)
+    links = LastingLinks(range_m=250.0, horizon_ns=6 * S, noticed_ns=2 * S)
     leaving = Motion(Enu(200.0, 0.0, 50.0), Enu(20.0, 0.0, 0.0), 0)
     links.hear(OTHER, leaving)
     assert not links.among(BIT, OWN)
@@ -41,16 +41,27 @@ def test_a_link_that_was_given_up_counts_again_only_with_a_margin() -> None:
 
 
 def test_a_link_lasts_however_fast_both_part_if_this_node_keeps_the_other_in_reach() -> None:
-    links = LastingLinks(range_m=250.0, horizon_ns=6 * S)
+    links = LastingLinks(range_m=250.0, horizon_ns=6 * S, noticed_ns=2 * S)
     links.hear(OTHER, Motion(Enu(200.0, 0.0, 50.0), Enu(20.0, 0.0, 0.0), 0))
     links.held = BIT
     assert links.among(BIT, OWN) == BIT
     links.held = 0
-    assert not links.among(BIT, OWN)
+    assert not links.among(BIT, OWN._replace(at_ns=2 * S))
+
+
+def test_who_was_kept_in_reach_until_just_now_counts_unless_it_is_gone_before_that_is_noticed() -> None:
+    for speed_m_s, later_ns, counts in ((30.0, S, True), (40.0, S, False), (30.0, S + 1, False)):
+        links = LastingLinks(range_m=250.0, horizon_ns=6 * S, noticed_ns=2 * S)
+        links.hear(OTHER, Motion(Enu(200.0, 0.0, 50.0), Enu(speed_m_s, 0.0, 0.0), 0))
+        links.held = BIT
+        assert links.among(BIT, OWN) == BIT
+        links.held = 0
+        links.hear(OTHER, Motion(Enu(200.0, 0.0, 50.0), Enu(speed_m_s, 0.0, 0.0), later_ns))
+        assert links.among(BIT, OWN._replace(at_ns=later_ns)) == (BIT if counts else 0)
 
 
 def test_where_somebody_was_before_it_was_away_says_nothing_when_it_is_heard_again() -> None:
-    links = LastingLinks(range_m=250.0, horizon_ns=6 * S)
+    links = LastingLinks(range_m=250.0, horizon_ns=6 * S, noticed_ns=2 * S)
     links.hear(OTHER, Motion(Enu(0.0, 240.0, 50.0), Enu(0.0, -10.0, 0.0), 0))
     assert not links.among(BIT, OWN._replace(at_ns=5 * S, position=Enu(300.0, 0.0, 50.0)))
     assert links.among(BIT, OWN._replace(at_ns=60 * S)) == BIT, "it is heard, so it is somewhere near"
@@ -58,7 +69,7 @@ def test_where_somebody_was_before_it_was_away_says_nothing_when_it_is_heard_aga
 
 
 def test_links_with_a_post_that_has_an_antenna_of_its_own_reach_farther() -> None:
-    links = LastingLinks(range_m=250.0, horizon_ns=6 * S, reaches={OTHER: 5.6})
+    links = LastingLinks(range_m=250.0, horizon_ns=6 * S, noticed_ns=2 * S, reaches={OTHER: 5.6})
     for east_m, lasts in ((-1300.0, True), (-1350.0, False)):
         links.hear(OTHER, Motion(Enu(east_m, 0.0, 0.0), STILL, 0))
         assert links.among(BIT, OWN) == (BIT if lasts else 0)
@@ -66,7 +77,7 @@ def test_links_with_a_post_that_has_an_antenna_of_its_own_reach_farther() -> Non
 
 
 def test_who_should_be_out_of_range_by_now_is_gone() -> None:
-    links = LastingLinks(range_m=250.0, horizon_ns=6 * S)
+    links = LastingLinks(range_m=250.0, horizon_ns=6 * S, noticed_ns=2 * S)
     links.hear(OTHER, Motion(Enu(200.0, 0.0, 50.0), Enu(20.0, 0.0, 0.0), 0))
     still = OWN._replace(velocity=STILL)
     for near, seconds, gone in ((BIT, 2, 0), (BIT, 3, BIT), (1, 3, 0)):

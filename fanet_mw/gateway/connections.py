@@ -71,6 +71,7 @@ class Connection:
         self._peers: dict[object, Any] = {}
         """What takes bytes for each ground station, the one that spoke last at the end."""
         self._close: list[Callable[[], None]] = []
+        """Of what is open."""
 
     async def open(self) -> None:
         """Raises BusError."""
@@ -114,6 +115,9 @@ class Connection:
 
     def closes(self, close: Callable[[], None]) -> None:
         self._close.append(close)
+
+    def closed(self, close: Callable[[], None]) -> None:
+        self._close.remove(close)
 
     def said(self, peer: object, data: bytes) -> None:
         answer = self._on_bytes(peer, data)
@@ -238,4 +242,5 @@ class _Stream(asyncio.Protocol):
 
     def connection_lost(self, _error: Exception | None) -> None:
         self._connection.went(self)
+        self._connection.closed(self._transport.abort)
         self.ended.set()

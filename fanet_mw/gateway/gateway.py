@@ -134,6 +134,9 @@ class Gateway:
         self._heard: deque[tuple[str, bytes]] = deque()
         self._drain_asked = False
         self._counts: Counter[str] = Counter()
+        """What did not pass as far as it was told."""
+        self._own: Counter[str] = Counter()
+        """What did not even come to a link."""
         self._loop: asyncio.AbstractEventLoop | None = None
 
     async def serve(self, over: asyncio.Event) -> None:
@@ -192,10 +195,9 @@ class Gateway:
         }
 
     def _say_counts(self) -> None:
-        now: Counter[str] = Counter()
+        now = self._own.copy()
         for link, _ in self._doors:
             now.update(link.counts)
-        now["lost_here"] = self._counts["lost_here"]
         news = now - self._counts
         self._counts = now
         words = [*hostile(news)]
@@ -207,7 +209,7 @@ class Gateway:
     def _from_thread(self, topic: str, payload: bytes) -> None:
         """Called on Zenoh's thread."""
         if len(self._heard) >= _MOST_WAITING:
-            self._counts["lost_here"] += 1
+            self._own["lost_here"] += 1
             return
         self._heard.append((topic, payload))
         loop = self._loop
@@ -227,7 +229,7 @@ class Gateway:
                         if shown:
                             connection.send(shown)
             except (MalformedFrameError, ValueError):
-                self._counts["malformed_taps"] += 1
+                self._own["malformed_taps"] += 1
 
     def _by_node(self, node: int, data: bytes) -> Iterable[tuple[NodeId, bytes]]:
         """What each UAV has said, in what was tapped at a node: at the post, what it has heard from all."""

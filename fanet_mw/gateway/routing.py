@@ -138,8 +138,8 @@ class Link:
 
 
 HOSTILE: Final = (
-    "bad_crc", "bad_signature", "for_nobody_here", "in_the_name_of_a_uav", "incompatible", "malformed", "replayed",
-    "stray_bytes", "too_many", "too_many_senders", "unknown_message", "unsigned",
+    "bad_crc", "bad_signature", "for_nobody_here", "in_the_name_of_a_uav", "incompatible", "lost_here", "malformed",
+    "malformed_taps", "replayed", "stray_bytes", "too_many", "too_many_senders", "unknown_message", "unsigned",
 )  # fmt: skip
 
 

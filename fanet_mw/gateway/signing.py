@@ -1,6 +1,7 @@
 """MAVLink 2 signatures on the link to a ground station, by a key that both have (mavlink.io, Message Signing).
 
-A time stamp counts as heard only once its signature was found right, so that a forged frame locks nobody out.
+A time stamp counts as heard only once its signature was found right, so that a forged frame locks nobody out. What is
+sent is later than all that was heard: a ground station whose clock is ahead would take it for a replay.
 """
 
 import codecs
@@ -22,6 +23,8 @@ _EPOCH_UNIX_S: Final = 1_420_070_400
 _UNIT_NS: Final = 10_000
 _OLDEST: Final = 60 * 100_000
 """A first frame may be this much older than this gateway's clock, one minute, as MAVLink has it."""
+_LATEST: Final = 1 << 47
+"""No clock leads to stamps later than this, in the year 2059, so that they never run out."""
 _MOST_STREAMS: Final = 1024
 _LINK: Final = 0
 
@@ -87,6 +90,7 @@ class Signing:
             counts["too_many_senders"] += 1
             return False
         self._heard[stream] = stamp
+        self._sent = max(self._sent, min(stamp, _LATEST))
         return True
 
     def _hash(self, covered: bytes) -> bytes:

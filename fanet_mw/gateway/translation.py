@@ -3,7 +3,7 @@
 HEARTBEAT            the autopilot and the number of the mode
 SET_MODE, DO_SET_MODE    the number of the mode
 NAV_TAKEOFF          its height counts from home, and not from the sea
-MISSION_*            item 0 is home: the gateway shows it, and the vehicle never has it
+MISSION_*            item 0 is home: the gateway shows it, and the vehicle never has it, so its numbers are one less
 """
 
 from collections.abc import Callable
@@ -50,16 +50,17 @@ class Ardupilot:
 
     def _one_more(self, message: Any, _system: int) -> None:  # noqa: ANN401
         if message.mission_type == common.MAV_MISSION_TYPE_MISSION and message.count:
-            message.count += 1
+            message.count = _one_later(message.count)
 
     def _later(self, message: Any, _system: int) -> None:  # noqa: ANN401
         if getattr(message, "mission_type", 0) == common.MAV_MISSION_TYPE_MISSION:
-            message.seq += 1
+            message.seq = _one_later(message.seq)
+            if getattr(message, "command", 0) == common.MAV_CMD_DO_JUMP:
+                message.param1 += 1
 
     def _current(self, message: Any, _system: int) -> None:  # noqa: ANN401
         if message.total not in (0, 0xFFFF):
-            message.seq += 1
-            message.total += 1
+            message.seq, message.total = _one_later(message.seq), _one_later(message.total)
 
     _OUT: Final[dict[int, Callable[["Ardupilot", Any, int], None]]] = {
         common.MAVLINK_MSG_ID_HEARTBEAT: _heartbeat,
@@ -109,6 +110,8 @@ class Ardupilot:
             return None, b""  # the vehicle asks for its own item 0, which is 1 there
         elif hasattr(message, "seq"):
             message.seq = max(0, message.seq - 1)
+            if getattr(message, "command", 0) == common.MAV_CMD_DO_JUMP and message.param1 > 0:
+                message.param1 -= 1
         return _framed(_again(message, like=frame.data)), b""
 
     _IN: Final = frozenset({
@@ -117,6 +120,10 @@ class Ardupilot:
         common.MAVLINK_MSG_ID_MISSION_REQUEST, common.MAVLINK_MSG_ID_MISSION_ITEM_INT,
         common.MAVLINK_MSG_ID_MISSION_ITEM, common.MAVLINK_MSG_ID_MISSION_SET_CURRENT,
     })  # fmt: skip
+
+
+def _one_later(number: int) -> int:
+    return min(number + 1, 0xFFFF)
 
 
 def _px4(number: int) -> int:
@@ -137,7 +144,8 @@ def _command(message: Any) -> Any:  # noqa: ANN401
             0, message.param1, message.param2, message.param3, message.param4, 0x7FFF_FFFF, 0x7FFF_FFFF, message.param7,
         )  # fmt: skip
     if message.command == common.MAV_CMD_DO_SET_MISSION_CURRENT:
-        message.param1 -= 1
+        if message.param1 > 0:  # home leads to the first item, and less than 0 names none
+            message.param1 -= 1
         return message
     return None
 

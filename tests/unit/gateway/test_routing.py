@@ -1,5 +1,6 @@
 """What passes a gateway and what does not: whole, known, unforged frames for a UAV of the link."""
 
+import math
 import random
 from itertools import pairwise
 
@@ -15,6 +16,8 @@ from fanet_mw.units import Enu, NodeId
 
 NODES = (NodeId(1), NodeId(2), NodeId(3))
 UNIX_NS = 1_800_000_000 * 10**9
+AHEAD = 300 * 100_000
+"""Five minutes in the units of a signature."""
 
 
 def link(*, flavor: Flavor = Flavor.PX4, signing: Signing | None = None) -> Link:
@@ -144,6 +147,25 @@ def test_pymavlink_believes_our_signatures() -> None:
         assert all(message.get_signed() for message in messages)
 
 
+def test_a_ground_station_whose_clock_is_ahead_believes_us_once_it_was_heard() -> None:
+    key = bytes(range(32))
+    door = link(signing=Signing(key, unix_ns=UNIX_NS))
+    reader = common.MAVLink(None, srcSystem=255)
+    reader.signing.secret_key = key
+    reader.signing.timestamp = (UNIX_NS // 10**9 - 1_420_070_400) * 100_000 + AHEAD
+    encoder = Encoder(NodeId(1), component=1)
+
+    def believed() -> int:
+        reader.robust_parsing = True
+        return sum(m.get_type() != "BAD_DATA" for m in reader.parse_buffer(door.out(NodeId(1), telemetry(encoder))))
+
+    assert not believed()
+    assert into(door, signed(arm(1), key, AHEAD)) == {1: ["COMMAND_LONG"]}
+    assert believed() == 2
+    assert into(door, signed(arm(1), b"x" * 32, 9 * AHEAD)) == {}
+    assert believed() == 2, "a forged stamp leads nobody"
+
+
 # --- flavors ------------------------------------------------------------------------------------------------------
 
 
@@ -196,6 +218,39 @@ def test_ardupilots_missions_begin_with_home_which_the_vehicle_never_has() -> No
     numbers.append(home.get_seq())
     out(encoder.vehicle_heartbeat(Mode.HOLD, armed=True))
     assert {(later - number) % 256 for number, later in pairwise(numbers)} == {1}
+
+
+def test_a_jump_of_ardupilots_mission_leads_to_the_same_item_on_both_sides_of_the_gateway() -> None:
+    door, encoder = link(flavor=Flavor.ARDUPILOT), Encoder(NodeId(1), component=1)
+    for makes in (common.MAVLink_mission_item_int_message, common.MAVLink_mission_item_message):
+        for target, on_the_vehicle in ((2.0, 1.0), (1.0, 0.0), (0.0, 0.0), (math.nan, math.nan)):
+            jump = makes(1, 1, 3, 2, common.MAV_CMD_DO_JUMP, 0, 1, target, 5, 0, 0, 0, 0, 0)
+            (to,), _ = door.into("peer", said(jump), 1.0, whole=True)
+            (item,) = decode(to.data)
+            assert (item.seq, item.param1) == (2, pytest.approx(on_the_vehicle, nan_ok=True))
+            (shown,) = decode(door.out(NodeId(1), encoder.pack(item)))
+            assert (shown.seq, shown.param1) == (3, pytest.approx(max(target, 1.0), nan_ok=True))
+        waypoint = makes(1, 1, 3, 6, common.MAV_CMD_NAV_WAYPOINT, 0, 1, 2.0, 0, 0, 0, 5, 6, 7)
+        (to,), _ = door.into("peer", said(waypoint), 1.0, whole=True)
+        assert decode(to.data)[0].param1 == 2.0, "the time that it waits"
+
+
+def test_ardupilots_mission_begins_anew_at_home_as_at_its_first_item() -> None:
+    door = link(flavor=Flavor.ARDUPILOT)
+    for asked, on_the_vehicle in ((0, 0), (1, 0), (3, 2), (-1, -1)):  # -1: no item, only a reset
+        command = common.MAVLink_command_long_message(1, 1, 224, 0, asked, 0, 0, 0, 0, 0, 0)
+        (to,), _ = door.into("peer", said(command), 1.0, whole=True)
+        assert decode(to.data)[0].param1 == on_the_vehicle
+
+
+def test_a_number_that_has_no_successor_stays_what_it_is() -> None:
+    door, encoder = link(flavor=Flavor.ARDUPILOT), Encoder(NodeId(1), component=1)
+    for message in (
+        common.MAVLink_mission_item_reached_message(0xFFFF), common.MAVLink_mission_count_message(255, 190, 0xFFFF),
+        common.MAVLink_mission_current_message(0xFFFF, 3), common.MAVLink_mission_request_int_message(255, 190, 0xFFFF),
+    ):  # fmt: skip
+        (shown,) = decode(door.out(NodeId(1), encoder.pack(message)))
+        assert 0xFFFF in (getattr(shown, "seq", 0), getattr(shown, "count", 0))
 
 
 # --- fuzz ---------------------------------------------------------------------------------------------------------

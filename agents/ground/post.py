@@ -31,7 +31,13 @@ _AGAIN_NS: Final = 5 * S
 """The time between two of these floods."""
 _IN_HELLO: Final = 2
 _MOST_ORDERS: Final = 1000
-
+_NUMBER_NS: Final = 10 * S
+"""Numbers of orders count up at least as fast as this time passes, so that a post that was started again begins above
+its earlier ones.
+"""
+_NUMBERS: Final = 1 << 16
+_SILENT_NS: Final = 70 * S
+"""After this time without a status a UAV is chosen only if all others are as silent."""
 
 _REVISION_BITS = 16
 
@@ -53,18 +59,23 @@ class KnownUavs:
         if self._plan is None or newer(plan.revision, self._plan.revision, bits=_REVISION_BITS):
             self._plan = plan
 
-    def nearest(self, east_m: float, north_m: float) -> int | None:
+    def nearest(self, east_m: float, north_m: float, *, now_ns: int) -> int | None:
         """The nearest follower that takes part in the search, otherwise the nearest UAV that does; None without any."""
         followers: set[int] = set()
         if self._plan is not None:
             places = pattern_of(self._plan, reach_m=self._reach_m).followers
             followers = {self._plan.nodes[place] for place in places if place < len(self._plan.nodes)}
         found = [
-            (node not in followers, math.hypot(at.position.east - east_m, at.position.north - north_m), node)
+            (
+                now_ns - at.t_us * US > _SILENT_NS,
+                node not in followers,
+                math.hypot(at.position.east - east_m, at.position.north - north_m),
+                node,
+            )
             for node, at in self._statuses.items()
             if at.charge > 0
         ]
-        return min(found)[2] if found else None
+        return min(found)[-1] if found else None
 
 
 class Post(Application):
@@ -86,6 +97,7 @@ class Post(Application):
         """The orders of operators that are given at the next wake-up."""
         self._refused = 0
         self._given: list[ToldOrder] = []
+        self._number = 0
         self._tellings: list[tuple[int, int, ToldOrder]] = []
         """When an order is flooded next, and how often it still is."""
         self._in_hellos = 0
@@ -115,17 +127,22 @@ class Post(Application):
 
     # --- what it orders -------------------------------------------------------------------------------------------
 
-    def give(self, order: Order, now_ns: int) -> str | None:
-        """Give an order; returns why that is not possible, or None."""
+    def give(self, order: Order, now_ns: int, *, planned_ns: int | None = None) -> str | None:
+        """Give an order; returns why that is not possible, or None.
+
+        A planned one has the time and the number of its plan: it is the same order if the post is started again.
+        """
         why = wrong(order, uavs=self.port.scenario.nodes.count)
         if why is not None or len(self._given) >= _MOST_ORDERS:
             return why or f"{_MOST_ORDERS} orders were given already"
         if not is_told(order):
-            chosen = self._uavs.nearest(order.east_m, order.north_m)
+            chosen = self._uavs.nearest(order.east_m, order.north_m, now_ns=now_ns)
             if chosen is None:
                 return "no UAV that takes part has been heard"
             order = order._replace(node=chosen)
-        told = ToldOrder(now_ns // US, self.port.node, len(self._given) + 1, order)
+        given_ns = now_ns if planned_ns is None else planned_ns
+        self._number = max(self._number + 1, given_ns // _NUMBER_NS)
+        told = ToldOrder(given_ns // US, self.port.node, self._number % _NUMBERS or _NUMBERS - 1, order)
         self._given.append(told)
         self._tellings.append((now_ns, _TELLINGS, told))
         self.port.record(record_of(told, self.port.node, now_ns))
@@ -134,7 +151,8 @@ class Post(Application):
 
     def wake(self, now_ns: int) -> None:
         while self._planned and self._planned[0][0] <= now_ns:
-            self.asked.append(self._orders[self._planned.pop(0)[1]])
+            planned_ns, index = self._planned.pop(0)
+            self._refused += self.give(self._orders[index], now_ns, planned_ns=planned_ns) is not None
         asked, self.asked = self.asked, []
         self._refused += sum(self.give(order, now_ns) is not None for order in asked)
         self._tell(now_ns)

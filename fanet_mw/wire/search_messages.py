@@ -38,7 +38,7 @@ class ToldOrder(NamedTuple):
     post: int
     """The node that gave it."""
     serial: int
-    """The number of the order; each of a post has the next one."""
+    """The number of the order; each of a post has a greater one."""
     order: Order
 
     def encode_frame(self, node: int) -> bytes:

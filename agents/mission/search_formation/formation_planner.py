@@ -118,20 +118,20 @@ class FormationPlanner:
 
     def status(self, status: SearchStatus, *, now_ns: int) -> None:
         before = self._members.get(status.node)
-        if before is None or status.t_us * US >= before.heard_ns - S:
-            stated_ns = min(now_ns, status.t_us * US)
-            if status.charge == 0:
-                self._left_ns.setdefault(status.node, now_ns)
-            else:
-                self._left_ns.pop(status.node, None)
-            self._members[status.node] = _HeardUav(
-                status.position,
-                stated_ns,
-                status.revision,
-                leaves=status.charge == 0,
-                absent=status.absent,
-                stated_ns=stated_ns,
-            )
+        stated_ns = min(now_ns, status.t_us * US)
+        if before is not None and before.stated_ns is not None and stated_ns < before.stated_ns:
+            return
+        position, heard_ns = status.position, stated_ns
+        if before is not None and before.heard_ns > stated_ns:  # a flood takes longer than a hello
+            position, heard_ns = before.position, before.heard_ns
+        leaves = status.charge == 0
+        if leaves:
+            self._left_ns.setdefault(status.node, now_ns)
+        else:
+            self._left_ns.pop(status.node, None)
+        self._members[status.node] = _HeardUav(
+            position, heard_ns, status.revision, leaves=leaves, absent=status.absent, stated_ns=stated_ns
+        )
 
     def on_neighbor(self, node: int, position: Enu, *, now_ns: int) -> None:
         before = self._members.get(node)

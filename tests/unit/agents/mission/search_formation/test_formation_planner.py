@@ -288,6 +288,17 @@ def test_nobody_begins_anew_when_the_search_is_over() -> None:
         assert planner.plan.start_us == before.start_us
 
 
+def test_what_a_slow_flood_says_counts_although_hellos_of_that_uav_came_before_it() -> None:
+    planner, _, _ = planned(0)
+    leaver, there = 7, Enu(30.0, 0.0, 50.0)
+    planner.on_neighbor(leaver, there, now_ns=10 * S)
+    planner.status(SearchStatus(5_000_000, Enu(0, 0, 50), leaver, 1, 0, absent=True), now_ns=10 * S)
+    assert (planner.leavers, planner.absent) == ({leaver}, {leaver})
+    assert planner._members[leaver].position == there
+    planner.status(SearchStatus(4_000_000, Enu(0, 0, 50), leaver, 1, 100), now_ns=11 * S)
+    assert planner.leavers == {leaver}, "an older status that comes later changes nothing"
+
+
 def test_a_planner_that_flies_home_leaves_planning_to_the_next() -> None:
     first, second = planner_with(45, node=1), planner_with(45, node=2)
     gone = SearchStatus(S // US, Enu(0, 0, 50), 1, 0, 0)

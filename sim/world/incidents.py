@@ -88,11 +88,14 @@ class Incidents:
 
 
 class Mishaps:
-    """The mishaps of one swarm: those to come, and the receivers that are wrong or silent now."""
+    """The mishaps of one swarm: those to come, and the receivers that are wrong or silent now.
+
+    Any fault ends one with its label, as on the air.
+    """
 
     def __init__(self, scenario: Scenario) -> None:
         """A world that continues an earlier one brings about again what that one did, which changes nothing."""
-        self._count = scenario.nodes.count
+        self._count, self._nodes = scenario.nodes.count, scenario.node_count
         self._order = 0
         self._agenda: list[tuple[int, int, Control]] = []
         self._standing: dict[str, tuple[Mishap, int]] = {}
@@ -105,29 +108,32 @@ class Mishaps:
             self.add(control, at_ns)
 
     def add(self, control: Control, at_ns: int) -> None:
-        """Something happens at this instant; what is no mishap, or impossible, is passed over."""
-        if isinstance(control, Restore) or (isinstance(control, Mishap) and wrong(control, count=self._count) is None):
+        """Something happens at this instant; what is impossible is passed over."""
+        count = self._count if isinstance(control, Mishap) else self._nodes
+        if isinstance(control, Restore) or wrong(control, count=count) is None:
             heapq.heappush(self._agenda, (at_ns, self._order, control))
             self._order += 1
 
     def due(self, now_ns: int) -> Iterable[Mishap]:
         """The mishaps that have happened since the last call; receivers become wrong or silent, or right again."""
-        ended = [label for label, (_, until_ns) in self._standing.items() if until_ns and until_ns <= now_ns]
-        begun = []
+        before, begun = [*self._standing.values()], []
         while self._agenda and self._agenda[0][0] <= now_ns:
             at_ns, _, control = heapq.heappop(self._agenda)
-            if isinstance(control, Restore):
-                ended += [control.label] if control.label else list(self._standing)
-            elif isinstance(control, Mishap):
+            self._end_by(at_ns)
+            for label in [control.label] if control.label else [*self._standing]:
+                self._standing.pop(label, None)
+            if isinstance(control, Mishap):
                 if control.what in (MishapKind.GPS, MishapKind.GPS_OFF):
                     self._standing[control.label] = control, at_ns + control.for_ns if control.for_ns else 0
-                    self._tell()
                 begun.append(control)
-        if ended:
-            for label in ended:
-                self._standing.pop(label, None)
+        self._end_by(now_ns)
+        if before != [*self._standing.values()]:
             self._tell()
         return begun
+
+    def _end_by(self, now_ns: int) -> None:
+        for label in [label for label, (_, until_ns) in self._standing.items() if until_ns and until_ns <= now_ns]:
+            del self._standing[label]
 
     def _tell(self) -> None:
         self.offset_m[:], self.silent[:] = 0.0, False

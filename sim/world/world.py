@@ -12,7 +12,7 @@ import numpy as np
 
 from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import Message, Poses, Setpoint
-from fanet_mw.bus.radio_control import Cut, Mishap, MishapKind, Restore
+from fanet_mw.bus.radio_control import Control, Cut, MishapKind
 from fanet_mw.bus.topics import Topics, node_of
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Scenario
@@ -166,7 +166,7 @@ class WorldActor(Actor):
 
     def receive(self, topic: str, message: Message, now_ns: int) -> None:
         if topic == self._topics.radio_control:
-            if isinstance(message, Mishap | Restore):
+            if isinstance(message, Control):
                 self._mishaps.add(message, now_ns)
             return
         node = node_of(topic)

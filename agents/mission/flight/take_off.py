@@ -68,7 +68,8 @@ class TakeOff:
 
     @property
     def stands(self) -> bool:
-        return self._told_ns is None
+        """True until it is sent up; False for a UAV that is up already when its program begins, as after a restart."""
+        return self._told_ns is None and self._climbed < _UP
 
     @property
     def left_s(self) -> float:
@@ -82,6 +83,9 @@ class TakeOff:
             self._began_ns = now_ns
         climb_m_s = self._own_motion.velocity.up
         if self._told_ns is None:
+            if not self.stands:
+                self.lasts = False
+                return
             if not self._is_clear(now_ns - self._began_ns, now_ns):
                 return
         elif self._is_up(climb_m_s):
@@ -106,5 +110,9 @@ class TakeOff:
 
     def _is_up(self, climb_m_s: float) -> bool:
         """True once the UAV has climbed far enough, or no farther than its altitude is measured wrongly."""
-        climbed = (self._own_motion.position.up - self._pad.up) / self._height_m
-        return climbed >= _UP or (climbed >= 0.5 * _UP and climb_m_s < _STOPPED_M_S)
+        return self._climbed >= _UP or (self._climbed >= 0.5 * _UP and climb_m_s < _STOPPED_M_S)
+
+    @property
+    def _climbed(self) -> float:
+        """The share of the height."""
+        return (self._own_motion.position.up - self._pad.up) / self._height_m

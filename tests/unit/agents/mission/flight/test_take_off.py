@@ -62,6 +62,13 @@ def test_it_listens_and_then_climbs_until_it_is_nearly_as_high_as_the_lanes() ->
     assert pad.now_ns == pytest.approx(take_off_ns(HEIGHT_M), abs=2 * S)
 
 
+def test_a_uav_that_is_up_when_its_program_begins_does_not_take_where_it_is_for_its_pad() -> None:
+    pad = Pad()
+    pad.up_m = PAD.up + 0.95 * HEIGHT_M
+    pad.wait(0.2)
+    assert (pad.take_off.stands, pad.take_off.lasts, pad.told_s) == (False, False, [])
+
+
 def test_a_lost_setpoint_is_sent_again() -> None:
     pad = Pad().wait(7.5)
     assert pad.told_s == [3.0, 5.0, 7.0]

@@ -74,14 +74,15 @@ class Line(NamedTuple):
         """The bound of the line's error at an instant, as the node states it to others."""
         far_ns = abs(local_ns - self.at_ns)
         drift_ns = min(oscillator.rate, _SIGMAS * self.rate_sd) * far_ns
-        drift_ns += min(oscillator.rate, self.stated_rate) * abs(local_ns - self.last_ns)
+        drift_ns += min(2 * oscillator.rate, self.stated_rate) * abs(local_ns - self.last_ns)
         # the rates of both clocks are random walks
         wander_ns = _SIGMAS * oscillator.wander * math.sqrt(2 / S) * math.pow(far_ns, 1.5)
         return math.ceil(self.stated_ns + _SIGMAS * self.offset_sd_ns + drift_ns + wander_ns)
 
     def rate_error(self, oscillator: Oscillator) -> float:
         """The bound of the rate's error (parts), as the node states it to others."""
-        return min(oscillator.rate, self.stated_rate + _SIGMAS * self.rate_sd)
+        most = oscillator.rate + abs(self.rate)  # the true rate may be the greatest one on the other side
+        return min(most, self.stated_rate + _SIGMAS * self.rate_sd)
 
 
 def alike(one: Pair, other: Pair, oscillator: Oscillator) -> bool:
@@ -120,6 +121,9 @@ def fitted(pairs: list[Pair], oscillator: Oscillator) -> Line:
     sigma_ns = max(floor_ns, math.sqrt(residual * free))
     slope_ns = max(sigma_ns, stated_ns / count**2)  # with few pairs, their stated errors may also cause a slope
     effective = whole * whole / math.fsum(w * w for w in weights)
+    rate_sd = slope_ns / math.sqrt(spread * effective) if spread > 0 else math.inf
+    if _SIGMAS * rate_sd >= oscillator.rate:
+        rate = 0.0  # it might be off by the greatest rate on the other side, and 0 is off by one at most
     middle_ns = at_ns + round(mean_x)
     return Line(
         at_ns=middle_ns,
@@ -127,7 +131,7 @@ def fitted(pairs: list[Pair], oscillator: Oscillator) -> Line:
         rate=rate,
         stated_ns=max(stated_ns, pairs[-1].error_ns),
         offset_sd_ns=sigma_ns / math.sqrt(effective),
-        rate_sd=slope_ns / math.sqrt(spread * effective) if spread > 0 else math.inf,
+        rate_sd=rate_sd,
         last_ns=at_ns,
         stated_rate=pairs[-1].rate,
     )

@@ -79,7 +79,7 @@ class ContendingRelaying:
             self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
             return ()
         if at_once:
-            return (self._relay(packet, _CONTROL_JITTER_NS, now_ns),)
+            return (self._relay(packet, _CONTROL_JITTER_NS, now_ns, membership=True),)
         if self._rule.relays_now(packet, now_ns=now_ns):
             return (self._relay(packet, self._jitter_ns, now_ns),)
         return ()
@@ -89,8 +89,9 @@ class ContendingRelaying:
         start_ns = self._contention.start_ns
         return [(packet, start_ns(due_ns=due_ns, now_ns=now_ns)) for due_ns, packet in decided] if decided else ()
 
-    def _relay(self, packet: Packet, jitter_ns: int, now_ns: int) -> Relay:
-        return packet, self._contention.start_ns(due_ns=now_ns, now_ns=now_ns, jitter_ns=jitter_ns)
+    def _relay(self, packet: Packet, jitter_ns: int, now_ns: int, *, membership: bool = False) -> Relay:
+        start_ns = self._contention.start_ns
+        return packet, start_ns(due_ns=now_ns, now_ns=now_ns, jitter_ns=jitter_ns, membership=membership)
 
     def waiting(self) -> int:
         return len(self._rule.open_until)

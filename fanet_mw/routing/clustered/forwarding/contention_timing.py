@@ -1,4 +1,8 @@
-"""When a frame that contends may start: after a random jitter; if turns are in force, only in a contention window."""
+"""When a frame that contends may start: after a random jitter; if turns are in force, only in a contention window.
+
+Floods of membership (joins, schedules) wait for windows only where bounds count on turns: when a leader is lost, all
+join anew within seconds, more than windows hold, and who is left out has no turns.
+"""
 
 from collections.abc import Callable
 from typing import Final
@@ -24,17 +28,20 @@ class ContentionTiming:
         """Gives the superframe in force at an instant, or None: frames start at any time. None without turns."""
         self.most_jitter_ns: int | None = None
         """The longest jitter in a window; None if there is no limit."""
+        self.membership_waits = True
+        """Whether floods of membership keep to windows, too."""
         self._used_ns: dict[int, int] = {}
         """The airtime of this node's data in windows, by the starts of their superframes."""
 
-    def start_ns(self, *, due_ns: int, now_ns: int, jitter_ns: int = 0) -> int:
+    def start_ns(self, *, due_ns: int, now_ns: int, jitter_ns: int = 0, membership: bool = False) -> int:
         """The earliest start of a frame that was to be announced at `due_ns`, with a jitter up to `jitter_ns`. A
         process woken late loses that much of the lead, so that instants drawn apart stay apart.
         """
-        if self.most_jitter_ns is not None and self._turns(due_ns + self._lead_ns) is not None:
+        waits = self.membership_waits or not membership
+        if waits and self.most_jitter_ns is not None and self._turns(due_ns + self._lead_ns) is not None:
             jitter_ns = min(jitter_ns, self.most_jitter_ns)
         start_ns = max(due_ns + self._lead_ns + int(self._jitter() * jitter_ns), now_ns)
-        return self.not_before(start_ns)
+        return self.not_before(start_ns) if waits else start_ns
 
     def not_before(self, start_ns: int) -> int:
         """The earliest start of a frame that is due: at once, or in a window if turns are in force."""

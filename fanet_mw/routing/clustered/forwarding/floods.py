@@ -43,7 +43,8 @@ class Floods:
     def contend_control(self, kind: Kind, inner: bytes, *, now_ns: int) -> Packet:
         """Make a control packet of this node, and transmit it in contention as soon as possible."""
         packet = self.control(kind, inner, now_ns=now_ns)
-        self._port.transmit(packet.frame, BROADCAST, start_ns=self._contention.start_ns(due_ns=now_ns, now_ns=now_ns))
+        start_ns = self._contention.start_ns(due_ns=now_ns, now_ns=now_ns, membership=True)
+        self._port.transmit(packet.frame, BROADCAST, start_ns=start_ns)
         return packet
 
     def contend_again(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:

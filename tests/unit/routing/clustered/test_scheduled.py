@@ -35,7 +35,7 @@ from fanet_mw.wire import (
 )
 from fanet_mw.wire.hello.digest import Digest, Holding
 from fanet_mw.wire.places import Places
-from fanet_mw.wire.schedule import Member, Schedule
+from fanet_mw.wire.schedule import Join, Member, Schedule
 
 US, ROOT, BEFORE, AFTER = NodeId(2), NodeId(3), NodeId(4), NodeId(5)
 TURNS = Turns(origin_ns=0, period_ns=100 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_superframe=29)
@@ -60,8 +60,12 @@ def planned(turns: tuple[Turn, ...], *, valid_ns: int = 0, unreached: tuple[Node
 
 @pytest.fixture
 def node(make_scenario: MakeScenario) -> Node:
+    return in_turns(make_scenario)
+
+
+def in_turns(make_scenario: MakeScenario, **more: object) -> Node:
     keys = {"nodes.count": 5, "clusters.relay": "scheduled", "clusters.flooding_period_s": 0.1, "radio.lead_ms": 2}
-    keys |= {"clusters.contention_ms": 40, "traffic.interval_s": 1}
+    keys |= {"clusters.contention_ms": 40, "traffic.interval_s": 1, **more}
     made = Node(US, make_scenario(**keys), make_protocol, position=Enu(0.0, 0.0, 50.0))
     made.start(0)
     access_of(made)._timetables.in_order = [planned(FLOODS)]
@@ -103,6 +107,31 @@ def test_a_flood_is_relayed_in_our_turn_of_it(node: Node) -> None:
 def test_a_flood_that_goes_on_in_the_next_superframe_is_relayed_there(node: Node) -> None:
     hear_in_turn(node, BEFORE, 28)
     assert relays(node) == [1100 + 40 + 2 * 2]
+
+
+@pytest.mark.parametrize(
+    ("more", "waits"),
+    [
+        ({}, True),
+        ({"mobility.model": "formation"}, True),
+        ({"mobility.model": "random_waypoint"}, False),
+        ({"mobility.model": "random_waypoint", "clusters.links": "measured"}, True),
+    ],
+)
+def test_joins_keep_out_of_turns_only_where_something_is_promised(
+    make_scenario: MakeScenario, more: dict[str, object], waits: bool
+) -> None:
+    """After the loss of a leader all join anew, and windows have no room for that."""
+    node = in_turns(make_scenario, **more)
+    for number in range(8):
+        header = Header(1_050_000, number, NodeId(5), BROADCAST, BEFORE, Kind.JOIN, 9, 1, 0, FLAG_FLOOD)
+        join = Join(5, Enu(0.0, 0.0, 50.0), Enu(0.0, 0.0, 0.0), 0).encode_frame(NodeId(5))
+        node.hear(Reception(header.encode() + join, BEFORE, 1051 * MS, -60.0), 1051 * MS)
+    access_of(node).flood_control(Kind.JOIN, filler(40), now_ns=1051 * MS)
+    starts = [request.start_ns % (100 * MS) for request in node.requests]
+    assert len(starts) == 9
+    assert (max(starts) < 40 * MS) == waits
+    assert (starts[-1] < 40 * MS) == waits, "our own"
 
 
 def test_a_flood_of_the_superframe_before_is_relayed_in_this_one(node: Node) -> None:

@@ -32,9 +32,17 @@ def test_who_is_seen_twice_from_two_places_is_reported_although_no_phone_fits() 
         uav = Uav()
         see(uav, Enu(3, 4, 0), second=0, north_m=0)
         see(uav, Enu(3, 4, 0), second=2, north_m=moved_m)
-        assert uav.identities.unreported(5 * S) == [], "a phone may still fit"
+        uav.hear(1, 1, Enu(0, 100, UP_M), -89.0)
+        assert uav.identities.unreported(5 * S) == [], "the phone may still fit"
         uav.identities.review(6 * S)
         assert len(uav.identities.unreported(6 * S)) == reported
+
+
+def test_who_is_seen_where_no_phone_is_heard_is_reported_at_once() -> None:
+    uav = Uav()
+    see(uav, Enu(3, 4, 0), second=0, north_m=0)
+    see(uav, Enu(3, 4, 0), second=2, north_m=12)
+    assert len(uav.identities.unreported(2 * S)) == 1
 
 
 @pytest.mark.parametrize(("apart_m", "sigma_m", "proven"), [(16.0, 4.8, False), (2.0, 1.0, True)])
